@@ -1,0 +1,108 @@
+//! One error type for the whole crate.
+//!
+//! Every error is one line that says what, where and what to do. The [`ErrorKind`] decides the exit code of the command
+//! and whether a retry can help.
+
+use std::fmt;
+
+/// What went wrong, as far as a program can act on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// A scene or builder value is unknown, impossible or inconsistent. Correct the named field; a retry does not help.
+    Scene,
+    /// The command line or an argument of a call is unusable. Correct the call; a retry does not help.
+    Usage,
+    /// A file could not be read or written. Check the path and its permissions; a retry may help.
+    Io,
+    /// A log is not an MCAP file or does not hold what was asked for. Name another file or topic.
+    Log,
+    /// The runtime refused a graph or could not start it. Change the rate groups.
+    Runtime,
+    /// A device refused a call or vanished. Reconnect it; a retry may help.
+    Device,
+    /// An actor failed while running (a panic, or numbers that are not finite). The run is over; the log up to then is good.
+    Fault,
+}
+
+impl ErrorKind {
+    /// True where the user's input is at fault: the command then exits with 2, otherwise with 1.
+    pub fn is_input(self) -> bool {
+        matches!(self, Self::Scene | Self::Usage | Self::Io | Self::Log)
+    }
+}
+
+/// The error of every fallible operation in palpate.
+#[derive(Debug)]
+pub struct Error {
+    kind: ErrorKind,
+    /// Where: a file and line, a field, a topic. Empty if the message says it all.
+    place: String,
+    message: String,
+    source: Option<Box<dyn std::error::Error + Send + Sync>>,
+}
+
+impl Error {
+    /// An error of `kind` with a one-line `message`.
+    pub fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
+        Self { kind, place: String::new(), message: one_line(&message.into()), source: None }
+    }
+
+    /// A scene error at `field` (dotted path, such as `body.material.stiffness_n_per_m`).
+    pub fn scene(field: &str, message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Scene, message).at(field)
+    }
+
+    /// An I/O error on `path`.
+    pub fn io(path: &std::path::Path, source: std::io::Error) -> Self {
+        let mut error = Self::new(ErrorKind::Io, source.to_string()).at(path.display().to_string());
+        error.source = Some(Box::new(source));
+        error
+    }
+
+    /// The same error with its place put in front: `place: earlier place: message`.
+    #[must_use]
+    pub fn at(mut self, place: impl AsRef<str>) -> Self {
+        let place = place.as_ref();
+        self.place = if self.place.is_empty() { place.to_owned() } else { format!("{place}: {}", self.place) };
+        self
+    }
+
+    /// The kind, for programs.
+    pub fn kind(&self) -> ErrorKind {
+        self.kind
+    }
+
+    /// Where it happened; may be empty.
+    pub fn place(&self) -> &str {
+        &self.place
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.place.is_empty() { f.write_str(&self.message) } else { write!(f, "{}: {}", self.place, self.message) }
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.source.as_deref().map(|source| source as _)
+    }
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_one_line_with_its_place_in_front() {
+        let error = Error::scene("body.block.nodes", "must be\n at least 2").at("scene.toml:4");
+        assert_eq!(error.to_string(), "scene.toml:4: body.block.nodes: must be at least 2");
+        assert!(error.kind().is_input());
+    }
+}

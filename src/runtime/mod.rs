@@ -1,0 +1,3 @@
+//! The runtime: threads, time, messages, records; no physics.
+
+pub mod record;

@@ -1,0 +1,213 @@
+//! The 64-byte records that leave real-time threads: no pointers, no strings, nothing to format.
+
+use crate::time::Nanos;
+
+/// What a [`Record`] is about. The runtime owns numbers below 16; programs number their own from 16.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Channel(pub u16);
+
+impl Channel {
+    /// One release of a rate group: see [`TickTiming`].
+    pub const TICK: Self = Self(0);
+    /// Something that happened once, `code` says what: see [`Event`].
+    pub const EVENT: Self = Self(1);
+    /// The first number that programs may use.
+    pub const FIRST_USER: Self = Self(16);
+}
+
+/// One record: a stamp, what it is about, and six words whose meaning the channel defines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C, align(64))]
+pub struct Record {
+    /// The scheduled time of the release that made it.
+    pub stamp: Nanos,
+    /// What the record is about.
+    pub channel: Channel,
+    /// A small number with a meaning of the channel's own (a mode, a cause, a group).
+    pub code: u16,
+    /// A larger number with a meaning of the channel's own (a node, a triangle, a version).
+    pub index: u32,
+    /// The payload: integers, or doubles by their bits ([`Record::with_floats`]).
+    pub words: [u64; 6],
+}
+
+const _: () = assert!(size_of::<Record>() == 64);
+
+impl Record {
+    /// A record whose payload is six doubles, kept bit for bit.
+    pub fn with_floats(stamp: Nanos, channel: Channel, code: u16, index: u32, floats: [f64; 6]) -> Self {
+        Self { stamp, channel, code, index, words: floats.map(f64::to_bits) }
+    }
+
+    /// The payload as doubles.
+    pub fn floats(&self) -> [f64; 6] {
+        self.words.map(f64::from_bits)
+    }
+}
+
+/// Why a period was skipped or a deadline missed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum SlipCause {
+    /// Nothing slipped.
+    #[default]
+    None = 0,
+    /// The thread was woken too late: the operating system or another thread had the core.
+    LateWake = 1,
+    /// The group's own work took longer than its period allows.
+    LongTick = 2,
+    /// The group waited for another group or for a device that did not deliver.
+    StalledPeer = 3,
+    /// The overrun policy gave the period up.
+    Policy = 4,
+}
+
+impl SlipCause {
+    /// The cause with this number; unknown numbers read as [`SlipCause::None`].
+    pub fn from_code(code: u8) -> Self {
+        match code {
+            1 => Self::LateWake,
+            2 => Self::LongTick,
+            3 => Self::StalledPeer,
+            4 => Self::Policy,
+            _ => Self::None,
+        }
+    }
+
+    /// A short name for tables and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::LateWake => "late wake",
+            Self::LongTick => "long tick",
+            Self::StalledPeer => "stalled peer",
+            Self::Policy => "policy",
+        }
+    }
+}
+
+/// The timing of one release. All times count from the start of the run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TickTiming {
+    /// The rate group, in the order the groups were added.
+    pub group: u16,
+    /// The number of the release, counting skipped ones: release n is due at n periods.
+    pub tick: u64,
+    /// When it was due.
+    pub scheduled: Nanos,
+    /// When the thread was running again after its wait.
+    pub woke: Nanos,
+    /// When the first actor's tick began.
+    pub start: Nanos,
+    /// When the last actor's work was done.
+    pub end: Nanos,
+    /// When it had to be done.
+    pub deadline: Nanos,
+    /// Periods skipped between the release before and this one.
+    pub slips: u32,
+    /// Why they were skipped or, without slips, why the deadline was missed.
+    pub cause: SlipCause,
+}
+
+impl TickTiming {
+    /// True when the work ended after the deadline.
+    pub fn missed(&self) -> bool {
+        self.end > self.deadline
+    }
+}
+
+impl From<TickTiming> for Record {
+    fn from(t: TickTiming) -> Self {
+        let slips = u64::from(t.slips) << 8 | t.cause as u64;
+        Self {
+            stamp: t.scheduled,
+            channel: Channel::TICK,
+            code: t.group,
+            index: 0,
+            words: [t.tick, t.woke.0, t.start.0, t.end.0, t.deadline.0, slips],
+        }
+    }
+}
+
+impl TickTiming {
+    /// Reads the timing back; `None` if the record is about something else.
+    pub fn from_record(record: &Record) -> Option<Self> {
+        if record.channel != Channel::TICK {
+            return None;
+        }
+        let [tick, woke, start, end, deadline, slips] = record.words;
+        Some(Self {
+            group: record.code,
+            tick,
+            scheduled: record.stamp,
+            woke: Nanos(woke),
+            start: Nanos(start),
+            end: Nanos(end),
+            deadline: Nanos(deadline),
+            slips: (slips >> 8) as u32,
+            cause: SlipCause::from_code(slips as u8),
+        })
+    }
+}
+
+/// Something that happened once and that a reader of the log wants to know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Event {
+    /// When.
+    pub stamp: Nanos,
+    /// The rate group it happened in.
+    pub group: u16,
+    /// What: a number below 256 is the runtime's ([`Event::PANIC`]), others are the program's.
+    pub code: u32,
+    /// A number that belongs to it.
+    pub detail: u64,
+}
+
+impl Event {
+    /// An actor panicked; `detail` is its place in the group.
+    pub const PANIC: u32 = 1;
+    /// An actor reported a fault; `detail` is the code that it gave.
+    pub const FAULT: u32 = 2;
+    /// The overrun policy stopped the group; `detail` is the number of periods missed.
+    pub const STOPPED: u32 = 3;
+}
+
+impl From<Event> for Record {
+    fn from(e: Event) -> Self {
+        Self { stamp: e.stamp, channel: Channel::EVENT, code: e.group, index: e.code, words: [e.detail, 0, 0, 0, 0, 0] }
+    }
+}
+
+impl Event {
+    /// Reads the event back; `None` if the record is about something else.
+    pub fn from_record(record: &Record) -> Option<Self> {
+        (record.channel == Channel::EVENT).then_some(Self {
+            stamp: record.stamp,
+            group: record.code,
+            code: record.index,
+            detail: record.words[0],
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn timing_survives_the_trip_through_a_record() {
+        let timing = TickTiming {
+            group: 3,
+            tick: u64::MAX,
+            scheduled: Nanos(1),
+            woke: Nanos(2),
+            start: Nanos(3),
+            end: Nanos(4),
+            deadline: Nanos(5),
+            slips: u32::MAX,
+            cause: SlipCause::Policy,
+        };
+        assert_eq!(TickTiming::from_record(&timing.into()), Some(timing));
+        assert_eq!(Event::from_record(&timing.into()), None);
+    }
+}
