@@ -1,0 +1,205 @@
+//! The block of point masses joined by springs to all 26 neighbours: the paper's body.
+
+use super::super::Vec3;
+use super::super::mesh::{Face, Lattice, Surface};
+use super::kernel::{self, Scratch};
+use super::lattice_springs::LatticeSprings;
+use super::{Body, State, TangentBlock};
+use crate::error::Error;
+
+/// A block of nodes and springs; made by [`Block::builder`].
+#[derive(Clone, Debug)]
+pub struct Block {
+    lattice: Lattice,
+    rest: Vec<Vec3>,
+    inverse_masses: Vec<f64>,
+    surface: Surface,
+    springs: LatticeSprings,
+    scratch: Scratch,
+}
+
+/// Collects what a [`Block`] is made of. Defaults: k 30 N/m, zeta 0.3, node mass 0.5 g, nothing held.
+#[derive(Clone, Debug)]
+pub struct BlockBuilder {
+    nodes: [usize; 3],
+    size: [f64; 3],
+    stiffness: f64,
+    damping_ratio: f64,
+    node_mass: f64,
+    fixed: Vec<Face>,
+}
+
+impl BlockBuilder {
+    /// Stiffness of every spring [N/m].
+    #[must_use]
+    pub fn stiffness(mut self, n_per_m: f64) -> Self {
+        self.stiffness = n_per_m;
+        self
+    }
+
+    /// zeta in b = zeta sqrt(2 m k), the paper's definition.
+    #[must_use]
+    pub fn damping_ratio(mut self, zeta: f64) -> Self {
+        self.damping_ratio = zeta;
+        self
+    }
+
+    /// Mass of every node [kg].
+    #[must_use]
+    pub fn node_mass(mut self, kg: f64) -> Self {
+        self.node_mass = kg;
+        self
+    }
+
+    /// Holds the nodes of `face` stationary.
+    #[must_use]
+    pub fn fix(mut self, face: Face) -> Self {
+        self.fixed.push(face);
+        self
+    }
+
+    /// Makes the block.
+    ///
+    /// # Errors
+    /// If a number is not finite, a mass, stiffness or size is not positive, or an axis has less than two nodes.
+    pub fn build(self) -> Result<Block, Error> {
+        let positive = |value: f64| value.is_finite() && value > 0.0;
+        if self.nodes.iter().any(|&n| n < 2) {
+            return Err(Error::scene("nodes", format!("{:?}: at least 2 per axis are needed", self.nodes)));
+        }
+        if !self.size.iter().all(|&length| positive(length)) {
+            return Err(Error::scene("size_m", format!("{:?}: three lengths above 0 are needed", self.size)));
+        }
+        for (field, value) in [("node_mass_kg", self.node_mass), ("stiffness_n_per_m", self.stiffness)] {
+            if !positive(value) {
+                return Err(Error::scene(field, format!("{value}: a finite value above 0 is needed")));
+            }
+        }
+        if !(self.damping_ratio.is_finite() && self.damping_ratio >= 0.0) {
+            return Err(Error::scene("damping_ratio", format!("{}: 0 or more is needed", self.damping_ratio)));
+        }
+        let lattice = Lattice { nodes: self.nodes };
+        let spacing: [f64; 3] = std::array::from_fn(|axis| self.size[axis] / (self.nodes[axis] - 1) as f64);
+        let at = |id: usize| lattice.coordinates(id as u32);
+        let held = |id: usize| self.fixed.iter().any(|&face| lattice.on_face(at(id), face));
+        let damping = self.damping_ratio * (2.0 * self.node_mass * self.stiffness).sqrt();
+        let springs = LatticeSprings::uniform(&lattice, spacing, self.stiffness, damping);
+        Ok(Block {
+            lattice,
+            rest: (0..lattice.len())
+                .map(|id| {
+                    let at = at(id);
+                    Vec3::from_fn(|axis, _| at[axis] as f64 * spacing[axis])
+                })
+                .collect(),
+            inverse_masses: (0..lattice.len()).map(|id| if held(id) { 0.0 } else { 1.0 / self.node_mass }).collect(),
+            surface: Surface::new(lattice.len(), lattice.surface_triangles())?,
+            scratch: Scratch::new(springs.padded()),
+            springs,
+        })
+    }
+}
+
+impl Block {
+    /// Starts a block of `nodes` per axis and `size` [m].
+    pub fn builder(nodes: [usize; 3], size: [f64; 3]) -> BlockBuilder {
+        BlockBuilder { nodes, size, stiffness: 30.0, damping_ratio: 0.3, node_mass: 0.5e-3, fixed: Vec::new() }
+    }
+
+    /// The lattice: numbering and neighbours.
+    pub fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    /// Number of springs.
+    pub fn spring_count(&self) -> usize {
+        self.springs.len()
+    }
+
+    /// The instruction set that its forces are computed with on this machine.
+    pub fn instruction_set() -> &'static str {
+        kernel::instruction_set()
+    }
+}
+
+impl Body for Block {
+    fn rest(&self) -> &[Vec3] {
+        &self.rest
+    }
+
+    fn inverse_masses(&self) -> &[f64] {
+        &self.inverse_masses
+    }
+
+    fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
+        kernel::forces(&self.springs, &mut self.scratch, &state.positions, &state.velocities, forces);
+    }
+
+    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
+        for (&node, force) in nodes.iter().zip(forces) {
+            let (x, v) = (state.positions[node as usize], state.velocities[node as usize]);
+            *force = self.springs.neighbours(&self.lattice, node).fold(Vec3::zeros(), |sum, (other, spring)| {
+                sum + spring.force(state.positions[other as usize] - x, state.velocities[other as usize] - v)
+            });
+        }
+    }
+
+    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
+        for &row in nodes {
+            let (x, v) = (state.positions[row as usize], state.velocities[row as usize]);
+            for (column, spring) in self.springs.neighbours(&self.lattice, row) {
+                let along = state.positions[column as usize] - x;
+                let closing = state.velocities[column as usize] - v;
+                let tangent = spring.tangent(along, closing, clamp);
+                emit(TangentBlock { row, column, position: tangent.position, velocity: tangent.velocity });
+                emit(TangentBlock { row, column: row, position: -tangent.position, velocity: -tangent.velocity });
+            }
+        }
+    }
+
+    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
+        self.lattice.window(self.surface.triangles[triangle as usize], size, nodes);
+        nodes.retain(|&node| self.inverse_masses[node as usize] > 0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_paper_block_has_18788_springs() {
+        let block = Block::builder([12; 3], [0.1; 3]).fix(Face::ZMin).build().unwrap();
+        assert_eq!(block.spring_count(), 18_788);
+        assert_eq!(block.inverse_masses().iter().filter(|&&w| w == 0.0).count(), 144);
+    }
+
+    #[test]
+    fn forces_vanish_at_rest() {
+        let mut block = Block::builder([4, 5, 6], [0.1, 0.07, 0.2]).build().unwrap();
+        let mut forces = vec![Vec3::x(); 120];
+        block.forces(&State::at_rest(&block.rest.clone()), &mut forces);
+        assert!(forces.iter().all(|force| force.norm() < 1e-14));
+    }
+
+    #[test]
+    fn forces_of_single_nodes_agree_with_the_kernel() {
+        let mut block = Block::builder([4, 5, 6], [0.1, 0.07, 0.2]).build().unwrap();
+        let mut state = State::at_rest(block.rest());
+        for (n, x) in state.positions.iter_mut().enumerate() {
+            *x += Vec3::new((n as f64).sin(), (2.0 * n as f64).cos(), (3.0 * n as f64).sin()) * 2e-3;
+        }
+        let mut all = vec![Vec3::zeros(); 120];
+        block.forces(&state, &mut all);
+        let nodes = [0, 17, 63, 119];
+        let mut some = [Vec3::zeros(); 4];
+        block.node_forces(&state, &nodes, &mut some);
+        for (&node, force) in nodes.iter().zip(&some) {
+            assert!((all[node as usize] - force).norm() < 1e-13);
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Deformable bodies: what a simulation needs to know of one, and the block of springs.
+
+mod block;
+mod kernel;
+mod lattice_springs;
+mod spring;
+
+pub use block::{Block, BlockBuilder};
+pub use spring::{Spring, SpringTangent};
+
+use super::mesh::Surface;
+use super::{Mat3, Vec3};
+
+/// Positions [m] and velocities [m/s] of all nodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// One position per node.
+    pub positions: Vec<Vec3>,
+    /// One velocity per node.
+    pub velocities: Vec<Vec3>,
+}
+
+impl State {
+    /// At rest at `positions`.
+    pub fn at_rest(positions: &[Vec3]) -> Self {
+        Self { positions: positions.to_vec(), velocities: vec![Vec3::zeros(); positions.len()] }
+    }
+
+    /// True if every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.positions.iter().chain(&self.velocities).all(|vector| vector.iter().all(|c| c.is_finite()))
+    }
+}
+
+/// One block of a tangent: how the force on node `row` answers to node `column`.
+#[derive(Clone, Copy, Debug)]
+pub struct TangentBlock {
+    /// The node that feels the force.
+    pub row: u32,
+    /// The node that moves.
+    pub column: u32,
+    /// df_row / dx_column [N/m].
+    pub position: Mat3,
+    /// df_row / dv_column [N s/m].
+    pub velocity: Mat3,
+}
+
+/// A deformable body: nodes, masses, internal forces, tangent and surface.
+///
+/// The block of springs is one implementation; a program brings its own by implementing this trait. Forces may be
+/// non-linear in the positions and must be linear in the velocities. Masses need not be equal.
+pub trait Body: Send + std::fmt::Debug {
+    /// Rest positions [m], one per node.
+    fn rest(&self) -> &[Vec3];
+
+    /// Inverse masses [1/kg], one per node; zero for a node that is held stationary.
+    fn inverse_masses(&self) -> &[f64];
+
+    /// The surface that tools touch.
+    fn surface(&self) -> &Surface;
+
+    /// Writes the internal force on every node [N] to `forces` (one per node).
+    ///
+    /// # Real-time
+    /// Called once per substep: bounded, must not allocate or block.
+    fn forces(&mut self, state: &State, forces: &mut [Vec3]);
+
+    /// Writes the internal force on each of `nodes` [N] to `forces` (one per entry of `nodes`).
+    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]);
+
+    /// Calls `emit` for every tangent block in the rows of `nodes`; blocks of the same place are added.
+    ///
+    /// With `clamp` the negative geometric stiffness of compressed springs is left out: an explicit linear model with
+    /// it diverges within one resync period.
+    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock));
+
+    /// Appends the nodes of a patch around surface triangle `triangle` to `nodes`, in increasing order and without
+    /// held ones; `size` = nodes along the surface, along it, into depth.
+    ///
+    /// The default grows rings of triangles along the surface until there are enough nodes; it has no depth.
+    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
+        let surface = self.surface();
+        let wanted = size[0] * size[1];
+        let first = nodes.len();
+        nodes.extend(surface.triangles[triangle as usize]);
+        let mut next = first;
+        while next < nodes.len() && nodes.len() - first < wanted {
+            for &t in surface.at_node(nodes[next]) {
+                for node in surface.triangles[t as usize] {
+                    if !nodes[first..].contains(&node) {
+                        nodes.push(node);
+                    }
+                }
+            }
+            next += 1;
+        }
+        let inverse_masses = self.inverse_masses();
+        nodes.retain(|&node| inverse_masses[node as usize] > 0.0);
+        nodes.sort_unstable();
+    }
+}

@@ -1,0 +1,117 @@
+//! Contact of a point tool with a deformable surface: detection, friction and tracking.
+//!
+//! [`step`] is one explicit step of any model, whole body or patch:
+//!
+//! ```text
+//! v* = v + d M^-1 f
+//! not in contact:  swept point against moving triangles, earliest hit; then the "already inside" search
+//! hit at share s:  x += s d v*;  d_c = (1 - s) d
+//! in contact:      impulse J so that the contact point follows the tool; release, slip or stick; v = v* - M^-1 G^T J
+//! x += d_c v;  slip or release: walk to the triangle under the tool
+//! force on the tool: J / d
+//! ```
+
+mod normal;
+mod paper;
+mod resolve;
+mod step;
+mod swept;
+mod triangle;
+mod walk;
+
+use super::Vec3;
+
+pub use step::{Deformable, step};
+
+/// The state of a contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// No force: not touching, or just released and still tracked.
+    #[default]
+    Free,
+    /// The contact point follows the tool.
+    Stick,
+    /// The tool slides over the surface.
+    Slip,
+    /// Every node of the triangle is held: no force can be computed.
+    Lost,
+}
+
+/// Which normal a contact uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Normals {
+    /// Unit vertex normals interpolated over the triangle: continuous along the surface.
+    #[default]
+    Interpolated,
+    /// The triangle's own, as printed in the paper; frictionless drags flip between facets and lose the contact.
+    Face,
+}
+
+/// Which equations resolve a contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Equations {
+    /// Velocity level, mass-weighted; the default.
+    #[default]
+    Corrected,
+    /// The paper's printed equations (10) to (31), to show the difference.
+    Paper,
+}
+
+/// How contacts are resolved.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Law {
+    /// Coulomb coefficient mu; infinite for a tool that sticks until pulled off.
+    pub friction: f64,
+    /// The normal used.
+    pub normals: Normals,
+    /// The equations used.
+    pub equations: Equations,
+}
+
+/// Where the tool touches: a surface triangle, barycentric weights and the mode.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contact {
+    /// Triangle id; `None` when nothing is tracked.
+    pub triangle: Option<u32>,
+    /// Weights of the triangle's three nodes; they sum to one.
+    pub weights: [f64; 3],
+    /// The mode.
+    pub mode: Mode,
+    /// Glued to its point: no cone test, no release.
+    pub glued: bool,
+    /// The normal that the last step used; zero before the first.
+    pub normal: Vec3,
+}
+
+impl Contact {
+    /// Glued to the surface at `weights` of `triangle`.
+    pub fn glued(triangle: u32, weights: [f64; 3]) -> Self {
+        Self { triangle: Some(triangle), weights, mode: Mode::Stick, glued: true, normal: Vec3::zeros() }
+    }
+
+    /// True if a force acts.
+    pub fn is_touching(&self) -> bool {
+        matches!(self.mode, Mode::Stick | Mode::Slip)
+    }
+}
+
+/// The tool's motion during one step: a straight line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolMotion {
+    /// Position at the start [m].
+    pub from: Vec3,
+    /// Position at the end [m].
+    pub to: Vec3,
+}
+
+impl ToolMotion {
+    /// The part from share `a` to share `b` of the motion.
+    pub fn part(&self, a: f64, b: f64) -> Self {
+        Self { from: self.at(a), to: self.at(b) }
+    }
+
+    /// The position at share `s`.
+    pub fn at(&self, s: f64) -> Vec3 {
+        self.from + (self.to - self.from) * s
+    }
+}

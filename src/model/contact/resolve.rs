@@ -1,0 +1,79 @@
+//! The corrected contact equations: velocity level, mass-weighted, with Coulomb friction.
+
+use super::super::Vec3;
+use super::normal::contact_normal;
+use super::step::Deformable;
+use super::triangle::interpolate;
+use super::{Law, Mode, ToolMotion};
+
+/// Penetration is recovered at this speed [m/s]; an open gap is closed in full.
+const RECOVERY: f64 = 0.1;
+/// Below this compliance S [1/kg] all nodes are held and no force can be computed.
+const IMMOVABLE: f64 = 1e-9;
+/// A remaining step shorter than this cannot carry an impulse [s].
+const NO_TIME: f64 = 1e-12;
+
+/// What a contact did in one step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Resolution {
+    /// The mode that resulted.
+    pub mode: Mode,
+    /// Impulse on the tool [N s].
+    pub impulse: Vec3,
+    /// The normal used.
+    pub normal: Vec3,
+}
+
+impl Resolution {
+    pub(super) fn without_force(mode: Mode, normal: Vec3) -> Self {
+        Self { mode, impulse: Vec3::zeros(), normal }
+    }
+}
+
+/// Solves the contact over the last `d_c` of a step of `d` [s] and changes the three nodes' velocities.
+///
+/// The contact point G x is to move with the tool: v_t = (q1 - q_start + r) / d_c, r the drift between the two. The
+/// impulse J = (G v* - v_t) / S with S = sum w_i^2 / m_i, and v_i = v*_i - (w_i / m_i) J. Source: physics of the
+/// paper's sections 4.2 to 4.4 in the mass-weighted form; J is the Lagrange multiplier for any masses.
+pub(super) fn resolve(
+    body: &mut Deformable<'_>,
+    law: &Law,
+    (triangle, weights, glued): (u32, &[f64; 3], bool),
+    tool: ToolMotion,
+    d_c: f64,
+    d: f64,
+) -> Resolution {
+    let nodes = body.surface.triangles[triangle as usize].map(|node| node as usize);
+    let compliance: f64 = nodes.iter().zip(weights).map(|(&node, w)| w * w * body.inverse_masses[node]).sum();
+    let normal = contact_normal(law.normals, body.surface, body.positions, triangle, weights);
+    if compliance < IMMOVABLE || d_c < NO_TIME {
+        return Resolution::without_force(Mode::Lost, normal);
+    }
+    let point = interpolate(weights, &nodes.map(|node| body.positions[node]));
+    let velocity = interpolate(weights, &nodes.map(|node| body.velocities[node]));
+    let mut drift = tool.from - point;
+    let (length, cap) = (drift.norm(), RECOVERY * d);
+    if length > cap && drift.dot(&normal) < 0.0 {
+        drift *= cap / length;
+    }
+    let target = (tool.to - tool.from + drift) / d_c;
+    let mut impulse = (velocity - target) / compliance;
+    let mut mode = Mode::Stick;
+    if !glued {
+        let along = impulse.dot(&normal);
+        // Written so that an impulse that is not a number releases.
+        if along.is_nan() || along <= 0.0 {
+            return Resolution::without_force(Mode::Free, normal);
+        }
+        let tangential = impulse - normal * along;
+        let limit = law.friction * along;
+        if tangential.norm() > limit {
+            mode = Mode::Slip;
+            impulse = normal * along + tangential * (limit / tangential.norm());
+        }
+    }
+    for (&node, w) in nodes.iter().zip(weights) {
+        body.velocities[node] -= impulse * (w * body.inverse_masses[node]);
+    }
+    Resolution { mode, impulse, normal }
+}

@@ -1,0 +1,115 @@
+//! Detection: a swept point against moving triangles, and a point that is already inside.
+
+use super::super::Vec3;
+use super::super::mesh::Surface;
+use super::ToolMotion;
+use super::triangle::Projection;
+
+/// A place on the surface where the tool comes in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Hit {
+    /// The triangle.
+    pub triangle: u32,
+    /// Barycentric weights.
+    pub weights: [f64; 3],
+    /// Share of the step after which it happens, in [0, 1].
+    pub share: f64,
+}
+
+/// Deepest penetration that the "already inside" search accepts [m].
+const MAX_DEPTH: f64 = 5e-3;
+/// A start this far below a triangle still counts as outside [m].
+const ON_SURFACE: f64 = 1e-9;
+/// Halvings of the step: resolves 1e-9 of it.
+const BISECTIONS: usize = 30;
+
+/// The earliest hit during one step: first the swept test, then the search for a tool that is inside at its end.
+///
+/// `candidates` are triangle indices; nodes move linearly from `x` to `x + d v`.
+pub(super) fn find(
+    surface: &Surface,
+    candidates: &[u32],
+    x: &[Vec3],
+    v: &[Vec3],
+    tool: ToolMotion,
+    d: f64,
+) -> Option<Hit> {
+    let mut best: Option<Hit> = None;
+    for &t in candidates {
+        if let Some(hit) = swept(surface, t, x, v, tool, d)
+            && best.is_none_or(|best| hit.share < best.share)
+        {
+            best = Some(hit);
+        }
+    }
+    best.or_else(|| inside(surface, candidates, x, &tool.to))
+}
+
+/// The tool against one moving triangle x(s) = x + s d v, s in [0, 1].
+fn swept(surface: &Surface, t: u32, x: &[Vec3], v: &[Vec3], tool: ToolMotion, d: f64) -> Option<Hit> {
+    let nodes = surface.triangles[t as usize].map(|node| node as usize);
+    let start = nodes.map(|node| x[node]);
+    let motion = nodes.map(|node| v[node] * d);
+    if !reaches(&start, &motion, tool) {
+        return None;
+    }
+    let seen_at = |share: f64| {
+        let corners: [Vec3; 3] = std::array::from_fn(|i| start[i] + motion[i] * share);
+        Projection::new(&corners, &tool.at(share))
+    };
+    // A sliver has no side; it counts as "outside" at both ends and is never hit.
+    if seen_at(0.0).is_some_and(|seen| seen.distance < -ON_SURFACE)
+        || !seen_at(1.0).is_some_and(|seen| seen.distance < 0.0)
+    {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if seen_at(middle).is_none_or(|seen| seen.distance >= 0.0) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let seen = seen_at(low)?;
+    seen.is_inside(1e-6).then_some(Hit { triangle: t, weights: seen.weights, share: low })
+}
+
+/// Cheap and safe rejection: the boxes around the moving triangle and the moving tool must touch.
+#[inline]
+fn reaches(start: &[Vec3; 3], motion: &[Vec3; 3], tool: ToolMotion) -> bool {
+    (0..3).all(|axis| {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (start, motion) in start.iter().zip(motion) {
+            low = low.min(start[axis]).min(start[axis] + motion[axis]);
+            high = high.max(start[axis]).max(start[axis] + motion[axis]);
+        }
+        // Weights a little outside are accepted, so the box grows by a little of its size.
+        let margin = 1e-5 * (high - low) + 2.0 * ON_SURFACE;
+        tool.from[axis].min(tool.to[axis]) <= high + margin && tool.from[axis].max(tool.to[axis]) >= low - margin
+    })
+}
+
+/// The shallowest triangle that `point` is behind, by face normals and less than 5 mm deep.
+fn inside(surface: &Surface, candidates: &[u32], x: &[Vec3], point: &Vec3) -> Option<Hit> {
+    let mut best: Option<(f64, Hit)> = None;
+    for &t in candidates {
+        let corners = surface.triangles[t as usize].map(|node| x[node as usize]);
+        // A point behind the triangle and projecting into it lies in its box grown by the depth.
+        let near = (0..3).all(|axis| {
+            let low = corners.iter().map(|c| c[axis]).fold(f64::INFINITY, f64::min);
+            let high = corners.iter().map(|c| c[axis]).fold(f64::NEG_INFINITY, f64::max);
+            point[axis] >= low - MAX_DEPTH && point[axis] <= high + MAX_DEPTH
+        });
+        if !near {
+            continue;
+        }
+        let Some(seen) = Projection::new(&corners, point) else { continue };
+        let shallowest = best.map_or(-MAX_DEPTH, |(distance, _)| distance);
+        if seen.distance < 0.0 && seen.distance > shallowest && seen.is_inside(1e-9) {
+            best = Some((seen.distance, Hit { triangle: t, weights: seen.weights, share: 0.0 }));
+        }
+    }
+    best.map(|(_, hit)| hit)
+}

@@ -1,0 +1,74 @@
+//! The bridge to parry: the surface triangle nearest to a point. The only file that names it.
+
+use parry3d_f64::math::Vector;
+use parry3d_f64::query::PointQueryWithLocation;
+use parry3d_f64::shape::TriMesh;
+
+use super::Vec3;
+use super::mesh::Surface;
+use crate::error::{Error, ErrorKind};
+
+/// A surface with a bounding volume tree that follows its nodes.
+#[derive(Clone)]
+pub struct NearestTriangle {
+    mesh: TriMesh,
+    /// Node of each mesh vertex: the tree holds surface nodes only.
+    nodes: Vec<u32>,
+    vertices: Vec<Vector>,
+}
+
+impl std::fmt::Debug for NearestTriangle {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("NearestTriangle").field("nodes", &self.nodes.len()).finish_non_exhaustive()
+    }
+}
+
+impl NearestTriangle {
+    /// Over `surface` with nodes at `positions`.
+    ///
+    /// # Errors
+    /// If the surface has no triangles.
+    pub fn new(surface: &Surface, positions: &[Vec3]) -> Result<Self, Error> {
+        let nodes: Vec<u32> = (0..positions.len() as u32).filter(|&node| surface.has_node(node)).collect();
+        let vertices: Vec<Vector> = nodes.iter().map(|&node| Vector::from(positions[node as usize])).collect();
+        let vertex = |node: u32| nodes.binary_search(&node).unwrap_or(0) as u32;
+        let triangles = surface.triangles.iter().map(|triangle| triangle.map(vertex)).collect();
+        let mesh = TriMesh::new(vertices.clone(), triangles).map_err(|error| {
+            Error::new(ErrorKind::Scene, format!("the surface cannot be searched: {error}")).at("body")
+        })?;
+        Ok(Self { mesh, nodes, vertices })
+    }
+
+    /// The triangle nearest to `point` with nodes at `positions`; 0 if no number is finite.
+    ///
+    /// # Real-time
+    /// For the global actor: refits the tree in place, allocates nothing.
+    pub fn find(&mut self, positions: &[Vec3], point: &Vec3) -> u32 {
+        for (vertex, &node) in self.vertices.iter_mut().zip(&self.nodes) {
+            *vertex = Vector::from(positions[node as usize]);
+        }
+        self.mesh.set_vertices(&self.vertices);
+        // A hollow mesh: a tool inside the body also has a nearest triangle.
+        let (_, (triangle, _)) = self.mesh.project_local_point_and_get_location(Vector::from(*point), false);
+        triangle
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::body::{Block, Body};
+    use super::*;
+
+    #[test]
+    fn the_nearest_triangle_follows_moving_nodes() {
+        let block = Block::builder([5; 3], [0.1; 3]).build().unwrap();
+        let mut nearest = NearestTriangle::new(block.surface(), block.rest()).unwrap();
+        let above = Vec3::new(0.06, 0.03, 0.13);
+        let on_top = |t: u32, x: &[Vec3]| block.surface().triangles[t as usize].iter().all(|&n| x[n as usize].z > 0.09);
+        assert!(on_top(nearest.find(block.rest(), &above), block.rest()));
+        // With the block moved up by its height, the same point is nearest to the lower half.
+        let moved: Vec<Vec3> = block.rest().iter().map(|x| x + Vec3::z() * 0.1).collect();
+        let triangle = nearest.find(&moved, &Vec3::new(0.06, 0.03, 0.09));
+        assert!(block.surface().triangles[triangle as usize].iter().all(|&n| moved[n as usize].z < 0.101));
+    }
+}

@@ -1,0 +1,65 @@
+//! `full`: the whole body at the haptic rate, the reference that the others are measured against.
+
+use super::super::Vec3;
+use super::super::contact::{Contact, ToolMotion};
+use super::super::simulation::Simulation;
+use super::{LocalModel, PatchGeometry, ResyncView};
+
+/// The global model itself, run at the haptic rate. There is nothing to resync with.
+#[derive(Debug)]
+pub struct Full {
+    simulation: Simulation,
+    watched: Vec<u32>,
+}
+
+impl Full {
+    /// Around a simulation.
+    pub fn new(simulation: Simulation) -> Self {
+        Self { simulation, watched: Vec::new() }
+    }
+
+    /// The simulation.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+}
+
+impl LocalModel for Full {
+    fn name(&self) -> &'static str {
+        "full"
+    }
+
+    fn rebuild(&mut self, _: ResyncView<'_>) {}
+
+    fn tick(&mut self, tool: ToolMotion) -> Vec3 {
+        self.simulation.tick(tool)
+    }
+
+    fn built_at(&self) -> u64 {
+        0
+    }
+
+    fn catches_up(&self) -> bool {
+        false
+    }
+
+    fn contact(&self) -> Contact {
+        *self.simulation.contact()
+    }
+
+    fn position(&self, node: u32) -> Option<Vec3> {
+        self.simulation.state().positions.get(node as usize).copied()
+    }
+
+    fn global_position(&self, probe: usize) -> Option<Vec3> {
+        self.position(*self.watched.get(probe)?)
+    }
+
+    fn watch(&mut self, nodes: &[u32]) {
+        self.watched = nodes.to_vec();
+    }
+
+    fn geometry(&self, _: &mut PatchGeometry) -> bool {
+        false
+    }
+}

@@ -1,0 +1,59 @@
+//! `hold`: the last force of the global model, what haptics does without a local model.
+
+use super::super::Vec3;
+use super::super::contact::{Contact, ToolMotion};
+use super::{LocalModel, PatchGeometry, ResyncView, Watched};
+
+/// The force of the global model's last tick, held until the next.
+#[derive(Clone, Debug, Default)]
+pub struct Hold {
+    force: Vec3,
+    contact: Contact,
+    built_at: u64,
+    watched: Watched,
+}
+
+impl LocalModel for Hold {
+    fn name(&self) -> &'static str {
+        "hold"
+    }
+
+    fn rebuild(&mut self, resync: ResyncView<'_>) {
+        self.force = resync.global.force();
+        self.contact = *resync.global.contact();
+        self.built_at = resync.tick;
+        self.watched.take(resync.global.state());
+    }
+
+    fn tick(&mut self, _: ToolMotion) -> Vec3 {
+        self.force
+    }
+
+    fn built_at(&self) -> u64 {
+        self.built_at
+    }
+
+    fn catches_up(&self) -> bool {
+        false
+    }
+
+    fn contact(&self) -> Contact {
+        self.contact
+    }
+
+    fn position(&self, _: u32) -> Option<Vec3> {
+        None
+    }
+
+    fn global_position(&self, probe: usize) -> Option<Vec3> {
+        self.watched.positions.get(probe).copied()
+    }
+
+    fn watch(&mut self, nodes: &[u32]) {
+        self.watched.set(nodes);
+    }
+
+    fn geometry(&self, _: &mut PatchGeometry) -> bool {
+        false
+    }
+}

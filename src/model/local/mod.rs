@@ -1,0 +1,138 @@
+//! Local models: what runs at the haptic rate between two results of the global model. One file per model.
+
+mod full;
+mod hold;
+mod patch;
+mod window;
+
+use super::Vec3;
+use super::body::State;
+use super::contact::{Contact, ToolMotion};
+use super::simulation::Simulation;
+
+pub use full::Full;
+pub use hold::Hold;
+pub use patch::Patch;
+
+/// The local models by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// [`Full`].
+    Full,
+    /// [`Hold`].
+    Hold,
+    /// [`Patch`] of this many nodes along the surface, along it, into depth.
+    Patch([usize; 3]),
+}
+
+impl Kind {
+    /// An empty model of this kind, to be rebuilt in place; `None` for [`Full`], which is the simulation itself.
+    pub fn empty(self) -> Option<Box<dyn LocalModel>> {
+        match self {
+            Self::Full => None,
+            Self::Hold => Some(Box::new(Hold::default())),
+            Self::Patch(size) => Some(Box::new(Patch::new(size))),
+        }
+    }
+}
+
+/// The global model at a resync: what a local model is built from.
+#[derive(Clone, Copy, Debug)]
+pub struct ResyncView<'a> {
+    /// The whole body after the last tool sample it has received.
+    pub global: &'a Simulation,
+    /// The haptic tick that this state belongs to.
+    pub tick: u64,
+    /// The surface triangle to build around: the contact's, or the one nearest to the tool.
+    pub triangle: u32,
+}
+
+/// What a patch found, for a global model that takes the local one's geometry.
+#[derive(Clone, Debug, Default)]
+pub struct PatchGeometry {
+    /// The haptic tick that it belongs to.
+    pub tick: u64,
+    /// Global ids of the patch nodes.
+    pub nodes: Vec<u32>,
+    /// Their positions [m] and velocities [m/s].
+    pub state: State,
+    /// The contact; its triangle is a global id.
+    pub contact: Contact,
+}
+
+impl PatchGeometry {
+    /// True if there is something to take and every number is finite.
+    pub fn is_usable(&self) -> bool {
+        !self.nodes.is_empty() && self.state.is_finite()
+    }
+
+    /// Puts the patch's state and contact in place of the global model's own.
+    pub fn write_to(&self, global: &mut Simulation) {
+        let (state, contact) = global.state_mut();
+        for ((&node, x), v) in self.nodes.iter().zip(&self.state.positions).zip(&self.state.velocities) {
+            state.positions[node as usize] = *x;
+            state.velocities[node as usize] = *v;
+        }
+        *contact = self.contact;
+    }
+}
+
+/// A model that turns tool motion into force at the haptic rate.
+pub trait LocalModel: Send + std::fmt::Debug {
+    /// Its name in tables and logs.
+    fn name(&self) -> &'static str;
+
+    /// Makes it anew, in place, from the global model.
+    ///
+    /// # Real-time
+    /// For the global actor: allocates at first use and whenever it grows.
+    fn rebuild(&mut self, resync: ResyncView<'_>);
+
+    /// Advances one haptic tick while the tool moves along `tool`; returns the mean force on the tool [N].
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
+    fn tick(&mut self, tool: ToolMotion) -> Vec3;
+
+    /// The haptic tick that its state was built at; catching up starts there.
+    fn built_at(&self) -> u64;
+
+    /// True if its state has to be advanced to the present before it can serve.
+    fn catches_up(&self) -> bool;
+
+    /// The contact; its triangle is a global id.
+    fn contact(&self) -> Contact;
+
+    /// Where `node` (a global id) is in this model [m]; `None` if the model does not hold it.
+    fn position(&self, node: u32) -> Option<Vec3>;
+
+    /// Where `node` was in the global model that this one was built from [m]; `None` if that is not known.
+    fn global_position(&self, probe: usize) -> Option<Vec3>;
+
+    /// Nodes whose global position is to be remembered at each rebuild, by place in this list.
+    fn watch(&mut self, nodes: &[u32]);
+
+    /// Writes its geometry for feedback; false if it has none.
+    ///
+    /// # Real-time
+    /// Bounded and real-time safe once `geometry` is as large as the patch.
+    fn geometry(&self, geometry: &mut PatchGeometry) -> bool;
+}
+
+/// Global positions of watched nodes at the resync.
+#[derive(Clone, Debug, Default)]
+struct Watched {
+    nodes: Vec<u32>,
+    positions: Vec<Vec3>,
+}
+
+impl Watched {
+    fn set(&mut self, nodes: &[u32]) {
+        self.nodes = nodes.to_vec();
+    }
+
+    fn take(&mut self, state: &State) {
+        self.positions.clear();
+        self.positions.extend(self.nodes.iter().map(|&node| state.positions[node as usize]));
+    }
+}

@@ -1,0 +1,100 @@
+//! The part of a body that a patch holds: its nodes, and the surface around them, in compact numbering.
+
+use super::super::Vec3;
+use super::super::body::Body;
+use super::super::mesh::{NONE, Surface};
+
+/// Patch nodes first, then the rim: surface nodes that contact needs for normals and walking but that do not move.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Window {
+    /// Global id of each local node.
+    pub nodes: Vec<u32>,
+    /// How many of them the patch moves; they come first, in increasing order.
+    pub movable: usize,
+    /// The surface over local nodes: every triangle that shares a node with one that the tool can press.
+    pub surface: Surface,
+    /// Global id of each local triangle.
+    pub triangles: Vec<u32>,
+    /// Local triangles with a movable node: those that detection looks at.
+    pub candidates: Vec<u32>,
+    /// Local place of each global node and triangle, or [`NONE`]; as long as the body, only touched entries change.
+    local_node: Vec<u32>,
+    local_triangle: Vec<u32>,
+}
+
+impl Window {
+    /// Makes the window anew around surface triangle `triangle`; costs as much as the patch, whatever the body.
+    pub(super) fn rebuild(&mut self, body: &dyn Body, triangle: u32, size: [usize; 3]) {
+        let whole = body.surface();
+        self.forget();
+        self.local_node.resize(body.rest().len(), NONE);
+        self.local_triangle.resize(whole.triangles.len(), NONE);
+        body.patch(triangle, size, &mut self.nodes);
+        self.movable = self.nodes.len();
+        for (place, &node) in self.nodes.iter().enumerate() {
+            self.local_node[node as usize] = place as u32;
+        }
+        // First the triangles of movable nodes (the candidates), then those around their corners (for normals).
+        self.grow(whole, 0);
+        let candidates = self.triangles.len();
+        self.grow(whole, self.movable);
+        self.candidates.clear();
+        self.candidates.extend(0..candidates as u32);
+
+        self.surface.triangles.clear();
+        self.surface.neighbours.clear();
+        for &t in &self.triangles {
+            self.surface.triangles.push(whole.triangles[t as usize].map(|node| self.local_node[node as usize]));
+            let local = |t: u32| if t == NONE { NONE } else { self.local_triangle[t as usize] };
+            self.surface.neighbours.push(whole.neighbours[t as usize].map(local));
+        }
+        self.surface.index_nodes(self.nodes.len());
+    }
+
+    /// Adds the triangles at all present nodes from `first` on, and then their missing corners.
+    fn grow(&mut self, whole: &Surface, first: usize) {
+        let (start, end) = (self.triangles.len(), self.nodes.len());
+        for place in first..end {
+            for &t in whole.at_node(self.nodes[place]) {
+                if self.local_triangle[t as usize] == NONE {
+                    self.local_triangle[t as usize] = self.triangles.len() as u32;
+                    self.triangles.push(t);
+                }
+            }
+        }
+        for place in start..self.triangles.len() {
+            for node in whole.triangles[self.triangles[place] as usize] {
+                if self.local_node[node as usize] == NONE {
+                    self.local_node[node as usize] = self.nodes.len() as u32;
+                    self.nodes.push(node);
+                }
+            }
+        }
+    }
+
+    fn forget(&mut self) {
+        self.nodes.drain(..).for_each(|node| self.local_node[node as usize] = NONE);
+        self.triangles.drain(..).for_each(|t| self.local_triangle[t as usize] = NONE);
+    }
+
+    /// Local place of a global node.
+    pub(super) fn node(&self, global: u32) -> Option<u32> {
+        self.local_node.get(global as usize).copied().filter(|&place| place != NONE)
+    }
+
+    /// Local place of a global triangle.
+    pub(super) fn triangle(&self, global: u32) -> Option<u32> {
+        self.local_triangle.get(global as usize).copied().filter(|&place| place != NONE)
+    }
+
+    /// Place of a global node among the movable ones.
+    pub(super) fn movable(&self, global: u32) -> Option<usize> {
+        self.node(global).map(|place| place as usize).filter(|&place| place < self.movable)
+    }
+
+    /// Copies the window's share of a global array.
+    pub(super) fn gather(&self, global: &[Vec3], local: &mut Vec<Vec3>) {
+        local.clear();
+        local.extend(self.nodes.iter().map(|&node| global[node as usize]));
+    }
+}

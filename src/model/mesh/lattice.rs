@@ -1,0 +1,181 @@
+//! The regular lattice of a block: numbering, neighbours and faces.
+
+/// A face of the block, by the axis that it is perpendicular to and the end of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Face {
+    XMin,
+    XMax,
+    YMin,
+    YMax,
+    ZMin,
+    ZMax,
+}
+
+impl Face {
+    /// All six.
+    pub const ALL: [Self; 6] = [Self::XMin, Self::XMax, Self::YMin, Self::YMax, Self::ZMin, Self::ZMax];
+
+    /// The axis it is perpendicular to: 0, 1 or 2.
+    pub fn axis(self) -> usize {
+        self as usize / 2
+    }
+
+    /// True at the far end of the axis.
+    pub fn is_max(self) -> bool {
+        self as usize % 2 == 1
+    }
+}
+
+/// A block of nx x ny x nz nodes; node id = i + nx (j + ny k).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lattice {
+    /// Nodes per axis.
+    pub nodes: [usize; 3],
+}
+
+impl Lattice {
+    /// The 13 neighbour offsets that lead to higher node ids; with their opposites they are all 26.
+    pub const FORWARD: [[isize; 3]; 13] = [
+        [1, 0, 0],
+        [-1, 1, 0],
+        [0, 1, 0],
+        [1, 1, 0],
+        [-1, -1, 1],
+        [0, -1, 1],
+        [1, -1, 1],
+        [-1, 0, 1],
+        [0, 0, 1],
+        [1, 0, 1],
+        [-1, 1, 1],
+        [0, 1, 1],
+        [1, 1, 1],
+    ];
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.nodes.iter().product()
+    }
+
+    /// True for a lattice without nodes.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The id of the node at `[i, j, k]`.
+    pub fn id(&self, [i, j, k]: [usize; 3]) -> u32 {
+        (i + self.nodes[0] * (j + self.nodes[1] * k)) as u32
+    }
+
+    /// Where node `id` sits in the lattice.
+    pub fn coordinates(&self, id: u32) -> [usize; 3] {
+        let [nx, ny, _] = self.nodes;
+        let id = id as usize;
+        [id % nx, id / nx % ny, id / (nx * ny)]
+    }
+
+    /// The node `offset` away from `at`, if it is inside.
+    pub fn neighbour(&self, at: [usize; 3], offset: [isize; 3]) -> Option<[usize; 3]> {
+        let mut to = [0; 3];
+        for axis in 0..3 {
+            to[axis] = at[axis].checked_add_signed(offset[axis]).filter(|&c| c < self.nodes[axis])?;
+        }
+        Some(to)
+    }
+
+    /// True if the node lies on `face`.
+    pub fn on_face(&self, at: [usize; 3], face: Face) -> bool {
+        at[face.axis()] == if face.is_max() { self.nodes[face.axis()] - 1 } else { 0 }
+    }
+
+    /// Surface triangles of all six faces, counter-clockwise seen from outside; each quad is split along
+    /// (a, b)-(a+1, b+1), with a, b the two in-face axes in x < y < z order.
+    pub fn surface_triangles(&self) -> Vec<[u32; 3]> {
+        let mut triangles = Vec::new();
+        for face in Face::ALL {
+            let axis = face.axis();
+            let [a, b] = match axis {
+                0 => [1, 2],
+                1 => [0, 2],
+                _ => [0, 1],
+            };
+            let node = |u: usize, v: usize| {
+                let mut at = [0; 3];
+                at[axis] = if face.is_max() { self.nodes[axis] - 1 } else { 0 };
+                at[a] = u;
+                at[b] = v;
+                self.id(at)
+            };
+            // (a, b, axis) is right-handed for x and z, left-handed for y.
+            let outward = (axis != 1) == face.is_max();
+            for u in 0..self.nodes[a] - 1 {
+                for v in 0..self.nodes[b] - 1 {
+                    let corners = [node(u, v), node(u + 1, v), node(u + 1, v + 1), node(u, v + 1)];
+                    for [p, q, r] in [[0, 1, 2], [0, 2, 3]] {
+                        let [p, q, r] = [corners[p], corners[q], corners[r]];
+                        triangles.push(if outward { [p, q, r] } else { [p, r, q] });
+                    }
+                }
+            }
+        }
+        triangles
+    }
+
+    /// A window of `size` = (along, along, depth) nodes around the cell that surface triangle `nodes` belongs to,
+    /// clamped at the edges; appends the ids in increasing order to `out`.
+    pub fn window(&self, nodes: [u32; 3], size: [usize; 3], out: &mut Vec<u32>) {
+        let corners = nodes.map(|node| self.coordinates(node));
+        let low: [usize; 3] = std::array::from_fn(|axis| corners.iter().map(|c| c[axis]).min().unwrap_or(0));
+        let high: [usize; 3] = std::array::from_fn(|axis| corners.iter().map(|c| c[axis]).max().unwrap_or(0));
+        let depth_axis = (0..3).find(|&axis| low[axis] == high[axis]).unwrap_or(2);
+        let mut along = size[..2].iter();
+        let range: [(usize, usize); 3] = std::array::from_fn(|axis| {
+            let n = self.nodes[axis];
+            if axis == depth_axis {
+                let depth = size[2].min(n);
+                return if low[axis] > 0 { (n - depth, n) } else { (0, depth) };
+            }
+            let width = along.next().map_or(2, |&w| w).min(n);
+            let first = low[axis].saturating_sub((width.max(2) - 2) / 2).min(n - width);
+            (first, first + width)
+        });
+        for k in range[2].0..range[2].1 {
+            for j in range[1].0..range[1].1 {
+                out.extend((range[0].0..range[0].1).map(|i| self.id([i, j, k])));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forward_offsets_lead_to_higher_ids_and_make_26_with_their_opposites() {
+        let lattice = Lattice { nodes: [5, 4, 3] };
+        let centre = [2, 2, 1];
+        let mut seen = std::collections::HashSet::new();
+        for offset in Lattice::FORWARD {
+            let to = lattice.neighbour(centre, offset).unwrap();
+            assert!(lattice.id(to) > lattice.id(centre));
+            seen.insert(offset);
+            seen.insert(offset.map(|c| -c));
+        }
+        assert_eq!(seen.len(), 26);
+    }
+
+    #[test]
+    fn a_window_is_centred_on_the_cell_and_clamped_at_the_edge() {
+        let lattice = Lattice { nodes: [12, 12, 12] };
+        let cell = |i, j| [lattice.id([i, j, 11]), lattice.id([i + 1, j, 11]), lattice.id([i + 1, j + 1, 11])];
+        let mut window = Vec::new();
+        lattice.window(cell(5, 5), [4, 4, 2], &mut window);
+        assert_eq!(window.len(), 32);
+        assert_eq!(lattice.coordinates(window[0]), [4, 4, 10]);
+        assert_eq!(lattice.coordinates(window[31]), [7, 7, 11]);
+        window.clear();
+        lattice.window(cell(0, 10), [4, 4, 2], &mut window);
+        assert_eq!(lattice.coordinates(window[0]), [0, 8, 10]);
+    }
+}

@@ -1,0 +1,130 @@
+//! A closed or open triangle surface with its adjacency, as contact walks over it.
+
+use std::collections::HashMap;
+
+use crate::error::{Error, ErrorKind};
+
+/// No triangle, or no neighbour across an edge.
+pub const NONE: u32 = u32::MAX;
+
+/// Triangles over numbered nodes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Surface {
+    /// Node ids of each triangle, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// For each triangle the neighbour across the edge opposite to its first, second and third node, or [`NONE`].
+    pub neighbours: Vec<[u32; 3]>,
+    /// Where each node's list of triangles begins in `node_triangles`; one entry more than nodes.
+    node_start: Vec<u32>,
+    /// The triangles at each node, one list after the other.
+    node_triangles: Vec<u32>,
+}
+
+impl Surface {
+    /// From triangles over `nodes` nodes.
+    ///
+    /// # Errors
+    /// If a triangle names a node that does not exist or twice the same, or an edge has more than two triangles.
+    pub fn new(nodes: usize, triangles: Vec<[u32; 3]>) -> Result<Self, Error> {
+        let mut edges: HashMap<(u32, u32), (u32, usize)> = HashMap::with_capacity(triangles.len() * 2);
+        let mut neighbours = vec![[NONE; 3]; triangles.len()];
+        for (t, triangle) in triangles.iter().enumerate() {
+            let [a, b, c] = *triangle;
+            if triangle.iter().any(|&node| node as usize >= nodes) || a == b || b == c || c == a {
+                let message =
+                    format!("triangle {t} has nodes {triangle:?}: three different ones below {nodes} are needed");
+                return Err(Error::new(ErrorKind::Scene, message));
+            }
+            for opposite in 0..3 {
+                let (p, q) = (triangle[(opposite + 1) % 3], triangle[(opposite + 2) % 3]);
+                let edge = (p.min(q), p.max(q));
+                match edges.get(&edge) {
+                    None => {
+                        edges.insert(edge, (t as u32, opposite));
+                    }
+                    Some(&(other, across)) if neighbours[other as usize][across] == NONE => {
+                        neighbours[other as usize][across] = t as u32;
+                        neighbours[t][opposite] = other;
+                    }
+                    Some(_) => {
+                        let message =
+                            format!("edge {edge:?} has more than two triangles: the surface must be a manifold");
+                        return Err(Error::new(ErrorKind::Scene, message));
+                    }
+                }
+            }
+        }
+        let mut surface = Self { triangles, neighbours, ..Self::default() };
+        surface.index_nodes(nodes);
+        Ok(surface)
+    }
+
+    /// Fills the node -> triangle lists, reusing their memory.
+    pub(crate) fn index_nodes(&mut self, nodes: usize) {
+        self.node_start.clear();
+        self.node_start.resize(nodes + 1, 0);
+        for triangle in &self.triangles {
+            for &node in triangle {
+                self.node_start[node as usize + 1] += 1;
+            }
+        }
+        for node in 0..nodes {
+            self.node_start[node + 1] += self.node_start[node];
+        }
+        self.node_triangles.clear();
+        self.node_triangles.resize(3 * self.triangles.len(), NONE);
+        for (t, triangle) in self.triangles.iter().enumerate() {
+            for &node in triangle {
+                // Each list is filled from its start; a free place still reads NONE.
+                let start = self.node_start[node as usize] as usize;
+                let list = &mut self.node_triangles[start..];
+                if let Some(place) = list.iter_mut().find(|place| **place == NONE) {
+                    *place = t as u32;
+                }
+            }
+        }
+    }
+
+    /// The triangles at `node`.
+    pub fn at_node(&self, node: u32) -> &[u32] {
+        let range = self.node_start[node as usize] as usize..self.node_start[node as usize + 1] as usize;
+        &self.node_triangles[range]
+    }
+
+    /// True if `node` is a corner of some triangle.
+    pub fn has_node(&self, node: u32) -> bool {
+        !self.at_node(node).is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Lattice;
+    use super::*;
+
+    #[test]
+    fn a_block_is_closed_and_every_neighbour_points_back() {
+        let lattice = Lattice { nodes: [4, 3, 5] };
+        let surface = Surface::new(lattice.len(), lattice.surface_triangles()).unwrap();
+        assert_eq!(surface.triangles.len(), 2 * 2 * (3 * 2 + 3 * 4 + 2 * 4));
+        for (t, neighbours) in surface.neighbours.iter().enumerate() {
+            for (opposite, &across) in neighbours.iter().enumerate() {
+                assert_ne!(across, NONE);
+                assert!(surface.neighbours[across as usize].contains(&(t as u32)));
+                let edge = [surface.triangles[t][(opposite + 1) % 3], surface.triangles[t][(opposite + 2) % 3]];
+                assert!(edge.iter().all(|node| surface.triangles[across as usize].contains(node)));
+            }
+        }
+        for node in 0..lattice.len() as u32 {
+            assert!(surface.at_node(node).iter().all(|&t| surface.triangles[t as usize].contains(&node)));
+        }
+        let listed: usize = (0..lattice.len() as u32).map(|node| surface.at_node(node).len()).sum();
+        assert_eq!(listed, 3 * surface.triangles.len());
+    }
+
+    #[test]
+    fn a_triangle_outside_the_nodes_is_refused() {
+        assert!(Surface::new(3, vec![[0, 1, 3]]).is_err());
+        assert!(Surface::new(3, vec![[0, 1, 1]]).is_err());
+    }
+}

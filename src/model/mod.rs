@@ -1,0 +1,21 @@
+//! Physics and numerics: bodies, contact, local models. No threads, clocks, channels or logging.
+//!
+//! The equations are those of the paper (Jacobs, Moore, Cavusoglu, IJRR 2010) with the corrections that DESIGN.md
+//! lists. One step of any model, whole body or patch, is [`contact::step`].
+
+pub mod body;
+pub mod contact;
+pub mod equilibrium;
+pub mod geometry;
+pub mod integrator;
+pub mod local;
+pub mod mesh;
+pub mod simulation;
+mod sparse;
+pub mod tangent;
+
+/// A point, direction or force in space.
+pub type Vec3 = nalgebra::Vector3<f64>;
+
+/// A 3 x 3 block of a tangent.
+pub type Mat3 = nalgebra::Matrix3<f64>;

@@ -1,0 +1,138 @@
+//! A whole body with its contact, advanced tick by tick: the global model, and `full` at the haptic rate.
+
+use super::Vec3;
+use super::body::{Body, State};
+use super::contact::{Contact, Deformable, Law, ToolMotion, step};
+use super::integrator::Spectrum;
+use crate::error::Error;
+
+/// How time is divided: ticks of the haptic rate, each of several explicit substeps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stepping {
+    /// Haptic period [s].
+    pub tick: f64,
+    /// Explicit substeps per tick, at least one.
+    pub substeps: u32,
+}
+
+impl Stepping {
+    /// The substep d [s].
+    pub fn step(&self) -> f64 {
+        self.tick / f64::from(self.substeps)
+    }
+
+    /// Runs one tick: calls `substep` for each part of the tool's motion and returns the mean force [N].
+    pub(crate) fn tick(&self, tool: ToolMotion, mut substep: impl FnMut(ToolMotion, f64) -> Vec3) -> Vec3 {
+        let n = f64::from(self.substeps);
+        let sum = (0..self.substeps).fold(Vec3::zeros(), |sum, u| {
+            let u = f64::from(u);
+            sum + substep(tool.part(u / n, (u + 1.0) / n), self.step())
+        });
+        sum / n
+    }
+}
+
+/// A body, its state and the tool's contact with it.
+#[derive(Debug)]
+pub struct Simulation {
+    body: Box<dyn Body>,
+    state: State,
+    forces: Vec<Vec3>,
+    contact: Contact,
+    law: Law,
+    stepping: Stepping,
+    /// All surface triangles: the tool may touch anywhere.
+    candidates: Vec<u32>,
+    inverse_masses: Vec<f64>,
+    /// Mean force of the last tick [N].
+    force: Vec3,
+}
+
+impl Simulation {
+    /// A simulation of `body` from `state`; the tool starts in `contact` (default: not touching).
+    ///
+    /// # Errors
+    /// If the state does not fit the body or is not finite.
+    pub fn new(
+        body: Box<dyn Body>,
+        state: State,
+        contact: Contact,
+        law: Law,
+        stepping: Stepping,
+    ) -> Result<Self, Error> {
+        let nodes = body.rest().len();
+        if state.positions.len() != nodes || state.velocities.len() != nodes || body.inverse_masses().len() != nodes {
+            let lengths = (state.positions.len(), state.velocities.len(), body.inverse_masses().len());
+            let message = format!("{nodes} nodes, but {lengths:?} positions, velocities and inverse masses");
+            return Err(Error::scene("body", message));
+        }
+        if !state.is_finite() {
+            return Err(Error::scene("initial", "the initial state has numbers that are not finite"));
+        }
+        let candidates = (0..body.surface().triangles.len() as u32).collect();
+        let inverse_masses = body.inverse_masses().to_vec();
+        let forces = vec![Vec3::zeros(); nodes];
+        Ok(Self { body, state, forces, contact, law, stepping, candidates, inverse_masses, force: Vec3::zeros() })
+    }
+
+    /// Advances one haptic tick while the tool moves along `tool`; returns the force on the tool, its mean over the
+    /// tick [N].
+    ///
+    /// # Real-time
+    /// Bounded and real-time safe if the body's forces are.
+    pub fn tick(&mut self, tool: ToolMotion) -> Vec3 {
+        let Self { body, state, forces, contact, law, candidates, inverse_masses, stepping, .. } = self;
+        self.force = stepping.tick(tool, |tool, d| {
+            body.forces(state, forces);
+            let mut deformable = Deformable {
+                positions: &mut state.positions,
+                velocities: &mut state.velocities,
+                inverse_masses,
+                surface: body.surface(),
+                candidates,
+            };
+            step(&mut deformable, forces, contact, law, tool, d)
+        });
+        self.force
+    }
+
+    /// The body.
+    pub fn body(&self) -> &dyn Body {
+        &*self.body
+    }
+
+    /// Positions and velocities.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Positions, velocities and contact, to put in what a local model found.
+    pub fn state_mut(&mut self) -> (&mut State, &mut Contact) {
+        (&mut self.state, &mut self.contact)
+    }
+
+    /// The tool's contact; triangles are the body's.
+    pub fn contact(&self) -> &Contact {
+        &self.contact
+    }
+
+    /// How contacts are resolved.
+    pub fn law(&self) -> &Law {
+        &self.law
+    }
+
+    /// How time is divided.
+    pub fn stepping(&self) -> Stepping {
+        self.stepping
+    }
+
+    /// Mean force of the last tick on the tool [N].
+    pub fn force(&self) -> Vec3 {
+        self.force
+    }
+}
+
+/// Substeps per tick of `tick` [s] from the body's stability limit.
+pub fn stable_substeps(body: &mut dyn Body, tick: f64) -> u32 {
+    Spectrum::estimate(body).substeps(tick)
+}
