@@ -1,3 +1,93 @@
-//! The runtime: threads, time, messages, records; no physics.
+//! The runtime: actors in rate groups, on real-time threads or in deterministic virtual time; no physics.
+//!
+//! A graph is a set of [rate groups](RateGroup), each with [actors](Actor) that are released together, connected by
+//! ports. It runs *threaded*, one thread per group with absolute sleeps and, where granted, SCHED_FIFO, or in *virtual
+//! time*, one thread for everything, in the order (time, group), bit-identical every time. The actors are the same.
+//!
+//! - Ports: [`exchange`](RuntimeBuilder::exchange) for the newest value of a large state,
+//!   [`queue`](RuntimeBuilder::queue) for ordered samples, [`outlet`](RuntimeBuilder::outlet) for threads outside.
+//! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
+//!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
+//! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each.
+//! - Faults: a panic or a reported fault stops the whole graph in order and is in the [report](RuntimeReport).
+//!
+//! Words with a fixed meaning in these docs: *wait-free* (done in a bounded number of steps whatever others do),
+//! *lock-free* (some thread always gets on), *bounded*, *allocates*, *may block*, *real-time safe* (no allocation, no
+//! lock, no system call).
+//!
+//! # Example
+//!
+//! A slow producer and a fast consumer in virtual time; with `Execution::Threaded` the same graph runs in real time.
+//!
+//! ```
+//! use palpate::runtime::{Execution, Outcome, RateGroup, Runtime, actor_fn};
+//! use palpate::time::Nanos;
+//! use std::time::Duration;
+//!
+//! let mut graph = Runtime::builder(Execution::Virtual);
+//! let (mut model, mut newest) = graph.exchange(|| vec![0.0; 1000]);
+//! let slow = actor_fn("slow", move |ctx| {
+//!     model.buffer().fill(ctx.scheduled.as_secs_f64());
+//!     model.publish(ctx);
+//!     Outcome::Continue
+//! });
+//! let (mut shown, mut display) = graph.outlet(|| 0.0);
+//! let fast = actor_fn("fast", move |ctx| {
+//!     if newest.refresh(ctx) {
+//!         *shown.buffer() = newest.get()[0];
+//!         shown.publish(ctx);
+//!     }
+//!     Outcome::Continue
+//! });
+//! let running = graph
+//!     .group(RateGroup::hz(1000).name("fast"), vec![fast])
+//!     .group(RateGroup::hz(50).name("slow").latency(Nanos(5_000_000)), vec![slow])
+//!     .until(Nanos(100_000_000))
+//!     .build()?
+//!     .start()?;
+//! running.wait_for(Duration::from_millis(50));
+//! assert!(display.refresh());
+//! assert_eq!(*display.get(), 0.040); // published at 40 ms, visible from 45 ms on
+//!
+//! running.wait_for(Duration::MAX);
+//! let report = running.stop()?;
+//! assert_eq!(report.groups[0].released, 101);
+//! assert_eq!(report.fault, None);
+//! # Ok::<(), palpate::Error>(())
+//! ```
 
+mod actor;
+mod builder;
+mod deadline;
+pub mod exchange;
+mod grant;
+pub mod mailbox;
+mod os;
+mod outlet;
+mod port;
+mod rate_group;
 pub mod record;
+mod recorder;
+mod release;
+mod report;
+pub mod ring;
+mod running;
+mod schedule;
+mod supervisor;
+mod sync;
+mod threaded;
+mod virtual_port;
+mod virtual_time;
+
+pub use actor::{Actor, Mode, Outcome, TickContext, actor_fn};
+pub use builder::{Execution, RuntimeBuilder};
+pub use deadline::SlipCounts;
+pub use grant::{GrantHandle, GroupGrant, SystemGrant};
+pub use outlet::{OutletReader, OutletWriter};
+pub use port::{QueueReader, QueueWriter, Reader, Writer};
+pub use rate_group::{OverrunPolicy, RateGroup, Wait};
+pub use record::{Channel, Event, Record, SlipCause, TickTiming};
+pub use recorder::{RecordDrain, Recorder};
+pub use report::{GroupReport, RuntimeFault, RuntimeReport};
+pub use running::{Running, Runtime, STOP_BOUND};
+pub use supervisor::StopHandle;

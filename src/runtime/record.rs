@@ -170,6 +170,10 @@ impl Event {
     pub const FAULT: u32 = 2;
     /// The overrun policy stopped the group; `detail` is the number of periods missed.
     pub const STOPPED: u32 = 3;
+    /// The code of a group's degraded releases changed; `detail` is the code, [`Event::RECOVERED`] when there is none.
+    pub const DEGRADED: u32 = 4;
+    /// The detail of [`Event::DEGRADED`] when the group is back to normal.
+    pub const RECOVERED: u64 = u64::MAX;
 }
 
 impl From<Event> for Record {

@@ -1,0 +1,131 @@
+//! What a program writes: actors, and what they are told and answer at each release.
+
+use crate::error::Error;
+use crate::time::{Nanos, Rate};
+
+/// A part of a program that is called once per release of its rate group.
+///
+/// An actor never reads a clock and never makes a channel: time comes with the [`TickContext`], data through ports from
+/// the [builder](super::RuntimeBuilder). That is what lets the same actor run on a real thread and in virtual time.
+///
+/// One release of a group: every actor's [`tick`](Self::tick) in the order given to the builder, then every actor's
+/// [`commit`](Self::commit) in reverse order. So a device that ticks first (to read) commits last (to write what the
+/// others computed in the same release).
+pub trait Actor: Send {
+    /// A short name for reports and errors.
+    fn name(&self) -> &str;
+
+    /// Prepares the actor. All starts run one after the other, in group order, on the thread that calls
+    /// [`Runtime::start`](super::Runtime::start), before release 0. What is published here is visible from release 0 on,
+    /// whatever the group's latency.
+    ///
+    /// # Errors
+    /// An error ends the start of the whole runtime and is returned from it.
+    fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
+        let _ = ctx;
+        Ok(())
+    }
+
+    /// Does the work of one release.
+    ///
+    /// # Real-time
+    /// Called on the group's thread: keep it free of allocation, locks and system calls where the group is real-time.
+    fn tick(&mut self, ctx: &TickContext) -> Outcome;
+
+    /// Second phase of a release, after every actor of the group has ticked, in reverse order.
+    ///
+    /// # Real-time
+    /// As [`tick`](Self::tick).
+    fn commit(&mut self, ctx: &TickContext) -> Outcome {
+        let _ = ctx;
+        Outcome::Continue
+    }
+
+    /// Ends the actor: on the group's own thread after its last release, also after a fault of this or another actor.
+    fn stop(&mut self, ctx: &TickContext) {
+        let _ = ctx;
+    }
+}
+
+/// What an actor answers to a release.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Outcome {
+    /// All is well.
+    #[default]
+    Continue,
+    /// The release was done with less than full quality, for the program's cause with this code. The run goes on; the
+    /// report counts such releases, and a change of the code is recorded as [`Event::DEGRADED`](super::Event::DEGRADED).
+    Degraded(u32),
+    /// The actor cannot go on, for the program's cause with this code. Nothing of its group ticks or commits any more,
+    /// the whole runtime stops in order.
+    Fault(u32),
+}
+
+/// How much an actor should do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// All of it.
+    #[default]
+    Normal,
+    /// The least that keeps the system useful. Set by an overrun policy only, never by measured time; no policy of this
+    /// version sets it.
+    Degraded,
+}
+
+/// What an actor is told at a release. All times count from the start of the run.
+#[derive(Clone, Copy, Debug)]
+pub struct TickContext {
+    /// The number of the release, counting skipped ones: release n is due at n periods after the group's offset.
+    pub tick: u64,
+    /// When the release was due. Decisions that change results depend on this, never on `now`.
+    pub scheduled: Nanos,
+    /// When the group's work began; equal to `scheduled` in virtual time.
+    pub now: Nanos,
+    /// The period [s].
+    pub dt_nominal: f64,
+    /// Time since the work of the release before began [s]; `dt_nominal` at the first.
+    pub dt_measured: f64,
+    /// Periods skipped between the release before and this one.
+    pub slips: u32,
+    /// How much to do.
+    pub mode: Mode,
+    /// When publications made in this release become visible to others; only virtual time looks at it.
+    pub(super) visible_at: Nanos,
+}
+
+impl TickContext {
+    /// The context of release `n` at `rate`, on time and without latency: to drive an actor or a port by hand, in tests.
+    pub fn by_hand(rate: Rate, n: u64) -> Self {
+        let scheduled = rate.release(n);
+        Self {
+            tick: n,
+            scheduled,
+            now: scheduled,
+            dt_nominal: rate.period_s(),
+            dt_measured: rate.period_s(),
+            slips: 0,
+            mode: Mode::Normal,
+            visible_at: scheduled,
+        }
+    }
+}
+
+/// An actor made of a name and a closure, for programs that need no more.
+pub fn actor_fn(name: &str, tick: impl FnMut(&TickContext) -> Outcome + Send + 'static) -> Box<dyn Actor> {
+    Box::new(FnActor { name: name.to_owned(), tick })
+}
+
+struct FnActor<F> {
+    name: String,
+    tick: F,
+}
+
+impl<F: FnMut(&TickContext) -> Outcome + Send> Actor for FnActor<F> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        (self.tick)(ctx)
+    }
+}

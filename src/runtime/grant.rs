@@ -1,0 +1,125 @@
+//! What the system granted: asked for and given, so that a refused privilege is reported and never silent.
+
+use super::os;
+use super::rate_group::{RateGroup, Wait};
+use std::sync::{Arc, OnceLock};
+
+/// What a run got from the system. Plain texts and numbers, easy to serialise.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SystemGrant {
+    /// True in virtual time, where nothing is asked for.
+    pub virtual_time: bool,
+    /// Whether memory is locked: `locked`, `not asked`, or why it was refused.
+    pub mlock: String,
+    /// Timer slack of the group threads: `1 ns`, `not asked`, or why it was refused.
+    pub timer_slack: String,
+    /// What the kernel reads the time from.
+    pub clock_source: String,
+    /// The kernel's release and build.
+    pub kernel: String,
+    /// Processor cores that the process may use.
+    pub cores: usize,
+    /// One per rate group, in graph order.
+    pub groups: Vec<GroupGrant>,
+}
+
+/// What the thread of one rate group got.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct GroupGrant {
+    /// The group's name.
+    pub name: String,
+    /// The scheduling policy asked for.
+    pub policy_asked: String,
+    /// The scheduling policy in force.
+    pub policy: String,
+    /// The real-time priority asked for; 0 for none.
+    pub priority_asked: u8,
+    /// The real-time priority in force; 0 for none.
+    pub priority: u8,
+    /// The core asked for.
+    pub cpu_asked: Option<usize>,
+    /// The core the thread is pinned to.
+    pub cpu: Option<usize>,
+    /// How it waits for its releases.
+    pub wait: String,
+    /// Everything that was refused, with the reason; empty if nothing was.
+    pub refused: String,
+}
+
+/// Gives what the system granted, once it is known: before the first actor is started.
+#[derive(Clone, Debug, Default)]
+pub struct GrantHandle(Arc<OnceLock<SystemGrant>>);
+
+impl GrantHandle {
+    /// What the system granted; `None` before the runtime is started.
+    ///
+    /// # Real-time
+    /// Allocates: for loggers.
+    pub fn get(&self) -> Option<SystemGrant> {
+        self.0.get().cloned()
+    }
+
+    pub(super) fn set(&self, grant: SystemGrant) {
+        // A runtime is started once, so the handle is set once.
+        let _ = self.0.set(grant);
+    }
+}
+
+/// What the calling thread's set-up led to.
+pub(super) struct ThreadGrant {
+    pub(super) group: GroupGrant,
+    pub(super) timer_slack: String,
+    pub(super) wait: Wait,
+}
+
+const FIFO: &str = "SCHED_FIFO";
+const OTHER: &str = "SCHED_OTHER";
+
+/// Sets the calling thread up for `spec` as far as the system allows.
+pub(super) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
+    let mut refused = Vec::new();
+    let mut granted = |result: Result<(), String>| result.map_err(|reason| refused.push(reason)).is_ok();
+    let timer_slack = os::set_timer_slack().map_or_else(|reason| reason, |()| "1 ns".to_owned());
+    let cpu = spec.cpu.filter(|&cpu| granted(os::pin(cpu)));
+    let priority = spec.priority.filter(|&priority| granted(os::set_realtime(priority)));
+    let wait = spec.wait.granted(priority.is_some());
+    let group = GroupGrant {
+        name: spec.name.clone(),
+        policy_asked: if spec.priority.is_some() { FIFO } else { OTHER }.to_owned(),
+        policy: if priority.is_some() { FIFO } else { OTHER }.to_owned(),
+        priority_asked: spec.priority.unwrap_or(0),
+        priority: priority.unwrap_or(0),
+        cpu_asked: spec.cpu,
+        cpu,
+        wait: wait.to_string(),
+        refused: refused.join("; "),
+    };
+    ThreadGrant { group, timer_slack, wait }
+}
+
+impl SystemGrant {
+    /// The facts about the machine; groups and privileges are left to the caller.
+    pub(super) fn of_machine() -> Self {
+        Self {
+            virtual_time: false,
+            mlock: "not asked".to_owned(),
+            timer_slack: "not asked".to_owned(),
+            clock_source: os::clock_source(),
+            kernel: os::kernel(),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            groups: Vec::new(),
+        }
+    }
+
+    /// The grant of a virtual run: one thread, nothing asked for.
+    pub(super) fn of_virtual_time<'a>(groups: impl Iterator<Item = &'a RateGroup>) -> Self {
+        let group = |spec: &RateGroup| GroupGrant {
+            name: spec.name.clone(),
+            policy_asked: OTHER.to_owned(),
+            policy: OTHER.to_owned(),
+            wait: "virtual".to_owned(),
+            ..GroupGrant::default()
+        };
+        Self { virtual_time: true, groups: groups.map(group).collect(), ..Self::of_machine() }
+    }
+}

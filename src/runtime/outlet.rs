@@ -1,0 +1,78 @@
+//! The newest value for a thread outside the graph, such as a renderer: visible at once in both executions.
+
+use super::actor::TickContext;
+use super::exchange::{ExchangeReader, ExchangeWriter, exchange};
+use crate::time::Nanos;
+
+/// The actor's side of an outlet.
+#[derive(Debug)]
+pub struct OutletWriter<T>(ExchangeWriter<T>);
+
+/// The outside thread's side of an outlet. It owns its buffer until the next successful refresh.
+#[derive(Debug)]
+pub struct OutletReader<T>(ExchangeReader<T>);
+
+pub(super) fn outlet<T: Send>(init: impl FnMut() -> T) -> (OutletWriter<T>, OutletReader<T>) {
+    let (writer, reader) = exchange(init);
+    (OutletWriter(writer), OutletReader(reader))
+}
+
+impl<T> OutletWriter<T> {
+    /// The buffer to write the next value into; it holds an old value, of no particular age.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn buffer(&mut self) -> &mut T {
+        self.0.buffer()
+    }
+
+    /// Makes the buffer the newest value and returns its version, counting from 1.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn publish(&mut self, ctx: &TickContext) -> u64 {
+        self.0.publish(ctx.scheduled)
+    }
+}
+
+impl<T> OutletReader<T> {
+    /// Takes the newest value if there is one that was not taken yet; returns whether there was.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe; never disturbs the writer.
+    pub fn refresh(&mut self) -> bool {
+        self.0.refresh()
+    }
+
+    /// The value of the last refresh, or the initial value.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn get(&self) -> &T {
+        self.0.get()
+    }
+
+    /// The same to change or to swap out: the reader owns the buffer until the next refresh.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn get_mut(&mut self) -> &mut T {
+        self.0.get_mut()
+    }
+
+    /// The version of the value, counting from 1; 0 before the first.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn version(&self) -> u64 {
+        self.0.version()
+    }
+
+    /// The scheduled time of the release that published the value; zero before the first.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn published(&self) -> Nanos {
+        self.0.published()
+    }
+}

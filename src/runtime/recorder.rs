@@ -1,0 +1,120 @@
+//! How records leave an actor: a ring per source, drained by a logger that merges them by time.
+
+use super::record::Record;
+use super::ring::{Consumer, Producer, ring};
+use super::sync::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// All rings of a graph. The lock is taken when a ring is added and by the logger, never by a real-time tick.
+#[derive(Debug)]
+pub(crate) struct Registry {
+    rings: Mutex<Vec<Consumer<Record>>>,
+    /// Whether anybody wants the records.
+    wanted: AtomicBool,
+}
+
+impl Registry {
+    pub(crate) fn new() -> Arc<Self> {
+        Arc::new(Self { rings: Mutex::default(), wanted: AtomicBool::new(false) })
+    }
+
+    pub(crate) fn recorder(&self, capacity: usize) -> Recorder {
+        let (producer, consumer) = ring(capacity);
+        self.rings().push(consumer);
+        Recorder(producer)
+    }
+
+    pub(crate) fn drain(self: &Arc<Self>) -> RecordDrain {
+        // Relaxed: set while the graph is built, read before and after its threads run.
+        self.wanted.store(true, Ordering::Relaxed);
+        RecordDrain(Arc::clone(self))
+    }
+
+    pub(crate) fn wanted(&self) -> bool {
+        self.wanted.load(Ordering::Relaxed)
+    }
+
+    /// Records dropped because a ring was full; without a drain none is lost, since nobody asked.
+    pub(crate) fn lost(&self) -> u64 {
+        if self.wanted() { self.rings().iter().map(Consumer::lost).sum() } else { 0 }
+    }
+
+    fn rings(&self) -> MutexGuard<'_, Vec<Consumer<Record>>> {
+        // Nothing that can panic half-way runs under the lock.
+        self.rings.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A record sink of one actor.
+#[derive(Debug)]
+pub struct Recorder(Producer<Record>);
+
+impl Recorder {
+    /// Records something; a full ring drops and counts it.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    #[inline]
+    pub fn push(&mut self, record: impl Into<Record>) {
+        self.0.push(record.into());
+    }
+}
+
+/// Takes the records of all recorders of a graph and of every group's own timing and events.
+#[derive(Debug)]
+pub struct RecordDrain(Arc<Registry>);
+
+impl RecordDrain {
+    /// Appends what was recorded since the last call, in the order of the stamps; equal stamps keep the order in which
+    /// the recorders were made.
+    ///
+    /// # Real-time
+    /// Takes a lock and allocates: for loggers.
+    pub fn drain(&mut self, records: &mut Vec<Record>) {
+        let first = records.len();
+        for ring in self.0.rings().iter_mut() {
+            // At most one ring full, so that a fast producer cannot keep the logger here.
+            let capacity = ring.capacity();
+            records.extend(std::iter::from_fn(|| ring.pop()).take(capacity));
+        }
+        records[first..].sort_by_key(|record| record.stamp);
+    }
+
+    /// Records lost so far because a ring was full.
+    ///
+    /// # Real-time
+    /// Takes a lock: for loggers.
+    pub fn lost(&self) -> u64 {
+        self.0.lost()
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::runtime::record::Event;
+    use crate::time::Nanos;
+
+    fn event(stamp: u64, code: u32) -> Event {
+        Event { stamp: Nanos(stamp), group: 0, code, detail: 0 }
+    }
+
+    #[test]
+    fn records_are_merged_by_stamp_and_ties_keep_their_order() {
+        let registry = Registry::new();
+        let mut a = registry.recorder(8);
+        let mut drain = registry.drain();
+        let mut b = registry.recorder(2);
+        for (stamp, code) in [(1, 10), (3, 11), (3, 12)] {
+            a.push(event(stamp, code));
+        }
+        for (stamp, code) in [(2, 20), (3, 21), (4, 22)] {
+            b.push(event(stamp, code));
+        }
+        let mut records = Vec::new();
+        drain.drain(&mut records);
+        let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|e| e.code).collect();
+        assert_eq!(codes, [10, 20, 11, 12, 21]);
+        assert_eq!(drain.lost(), 1);
+    }
+}

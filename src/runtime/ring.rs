@@ -1,0 +1,287 @@
+//! A wait-free single-producer single-consumer ring for values that all count, in order.
+//!
+//! A full ring drops the new value and counts it; it never waits. Each side caches the other's index and reads the
+//! shared one only when the cached one says full or empty, so that a push and a pop usually touch one shared line each
+//! (as in Rigtorp's SPSCQueue and in rtrb).
+//!
+//! ```
+//! let (mut producer, mut consumer) = palpate::runtime::ring::ring(3);
+//! assert_eq!(producer.capacity(), 4);
+//! assert!(producer.push(7));
+//! assert_eq!((consumer.peek(), consumer.pop(), consumer.pop()), (Some(7), Some(7), None));
+//! ```
+
+use super::sync::{AtomicU64, AtomicUsize, CachePadded, Ordering, UnsafeCell};
+use std::fmt;
+use std::mem::MaybeUninit;
+use std::sync::Arc;
+
+struct Shared<T> {
+    slots: Box<[UnsafeCell<MaybeUninit<T>>]>,
+    /// Values taken so far, wrapping; written by the consumer.
+    head: CachePadded<AtomicUsize>,
+    /// Values pushed so far, wrapping; written by the producer.
+    tail: CachePadded<AtomicUsize>,
+    /// Values dropped because the ring was full; written by the producer.
+    lost: CachePadded<AtomicU64>,
+    #[cfg(all(test, loom))]
+    release: Ordering,
+}
+
+// SAFETY: slots in head..tail are read by the consumer only, the others are written by the producer only, and the
+// indices that move this border are atomics; values cross threads, hence `T: Send`.
+unsafe impl<T: Send> Sync for Shared<T> {}
+
+impl<T> Shared<T> {
+    fn new(capacity: usize) -> Self {
+        Self {
+            slots: (0..rounded(capacity)).map(|_| UnsafeCell::new(MaybeUninit::uninit())).collect(),
+            head: CachePadded(AtomicUsize::new(0)),
+            tail: CachePadded(AtomicUsize::new(0)),
+            lost: CachePadded(AtomicU64::new(0)),
+            #[cfg(all(test, loom))]
+            release: Ordering::Release,
+        }
+    }
+
+    fn slot(&self, index: usize) -> &UnsafeCell<MaybeUninit<T>> {
+        &self.slots[index & (self.slots.len() - 1)]
+    }
+
+    /// The ordering of a store that hands slots over; loom's tests weaken it to see that they notice.
+    fn release(&self) -> Ordering {
+        #[cfg(all(test, loom))]
+        return self.release;
+        #[cfg(not(all(test, loom)))]
+        Ordering::Release
+    }
+}
+
+/// The capacity that a ring asked for `capacity` gets: the next power of two.
+pub(crate) fn rounded(capacity: usize) -> usize {
+    capacity.max(1).next_power_of_two()
+}
+
+/// Makes a ring for at least `capacity` values, rounded up to a power of two.
+pub fn ring<T: Copy + Send>(capacity: usize) -> (Producer<T>, Consumer<T>) {
+    pair(Shared::new(capacity))
+}
+
+fn pair<T>(shared: Shared<T>) -> (Producer<T>, Consumer<T>) {
+    let shared = Arc::new(shared);
+    (Producer { shared: Arc::clone(&shared), tail: 0, head: 0 }, Consumer { shared, head: 0, tail: 0 })
+}
+
+/// The pushing side of a [`ring`].
+pub struct Producer<T> {
+    shared: Arc<Shared<T>>,
+    tail: usize,
+    /// The consumer's index when it was last read: never ahead of the true one.
+    head: usize,
+}
+
+impl<T: Copy> Producer<T> {
+    /// Appends a value; false if the ring is full: the value is then dropped and counted.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    #[inline]
+    pub fn push(&mut self, value: T) -> bool {
+        if self.tail.wrapping_sub(self.head) == self.shared.slots.len() {
+            // Acquire: with the consumer's release of `head`, so that its read of the slot is over before we overwrite.
+            self.head = self.shared.head.load(Ordering::Acquire);
+            if self.tail.wrapping_sub(self.head) == self.shared.slots.len() {
+                // Relaxed: a count of its own that orders nothing; no read-modify-write, this is its only writer.
+                self.shared.lost.store(self.shared.lost.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+                return false;
+            }
+        }
+        self.shared.slot(self.tail).with_mut(|slot| {
+            // SAFETY: the slot is outside head..tail, so the consumer does not touch it until `tail` is stored.
+            unsafe { (*slot).write(value) };
+        });
+        self.tail = self.tail.wrapping_add(1);
+        // Release: with the consumer's acquire of `tail`, so that it sees the value just written.
+        self.shared.tail.store(self.tail, self.shared.release());
+        true
+    }
+
+    /// How many values fit.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn capacity(&self) -> usize {
+        self.shared.slots.len()
+    }
+
+    /// Values dropped so far because the ring was full.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn lost(&self) -> u64 {
+        self.shared.lost.load(Ordering::Relaxed)
+    }
+}
+
+impl<T> fmt::Debug for Producer<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Producer").field("capacity", &self.shared.slots.len()).finish_non_exhaustive()
+    }
+}
+
+/// The taking side of a [`ring`].
+pub struct Consumer<T> {
+    shared: Arc<Shared<T>>,
+    head: usize,
+    /// The producer's index when it was last read: never ahead of the true one.
+    tail: usize,
+}
+
+impl<T: Copy> Consumer<T> {
+    /// The oldest value, left in the ring.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    #[inline]
+    pub fn peek(&mut self) -> Option<T> {
+        if self.head == self.tail {
+            // Acquire: with the producer's release of `tail`, so that we see the values it wrote before.
+            self.tail = self.shared.tail.load(Ordering::Acquire);
+            if self.head == self.tail {
+                return None;
+            }
+        }
+        // SAFETY: the slot is inside head..tail, so it was written and the producer leaves it alone until `head` is
+        // stored.
+        Some(self.shared.slot(self.head).with(|slot| unsafe { (*slot).assume_init() }))
+    }
+
+    /// Takes the oldest value.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    #[inline]
+    pub fn pop(&mut self) -> Option<T> {
+        let value = self.peek()?;
+        self.head = self.head.wrapping_add(1);
+        // Release: with the producer's acquire of `head`, so that our read of the slot is over before it overwrites.
+        self.shared.head.store(self.head, self.shared.release());
+        Some(value)
+    }
+
+    /// How many values fit.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn capacity(&self) -> usize {
+        self.shared.slots.len()
+    }
+
+    /// Values dropped so far because the ring was full.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn lost(&self) -> u64 {
+        self.shared.lost.load(Ordering::Relaxed)
+    }
+}
+
+impl<T> fmt::Debug for Consumer<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Consumer").field("capacity", &self.shared.slots.len()).finish_non_exhaustive()
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::VecDeque;
+
+    proptest! {
+        #[test]
+        fn a_ring_behaves_like_a_bounded_queue(capacity in 1_usize..9, pushes in prop::collection::vec(any::<bool>(), 0..200)) {
+            let (mut producer, mut consumer) = ring(capacity);
+            let mut queue = VecDeque::new();
+            let mut lost = 0;
+            for (n, push) in pushes.into_iter().enumerate() {
+                if push {
+                    let fits = queue.len() < producer.capacity();
+                    prop_assert_eq!(producer.push(n), fits);
+                    if fits { queue.push_back(n) } else { lost += 1 }
+                } else {
+                    prop_assert_eq!(consumer.peek(), queue.front().copied());
+                    prop_assert_eq!(consumer.pop(), queue.pop_front());
+                }
+                prop_assert_eq!((producer.lost(), consumer.lost()), (lost, lost));
+            }
+        }
+    }
+
+    #[test]
+    fn two_threads_see_every_value_once_and_in_order() {
+        const COUNT: u64 = 50_000;
+        let (mut producer, mut consumer) = ring(64);
+        let thread = std::thread::spawn(move || {
+            for n in 0..COUNT {
+                while !producer.push(n) {
+                    std::thread::yield_now();
+                }
+            }
+        });
+        let mut next = 0;
+        while next < COUNT {
+            match consumer.pop() {
+                Some(value) => {
+                    // Check that no value is missing, doubled or out of order
+                    assert_eq!(value, next);
+                    next += 1;
+                }
+                None => std::thread::yield_now(),
+            }
+        }
+        thread.join().unwrap();
+    }
+}
+
+#[cfg(all(test, loom))]
+mod loom_tests {
+    use super::*;
+
+    fn model(release: Ordering) {
+        let mut builder = loom::model::Builder::new();
+        // Bounded preemptions keep the model small; known bugs of lock-free code need two or three.
+        builder.preemption_bound = Some(3);
+        builder.check(move || {
+            let (mut producer, mut consumer) = pair(Shared { release, ..Shared::new(2) });
+            let thread = loom::thread::spawn(move || (1..=3_u64).filter(|&n| producer.push(n)).count());
+            let mut last = 0;
+            let mut taken = 0;
+            let mut take = |consumer: &mut Consumer<u64>| {
+                if let Some(value) = consumer.pop() {
+                    assert!(value > last);
+                    last = value;
+                    taken += 1;
+                }
+            };
+            take(&mut consumer);
+            take(&mut consumer);
+            let pushed = thread.join().unwrap();
+            take(&mut consumer);
+            take(&mut consumer);
+            assert_eq!(taken, pushed);
+            assert_eq!(pushed as u64 + consumer.lost(), 3);
+        });
+    }
+
+    #[test]
+    fn loom_every_interleaving_keeps_order_and_count() {
+        model(Ordering::Release);
+    }
+
+    #[test]
+    #[should_panic(expected = "Causality violation")]
+    fn loom_catches_a_relaxed_ring() {
+        model(Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,165 @@
+//! The admission check: a graph that cannot work is refused when it is built, with the values that failed.
+
+use super::rate_group::{OverrunPolicy, RateGroup};
+use crate::error::{Error, ErrorKind};
+use std::collections::BTreeMap;
+
+/// Records carry the group's number in 16 bits; far fewer make sense.
+const MAX_GROUPS: usize = 256;
+
+/// Checks the groups of a graph against each other and against themselves.
+pub(crate) fn admit(groups: &[RateGroup]) -> Result<(), Error> {
+    if groups.iter().all(|group| group.observer) {
+        return Err(refuse("the graph has no group that is not an observer: it would end at once; add one"));
+    }
+    if groups.len() > MAX_GROUPS {
+        return Err(refuse(format!("{} rate groups, at most {MAX_GROUPS} are possible", groups.len())));
+    }
+    groups.iter().try_for_each(check_group)?;
+    for (index, group) in groups.iter().enumerate() {
+        for earlier in &groups[..index] {
+            check_pair(earlier, group)?;
+        }
+    }
+    check_cores(groups)
+}
+
+fn check_group(group: &RateGroup) -> Result<(), Error> {
+    let refuse = |message: String| Err(refuse(message).at(place(group)));
+    let period = group.rate.period();
+    if let Some(deadline) = group.deadline
+        && (deadline.0 == 0 || deadline > period)
+    {
+        return refuse(format!("deadline {deadline} must be above 0 and at most the period {period}"));
+    }
+    if let Some(budget) = group.budget
+        && (budget.0 == 0 || budget > group.relative_deadline())
+    {
+        let deadline = group.relative_deadline();
+        return refuse(format!(
+            "budget {budget} must be above 0 and at most the deadline {deadline} (period {period})"
+        ));
+    }
+    if let Some(priority) = group.priority
+        && !(1..=99).contains(&priority)
+    {
+        return refuse(format!("real-time priority {priority} must be 1 to 99"));
+    }
+    if matches!(group.overrun, OverrunPolicy::CatchUp { max: 0 }) {
+        return refuse(
+            "catching up with at most 0 releases is the policy Skip; use that or a larger number".to_owned(),
+        );
+    }
+    Ok(())
+}
+
+fn check_pair(a: &RateGroup, b: &RateGroup) -> Result<(), Error> {
+    if a.name == b.name {
+        return Err(refuse(format!("two rate groups are called `{}`; give each its own name", a.name)));
+    }
+    if let (Some(priority), Some(cpu)) = (a.priority, a.cpu)
+        && (b.priority, b.cpu) == (a.priority, a.cpu)
+    {
+        return Err(refuse(format!(
+            "rate groups `{}` and `{}` both have real-time priority {priority} on core {cpu}: one would wait for the \
+             other to sleep; give them different priorities or cores",
+            a.name, b.name
+        )));
+    }
+    Ok(())
+}
+
+/// The budgets of the groups pinned to one core must fit into its time.
+fn check_cores(groups: &[RateGroup]) -> Result<(), Error> {
+    let mut cores = BTreeMap::<usize, (f64, Vec<String>)>::new();
+    for group in groups {
+        if let (Some(cpu), Some(budget)) = (group.cpu, group.budget) {
+            let (sum, terms) = cores.entry(cpu).or_default();
+            *sum += budget.as_secs_f64() / group.rate.period_s();
+            terms.push(format!("`{}` {budget} of {}", group.name, group.rate.period()));
+        }
+    }
+    for (cpu, (sum, terms)) in cores {
+        // One part in a million of slack: budgets that fill a core exactly must not fail on the last bit.
+        if sum > 1.0 + 1e-6 {
+            return Err(refuse(format!(
+                "the budgets on core {cpu} need {:.1} % of it ({}); lower them or use another core",
+                100.0 * sum,
+                terms.join(" + ")
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn place(group: &RateGroup) -> String {
+    format!("rate group `{}`", group.name)
+}
+
+fn refuse(message: impl Into<String>) -> Error {
+    Error::new(ErrorKind::Runtime, message)
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::time::{Nanos, Rate};
+
+    fn named(name: &str) -> RateGroup {
+        RateGroup::hz(1000).name(name)
+    }
+
+    #[track_caller]
+    fn refused(groups: &[RateGroup], words: &[&str]) {
+        let error = admit(groups).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Runtime);
+        for word in words {
+            assert!(error.to_string().contains(word), "`{word}` is not in: {error}");
+        }
+    }
+
+    #[test]
+    fn a_deadline_beyond_the_period_is_refused_with_both_values() {
+        refused(&[named("a").deadline(Nanos(1_500_000))], &["rate group `a`", "1.5ms", "1ms"]);
+        refused(&[named("a").deadline(Nanos(0))], &["above 0"]);
+        assert!(admit(&[named("a").deadline(Nanos(1_000_000))]).is_ok());
+    }
+
+    #[test]
+    fn a_budget_beyond_the_period_or_deadline_is_refused() {
+        refused(&[named("a").budget(Nanos(2_000_000))], &["budget 2ms", "1ms"]);
+        refused(&[named("a").deadline(Nanos(200_000)).budget(Nanos(300_000))], &["300µs", "200µs"]);
+    }
+
+    #[test]
+    fn a_latency_beyond_the_period_is_allowed() {
+        assert!(admit(&[named("a").latency(Nanos(5_000_000))]).is_ok());
+    }
+
+    #[test]
+    fn equal_real_time_priorities_on_one_core_are_refused() {
+        refused(&[named("a").realtime(80).pin(1), named("b").realtime(80).pin(1)], &["`a` and `b`", "80", "core 1"]);
+        assert!(admit(&[named("a").realtime(80).pin(1), named("b").realtime(80).pin(0)]).is_ok());
+        assert!(admit(&[named("a").realtime(80).pin(1), named("b").realtime(79).pin(1)]).is_ok());
+        assert!(admit(&[named("a").realtime(80), named("b").realtime(80)]).is_ok());
+        refused(&[named("a").realtime(0)], &["priority 0"]);
+        refused(&[named("a").realtime(100)], &["priority 100"]);
+    }
+
+    #[test]
+    fn budgets_that_overfill_a_core_are_refused_with_the_sum() {
+        let slow = RateGroup::new(Rate::hz(30)).name("slow").pin(1).budget(Nanos(20_000_000));
+        refused(
+            &[named("fast").pin(1).budget(Nanos(500_000)), slow.clone()],
+            &["core 1", "110.0 %", "`fast`", "`slow`"],
+        );
+        assert!(admit(&[named("fast").pin(0).budget(Nanos(500_000)), slow]).is_ok());
+    }
+
+    #[test]
+    fn names_are_unique_and_something_must_run() {
+        refused(&[named("a"), named("b"), named("a")], &["called `a`"]);
+        refused(&[], &["no group"]);
+        refused(&[named("a").observer()], &["observer"]);
+    }
+}

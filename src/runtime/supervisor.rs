@@ -1,0 +1,120 @@
+//! Who is still running, what went wrong first, and in which order things stop.
+//!
+//! Order: a stop is requested (by the program, by a signal, by a fault); every group that is no observer ends after the
+//! release it is in and stops its actors; then every observer ticks once more, sees all they left behind, and stops.
+
+use super::report::{GroupReport, RuntimeFault};
+use super::sync::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::Arc;
+
+/// Flags that all threads of a run share.
+#[derive(Debug)]
+pub(crate) struct Control {
+    stop: AtomicBool,
+    /// Groups that are no observers and have not ended.
+    active: AtomicUsize,
+    /// Set when a group is given up, so that observers no longer wait for it.
+    abandoned: AtomicBool,
+}
+
+impl Control {
+    pub(crate) fn new(active: usize) -> Arc<Self> {
+        let (stop, abandoned) = (AtomicBool::new(false), AtomicBool::new(false));
+        Arc::new(Self { stop, active: AtomicUsize::new(active), abandoned })
+    }
+
+    pub(crate) fn request_stop(&self) {
+        // Relaxed, here and where it is read: it says only that it is time to go; data travels by other ways.
+        self.stop.store(true, Ordering::Relaxed);
+    }
+
+    pub(crate) fn stop_requested(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Called once by each group that is no observer, when its actors are gone.
+    pub(crate) fn group_ended(&self) {
+        // Release: with the acquire in `observers_may_end`, so that an observer's last tick sees all that was recorded.
+        self.active.fetch_sub(1, Ordering::Release);
+    }
+
+    pub(crate) fn abandon(&self) {
+        self.abandoned.store(true, Ordering::Relaxed);
+    }
+
+    pub(crate) fn observers_may_end(&self) -> bool {
+        // Acquire: with the release in `group_ended`; the subtractions are one release sequence.
+        self.active.load(Ordering::Acquire) == 0 || self.abandoned.load(Ordering::Relaxed)
+    }
+}
+
+/// Asks a run to stop, from any thread, also from one that handles signals.
+#[derive(Clone, Debug)]
+pub struct StopHandle(pub(super) Arc<Control>);
+
+impl StopHandle {
+    /// Asks every group to end after the release it is in. Returns at once.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe, async-signal-safe.
+    pub fn request(&self) {
+        self.0.request_stop();
+    }
+
+    /// True once a stop was requested, by a program or by a fault.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn requested(&self) -> bool {
+        self.0.stop_requested()
+    }
+}
+
+/// What group threads tell the supervisor.
+#[derive(Debug)]
+pub(crate) enum Message {
+    /// Something fatal happened; a stop is already requested.
+    Fault(RuntimeFault),
+    /// The group with this number has ended, its actors are gone.
+    Ended(usize, Box<GroupReport>),
+}
+
+/// Collects what the groups report.
+#[derive(Debug)]
+pub(crate) struct Supervisor {
+    reports: Vec<Option<GroupReport>>,
+    fault: Option<RuntimeFault>,
+}
+
+impl Supervisor {
+    pub(crate) fn new(groups: usize) -> Self {
+        Self { reports: vec![None; groups], fault: None }
+    }
+
+    pub(crate) fn note(&mut self, message: Message) {
+        match message {
+            Message::Fault(fault) => {
+                // What follows a fault is often its consequence: the first one is the one to report.
+                self.fault.get_or_insert(fault);
+            }
+            Message::Ended(group, report) => self.reports[group] = Some(*report),
+        }
+    }
+
+    pub(crate) fn ended(&self) -> usize {
+        self.reports.iter().flatten().count()
+    }
+
+    pub(crate) fn has_ended(&self, group: usize) -> bool {
+        self.reports[group].is_some()
+    }
+
+    pub(crate) fn all_ended(&self) -> bool {
+        self.ended() == self.reports.len()
+    }
+
+    /// The reports of the groups that ended, and the first fault.
+    pub(crate) fn results(&self) -> (Vec<GroupReport>, Option<RuntimeFault>) {
+        (self.reports.iter().flatten().cloned().collect(), self.fault.clone())
+    }
+}
