@@ -1,1 +1,103 @@
-//! (helper A)
+//! Scene files: TOML text to a validated [`Scene`], every error with its line and field.
+
+use std::path::Path;
+
+use toml::de::DeTable;
+
+use super::fault::{Fault, plain_key};
+use super::locate::{line_of, offset_of, table_at};
+use super::{Scene, ToolPath, reader};
+use crate::error::{Error, ErrorKind};
+
+impl Scene {
+    /// Reads, completes and validates a scene file; the tool's path is found relative to it.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if a file cannot be read, [`ErrorKind::Scene`] with file, line, field and what would be right if
+    /// it cannot work.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let name = path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let line = line_of(error.as_bytes(), error.utf8_error().valid_up_to());
+            Error::new(ErrorKind::Scene, "is not UTF-8 text, save the file as UTF-8").at(format!("{name}:{line}"))
+        })?;
+        Self::from_toml(&text, &name, path.parent())
+    }
+
+    /// The scene in `text`; `name` stands for the file in errors, and `device.path_csv` is found in the folder `base`, or
+    /// in the current one.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn from_toml(text: &str, name: &str, base: Option<&Path>) -> Result<Self, Error> {
+        Self::from_toml_with(text, name, |path_csv| {
+            ToolPath::read_csv(&base.map_or_else(|| path_csv.to_owned(), |base| base.join(path_csv)))
+        })
+    }
+
+    /// As [`from_toml`](Self::from_toml), with the tool's path fetched by `read_path`.
+    pub(super) fn from_toml_with(
+        text: &str,
+        name: &str,
+        read_path: impl FnOnce(&Path) -> Result<ToolPath, Error>,
+    ) -> Result<Self, Error> {
+        let (document, syntax) = DeTable::parse_recoverable(text);
+        let root = document.get_ref();
+        let on_line = |error: Error, offset: usize| error.at(format!("{name}:{}", line_of(text, offset)));
+        let refuse = |fault: Fault| {
+            let error = Error::new(ErrorKind::Scene, fault.message);
+            let error = if fault.field.is_empty() { error } else { error.at(fault.field) };
+            on_line(error, fault.offset.unwrap_or(0))
+        };
+
+        if let Some(error) = syntax.first() {
+            return Err(refuse(syntax_fault(text, root, error)));
+        }
+        let mut scene: Self = reader::read(root).map_err(refuse)?;
+        scene.source = Some(text.to_owned());
+        if let Some(path_csv) = &scene.device.path_csv {
+            let read = read_path(path_csv).map_err(|error| match error.kind() {
+                // A file that is there but wrong has a line of its own to name.
+                ErrorKind::Io => on_line(error.at("device.path_csv"), offset_of(root, "device.path_csv")),
+                _ => error,
+            })?;
+            scene.device.path = Some(read);
+        }
+        scene.validate().and_then(|()| scene.check_tool()).map_err(|error| {
+            let offset = offset_of(root, error.place());
+            on_line(error, offset)
+        })?;
+        Ok(scene)
+    }
+
+    /// A scene file must move its tool itself; a program may bring a device of its own.
+    fn check_tool(&self) -> Result<(), Error> {
+        if self.device.path.is_none() && self.device.attach_node.is_none() {
+            let message = "has no tool, give path_csv (a file t_s,x_m,y_m,z_m), attach_node or both";
+            return Err(Error::scene("device", message));
+        }
+        Ok(())
+    }
+}
+
+/// toml's complaint in the form of ours; a key given twice is named with its table and its first line.
+fn syntax_fault(text: &str, root: &DeTable<'_>, error: &toml::de::Error) -> Fault {
+    let span = error.span().unwrap_or(0..0);
+    let at = |fault: Fault| fault.or_at(span.start);
+    if error.message() != "duplicate key" {
+        return at(Fault::new(format!("TOML syntax: {}", error.message())));
+    }
+    let key = text.get(span.clone()).unwrap_or_default().trim_matches(['"', '\'']);
+    let line = line_of(text, span.start);
+    let is_header = text.lines().nth(line - 1).is_some_and(|line| line.trim_start().starts_with('['));
+    let table = if is_header { String::new() } else { table_at(root, span.start) };
+    let field = if table.is_empty() { plain_key(key) } else { format!("{table}.{}", plain_key(key)) };
+    let first = line_of(text, offset_of(root, &field));
+    let message = if is_header || first >= line {
+        "is given twice, keep one".to_owned()
+    } else {
+        format!("is given twice, first on line {first}, keep one")
+    };
+    at(Fault { field, offset: None, message })
+}

@@ -5,16 +5,35 @@
 
 use crate::error::Error;
 
+mod body;
+mod check;
+mod contact;
+mod device;
+mod models;
 mod path;
+mod path_csv;
+mod quote;
 mod validate;
 
 #[cfg(feature = "scene")]
 mod demo;
 #[cfg(feature = "scene")]
+mod fault;
+#[cfg(feature = "scene")]
 mod file;
 #[cfg(feature = "scene")]
+mod friction;
+#[cfg(feature = "scene")]
 mod locate;
+#[cfg(feature = "scene")]
+mod reader;
+#[cfg(feature = "scene")]
+mod suggest;
 
+pub use body::{BlockSpec, BodyKind, BodySpec, Face, MaterialSpec};
+pub use contact::{ContactEquations, ContactSpec, Friction, NormalKind};
+pub use device::{DeviceKind, DeviceSpec, SafetySpec};
+pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec};
 pub use path::ToolPath;
 
 /// Everything a run needs to know.
@@ -50,275 +69,6 @@ pub struct Scene {
     /// The file that the scene was read from, as text; it is attached to the log.
     #[cfg_attr(feature = "scene", serde(skip))]
     pub source: Option<String>,
-}
-
-/// A block of nodes joined by springs to all 26 neighbours.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
-pub struct BodySpec {
-    /// The kind of body; `mass_spring` is the only one in scene files.
-    #[cfg_attr(feature = "scene", serde(default))]
-    pub kind: BodyKind,
-    /// Its shape.
-    pub block: BlockSpec,
-    /// What it is made of.
-    pub material: MaterialSpec,
-}
-
-/// The kinds of body that a scene file can name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum BodyKind {
-    /// Point masses and springs.
-    #[default]
-    MassSpring,
-}
-
-/// A block's lattice.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
-pub struct BlockSpec {
-    /// Nodes per axis, at least 2 each; node id = i + nx (j + ny k).
-    pub nodes: [usize; 3],
-    /// Edge lengths [m].
-    pub size_m: [f64; 3],
-    /// Faces held stationary.
-    #[cfg_attr(feature = "scene", serde(default = "default_fixed"))]
-    pub fixed: Vec<Face>,
-}
-
-/// A face of the block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-#[allow(missing_docs)]
-pub enum Face {
-    XMin,
-    XMax,
-    YMin,
-    YMax,
-    ZMin,
-    ZMax,
-}
-
-#[cfg(feature = "scene")]
-fn default_fixed() -> Vec<Face> {
-    vec![Face::ZMin]
-}
-
-/// One material for all springs and nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
-pub struct MaterialSpec {
-    /// Mass of every node [kg].
-    pub node_mass_kg: f64,
-    /// Stiffness k of every spring [N/m].
-    pub stiffness_n_per_m: f64,
-    /// zeta in b = zeta sqrt(2 m k), the paper's definition.
-    pub damping_ratio: f64,
-}
-
-/// How the tool touches the body.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
-pub struct ContactSpec {
-    /// Coulomb friction.
-    pub friction: Friction,
-    /// Which normal a contact uses.
-    pub normals: NormalKind,
-    /// Which equations resolve it.
-    pub equations: ContactEquations,
-}
-
-/// Coulomb friction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Friction {
-    /// The coefficient mu >= 0.
-    Coefficient(f64),
-    /// Unbounded: a touching tool sticks until it is pulled off.
-    Stick,
-}
-
-impl Default for Friction {
-    fn default() -> Self {
-        Self::Coefficient(0.0)
-    }
-}
-
-impl Friction {
-    /// The coefficient; infinite for [`Friction::Stick`].
-    pub fn coefficient(self) -> f64 {
-        match self {
-            Self::Coefficient(mu) => mu,
-            Self::Stick => f64::INFINITY,
-        }
-    }
-}
-
-/// Which normal a contact uses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum NormalKind {
-    /// Unit vertex normals interpolated over the triangle: continuous along the surface.
-    #[default]
-    Interpolated,
-    /// The triangle's own normal, as printed in the paper.
-    Face,
-}
-
-/// Which equations resolve the contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum ContactEquations {
-    /// Velocity level, mass-weighted.
-    #[default]
-    Corrected,
-    /// The paper's printed equations (10) to (31), to show the difference.
-    Paper,
-}
-
-/// The slow, detailed simulation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
-pub struct GlobalSpec {
-    /// Releases per second.
-    pub rate_hz: f64,
-    /// Explicit steps per millisecond; chosen from the stability limit if absent.
-    pub substeps_per_ms: Option<u32>,
-    /// Virtual time: how long after its release a result becomes visible [ms].
-    pub compute_latency_ms: f64,
-}
-
-impl Default for GlobalSpec {
-    fn default() -> Self {
-        Self { rate_hz: 30.0, substeps_per_ms: None, compute_latency_ms: 0.0 }
-    }
-}
-
-/// The fast, small simulation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
-pub struct LocalSpec {
-    /// Releases per second.
-    pub rate_hz: f64,
-    /// Which local model.
-    pub model: LocalModelKind,
-    /// Patch window: nodes along the surface, along it, into depth.
-    pub patch: [usize; 3],
-    /// What the global model learns from the local one.
-    pub feedback: Option<Feedback>,
-    /// How a resync's discontinuity is spread.
-    pub blend: BlendSpec,
-}
-
-impl Default for LocalSpec {
-    fn default() -> Self {
-        Self {
-            rate_hz: 1000.0,
-            model: LocalModelKind::default(),
-            patch: [4, 4, 2],
-            feedback: None,
-            blend: BlendSpec::default(),
-        }
-    }
-}
-
-/// The local models.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum LocalModelKind {
-    /// The whole body at the haptic rate: the reference that the others are measured against.
-    Full,
-    /// The last force of the global model.
-    Hold,
-    /// The paper's: a linear patch in fixed surroundings.
-    #[default]
-    Patch,
-}
-
-impl LocalModelKind {
-    /// Every model, in order of cost.
-    pub const ALL: [Self; 3] = [Self::Hold, Self::Patch, Self::Full];
-
-    /// Its name in scene files and tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Full => "full",
-            Self::Hold => "hold",
-            Self::Patch => "patch",
-        }
-    }
-}
-
-/// What the global model learns from the local one, besides the tool's trajectory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum Feedback {
-    /// Nothing: it resolves the contact along the tool's trajectory itself.
-    Trajectory,
-    /// The patch's positions, velocities and contact replace its own: the paper's.
-    Geometry,
-}
-
-/// How a resync's discontinuity is spread over time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
-pub struct BlendSpec {
-    /// The way.
-    pub kind: BlendKind,
-    /// How long [ms]; not used by `none`.
-    #[cfg_attr(feature = "scene", serde(default))]
-    pub ms: f64,
-}
-
-/// The ways of blending.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum BlendKind {
-    /// The new model's force at once.
-    #[default]
-    None,
-    /// Old and new model both run; the force moves linearly from one to the other.
-    Crossfade,
-}
-
-/// What moves the tool.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
-pub struct DeviceSpec {
-    /// The kind of device.
-    pub kind: DeviceKind,
-    /// A CSV file `t_s,x_m,y_m,z_m`, relative to the scene file.
-    pub path_csv: Option<std::path::PathBuf>,
-    /// The tool is glued to this node.
-    pub attach_node: Option<[usize; 3]>,
-    /// The path itself: read from `path_csv`, or given by a program.
-    #[cfg_attr(feature = "scene", serde(skip))]
-    pub path: Option<ToolPath>,
-}
-
-/// The devices that a scene file can name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum DeviceKind {
-    /// A tool that follows a path and ignores the force.
-    #[default]
-    Scripted,
-}
-
-/// Limits on what reaches the device.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
-pub struct SafetySpec {
-    /// Largest force [N]; the device's own limit if absent.
-    pub max_force_n: Option<f64>,
-    /// Largest change of the force [N/ms].
-    pub max_slew_n_per_ms: f64,
-}
-
-impl Default for SafetySpec {
-    fn default() -> Self {
-        Self { max_force_n: None, max_slew_n_per_ms: 0.5 }
-    }
 }
 
 /// A static equilibrium to start from, at rest, released at t = 0.
@@ -371,5 +121,15 @@ impl Scene {
     /// [`ErrorKind::Scene`](crate::error::ErrorKind::Scene), with the field's dotted path as its place.
     pub fn validate(&self) -> Result<(), Error> {
         validate::validate(self)
+    }
+
+    /// The same scene with another local model, without a feedback that only the former model can give.
+    #[must_use]
+    pub fn with_model(mut self, model: LocalModelKind) -> Self {
+        if !self.local.feedback.is_none_or(|feedback| feedback.fits(model)) {
+            self.local.feedback = None;
+        }
+        self.local.model = model;
+        self
     }
 }

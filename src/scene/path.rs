@@ -1,5 +1,13 @@
 //! The path of a scripted tool.
 
+use std::path::Path;
+
+use super::path_csv;
+use crate::error::{Error, ErrorKind};
+
+/// No coordinate of a tool lies farther out than this [m]; it keeps every difference of positions finite.
+const FARTHEST_M: f64 = 1e6;
+
 /// Tool positions over time, linear in between, held after the last and before the first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToolPath {
@@ -7,4 +15,118 @@ pub struct ToolPath {
     times_s: Vec<f64>,
     /// Positions [m], one per time.
     positions_m: Vec<[f64; 3]>,
+}
+
+impl ToolPath {
+    /// A path through `positions_m` [m] at `times_s` [s].
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] if there is no sample, the lengths differ, a number is not finite, the first time is negative
+    /// or a time is not after the one before.
+    pub fn new(times_s: Vec<f64>, positions_m: Vec<[f64; 3]>) -> Result<Self, Error> {
+        if times_s.len() != positions_m.len() {
+            let (times, positions) = (times_s.len(), positions_m.len());
+            let message = format!("{times} times and {positions} positions, there must be one position per time");
+            return Err(Error::new(ErrorKind::Scene, message));
+        }
+        if times_s.is_empty() {
+            return Err(Error::new(ErrorKind::Scene, "no sample, a path needs at least one"));
+        }
+        let mut before_s = None;
+        for (index, (&time_s, position_m)) in times_s.iter().zip(&positions_m).enumerate() {
+            check_sample(before_s, time_s, position_m)
+                .map_err(|message| Error::new(ErrorKind::Scene, message).at(format!("sample {index}")))?;
+            before_s = Some(time_s);
+        }
+        Ok(Self { times_s, positions_m })
+    }
+
+    /// A tool that stays at `position_m` [m].
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] if a coordinate is not finite.
+    pub fn constant(position_m: [f64; 3]) -> Result<Self, Error> {
+        Self::new(vec![0.0], vec![position_m])
+    }
+
+    /// Reads a file with the columns `t_s,x_m,y_m,z_m`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if the file cannot be read, [`ErrorKind::Scene`] with its name and line if a row is unusable.
+    pub fn read_csv(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+        Self::from_csv(&text, &path.display().to_string())
+    }
+
+    /// Reads the text of a file with the columns `t_s,x_m,y_m,z_m`; `name` stands for the file in errors.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] with `name` and the line if the header or a row is unusable.
+    pub fn from_csv(text: &str, name: &str) -> Result<Self, Error> {
+        let (times_s, positions_m) = path_csv::parse(text, name)?;
+        Ok(Self { times_s, positions_m })
+    }
+
+    /// The position [m] at `time_s` [s]: a sample's own value at its time, linear in between, held outside.
+    ///
+    /// # Real-time
+    /// Real-time safe: allocates nothing, bounded by a binary search over the samples.
+    pub fn at(&self, time_s: f64) -> [f64; 3] {
+        let next = self.times_s.partition_point(|&sample_s| sample_s <= time_s);
+        if next == 0 {
+            return self.positions_m[0];
+        }
+        let (from_s, from_m) = (self.times_s[next - 1], self.positions_m[next - 1]);
+        // Equality is exact on purpose: a sample's own time must give its own value to the last bit.
+        if next == self.times_s.len() || time_s == from_s {
+            return from_m;
+        }
+        let (to_s, to_m) = (self.times_s[next], self.positions_m[next]);
+        let share = (time_s - from_s) / (to_s - from_s);
+        std::array::from_fn(|axis| from_m[axis] + share * (to_m[axis] - from_m[axis]))
+    }
+
+    /// The time of the last sample [s]; the tool stays there from then on.
+    ///
+    /// # Real-time
+    /// Real-time safe.
+    pub fn duration_s(&self) -> f64 {
+        self.times_s[self.times_s.len() - 1]
+    }
+
+    /// The times of the samples [s], strictly increasing.
+    pub fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
+    /// The positions of the samples [m], one per time.
+    pub fn positions_m(&self) -> &[[f64; 3]] {
+        &self.positions_m
+    }
+}
+
+/// What is wrong with a sample after one at `before_s`, and what would be right.
+pub(super) fn check_sample(before_s: Option<f64>, time_s: f64, position_m: &[f64; 3]) -> Result<(), String> {
+    if !time_s.is_finite() {
+        return Err(format!("t_s is {time_s}, must be a finite number"));
+    }
+    if time_s < 0.0 {
+        return Err(format!("t_s is {time_s}, a path starts at 0 or later"));
+    }
+    if let Some(before_s) = before_s
+        && time_s <= before_s
+    {
+        return Err(format!("t_s is {time_s} after {before_s}, times must increase from row to row"));
+    }
+    for (name, value) in ["x_m", "y_m", "z_m"].into_iter().zip(position_m) {
+        if !value.is_finite() {
+            return Err(format!("{name} is {value}, must be a finite number"));
+        }
+        if value.abs() > FARTHEST_M {
+            return Err(format!(
+                "{name} is {value}, must lie within {FARTHEST_M} m of the origin (the unit is the metre)"
+            ));
+        }
+    }
+    Ok(())
 }

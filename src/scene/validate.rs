@@ -1,8 +1,213 @@
 //! The one validation that builder and scene files pass through.
 
-use super::Scene;
+use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
+use super::{
+    BlendKind, BlockSpec, BodySpec, DeviceSpec, Face, Friction, GlobalSpec, InitialSpec, LocalModelKind, LocalSpec,
+    SafetySpec, Scene,
+};
 use crate::error::Error;
+use crate::time::Rate;
 
-pub(super) fn validate(_scene: &Scene) -> Result<(), Error> {
+/// Largest body; a million nodes have 13 million springs, minutes of work for a second of simulation.
+const MAX_NODES: usize = 1_000_000;
+/// Longest edge or offset [m]; a larger number has the wrong unit.
+const MAX_LENGTH_M: f64 = 1e3;
+/// The contact takes a smaller triangle (twice its area) for none.
+const MIN_TRIANGLE_M2: f64 = 1e-14;
+/// Steps of 0.1 us: whatever needs more is no deformable body.
+const MAX_SUBSTEPS_PER_MS: u32 = 10_000;
+/// Eleven days.
+const MAX_DURATION_S: f64 = 1e6;
+
+pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
+    let block = &scene.body.block;
+    body(&scene.body)?;
+    if let Friction::Coefficient(coefficient) = scene.contact.friction
+        && !(coefficient.is_finite() && coefficient >= 0.0)
+    {
+        let message = format!("is {coefficient}, must be a finite number of at least 0 or \"stick\" (no bound)");
+        return Err(Error::scene("contact.friction", message));
+    }
+    global(&scene.global)?;
+    local(&scene.local, &scene.global, block)?;
+    device(&scene.device, block)?;
+    safety(&scene.safety)?;
+    if let Some(spec) = &scene.initial {
+        initial(spec, block)?;
+    }
+    for (index, probe) in scene.probes.iter().enumerate() {
+        inside(&format!("probe[{index}].node"), probe.node, block)?;
+    }
+    duration(scene.run.duration_s, scene.local.rate_hz)
+}
+
+fn body(body: &BodySpec) -> Result<(), Error> {
+    lattice(&body.block)?;
+    let material = &body.material;
+    positive("body.material.node_mass_kg", material.node_mass_kg)?;
+    positive("body.material.stiffness_n_per_m", material.stiffness_n_per_m)?;
+    not_negative("body.material.damping_ratio", material.damping_ratio)?;
+    let (m, k) = (material.node_mass_kg, material.stiffness_n_per_m);
+    let damping_n_s_per_m = material.damping_ratio * (2.0 * m * k).sqrt();
+    if !((k / m).is_finite() && damping_n_s_per_m.is_finite() && (damping_n_s_per_m / m).is_finite()) {
+        let message = "stiffness or damping over mass is beyond all numbers, check the units (kg, N/m)";
+        return Err(Error::scene("body.material", message));
+    }
+    Ok(())
+}
+
+fn lattice(block: &BlockSpec) -> Result<(), Error> {
+    let (nodes, size_m) = (block.nodes, block.size_m);
+    if nodes.iter().any(|&count| count < 2) {
+        return Err(Error::scene("body.block.nodes", format!("is {nodes:?}, must be at least 2 along every axis")));
+    }
+    let total = nodes.iter().try_fold(1_usize, |total, &count| total.checked_mul(count));
+    if total.is_none_or(|total| total > MAX_NODES) {
+        let message = format!("is {nodes:?}, must be at most {MAX_NODES} nodes in all");
+        return Err(Error::scene("body.block.nodes", message));
+    }
+    lengths_within("body.block.size_m", size_m, MAX_LENGTH_M)?;
+    if let Some(edge_m) = size_m.iter().find(|&&edge_m| edge_m <= 0.0) {
+        let message = format!("is {size_m:?}, every edge must be above 0 m and one is {edge_m}");
+        return Err(Error::scene("body.block.size_m", message));
+    }
+    let spacing_m: [f64; 3] = std::array::from_fn(|axis| size_m[axis] / (nodes[axis] - 1) as f64);
+    for [a, b] in [[0, 1], [0, 2], [1, 2]] {
+        if spacing_m[a] * spacing_m[b] < MIN_TRIANGLE_M2 {
+            let message = format!(
+                "puts nodes {} m and {} m apart, which is too small for contact, make the body larger or its nodes fewer",
+                spacing_m[a], spacing_m[b]
+            );
+            return Err(Error::scene("body.block.size_m", message));
+        }
+    }
+    let is_free = |axis: usize| {
+        let held = Face::ALL.iter().filter(|face| face.axis() == axis && block.fixed.contains(face)).count();
+        nodes[axis] > held
+    };
+    if Face::ALL.iter().all(|face| block.fixed.contains(face)) {
+        return Err(Error::scene("body.block.fixed", "holds all six faces, leave one free to be touched"));
+    }
+    if !(0..3).all(is_free) {
+        let message = "holds every node, leave a face free or put nodes between the fixed ones";
+        return Err(Error::scene("body.block.fixed", message));
+    }
+    Ok(())
+}
+
+fn rate(field: &str, hz: f64) -> Result<(), Error> {
+    if Rate::from_hz(hz).is_some() {
+        return Ok(());
+    }
+    Err(Error::scene(field, format!("is {hz}, must be 0.001 to 1000000 Hz with at most six decimals")))
+}
+
+fn global(global: &GlobalSpec) -> Result<(), Error> {
+    rate("global.rate_hz", global.rate_hz)?;
+    if let Some(substeps) = global.substeps_per_ms
+        && !(1..=MAX_SUBSTEPS_PER_MS).contains(&substeps)
+    {
+        let message = format!(
+            "is {substeps}, must be 1 to {MAX_SUBSTEPS_PER_MS}; leave it out to have it chosen from the stability limit"
+        );
+        return Err(Error::scene("global.substeps_per_ms", message));
+    }
+    not_negative("global.compute_latency_ms", global.compute_latency_ms)
+}
+
+fn local(local: &LocalSpec, global: &GlobalSpec, block: &BlockSpec) -> Result<(), Error> {
+    rate("local.rate_hz", local.rate_hz)?;
+    if local.rate_hz < global.rate_hz {
+        let message = format!("is {}, must be at least global.rate_hz, {}", local.rate_hz, global.rate_hz);
+        return Err(Error::scene("local.rate_hz", message));
+    }
+    // A body too small for the default patch is fine for the models that have none; a patch that was asked for is not.
+    if local.model == LocalModelKind::Patch || local.patch != LocalSpec::default().patch {
+        patch(local.patch, block)?;
+    }
+    if let Some(feedback) = local.feedback
+        && !feedback.fits(local.model)
+    {
+        let message =
+            format!("\"geometry\" needs model = \"patch\" and the model is {:?}, leave it out", local.model.name());
+        return Err(Error::scene("local.feedback", message));
+    }
+    not_negative("local.blend.ms", local.blend.ms)?;
+    if local.blend.kind == BlendKind::Crossfade && local.blend.ms == 0.0 {
+        return Err(Error::scene("local.blend.ms", "is 0 or missing, a crossfade needs a time above 0 such as 10"));
+    }
+    Ok(())
+}
+
+/// The tool may wander over an edge, so the window must fit every face that can be touched: the ones that are not fixed.
+fn patch(patch: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
+    let mut largest = [usize::MAX; 3];
+    for face in Face::ALL.iter().filter(|face| !block.fixed.contains(face)) {
+        let across = face.axis();
+        let [first, second] = [[1, 2], [0, 2], [0, 1]][across];
+        for (limit, axis) in largest.iter_mut().zip([first, second, across]) {
+            *limit = (*limit).min(block.nodes[axis]);
+        }
+    }
+    if (0..3).all(|part| (2..=largest[part]).contains(&patch[part])) {
+        return Ok(());
+    }
+    let message = format!(
+        "is {patch:?}, must be [2, 2, 2] to {largest:?} to fit every free face of the body of {:?} nodes",
+        block.nodes
+    );
+    Err(Error::scene("local.patch", message))
+}
+
+fn device(device: &DeviceSpec, block: &BlockSpec) -> Result<(), Error> {
+    if device.path_csv.is_some() && device.path.is_none() {
+        let message = "was not read, use Scene::load, or set device.path to a ToolPath";
+        return Err(Error::scene("device.path_csv", message));
+    }
+    let Some(node) = device.attach_node else { return Ok(()) };
+    let field = "device.attach_node";
+    movable(field, node, block, "the tool could not move it")?;
+    if !on_surface(node, block.nodes) {
+        let message = format!("{node:?} is inside the body, the tool can only be glued to a node of the surface");
+        return Err(Error::scene(field, message));
+    }
+    Ok(())
+}
+
+fn safety(safety: &SafetySpec) -> Result<(), Error> {
+    if let Some(force_n) = safety.max_force_n {
+        positive("safety.max_force_n", force_n)?;
+    }
+    positive("safety.max_slew_n_per_ms", safety.max_slew_n_per_ms)
+}
+
+fn initial(initial: &InitialSpec, block: &BlockSpec) -> Result<(), Error> {
+    let pulled = initial.pull.node;
+    movable("initial.pull.node", pulled, block, "it cannot be pulled")?;
+    lengths_within("initial.pull.offset_m", initial.pull.offset_m, MAX_LENGTH_M)?;
+    for &node in &initial.hold {
+        inside("initial.hold", node, block)?;
+        if node == pulled {
+            return Err(Error::scene(
+                "initial.hold",
+                format!("{node:?} is the pulled node, it cannot be held as well"),
+            ));
+        }
+    }
+    if block.fixed.is_empty() {
+        let message = "needs a fixed face: a body that floats has no equilibrium, set body.block.fixed";
+        return Err(Error::scene("initial.pull", message));
+    }
+    Ok(())
+}
+
+fn duration(duration_s: f64, haptic_rate_hz: f64) -> Result<(), Error> {
+    positive("run.duration_s", duration_s)?;
+    let period_s = 1.0 / haptic_rate_hz;
+    // Half a period of tolerance: 0.003 at 333.3 Hz is one tick, whatever the last digit says.
+    if duration_s > MAX_DURATION_S || duration_s < 0.5 * period_s {
+        let message = format!("is {duration_s}, must be one haptic period ({period_s} s) to {MAX_DURATION_S} s");
+        return Err(Error::scene("run.duration_s", message));
+    }
     Ok(())
 }

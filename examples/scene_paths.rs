@@ -1,0 +1,94 @@
+//! Writes `scenes/paths/*.csv`, the tool paths of the scenes, from their formulas.
+//!
+//! Run it after changing a formula: `cargo run --example scene_paths`. A test compares the committed files with it.
+
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Distance of neighbouring nodes in every scene: 12 nodes over 0.1 m [m].
+const SPACING_M: f64 = 0.1 / 11.0;
+
+/// The position [m] at a time [s].
+type Formula = fn(f64) -> [f64; 3];
+
+/// Name, length [s] and formula of every path file.
+const PATHS: [(&str, f64, Formula); 5] = [
+    ("demo.csv", 5.0, demo),
+    ("drag.csv", 2.5, drag),
+    ("hand.csv", 0.8, hand),
+    ("hover.csv", 0.0, hover),
+    ("pull_release.csv", 1.0, pull_release),
+];
+
+/// The minimum-jerk step from 0 to 1: how a hand moves from one point to another.
+fn min_jerk(u: f64) -> f64 {
+    let u = u.clamp(0.0, 1.0);
+    u * u * u * (10.0 + u * (6.0 * u - 15.0))
+}
+
+/// A press of 10 mm, a drag, a circle, a lift and two taps.
+fn demo(t: f64) -> [f64; 3] {
+    const RADIUS_M: f64 = 0.012;
+    let angle = 2.0 * PI * min_jerk((t - 2.0) / 1.4);
+    let tap = |start_s: f64| 0.011 * (PI * ((t - start_s) / 0.4).clamp(0.0, 1.0)).sin().powi(2);
+    let x = 0.03 + 0.035 * min_jerk((t - 1.0) / 1.0) - RADIUS_M * (1.0 - angle.cos());
+    let y = 0.0512 + RADIUS_M * angle.sin();
+    let z = 0.105 - 0.015 * min_jerk((t - 0.2) / 0.6) + 0.015 * min_jerk((t - 3.4) / 0.4) - tap(4.0) - tap(4.5);
+    [x, y, z]
+}
+
+/// Press 8 mm deep, drag 25 mm along x, lift: the reference's drag.
+fn drag(t: f64) -> [f64; 3] {
+    let x = 0.025 + 0.025 * min_jerk((t - 0.5) / 1.5);
+    let z = 0.101 - 0.009 * min_jerk(t / 0.3) + 0.011 * min_jerk((t - 2.2) / 0.3);
+    [x, 0.0512, z]
+}
+
+/// Node [5, 5, 11] in a hand that trembles at 2, 3 and 5 Hz.
+fn hand(t: f64) -> [f64; 3] {
+    let wave = |hz: f64| (2.0 * PI * hz * t).sin();
+    let grown = min_jerk(t / 0.2);
+    let x = 5.0 * SPACING_M + grown * 0.004 * wave(3.0);
+    let z = 0.1 + grown * (-0.008 * wave(2.0) - 0.004 * wave(5.0));
+    [x, 5.0 * SPACING_M, z]
+}
+
+/// 1 cm above node [8, 5, 11], motionless.
+fn hover(_: f64) -> [f64; 3] {
+    [8.0 * SPACING_M, 5.0 * SPACING_M, 0.11]
+}
+
+/// Node [5, 5, 11] pulled up 2 cm and let back.
+fn pull_release(t: f64) -> [f64; 3] {
+    let z = 0.1 + 0.02 * min_jerk(t / 0.4) * (1.0 - min_jerk((t - 0.6) / 0.4));
+    [5.0 * SPACING_M, 5.0 * SPACING_M, z]
+}
+
+/// File names and contents of all paths: a row per millisecond, without the rows inside a stretch of rest.
+pub fn files() -> Vec<(&'static str, String)> {
+    PATHS.iter().map(|&(name, length_s, position)| (name, csv(length_s, position))).collect()
+}
+
+fn csv(length_s: f64, position: Formula) -> String {
+    let time_s = |row: usize| row as f64 / 1000.0;
+    let last = (length_s * 1000.0).round() as usize;
+    let rows: Vec<[f64; 3]> = (0..=last).map(|row| position(time_s(row))).collect();
+    let mut text = String::from("t_s,x_m,y_m,z_m\n");
+    for (row, position @ [x, y, z]) in rows.iter().enumerate() {
+        let rests = row > 0 && row < last && rows[row - 1] == *position && rows[row + 1] == *position;
+        if !rests {
+            writeln!(text, "{},{x},{y},{z}", time_s(row)).expect("a String takes every text");
+        }
+    }
+    text
+}
+
+fn main() -> std::io::Result<()> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paths");
+    for (name, text) in files() {
+        std::fs::write(folder.join(name), &text)?;
+        println!("scenes/paths/{name}: {} rows", text.lines().count() - 1);
+    }
+    Ok(())
+}
