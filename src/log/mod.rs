@@ -1,10 +1,47 @@
 //! What a run leaves behind: typed records, and MCAP files with protobuf messages.
 //!
-//! [`LogRecord`] is what actors record and analysis reads; it is there without the `log` feature too, for programs
-//! that keep records in memory.
+//! [`LogRecord`] is what actors record and [`Analysis`] reads; both are there without the `log` feature too, for
+//! programs that keep records in memory. With it, [`McapWriter`] and [`LogReader`] keep them in files that any MCAP
+//! viewer opens.
 
+mod analysis;
+mod entry;
+mod environment;
+mod event;
+mod group;
+mod haptics;
+mod percentiles;
 mod records;
+mod stats;
 
+#[cfg(feature = "log")]
+mod chunk;
+#[cfg(feature = "log")]
+mod convert;
+#[cfg(feature = "log")]
+mod framing;
+#[cfg(feature = "log")]
+mod reader;
+#[cfg(feature = "log")]
+mod schema;
+#[cfg(feature = "log")]
+pub(crate) mod topic;
+#[cfg(feature = "log")]
+mod writer;
+
+pub use analysis::{Analysis, RunReport};
+pub use entry::LogEntry;
+pub use environment::{Environment, Execution, GroupInfo};
+pub use event::{Level, TextEvent};
+pub use group::{CauseCounts, GroupReport};
+pub use haptics::{ContactReport, ForceReport, LimitReport, ResyncReport};
+pub use percentiles::{Distribution, Magnitudes, Percentiles};
 pub use records::{
     CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ToolSample,
 };
+pub use stats::{GroupStats, StatsCounter};
+
+#[cfg(feature = "log")]
+pub use reader::LogReader;
+#[cfg(feature = "log")]
+pub use writer::McapWriter;

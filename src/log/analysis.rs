@@ -1,0 +1,260 @@
+//! What happened in a run, from its records, in one pass.
+
+use std::collections::BTreeMap;
+
+use super::entry::LogEntry;
+use super::environment::{Environment, Execution};
+use super::event::{Level, TextEvent};
+use super::group::{GroupCounter, GroupReport};
+use super::haptics::{ContactReport, ForceReport, HapticsCounter, LimitReport, ResyncReport};
+use super::records::LogRecord;
+use crate::runtime::record::Event;
+use crate::time::Nanos;
+
+/// Events that a report lists; the others are only counted.
+const EVENTS_KEPT: usize = 100;
+
+/// What [`Analysis`] found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RunReport {
+    /// About the run as a whole, if it is known.
+    pub environment: Option<Environment>,
+    /// The time of the last record.
+    pub duration: Nanos,
+    /// The rate groups in their order.
+    pub groups: Vec<GroupReport>,
+    /// Resyncs.
+    pub resyncs: ResyncReport,
+    /// The force.
+    pub force: ForceReport,
+    /// The contact.
+    pub contact: ContactReport,
+    /// The safety pipeline.
+    pub limits: LimitReport,
+    /// The first events, in words.
+    pub events: Vec<TextEvent>,
+    /// The number of all events.
+    pub event_count: u64,
+    /// The gravest event.
+    pub worst_event: Option<Level>,
+    /// What is wrong with the log that the records came from; set by whoever read it.
+    pub damage: Option<String>,
+}
+
+impl RunReport {
+    /// True if the run was in simulated time, where lateness is zero by construction.
+    pub fn is_virtual(&self) -> bool {
+        self.environment.as_ref().is_some_and(|environment| environment.execution == Execution::Virtual)
+    }
+
+    /// Records lost because a ring was full, all groups together.
+    pub fn lost_records(&self) -> u64 {
+        self.groups.iter().map(|group| group.lost_records).sum()
+    }
+
+    /// Periods skipped, all groups together.
+    pub fn skipped(&self) -> u64 {
+        self.groups.iter().map(|group| group.skipped.total()).sum()
+    }
+
+    /// Deadlines missed, all groups together.
+    pub fn missed(&self) -> u64 {
+        self.groups.iter().map(|group| group.missed.total()).sum()
+    }
+}
+
+/// Gathers a [`RunReport`] from records in any order that is in time order within each group.
+///
+/// Memory grows with the number of distinct durations, see [`Distribution`](super::Distribution).
+///
+/// ```
+/// use palpate::log::{Analysis, LogRecord};
+/// use palpate::runtime::record::TickTiming;
+///
+/// let mut analysis = Analysis::default();
+/// analysis.push(&LogRecord::Tick(TickTiming::default()));
+/// assert_eq!(analysis.report().groups[0].released, 1);
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Analysis {
+    environment: Option<Environment>,
+    duration: Nanos,
+    groups: BTreeMap<u16, GroupCounter>,
+    haptics: HapticsCounter,
+    coded_events: Vec<Event>,
+    events: Vec<TextEvent>,
+    event_count: u64,
+    worst_event: Option<Level>,
+}
+
+impl Analysis {
+    /// Counts one record. Allocates.
+    pub fn push(&mut self, record: &LogRecord) {
+        self.duration = self.duration.max(record.time());
+        match record {
+            LogRecord::Tick(r) => self.groups.entry(r.group).or_default().push(r),
+            LogRecord::Event(r) => self.push_event(r),
+            LogRecord::Force(r) => self.haptics.push_force(r),
+            LogRecord::Command(r) => self.haptics.push_command(r),
+            LogRecord::Contact(r) => self.haptics.push_contact(r),
+            LogRecord::Resync(r) => self.haptics.push_resync(r),
+            LogRecord::Tool(_) | LogRecord::Global(_) | LogRecord::Probe(_) => {}
+        }
+    }
+
+    /// Counts one entry of a log.
+    pub fn push_entry(&mut self, entry: &LogEntry) {
+        match entry {
+            LogEntry::Environment(environment) => self.set_environment(environment),
+            LogEntry::Record(record) => self.push(record),
+            LogEntry::Stats(stats) => self.set_lost(stats.group, stats.lost_records),
+            LogEntry::Text(event) => self.push_text(event),
+        }
+    }
+
+    /// Says what the run is about: names and rates of groups, limiter stages.
+    pub fn set_environment(&mut self, environment: &Environment) {
+        self.environment = Some(environment.clone());
+    }
+
+    /// Counts one event in words.
+    pub fn push_text(&mut self, event: &TextEvent) {
+        self.event_count += 1;
+        self.worst_event = self.worst_event.max(Some(event.level));
+        if self.events.len() < EVENTS_KEPT {
+            self.events.push(event.clone());
+        }
+    }
+
+    /// Notes that `total` records of `group` have been lost since the start.
+    pub fn set_lost(&mut self, group: u16, total: u64) {
+        self.groups.entry(group).or_default().set_lost(total);
+    }
+
+    /// What has been found so far.
+    pub fn report(&self) -> RunReport {
+        // Groups that the environment promised and that never ran are part of the report.
+        let promised = self.environment.as_ref().map_or(0, |environment| environment.groups.len());
+        let mut groups = self.groups.clone();
+        for group in 0..u16::try_from(promised).unwrap_or(u16::MAX) {
+            groups.entry(group).or_default();
+        }
+        let unknown = Environment::default();
+        let environment = self.environment.as_ref().unwrap_or(&unknown);
+        let rate = |group: u16| environment.groups.get(usize::from(group)).map(|info| info.rate_hz);
+        let groups = groups.iter().map(|(&id, counter)| counter.report(environment.group_name(id), rate(id))).collect();
+        let described = |event: &Event| TextEvent::describe(event, &environment.group_name(event.group));
+        let mut events: Vec<TextEvent> =
+            self.events.iter().cloned().chain(self.coded_events.iter().map(described)).collect();
+        events.sort_by_key(|event| event.time);
+        events.truncate(EVENTS_KEPT);
+        RunReport {
+            environment: self.environment.clone(),
+            duration: self.duration,
+            groups,
+            resyncs: self.haptics.resyncs(),
+            force: self.haptics.force(),
+            contact: self.haptics.contact(),
+            limits: self.haptics.limits(&environment.limit_stages),
+            events,
+            event_count: self.event_count,
+            worst_event: self.worst_event,
+            damage: None,
+        }
+    }
+
+    fn push_event(&mut self, event: &Event) {
+        self.event_count += 1;
+        self.worst_event = self.worst_event.max(Some(TextEvent::describe(event, "").level));
+        if self.coded_events.len() < EVENTS_KEPT {
+            self.coded_events.push(*event);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{CommandSample, ContactMode, ContactSample, ForceSample, GroupInfo, Resync};
+    use crate::runtime::record::{SlipCause, TickTiming};
+
+    fn tick(tick: u64, late: u64, work: u64, slips: u32, cause: SlipCause) -> LogRecord {
+        let scheduled = Nanos(tick * 1_000_000);
+        let woke = scheduled + Nanos(late);
+        let deadline = scheduled + Nanos(1_000_000);
+        LogRecord::Tick(TickTiming {
+            group: 0,
+            tick,
+            scheduled,
+            woke,
+            start: woke,
+            end: woke + Nanos(work),
+            deadline,
+            slips,
+            cause,
+        })
+    }
+
+    // Check that every period is accounted for and every slip and miss keeps its cause.
+    #[test]
+    fn slips_and_misses_are_counted_by_cause_and_add_up_to_the_elapsed_periods() {
+        let mut analysis = Analysis::default();
+        analysis.push(&tick(0, 10, 5, 0, SlipCause::None));
+        analysis.push(&tick(1, 30, 2_500_000, 0, SlipCause::LongTick));
+        analysis.push(&tick(4, 20, 5, 2, SlipCause::LongTick));
+        analysis.push(&tick(6, 20, 5, 1, SlipCause::LateWake));
+        let report = analysis.report();
+        let group = &report.groups[0];
+        assert_eq!((group.released, group.skipped.total(), group.elapsed_periods), (4, 3, 7));
+        assert_eq!((group.skipped.of(SlipCause::LongTick), group.skipped.of(SlipCause::LateWake)), (2, 1));
+        assert_eq!((group.missed.total(), group.missed.of(SlipCause::LongTick)), (1, 1));
+        assert_eq!((group.lateness.p50, group.lateness.max), (20, 30));
+        assert_eq!((group.period_error.count, group.period_error.p50, group.period_error.max), (3, 10, 20));
+        assert_eq!(group.execution.max, 2_500_000);
+        assert_eq!(report.duration, Nanos(6_000_000));
+    }
+
+    #[test]
+    fn force_contact_resyncs_and_limits_are_summed_up() {
+        let mut analysis = Analysis::default();
+        analysis.set_environment(&Environment {
+            limit_stages: vec!["finite".into(), "clamp".into()],
+            groups: vec![GroupInfo { name: "haptic".into(), rate_hz: 1000.0 }],
+            ..Environment::default()
+        });
+        for n in 1..=100_u64 {
+            let time = Nanos(n * 1_000_000);
+            let force_n = if n == 50 { [f64::NAN, 0.0, 0.0] } else { [0.0, 3.0, -4.0] };
+            analysis.push(&LogRecord::Force(ForceSample {
+                time,
+                force_n,
+                model_age_s: n as f64,
+                ..ForceSample::default()
+            }));
+            let limits = if n <= 10 { 0b1010 } else { 0 };
+            analysis.push(&LogRecord::Command(CommandSample { time, force_n: [1.0, 0.0, 0.0], limits }));
+            let mode = ContactMode::from_code((n % 4) as u16);
+            analysis.push(&LogRecord::Contact(ContactSample { time, mode, ..ContactSample::default() }));
+        }
+        analysis.push(&LogRecord::Resync(Resync { jump_before_n: 0.5, age: Nanos(7), ..Resync::default() }));
+        let report = analysis.report();
+        assert_eq!((report.force.ticks, report.force.peak_n, report.force.not_finite), (100, 5.0, 1));
+        assert_eq!((report.force.peak_commanded_n, report.force.model_age_s.p99), (1.0, 99.0));
+        assert_eq!(report.contact, ContactReport { free: 25, stick: 25, slip: 25, lost: 25 });
+        assert_eq!(report.limits.stages, [("clamp".to_owned(), 10), ("bit 3".to_owned(), 10)]);
+        assert_eq!(report.limits.share(), 0.1);
+        assert_eq!((report.resyncs.jump_before_n.max, report.resyncs.age_ns.p50), (0.5, 7));
+        assert_eq!((report.groups[0].name.as_str(), report.groups[0].released), ("haptic", 0));
+    }
+
+    #[test]
+    fn events_are_listed_in_time_order_with_the_gravest_level() {
+        let mut analysis = Analysis::default();
+        analysis.push(&LogRecord::Event(Event { stamp: Nanos(9), group: 1, code: Event::PANIC, detail: 0 }));
+        analysis.push_text(&TextEvent { time: Nanos(3), level: Level::Warning, message: "mlock refused".into() });
+        let report = analysis.report();
+        let messages: Vec<&str> = report.events.iter().map(|event| event.message.as_str()).collect();
+        assert_eq!(messages, ["mlock refused", "group-1: actor 0 panicked"]);
+        assert_eq!((report.event_count, report.worst_event), (2, Some(Level::Error)));
+    }
+}

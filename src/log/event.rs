@@ -1,0 +1,75 @@
+//! Text events: what a reader of the log should be told in words.
+
+use crate::runtime::record::Event;
+use crate::time::Nanos;
+
+/// How grave an event is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u16)]
+pub enum Level {
+    /// Worth knowing.
+    #[default]
+    Info = 0,
+    /// The run went on, but not as it should.
+    Warning = 1,
+    /// Something failed.
+    Error = 2,
+}
+
+impl Level {
+    /// The level with this number; unknown numbers read as an error, so that nothing grave goes unseen.
+    pub fn from_code(code: u16) -> Self {
+        match code {
+            0 => Self::Info,
+            1 => Self::Warning,
+            _ => Self::Error,
+        }
+    }
+
+    /// A short name for tables and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
+
+/// One event in words.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TextEvent {
+    /// When.
+    pub time: Nanos,
+    /// How grave.
+    pub level: Level,
+    /// One line.
+    pub message: String,
+}
+
+impl TextEvent {
+    /// An event record in words; `group` is the name of the rate group it happened in.
+    pub fn describe(event: &Event, group: &str) -> Self {
+        let (level, message) = match event.code {
+            Event::PANIC => (Level::Error, format!("{group}: actor {} panicked", event.detail)),
+            Event::FAULT => (Level::Error, format!("{group}: an actor reported fault {}", event.detail)),
+            Event::STOPPED => {
+                (Level::Error, format!("{group}: stopped by its overrun policy, {} periods behind", event.detail))
+            }
+            code => (Level::Warning, format!("{group}: event {code}, detail {}", event.detail)),
+        };
+        Self { time: event.stamp, level, message }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_an_error_that_names_group_and_actor() {
+        let event = Event { stamp: Nanos(5), group: 1, code: Event::PANIC, detail: 2 };
+        let text = TextEvent::describe(&event, "global");
+        assert_eq!((text.level, text.message.as_str()), (Level::Error, "global: actor 2 panicked"));
+    }
+}

@@ -1,0 +1,157 @@
+//! The record structure of an MCAP file, read to the first damage.
+//!
+//! A file may end at any byte or hold wrong bytes: whatever is read before the damage is good, memory stays bounded by
+//! [`MAX_RECORD_BYTES`], and [`RecordStream::damage`] says where and what. Chunks are checked against their checksum
+//! before anything of them is given out, except the last one of a cut file, which ends before its records do.
+
+use std::io::{self, Read};
+
+use mcap::records::op;
+
+use super::chunk::ChunkRecords;
+
+/// The largest record or unpacked chunk that is read [bytes].
+pub(super) const MAX_RECORD_BYTES: u64 = 1 << 26;
+
+/// The records of a file one after the other, those inside chunks included.
+pub(super) struct RecordStream<R> {
+    source: R,
+    /// Bytes read so far.
+    offset: u64,
+    record: Vec<u8>,
+    chunk: Option<(ChunkRecords, u64)>,
+    damage: Option<String>,
+    ended: bool,
+}
+
+impl<R: Read> RecordStream<R> {
+    /// Reads the leading magic.
+    ///
+    /// # Errors
+    /// If the source cannot be read; [`io::ErrorKind::InvalidData`] if it is no MCAP.
+    pub(super) fn new(mut source: R) -> io::Result<Self> {
+        let mut magic = [0; mcap::MAGIC.len()];
+        source.read_exact(&mut magic).map_err(|e| match e.kind() {
+            io::ErrorKind::UnexpectedEof => io::ErrorKind::InvalidData.into(),
+            _ => e,
+        })?;
+        if magic != mcap::MAGIC {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        let offset = magic.len() as u64;
+        Ok(Self { source, offset, record: Vec::new(), chunk: None, damage: None, ended: false })
+    }
+
+    /// What is wrong with the file, as far as it has been read.
+    pub(super) fn damage(&self) -> Option<&str> {
+        self.damage.as_deref()
+    }
+
+    /// Ends the stream because of `what`. The first damage counts.
+    pub(super) fn stop(&mut self, what: String) {
+        self.ended = true;
+        self.chunk = None;
+        self.damage.get_or_insert(what);
+    }
+
+    /// The body of the record that [`next`](Self::next) found.
+    pub(super) fn body(&self) -> &[u8] {
+        &self.record
+    }
+
+    /// Reads the next record and gives its opcode; `None` at the end of the file or of what is readable.
+    pub(super) fn next(&mut self) -> Option<u8> {
+        loop {
+            if let Some((chunk, start)) = &mut self.chunk {
+                let start = *start;
+                match chunk.next(&mut self.record) {
+                    Ok(Some(opcode)) => return Some(opcode),
+                    Ok(None) => self.chunk = None,
+                    Err(_) if chunk.is_cut() => {
+                        self.stop(format!("the log is cut off at byte {}, in the chunk at byte {start}", self.offset));
+                    }
+                    Err(e) => self.stop(format!("the chunk at byte {start} is damaged: {e}")),
+                }
+            }
+            if self.ended {
+                return None;
+            }
+            match self.read_record() {
+                Ok(Some(opcode)) => return Some(opcode),
+                Ok(None) => {}
+                Err(what) => self.stop(what),
+            }
+        }
+    }
+
+    /// Reads one record of the file. `Ok(None)` if there is nothing in it to give out.
+    fn read_record(&mut self) -> Result<Option<u8>, String> {
+        let start = self.offset;
+        let mut head = [0; 9];
+        match self.fill(&mut head)? {
+            0 => return Err(format!("the log ends without its index at byte {start}: the run was cut off")),
+            9 => {}
+            _ => return Err(format!("the log is cut off at byte {}", self.offset)),
+        }
+        let opcode = head[0];
+        let length = u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]]);
+        let cut = |offset: u64| format!("the log is cut off at byte {offset}, in the record at byte {start}");
+        match opcode {
+            op::CHUNK | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::STATISTICS => {
+                if length > MAX_RECORD_BYTES {
+                    return Err(format!("the record at byte {start} is damaged: it claims {length} bytes"));
+                }
+                self.record.clear();
+                self.read_body(length)?;
+                let complete = self.record.len() as u64 == length;
+                if opcode == op::CHUNK {
+                    let chunk = ChunkRecords::new(std::mem::take(&mut self.record), length);
+                    self.chunk =
+                        Some((chunk.map_err(|e| format!("the chunk at byte {start} is damaged: {e}"))?, start));
+                    return Ok(None);
+                }
+                if complete { Ok(Some(opcode)) } else { Err(cut(self.offset)) }
+            }
+            op::FOOTER => {
+                self.ended = true;
+                self.record.clear();
+                self.read_body(length.saturating_add(mcap::MAGIC.len() as u64).min(MAX_RECORD_BYTES))?;
+                let intact = length == 20 && self.record.len() == 28 && self.record.ends_with(mcap::MAGIC);
+                if intact { Ok(None) } else { Err(format!("the index of the log is damaged at byte {start}")) }
+            }
+            0 => Err(format!("the log is damaged at byte {start}: no record begins there")),
+            _ => {
+                let skipped = io::copy(&mut (&mut self.source).take(length), &mut io::sink());
+                let skipped = skipped.map_err(|e| unreadable(self.offset, &e))?;
+                self.offset += skipped;
+                if skipped == length { Ok(None) } else { Err(cut(self.offset)) }
+            }
+        }
+    }
+
+    /// Appends `length` bytes, or what is left, to the record.
+    fn read_body(&mut self, length: u64) -> Result<(), String> {
+        let read = (&mut self.source).take(length).read_to_end(&mut self.record);
+        self.offset += read.map_err(|e| unreadable(self.offset, &e))? as u64;
+        Ok(())
+    }
+
+    /// Fills `buffer` as far as the file goes.
+    fn fill(&mut self, buffer: &mut [u8]) -> Result<usize, String> {
+        let mut filled = 0;
+        while filled < buffer.len() {
+            match self.source.read(&mut buffer[filled..]) {
+                Ok(0) => break,
+                Ok(n) => filled += n,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(unreadable(self.offset, &e)),
+            }
+        }
+        self.offset += filled as u64;
+        Ok(filled)
+    }
+}
+
+fn unreadable(offset: u64, error: &io::Error) -> String {
+    format!("the log cannot be read past byte {offset}: {error}")
+}

@@ -1,0 +1,117 @@
+//! The timing of one rate group over a run.
+
+use super::percentiles::{Distribution, Percentiles};
+use crate::runtime::record::{SlipCause, TickTiming};
+use crate::time::Nanos;
+
+/// How often each cause of a slip or a missed deadline occurred.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CauseCounts([u64; 5]);
+
+impl CauseCounts {
+    const CAUSES: [SlipCause; 5] =
+        [SlipCause::LateWake, SlipCause::LongTick, SlipCause::StalledPeer, SlipCause::Policy, SlipCause::None];
+
+    fn add(&mut self, cause: SlipCause, count: u64) {
+        self.0[cause as usize] += count;
+    }
+
+    /// The count of one cause; [`SlipCause::None`] counts those that no cause was recorded for.
+    pub fn of(&self, cause: SlipCause) -> u64 {
+        self.0[cause as usize]
+    }
+
+    /// Every cause with its count, those without a recorded cause last.
+    pub fn iter(&self) -> impl Iterator<Item = (SlipCause, u64)> {
+        Self::CAUSES.into_iter().map(|cause| (cause, self.of(cause)))
+    }
+
+    /// The sum of all causes.
+    pub fn total(&self) -> u64 {
+        self.0.iter().sum()
+    }
+}
+
+/// How one rate group kept time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GroupReport {
+    /// The group's name.
+    pub name: String,
+    /// Its rate, if the environment of the run is known [Hz].
+    pub rate_hz: Option<f64>,
+    /// Releases that ran.
+    pub released: u64,
+    /// Periods skipped, by cause.
+    pub skipped: CauseCounts,
+    /// Deadlines missed, by cause.
+    pub missed: CauseCounts,
+    /// Periods between the first and the last release, both counted: `released + skipped` unless records were lost.
+    pub elapsed_periods: u64,
+    /// Records that were lost because a ring was full.
+    pub lost_records: u64,
+    /// Wake-up lateness, woke - scheduled [ns].
+    pub lateness: Percentiles<u64>,
+    /// Execution time, end - start [ns].
+    pub execution: Percentiles<u64>,
+    /// Magnitude of the difference between the time from wake-up to wake-up and the time that was scheduled [ns].
+    pub period_error: Percentiles<u64>,
+    /// The scheduled time of the last release.
+    pub last_release: Nanos,
+}
+
+/// Gathers a [`GroupReport`].
+#[derive(Clone, Debug, Default)]
+pub(super) struct GroupCounter {
+    released: u64,
+    skipped: CauseCounts,
+    missed: CauseCounts,
+    first_tick: u64,
+    last: TickTiming,
+    lost_records: u64,
+    lateness: Distribution,
+    execution: Distribution,
+    period_error: Distribution,
+}
+
+impl GroupCounter {
+    pub(super) fn push(&mut self, timing: &TickTiming) {
+        self.skipped.add(timing.cause, timing.slips.into());
+        if timing.missed() {
+            self.missed.add(timing.cause, 1);
+        }
+        self.lateness.push(timing.woke.saturating_sub(timing.scheduled).0);
+        self.execution.push(timing.end.saturating_sub(timing.start).0);
+        if self.released == 0 {
+            // Periods skipped before the first release belong to the run as well.
+            self.first_tick = timing.tick.saturating_sub(timing.slips.into());
+        } else {
+            let scheduled = timing.scheduled.saturating_sub(self.last.scheduled).0;
+            let measured = timing.woke.saturating_sub(self.last.woke).0;
+            self.period_error.push(measured.abs_diff(scheduled));
+        }
+        self.released += 1;
+        self.last = *timing;
+    }
+
+    /// Notes that `total` records have been lost since the start.
+    pub(super) fn set_lost(&mut self, total: u64) {
+        self.lost_records = self.lost_records.max(total);
+    }
+
+    pub(super) fn report(&self, name: String, rate_hz: Option<f64>) -> GroupReport {
+        let elapsed = self.last.tick.wrapping_sub(self.first_tick).wrapping_add(1);
+        GroupReport {
+            name,
+            rate_hz,
+            released: self.released,
+            skipped: self.skipped,
+            missed: self.missed,
+            elapsed_periods: if self.released == 0 { 0 } else { elapsed },
+            lost_records: self.lost_records,
+            lateness: self.lateness.percentiles(),
+            execution: self.execution.percentiles(),
+            period_error: self.period_error.percentiles(),
+            last_release: self.last.scheduled,
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! What a run did to the force: resyncs, contact, limits.
+
+use super::percentiles::{Distribution, Magnitudes, Percentiles};
+use super::records::{CommandSample, ContactMode, ContactSample, ForceSample, Resync};
+
+/// The bits of [`CommandSample::limits`].
+const LIMIT_BITS: usize = 16;
+
+/// The resyncs of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ResyncReport {
+    /// Jump of the force at the swap, before blending [N]; its count is the number of resyncs.
+    pub jump_before_n: Percentiles<f64>,
+    /// Largest one-tick change that blending leaves of it [N].
+    pub jump_after_n: Percentiles<f64>,
+    /// Age of the new model's state on arrival [ns].
+    pub age_ns: Percentiles<u64>,
+}
+
+/// The force of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ForceReport {
+    /// Haptic ticks with a force.
+    pub ticks: u64,
+    /// Largest finite magnitude before the safety pipeline [N].
+    pub peak_n: f64,
+    /// Largest finite magnitude after it [N].
+    pub peak_commanded_n: f64,
+    /// Forces before the safety pipeline that were not finite.
+    pub not_finite: u64,
+    /// Age of the local model's last resync at each tick [s].
+    pub model_age_s: Percentiles<f64>,
+}
+
+/// Haptic ticks in each contact mode.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub struct ContactReport {
+    pub free: u64,
+    pub stick: u64,
+    pub slip: u64,
+    pub lost: u64,
+}
+
+/// What the safety pipeline did.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LimitReport {
+    /// Commands that passed the pipeline.
+    pub ticks: u64,
+    /// Commands that at least one stage changed.
+    pub limited: u64,
+    /// The stages that acted, with the number of ticks on which they did.
+    pub stages: Vec<(String, u64)>,
+}
+
+impl LimitReport {
+    /// The share of ticks on which at least one stage acted, 0 to 1.
+    pub fn share(&self) -> f64 {
+        if self.ticks == 0 { 0.0 } else { self.limited as f64 / self.ticks as f64 }
+    }
+}
+
+/// Gathers the reports above.
+#[derive(Clone, Debug, Default)]
+pub(super) struct HapticsCounter {
+    jump_before: Magnitudes,
+    jump_after: Magnitudes,
+    resync_age: Distribution,
+    model_age: Magnitudes,
+    force: ForceReport,
+    contact: ContactReport,
+    commands: u64,
+    limited: u64,
+    limits: [u64; LIMIT_BITS],
+}
+
+impl HapticsCounter {
+    pub(super) fn push_force(&mut self, sample: &ForceSample) {
+        self.force.ticks += 1;
+        self.model_age.push(sample.model_age_s);
+        let magnitude = norm(sample.force_n);
+        if magnitude.is_finite() {
+            self.force.peak_n = self.force.peak_n.max(magnitude);
+        } else {
+            self.force.not_finite += 1;
+        }
+    }
+
+    pub(super) fn push_command(&mut self, sample: &CommandSample) {
+        self.commands += 1;
+        self.limited += u64::from(sample.limits != 0);
+        for (bit, count) in self.limits.iter_mut().enumerate() {
+            *count += u64::from(sample.limits >> bit & 1);
+        }
+        let magnitude = norm(sample.force_n);
+        if magnitude.is_finite() {
+            self.force.peak_commanded_n = self.force.peak_commanded_n.max(magnitude);
+        }
+    }
+
+    pub(super) fn push_contact(&mut self, sample: &ContactSample) {
+        let ticks = match sample.mode {
+            ContactMode::Free => &mut self.contact.free,
+            ContactMode::Stick => &mut self.contact.stick,
+            ContactMode::Slip => &mut self.contact.slip,
+            ContactMode::Lost => &mut self.contact.lost,
+        };
+        *ticks += 1;
+    }
+
+    pub(super) fn push_resync(&mut self, resync: &Resync) {
+        self.jump_before.push(resync.jump_before_n);
+        self.jump_after.push(resync.jump_after_n);
+        self.resync_age.push(resync.age.0);
+    }
+
+    pub(super) fn resyncs(&self) -> ResyncReport {
+        ResyncReport {
+            jump_before_n: self.jump_before.percentiles(),
+            jump_after_n: self.jump_after.percentiles(),
+            age_ns: self.resync_age.percentiles(),
+        }
+    }
+
+    pub(super) fn force(&self) -> ForceReport {
+        ForceReport { model_age_s: self.model_age.percentiles(), ..self.force }
+    }
+
+    pub(super) fn contact(&self) -> ContactReport {
+        self.contact
+    }
+
+    /// `names` are those of the bits, lowest first.
+    pub(super) fn limits(&self, names: &[String]) -> LimitReport {
+        let name = |bit: usize| names.get(bit).cloned().unwrap_or_else(|| format!("bit {bit}"));
+        let acted = self.limits.iter().enumerate().filter(|&(_, &count)| count > 0);
+        LimitReport {
+            ticks: self.commands,
+            limited: self.limited,
+            stages: acted.map(|(bit, &count)| (name(bit), count)).collect(),
+        }
+    }
+}
+
+fn norm([x, y, z]: [f64; 3]) -> f64 {
+    (x * x + y * y + z * z).sqrt()
+}

@@ -1,0 +1,193 @@
+//! Reads a log from front to back, a chunk at a time, to its end or to the first damage.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::Path;
+
+use mcap::records::{Record, op};
+
+use super::entry::LogEntry;
+use super::environment::Environment;
+use super::framing::RecordStream;
+use super::records::LogRecord;
+use super::schema;
+use super::topic::Kind;
+use crate::error::{Error, ErrorKind};
+
+const READ_BUFFER_BYTES: usize = 1 << 18;
+/// Channel id, sequence number, log time and publish time in front of every message.
+const MESSAGE_HEADER_BYTES: usize = 22;
+
+/// The entries of a log, as an iterator.
+///
+/// A damaged or truncated log gives everything before the damage and then ends; [`damage`](Self::damage) says what
+/// and where. Memory is bounded by one chunk.
+pub struct LogReader<R> {
+    records: RecordStream<R>,
+    place: String,
+    schemas: HashMap<u16, String>,
+    channels: HashMap<u16, Channel>,
+    topic: String,
+    messages: u64,
+}
+
+struct Channel {
+    topic: String,
+    /// `None` for messages that are not palpate's.
+    kind: Option<Kind>,
+}
+
+impl LogReader<BufReader<File>> {
+    /// Opens the log at `path`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if it cannot be read, [`ErrorKind::Log`] if it is no MCAP file.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let file = File::open(path).map_err(|e| Error::io(path, e))?;
+        Self::new(BufReader::with_capacity(READ_BUFFER_BYTES, file), &path.display().to_string())
+    }
+}
+
+impl<R: Read> LogReader<R> {
+    /// Reads a log from `source`; `place` names it in errors. `source` should be buffered.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if it cannot be read, [`ErrorKind::Log`] if it is no MCAP file.
+    pub fn new(source: R, place: &str) -> Result<Self, Error> {
+        let records = RecordStream::new(source).map_err(|e| match e.kind() {
+            io::ErrorKind::InvalidData => {
+                Error::new(ErrorKind::Log, "no MCAP file: it does not begin with the MCAP magic").at(place)
+            }
+            _ => Error::io(Path::new(place), e),
+        })?;
+        Ok(Self {
+            records,
+            place: place.to_owned(),
+            schemas: HashMap::new(),
+            channels: HashMap::new(),
+            topic: String::new(),
+            messages: 0,
+        })
+    }
+
+    /// What is wrong with the log and where, in one line; known only once the iterator has ended.
+    pub fn damage(&self) -> Option<&str> {
+        self.records.damage()
+    }
+
+    /// The name that errors use.
+    pub fn place(&self) -> &str {
+        &self.place
+    }
+
+    /// The topic of the entry before; empty for an environment.
+    pub fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// The topics that the log has declared so far, in alphabetical order.
+    pub fn topics(&self) -> Vec<&str> {
+        let mut topics: Vec<&str> = self.channels.values().map(|channel| channel.topic.as_str()).collect();
+        topics.sort_unstable();
+        topics.dedup();
+        topics
+    }
+
+    /// The entry in the record just read: `Ok(None)` if it holds none.
+    fn decode(&mut self, opcode: u8) -> Result<Option<LogEntry>, String> {
+        let body = self.records.body();
+        if opcode == op::MESSAGE {
+            return self.decode_message();
+        }
+        match mcap::parse_record(opcode, body).map_err(|e| e.to_string())? {
+            Record::Schema { header, .. } => {
+                self.schemas.insert(header.id, header.name);
+            }
+            Record::Channel(channel) => {
+                let kind = self.schemas.get(&channel.schema_id).and_then(|name| Kind::from_schema(name));
+                self.channels.insert(channel.id, Channel { topic: channel.topic, kind });
+            }
+            Record::Metadata(metadata) if metadata.name == "environment" => {
+                self.topic.clear();
+                return Ok(Some(LogEntry::Environment(Environment::from_map(&metadata.metadata))));
+            }
+            Record::Statistics(statistics) if statistics.message_count != self.messages => {
+                return Err(format!(
+                    "its index counts {} messages but {} could be read",
+                    statistics.message_count, self.messages
+                ));
+            }
+            _ => {}
+        }
+        Ok(None)
+    }
+
+    fn decode_message(&mut self) -> Result<Option<LogEntry>, String> {
+        let body = self.records.body();
+        let Some((header, data)) = body.split_at_checked(MESSAGE_HEADER_BYTES) else {
+            return Err("a message without its header".into());
+        };
+        let id = u16::from_le_bytes([header[0], header[1]]);
+        let Some(channel) = self.channels.get(&id) else {
+            return Err(format!("a message on channel {id}, which was never declared"));
+        };
+        self.messages += 1;
+        let Some(kind) = channel.kind else {
+            return Ok(None);
+        };
+        self.topic.clone_from(&channel.topic);
+        match decode_data(kind, data) {
+            Ok(entry) => Ok(Some(entry)),
+            Err(e) => Err(format!("a message on {} does not decode: {e}", channel.topic)),
+        }
+    }
+}
+
+impl<R: Read> Iterator for LogReader<R> {
+    type Item = LogEntry;
+
+    fn next(&mut self) -> Option<LogEntry> {
+        loop {
+            let opcode = self.records.next()?;
+            match self.decode(opcode) {
+                Ok(Some(entry)) => return Some(entry),
+                Ok(None) => {}
+                Err(e) => self.records.stop(format!("the log is damaged: {e}")),
+            }
+        }
+    }
+}
+
+impl<R> std::fmt::Debug for LogReader<R> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LogReader")
+            .field("place", &self.place)
+            .field("messages", &self.messages)
+            .finish_non_exhaustive()
+    }
+}
+
+fn decode_data(kind: Kind, data: &[u8]) -> Result<LogEntry, prost::DecodeError> {
+    fn parse<M: prost::Message + Default>(data: &[u8]) -> Result<M, prost::DecodeError> {
+        M::decode(data)
+    }
+    Ok(LogEntry::Record(match kind {
+        Kind::Timing => LogRecord::Tick(parse::<schema::TickTiming>(data)?.into()),
+        Kind::Force => LogRecord::Force(parse::<schema::Force>(data)?.into()),
+        Kind::ForceCommanded => LogRecord::Command(parse::<schema::CommandedForce>(data)?.into()),
+        Kind::Tool => LogRecord::Tool(parse::<schema::Tool>(data)?.into()),
+        Kind::Contact => LogRecord::Contact(parse::<schema::Contact>(data)?.into()),
+        Kind::Resync => LogRecord::Resync(parse::<schema::Resync>(data)?.into()),
+        Kind::Global => LogRecord::Global(parse::<schema::GlobalTick>(data)?.into()),
+        Kind::Probe => LogRecord::Probe(parse::<schema::Probe>(data)?.into()),
+        Kind::Stats => return Ok(LogEntry::Stats(parse::<schema::Stats>(data)?.into())),
+        Kind::Log => {
+            let message = parse::<schema::Log>(data)?;
+            match message.event() {
+                Some(event) => LogRecord::Event(event),
+                None => return Ok(LogEntry::Text(message.into())),
+            }
+        }
+    }))
+}

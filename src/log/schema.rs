@@ -1,0 +1,308 @@
+//! The protobuf messages of a log, defined once.
+//!
+//! [`proto_schema!`] makes the struct, its field numbers and its descriptor from one definition, so that they cannot
+//! disagree; every log embeds the descriptors and needs no plugin in a viewer.
+//!
+//! Fields are only ever added, with new numbers. Every field is always written (`required` to prost, plain proto3 to a
+//! reader): proto3 leaves out what equals zero, and -0.0 equals zero, so a force would not come back bit for bit.
+
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{
+    DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto, FileDescriptorProto,
+    FileDescriptorSet,
+};
+
+use super::event::Level;
+use super::records::ContactMode;
+use crate::runtime::record::SlipCause;
+
+/// The version of the schema that this build writes.
+pub(crate) const SCHEMA_VERSION: u32 = 1;
+
+/// A protobuf message of a log.
+pub(crate) trait LogMessage: prost::Message + Default {
+    /// Its full protobuf name, which is the name of its MCAP schema.
+    const NAME: &'static str;
+}
+
+macro_rules! rust_type {
+    (uint32) => {
+        u32
+    };
+    (uint64) => {
+        u64
+    };
+    (int32) => {
+        i32
+    };
+    (float) => {
+        f32
+    };
+    (double) => {
+        f64
+    };
+    (bool) => {
+        bool
+    };
+    (string) => {
+        String
+    };
+    (message $of:ident) => {
+        $of
+    };
+}
+
+macro_rules! proto_schema {
+    (
+        $(enum $enum:ident { $($variant:ident),+ $(,)? })*
+        $(
+            $(#[$doc:meta])*
+            message $message:ident {
+                $( $(#[$field_doc:meta])* $field:ident: $kind:ident $(of $of:ident)? $(as $as:ident)? = $tag:tt, )*
+            }
+        )*
+    ) => {
+        $(
+            $(#[$doc])*
+            #[derive(Clone, PartialEq, prost::Message)]
+            pub(crate) struct $message {
+                $( $(#[$field_doc])* #[prost($kind, required, tag = $tag)] pub $field: rust_type!($kind $($of)?), )*
+            }
+
+            impl LogMessage for $message {
+                const NAME: &'static str = concat!("palpate.", stringify!($message));
+            }
+        )*
+
+        fn enums() -> Vec<EnumDescriptorProto> {
+            // A new variant that is not listed in the schema fails to compile here.
+            $( const _: fn($enum) = |value| match value { $($enum::$variant => {})+ }; )*
+            vec![$( enum_descriptor(stringify!($enum), &[$((stringify!($variant), $enum::$variant as i32)),+]) ),*]
+        }
+
+        fn messages() -> Vec<DescriptorProto> {
+            vec![$( DescriptorProto {
+                name: Some(stringify!($message).into()),
+                field: vec![$(
+                    field_descriptor(
+                        stringify!($field),
+                        $tag,
+                        stringify!($kind),
+                        [$(stringify!($of),)? $(stringify!($as),)?].first().copied(),
+                    )
+                ),*],
+                ..Default::default()
+            } ),*]
+        }
+    };
+}
+
+proto_schema! {
+    enum SlipCause { None, LateWake, LongTick, StalledPeer, Policy }
+    enum ContactMode { Free, Stick, Slip, Lost }
+    enum Level { Info, Warning, Error }
+
+    /// A vector in world coordinates.
+    message Vector3 {
+        x: double = 1,
+        y: double = 2,
+        z: double = 3,
+    }
+
+    /// Nearest-rank percentiles of durations.
+    message Percentiles {
+        count: uint64 = 1,
+        p50_ns: uint64 = 2,
+        p90_ns: uint64 = 3,
+        p99_ns: uint64 = 4,
+        p999_ns: uint64 = 5,
+        max_ns: uint64 = 6,
+    }
+
+    /// `/timing/GROUP`: one release of a rate group.
+    message TickTiming {
+        group: uint32 = 1,
+        tick: uint64 = 2,
+        scheduled_ns: uint64 = 3,
+        woke_ns: uint64 = 4,
+        start_ns: uint64 = 5,
+        end_ns: uint64 = 6,
+        deadline_ns: uint64 = 7,
+        slips: uint32 = 8,
+        cause: int32 as SlipCause = 9,
+    }
+
+    /// `/force`: the force on the tool before the safety pipeline.
+    message Force {
+        time_ns: uint64 = 1,
+        force_n: message of Vector3 = 2,
+        model_version: uint32 = 3,
+        model_age_s: double = 4,
+        energy_j: double = 5,
+    }
+
+    /// `/force_commanded`: the force after the safety pipeline.
+    message CommandedForce {
+        time_ns: uint64 = 1,
+        force_n: message of Vector3 = 2,
+        limits: uint32 = 3,
+    }
+
+    /// `/tool`: the raw device sample.
+    message Tool {
+        time_ns: uint64 = 1,
+        id: uint32 = 2,
+        position_m: message of Vector3 = 3,
+        velocity_m_s: message of Vector3 = 4,
+        buttons: uint32 = 5,
+    }
+
+    /// `/contact`: the state of the contact.
+    message Contact {
+        time_ns: uint64 = 1,
+        mode: int32 as ContactMode = 2,
+        triangle: uint32 = 3,
+        weight_a: double = 4,
+        weight_b: double = 5,
+        weight_c: double = 6,
+        normal: message of Vector3 = 7,
+        normal_force_n: float = 8,
+        tangential_force_n: float = 9,
+    }
+
+    /// `/resync`: the local model was replaced by a newer one.
+    message Resync {
+        time_ns: uint64 = 1,
+        version: uint32 = 2,
+        age_ns: uint64 = 3,
+        jump_before_n: double = 4,
+        jump_after_n: double = 5,
+        energy_j: double = 6,
+    }
+
+    /// `/global`: one release of the global model.
+    message GlobalTick {
+        time_ns: uint64 = 1,
+        version: uint32 = 2,
+        first_tick: uint64 = 3,
+        last_tick: uint64 = 4,
+    }
+
+    /// `/probe`: a probed node.
+    message Probe {
+        time_ns: uint64 = 1,
+        node: uint32 = 2,
+        local_m: message of Vector3 = 3,
+        global_m: message of Vector3 = 4,
+    }
+
+    /// `/stats/GROUP`: how a group has kept time, once a second.
+    message Stats {
+        time_ns: uint64 = 1,
+        group: uint32 = 2,
+        released: uint64 = 3,
+        skipped: uint64 = 4,
+        missed: uint64 = 5,
+        lost_records: uint64 = 6,
+        lateness: message of Percentiles = 7,
+        lateness_last_second: message of Percentiles = 8,
+        execution: message of Percentiles = 9,
+        execution_last_second: message of Percentiles = 10,
+    }
+
+    /// `/log`: something that happened once. `coded` ones came from a rate group as numbers.
+    message Log {
+        time_ns: uint64 = 1,
+        level: int32 as Level = 2,
+        message: string = 3,
+        coded: bool = 4,
+        group: uint32 = 5,
+        code: uint32 = 6,
+        detail: uint64 = 7,
+    }
+}
+
+fn enum_descriptor(name: &str, variants: &[(&str, i32)]) -> EnumDescriptorProto {
+    // Protobuf scopes the names of values beside their enum, so each carries it as a prefix.
+    let value = |&(variant, number): &(&str, i32)| EnumValueDescriptorProto {
+        name: Some(format!("{}_{}", screaming(name), screaming(variant))),
+        number: Some(number),
+        ..Default::default()
+    };
+    EnumDescriptorProto { name: Some(name.into()), value: variants.iter().map(value).collect(), ..Default::default() }
+}
+
+fn field_descriptor(name: &str, number: i32, kind: &str, type_name: Option<&str>) -> FieldDescriptorProto {
+    let r#type = match (kind, type_name) {
+        ("message", _) => Type::Message,
+        (_, Some(_)) => Type::Enum,
+        ("uint32", _) => Type::Uint32,
+        ("uint64", _) => Type::Uint64,
+        ("int32", _) => Type::Int32,
+        ("float", _) => Type::Float,
+        ("double", _) => Type::Double,
+        ("bool", _) => Type::Bool,
+        (_, _) => Type::String,
+    };
+    FieldDescriptorProto {
+        name: Some(name.into()),
+        number: Some(number),
+        label: Some(Label::Optional as i32),
+        r#type: Some(r#type as i32),
+        type_name: type_name.map(|name| format!(".palpate.{name}")),
+        ..Default::default()
+    }
+}
+
+/// `LateWake` as `LATE_WAKE`.
+fn screaming(name: &str) -> String {
+    let mut out = String::with_capacity(name.len() + 4);
+    for (i, c) in name.chars().enumerate() {
+        if i > 0 && c.is_uppercase() {
+            out.push('_');
+        }
+        out.push(c.to_ascii_uppercase());
+    }
+    out
+}
+
+/// The descriptors of all messages, encoded: the data of every MCAP schema.
+pub(crate) fn descriptor_set() -> Vec<u8> {
+    let file = FileDescriptorProto {
+        name: Some("palpate/log.proto".into()),
+        package: Some("palpate".into()),
+        syntax: Some("proto3".into()),
+        message_type: messages(),
+        enum_type: enums(),
+        ..Default::default()
+    };
+    prost::Message::encode_to_vec(&FileDescriptorSet { file: vec![file] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use prost::Message;
+
+    #[test]
+    fn the_descriptor_names_every_field_with_the_number_on_the_wire() {
+        let set = FileDescriptorSet::decode(descriptor_set().as_slice()).unwrap();
+        let contact = set.file[0].message_type.iter().find(|m| m.name() == "Contact").unwrap();
+        let fields: Vec<_> = contact.field.iter().map(|f| (f.name(), f.number(), f.r#type())).collect();
+        assert_eq!(fields[1], ("mode", 2, Type::Enum));
+        assert_eq!(contact.field[1].type_name(), ".palpate.ContactMode");
+        assert_eq!(fields[6], ("normal", 7, Type::Message));
+        assert_eq!(contact.field[6].type_name(), ".palpate.Vector3");
+        assert_eq!(fields[8], ("tangential_force_n", 9, Type::Float));
+        let cause = &set.file[0].enum_type[0];
+        let values: Vec<_> = cause.value.iter().map(|v| (v.name(), v.number())).collect();
+        assert_eq!(values[..2], [("SLIP_CAUSE_NONE", 0), ("SLIP_CAUSE_LATE_WAKE", 1)]);
+    }
+
+    #[test]
+    fn negative_zero_and_nan_come_back_bit_for_bit() {
+        let sent = Vector3 { x: -0.0, y: f64::from_bits(0x7ff8_0000_0000_1234), z: 0.0 };
+        let got = Vector3::decode(sent.encode_to_vec().as_slice()).unwrap();
+        assert_eq!([got.x, got.y, got.z].map(f64::to_bits), [sent.x, sent.y, sent.z].map(f64::to_bits));
+    }
+}

@@ -1,0 +1,121 @@
+//! How a rate group keeps time, condensed once a second for the log and for a live display.
+
+use super::percentiles::{Distribution, Percentiles};
+use crate::runtime::record::TickTiming;
+use crate::time::Nanos;
+
+const SECOND: u64 = 1_000_000_000;
+
+/// The state of a group at one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GroupStats {
+    /// When: the scheduled time of the last release counted.
+    pub time: Nanos,
+    /// Which group.
+    pub group: u16,
+    /// Releases since the start.
+    pub released: u64,
+    /// Periods skipped since the start.
+    pub skipped: u64,
+    /// Deadlines missed since the start.
+    pub missed: u64,
+    /// Records of this group lost since the start, because a ring was full.
+    pub lost_records: u64,
+    /// Wake-up lateness since the start [ns].
+    pub lateness: Percentiles<u64>,
+    /// Wake-up lateness in the last second [ns].
+    pub lateness_last_second: Percentiles<u64>,
+    /// Execution time since the start [ns].
+    pub execution: Percentiles<u64>,
+    /// Execution time in the last second [ns].
+    pub execution_last_second: Percentiles<u64>,
+}
+
+/// Counts the releases of one group and gives a [`GroupStats`] for each second.
+#[derive(Clone, Debug, Default)]
+pub struct StatsCounter {
+    now: GroupStats,
+    lateness: Distribution,
+    lateness_second: Distribution,
+    execution: Distribution,
+    execution_second: Distribution,
+}
+
+impl StatsCounter {
+    /// A counter for `group`.
+    pub fn new(group: u16) -> Self {
+        Self { now: GroupStats { group, ..GroupStats::default() }, ..Self::default() }
+    }
+
+    /// Counts one release. Returns the statistics of the second before if this release begins another one. Allocates.
+    pub fn push(&mut self, timing: &TickTiming) -> Option<GroupStats> {
+        let closed = self.now.released > 0 && timing.scheduled.0 / SECOND > self.now.time.0 / SECOND;
+        let stats = closed.then(|| self.close_second());
+        let lateness = timing.woke.saturating_sub(timing.scheduled).0;
+        let execution = timing.end.saturating_sub(timing.start).0;
+        self.now.time = timing.scheduled;
+        self.now.released += 1;
+        self.now.skipped += u64::from(timing.slips);
+        self.now.missed += u64::from(timing.missed());
+        self.lateness.push(lateness);
+        self.lateness_second.push(lateness);
+        self.execution.push(execution);
+        self.execution_second.push(execution);
+        stats
+    }
+
+    /// Sets the number of records of this group lost since the start.
+    pub fn set_lost(&mut self, total: u64) {
+        self.now.lost_records = total;
+    }
+
+    /// The statistics up to the last release, for the end of a run.
+    pub fn finish(mut self) -> GroupStats {
+        self.close_second()
+    }
+
+    fn close_second(&mut self) -> GroupStats {
+        let stats = GroupStats {
+            lateness: self.lateness.percentiles(),
+            lateness_last_second: self.lateness_second.percentiles(),
+            execution: self.execution.percentiles(),
+            execution_last_second: self.execution_second.percentiles(),
+            ..self.now
+        };
+        self.lateness_second.clear();
+        self.execution_second.clear();
+        stats
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_second_is_reported_once_beside_the_whole_run() {
+        let mut counter = StatsCounter::new(2);
+        let mut reports = Vec::new();
+        for tick in 0..2500_u64 {
+            let scheduled = Nanos(tick * 1_000_000);
+            let woke = scheduled + Nanos(tick / 1000 * 100);
+            let timing = TickTiming {
+                tick,
+                scheduled,
+                woke,
+                start: woke,
+                end: woke + Nanos(7),
+                deadline: scheduled + Nanos(1_000_000),
+                ..TickTiming::default()
+            };
+            reports.extend(counter.push(&timing));
+        }
+        counter.set_lost(3);
+        reports.push(counter.finish());
+        let last_second: Vec<u64> = reports.iter().map(|r| r.lateness_last_second.count).collect();
+        assert_eq!(last_second, [1000, 1000, 500]);
+        assert_eq!((reports[1].lateness.p50, reports[1].lateness_last_second.p50), (0, 100));
+        assert_eq!((reports[2].group, reports[2].released, reports[2].lost_records), (2, 2500, 3));
+        assert_eq!(reports[2].execution.max, 7);
+    }
+}

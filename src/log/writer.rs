@@ -1,0 +1,269 @@
+//! Writes records as an MCAP file that any viewer opens.
+//!
+//! Messages are collected for up to 500 ms, put in time order and written as one lz4 chunk with a single sequential
+//! write: a killed process loses less than a second, and what is on disk is never patched afterwards.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{Attachment, Compression, WriteOptions};
+
+use super::environment::Environment;
+use super::event::TextEvent;
+use super::records::LogRecord;
+use super::schema::{self, SCHEMA_VERSION};
+use super::stats::GroupStats;
+use super::topic::Topic;
+use crate::error::{Error, ErrorKind};
+use crate::time::Nanos;
+
+/// Log time or wall time between two chunks.
+const FLUSH_INTERVAL: Nanos = Nanos(500_000_000);
+/// Collected messages that force a chunk earlier [bytes].
+const CHUNK_BYTES: usize = 1 << 20;
+/// The file buffer [bytes]: a chunk goes to the file in few large writes.
+const FILE_BUFFER_BYTES: usize = 1 << 18;
+
+/// A message that waits for the next chunk.
+#[derive(Debug)]
+struct Pending {
+    time: Nanos,
+    topic: Topic,
+    start: usize,
+    end: usize,
+}
+
+/// Writes one log.
+///
+/// # Real-time
+/// Every method allocates and may block: this is for the logger's thread.
+pub struct McapWriter<W: Write> {
+    /// Gone after an error: what is on disk stays as it is.
+    output: Option<mcap::Writer<NoSeek<W>>>,
+    place: String,
+    environment: Environment,
+    environment_is_written: bool,
+    scene_is_written: bool,
+    channels: BTreeMap<Topic, (u16, u32)>,
+    pending: Vec<Pending>,
+    bytes: Vec<u8>,
+    flushed_at: (Nanos, Nanos),
+}
+
+impl McapWriter<BufWriter<File>> {
+    /// Creates or overwrites the log at `path`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if the file cannot be created or written.
+    pub fn create(path: &Path, environment: &Environment) -> Result<Self, Error> {
+        let file = File::create(path).map_err(|e| Error::io(path, e))?;
+        Self::new(BufWriter::with_capacity(FILE_BUFFER_BYTES, file), &path.display().to_string(), environment)
+    }
+}
+
+impl<W: Write> McapWriter<W> {
+    /// Begins a log in `output`; `place` names it in errors.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if `output` cannot be written.
+    pub fn new(output: W, place: &str, environment: &Environment) -> Result<Self, Error> {
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Lz4))
+            .profile("palpate")
+            .library(concat!("palpate/", env!("CARGO_PKG_VERSION")))
+            .chunk_size(None)
+            .disable_seeking(true);
+        let output = options.create(NoSeek::new(output)).map_err(|e| write_error(place, e))?;
+        Ok(Self {
+            output: Some(output),
+            place: place.to_owned(),
+            environment: environment.clone(),
+            environment_is_written: false,
+            scene_is_written: false,
+            channels: BTreeMap::new(),
+            pending: Vec::new(),
+            bytes: Vec::with_capacity(CHUNK_BYTES),
+            flushed_at: (Nanos::ZERO, Nanos::ZERO),
+        })
+    }
+
+    /// Replaces the environment, for what is known only after the start. It is written with the next chunk; after the
+    /// first chunk, as a second metadata record that readers prefer. Group names are fixed by the first chunk.
+    pub fn set_environment(&mut self, environment: &Environment) {
+        self.environment = environment.clone();
+        self.environment_is_written = false;
+    }
+
+    /// Adds a record.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if a chunk was full and could not be written. The log is then given up: further calls fail at
+    /// once and what is on disk stays readable.
+    pub fn write(&mut self, record: &LogRecord) -> Result<(), Error> {
+        let topic = Topic::of(record);
+        let time = record.time();
+        match record {
+            LogRecord::Tick(r) => self.push(topic, time, &schema::TickTiming::from(r)),
+            LogRecord::Event(r) => {
+                let group = self.environment.group_name(r.group);
+                self.push(topic, time, &schema::Log::coded(r, &group))
+            }
+            LogRecord::Force(r) => self.push(topic, time, &schema::Force::from(r)),
+            LogRecord::Command(r) => self.push(topic, time, &schema::CommandedForce::from(r)),
+            LogRecord::Tool(r) => self.push(topic, time, &schema::Tool::from(r)),
+            LogRecord::Contact(r) => self.push(topic, time, &schema::Contact::from(r)),
+            LogRecord::Resync(r) => self.push(topic, time, &schema::Resync::from(r)),
+            LogRecord::Global(r) => self.push(topic, time, &schema::GlobalTick::from(r)),
+            LogRecord::Probe(r) => self.push(topic, time, &schema::Probe::from(r)),
+        }
+    }
+
+    /// Adds an event in words.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_text(&mut self, event: &TextEvent) -> Result<(), Error> {
+        self.push(Topic::Log, event.time, &schema::Log::from(event))
+    }
+
+    /// Adds the statistics of a group.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
+        self.push(Topic::Stats(stats.group), stats.time, &schema::Stats::from(stats))
+    }
+
+    /// Writes a chunk if 500 ms of log time or of wall time have passed since the last one. `wall` counts from any
+    /// fixed moment.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn flush_if_due(&mut self, log_time: Nanos, wall: Nanos) -> Result<(), Error> {
+        let (last_log_time, last_wall) = self.flushed_at;
+        let due = |now: Nanos, last: Nanos| now.saturating_sub(last) >= FLUSH_INTERVAL;
+        if due(log_time, last_log_time) || due(wall, last_wall) {
+            self.flushed_at = (log_time, wall);
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Writes what has been collected as one chunk and hands it to the operating system.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn flush(&mut self) -> Result<(), Error> {
+        let Some(mut output) = self.output.take() else {
+            return Err(Error::new(ErrorKind::Io, "the log was given up after an earlier write error").at(&self.place));
+        };
+        match self.write_chunk(&mut output) {
+            Ok(()) => {
+                self.output = Some(output);
+                Ok(())
+            }
+            Err(e) => {
+                // Dropping the writer would append an index to a half-written record.
+                drop(output.into_inner());
+                Err(write_error(&self.place, e))
+            }
+        }
+    }
+
+    /// Writes the last chunk and the index, and gives the output back.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn finish(mut self) -> Result<W, Error> {
+        self.flush()?;
+        let place = std::mem::take(&mut self.place);
+        let mut output = self.output.take().expect("flush succeeded and put the output back");
+        output.finish().map_err(|e| write_error(&place, e))?;
+        let mut inner = output.into_inner().into_inner();
+        inner.flush().map_err(|e| write_error(&place, e.into()))?;
+        Ok(inner)
+    }
+
+    fn push(&mut self, topic: Topic, time: Nanos, message: &impl prost::Message) -> Result<(), Error> {
+        let start = self.bytes.len();
+        message.encode_raw(&mut self.bytes);
+        self.pending.push(Pending { time, topic, start, end: self.bytes.len() });
+        if self.bytes.len() >= CHUNK_BYTES { self.flush() } else { Ok(()) }
+    }
+
+    fn write_chunk(&mut self, output: &mut mcap::Writer<NoSeek<W>>) -> mcap::McapResult<()> {
+        if !self.environment_is_written {
+            let metadata = self.environment.to_map(SCHEMA_VERSION);
+            output.write_metadata(&Metadata { name: "environment".into(), metadata })?;
+            self.environment_is_written = true;
+        }
+        self.write_scene(output)?;
+        if self.channels.is_empty() {
+            let groups = 0..u16::try_from(self.environment.groups.len()).unwrap_or(u16::MAX);
+            let of_groups = groups.flat_map(|group| [Topic::Timing(group), Topic::Stats(group)]);
+            for topic in of_groups.chain(Topic::FIXED) {
+                self.channel(output, topic)?;
+            }
+        }
+        let mut pending = std::mem::take(&mut self.pending);
+        // Stable: what happened at one time keeps the order in which it was written.
+        pending.sort_by_key(|message| message.time);
+        for message in pending.drain(..) {
+            let (channel_id, sequence) = self.channel(output, message.topic)?;
+            let log_time = self.environment.epoch_ns().saturating_add(message.time.0);
+            let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+            output.write_to_known_channel(&header, &self.bytes[message.start..message.end])?;
+        }
+        self.pending = pending;
+        self.bytes.clear();
+        output.flush()
+    }
+
+    fn write_scene(&mut self, output: &mut mcap::Writer<NoSeek<W>>) -> mcap::McapResult<()> {
+        let Some(scene) = self.environment.scene.as_deref().filter(|_| !self.scene_is_written) else {
+            return Ok(());
+        };
+        let time = self.environment.epoch_ns();
+        output.attach(&Attachment {
+            log_time: time,
+            create_time: time,
+            name: "scene.toml".into(),
+            media_type: "application/toml".into(),
+            data: scene.as_bytes().into(),
+        })?;
+        self.scene_is_written = true;
+        Ok(())
+    }
+
+    /// The id of the topic's channel and the number of its next message.
+    fn channel(&mut self, output: &mut mcap::Writer<NoSeek<W>>, topic: Topic) -> mcap::McapResult<(u16, u32)> {
+        if let Some((id, sequence)) = self.channels.get_mut(&topic) {
+            *sequence = sequence.wrapping_add(1);
+            return Ok((*id, *sequence));
+        }
+        let schema = output.add_schema(topic.kind().schema(), "protobuf", &schema::descriptor_set())?;
+        let id = output.add_channel(schema, &topic.name(&self.environment), "protobuf", &BTreeMap::new())?;
+        self.channels.insert(topic, (id, 0));
+        Ok((id, 0))
+    }
+}
+
+impl<W: Write> std::fmt::Debug for McapWriter<W> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("McapWriter")
+            .field("place", &self.place)
+            .field("pending", &self.pending.len())
+            .finish_non_exhaustive()
+    }
+}
+
+fn write_error(place: &str, error: mcap::McapError) -> Error {
+    match error {
+        mcap::McapError::Io(e) => Error::io(Path::new(place), e),
+        other => Error::new(ErrorKind::Io, format!("the log cannot be written: {other}")).at(place),
+    }
+}
