@@ -3,6 +3,7 @@
 //! The equations are those of the paper (Jacobs, Moore, Cavusoglu, IJRR 2010) with the corrections that DESIGN.md
 //! lists. One step of any model, whole body or patch, is [`contact::step`].
 
+pub mod blend;
 pub mod body;
 pub mod contact;
 pub mod equilibrium;

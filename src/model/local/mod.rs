@@ -3,6 +3,7 @@
 mod full;
 mod hold;
 mod patch;
+mod succession;
 mod window;
 
 use super::Vec3;
@@ -13,6 +14,7 @@ use super::simulation::Simulation;
 pub use full::Full;
 pub use hold::Hold;
 pub use patch::Patch;
+pub use succession::{Resynced, Served, Succession};
 
 /// The local models by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

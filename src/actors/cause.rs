@@ -1,0 +1,61 @@
+//! Why an actor did less than it should.
+
+use crate::devices::DeviceFault;
+
+/// The causes that palpate's actors report with an outcome.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Cause {
+    /// The device could not be read or written.
+    Device(DeviceFault),
+    /// The device reported numbers that are not finite; the last state is used.
+    DeviceNotFinite,
+    /// The local model's force is not finite: zero is commanded until the next resync.
+    LocalNotFinite,
+    /// The global model's state is not finite: it publishes nothing any more.
+    GlobalNotFinite,
+    /// Samples of the tool were lost between local and global model; the path was interpolated.
+    SamplesLost,
+}
+
+impl Cause {
+    const DEVICE: u32 = 256;
+
+    /// The number that goes into outcomes and records.
+    pub fn code(self) -> u32 {
+        match self {
+            Self::Device(fault) => Self::DEVICE + fault.code(),
+            Self::DeviceNotFinite => 300,
+            Self::LocalNotFinite => 301,
+            Self::GlobalNotFinite => 302,
+            Self::SamplesLost => 303,
+        }
+    }
+
+    /// What the number means, in words; `None` if it is not palpate's.
+    pub fn describe(code: u32) -> Option<&'static str> {
+        Some(match code {
+            257 => "the device had no new state",
+            258 => "the device is not ready",
+            259 => "the device is disconnected",
+            300 => "the device reported numbers that are not finite",
+            301 => "the local model's force is not finite, zero is commanded",
+            302 => "the global model's state is not finite, it publishes nothing any more",
+            303 => "tool samples were lost between local and global model",
+            _ => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cause_has_words() {
+        let faults = [DeviceFault::Stale, DeviceFault::NotReady, DeviceFault::Disconnected];
+        let others = [Cause::DeviceNotFinite, Cause::LocalNotFinite, Cause::GlobalNotFinite, Cause::SamplesLost];
+        for cause in faults.map(Cause::Device).into_iter().chain(others) {
+            assert!(Cause::describe(cause.code()).is_some(), "{cause:?}");
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! The device actor: reads the tool at the start of a release, writes the force of the same release at its end.
+
+use super::cause::Cause;
+use super::messages::{DeviceSample, ForceCommand};
+use crate::devices::{Device, DeviceFault, DeviceState};
+use crate::error::{Error, ErrorKind};
+use crate::log::{CommandSample, ToolSample};
+use crate::model::Vec3;
+use crate::runtime::{Actor, Outcome, Reader, Recorder, TickContext, Writer};
+use crate::safety::Pipeline;
+
+/// Releases without a new command after which zero is the command.
+const COMMAND_EXPIRES: u32 = 2;
+
+/// Reads and writes one device; everything that is written passes the safety pipeline.
+#[derive(Debug)]
+pub struct DeviceActor {
+    device: Box<dyn Device>,
+    samples: Writer<DeviceSample>,
+    commands: Reader<ForceCommand>,
+    safety: Pipeline,
+    recorder: Recorder,
+    last: DeviceSample,
+    missed_commands: u32,
+}
+
+impl DeviceActor {
+    /// An actor for `device`.
+    pub fn new(
+        device: Box<dyn Device>,
+        samples: Writer<DeviceSample>,
+        commands: Reader<ForceCommand>,
+        safety: Pipeline,
+        recorder: Recorder,
+    ) -> Self {
+        Self { device, samples, commands, safety, recorder, last: DeviceSample::default(), missed_commands: 0 }
+    }
+
+    fn read(&mut self, ctx: &TickContext) -> Outcome {
+        match self.device.read(ctx.scheduled) {
+            Ok(state) if is_finite(&state) => {
+                self.last = DeviceSample { id: self.last.id.wrapping_add(1), state };
+                Outcome::Continue
+            }
+            Ok(_) => Outcome::Degraded(Cause::DeviceNotFinite.code()),
+            Err(fault) => degraded(fault),
+        }
+    }
+}
+
+impl Actor for DeviceActor {
+    fn name(&self) -> &str {
+        self.device.name()
+    }
+
+    fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
+        // Without a first position there is no tool; a wrong one could start inside the body.
+        match self.device.read(ctx.scheduled) {
+            Ok(state) if is_finite(&state) => {
+                self.last.state = state;
+                Ok(())
+            }
+            Ok(_) => Err(Error::new(ErrorKind::Device, "its first state is not finite").at(self.device.name())),
+            Err(fault) => Err(Error::new(ErrorKind::Device, format!("no first state: {fault}")).at(self.device.name())),
+        }
+    }
+
+    fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        let outcome = self.read(ctx);
+        *self.samples.buffer() = self.last;
+        self.samples.publish(ctx);
+        let DeviceSample { id, state } = self.last;
+        self.recorder.push(ToolSample {
+            time: ctx.scheduled,
+            id,
+            position_m: state.position.into(),
+            velocity_m_s: state.velocity.into(),
+            buttons: state.buttons,
+        });
+        outcome
+    }
+
+    fn commit(&mut self, ctx: &TickContext) -> Outcome {
+        if self.commands.refresh(ctx) {
+            self.missed_commands = 0;
+        } else if self.commands.version() == 0 {
+            // Release 0: nothing has been computed, so nothing is written.
+            return Outcome::Continue;
+        } else {
+            self.missed_commands = self.missed_commands.saturating_add(1);
+        }
+        let command = *self.commands.get();
+        let force = if self.missed_commands > COMMAND_EXPIRES { Vec3::zeros() } else { command.force };
+        let dt = ctx.dt_nominal * f64::from(ctx.slips + 1);
+        let (force_n, actions) = self.safety.apply(force.into(), dt);
+        let outcome = self.device.write(Vec3::from(force_n)).map_or_else(degraded, |()| Outcome::Continue);
+        let time = if self.missed_commands == 0 { command.time } else { ctx.scheduled };
+        self.recorder.push(CommandSample { time, force_n, limits: actions.0 });
+        outcome
+    }
+
+    fn stop(&mut self, _: &TickContext) {
+        // A device that is gone cannot be told; there is nobody left to report to.
+        let _ = self.device.write(Vec3::zeros());
+    }
+}
+
+fn degraded(fault: DeviceFault) -> Outcome {
+    Outcome::Degraded(Cause::Device(fault).code())
+}
+
+fn is_finite(state: &DeviceState) -> bool {
+    state.position.iter().chain(state.velocity.iter()).all(|c| c.is_finite())
+}

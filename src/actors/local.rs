@@ -1,0 +1,222 @@
+//! The local actor: turns the newest tool sample into a force at the haptic rate.
+
+use super::cause::Cause;
+use super::messages::{DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
+use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync};
+use crate::model::Vec3;
+use crate::model::contact::{Contact, Mode};
+use crate::model::local::{LocalModel, PatchGeometry, Resynced, Served, Succession};
+use crate::runtime::{Actor, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer};
+use crate::time::{Nanos, Rate};
+
+/// Haptic ticks that one release advances at most. After a long stall the rest is made up by the releases that follow:
+/// simulated time never stretches, and no release takes longer than this many ticks.
+const MAX_TICKS_PER_RELEASE: u64 = 8;
+
+/// Where local models come from.
+#[derive(Debug)]
+pub enum ModelSource {
+    /// One model that needs no other (`full`); it publishes the surface itself.
+    Alone(OutletWriter<SurfaceView>),
+    /// Newer ones from a global model.
+    Global {
+        /// They arrive here.
+        models: Reader<Box<dyn LocalModel>>,
+        /// The tool at every haptic tick goes there.
+        ticks: QueueWriter<ToolTick>,
+        /// The patch's geometry at the tick of each resync, if it is fed back.
+        geometry: Option<Writer<PatchGeometry>>,
+    },
+}
+
+/// The ports of a [`LocalActor`].
+#[derive(Debug)]
+pub struct LocalPorts {
+    /// The device's newest state.
+    pub samples: Reader<DeviceSample>,
+    /// The newest force for it.
+    pub commands: Writer<ForceCommand>,
+    /// Where local models come from.
+    pub source: ModelSource,
+    /// The newest tool and force for a program that draws.
+    pub view: OutletWriter<ToolView>,
+    /// Records.
+    pub recorder: Recorder,
+}
+
+/// Runs the fast, small simulation.
+#[derive(Debug)]
+pub struct LocalActor {
+    models: Succession,
+    ports: LocalPorts,
+    haptic: Rate,
+    /// Rate of the resyncs, and the next one.
+    global: Rate,
+    resync: u64,
+    /// Logged nodes, in the order that models watch them.
+    probes: Vec<u32>,
+    /// Energy that the tool has given to the simulation [J].
+    energy: f64,
+    begun: bool,
+}
+
+impl LocalActor {
+    /// An actor over `models`; `haptic` and `global` are the rates of the two groups, `probes` the logged nodes.
+    pub fn new(models: Succession, haptic: Rate, global: Rate, probes: Vec<u32>, ports: LocalPorts) -> Self {
+        Self { models, ports, haptic, global, resync: 0, probes, energy: 0.0, begun: false }
+    }
+
+    /// Release 0: the first sample and the first model, no force.
+    fn begin(&mut self, ctx: &TickContext) {
+        self.begun = true;
+        let tool = self.ports.samples.get().state.position;
+        let first = match &mut self.ports.source {
+            ModelSource::Global { models, .. } if models.refresh(ctx) => {
+                let version = models.version() as u32;
+                Some((models.get_mut(), version))
+            }
+            _ => None,
+        };
+        self.models.begin(tool, first);
+        self.publish_state(ctx);
+    }
+
+    /// Advances the model to this release, or as far towards it as one release may.
+    fn advance(&mut self, ctx: &TickContext, target: Vec3) -> Served {
+        let mut served = Served::default();
+        let owed = ctx.tick.saturating_sub(self.models.now());
+        for i in 0..owed.min(MAX_TICKS_PER_RELEASE) {
+            // The tool is interpolated over all periods that are owed.
+            let from = self.models.tool();
+            let tool = from + (target - from) / (owed - i) as f64;
+            let resync = served.resync;
+            served = self.models.tick(tool);
+            served.resync = served.resync.or(resync);
+            self.energy -= finite_or_zero(served.force).dot(&(tool - from));
+            self.publish_state(ctx);
+        }
+        served
+    }
+
+    /// Tells the global model where the tool and the patch are.
+    fn publish_state(&mut self, ctx: &TickContext) {
+        let (tick, position) = (self.models.now(), self.models.tool());
+        let is_resync = tick == self.haptic.last_release(self.global.release(self.resync));
+        if is_resync {
+            self.resync += 1;
+        }
+        match &mut self.ports.source {
+            ModelSource::Alone(surface) if is_resync => {
+                let view = surface.buffer();
+                view.time = self.haptic.release(tick);
+                for (node, position) in view.positions.iter_mut().enumerate() {
+                    *position = self.models.serving().position(node as u32).unwrap_or(*position);
+                }
+                surface.publish(ctx);
+            }
+            ModelSource::Alone(_) => {}
+            ModelSource::Global { ticks, geometry, .. } => {
+                if let Some(geometry) = geometry.as_mut().filter(|_| is_resync) {
+                    let buffer = geometry.buffer();
+                    buffer.tick = tick;
+                    if self.models.serving().geometry(buffer) {
+                        geometry.publish(ctx);
+                    }
+                }
+                // A full queue is counted; the global model sees the gap and interpolates over it.
+                ticks.push(ctx, ToolTick { tick, position });
+            }
+        }
+    }
+
+    fn record(&mut self, time: Nanos, force: Vec3, resync: Option<Resynced>) {
+        let model = self.models.serving();
+        let age = |ticks: u64| self.haptic.release(ticks);
+        let recorder = &mut self.ports.recorder;
+        let model_age_s = match self.ports.source {
+            ModelSource::Alone(_) => 0.0,
+            ModelSource::Global { .. } => age(self.models.now().saturating_sub(model.built_at())).as_secs_f64(),
+        };
+        recorder.push(ForceSample {
+            time,
+            force_n: force.into(),
+            model_version: self.models.version(),
+            model_age_s,
+            energy_j: self.energy,
+        });
+        recorder.push(contact_sample(time, &model.contact(), force));
+        for (place, &node) in self.probes.iter().enumerate() {
+            let global = model.global_position(place).unwrap_or_default();
+            let local = model.position(node).unwrap_or(global);
+            recorder.push(ProbeSample { time, node, local_m: local.into(), global_m: global.into() });
+        }
+        if let Some(resync) = resync {
+            recorder.push(Resync {
+                time,
+                version: resync.version,
+                age: age(resync.age),
+                jump_before_n: resync.jump.before,
+                jump_after_n: resync.jump.after,
+                energy_j: self.energy,
+            });
+        }
+    }
+}
+
+impl Actor for LocalActor {
+    fn name(&self) -> &str {
+        "local"
+    }
+
+    fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        self.ports.samples.refresh(ctx);
+        if !self.begun {
+            self.begin(ctx);
+            return Outcome::Continue;
+        }
+        if let ModelSource::Global { models, .. } = &mut self.ports.source
+            && models.refresh(ctx)
+        {
+            let version = models.version() as u32;
+            self.models.offer(models.get_mut(), version);
+        }
+        let target = self.ports.samples.get().state.position;
+        let Served { force: computed, resync } = self.advance(ctx, target);
+        let force = finite_or_zero(computed);
+        let time = self.haptic.release(self.models.now());
+        *self.ports.commands.buffer() = ForceCommand { time, force };
+        self.ports.commands.publish(ctx);
+        let mode = self.models.serving().contact().mode;
+        *self.ports.view.buffer() = ToolView { time, position: self.models.tool(), force, mode };
+        self.ports.view.publish(ctx);
+        self.record(time, force, resync);
+        match (force == computed, &self.ports.source) {
+            (true, _) => Outcome::Continue,
+            // The next resync brings a good model; without a global model nothing would.
+            (false, ModelSource::Global { .. }) => Outcome::Degraded(Cause::LocalNotFinite.code()),
+            (false, ModelSource::Alone(_)) => Outcome::Fault(Cause::LocalNotFinite.code()),
+        }
+    }
+}
+
+fn finite_or_zero(force: Vec3) -> Vec3 {
+    if force.iter().all(|c| c.is_finite()) { force } else { Vec3::zeros() }
+}
+
+fn contact_sample(time: Nanos, contact: &Contact, force: Vec3) -> ContactSample {
+    let along = force.dot(&contact.normal);
+    ContactSample {
+        time,
+        mode: match contact.mode {
+            Mode::Free => ContactMode::Free,
+            Mode::Stick => ContactMode::Stick,
+            Mode::Slip => ContactMode::Slip,
+            Mode::Lost => ContactMode::Lost,
+        },
+        triangle: contact.triangle.unwrap_or(u32::MAX),
+        weights: [contact.weights[1], contact.weights[2]],
+        normal: contact.normal.into(),
+        normal_force_n: along as f32,
+        tangential_force_n: (force - contact.normal * along).norm() as f32,
+    }
+}

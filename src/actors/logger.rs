@@ -1,0 +1,201 @@
+//! The logger actor: takes the records of all threads, keeps statistics and writes the log.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::cause::Cause;
+use super::granted::granted;
+use crate::error::Error;
+use crate::log::{Analysis, Environment, Level, GroupStats, LogRecord, RunReport, StatsCounter, TextEvent};
+use crate::runtime::record::Event;
+use crate::runtime::{Actor, GrantHandle, Outcome, Record, RecordDrain, TickContext};
+use crate::time::Nanos;
+
+/// Where log entries go, besides the statistics.
+pub trait LogSink: Send {
+    /// Takes one record.
+    ///
+    /// # Errors
+    /// If it cannot be kept; the sink is then not used any more.
+    fn record(&mut self, record: &LogRecord) -> Result<(), Error>;
+
+    /// Takes an event in words.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    fn text(&mut self, event: &TextEvent) -> Result<(), Error>;
+
+    /// Takes the statistics of a group, once per second.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    fn stats(&mut self, stats: &GroupStats) -> Result<(), Error>;
+
+    /// Takes what became known of the run as a whole.
+    fn environment(&mut self, environment: &Environment);
+
+    /// Writes what is due at `log_time` and `now` (both since the start of the run).
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error>;
+
+    /// Ends the log.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    fn finish(&mut self) -> Result<(), Error>;
+}
+
+/// What a run left behind, filled in when the logger stops.
+#[derive(Clone, Debug, Default)]
+pub struct LoggerOutcome(Arc<Mutex<(RunReport, Option<Error>)>>);
+
+impl LoggerOutcome {
+    /// Takes the report and the error that ended the log before its time.
+    pub fn take(&self) -> (RunReport, Option<Error>) {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Drains records at a low rate on a low-priority thread.
+pub struct LoggerActor {
+    drain: RecordDrain,
+    sink: Option<Box<dyn LogSink>>,
+    environment: Environment,
+    grants: GrantHandle,
+    grants_known: bool,
+    analysis: Analysis,
+    stats: Vec<StatsCounter>,
+    outcome: LoggerOutcome,
+    failure: Option<Error>,
+    records: Vec<Record>,
+    log_time: Nanos,
+}
+
+impl std::fmt::Debug for LoggerActor {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LoggerActor").field("environment", &self.environment).finish_non_exhaustive()
+    }
+}
+
+impl LoggerActor {
+    /// A logger that keeps statistics, and writes to `sink` if there is one.
+    pub fn new(
+        drain: RecordDrain,
+        sink: Option<Box<dyn LogSink>>,
+        environment: Environment,
+        grants: GrantHandle,
+        outcome: LoggerOutcome,
+    ) -> Self {
+        let stats = (0..environment.groups.len() as u16).map(StatsCounter::new).collect();
+        let mut analysis = Analysis::default();
+        analysis.set_environment(&environment);
+        Self {
+            drain,
+            sink,
+            environment,
+            grants,
+            grants_known: false,
+            analysis,
+            stats,
+            outcome,
+            failure: None,
+            records: Vec::new(),
+            log_time: Nanos::ZERO,
+        }
+    }
+
+    /// A sink that failed is given up; the run goes on, its report says so.
+    fn keep(&mut self, write: impl FnOnce(&mut dyn LogSink) -> Result<(), Error>) {
+        if let Some(sink) = &mut self.sink
+            && let Err(error) = write(&mut **sink)
+        {
+            tracing::error!("the log ends here: {error}");
+            self.failure.get_or_insert(error);
+            self.sink = None;
+        }
+    }
+
+    fn take_records(&mut self) {
+        let mut records = std::mem::take(&mut self.records);
+        self.drain.drain(&mut records);
+        for record in records.drain(..).filter_map(|record| LogRecord::from_record(&record)) {
+            self.log_time = self.log_time.max(record.time());
+            match &record {
+                LogRecord::Event(event) => {
+                    let text = in_words(event, &self.environment.group_name(event.group));
+                    match text.level {
+                        Level::Info => tracing::info!(time = %text.time, "{}", text.message),
+                        Level::Warning => tracing::warn!(time = %text.time, "{}", text.message),
+                        Level::Error => tracing::error!(time = %text.time, "{}", text.message),
+                    }
+                    self.analysis.push_text(&text);
+                    self.keep(|sink| sink.text(&text));
+                    continue;
+                }
+                LogRecord::Tick(timing) => {
+                    let counter = self.stats.get_mut(usize::from(timing.group));
+                    if let Some(stats) = counter.and_then(|counter| counter.push(timing)) {
+                        self.keep(|sink| sink.stats(&stats));
+                    }
+                }
+                _ => {}
+            }
+            self.analysis.push(&record);
+            self.keep(|sink| sink.record(&record));
+        }
+        self.records = records;
+    }
+
+    fn learn_grants(&mut self) {
+        if self.grants_known {
+            return;
+        }
+        if let Some(grant) = self.grants.get() {
+            self.grants_known = true;
+            self.environment.granted = granted(&grant);
+            self.analysis.set_environment(&self.environment);
+            if let Some(sink) = &mut self.sink {
+                sink.environment(&self.environment);
+            }
+        }
+    }
+}
+
+impl Actor for LoggerActor {
+    fn name(&self) -> &str {
+        "logger"
+    }
+
+    fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        self.learn_grants();
+        self.take_records();
+        let log_time = self.log_time;
+        self.keep(|sink| sink.flush(log_time, ctx.now));
+        Outcome::Continue
+    }
+
+    fn stop(&mut self, _: &TickContext) {
+        self.learn_grants();
+        self.take_records();
+        for counter in std::mem::take(&mut self.stats) {
+            let stats = counter.finish();
+            self.keep(|sink| sink.stats(&stats));
+        }
+        self.keep(|sink| sink.finish());
+        self.analysis.set_lost(0, self.drain.lost());
+        let mut outcome = self.outcome.0.lock().unwrap_or_else(PoisonError::into_inner);
+        *outcome = (self.analysis.report(), self.failure.take());
+    }
+}
+
+/// An event in words; the causes that palpate's own actors give are named.
+fn in_words(event: &Event, group: &str) -> TextEvent {
+    let mut text = TextEvent::describe(event, group);
+    if matches!(event.code, Event::FAULT | Event::DEGRADED)
+        && let Some(cause) = u32::try_from(event.detail).ok().and_then(Cause::describe)
+    {
+        text.message = format!("{group}: {cause}");
+    }
+    text
+}

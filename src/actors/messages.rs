@@ -1,0 +1,55 @@
+//! What actors say to each other and to programs that watch.
+
+use crate::devices::DeviceState;
+use crate::model::Vec3;
+use crate::model::contact::Mode;
+use crate::time::Nanos;
+
+/// The device's newest state, numbered.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DeviceSample {
+    /// Counts successful reads from 1.
+    pub id: u32,
+    /// What was read.
+    pub state: DeviceState,
+}
+
+/// The tool at the end of one haptic tick of the local model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ToolTick {
+    /// The haptic tick.
+    pub tick: u64,
+    /// Position [m].
+    pub position: Vec3,
+}
+
+/// The newest force for the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ForceCommand {
+    /// End of the tick that it belongs to.
+    pub time: Nanos,
+    /// Mean force over that tick [N].
+    pub force: Vec3,
+}
+
+/// The newest tool and force, for a program that draws.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ToolView {
+    /// End of the haptic tick.
+    pub time: Nanos,
+    /// Tool position [m].
+    pub position: Vec3,
+    /// Force on the tool [N].
+    pub force: Vec3,
+    /// State of the contact.
+    pub mode: Mode,
+}
+
+/// The newest state of the body, for a program that draws.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SurfaceView {
+    /// The time that it belongs to.
+    pub time: Nanos,
+    /// Position of every node [m]; the triangles are those of the body's surface.
+    pub positions: Vec<Vec3>,
+}

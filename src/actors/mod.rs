@@ -1,0 +1,22 @@
+//! The four actors of a haptic session: thin glue between models, devices, logs and the runtime.
+//!
+//! ```text
+//! device --DeviceSample--> local --ToolTick, PatchGeometry--> global
+//!        <--ForceCommand--       <--local model--
+//! every actor --records--> logger
+//! ```
+
+mod cause;
+mod device;
+mod global;
+mod granted;
+mod local;
+mod logger;
+mod messages;
+
+pub use cause::Cause;
+pub use device::DeviceActor;
+pub use global::{GlobalActor, GlobalPorts};
+pub use local::{LocalActor, LocalPorts, ModelSource};
+pub use logger::{LogSink, LoggerActor, LoggerOutcome};
+pub use messages::{DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};

@@ -1,0 +1,89 @@
+//! Devices: what moves the tool and feels the force. One file per device; a program brings its own.
+
+mod scripted;
+
+pub use scripted::Scripted;
+
+use crate::model::Vec3;
+use crate::time::Nanos;
+
+/// What a device can do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Capabilities {
+    /// Largest force that it can or may exert [N].
+    pub max_force_n: f64,
+}
+
+/// The newest state of a device.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DeviceState {
+    /// Tool position [m].
+    pub position: Vec3,
+    /// Tool velocity [m/s].
+    pub velocity: Vec3,
+    /// Pressed buttons, a bit each.
+    pub buttons: u16,
+}
+
+/// Why a device could not be read or written. `Copy`, so that a real-time tick can pass it on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum DeviceFault {
+    /// No new state since the last read; the last one is used again. A retry helps.
+    Stale,
+    /// It is not calibrated or not ready. A retry helps once the user has made it ready.
+    NotReady,
+    /// It is gone. A retry does not help until it is connected again.
+    Disconnected,
+}
+
+impl DeviceFault {
+    /// A number for records and outcomes.
+    pub fn code(self) -> u32 {
+        match self {
+            Self::Stale => 1,
+            Self::NotReady => 2,
+            Self::Disconnected => 3,
+        }
+    }
+}
+
+impl std::fmt::Display for DeviceFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Stale => "the device had no new state",
+            Self::NotReady => "the device is not ready",
+            Self::Disconnected => "the device is disconnected",
+        })
+    }
+}
+
+/// A force-feedback device, or anything that moves a tool.
+///
+/// Per release of its group, [`read`](Self::read) is called once and then, from the second release on,
+/// [`write`](Self::write) once with the force of the same release.
+pub trait Device: Send + std::fmt::Debug {
+    /// Its name in reports and logs.
+    fn name(&self) -> &str;
+
+    /// What it can do.
+    fn capabilities(&self) -> Capabilities;
+
+    /// The state at `time`, the scheduled time of the release.
+    ///
+    /// # Errors
+    /// A [`DeviceFault`]; the run goes on with the last state.
+    ///
+    /// # Real-time
+    /// Called in the haptic tick: must not allocate; may block only if the device paces its group.
+    fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault>;
+
+    /// Exerts `force` [N] until the next call.
+    ///
+    /// # Errors
+    /// A [`DeviceFault`]; it is counted and reported.
+    ///
+    /// # Real-time
+    /// As [`read`](Self::read).
+    fn write(&mut self, force: Vec3) -> Result<(), DeviceFault>;
+}

@@ -1,0 +1,13 @@
+//! Stage 3: the largest change from one command to the next.
+
+use super::{Force, norm};
+
+/// `to`, or as far towards it as `limit` [N] from `from` allows; and whether it acted.
+pub fn slew(from: Force, to: Force, limit: f64) -> (Force, bool) {
+    let change: Force = std::array::from_fn(|i| to[i] - from[i]);
+    let length = norm(change);
+    if length <= limit {
+        return (to, false);
+    }
+    (std::array::from_fn(|i| from[i] + change[i] * (limit / length)), true)
+}
