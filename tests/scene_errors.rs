@@ -108,7 +108,7 @@ const CASES: &[Case] = &[
     case("kind = \"scripted\"", "kind = \"scripted", "scene.toml:25: ", &["TOML syntax"]),
     case("size_m = [0.1, 0.1, 0.1]", "nodes = [3, 3, 3]", "scene.toml:5: body.block.nodes: ", &["given twice", "first on line 4"]),
     case("ms = 10 }", "kind = \"none\" }", "scene.toml:23: local.blend.kind: ", &["given twice"]),
-    case("[safety]", "[body.block]", "scene.toml:27: ", &["block", "given twice"]),
+    case("[safety]", "[body.block]", "scene.toml:27: body.block: ", &["given twice"]),
     case("node = [7, 5, 11]", "node = [7, 5, 11]\nnode = [7, 5, 11]", "scene.toml:37: probe[1].node: ", &["given twice", "first on line 36"]),
     // Impossible values: body.
     case("nodes = [12, 12, 12]", "nodes = [12, 0, 12]", "scene.toml:4: body.block.nodes: ", &["[12, 0, 12]", "at least 2"]),
@@ -201,6 +201,23 @@ fn dotted_keys_and_inline_tables_are_located_too() {
 }
 
 #[test]
+fn a_key_given_twice_names_its_first_line_only_where_that_is_sure() {
+    for (text, expected) in [
+        ("a = 1\na = 2", "scene.toml:2: a: is given twice, first on line 1, keep one"),
+        ("\n[x]\n[x]", "scene.toml:3: x: is given twice, keep one"),
+        ("[x]\n\"a.b\" = 1\n\"a.b\" = 1", "scene.toml:3: x.\"a.b\": is given twice, keep one"),
+        ("x.a = 1\n\nx.a = 2", "scene.toml:3: x.a: is given twice, first on line 1, keep one"),
+        (
+            "[body]\nblock.nodes = 1\nblock.nodes = 2",
+            "scene.toml:3: body.block.nodes: is given twice, first on line 2, keep one",
+        ),
+    ] {
+        let message = refusal(text).to_string();
+        assert_eq!(message, expected);
+    }
+}
+
+#[test]
 fn a_missing_section_is_named_on_the_line_of_the_table_around_it() {
     let message = refusal("# a comment\n[body]\nkind = \"mass_spring\"\n").to_string();
     assert!(message.starts_with("scene.toml:2: body.block: is missing"), "{message}");
@@ -243,6 +260,19 @@ fn a_small_body_needs_no_patch_for_a_model_without_one() {
     assert!(refusal(&asked_for).to_string().contains("local.patch"));
 }
 
+/// A stack overflow would end the program, so the depth of the text must not become a depth of calls.
+#[test]
+fn deep_nesting_is_refused_in_one_line() {
+    for deep in [
+        format!("a = {}", "[".repeat(100_000)),
+        format!("a = {}", "{ a = ".repeat(100_000)),
+        format!("{} = 1", vec!["a"; 100_000].join(".")),
+        format!("[{}]", vec!["a"; 100_000].join(".")),
+    ] {
+        assert!(is_one_line(&refusal(&deep).to_string()));
+    }
+}
+
 #[test]
 fn files_that_cannot_be_read_say_so() {
     let folder = tempfile::tempdir().unwrap();
@@ -274,7 +304,7 @@ fn a_bad_path_file_is_named_with_its_own_line() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Check that no text makes the reader panic or speak in several lines: random splices of a good scene.
     #[test]

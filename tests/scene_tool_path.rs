@@ -21,6 +21,8 @@ fn samples() -> impl Strategy<Value = (Vec<f64>, Vec<[f64; 3]>)> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
     /// Check that a sample's own time gives its own value to the last bit.
     #[test]
     fn a_path_goes_exactly_through_its_samples((times, positions) in samples()) {

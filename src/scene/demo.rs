@@ -7,7 +7,6 @@ const PATH_CSV: &str = include_str!("../../scenes/paths/demo.csv");
 
 impl Scene {
     /// The built-in demo: five seconds of pressing, dragging, circling and tapping. Reads no file.
-    #[allow(clippy::missing_panics_doc, reason = "a test loads the files that are compiled in")]
     pub fn demo() -> Self {
         Self::from_toml_with(TOML, "demo.toml", |path_csv| {
             ToolPath::from_csv(PATH_CSV, &path_csv.display().to_string())

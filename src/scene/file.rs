@@ -5,7 +5,7 @@ use std::path::Path;
 use toml::de::DeTable;
 
 use super::fault::{Fault, plain_key};
-use super::locate::{line_of, offset_of, table_at};
+use super::locate::{exact_offset_of, line_of, offset_of, table_at};
 use super::{Scene, ToolPath, reader};
 use crate::error::{Error, ErrorKind};
 
@@ -88,16 +88,18 @@ fn syntax_fault(text: &str, root: &DeTable<'_>, error: &toml::de::Error) -> Faul
     if error.message() != "duplicate key" {
         return at(Fault::new(format!("TOML syntax: {}", error.message())));
     }
-    let key = text.get(span.clone()).unwrap_or_default().trim_matches(['"', '\'']);
     let line = line_of(text, span.start);
-    let is_header = text.lines().nth(line - 1).is_some_and(|line| line.trim_start().starts_with('['));
-    let table = if is_header { String::new() } else { table_at(root, span.start) };
-    let field = if table.is_empty() { plain_key(key) } else { format!("{table}.{}", plain_key(key)) };
-    let first = line_of(text, offset_of(root, &field));
-    let message = if is_header || first >= line {
-        "is given twice, keep one".to_owned()
-    } else {
-        format!("is given twice, first on line {first}, keep one")
-    };
+    let header = text.lines().nth(line - 1).unwrap_or_default().trim_start().strip_prefix('[');
+    if let Some(header) = header {
+        let table = header.trim_start_matches('[').split(']').next().unwrap_or_default().trim();
+        let field = table.split('.').map(|key| plain_key(key.trim())).collect::<Vec<_>>().join(".");
+        return at(Fault { field, offset: None, message: "is given twice, keep one".to_owned() });
+    }
+    let key = plain_key(text.get(span.clone()).unwrap_or_default().trim_matches(['"', '\'']));
+    let table = table_at(root, span.start);
+    let field = if table.is_empty() { key } else { format!("{table}.{key}") };
+    let first = exact_offset_of(root, &field).map(|offset| line_of(text, offset)).filter(|&first| first < line);
+    let first = first.map(|first| format!(" first on line {first},")).unwrap_or_default();
+    let message = format!("is given twice,{first} keep one");
     at(Fault { field, offset: None, message })
 }

@@ -5,6 +5,8 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::fault::plain_key;
+
 /// The line, counted from 1, on which byte `offset` of `text` lies.
 pub(super) fn line_of(text: impl AsRef<[u8]>, offset: usize) -> usize {
     let text = text.as_ref();
@@ -15,11 +17,25 @@ pub(super) fn line_of(text: impl AsRef<[u8]>, offset: usize) -> usize {
 /// The byte offset of `field` (such as `body.block.nodes` or `probe[1].node`), or of the innermost table of its path
 /// that the document has; 0 if it has none.
 pub(super) fn offset_of(root: &DeTable<'_>, field: &str) -> usize {
+    walk(root, field).0
+}
+
+/// The byte offset of `field` if the document has exactly that.
+pub(super) fn exact_offset_of(root: &DeTable<'_>, field: &str) -> Option<usize> {
+    let (offset, is_exact) = walk(root, field);
+    is_exact.then_some(offset)
+}
+
+/// As far along `field` as the document goes, and whether that is all of it.
+fn walk(root: &DeTable<'_>, field: &str) -> (usize, bool) {
     let mut table = root;
     let mut offset = 0;
-    for step in field.split('.') {
+    let mut steps = field.split('.');
+    while let Some(step) = steps.next() {
         let (key, index) = split_index(step);
-        let Some((spanned_key, value)) = table.iter().find(|(name, _)| name.get_ref() == key) else { break };
+        let Some((spanned_key, value)) = table.iter().find(|(name, _)| name.get_ref() == key) else {
+            return (offset, false);
+        };
         let value = match (index, value.get_ref()) {
             (Some(index), DeValue::Array(items)) => items.get(index).unwrap_or(value),
             _ => value,
@@ -29,10 +45,10 @@ pub(super) fn offset_of(root: &DeTable<'_>, field: &str) -> usize {
         offset = if is_section { value.span().start } else { spanned_key.span().start };
         match value.get_ref() {
             DeValue::Table(inner) => table = inner,
-            _ => break,
+            _ => return (offset, steps.next().is_none()),
         }
     }
-    offset
+    (offset, true)
 }
 
 /// `probe[1]` as `probe` and 1.
@@ -56,7 +72,8 @@ pub(super) fn table_at(root: &DeTable<'_>, offset: usize) -> String {
 
 fn collect(table: &DeTable<'_>, path: &str, sections: &mut Vec<(Range<usize>, String)>) {
     for (key, value) in table.iter() {
-        let path = if path.is_empty() { key.get_ref().to_string() } else { format!("{path}.{}", key.get_ref()) };
+        let key = plain_key(key.get_ref());
+        let path = if path.is_empty() { key } else { format!("{path}.{key}") };
         collect_value(value, path, sections);
     }
 }
