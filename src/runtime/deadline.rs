@@ -303,7 +303,7 @@ mod tests {
         assert_eq!((carried.slips, carried.cause), (0, SlipCause::LateWake));
         assert_eq!(ledger.skipped.of(SlipCause::LateWake), 2);
         assert_eq!(ledger.skipped.of(SlipCause::LongTick), 1);
-        assert_eq!(ledger.missed, 4);
+        assert_eq!(ledger.missed, 3);
     }
 
     #[test]
