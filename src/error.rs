@@ -95,6 +95,18 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// Longest piece of a user's text that a message repeats, in characters.
+const LONGEST_QUOTE: usize = 40;
+
+/// `text` in quotes, shortened, control characters escaped: a piece of a user's file for an error message.
+pub(crate) fn quoted(text: &str) -> String {
+    let mut short: String = text.chars().take(LONGEST_QUOTE).collect();
+    if short.len() < text.len() {
+        short.push('…');
+    }
+    format!("{short:?}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,9 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use palpate::scene::{
-    BlendKind, ContactEquations, Face, Feedback, Friction, LocalModelKind, NormalKind, Scene, ToolPath,
-};
+use palpate::scene::{BlendKind, Equations, Face, Feedback, Friction, LocalModelKind, Normals, Scene, ToolPath};
 
 #[path = "../examples/scene_paths.rs"]
 #[allow(dead_code, reason = "its main function writes the files that are only compared here")]
@@ -52,13 +50,13 @@ fn the_built_in_demo_is_the_demo_file() {
 #[test]
 fn the_demo_file_reads_as_it_is_written() {
     let scene = Scene::demo();
-    assert_eq!(scene.body.block.nodes, [12, 12, 12]);
-    assert_eq!(scene.body.block.size_m, [0.1; 3]);
-    assert_eq!(scene.body.block.fixed, [Face::ZMin]);
-    assert_eq!(scene.body.material.node_mass_kg, 0.0005);
+    assert_eq!(scene.body.as_ref().unwrap().block.nodes, [12, 12, 12]);
+    assert_eq!(scene.body.as_ref().unwrap().block.size_m, [0.1; 3]);
+    assert_eq!(scene.body.as_ref().unwrap().block.fixed, [Face::ZMin]);
+    assert_eq!(scene.body.as_ref().unwrap().material.node_mass_kg, 0.0005);
     assert_eq!(scene.contact.friction, Friction::Coefficient(0.5));
-    assert_eq!(scene.contact.normals, NormalKind::Interpolated);
-    assert_eq!(scene.contact.equations, ContactEquations::Corrected);
+    assert_eq!(scene.contact.normals, Normals::Interpolated);
+    assert_eq!(scene.contact.equations, Equations::Corrected);
     assert_eq!((scene.global.rate_hz, scene.global.substeps_per_ms), (30.0, Some(2)));
     assert_eq!(scene.local.feedback, Some(Feedback::Geometry));
     assert_eq!((scene.local.blend.kind, scene.local.blend.ms), (BlendKind::Crossfade, 10.0));
@@ -114,7 +112,7 @@ fn the_reference_scenes_have_the_reference_parameters() {
         ("drag_friction", false, Friction::Coefficient(1.0), 2.5),
     ] {
         let scene = load(name);
-        let material = scene.body.material;
+        let material = scene.body.as_ref().unwrap().material;
         let numbers = (material.node_mass_kg, material.stiffness_n_per_m, material.damping_ratio);
         assert_eq!(numbers, if is_slow { (0.001, 6.0, 1.0) } else { (0.0005, 30.0, 0.3) }, "{name}");
         assert_eq!(scene.global.substeps_per_ms, Some(2), "{name}");
@@ -153,7 +151,7 @@ fn the_path_files_are_what_their_formulas_give() {
 fn a_glued_tool_starts_where_its_node_rests() {
     for name in ["hand", "pull_release"] {
         let scene = load(name);
-        let (block, node) = (&scene.body.block, scene.device.attach_node.unwrap());
+        let (block, node) = (&scene.body.as_ref().unwrap().block, scene.device.attach_node.unwrap());
         let start = scene.device.path.as_ref().unwrap().at(0.0);
         for axis in 0..3 {
             let rest = block.size_m[axis] * node[axis] as f64 / (block.nodes[axis] - 1) as f64;

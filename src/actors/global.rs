@@ -78,8 +78,8 @@ impl GlobalActor {
     /// Builds the next local model around the contact, or around the surface nearest to the tool.
     fn publish_model(&mut self, ctx: &TickContext) -> u64 {
         let triangle = self.simulation.contact().triangle;
-        let triangle = triangle
-            .unwrap_or_else(|| self.nearest.find(&self.simulation.state().positions, &self.tool.position));
+        let triangle =
+            triangle.unwrap_or_else(|| self.nearest.find(&self.simulation.state().positions, &self.tool.position));
         let resync = ResyncView { global: &self.simulation, tick: self.tool.tick, triangle };
         self.ports.models.buffer().rebuild(resync);
         self.ports.models.publish(ctx)

@@ -70,14 +70,14 @@ impl LocalActor {
     fn begin(&mut self, ctx: &TickContext) {
         self.begun = true;
         let tool = self.ports.samples.get().state.position;
-        let first = match &mut self.ports.source {
-            ModelSource::Global { models, .. } if models.refresh(ctx) => {
+        match &mut self.ports.source {
+            ModelSource::Global { models, .. } => {
+                models.refresh(ctx);
                 let version = models.version() as u32;
-                Some((models.get_mut(), version))
+                self.models.begin(tool, Some((models.get_mut(), version)));
             }
-            _ => None,
-        };
-        self.models.begin(tool, first);
+            ModelSource::Alone(_) => self.models.begin(tool, None),
+        }
         self.publish_state(ctx);
     }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::cause::Cause;
 use super::granted::granted;
 use crate::error::Error;
-use crate::log::{Analysis, Environment, Level, GroupStats, LogRecord, RunReport, StatsCounter, TextEvent};
+use crate::log::{Analysis, Environment, GroupStats, Level, LogRecord, RunReport, StatsCounter, TextEvent};
 use crate::runtime::record::Event;
 use crate::runtime::{Actor, GrantHandle, Outcome, Record, RecordDrain, TickContext};
 use crate::time::Nanos;

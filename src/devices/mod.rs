@@ -1,8 +1,11 @@
 //! Devices: what moves the tool and feels the force. One file per device; a program brings its own.
 
+mod path_csv;
 mod scripted;
+mod tool_path;
 
 pub use scripted::Scripted;
+pub use tool_path::ToolPath;
 
 use crate::model::Vec3;
 use crate::time::Nanos;

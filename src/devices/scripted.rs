@@ -1,8 +1,7 @@
 //! A tool that follows a path and ignores the force.
 
-use super::{Capabilities, Device, DeviceFault, DeviceState};
+use super::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
 use crate::model::Vec3;
-use crate::scene::ToolPath;
 use crate::time::Nanos;
 
 /// Follows a path; exerts nothing.

@@ -1,5 +1,7 @@
 //! The body's part of a scene: shape, fixed faces, material.
 
+use crate::model::mesh::Face;
+
 /// A block of nodes joined by springs to all 26 neighbours.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
@@ -33,45 +35,6 @@ pub struct BlockSpec {
     /// Faces held stationary.
     #[cfg_attr(feature = "scene", serde(default = "default_fixed"))]
     pub fixed: Vec<Face>,
-}
-
-/// A face of the block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum Face {
-    /// x = 0.
-    XMin,
-    /// x = the block's length.
-    XMax,
-    /// y = 0.
-    YMin,
-    /// y = the block's length.
-    YMax,
-    /// z = 0: the bottom.
-    ZMin,
-    /// z = the block's height: the top.
-    ZMax,
-}
-
-impl Face {
-    /// All six, in the order x, y, z.
-    pub const ALL: [Self; 6] = [Self::XMin, Self::XMax, Self::YMin, Self::YMax, Self::ZMin, Self::ZMax];
-
-    /// Its name in scene files.
-    pub fn name(self) -> &'static str {
-        ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"][self as usize]
-    }
-
-    /// The axis across it: 0, 1 or 2 for x, y or z.
-    pub fn axis(self) -> usize {
-        self as usize / 2
-    }
-
-    /// True if `node` of a lattice of `nodes` per axis lies on it.
-    pub fn holds(self, node: [usize; 3], nodes: [usize; 3]) -> bool {
-        let is_max = self as usize % 2 == 1;
-        node[self.axis()] == if is_max { nodes[self.axis()] - 1 } else { 0 }
-    }
 }
 
 #[cfg(feature = "scene")]

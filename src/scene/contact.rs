@@ -1,5 +1,7 @@
 //! The contact's part of a scene: friction, normals, equations.
 
+use crate::model::contact::{Equations, Normals};
+
 /// How the tool touches the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
@@ -7,9 +9,9 @@ pub struct ContactSpec {
     /// Coulomb friction.
     pub friction: Friction,
     /// Which normal a contact uses.
-    pub normals: NormalKind,
+    pub normals: Normals,
     /// Which equations resolve it.
-    pub equations: ContactEquations,
+    pub equations: Equations,
 }
 
 /// Coulomb friction.
@@ -35,26 +37,4 @@ impl Friction {
             Self::Stick => f64::INFINITY,
         }
     }
-}
-
-/// Which normal a contact uses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum NormalKind {
-    /// Unit vertex normals interpolated over the triangle: continuous along the surface.
-    #[default]
-    Interpolated,
-    /// The triangle's own normal, as printed in the paper.
-    Face,
-}
-
-/// Which equations resolve the contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum ContactEquations {
-    /// Velocity level, mass-weighted.
-    #[default]
-    Corrected,
-    /// The paper's printed equations (10) to (31), to show the difference.
-    Paper,
 }

@@ -4,8 +4,8 @@ use std::fmt;
 
 use serde::de::{Error, Expected, Unexpected};
 
-use super::quote::quoted;
 use super::suggest::suggest;
+use crate::error::quoted;
 
 /// One reason to refuse a scene file.
 ///

@@ -55,6 +55,10 @@ impl Scene {
             return Err(refuse(syntax_fault(text, root, error)));
         }
         let mut scene: Self = reader::read(root).map_err(refuse)?;
+        if scene.body.is_none() {
+            let message = "is missing, a scene needs the tables [body.block] and [body.material]";
+            return Err(on_line(Error::scene("body", message), 0));
+        }
         scene.source = Some(text.to_owned());
         if let Some(path_csv) = &scene.device.path_csv {
             let read = read_path(path_csv).map_err(|error| match error.kind() {

@@ -10,9 +10,6 @@ mod check;
 mod contact;
 mod device;
 mod models;
-mod path;
-mod path_csv;
-mod quote;
 mod validate;
 
 #[cfg(feature = "scene")]
@@ -30,18 +27,21 @@ mod reader;
 #[cfg(feature = "scene")]
 mod suggest;
 
-pub use body::{BlockSpec, BodyKind, BodySpec, Face, MaterialSpec};
-pub use contact::{ContactEquations, ContactSpec, Friction, NormalKind};
+pub use body::{BlockSpec, BodyKind, BodySpec, MaterialSpec};
+pub use contact::{ContactSpec, Friction};
+
+pub use crate::devices::ToolPath;
+pub use crate::model::contact::{Equations, Normals};
+pub use crate::model::mesh::Face;
 pub use device::{DeviceKind, DeviceSpec, SafetySpec};
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec};
-pub use path::ToolPath;
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Scene {
-    /// The soft body.
-    pub body: BodySpec,
+    /// The soft body; a scene file must have one, `None` stands for a program's own.
+    pub body: Option<BodySpec>,
     /// How the tool touches it.
     #[cfg_attr(feature = "scene", serde(default))]
     pub contact: ContactSpec,

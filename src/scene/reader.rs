@@ -10,7 +10,7 @@ use toml::Spanned;
 use toml::de::{DeArray, DeInteger, DeTable, DeValue};
 
 use super::fault::{Fault, one_of};
-use super::quote::quoted;
+use crate::error::quoted;
 
 /// A value of the file, ready to be read as what serde asks for.
 pub(super) struct Reader<'a, 'i>(&'a DeValue<'i>);

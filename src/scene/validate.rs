@@ -20,8 +20,9 @@ const MAX_SUBSTEPS_PER_MS: u32 = 10_000;
 const MAX_DURATION_S: f64 = 1e6;
 
 pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
-    let block = &scene.body.block;
-    body(&scene.body)?;
+    if let Some(spec) = &scene.body {
+        body(spec)?;
+    }
     if let Friction::Coefficient(coefficient) = scene.contact.friction
         && !(coefficient.is_finite() && coefficient >= 0.0)
     {
@@ -29,16 +30,48 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
         return Err(Error::scene("contact.friction", message));
     }
     global(&scene.global)?;
-    local(&scene.local, &scene.global, block)?;
-    device(&scene.device, block)?;
+    local(&scene.local, &scene.global)?;
+    device(&scene.device)?;
     safety(&scene.safety)?;
+    if let Some(spec) = &scene.initial {
+        lengths_within("initial.pull.offset_m", spec.pull.offset_m, MAX_LENGTH_M)?;
+    }
+    match &scene.body {
+        Some(spec) => on_block(scene, &spec.block)?,
+        None => on_no_lattice(scene)?,
+    }
+    duration(scene.run.duration_s, scene.local.rate_hz)
+}
+
+/// What names nodes of the block, or has to fit into it.
+fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
+    // A body too small for the default patch is fine for the models that have none; a patch that was asked for is not.
+    if scene.local.model == LocalModelKind::Patch || scene.local.patch != LocalSpec::default().patch {
+        patch(scene.local.patch, block)?;
+    }
+    if let Some(node) = scene.device.attach_node {
+        attached(node, block)?;
+    }
     if let Some(spec) = &scene.initial {
         initial(spec, block)?;
     }
     for (index, probe) in scene.probes.iter().enumerate() {
         inside(&format!("probe[{index}].node"), probe.node, block)?;
     }
-    duration(scene.run.duration_s, scene.local.rate_hz)
+    Ok(())
+}
+
+/// A program's own body has node ids and no lattice: the builder's methods name its nodes.
+fn on_no_lattice(scene: &Scene) -> Result<(), Error> {
+    let named = [
+        ("device.attach_node", scene.device.attach_node.is_some()),
+        ("initial", scene.initial.is_some()),
+        ("probe", !scene.probes.is_empty()),
+    ];
+    match named.iter().find(|(_, is_used)| *is_used) {
+        None => Ok(()),
+        Some((field, _)) => Err(Error::scene(field, "names nodes of a block, and the body is the program's own")),
+    }
 }
 
 fn body(body: &BodySpec) -> Result<(), Error> {
@@ -115,15 +148,11 @@ fn global(global: &GlobalSpec) -> Result<(), Error> {
     not_negative("global.compute_latency_ms", global.compute_latency_ms)
 }
 
-fn local(local: &LocalSpec, global: &GlobalSpec, block: &BlockSpec) -> Result<(), Error> {
+fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
     rate("local.rate_hz", local.rate_hz)?;
     if local.rate_hz < global.rate_hz {
         let message = format!("is {}, must be at least global.rate_hz, {}", local.rate_hz, global.rate_hz);
         return Err(Error::scene("local.rate_hz", message));
-    }
-    // A body too small for the default patch is fine for the models that have none; a patch that was asked for is not.
-    if local.model == LocalModelKind::Patch || local.patch != LocalSpec::default().patch {
-        patch(local.patch, block)?;
     }
     if let Some(feedback) = local.feedback
         && !feedback.fits(local.model)
@@ -159,12 +188,15 @@ fn patch(patch: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
     Err(Error::scene("local.patch", message))
 }
 
-fn device(device: &DeviceSpec, block: &BlockSpec) -> Result<(), Error> {
+fn device(device: &DeviceSpec) -> Result<(), Error> {
     if device.path_csv.is_some() && device.path.is_none() {
         let message = "was not read, use Scene::load, or set device.path to a ToolPath";
         return Err(Error::scene("device.path_csv", message));
     }
-    let Some(node) = device.attach_node else { return Ok(()) };
+    Ok(())
+}
+
+fn attached(node: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
     let field = "device.attach_node";
     movable(field, node, block, "the tool could not move it")?;
     if !on_surface(node, block.nodes) {
@@ -184,7 +216,6 @@ fn safety(safety: &SafetySpec) -> Result<(), Error> {
 fn initial(initial: &InitialSpec, block: &BlockSpec) -> Result<(), Error> {
     let pulled = initial.pull.node;
     movable("initial.pull.node", pulled, block, "it cannot be pulled")?;
-    lengths_within("initial.pull.offset_m", initial.pull.offset_m, MAX_LENGTH_M)?;
     for &node in &initial.hold {
         inside("initial.hold", node, block)?;
         if node == pulled {

@@ -81,7 +81,7 @@ impl BlockBuilder {
         let lattice = Lattice { nodes: self.nodes };
         let spacing: [f64; 3] = std::array::from_fn(|axis| self.size[axis] / (self.nodes[axis] - 1) as f64);
         let at = |id: usize| lattice.coordinates(id as u32);
-        let held = |id: usize| self.fixed.iter().any(|&face| lattice.on_face(at(id), face));
+        let held = |id: usize| self.fixed.iter().any(|&face| face.holds(at(id), self.nodes));
         let damping = self.damping_ratio * (2.0 * self.node_mass * self.stiffness).sqrt();
         let springs = LatticeSprings::uniform(&lattice, spacing, self.stiffness, damping);
         Ok(Block {

@@ -132,7 +132,8 @@ impl Succession {
         std::mem::swap(&mut self.fading, &mut self.serving);
         std::mem::swap(&mut self.serving, &mut self.arriving);
         self.version = version;
-        self.resync = Resynced { version, age: self.now.saturating_sub(self.serving.built_at()), ..Resynced::default() };
+        self.resync =
+            Resynced { version, age: self.now.saturating_sub(self.serving.built_at()), ..Resynced::default() };
         self.blend.begin();
     }
 

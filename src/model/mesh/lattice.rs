@@ -1,29 +1,45 @@
 //! The regular lattice of a block: numbering, neighbours and faces.
 
-/// A face of the block, by the axis that it is perpendicular to and the end of it.
+/// A face of the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[allow(missing_docs)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Face {
+    /// x = 0.
     XMin,
+    /// x = the block's length.
     XMax,
+    /// y = 0.
     YMin,
+    /// y = the block's length.
     YMax,
+    /// z = 0: the bottom.
     ZMin,
+    /// z = the block's height: the top.
     ZMax,
 }
 
 impl Face {
-    /// All six.
+    /// All six, in the order x, y, z.
     pub const ALL: [Self; 6] = [Self::XMin, Self::XMax, Self::YMin, Self::YMax, Self::ZMin, Self::ZMax];
 
-    /// The axis it is perpendicular to: 0, 1 or 2.
+    /// Its name in scene files.
+    pub fn name(self) -> &'static str {
+        ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"][self as usize]
+    }
+
+    /// The axis across it: 0, 1 or 2 for x, y or z.
     pub fn axis(self) -> usize {
         self as usize / 2
     }
 
-    /// True at the far end of the axis.
+    /// True at the far end of its axis.
     pub fn is_max(self) -> bool {
         self as usize % 2 == 1
+    }
+
+    /// True if `node` of a lattice of `nodes` per axis lies on it.
+    pub fn holds(self, node: [usize; 3], nodes: [usize; 3]) -> bool {
+        node[self.axis()] == if self.is_max() { nodes[self.axis()] - 1 } else { 0 }
     }
 }
 
@@ -81,11 +97,6 @@ impl Lattice {
             to[axis] = at[axis].checked_add_signed(offset[axis]).filter(|&c| c < self.nodes[axis])?;
         }
         Some(to)
-    }
-
-    /// True if the node lies on `face`.
-    pub fn on_face(&self, at: [usize; 3], face: Face) -> bool {
-        at[face.axis()] == if face.is_max() { self.nodes[face.axis()] - 1 } else { 0 }
     }
 
     /// Surface triangles of all six faces, counter-clockwise seen from outside; each quad is split along

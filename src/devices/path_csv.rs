@@ -1,8 +1,7 @@
 //! The text form of a tool path: `t_s,x_m,y_m,z_m`, one sample a line.
 
-use super::path::check_sample;
-use super::quote::quoted;
-use crate::error::{Error, ErrorKind};
+use super::tool_path::check_sample;
+use crate::error::{Error, ErrorKind, quoted};
 
 /// The first line of every path file; the units in it are the reason that it must be exactly this.
 const HEADER: &str = "t_s,x_m,y_m,z_m";
