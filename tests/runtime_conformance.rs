@@ -431,7 +431,11 @@ fn a_panicking_observer_stops_the_graph(execution: Execution) {
         .group(group("work", 1000), vec![Witness::boxed("worker", &log)])
         .until(Nanos(60_000 * MS));
     assert_eq!(run(&mut graph).fault.unwrap().group, "log");
-    assert_eq!(stops(&lines(&log)), 2);
+    let lines = lines(&log);
+    assert_eq!(stops(&lines), 2);
+    // After its own fault it is stopped, last, but never ticked again.
+    assert_eq!(lines.iter().filter(|line| line.starts_with("observer tick")).count(), 3);
+    assert_eq!(lines.last().unwrap(), "observer stop");
 }
 
 fn a_failed_start_stops_what_was_started_and_names_the_actor(execution: Execution) {

@@ -39,8 +39,7 @@ fn versions_seen(latency: Nanos, reader_first: bool) -> Vec<u64> {
     let running = graph.until(Nanos(60 * MS)).build().unwrap().start().unwrap();
     running.wait_for(Duration::from_secs(1));
     assert_eq!(running.stop().unwrap().fault, None);
-    let seen = seen.lock().unwrap().clone();
-    seen
+    seen.lock().unwrap().clone()
 }
 
 #[test]
@@ -173,8 +172,7 @@ fn records(latency: Nanos, steps: &[u64]) -> Vec<Record> {
     }
     running.wait_for(Duration::from_secs(1));
     assert_eq!(running.stop().unwrap().fault, None);
-    let all = all.lock().unwrap().clone();
-    all
+    all.lock().unwrap().clone()
 }
 
 proptest! {

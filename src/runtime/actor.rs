@@ -81,9 +81,9 @@ pub struct TickContext {
     pub scheduled: Nanos,
     /// When the group's work began; equal to `scheduled` in virtual time.
     pub now: Nanos,
-    /// The period [s].
+    /// The period, in seconds.
     pub dt_nominal: f64,
-    /// Time since the work of the release before began [s]; `dt_nominal` at the first.
+    /// Time since the work of the release before began, in seconds; `dt_nominal` at the first.
     pub dt_measured: f64,
     /// Periods skipped between the release before and this one.
     pub slips: u32,

@@ -36,7 +36,7 @@ mod imp {
 
     const NANOS_PER_S: u64 = 1_000_000_000;
 
-    /// Time since some start of the machine's own [ns].
+    /// Time since some start of the machine's own, in nanoseconds.
     ///
     /// # Real-time
     /// Wait-free, no system call (vDSO).

@@ -136,7 +136,8 @@ impl RateGroup {
     }
 
     /// Virtual time: when its publications become visible, counted from the release. It may exceed the period; several
-    /// publications are then in flight and become visible in order. Threads take the time that they take.
+    /// publications are then in flight and become visible in order. A latency beyond the deadline misses it each time.
+    /// Threads take the time that they take.
     #[must_use]
     pub fn latency(mut self, latency: Nanos) -> Self {
         self.latency = latency;

@@ -24,6 +24,8 @@ pub(crate) struct GroupRun {
     started: usize,
     degraded: u64,
     degraded_code: Option<u32>,
+    /// After a fault the actors are stopped and nothing else.
+    faulted: bool,
 }
 
 /// Why a release ended early.
@@ -53,7 +55,19 @@ impl GroupRun {
         };
         let names = actors.iter().map(|actor| actor.name().to_owned()).collect();
         let ledger = Ledger::new(index, &spec, until);
-        Self { index, spec, ledger, actors, names, recorder, last, started: 0, degraded: 0, degraded_code: None }
+        Self {
+            index,
+            spec,
+            ledger,
+            actors,
+            names,
+            recorder,
+            last,
+            started: 0,
+            degraded: 0,
+            degraded_code: None,
+            faulted: false,
+        }
     }
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
@@ -163,6 +177,7 @@ impl GroupRun {
     }
 
     fn fatal(&mut self, actor: usize, fatal: Fatal) -> RuntimeFault {
+        self.faulted = true;
         let at = self.last.scheduled;
         let what = match fatal {
             Fatal::Panic(text) => {
@@ -178,6 +193,7 @@ impl GroupRun {
     }
 
     fn overrun(&mut self, skipped: u64) -> RuntimeFault {
+        self.faulted = true;
         let at = self.ledger.due(self.ledger.elapsed_periods() - 1);
         self.event(at, Event::STOPPED, skipped);
         let what = format!("stopped by its overrun policy with {skipped} releases due at once");
@@ -190,8 +206,11 @@ impl GroupRun {
         }
     }
 
-    /// An observer's last tick, at `now`, after all others have ended.
+    /// An observer's last tick, at `now`, after all others have ended; none after a fault of its own.
     pub(crate) fn last_tick(&mut self, now: Nanos) -> Result<(), RuntimeFault> {
+        if self.faulted {
+            return Ok(());
+        }
         let tick = self.ledger.elapsed_periods();
         let dt_measured = now.saturating_sub(self.last.now).as_secs_f64();
         self.last = TickContext { tick, scheduled: now, now, dt_measured, slips: 0, visible_at: now, ..self.last };

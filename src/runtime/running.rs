@@ -183,3 +183,44 @@ impl fmt::Debug for Running {
         f.debug_struct("Running").field("groups", &self.names).finish_non_exhaustive()
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::runtime::{Outcome, RateGroup, actor_fn};
+
+    #[test]
+    fn a_run_can_be_shared_between_threads() {
+        fn shared<T: Send + Sync>() {}
+        shared::<Running>();
+        shared::<StopHandle>();
+    }
+
+    #[test]
+    fn a_group_that_does_not_return_is_given_up_and_observers_still_end() {
+        let bound = Duration::from_millis(300);
+        let (release, stuck) = std::sync::mpsc::channel::<()>();
+        let stuck = actor_fn("stuck", move |_| {
+            let _ = stuck.recv();
+            Outcome::Continue
+        });
+        let mut graph = Runtime::builder(Execution::Threaded);
+        graph.group(RateGroup::hz(100).name("stuck"), vec![stuck]);
+        graph.group(RateGroup::hz(100).name("log").observer(), vec![]);
+        let running = graph.build().unwrap().start().unwrap();
+        running.wait_for(Duration::from_millis(30));
+        let given_up = |bound| match &mut *running.lock() {
+            Executor::Threaded(threads) => threads.join(&running.names, bound),
+            Executor::Virtual(_) => unreachable!("the graph is threaded"),
+        };
+        assert_eq!(given_up(bound), ["stuck"]);
+        // Check that a later stop, and the drop, do not wait for it again
+        let again = Instant::now();
+        assert_eq!(given_up(STOP_BOUND), ["stuck"]);
+        assert!(again.elapsed() < STOP_BOUND);
+        let error = running.stop().unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Fault);
+        assert!(error.to_string().contains("`stuck`"), "{error}");
+        drop(release);
+    }
+}

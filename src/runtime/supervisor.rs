@@ -38,8 +38,9 @@ impl Control {
         self.active.fetch_sub(1, Ordering::Release);
     }
 
-    pub(crate) fn abandon(&self) {
-        self.abandoned.store(true, Ordering::Relaxed);
+    /// Lets the observers end although a group has not; true if that was already so.
+    pub(crate) fn abandon(&self) -> bool {
+        self.abandoned.swap(true, Ordering::Relaxed)
     }
 
     pub(crate) fn observers_may_end(&self) -> bool {

@@ -7,6 +7,7 @@ use super::mailbox::{MailReceiver, MailSender, mailbox};
 use super::os;
 use super::rate_group::{RateGroup, Wait};
 use super::release::GroupRun;
+use super::report::RuntimeFault;
 use super::supervisor::{Control, Message, Supervisor};
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
@@ -34,6 +35,8 @@ pub(crate) struct Threads {
     mail: MailReceiver<Message>,
     control: Arc<Control>,
     base_ns: u64,
+    /// Set when a join has waited long enough: nobody waits for the rest again.
+    given_up: bool,
     /// When the last group was seen to end.
     ended_at: Option<Nanos>,
     pub(crate) supervisor: Supervisor,
@@ -65,7 +68,7 @@ impl Threads {
             // A thread waits at its gate until it gets its group, so this cannot fail.
             let _ = gate.send(Go { group, base_ns });
         }
-        Ok(Self { handles, mail, control, base_ns, ended_at: None, supervisor })
+        Ok(Self { handles, mail, control, base_ns, given_up: false, ended_at: None, supervisor })
     }
 
     /// Takes the mail; true when all groups have ended.
@@ -89,16 +92,11 @@ impl Threads {
     pub(crate) fn join(&mut self, names: &[String], bound: Duration) -> Vec<String> {
         self.control.request_stop();
         let mut progress = (self.supervisor.ended(), Instant::now());
-        let mut abandoned = false;
-        while !self.poll() {
+        while !self.poll() && !self.given_up {
             if self.supervisor.ended() != progress.0 {
                 progress = (self.supervisor.ended(), Instant::now());
             } else if progress.1.elapsed() > bound {
-                if abandoned {
-                    break;
-                }
-                abandoned = true;
-                self.control.abandon();
+                self.given_up = self.control.abandon();
                 progress.1 = Instant::now();
             }
             std::thread::sleep(POLL);
@@ -165,18 +163,16 @@ fn group_thread(go: &Receiver<Go>, wait: Wait, control: &Control, post: &MailSen
     let observer = group.spec.observer;
     let now = || since(base_ns);
     let leave = || if observer { control.observers_may_end() } else { control.stop_requested() };
-    let mut faulted = false;
     while let Some(due) = group.ledger.next_due() {
         if !wait_until(base_ns + due.0, wait, leave) {
             break;
         }
         if let Err(fault) = group.release(now(), |_| now(), |_| now()) {
             post_fault(post, control, fault);
-            faulted = true;
             break;
         }
     }
-    if observer && !faulted {
+    if observer {
         while !control.observers_may_end() {
             std::thread::sleep(POLL);
         }
@@ -194,7 +190,7 @@ fn group_thread(go: &Receiver<Go>, wait: Wait, control: &Control, post: &MailSen
     post.try_send(Message::Ended(index, Box::new(report)));
 }
 
-fn post_fault(post: &MailSender<Message>, control: &Control, fault: super::report::RuntimeFault) {
+fn post_fault(post: &MailSender<Message>, control: &Control, fault: RuntimeFault) {
     post.try_send(Message::Fault(fault));
     control.request_stop();
 }
