@@ -2,6 +2,7 @@
 
 pub mod error;
 pub mod log;
+pub mod report;
 pub mod runtime;
 pub mod scene;
 pub mod time;
