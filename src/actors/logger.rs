@@ -79,10 +79,10 @@ impl std::fmt::Debug for LoggerActor {
 }
 
 impl LoggerActor {
-    /// A logger that keeps statistics, and writes to `sink` if there is one.
+    /// A logger that keeps statistics and writes everything to `sink`.
     pub fn new(
         drain: RecordDrain,
-        sink: Option<Box<dyn LogSink>>,
+        sink: impl LogSink + 'static,
         environment: Environment,
         grants: GrantHandle,
         outcome: LoggerOutcome,
@@ -92,7 +92,7 @@ impl LoggerActor {
         analysis.set_environment(&environment);
         Self {
             drain,
-            sink,
+            sink: Some(Box::new(sink)),
             environment,
             grants,
             grants_known: false,

@@ -39,6 +39,8 @@ pub struct RunReport {
     pub worst_event: Option<Level>,
     /// What is wrong with the log that the records came from; set by whoever read it.
     pub damage: Option<String>,
+    /// Messages in that log by topic; set by whoever read it.
+    pub messages: BTreeMap<String, u64>,
 }
 
 impl RunReport {
@@ -160,6 +162,7 @@ impl Analysis {
             event_count: self.event_count,
             worst_event: self.worst_event,
             damage: None,
+            messages: BTreeMap::new(),
         }
     }
 

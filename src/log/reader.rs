@@ -1,6 +1,6 @@
 //! Reads a log from front to back, a chunk at a time, to its end or to the first damage.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
@@ -36,6 +36,7 @@ struct Channel {
     topic: String,
     /// `None` for messages that are not palpate's.
     kind: Option<Kind>,
+    messages: u64,
 }
 
 impl LogReader<BufReader<File>> {
@@ -86,12 +87,18 @@ impl<R: Read> LogReader<R> {
         &self.topic
     }
 
-    /// The topics that the log has declared so far, in alphabetical order.
-    pub fn topics(&self) -> Vec<&str> {
-        let mut topics: Vec<&str> = self.channels.values().map(|channel| channel.topic.as_str()).collect();
-        topics.sort_unstable();
-        topics.dedup();
+    /// The topics that the log has declared so far, with the number of messages read from each.
+    pub fn topics(&self) -> BTreeMap<&str, u64> {
+        let mut topics = BTreeMap::new();
+        for channel in self.channels.values() {
+            *topics.entry(channel.topic.as_str()).or_insert(0) += channel.messages;
+        }
         topics
+    }
+
+    /// What `topic` carries, if the log has declared it and its messages are palpate's.
+    pub(crate) fn kind(&self, topic: &str) -> Option<Kind> {
+        self.channels.values().find(|channel| channel.topic == topic)?.kind
     }
 
     /// The entry in the record just read: `Ok(None)` if it holds none.
@@ -106,7 +113,8 @@ impl<R: Read> LogReader<R> {
             }
             Record::Channel(channel) => {
                 let kind = self.schemas.get(&channel.schema_id).and_then(|name| Kind::from_schema(name));
-                self.channels.insert(channel.id, Channel { topic: channel.topic, kind });
+                // The index repeats every channel.
+                self.channels.entry(channel.id).or_insert(Channel { topic: channel.topic, kind, messages: 0 });
             }
             Record::Metadata(metadata) if metadata.name == "environment" => {
                 self.topic.clear();
@@ -129,10 +137,11 @@ impl<R: Read> LogReader<R> {
             return Err("a message without its header".into());
         };
         let id = u16::from_le_bytes([header[0], header[1]]);
-        let Some(channel) = self.channels.get(&id) else {
+        let Some(channel) = self.channels.get_mut(&id) else {
             return Err(format!("a message on channel {id}, which was never declared"));
         };
         self.messages += 1;
+        channel.messages += 1;
         let Some(kind) = channel.kind else {
             return Ok(None);
         };

@@ -127,4 +127,19 @@ impl Kind {
     pub(crate) fn from_schema(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.schema() == name)
     }
+
+    /// What a topic of this name carries in any log of palpate's.
+    pub(crate) fn of_topic(name: &str) -> Option<Self> {
+        let environment = Environment::default();
+        let fixed = Topic::FIXED.into_iter().find(|topic| topic.name(&environment) == name).map(Topic::kind);
+        let of_group = || {
+            let (kind, group) = name.strip_prefix('/')?.split_once('/')?;
+            match (kind, group.is_empty()) {
+                ("timing", false) => Some(Self::Timing),
+                ("stats", false) => Some(Self::Stats),
+                _ => None,
+            }
+        };
+        fixed.or_else(of_group)
+    }
 }

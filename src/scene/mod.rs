@@ -115,6 +115,22 @@ impl Default for RunSpec {
 }
 
 impl Scene {
+    /// The defaults around a program's own body: default rates, frictionless, `patch`, nothing moves the tool yet.
+    pub fn of_program() -> Self {
+        Self {
+            body: None,
+            contact: ContactSpec::default(),
+            global: GlobalSpec::default(),
+            local: LocalSpec::default(),
+            device: DeviceSpec::default(),
+            safety: SafetySpec::default(),
+            initial: None,
+            probes: Vec::new(),
+            run: RunSpec::default(),
+            source: None,
+        }
+    }
+
     /// Refuses what cannot work, naming the field and what would be right.
     ///
     /// # Errors

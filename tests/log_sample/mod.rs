@@ -109,6 +109,7 @@ pub fn time_of(entry: &LogEntry) -> Nanos {
 fn timing(group: u16, tick: u64, scheduled: Nanos, period: u64) -> TickTiming {
     let woke = scheduled + Nanos(50_000 + tick * 7919 % 1000);
     let long = tick % 50 == 49;
+    let after_long = tick > 0 && tick.is_multiple_of(50);
     TickTiming {
         group,
         tick,
@@ -117,8 +118,8 @@ fn timing(group: u16, tick: u64, scheduled: Nanos, period: u64) -> TickTiming {
         start: woke + Nanos(300),
         end: woke + Nanos(if long { 2 * period } else { 20_000 }),
         deadline: scheduled + Nanos(period),
-        slips: u32::from(tick % 50 == 0 && tick > 0),
-        cause: if long || tick % 50 == 0 { SlipCause::LongTick } else { SlipCause::None },
+        slips: u32::from(after_long),
+        cause: if long || after_long { SlipCause::LongTick } else { SlipCause::None },
     }
 }
 

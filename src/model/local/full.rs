@@ -25,10 +25,6 @@ impl Full {
 }
 
 impl LocalModel for Full {
-    fn name(&self) -> &'static str {
-        "full"
-    }
-
     fn rebuild(&mut self, _: ResyncView<'_>) {}
 
     fn tick(&mut self, tool: ToolMotion) -> Vec3 {

@@ -14,10 +14,6 @@ pub struct Hold {
 }
 
 impl LocalModel for Hold {
-    fn name(&self) -> &'static str {
-        "hold"
-    }
-
     fn rebuild(&mut self, resync: ResyncView<'_>) {
         self.force = resync.global.force();
         self.contact = *resync.global.contact();

@@ -28,6 +28,15 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Its name in tables and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Hold => "hold",
+            Self::Patch(_) => "patch",
+        }
+    }
+
     /// An empty model of this kind, to be rebuilt in place; `None` for [`Full`], which is the simulation itself.
     pub fn empty(self) -> Option<Box<dyn LocalModel>> {
         match self {
@@ -81,9 +90,6 @@ impl PatchGeometry {
 
 /// A model that turns tool motion into force at the haptic rate.
 pub trait LocalModel: Send + std::fmt::Debug {
-    /// Its name in tables and logs.
-    fn name(&self) -> &'static str;
-
     /// Makes it anew, in place, from the global model.
     ///
     /// # Real-time

@@ -52,10 +52,6 @@ impl Patch {
 }
 
 impl LocalModel for Patch {
-    fn name(&self) -> &'static str {
-        "patch"
-    }
-
     fn rebuild(&mut self, resync: ResyncView<'_>) {
         let global = resync.global;
         let (body, state) = (global.body(), global.state());

@@ -1,0 +1,30 @@
+//! What the subcommands share: standard output that may be closed early, and the warning on a damaged log.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use palpate::Error;
+
+/// Writes `text` to standard output. A reader that has gone away, such as `head`, is not an error.
+pub fn print(text: &str) -> Result<(), Error> {
+    let mut out = io::stdout().lock();
+    let result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    forgive_closed_pipe(result.map_err(|e| Error::io(Path::new("standard output"), e)))
+}
+
+/// Takes the error of a closed pipe for the end of the output.
+pub fn forgive_closed_pipe(result: Result<(), Error>) -> Result<(), Error> {
+    let Err(error) = result else { return Ok(()) };
+    let io_error = std::error::Error::source(&error).and_then(|source| source.downcast_ref::<io::Error>());
+    match io_error.map(io::Error::kind) {
+        Some(io::ErrorKind::BrokenPipe) => Ok(()),
+        _ => Err(error),
+    }
+}
+
+/// Says on standard error, in one line, what is wrong with the log.
+pub fn warn_of_damage(place: &str, damage: Option<&str>) {
+    if let Some(damage) = damage {
+        eprintln!("warning: {place}: {damage}");
+    }
+}

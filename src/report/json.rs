@@ -1,0 +1,154 @@
+//! The report for programs: one JSON document.
+//!
+//! Field names are stable; later versions only add fields. Units are in the names; counts and nanoseconds are
+//! integers. A number that is not finite, which JSON cannot hold, and a fact that is not known are `null`.
+//!
+//! | field | content |
+//! | --- | --- |
+//! | `schema_version` | 1 |
+//! | `verdict`, `reason` | `OK`, `INCOMPLETE`, `LATE` or `FAILED`, and why in one line |
+//! | `duration_s` | time of the last record |
+//! | `virtual_time` | true if lateness is zero by construction |
+//! | `damage` | what is wrong with the log and where, or `null` |
+//! | `messages` | number of messages read, by topic |
+//! | `environment` | versions, rates, and in `granted` what the system granted; `null` if unknown |
+//! | `groups[]` | `name`, `rate_hz`, `released`, `skipped`, `missed`, `elapsed_periods`, `lost_records`, `skipped_by_cause`, `missed_by_cause`, `lateness_ns`, `execution_ns`, `period_error_ns` |
+//! | `resyncs` | `count`, `jump_before_n`, `jump_after_n`, `age_ns` |
+//! | `force` | `ticks`, `peak_n`, `peak_commanded_n`, `not_finite`, `model_age_s` |
+//! | `contact` | haptic ticks `free`, `stick`, `slip`, `lost` |
+//! | `limits` | `ticks`, `limited`, `share` (0 to 1), `stages` by name |
+//! | `lost_records` | of all groups |
+//! | `events` | `count`, `worst`, `first[]` with `t_s`, `level`, `message` |
+//!
+//! Distributions are `{count, p50, p90, p99, p999, max}`, nearest-rank, all zero if `count` is zero. Causes are
+//! `late_wake`, `long_tick`, `stalled_peer`, `policy` and `unattributed`.
+
+use serde_json::{Map, Value, json};
+
+use super::verdict::verdict;
+use crate::log::{CauseCounts, Environment, Execution, GroupReport, Level, Percentiles, RunReport, TextEvent};
+use crate::runtime::record::SlipCause;
+
+/// The report as one JSON document.
+pub fn to_json(report: &RunReport) -> String {
+    let (verdict, reason) = verdict(report);
+    let resyncs = &report.resyncs;
+    let force = &report.force;
+    let contact = &report.contact;
+    let limits = &report.limits;
+    let document = json!({
+        "schema_version": 1,
+        "verdict": verdict.name(),
+        "reason": reason,
+        "duration_s": report.duration.as_secs_f64(),
+        "virtual_time": report.is_virtual(),
+        "damage": report.damage,
+        "messages": report.messages,
+        "environment": report.environment.as_ref().map(environment),
+        "groups": report.groups.iter().map(group).collect::<Vec<_>>(),
+        "resyncs": {
+            "count": resyncs.jump_before_n.count,
+            "jump_before_n": percentiles(resyncs.jump_before_n),
+            "jump_after_n": percentiles(resyncs.jump_after_n),
+            "age_ns": percentiles(resyncs.age_ns),
+        },
+        "force": {
+            "ticks": force.ticks,
+            "peak_n": force.peak_n,
+            "peak_commanded_n": force.peak_commanded_n,
+            "not_finite": force.not_finite,
+            "model_age_s": percentiles(force.model_age_s),
+        },
+        "contact": {
+            "free": contact.free,
+            "stick": contact.stick,
+            "slip": contact.slip,
+            "lost": contact.lost,
+        },
+        "limits": {
+            "ticks": limits.ticks,
+            "limited": limits.limited,
+            "share": limits.share(),
+            "stages": limits.stages.iter().map(|(name, count)| (name.clone(), json!(count))).collect::<Map<_, _>>(),
+        },
+        "lost_records": report.lost_records(),
+        "events": {
+            "count": report.event_count,
+            "worst": report.worst_event.map(Level::name),
+            "first": report.events.iter().map(event).collect::<Vec<_>>(),
+        },
+    });
+    document.to_string()
+}
+
+fn environment(environment: &Environment) -> Value {
+    json!({
+        "palpate_version": environment.palpate_version,
+        "instruction_set": environment.instruction_set,
+        "execution": match environment.execution {
+            Execution::Virtual => "virtual",
+            Execution::Threaded { .. } => "threaded",
+        },
+        "start_unix_ns": environment.epoch_ns(),
+        "model": environment.model,
+        "haptic_hz": environment.haptic_hz,
+        "global_hz": environment.global_hz,
+        "granted": environment.granted,
+    })
+}
+
+fn group(group: &GroupReport) -> Value {
+    json!({
+        "name": group.name,
+        "rate_hz": group.rate_hz,
+        "released": group.released,
+        "skipped": group.skipped.total(),
+        "missed": group.missed.total(),
+        "elapsed_periods": group.elapsed_periods,
+        "lost_records": group.lost_records,
+        "skipped_by_cause": causes(group.skipped),
+        "missed_by_cause": causes(group.missed),
+        "lateness_ns": percentiles(group.lateness),
+        "execution_ns": percentiles(group.execution),
+        "period_error_ns": percentiles(group.period_error),
+    })
+}
+
+fn causes(counts: CauseCounts) -> Value {
+    let name = |cause| match cause {
+        SlipCause::None => "unattributed",
+        SlipCause::LateWake => "late_wake",
+        SlipCause::LongTick => "long_tick",
+        SlipCause::StalledPeer => "stalled_peer",
+        SlipCause::Policy => "policy",
+    };
+    Value::Object(counts.iter().map(|(cause, count)| (name(cause).to_owned(), json!(count))).collect())
+}
+
+fn percentiles<T: Into<Value>>(p: Percentiles<T>) -> Value {
+    let p = p.map(Into::into);
+    json!({ "count": p.count, "p50": p.p50, "p90": p.p90, "p99": p.p99, "p999": p.p999, "max": p.max })
+}
+
+fn event(event: &TextEvent) -> Value {
+    json!({ "t_s": event.time.as_secs_f64(), "level": event.level.name(), "message": event.message })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Analysis, LogRecord};
+    use crate::runtime::record::TickTiming;
+    use crate::time::Nanos;
+
+    #[test]
+    fn integers_survive_beyond_the_precision_of_doubles() {
+        let mut analysis = Analysis::default();
+        let end = Nanos((1 << 53) + 1);
+        analysis.push(&LogRecord::Tick(TickTiming { end, deadline: end, ..TickTiming::default() }));
+        let value: Value = serde_json::from_str(&to_json(&analysis.report())).unwrap();
+        assert_eq!(value["groups"][0]["execution_ns"]["max"], json!((1_u64 << 53) + 1));
+        assert_eq!(value["groups"][0]["missed_by_cause"]["unattributed"], json!(0));
+        assert_eq!((&value["damage"], &value["verdict"]), (&Value::Null, &json!("OK")));
+    }
+}

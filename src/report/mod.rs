@@ -1,0 +1,19 @@
+//! Reports about a run: for a terminal, for programs, and its records as tables.
+
+mod units;
+mod verdict;
+
+#[cfg(feature = "log")]
+mod csv;
+#[cfg(feature = "log")]
+mod export;
+#[cfg(feature = "cli")]
+mod json;
+mod text;
+
+#[cfg(feature = "log")]
+pub use export::{Format, export};
+#[cfg(feature = "cli")]
+pub use json::to_json;
+pub use text::to_text;
+pub use verdict::{Verdict, verdict};

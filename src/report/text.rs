@@ -1,0 +1,252 @@
+//! The report for a terminal: a verdict, then who was late and why, then what it did to the force.
+//!
+//! It fits a screen of 80 columns and 40 lines for a run of up to four rate groups.
+
+use super::units::{duration, force, seconds};
+use super::verdict::verdict;
+use crate::log::{CauseCounts, Environment, Execution, GroupReport, Percentiles, RunReport};
+
+const WIDTH: usize = 80;
+const EVENTS_SHOWN: usize = 4;
+/// Lines for what the system granted.
+const GRANT_LINES: usize = 3;
+
+/// The report as text, every line ended by a newline.
+pub fn to_text(report: &RunReport) -> String {
+    let (verdict, reason) = verdict(report);
+    let mut page = Page::default();
+    page.line(format!("{}: {reason}", verdict.name()));
+    if let Some(environment) = &report.environment {
+        page.line(String::new());
+        about(&mut page, environment);
+    }
+    page.line(String::new());
+    groups(&mut page, report);
+    page.line(String::new());
+    haptics(&mut page, report);
+    events(&mut page, report);
+    page.text
+}
+
+#[derive(Default)]
+struct Page {
+    text: String,
+}
+
+impl Page {
+    /// Adds a line, cut to the width of the page.
+    fn line(&mut self, line: String) {
+        let mut kept: String = line.chars().take(WIDTH).collect();
+        if kept.len() < line.len() {
+            kept.truncate(kept.char_indices().nth(WIDTH - 3).map_or(kept.len(), |(at, _)| at));
+            kept.push_str("...");
+        }
+        self.text.push_str(kept.trim_end());
+        self.text.push('\n');
+    }
+
+    /// Adds a line with a name in front.
+    fn named(&mut self, name: &str, text: String) {
+        self.line(format!("{name:<11}{text}"));
+    }
+}
+
+fn about(page: &mut Page, environment: &Environment) {
+    let execution = match environment.execution {
+        Execution::Virtual => "virtual",
+        Execution::Threaded { .. } => "threaded",
+    };
+    page.named(
+        "run",
+        format!(
+            "{execution}, model {}, palpate {}, {}",
+            environment.model, environment.palpate_version, environment.instruction_set
+        ),
+    );
+    let mut lines = vec![String::new()];
+    for (key, value) in &environment.granted {
+        let grant = format!("{key} {value}");
+        let line = lines.last_mut().expect("there is always a line");
+        if line.is_empty() {
+            *line = grant;
+        } else if line.len() + grant.len() + 13 <= WIDTH {
+            *line = format!("{line}, {grant}");
+        } else {
+            lines.push(grant);
+        }
+    }
+    let hidden = lines.len() > GRANT_LINES;
+    lines.truncate(GRANT_LINES);
+    for (i, line) in lines.iter().filter(|line| !line.is_empty()).enumerate() {
+        let more = if hidden && i + 1 == GRANT_LINES { ", ..." } else { "" };
+        page.named(if i == 0 { "granted" } else { "" }, format!("{line}{more}"));
+    }
+}
+
+fn groups(page: &mut Page, report: &RunReport) {
+    page.line(format!(
+        "{:<11}{:>10}{:>11}{:>11}{:>11}{:>13}",
+        "group", "rate", "released", "skipped", "missed", "lost records"
+    ));
+    for group in &report.groups {
+        let rate = group.rate_hz.map_or("-".to_owned(), |hz| format!("{hz} Hz"));
+        let (skipped, missed) = (group.skipped.total(), group.missed.total());
+        page.line(format!(
+            "{:<11}{rate:>10}{:>11}{skipped:>11}{missed:>11}{:>13}",
+            short(&group.name),
+            group.released,
+            group.lost_records
+        ));
+    }
+    for (what, of) in
+        [("skipped", (|group| group.skipped) as fn(&GroupReport) -> CauseCounts), ("missed", |group| group.missed)]
+    {
+        for group in report.groups.iter().filter(|group| of(group).total() > 0) {
+            page.line(format!("  {} {what}: {}", group.name, causes(of(group))));
+        }
+    }
+    page.line(String::new());
+    page.line(format!("{:<25}{:>11}{:>11}{:>11}{:>11}{:>11}", "", "p50", "p90", "p99", "p99.9", "max"));
+    for group in &report.groups {
+        percentiles(page, short(&group.name), "lateness", group.lateness);
+        percentiles(page, "", "execution", group.execution);
+        percentiles(page, "", "period error", group.period_error);
+    }
+    if report.is_virtual() {
+        page.line("virtual time: lateness and period error are zero by construction".to_owned());
+    }
+}
+
+fn percentiles(page: &mut Page, group: &str, what: &str, p: Percentiles<u64>) {
+    let cell = |ns: u64| if p.count == 0 { "-".to_owned() } else { duration(ns) };
+    let [p50, p90, p99, p999, max] = [p.p50, p.p90, p.p99, p.p999, p.max].map(cell);
+    page.line(format!("{group:<11}{what:<14}{p50:>11}{p90:>11}{p99:>11}{p999:>11}{max:>11}"));
+}
+
+fn haptics(page: &mut Page, report: &RunReport) {
+    let resyncs = &report.resyncs;
+    page.named("resyncs", resyncs.jump_before_n.count.to_string());
+    if resyncs.jump_before_n.count > 0 {
+        let of = |p: Percentiles<f64>, show: fn(f64) -> String| {
+            format!("p50 {:>9}   p99 {:>9}   max {:>9}", show(p.p50), show(p.p99), show(p.max))
+        };
+        page.named("  jump", format!("before blending  {}", of(resyncs.jump_before_n, force)));
+        page.named("", format!("after blending   {}", of(resyncs.jump_after_n, force)));
+        page.named("  age", format!("on arrival       {}", of(resyncs.age_ns.map(|ns| ns as f64 / 1e9), seconds)));
+        page.named("", format!("at each tick     {}", of(report.force.model_age_s, seconds)));
+    }
+    let contact = report.contact;
+    page.named(
+        "contact",
+        format!(
+            "free {}, stick {}, slip {}, lost {} (haptic ticks)",
+            contact.free, contact.stick, contact.slip, contact.lost
+        ),
+    );
+    let not_finite = match report.force.not_finite {
+        0 => String::new(),
+        count => format!(", {count} not finite"),
+    };
+    page.named(
+        "force",
+        format!("peak {}, commanded {}{not_finite}", force(report.force.peak_n), force(report.force.peak_commanded_n)),
+    );
+    if report.limits.limited > 0 {
+        let stages = report.limits.stages.iter().map(|(name, count)| format!("{name} {count}"));
+        let share = 100.0 * report.limits.share();
+        page.named("limits", format!("{} ({share:.2} % of ticks)", stages.collect::<Vec<_>>().join(", ")));
+    }
+}
+
+fn events(page: &mut Page, report: &RunReport) {
+    for (i, event) in report.events.iter().take(EVENTS_SHOWN).enumerate() {
+        let name = if i == 0 { "events" } else { "" };
+        page.named(name, format!("{:.3} s {}: {}", event.time.as_secs_f64(), event.level.name(), event.message));
+    }
+    let hidden = report.event_count.saturating_sub(EVENTS_SHOWN as u64);
+    if hidden > 0 {
+        page.named("", format!("and {hidden} more"));
+    }
+    if let Some(damage) = &report.damage {
+        page.named("damage", damage.clone());
+    }
+}
+
+fn causes(counts: CauseCounts) -> String {
+    let named = counts.iter().filter(|&(_, count)| count > 0);
+    named.map(|(cause, count)| format!("{} {count}", cause.name())).collect::<Vec<_>>().join(", ")
+}
+
+/// A name that fits its column.
+fn short(name: &str) -> &str {
+    name.char_indices().nth(10).map_or(name, |(at, _)| &name[..at])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Analysis, GroupInfo, Level, LogRecord, Resync, TextEvent};
+    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::time::Nanos;
+
+    fn busy_report() -> RunReport {
+        let mut analysis = Analysis::default();
+        let names = ["haptic", "global", "a_rather_long_name", "device"];
+        analysis.set_environment(&Environment {
+            execution: Execution::Threaded { start_unix_ns: 1 },
+            model: "patch".into(),
+            groups: names.map(|name| GroupInfo { name: name.into(), rate_hz: 29.97 }).into(),
+            granted: (0..30).map(|i| (format!("grant_{i}"), "refused by the system".into())).collect(),
+            ..Environment::default()
+        });
+        for group in 0..4 {
+            for cause in [SlipCause::LateWake, SlipCause::LongTick, SlipCause::StalledPeer, SlipCause::Policy] {
+                analysis.push(&LogRecord::Tick(TickTiming {
+                    group,
+                    end: Nanos(u64::MAX),
+                    slips: u32::MAX,
+                    cause,
+                    ..TickTiming::default()
+                }));
+            }
+        }
+        analysis.push(&LogRecord::Resync(Resync { jump_before_n: -1e4, ..Resync::default() }));
+        for _ in 0..1000 {
+            analysis.push_text(&TextEvent {
+                level: Level::Warning,
+                message: "priorité ".repeat(20),
+                ..TextEvent::default()
+            });
+        }
+        RunReport { damage: Some("the log is cut off".into()), ..analysis.report() }
+    }
+
+    #[test]
+    fn even_a_busy_report_fits_eighty_columns_and_its_head_says_what_matters() {
+        let text = to_text(&busy_report());
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        assert!(text.starts_with("LATE: 68719476720 periods skipped and 16 deadlines missed"), "{text}");
+        assert!(text.contains("haptic skipped: late wake 4294967295, long tick 4294967295"), "{text}");
+        assert!(text.contains("and 996 more"), "{text}");
+    }
+
+    #[test]
+    fn a_normal_report_fits_forty_lines() {
+        let mut analysis = Analysis::default();
+        analysis.set_environment(&Environment {
+            groups: vec![
+                GroupInfo { name: "haptic".into(), rate_hz: 1000.0 },
+                GroupInfo { name: "global".into(), rate_hz: 30.0 },
+            ],
+            granted: (0..30).map(|i| (format!("grant_{i}"), "refused".into())).collect(),
+            ..Environment::default()
+        });
+        for group in 0..2 {
+            analysis.push(&LogRecord::Tick(TickTiming { group, ..TickTiming::default() }));
+        }
+        analysis.push(&LogRecord::Resync(Resync::default()));
+        let text = to_text(&analysis.report());
+        assert!(text.lines().count() <= 40, "{text}");
+        assert!(text.contains("zero by construction"), "{text}");
+    }
+}

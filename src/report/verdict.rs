@@ -1,0 +1,94 @@
+//! The one line that a report begins with.
+
+use super::units::plural;
+use crate::log::{Level, RunReport};
+
+/// How a run went, best first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Verdict {
+    /// Every period kept, every deadline met, nothing lost.
+    Ok,
+    /// The timing is good, but records are missing.
+    Incomplete,
+    /// Periods were skipped or deadlines missed.
+    Late,
+    /// An actor failed.
+    Failed,
+}
+
+impl Verdict {
+    /// Its name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "OK",
+            Self::Incomplete => "INCOMPLETE",
+            Self::Late => "LATE",
+            Self::Failed => "FAILED",
+        }
+    }
+}
+
+/// The verdict on a run and the reason in words.
+pub fn verdict(report: &RunReport) -> (Verdict, String) {
+    let time = match (report.is_virtual(), &report.environment) {
+        (true, _) => "virtual time",
+        (false, Some(_)) => "real time",
+        (false, None) => "run time",
+    };
+    let ran = format!("{:.3} s of {time}", report.duration.as_secs_f64());
+    let (skipped, missed, lost) = (report.skipped(), report.missed(), report.lost_records());
+    if report.worst_event == Some(Level::Error) {
+        let first = report.events.iter().find(|event| event.level == Level::Error);
+        let reason = first.map_or("an actor failed".to_owned(), |event| event.message.clone());
+        return (Verdict::Failed, format!("{reason}, in {ran}"));
+    }
+    if skipped > 0 || missed > 0 {
+        let skipped = plural(skipped, "period", "periods");
+        let missed = plural(missed, "deadline", "deadlines");
+        return (Verdict::Late, format!("{skipped} skipped and {missed} missed in {ran}"));
+    }
+    if lost > 0 {
+        return (Verdict::Incomplete, format!("{} lost in {ran}", plural(lost, "record", "records")));
+    }
+    if report.damage.is_some() {
+        return (Verdict::Incomplete, format!("the log is damaged after {ran}"));
+    }
+    if report.groups.iter().all(|group| group.released == 0) {
+        return (Verdict::Incomplete, "the log holds no ticks".to_owned());
+    }
+    (Verdict::Ok, format!("{ran}, every period kept, every deadline met"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Analysis, Environment, LogRecord};
+    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::time::Nanos;
+
+    fn report(slips: u32) -> RunReport {
+        let mut analysis = Analysis::default();
+        analysis.set_environment(&Environment::default());
+        analysis.push(&LogRecord::Tick(TickTiming {
+            scheduled: Nanos(1_500_000_000),
+            tick: 1500,
+            slips,
+            cause: SlipCause::LateWake,
+            deadline: Nanos(1_501_000_000),
+            ..TickTiming::default()
+        }));
+        analysis.report()
+    }
+
+    #[test]
+    fn the_gravest_finding_decides() {
+        let good = (Verdict::Ok, "1.500 s of virtual time, every period kept, every deadline met".to_owned());
+        assert_eq!(verdict(&report(0)), good);
+        let late = verdict(&report(3));
+        assert_eq!(late, (Verdict::Late, "3 periods skipped and 0 deadlines missed in 1.500 s of virtual time".into()));
+        let cut = RunReport { damage: Some("cut".into()), ..report(0) };
+        assert_eq!(verdict(&cut).0, Verdict::Incomplete);
+        let both = RunReport { worst_event: Some(Level::Error), ..report(3) };
+        assert_eq!(verdict(&both).0, Verdict::Failed);
+    }
+}

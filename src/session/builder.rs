@@ -1,0 +1,148 @@
+//! Collects what a session is made of.
+
+use std::path::PathBuf;
+
+use super::Session;
+use super::prepare::{Parts, prepare};
+use crate::devices::{Device, ToolPath};
+use crate::error::Error;
+use crate::model::body::Body;
+use crate::runtime::{Execution, RateGroup};
+use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, LocalModelKind, Scene};
+
+/// Collects what a session is made of; fills the same [`Scene`] as a scene file and passes the same validation.
+#[derive(Debug)]
+pub struct SessionBuilder {
+    parts: Parts,
+}
+
+impl SessionBuilder {
+    pub(super) fn new(body: Option<Box<dyn Body>>, scene: Scene) -> Self {
+        Self { parts: Parts::new(body, scene) }
+    }
+
+    /// The device; without one the tool follows the scene's path.
+    #[must_use]
+    pub fn device(mut self, device: impl Device + 'static) -> Self {
+        self.parts.device = Some(Box::new(device));
+        self
+    }
+
+    /// A scripted tool that follows `path`.
+    #[must_use]
+    pub fn path(mut self, path: ToolPath) -> Self {
+        self.parts.scene.device.path = Some(path);
+        self
+    }
+
+    /// Glues the tool to a surface node, by id.
+    #[must_use]
+    pub fn attach_node(mut self, node: u32) -> Self {
+        self.parts.attach = Some(node);
+        self
+    }
+
+    /// Logs a node's position every tick, by id; may be called again.
+    #[must_use]
+    pub fn probe(mut self, node: u32) -> Self {
+        self.parts.probes.push(node);
+        self
+    }
+
+    /// The global model's rate group: rate, pinning, priority.
+    #[must_use]
+    pub fn global(mut self, group: RateGroup) -> Self {
+        self.parts.scene.global.rate_hz = group.rate().as_hz();
+        self.parts.global = Some(group);
+        self
+    }
+
+    /// The haptic rate group, with device and local model in it.
+    #[must_use]
+    pub fn local(mut self, group: RateGroup) -> Self {
+        self.parts.scene.local.rate_hz = group.rate().as_hz();
+        self.parts.local = Some(group);
+        self
+    }
+
+    /// Which local model.
+    #[must_use]
+    pub fn model(mut self, model: LocalModelKind) -> Self {
+        self.parts.scene = self.parts.scene.with_model(model);
+        self
+    }
+
+    /// Nodes of a patch: along the surface, along it, into depth.
+    #[must_use]
+    pub fn patch(mut self, size: [usize; 3]) -> Self {
+        self.parts.scene.local.patch = size;
+        self
+    }
+
+    /// What the global model takes over from the local one.
+    #[must_use]
+    pub fn feedback(mut self, feedback: Feedback) -> Self {
+        self.parts.scene.local.feedback = Some(feedback);
+        self
+    }
+
+    /// Blends resyncs over `ms` milliseconds.
+    #[must_use]
+    pub fn crossfade_ms(mut self, ms: f64) -> Self {
+        self.parts.scene.local.blend = BlendSpec { kind: BlendKind::Crossfade, ms };
+        self
+    }
+
+    /// Coulomb coefficient; infinite for a tool that sticks until it is pulled off.
+    #[must_use]
+    pub fn friction(mut self, mu: f64) -> Self {
+        self.parts.scene.contact.friction =
+            if mu == f64::INFINITY { Friction::Stick } else { Friction::Coefficient(mu) };
+        self
+    }
+
+    /// Explicit steps per millisecond; without, chosen from the stability limit.
+    #[must_use]
+    pub fn substeps_per_ms(mut self, substeps: u32) -> Self {
+        self.parts.scene.global.substeps_per_ms = Some(substeps);
+        self
+    }
+
+    /// Ends the run by itself after `seconds`; without, it runs until it is stopped (scenes have a duration).
+    #[must_use]
+    pub fn duration_s(mut self, seconds: f64) -> Self {
+        self.parts.scene.run.duration_s = seconds;
+        self.parts.endless = false;
+        self
+    }
+
+    /// Runs in simulated time, on one thread, as fast as the machine allows and bit-identically every time.
+    #[must_use]
+    pub fn virtual_time(mut self) -> Self {
+        self.parts.execution = Execution::Virtual;
+        self
+    }
+
+    /// Writes a log to `path`, overwriting what is there.
+    #[cfg(feature = "log")]
+    #[must_use]
+    pub fn log(mut self, path: impl Into<PathBuf>) -> Self {
+        self.parts.log = Some(path.into());
+        self
+    }
+
+    /// Keeps every record in memory, for [`Summary::records`](super::Summary::records).
+    #[must_use]
+    pub fn keep_records(mut self) -> Self {
+        self.parts.keep_records = true;
+        self
+    }
+
+    /// Checks everything and makes the session ready to start.
+    ///
+    /// # Errors
+    /// Whatever cannot work, naming the field and what would be right.
+    pub fn build(self) -> Result<Session, Error> {
+        Ok(Session { prepared: prepare(self.parts)? })
+    }
+}

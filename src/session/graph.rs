@@ -1,0 +1,147 @@
+//! Wires actors and ports into a runtime and starts it.
+
+use super::prepare::Prepared;
+use super::running::{Running, Viewer};
+use super::sink::{Memory, Sinks};
+use crate::actors::{
+    DeviceActor, DeviceSample, ForceCommand, GlobalActor, GlobalPorts, LocalActor, LocalPorts, LoggerActor,
+    LoggerOutcome, ModelSource, SurfaceView, ToolTick, ToolView,
+};
+use crate::error::Error;
+use crate::log::{Environment, Execution as LogExecution, GroupInfo};
+use crate::model::Vec3;
+use crate::model::body::Block;
+use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
+use crate::runtime::{Actor, Execution, RateGroup, Runtime};
+use crate::safety::{Actions, Pipeline};
+use crate::time::Rate;
+
+/// How often records are taken to the log.
+const LOGGER: Rate = Rate::hz(20);
+/// Records of one actor per haptic tick at most, besides one per probe.
+const RECORDS_PER_TICK: usize = 4;
+/// A logger or a global model that is stuck for this long loses nothing.
+const SECONDS_BUFFERED: f64 = 4.0;
+
+pub(super) fn start(prepared: Prepared) -> Result<Running, Error> {
+    let environment = environment(&prepared);
+    let (sinks, memory) = sinks(&prepared, &environment)?;
+    let mut graph = Runtime::builder(prepared.execution);
+    let ticks_buffered = (SECONDS_BUFFERED * prepared.haptic.as_hz()) as usize;
+    let per_tick = RECORDS_PER_TICK + prepared.probes.len();
+
+    let positions = prepared.simulation.state().positions.clone();
+    let triangles = prepared.simulation.body().surface().triangles.clone();
+    let (view_writer, view) = graph.outlet(ToolView::default);
+    let (surface_writer, surface) =
+        graph.outlet(|| SurfaceView { positions: positions.clone(), ..SurfaceView::default() });
+    let (sample_writer, samples) = graph.exchange(DeviceSample::default);
+    let (command_writer, commands) = graph.exchange(ForceCommand::default);
+
+    let probes = prepared.probes;
+    let watching = |mut model: Box<dyn LocalModel>, probes: &[u32]| {
+        model.watch(probes);
+        model
+    };
+    let spare = || Box::new(Hold::default()) as Box<dyn LocalModel>;
+    let (source, models, global) = match prepared.kind.empty() {
+        None => {
+            let full = watching(Box::new(Full::new(prepared.simulation)), &probes);
+            (ModelSource::Alone(surface_writer), [full, spare(), spare()], None)
+        }
+        Some(_) => {
+            let (kind, watched) = (prepared.kind, probes.clone());
+            let model = move || watching(kind.empty().unwrap_or_else(spare), &watched);
+            let rotating = [model(), model(), model()];
+            let (model_writer, model_reader) = graph.exchange(model);
+            let (tick_writer, ticks) = graph.queue(ticks_buffered);
+            let (geometry_writer, geometry) = match prepared.geometry_feedback {
+                true => {
+                    let (writer, reader) = graph.exchange(PatchGeometry::default);
+                    (Some(writer), Some(reader))
+                }
+                false => (None, None),
+            };
+            let ports = GlobalPorts {
+                ticks,
+                geometry,
+                models: model_writer,
+                surface: surface_writer,
+                recorder: graph.recorder(ticks_buffered),
+            };
+            let global = GlobalActor::new(prepared.simulation, ToolTick::default(), prepared.haptic, ports)?;
+            let source = ModelSource::Global { models: model_reader, ticks: tick_writer, geometry: geometry_writer };
+            (source, rotating, Some(global))
+        }
+    };
+    let device = DeviceActor::new(
+        prepared.device,
+        sample_writer,
+        commands,
+        Pipeline::new(prepared.limits),
+        graph.recorder(ticks_buffered * 2),
+    );
+    let ports = LocalPorts {
+        samples,
+        commands: command_writer,
+        source,
+        view: view_writer,
+        recorder: graph.recorder(ticks_buffered * per_tick),
+    };
+    let succession = Succession::new(models, prepared.blend_ticks, Vec3::zeros());
+    let local = LocalActor::new(succession, prepared.haptic, prepared.global_rate, probes, ports);
+
+    let outcome = LoggerOutcome::default();
+    let logger = LoggerActor::new(graph.drain(), sinks, environment, graph.grants(), outcome.clone());
+    graph.group(prepared.local, vec![Box::new(device), Box::new(local)]);
+    if let Some(global) = global {
+        graph.group(prepared.global, vec![Box::new(global) as Box<dyn Actor>]);
+    }
+    graph.group(RateGroup::new(LOGGER).name("logger").observer(), vec![Box::new(logger)]);
+    if let Some(until) = prepared.until {
+        graph.until(until);
+    }
+    let running = graph.build()?.start()?;
+    Ok(Running::new(running, outcome, memory, Viewer::new(triangles, surface, view), prepared.until))
+}
+
+fn environment(prepared: &Prepared) -> Environment {
+    let group = |name: &str, rate: Rate| GroupInfo { name: name.to_owned(), rate_hz: rate.as_hz() };
+    let is_multi_rate = prepared.kind != Kind::Full;
+    let mut groups = vec![group("local", prepared.haptic)];
+    if is_multi_rate {
+        groups.push(group("global", prepared.global_rate));
+    }
+    groups.push(group("logger", LOGGER));
+    Environment {
+        palpate_version: env!("CARGO_PKG_VERSION").to_owned(),
+        instruction_set: Block::instruction_set().to_owned(),
+        execution: match prepared.execution {
+            Execution::Virtual => LogExecution::Virtual,
+            Execution::Threaded => LogExecution::Threaded { start_unix_ns: unix_now_ns() },
+        },
+        model: prepared.kind.name().to_owned(),
+        haptic_hz: prepared.haptic.as_hz(),
+        global_hz: if is_multi_rate { prepared.global_rate.as_hz() } else { 0.0 },
+        groups,
+        limit_stages: Actions::NAMES.map(str::to_owned).into(),
+        granted: Default::default(),
+        scene: prepared.source.clone(),
+    }
+}
+
+fn unix_now_ns() -> u64 {
+    let since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX)
+}
+
+#[cfg_attr(not(feature = "log"), allow(unused_mut, unused_variables))]
+fn sinks(prepared: &Prepared, environment: &Environment) -> Result<(Sinks, Option<Memory>), Error> {
+    let memory = prepared.keep_records.then(Memory::default);
+    let mut sinks = Sinks::new(memory.clone());
+    #[cfg(feature = "log")]
+    if let Some(path) = &prepared.log {
+        sinks = sinks.with_file(path, environment)?;
+    }
+    Ok((sinks, memory))
+}

@@ -1,0 +1,63 @@
+//! From a scene or a builder to a running session: actors, their ports and the runtime that executes them.
+//!
+//! ```
+//! use palpate::prelude::*;
+//!
+//! # fn main() -> Result<(), Error> {
+//! let body = Block::builder([6, 6, 6], [0.05; 3]).fix(Face::ZMin).build()?;
+//! let top = body.lattice().id([2, 2, 5]);
+//! let summary = Session::builder(body).attach_node(top).virtual_time().duration_s(0.1).build()?.run()?;
+//! assert_eq!(summary.report.force.samples, 100);
+//! # Ok(())
+//! # }
+//! ```
+
+mod builder;
+mod graph;
+mod prepare;
+mod running;
+mod sink;
+
+pub use builder::SessionBuilder;
+pub use running::{Running, Summary, Viewer};
+
+use crate::error::Error;
+use crate::model::body::Body;
+use crate::scene::Scene;
+use prepare::Prepared;
+
+/// A session that has passed every check and can start.
+#[derive(Debug)]
+pub struct Session {
+    prepared: Prepared,
+}
+
+impl Session {
+    /// A session with a program's own or a built body.
+    pub fn builder(body: impl Body + 'static) -> SessionBuilder {
+        SessionBuilder::new(Some(Box::new(body)), Scene::of_program())
+    }
+
+    /// A session as a scene describes it; the builder can still change it.
+    pub fn from_scene(scene: Scene) -> SessionBuilder {
+        SessionBuilder::new(None, scene)
+    }
+
+    /// Starts it: threads are up and the first local model is built when this returns.
+    ///
+    /// # Errors
+    /// If the log cannot be created, the device gives no first state or a thread cannot be started.
+    pub fn start(self) -> Result<Running, Error> {
+        graph::start(self.prepared)
+    }
+
+    /// Runs it to its end, see [`SessionBuilder::duration_s`].
+    ///
+    /// # Errors
+    /// As [`start`](Self::start) and [`Running::stop`].
+    pub fn run(self) -> Result<Summary, Error> {
+        let running = self.start()?;
+        running.wait();
+        running.stop()
+    }
+}

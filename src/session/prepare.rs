@@ -1,0 +1,253 @@
+//! Turns a validated description into bodies, states and models that can start.
+
+use std::path::PathBuf;
+
+use crate::devices::{Device, Scripted, ToolPath};
+use crate::error::{Error, ErrorKind};
+use crate::model::Vec3;
+use crate::model::body::{Block, Body, State};
+use crate::model::contact::{Contact, Law};
+use crate::model::equilibrium::static_equilibrium;
+use crate::model::integrator::Spectrum;
+use crate::model::local::Kind;
+use crate::model::mesh::Lattice;
+use crate::model::simulation::{Simulation, Stepping};
+use crate::runtime::{Execution, RateGroup};
+use crate::safety::Limits;
+use crate::scene::{BlendKind, BodySpec, Feedback, InitialSpec, LocalModelKind, Scene};
+use crate::time::{Nanos, Rate};
+
+/// What a builder has collected.
+#[derive(Debug)]
+pub(super) struct Parts {
+    pub scene: Scene,
+    /// The program's own body, in place of the scene's.
+    pub body: Option<Box<dyn Body>>,
+    pub device: Option<Box<dyn Device>>,
+    pub attach: Option<u32>,
+    pub probes: Vec<u32>,
+    pub global: Option<RateGroup>,
+    pub local: Option<RateGroup>,
+    pub execution: Execution,
+    pub log: Option<PathBuf>,
+    pub keep_records: bool,
+    pub endless: bool,
+}
+
+impl Parts {
+    pub(super) fn new(body: Option<Box<dyn Body>>, scene: Scene) -> Self {
+        Self {
+            endless: body.is_some(),
+            scene,
+            body,
+            device: None,
+            attach: None,
+            probes: Vec::new(),
+            global: None,
+            local: None,
+            execution: Execution::Threaded,
+            log: None,
+            keep_records: false,
+        }
+    }
+}
+
+/// Everything that a session's actors are made of.
+#[derive(Debug)]
+pub(super) struct Prepared {
+    pub simulation: Simulation,
+    pub kind: Kind,
+    pub geometry_feedback: bool,
+    pub blend_ticks: u32,
+    pub device: Box<dyn Device>,
+    pub limits: Limits,
+    pub probes: Vec<u32>,
+    pub haptic: Rate,
+    pub global_rate: Rate,
+    pub local: RateGroup,
+    pub global: RateGroup,
+    pub execution: Execution,
+    pub until: Option<Nanos>,
+    pub log: Option<PathBuf>,
+    pub keep_records: bool,
+    /// The scene file's text, for the log.
+    pub source: Option<String>,
+}
+
+/// The priority of the haptic thread: above everything but the kernel's own.
+const HAPTIC_PRIORITY: u8 = 80;
+
+pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
+    let scene = parts.scene;
+    scene.validate()?;
+    let haptic = rate("local.rate_hz", scene.local.rate_hz)?;
+    let global_rate = rate("global.rate_hz", scene.global.rate_hz)?;
+    let mut body = match (parts.body, &scene.body) {
+        (Some(own), _) => own,
+        (None, Some(spec)) => Box::new(block(spec)?) as Box<dyn Body>,
+        (None, None) => return Err(Error::scene("body", "is missing")),
+    };
+    check_body(&*body)?;
+
+    let lattice = scene.body.as_ref().map(|spec| Lattice { nodes: spec.block.nodes });
+    let id = |node: [usize; 3]| lattice.map_or(0, |lattice| lattice.id(node));
+    let attach = parts.attach.or(scene.device.attach_node.map(id));
+    let probes: Vec<u32> = parts.probes.into_iter().chain(scene.probes.iter().map(|probe| id(probe.node))).collect();
+    check_nodes(&*body, attach, &probes)?;
+
+    let tick = haptic.period_s();
+    let substeps = substeps(&mut *body, scene.global.substeps_per_ms, tick)?;
+    let state = match &scene.initial {
+        Some(initial) => pulled(&mut *body, initial, id)?,
+        None => State::at_rest(body.rest()),
+    };
+    let contact = attach.map_or_else(Contact::default, |node| glued(&*body, node));
+    let device = match parts.device {
+        Some(device) => device,
+        None => scripted(scene.device.path, attach.map(|node| body.rest()[node as usize]))?,
+    };
+    let law = Law {
+        friction: scene.contact.friction.coefficient(),
+        normals: scene.contact.normals,
+        equations: scene.contact.equations,
+    };
+    let limits = Limits {
+        max_force_n: scene.safety.max_force_n.unwrap_or(device.capabilities().max_force_n),
+        max_slew_n_per_s: scene.safety.max_slew_n_per_ms * 1e3,
+    };
+    let kind = match scene.local.model {
+        LocalModelKind::Full => Kind::Full,
+        LocalModelKind::Hold => Kind::Hold,
+        LocalModelKind::Patch => Kind::Patch(scene.local.patch),
+    };
+    // The paper feeds the patch's geometry back; hold has none.
+    let feedback = scene.local.feedback.unwrap_or(Feedback::Geometry);
+    let blend_ticks = match scene.local.blend.kind {
+        BlendKind::None => 0,
+        BlendKind::Crossfade => (scene.local.blend.ms * 1e-3 / tick).round().max(1.0) as u32,
+    };
+    let latency = Nanos::from_secs_f64(scene.global.compute_latency_ms * 1e-3);
+    let last_core = std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1);
+    let local = parts.local.unwrap_or_else(|| {
+        let group = RateGroup::new(haptic).realtime(HAPTIC_PRIORITY);
+        // On a single core the haptic thread preempts the others; pinning would gain nothing.
+        if last_core > 0 { group.pin(last_core) } else { group }
+    });
+    Ok(Prepared {
+        simulation: Simulation::new(body, state, contact, law, Stepping { tick, substeps })?,
+        kind,
+        geometry_feedback: feedback == Feedback::Geometry && matches!(kind, Kind::Patch(_)),
+        blend_ticks,
+        device,
+        limits,
+        probes,
+        haptic,
+        global_rate,
+        local: local.name("local"),
+        global: parts.global.unwrap_or_else(|| RateGroup::new(global_rate)).name("global").latency(latency),
+        execution: parts.execution,
+        until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
+        log: parts.log,
+        keep_records: parts.keep_records,
+        source: scene.source,
+    })
+}
+
+fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
+    Rate::from_hz(hz).ok_or_else(|| Error::scene(field, format!("is {hz}, which is no rate")))
+}
+
+fn block(spec: &BodySpec) -> Result<Block, Error> {
+    let builder = Block::builder(spec.block.nodes, spec.block.size_m)
+        .node_mass(spec.material.node_mass_kg)
+        .stiffness(spec.material.stiffness_n_per_m)
+        .damping_ratio(spec.material.damping_ratio);
+    spec.block.fixed.iter().fold(builder, |builder, &face| builder.fix(face)).build().map_err(|error| error.at("body"))
+}
+
+/// What a program's own body can get wrong.
+fn check_body(body: &dyn Body) -> Result<(), Error> {
+    let (nodes, masses) = (body.rest().len(), body.inverse_masses().len());
+    if nodes == 0 || nodes != masses {
+        let message =
+            format!("has {nodes} nodes and {masses} inverse masses, one each for at least one node is needed");
+        return Err(Error::scene("body", message));
+    }
+    if !body.rest().iter().flat_map(Vec3::iter).all(|c| c.is_finite()) {
+        return Err(Error::scene("body", "has rest positions that are not finite"));
+    }
+    if !body.inverse_masses().iter().all(|w| w.is_finite() && *w >= 0.0) {
+        return Err(Error::scene("body", "has inverse masses that are negative or not finite"));
+    }
+    if body.surface().triangles.is_empty() {
+        return Err(Error::scene("body", "has no surface triangles, a tool could not touch it"));
+    }
+    Ok(())
+}
+
+fn check_nodes(body: &dyn Body, attach: Option<u32>, probes: &[u32]) -> Result<(), Error> {
+    let nodes = body.rest().len();
+    let named = attach.map(|node| ("device.attach_node", node)).into_iter();
+    for (field, node) in named.chain(probes.iter().map(|&node| ("probe", node))) {
+        if node as usize >= nodes {
+            let message = format!("node {node} is outside the body, nodes run from 0 to {}", nodes - 1);
+            return Err(Error::scene(field, message));
+        }
+    }
+    match attach {
+        Some(node) if !body.surface().has_node(node) => {
+            let message =
+                format!("node {node} is inside the body, the tool can only be glued to a node of the surface");
+            Err(Error::scene("device.attach_node", message))
+        }
+        Some(node) if body.inverse_masses()[node as usize] == 0.0 => {
+            let message = format!("node {node} is held, the tool could not move it");
+            Err(Error::scene("device.attach_node", message))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Substeps per haptic tick: as asked, unless that is unstable, or from the stability limit.
+fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<u32, Error> {
+    let spectrum = Spectrum::estimate(body);
+    let Some(per_ms) = per_ms else { return Ok(spectrum.substeps(tick)) };
+    let substeps = (f64::from(per_ms) * tick * 1e3 - 1e-9).ceil().max(1.0);
+    let stable = spectrum.stable_step();
+    if tick / substeps >= stable {
+        let needed = (1.3e-3 / stable).ceil();
+        let message = format!(
+            "is {per_ms}, which is unstable for this stiffness, damping and mass: use {needed} or more, or leave it out"
+        );
+        return Err(Error::scene("global.substeps_per_ms", message));
+    }
+    Ok(substeps as u32)
+}
+
+fn pulled(body: &mut dyn Body, initial: &InitialSpec, id: impl Fn([usize; 3]) -> u32) -> Result<State, Error> {
+    let rest = |node: u32, body: &dyn Body| body.rest()[node as usize];
+    let pulled = id(initial.pull.node);
+    let mut held = vec![(pulled, rest(pulled, body) + Vec3::from(initial.pull.offset_m))];
+    held.extend(initial.hold.iter().map(|&node| (id(node), rest(id(node), body))));
+    static_equilibrium(body, &held)
+}
+
+/// The contact that glues the tool to `node`.
+fn glued(body: &dyn Body, node: u32) -> Contact {
+    let triangle = body.surface().at_node(node)[0];
+    let weights = body.surface().triangles[triangle as usize].map(|corner| f64::from(u8::from(corner == node)));
+    Contact::glued(triangle, weights)
+}
+
+/// A tool that follows `path`, or stays where the node that it is glued to rests.
+fn scripted(path: Option<ToolPath>, resting: Option<Vec3>) -> Result<Box<dyn Device>, Error> {
+    let path = match (path, resting) {
+        (Some(path), _) => path,
+        (None, Some(position)) => ToolPath::constant(position.into())?,
+        (None, None) => {
+            let message = "nothing moves the tool: give it a path_csv, an attach_node or a device of the program's own";
+            return Err(Error::new(ErrorKind::Scene, message).at("device"));
+        }
+    };
+    Ok(Box::new(Scripted::new(path)))
+}

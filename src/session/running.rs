@@ -1,0 +1,149 @@
+//! A session that runs, and what is left of it afterwards.
+
+use std::fmt;
+use std::time::Duration;
+
+use super::sink::Memory;
+use crate::actors::{LoggerOutcome, SurfaceView, ToolView};
+use crate::error::Error;
+use crate::log::{LogRecord, RunReport};
+use crate::runtime::{OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
+use crate::time::Nanos;
+
+/// A session that runs. Dropping it commands zero force and joins its threads, within
+/// [`STOP_BOUND`](crate::runtime::STOP_BOUND) per group.
+#[derive(Debug)]
+pub struct Running {
+    runtime: RuntimeRunning,
+    outcome: LoggerOutcome,
+    memory: Option<Memory>,
+    viewer: Option<Viewer>,
+    until: Option<Nanos>,
+}
+
+impl Running {
+    pub(super) fn new(
+        runtime: RuntimeRunning,
+        outcome: LoggerOutcome,
+        memory: Option<Memory>,
+        viewer: Viewer,
+        until: Option<Nanos>,
+    ) -> Self {
+        Self { runtime, outcome, memory, viewer: Some(viewer), until }
+    }
+
+    /// Waits for `span`, or until the run has ended; in virtual time, runs that much of it.
+    pub fn wait_for(&self, span: Duration) {
+        self.runtime.wait_for(span);
+    }
+
+    /// Waits until the run has ended by itself; returns at once for one that has no end.
+    pub fn wait(&self) {
+        if self.until.is_some() {
+            self.runtime.wait_for(Duration::MAX);
+        }
+    }
+
+    /// Time since the start, simulated in virtual time.
+    pub fn elapsed(&self) -> Nanos {
+        self.runtime.elapsed()
+    }
+
+    /// When the run ends by itself.
+    pub fn until(&self) -> Option<Nanos> {
+        self.until
+    }
+
+    /// True once it has ended, by itself or by a fault.
+    pub fn finished(&self) -> bool {
+        self.runtime.finished()
+    }
+
+    /// Stops the run from another thread or a signal handler's.
+    pub fn stop_handle(&self) -> StopHandle {
+        self.runtime.stop_handle()
+    }
+
+    /// The newest surface, tool and force, for a program that draws; there is one, for one thread.
+    pub fn take_viewer(&mut self) -> Option<Viewer> {
+        self.viewer.take()
+    }
+
+    /// Ends the run and says how it went. A fault or a log that could not be written is part of the summary.
+    ///
+    /// # Errors
+    /// If a thread cannot be joined.
+    pub fn stop(self) -> Result<Summary, Error> {
+        let runtime = self.runtime.stop()?;
+        let (report, log_error) = self.outcome.take();
+        let records = self.memory.map(|memory| memory.take()).unwrap_or_default();
+        Ok(Summary { report, runtime, log_error, records })
+    }
+}
+
+/// What a program that draws can see, without disturbing a tick.
+#[derive(Debug)]
+pub struct Viewer {
+    triangles: Vec<[u32; 3]>,
+    surface: OutletReader<SurfaceView>,
+    tool: OutletReader<ToolView>,
+}
+
+impl Viewer {
+    pub(super) fn new(
+        triangles: Vec<[u32; 3]>,
+        surface: OutletReader<SurfaceView>,
+        tool: OutletReader<ToolView>,
+    ) -> Self {
+        Self { triangles, surface, tool }
+    }
+
+    /// Node ids of the surface triangles, counter-clockwise seen from outside; they never change.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The newest positions of all nodes, at the rate of the global model.
+    ///
+    /// # Real-time
+    /// Wait-free, for this side and for the writer.
+    pub fn surface(&mut self) -> &SurfaceView {
+        self.surface.refresh();
+        self.surface.get()
+    }
+
+    /// The newest tool and force, at the haptic rate.
+    ///
+    /// # Real-time
+    /// Wait-free, for this side and for the writer.
+    pub fn tool(&mut self) -> ToolView {
+        self.tool.refresh();
+        *self.tool.get()
+    }
+}
+
+/// How a run went.
+#[derive(Debug)]
+pub struct Summary {
+    /// Timing, resyncs, force, contact, limits and events.
+    pub report: RunReport,
+    /// What the runtime counted, what the system granted, and the fault that ended the run, if any.
+    pub runtime: RuntimeReport,
+    /// Why the log ended before its time, if it did.
+    pub log_error: Option<Error>,
+    /// Every record, if they were kept.
+    pub records: Vec<LogRecord>,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&crate::report::to_text(&self.report))?;
+        if let Some(fault) = &self.runtime.fault {
+            writeln!(f, "fault: {fault}")?;
+        }
+        if let Some(error) = &self.log_error {
+            writeln!(f, "log: {error}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,100 @@
+//! Where a session's log entries go: a file, memory, or nowhere.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::actors::LogSink;
+use crate::error::Error;
+use crate::log::{Environment, GroupStats, LogRecord, TextEvent};
+use crate::time::Nanos;
+
+/// Records kept in memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory(Arc<Mutex<Vec<LogRecord>>>);
+
+impl Memory {
+    pub(super) fn take(&self) -> Vec<LogRecord> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn push(&self, record: LogRecord) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(record);
+    }
+}
+
+/// All sinks that a session asked for, one after the other.
+#[derive(Default)]
+pub(super) struct Sinks {
+    memory: Option<Memory>,
+    #[cfg(feature = "log")]
+    file: Option<crate::log::McapWriter<std::io::BufWriter<std::fs::File>>>,
+}
+
+impl Sinks {
+    /// Keeps records in `memory`, if there is one.
+    pub(super) fn new(memory: Option<Memory>) -> Self {
+        Self { memory, ..Self::default() }
+    }
+
+    /// Also writes a file.
+    #[cfg(feature = "log")]
+    pub(super) fn with_file(mut self, path: &std::path::Path, environment: &Environment) -> Result<Self, Error> {
+        self.file = Some(crate::log::McapWriter::create(path, environment)?);
+        Ok(self)
+    }
+}
+
+impl LogSink for Sinks {
+    fn record(&mut self, record: &LogRecord) -> Result<(), Error> {
+        if let Some(memory) = &self.memory {
+            memory.push(*record);
+        }
+        #[cfg(feature = "log")]
+        if let Some(file) = &mut self.file {
+            file.write(record)?;
+        }
+        Ok(())
+    }
+
+    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
+    fn text(&mut self, event: &TextEvent) -> Result<(), Error> {
+        #[cfg(feature = "log")]
+        if let Some(file) = &mut self.file {
+            file.write_text(event)?;
+        }
+        Ok(())
+    }
+
+    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
+    fn stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
+        #[cfg(feature = "log")]
+        if let Some(file) = &mut self.file {
+            file.write_stats(stats)?;
+        }
+        Ok(())
+    }
+
+    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
+    fn environment(&mut self, environment: &Environment) {
+        #[cfg(feature = "log")]
+        if let Some(file) = &mut self.file {
+            file.set_environment(environment);
+        }
+    }
+
+    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
+    fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error> {
+        #[cfg(feature = "log")]
+        if let Some(file) = &mut self.file {
+            file.flush_if_due(log_time, now)?;
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), Error> {
+        #[cfg(feature = "log")]
+        if let Some(file) = self.file.take() {
+            file.finish()?;
+        }
+        Ok(())
+    }
+}
