@@ -6,13 +6,13 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Distance of neighbouring nodes in every scene: 12 nodes over 0.1 m [m].
+/// Distance of neighbouring nodes in every scene: 12 nodes over 0.1 m (m).
 const SPACING_M: f64 = 0.1 / 11.0;
 
-/// The position [m] at a time [s].
+/// The position (m) at a time (s).
 type Formula = fn(f64) -> [f64; 3];
 
-/// Name, length [s] and formula of every path file.
+/// Name, length (s) and formula of every path file.
 const PATHS: [(&str, f64, Formula); 5] = [
     ("demo.csv", 5.0, demo),
     ("drag.csv", 2.5, drag),

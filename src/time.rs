@@ -94,7 +94,7 @@ impl Rate {
         f64::from(self.releases) / f64::from(self.seconds)
     }
 
-    /// The period [s].
+    /// The period (s).
     pub fn period_s(self) -> f64 {
         f64::from(self.seconds) / f64::from(self.releases)
     }

@@ -2,29 +2,28 @@
 
 use std::collections::BTreeMap;
 
-use crate::runtime::SystemGrant;
+use crate::runtime::{GroupGrant, SystemGrant};
 
-/// The grant as text: `mlock`, `kernel`, ... and `GROUP.policy`, `GROUP.cpu`, ... for every rate group.
+/// The grant as text: the machine, what the process got, and a line per rate group.
 pub(super) fn granted(grant: &SystemGrant) -> BTreeMap<String, String> {
-    let mut map: BTreeMap<String, String> = [
-        ("mlock", grant.mlock.clone()),
-        ("timer_slack", grant.timer_slack.clone()),
-        ("clock_source", grant.clock_source.clone()),
-        ("kernel", grant.kernel.clone()),
-        ("cores", grant.cores.to_string()),
-    ]
-    .map(|(key, value)| (key.to_owned(), value))
-    .into();
-    for group in &grant.groups {
-        let cpu = group.cpu.map_or("any".to_owned(), |cpu| cpu.to_string());
-        let facts = [
-            ("policy", group.policy.clone()),
-            ("priority", group.priority.to_string()),
-            ("cpu", cpu),
-            ("wait", group.wait.clone()),
-            ("refused", group.refused.clone()),
-        ];
-        map.extend(facts.map(|(key, value)| (format!("{}.{key}", group.name), value)));
+    let machine = format!("{}, clock {}, {} cores", kernel(&grant.kernel), grant.clock_source, grant.cores);
+    let mut map: BTreeMap<String, String> = [("machine".to_owned(), machine)].into();
+    if !grant.virtual_time {
+        map.insert("memory".to_owned(), format!("mlockall {}", grant.mlock));
+        map.insert("timer slack".to_owned(), grant.timer_slack.clone());
+        map.extend(grant.groups.iter().map(|group| (group.name.clone(), in_words(group))));
     }
     map
+}
+
+/// System and release, without the build's own story.
+fn kernel(kernel: &str) -> String {
+    kernel.split_whitespace().take(2).collect::<Vec<_>>().join(" ")
+}
+
+fn in_words(group: &GroupGrant) -> String {
+    let priority = if group.priority > 0 { format!(" {}", group.priority) } else { String::new() };
+    let cpu = group.cpu.map_or("any cpu".to_owned(), |cpu| format!("cpu {cpu}"));
+    let refused = if group.refused.is_empty() { String::new() } else { format!("; refused: {}", group.refused) };
+    format!("{}{priority} on {cpu}, {}{refused}", group.policy, group.wait)
 }

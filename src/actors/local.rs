@@ -55,7 +55,7 @@ pub struct LocalActor {
     resync: u64,
     /// Logged nodes, in the order that models watch them.
     probes: Vec<u32>,
-    /// Energy that the tool has given to the simulation [J].
+    /// Energy that the tool has given to the simulation (J).
     energy: f64,
     begun: bool,
 }

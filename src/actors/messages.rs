@@ -19,7 +19,7 @@ pub struct DeviceSample {
 pub struct ToolTick {
     /// The haptic tick.
     pub tick: u64,
-    /// Position [m].
+    /// Position (m).
     pub position: Vec3,
 }
 
@@ -28,7 +28,7 @@ pub struct ToolTick {
 pub struct ForceCommand {
     /// End of the tick that it belongs to.
     pub time: Nanos,
-    /// Mean force over that tick [N].
+    /// Mean force over that tick (N).
     pub force: Vec3,
 }
 
@@ -37,9 +37,9 @@ pub struct ForceCommand {
 pub struct ToolView {
     /// End of the haptic tick.
     pub time: Nanos,
-    /// Tool position [m].
+    /// Tool position (m).
     pub position: Vec3,
-    /// Force on the tool [N].
+    /// Force on the tool (N).
     pub force: Vec3,
     /// State of the contact.
     pub mode: Mode,
@@ -50,6 +50,6 @@ pub struct ToolView {
 pub struct SurfaceView {
     /// The time that it belongs to.
     pub time: Nanos,
-    /// Position of every node [m]; the triangles are those of the body's surface.
+    /// Position of every node (m); the triangles are those of the body's surface.
     pub positions: Vec<Vec3>,
 }

@@ -1,6 +1,83 @@
-//! The subcommands of `palpate`, one file each.
+//! The subcommands of `palpate`, one file each, and the contract that they share.
+//!
+//! Exit code 0 on success, 2 on a usage or input error (one line on standard error), 1 on a failed run.
 
 pub mod export;
+pub mod run;
 pub mod timing;
 
 mod output;
+mod progress;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser, Subcommand};
+use palpate::{Error, ErrorKind};
+
+/// Feel deformable objects: a detailed simulation at 30 Hz, a local model at 1 kHz, and a log of every tick.
+///
+/// Without a subcommand, runs the built-in demo scene in real time for 5 seconds and reports how it went.
+#[derive(Debug, Parser)]
+#[command(name = "palpate", version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a scene file, in real time or in virtual time
+    Run(run::RunArgs),
+    /// Say how well a recorded run kept its time, and what that did to the force
+    Timing(timing::TimingArgs),
+    /// Write one topic of a log as a table
+    Export(export::ExportArgs),
+}
+
+/// Parses the command line, runs it and says how it ended.
+pub fn main() -> ExitCode {
+    // Warnings of actors go to standard error; nothing real-time ever writes there itself.
+    tracing_subscriber::fmt()
+        .with_max_level(tracing::Level::WARN)
+        .with_target(false)
+        .without_time()
+        .with_ansi(false)
+        .with_writer(std::io::stderr)
+        .init();
+    let result = match Cli::try_parse() {
+        Ok(Cli { command }) => match command {
+            None => run::demo(),
+            Some(Command::Run(args)) => run::run(&args),
+            Some(Command::Timing(args)) => timing::run(&args),
+            Some(Command::Export(args)) => export::run(&args),
+        },
+        Err(error) if error.use_stderr() => Err(usage_error(&error)),
+        Err(help) => return print_help(&help),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            if error.kind().is_input() { ExitCode::from(2) } else { ExitCode::from(1) }
+        }
+    }
+}
+
+fn print_help(help: &clap::Error) -> ExitCode {
+    match output::print(&help.to_string()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) => ExitCode::from(2),
+    }
+}
+
+/// One line out of clap's several: what was wrong, then where to look.
+fn usage_error(error: &clap::Error) -> Error {
+    let text = error.to_string();
+    let complaint = text.split("\n\nUsage:").next().unwrap_or(&text);
+    let complaint = complaint.split("\n\nFor more information").next().unwrap_or(complaint);
+    let complaint = complaint.trim_start_matches("error: ");
+    let subcommands: Vec<String> = Cli::command().get_subcommands().map(|c| c.get_name().to_owned()).collect();
+    let asked = std::env::args().nth(1).filter(|word| subcommands.contains(word));
+    let help = asked.map_or("palpate --help".to_owned(), |word| format!("palpate {word} --help"));
+    Error::new(ErrorKind::Usage, format!("{complaint}; see `{help}`"))
+}

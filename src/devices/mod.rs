@@ -13,16 +13,16 @@ use crate::time::Nanos;
 /// What a device can do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capabilities {
-    /// Largest force that it can or may exert [N].
+    /// Largest force that it can or may exert (N).
     pub max_force_n: f64,
 }
 
 /// The newest state of a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeviceState {
-    /// Tool position [m].
+    /// Tool position (m).
     pub position: Vec3,
-    /// Tool velocity [m/s].
+    /// Tool velocity (m/s).
     pub velocity: Vec3,
     /// Pressed buttons, a bit each.
     pub buttons: u16,
@@ -81,7 +81,7 @@ pub trait Device: Send + std::fmt::Debug {
     /// Called in the haptic tick: must not allocate; may block only if the device paces its group.
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault>;
 
-    /// Exerts `force` [N] until the next call.
+    /// Exerts `force` (N) until the next call.
     ///
     /// # Errors
     /// A [`DeviceFault`]; it is counted and reported.

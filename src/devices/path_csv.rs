@@ -6,7 +6,7 @@ use crate::error::{Error, ErrorKind, quoted};
 /// The first line of every path file; the units in it are the reason that it must be exactly this.
 const HEADER: &str = "t_s,x_m,y_m,z_m";
 
-/// The times [s] and positions [m] in `text`, checked row by row so that every error names its line.
+/// The times (s) and positions (m) in `text`, checked row by row so that every error names its line.
 pub(super) fn parse(text: &str, name: &str) -> Result<(Vec<f64>, Vec<[f64; 3]>), Error> {
     let at = |line: usize, message: String| Error::new(ErrorKind::Scene, message).at(format!("{name}:{line}"));
     let (mut times_s, mut positions_m) = (Vec::new(), Vec::new());

@@ -12,7 +12,7 @@ pub struct Scripted {
 }
 
 impl Scripted {
-    /// The largest force of the device that the paper used, Phantom Premium 1.5 [N].
+    /// The largest force of the device that the paper used, Phantom Premium 1.5 (N).
     const MAX_FORCE_N: f64 = 8.5;
 
     /// A tool on `path`; past its end it holds the last sample.

@@ -5,20 +5,20 @@ use std::path::Path;
 use super::path_csv;
 use crate::error::{Error, ErrorKind};
 
-/// No coordinate of a tool lies farther out than this [m]; it keeps every difference of positions finite.
+/// No coordinate of a tool lies farther out than this (m); it keeps every difference of positions finite.
 const FARTHEST_M: f64 = 1e6;
 
 /// Tool positions over time, linear in between, held after the last and before the first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToolPath {
-    /// Strictly increasing times [s].
+    /// Strictly increasing times (s).
     times_s: Vec<f64>,
-    /// Positions [m], one per time.
+    /// Positions (m), one per time.
     positions_m: Vec<[f64; 3]>,
 }
 
 impl ToolPath {
-    /// A path through `positions_m` [m] at `times_s` [s].
+    /// A path through `positions_m` (m) at `times_s` (s).
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] if there is no sample, the lengths differ, a number is not finite, the first time is negative
@@ -41,7 +41,7 @@ impl ToolPath {
         Ok(Self { times_s, positions_m })
     }
 
-    /// A tool that stays at `position_m` [m].
+    /// A tool that stays at `position_m` (m).
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] if a coordinate is not finite.
@@ -67,7 +67,7 @@ impl ToolPath {
         Ok(Self { times_s, positions_m })
     }
 
-    /// The position [m] at `time_s` [s]: a sample's own value at its time, linear in between, held outside.
+    /// The position (m) at `time_s` (s): a sample's own value at its time, linear in between, held outside.
     ///
     /// # Real-time
     /// Real-time safe: allocates nothing, bounded by a binary search over the samples.
@@ -86,7 +86,7 @@ impl ToolPath {
         std::array::from_fn(|axis| from_m[axis] + share * (to_m[axis] - from_m[axis]))
     }
 
-    /// The time of the last sample [s]; the tool stays there from then on.
+    /// The time of the last sample (s); the tool stays there from then on.
     ///
     /// # Real-time
     /// Real-time safe.
@@ -94,12 +94,12 @@ impl ToolPath {
         self.times_s[self.times_s.len() - 1]
     }
 
-    /// The times of the samples [s], strictly increasing.
+    /// The times of the samples (s), strictly increasing.
     pub fn times_s(&self) -> &[f64] {
         &self.times_s
     }
 
-    /// The positions of the samples [m], one per time.
+    /// The positions of the samples (m), one per time.
     pub fn positions_m(&self) -> &[[f64; 3]] {
         &self.positions_m
     }

@@ -35,9 +35,9 @@ pub struct Environment {
     pub execution: Execution,
     /// The local model.
     pub model: String,
-    /// The haptic rate [Hz].
+    /// The haptic rate (Hz).
     pub haptic_hz: f64,
-    /// The rate of the global model [Hz].
+    /// The rate of the global model (Hz).
     pub global_hz: f64,
     /// The rate groups.
     pub groups: Vec<GroupInfo>,
@@ -58,7 +58,7 @@ impl Environment {
         }
     }
 
-    /// The Unix time of the start [ns]: what is added to the time of a record to give its log time.
+    /// The Unix time of the start (ns): what is added to the time of a record to give its log time.
     pub fn epoch_ns(&self) -> u64 {
         match self.execution {
             Execution::Virtual => 0,

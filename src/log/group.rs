@@ -37,7 +37,7 @@ impl CauseCounts {
 pub struct GroupReport {
     /// The group's name.
     pub name: String,
-    /// Its rate, if the environment of the run is known [Hz].
+    /// Its rate, if the environment of the run is known (Hz).
     pub rate_hz: Option<f64>,
     /// Releases that ran.
     pub released: u64,
@@ -49,11 +49,11 @@ pub struct GroupReport {
     pub elapsed_periods: u64,
     /// Records that were lost because a ring was full.
     pub lost_records: u64,
-    /// Wake-up lateness, woke - scheduled [ns].
+    /// Wake-up lateness, woke - scheduled (ns).
     pub lateness: Percentiles<u64>,
-    /// Execution time, end - start [ns].
+    /// Execution time, end - start (ns).
     pub execution: Percentiles<u64>,
-    /// Magnitude of the difference between the time from wake-up to wake-up and the time that was scheduled [ns].
+    /// Magnitude of the difference between the time from wake-up to wake-up and the time that was scheduled (ns).
     pub period_error: Percentiles<u64>,
     /// The scheduled time of the last release.
     pub last_release: Nanos,

@@ -9,11 +9,11 @@ const LIMIT_BITS: usize = 16;
 /// The resyncs of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ResyncReport {
-    /// Jump of the force at the swap, before blending [N]; its count is the number of resyncs.
+    /// Jump of the force at the swap, before blending (N); its count is the number of resyncs.
     pub jump_before_n: Percentiles<f64>,
-    /// Largest one-tick change that blending leaves of it [N].
+    /// Largest one-tick change that blending leaves of it (N).
     pub jump_after_n: Percentiles<f64>,
-    /// Age of the new model's state on arrival [ns].
+    /// Age of the new model's state on arrival (ns).
     pub age_ns: Percentiles<u64>,
 }
 
@@ -22,13 +22,13 @@ pub struct ResyncReport {
 pub struct ForceReport {
     /// Haptic ticks with a force.
     pub ticks: u64,
-    /// Largest finite magnitude before the safety pipeline [N].
+    /// Largest finite magnitude before the safety pipeline (N).
     pub peak_n: f64,
-    /// Largest finite magnitude after it [N].
+    /// Largest finite magnitude after it (N).
     pub peak_commanded_n: f64,
     /// Forces before the safety pipeline that were not finite.
     pub not_finite: u64,
-    /// Age of the local model's last resync at each tick [s].
+    /// Age of the local model's last resync at each tick (s).
     pub model_age_s: Percentiles<f64>,
 }
 

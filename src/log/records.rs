@@ -8,13 +8,13 @@ use crate::time::Nanos;
 pub struct ForceSample {
     /// End of the tick.
     pub time: Nanos,
-    /// On the tool, mean over the tick, after blending, before safety [N].
+    /// On the tool, mean over the tick, after blending, before safety (N).
     pub force_n: [f64; 3],
     /// Version of the local model that served the tick.
     pub model_version: u32,
-    /// Age of that model's last resync [s].
+    /// Age of that model's last resync (s).
     pub model_age_s: f64,
-    /// Energy that the tool has given to the simulation since the start, negative if it got some [J].
+    /// Energy that the tool has given to the simulation since the start, negative if it got some (J).
     pub energy_j: f64,
 }
 
@@ -23,7 +23,7 @@ pub struct ForceSample {
 pub struct CommandSample {
     /// End of the tick whose force it is.
     pub time: Nanos,
-    /// The force after the safety pipeline [N].
+    /// The force after the safety pipeline (N).
     pub force_n: [f64; 3],
     /// Safety stages that acted: a bit each, see `safety::Limits`.
     pub limits: u16,
@@ -36,9 +36,9 @@ pub struct ToolSample {
     pub time: Nanos,
     /// The device's sample number.
     pub id: u32,
-    /// Position [m].
+    /// Position (m).
     pub position_m: [f64; 3],
-    /// Velocity [m/s].
+    /// Velocity (m/s).
     pub velocity_m_s: [f64; 3],
     /// Pressed buttons, a bit each.
     pub buttons: u16,
@@ -84,9 +84,9 @@ pub struct ContactSample {
     pub weights: [f64; 2],
     /// Outward unit normal used.
     pub normal: [f64; 3],
-    /// Force along the normal, mean over the tick [N].
+    /// Force along the normal, mean over the tick (N).
     pub normal_force_n: f32,
-    /// Magnitude of the force across it [N].
+    /// Magnitude of the force across it (N).
     pub tangential_force_n: f32,
 }
 
@@ -99,11 +99,11 @@ pub struct Resync {
     pub version: u32,
     /// How old its state was when it arrived.
     pub age: Nanos,
-    /// Difference of the new and the old model's force at the swap [N].
+    /// Difference of the new and the old model's force at the swap (N).
     pub jump_before_n: f64,
-    /// Largest one-tick change of the force that the blend leaves of it [N].
+    /// Largest one-tick change of the force that the blend leaves of it (N).
     pub jump_after_n: f64,
-    /// Energy that the tool has given to the simulation since the start, negative if it got some [J].
+    /// Energy that the tool has given to the simulation since the start, negative if it got some (J).
     pub energy_j: f64,
 }
 
@@ -127,9 +127,9 @@ pub struct ProbeSample {
     pub time: Nanos,
     /// Node id.
     pub node: u32,
-    /// Position in the local model, or in the newest global one if the node is outside the patch [m].
+    /// Position in the local model, or in the newest global one if the node is outside the patch (m).
     pub local_m: [f64; 3],
-    /// Position in the newest global model that the tick could see [m].
+    /// Position in the newest global model that the tick could see (m).
     pub global_m: [f64; 3],
 }
 

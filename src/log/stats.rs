@@ -21,13 +21,13 @@ pub struct GroupStats {
     pub missed: u64,
     /// Records of this group lost since the start, because a ring was full.
     pub lost_records: u64,
-    /// Wake-up lateness since the start [ns].
+    /// Wake-up lateness since the start (ns).
     pub lateness: Percentiles<u64>,
-    /// Wake-up lateness in the last second [ns].
+    /// Wake-up lateness in the last second (ns).
     pub lateness_last_second: Percentiles<u64>,
-    /// Execution time since the start [ns].
+    /// Execution time since the start (ns).
     pub execution: Percentiles<u64>,
-    /// Execution time in the last second [ns].
+    /// Execution time in the last second (ns).
     pub execution_last_second: Percentiles<u64>,
 }
 

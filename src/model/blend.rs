@@ -8,7 +8,7 @@ pub struct Crossfade {
     ticks: u32,
     /// Ticks since the swap; `None` when no old model is needed any more.
     elapsed: Option<u32>,
-    /// What the blend added to the new model's force in the last tick [N].
+    /// What the blend added to the new model's force in the last tick (N).
     residue: Vec3,
     jump: Jump,
 }
@@ -16,9 +16,9 @@ pub struct Crossfade {
 /// The discontinuity of one resync.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Jump {
-    /// Difference of the new and the old model's force in the first tick [N].
+    /// Difference of the new and the old model's force in the first tick (N).
     pub before: f64,
-    /// Largest one-tick change of the force that the blend leaves of it [N].
+    /// Largest one-tick change of the force that the blend leaves of it (N).
     pub after: f64,
 }
 

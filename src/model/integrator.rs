@@ -3,7 +3,7 @@
 use super::Vec3;
 use super::body::{Body, State};
 
-/// Below this magnitude positions [m] and velocities [m/s] are snapped to zero: a resting state must not decay into
+/// Below this magnitude positions (m) and velocities (m/s) are snapped to zero: a resting state must not decay into
 /// denormals, which are a hundred times slower. Far below anything that a force can show.
 const REST: f64 = 1e-30;
 
@@ -35,9 +35,9 @@ pub fn advance(positions: &mut [Vec3], velocities: &[Vec3], d: f64) {
 /// The largest eigenvalues of a body's linearisation at rest; they bound the explicit step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spectrum {
-    /// w^2, largest eigenvalue of M^-1 K [1/s^2].
+    /// w^2, largest eigenvalue of M^-1 K (1/s^2).
     pub stiffness: f64,
-    /// c, largest eigenvalue of M^-1 C [1/s].
+    /// c, largest eigenvalue of M^-1 C (1/s).
     pub damping: f64,
 }
 
@@ -73,7 +73,7 @@ impl Spectrum {
         Self { stiffness, damping }
     }
 
-    /// The largest stable explicit step d [s]: w^2 d^2 + 2 c d = 4.
+    /// The largest stable explicit step d (s): w^2 d^2 + 2 c d = 4.
     pub fn stable_step(&self) -> f64 {
         if self.stiffness <= 0.0 && self.damping <= 0.0 {
             return f64::INFINITY;
@@ -82,7 +82,7 @@ impl Spectrum {
         4.0 / (self.damping + (self.damping * self.damping + 4.0 * self.stiffness).sqrt())
     }
 
-    /// Substeps per tick of `dt` [s]: 1.3 times what stability asks for, at least one.
+    /// Substeps per tick of `dt` (s): 1.3 times what stability asks for, at least one.
     pub fn substeps(&self, dt: f64) -> u32 {
         (1.3 * dt / self.stable_step()).ceil().max(1.0) as u32
     }

@@ -9,19 +9,19 @@ use crate::error::Error;
 /// How time is divided: ticks of the haptic rate, each of several explicit substeps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stepping {
-    /// Haptic period [s].
+    /// Haptic period (s).
     pub tick: f64,
     /// Explicit substeps per tick, at least one.
     pub substeps: u32,
 }
 
 impl Stepping {
-    /// The substep d [s].
+    /// The substep d (s).
     pub fn step(&self) -> f64 {
         self.tick / f64::from(self.substeps)
     }
 
-    /// Runs one tick: calls `substep` for each part of the tool's motion and returns the mean force [N].
+    /// Runs one tick: calls `substep` for each part of the tool's motion and returns the mean force (N).
     pub(crate) fn tick(&self, tool: ToolMotion, mut substep: impl FnMut(ToolMotion, f64) -> Vec3) -> Vec3 {
         let n = f64::from(self.substeps);
         let sum = (0..self.substeps).fold(Vec3::zeros(), |sum, u| {
@@ -44,7 +44,7 @@ pub struct Simulation {
     /// All surface triangles: the tool may touch anywhere.
     candidates: Vec<u32>,
     inverse_masses: Vec<f64>,
-    /// Mean force of the last tick [N].
+    /// Mean force of the last tick, or of the resting contact before the first (N).
     force: Vec3,
 }
 
@@ -72,11 +72,28 @@ impl Simulation {
         let candidates = (0..body.surface().triangles.len() as u32).collect();
         let inverse_masses = body.inverse_masses().to_vec();
         let forces = vec![Vec3::zeros(); nodes];
-        Ok(Self { body, state, forces, contact, law, stepping, candidates, inverse_masses, force: Vec3::zeros() })
+        let force = Vec3::zeros();
+        let mut new = Self { body, state, forces, contact, law, stepping, candidates, inverse_masses, force };
+        new.force = new.resting_force();
+        Ok(new)
+    }
+
+    /// The force that holds the contact point still in the present state (N): what a tool feels before the first tick.
+    fn resting_force(&mut self) -> Vec3 {
+        let Some(triangle) = self.contact.triangle else { return Vec3::zeros() };
+        self.body.forces(&self.state, &mut self.forces);
+        let nodes = self.body.surface().triangles[triangle as usize];
+        let (mut acceleration, mut compliance) = (Vec3::zeros(), 0.0);
+        for (&node, w) in nodes.iter().zip(&self.contact.weights) {
+            let mobility = w * self.inverse_masses[node as usize];
+            acceleration += self.forces[node as usize] * mobility;
+            compliance += w * mobility;
+        }
+        if compliance > 0.0 { acceleration / compliance } else { Vec3::zeros() }
     }
 
     /// Advances one haptic tick while the tool moves along `tool`; returns the force on the tool, its mean over the
-    /// tick [N].
+    /// tick (N).
     ///
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
@@ -126,13 +143,13 @@ impl Simulation {
         self.stepping
     }
 
-    /// Mean force of the last tick on the tool [N].
+    /// Mean force of the last tick on the tool (N).
     pub fn force(&self) -> Vec3 {
         self.force
     }
 }
 
-/// Substeps per tick of `tick` [s] from the body's stability limit.
+/// Substeps per tick of `tick` (s) from the body's stability limit.
 pub fn stable_substeps(body: &mut dyn Body, tick: f64) -> u32 {
     Spectrum::estimate(body).substeps(tick)
 }

@@ -10,13 +10,13 @@ use super::body::{Body, State};
 /// f = f_0 + K (x - x_0) + C (v - v_0), with f_0 the force at (x_0, v_0) while every node outside stands still.
 #[derive(Clone, Debug, Default)]
 pub struct PatchTangent {
-    /// f_0 [N], 3n.
+    /// f_0 (N), 3n.
     force: DVector<f64>,
     /// [K | C], 3n x 6n: one product per step reads one matrix.
     matrix: DMatrix<f64>,
     /// [x - x_0; v - v_0], 6n.
     deviation: DVector<f64>,
-    /// x_0 [m] and v_0 [m/s], n each.
+    /// x_0 (m) and v_0 (m/s), n each.
     origin: State,
     node_forces: Vec<Vec3>,
     /// Working memory of [`forces`](Self::forces), 3n.
@@ -67,7 +67,7 @@ impl PatchTangent {
         self.origin.velocities.extend(nodes.iter().map(|&node| state.velocities[node as usize]));
     }
 
-    /// Writes the force on each patch node [N] for the given positions and velocities (the first n of each are read).
+    /// Writes the force on each patch node (N) for the given positions and velocities (the first n of each are read).
     ///
     /// # Real-time
     /// Bounded, real-time safe: 18 n^2 multiply-adds.

@@ -9,7 +9,7 @@ use crate::log::{CauseCounts, Environment, Execution, GroupReport, Percentiles, 
 const WIDTH: usize = 80;
 const EVENTS_SHOWN: usize = 4;
 /// Lines for what the system granted.
-const GRANT_LINES: usize = 3;
+const GRANT_LINES: usize = 6;
 
 /// The report as text, every line ended by a newline.
 pub fn to_text(report: &RunReport) -> String {
@@ -63,23 +63,11 @@ fn about(page: &mut Page, environment: &Environment) {
             environment.model, environment.palpate_version, environment.instruction_set
         ),
     );
-    let mut lines = vec![String::new()];
-    for (key, value) in &environment.granted {
-        let grant = format!("{key} {value}");
-        let line = lines.last_mut().expect("there is always a line");
-        if line.is_empty() {
-            *line = grant;
-        } else if line.len() + grant.len() + 13 <= WIDTH {
-            *line = format!("{line}, {grant}");
-        } else {
-            lines.push(grant);
-        }
+    for (i, (what, granted)) in environment.granted.iter().take(GRANT_LINES).enumerate() {
+        page.named(if i == 0 { "granted" } else { "" }, format!("{what}: {granted}"));
     }
-    let hidden = lines.len() > GRANT_LINES;
-    lines.truncate(GRANT_LINES);
-    for (i, line) in lines.iter().filter(|line| !line.is_empty()).enumerate() {
-        let more = if hidden && i + 1 == GRANT_LINES { ", ..." } else { "" };
-        page.named(if i == 0 { "granted" } else { "" }, format!("{line}{more}"));
+    if let Some(hidden) = environment.granted.len().checked_sub(GRANT_LINES).filter(|&hidden| hidden > 0) {
+        page.named("", format!("and {hidden} more"));
     }
 }
 

@@ -10,7 +10,7 @@ pub use clamp::clamp;
 pub use finite::finite;
 pub use slew::slew;
 
-/// A force in space [N].
+/// A force in space (N).
 pub type Force = [f64; 3];
 
 /// The stages that acted on a command, a bit each.
@@ -43,9 +43,9 @@ impl Actions {
 /// The limits of the pipeline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Largest force [N].
+    /// Largest force (N).
     pub max_force_n: f64,
-    /// Largest change of the force [N/s].
+    /// Largest change of the force (N/s).
     pub max_slew_n_per_s: f64,
 }
 

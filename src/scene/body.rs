@@ -30,7 +30,7 @@ pub enum BodyKind {
 pub struct BlockSpec {
     /// Nodes per axis, at least 2 each; node id = i + nx (j + ny k).
     pub nodes: [usize; 3],
-    /// Edge lengths [m].
+    /// Edge lengths (m).
     pub size_m: [f64; 3],
     /// Faces held stationary.
     #[cfg_attr(feature = "scene", serde(default = "default_fixed"))]
@@ -46,9 +46,9 @@ fn default_fixed() -> Vec<Face> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
 pub struct MaterialSpec {
-    /// Mass of every node [kg].
+    /// Mass of every node (kg).
     pub node_mass_kg: f64,
-    /// Stiffness k of every spring [N/m].
+    /// Stiffness k of every spring (N/m).
     pub stiffness_n_per_m: f64,
     /// zeta in b = zeta sqrt(2 m k), the paper's definition.
     pub damping_ratio: f64,

@@ -19,7 +19,7 @@ pub(super) fn not_negative(field: &str, value: f64) -> Result<(), Error> {
     Err(Error::scene(field, format!("is {value}, must be a finite number of at least 0")))
 }
 
-/// Three finite lengths within `limit_m` [m].
+/// Three finite lengths within `limit_m` (m).
 pub(super) fn lengths_within(field: &str, values_m: [f64; 3], limit_m: f64) -> Result<(), Error> {
     if values_m.iter().all(|value| value.is_finite() && value.abs() <= limit_m) {
         return Ok(());

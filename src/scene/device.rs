@@ -30,9 +30,9 @@ pub enum DeviceKind {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct SafetySpec {
-    /// Largest force [N]; the device's own limit if absent.
+    /// Largest force (N); the device's own limit if absent.
     pub max_force_n: Option<f64>,
-    /// Largest change of the force [N/ms].
+    /// Largest change of the force (N/ms).
     pub max_slew_n_per_ms: f64,
 }
 

@@ -88,7 +88,7 @@ pub struct InitialSpec {
 pub struct PullSpec {
     /// Which.
     pub node: [usize; 3],
-    /// From its rest position [m].
+    /// From its rest position (m).
     pub offset_m: [f64; 3],
 }
 
@@ -104,7 +104,7 @@ pub struct ProbeSpec {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct RunSpec {
-    /// Simulated time [s].
+    /// Simulated time (s).
     pub duration_s: f64,
 }
 

@@ -8,7 +8,7 @@ pub struct GlobalSpec {
     pub rate_hz: f64,
     /// Explicit steps per millisecond; chosen from the stability limit if absent.
     pub substeps_per_ms: Option<u32>,
-    /// Virtual time: how long after its release a result becomes visible [ms].
+    /// Virtual time: how long after its release a result becomes visible (ms).
     pub compute_latency_ms: f64,
 }
 
@@ -96,7 +96,7 @@ impl Feedback {
 pub struct BlendSpec {
     /// The way.
     pub kind: BlendKind,
-    /// How long [ms]; not used by `none`.
+    /// How long (ms); not used by `none`.
     #[cfg_attr(feature = "scene", serde(default))]
     pub ms: f64,
 }

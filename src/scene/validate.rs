@@ -10,7 +10,7 @@ use crate::time::Rate;
 
 /// Largest body; a million nodes have 13 million springs, minutes of work for a second of simulation.
 const MAX_NODES: usize = 1_000_000;
-/// Longest edge or offset [m]; a larger number has the wrong unit.
+/// Longest edge or offset (m); a larger number has the wrong unit.
 const MAX_LENGTH_M: f64 = 1e3;
 /// The contact takes a smaller triangle (twice its area) for none.
 const MIN_TRIANGLE_M2: f64 = 1e-14;

@@ -48,7 +48,7 @@ pub fn minjerk(u: f64) -> f64 {
     u.powi(3) * (10.0 + u * (6.0 * u - 15.0))
 }
 
-/// The reference's drag path at time t [s].
+/// The reference's drag path at time t (s).
 pub fn drag_path(t: f64) -> Vec3 {
     let x = 0.025 + 0.025 * minjerk((t - 0.5) / 1.5);
     let z = 0.101 - 0.009 * minjerk(t / 0.3) + 0.011 * minjerk((t - 2.2) / 0.3);

@@ -30,7 +30,7 @@ pub struct BlockBuilder {
 }
 
 impl BlockBuilder {
-    /// Stiffness of every spring [N/m].
+    /// Stiffness of every spring (N/m).
     #[must_use]
     pub fn stiffness(mut self, n_per_m: f64) -> Self {
         self.stiffness = n_per_m;
@@ -44,7 +44,7 @@ impl BlockBuilder {
         self
     }
 
-    /// Mass of every node [kg].
+    /// Mass of every node (kg).
     #[must_use]
     pub fn node_mass(mut self, kg: f64) -> Self {
         self.node_mass = kg;
@@ -101,7 +101,7 @@ impl BlockBuilder {
 }
 
 impl Block {
-    /// Starts a block of `nodes` per axis and `size` [m].
+    /// Starts a block of `nodes` per axis and `size` (m).
     pub fn builder(nodes: [usize; 3], size: [f64; 3]) -> BlockBuilder {
         BlockBuilder { nodes, size, stiffness: 30.0, damping_ratio: 0.3, node_mass: 0.5e-3, fixed: Vec::new() }
     }

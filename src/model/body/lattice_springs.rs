@@ -22,7 +22,7 @@ pub(super) struct LatticeSprings {
 }
 
 impl LatticeSprings {
-    /// Equal springs everywhere; `spacing` between nodes [m], `stiffness` [N/m], `damping` [N s/m].
+    /// Equal springs everywhere; `spacing` between nodes (m), `stiffness` (N/m), `damping` (N s/m).
     pub(super) fn uniform(lattice: &Lattice, spacing: [f64; 3], stiffness: f64, damping: f64) -> Self {
         let nodes = lattice.len();
         let blocks = nodes.next_multiple_of(LANES);

@@ -11,7 +11,7 @@ pub use spring::{Spring, SpringTangent};
 use super::mesh::Surface;
 use super::{Mat3, Vec3};
 
-/// Positions [m] and velocities [m/s] of all nodes.
+/// Positions (m) and velocities (m/s) of all nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
     /// One position per node.
@@ -39,9 +39,9 @@ pub struct TangentBlock {
     pub row: u32,
     /// The node that moves.
     pub column: u32,
-    /// df_row / dx_column [N/m].
+    /// df_row / dx_column (N/m).
     pub position: Mat3,
-    /// df_row / dv_column [N s/m].
+    /// df_row / dv_column (N s/m).
     pub velocity: Mat3,
 }
 
@@ -50,22 +50,22 @@ pub struct TangentBlock {
 /// The block of springs is one implementation; a program brings its own by implementing this trait. Forces may be
 /// non-linear in the positions and must be linear in the velocities. Masses need not be equal.
 pub trait Body: Send + std::fmt::Debug {
-    /// Rest positions [m], one per node.
+    /// Rest positions (m), one per node.
     fn rest(&self) -> &[Vec3];
 
-    /// Inverse masses [1/kg], one per node; zero for a node that is held stationary.
+    /// Inverse masses (1/kg), one per node; zero for a node that is held stationary.
     fn inverse_masses(&self) -> &[f64];
 
     /// The surface that tools touch.
     fn surface(&self) -> &Surface;
 
-    /// Writes the internal force on every node [N] to `forces` (one per node).
+    /// Writes the internal force on every node (N) to `forces` (one per node).
     ///
     /// # Real-time
     /// Called once per substep: bounded, must not allocate or block.
     fn forces(&mut self, state: &State, forces: &mut [Vec3]);
 
-    /// Writes the internal force on each of `nodes` [N] to `forces` (one per entry of `nodes`).
+    /// Writes the internal force on each of `nodes` (N) to `forces` (one per entry of `nodes`).
     fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]);
 
     /// Calls `emit` for every tangent block in the rows of `nodes`; blocks of the same place are added.

@@ -5,20 +5,20 @@ use super::super::{Mat3, Vec3};
 /// A spring and a damper in parallel between two nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spring {
-    /// Stiffness k [N/m].
+    /// Stiffness k (N/m).
     pub stiffness: f64,
-    /// Damping b [N s/m].
+    /// Damping b (N s/m).
     pub damping: f64,
-    /// Rest length L0 [m].
+    /// Rest length L0 (m).
     pub rest_length: f64,
 }
 
 /// How the force on a spring's first node answers to its second; the answer to the first node is the opposite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpringTangent {
-    /// df_i / dx_j [N/m].
+    /// df_i / dx_j (N/m).
     pub position: Mat3,
-    /// df_i / dv_j [N s/m].
+    /// df_i / dv_j (N s/m).
     pub velocity: Mat3,
 }
 
@@ -26,9 +26,9 @@ impl Spring {
     /// A spring shorter than this share of its rest length has no direction: no force, no tangent.
     pub const COLLAPSED: f64 = 1e-3;
 
-    /// Force on the first node [N]: `[k (L - L0) + b u.(v_j - v_i)] u`, u the unit vector to the second node.
+    /// Force on the first node (N): `[k (L - L0) + b u.(v_j - v_i)] u`, u the unit vector to the second node.
     ///
-    /// `along` = x_j - x_i [m], `closing` = v_j - v_i [m/s].
+    /// `along` = x_j - x_i (m), `closing` = v_j - v_i (m/s).
     pub fn force(&self, along: Vec3, closing: Vec3) -> Vec3 {
         let length = along.norm();
         if length < Self::COLLAPSED * self.rest_length {

@@ -100,9 +100,9 @@ impl Contact {
 /// The tool's motion during one step: a straight line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolMotion {
-    /// Position at the start [m].
+    /// Position at the start (m).
     pub from: Vec3,
-    /// Position at the end [m].
+    /// Position at the end (m).
     pub to: Vec3,
 }
 

@@ -6,11 +6,11 @@ use super::step::Deformable;
 use super::triangle::interpolate;
 use super::{Law, Mode, ToolMotion};
 
-/// Penetration is recovered at this speed [m/s]; an open gap is closed in full.
+/// Penetration is recovered at this speed (m/s); an open gap is closed in full.
 const RECOVERY: f64 = 0.1;
-/// Below this compliance S [1/kg] all nodes are held and no force can be computed.
+/// Below this compliance S (1/kg) all nodes are held and no force can be computed.
 const IMMOVABLE: f64 = 1e-9;
-/// A remaining step shorter than this cannot carry an impulse [s].
+/// A remaining step shorter than this cannot carry an impulse (s).
 const NO_TIME: f64 = 1e-12;
 
 /// What a contact did in one step.
@@ -18,7 +18,7 @@ const NO_TIME: f64 = 1e-12;
 pub(super) struct Resolution {
     /// The mode that resulted.
     pub mode: Mode,
-    /// Impulse on the tool [N s].
+    /// Impulse on the tool (N s).
     pub impulse: Vec3,
     /// The normal used.
     pub normal: Vec3,
@@ -30,7 +30,7 @@ impl Resolution {
     }
 }
 
-/// Solves the contact over the last `d_c` of a step of `d` [s] and changes the three nodes' velocities.
+/// Solves the contact over the last `d_c` of a step of `d` (s) and changes the three nodes' velocities.
 ///
 /// The contact point G x is to move with the tool: v_t = (q1 - q_start + r) / d_c, r the drift between the two. The
 /// impulse J = (G v* - v_t) / S with S = sum w_i^2 / m_i, and v_i = v*_i - (w_i / m_i) J. Source: physics of the

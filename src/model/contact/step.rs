@@ -8,17 +8,17 @@ use super::triangle::interpolate;
 use super::walk::walk;
 use super::{Contact, Equations, Law, Mode, ToolMotion, paper, swept};
 
-/// A released tool that is nearer than this is still tracked [m]: touching again needs no new detection.
+/// A released tool that is nearer than this is still tracked (m): touching again needs no new detection.
 const TRACKED_GAP: f64 = 3e-4;
 
 /// What a step works on: nodes in contact order, movable ones first for a patch.
 #[derive(Debug)]
 pub struct Deformable<'a> {
-    /// Positions of all nodes that the surface names [m].
+    /// Positions of all nodes that the surface names (m).
     pub positions: &'a mut [Vec3],
-    /// Their velocities [m/s].
+    /// Their velocities (m/s).
     pub velocities: &'a mut [Vec3],
-    /// Their inverse masses [1/kg]; zero for nodes that this model does not move.
+    /// Their inverse masses (1/kg); zero for nodes that this model does not move.
     pub inverse_masses: &'a [f64],
     /// The surface over these nodes.
     pub surface: &'a Surface,
@@ -34,7 +34,7 @@ impl Deformable<'_> {
 }
 
 /// One step of `d` seconds: velocities take `forces`, the tool's contact is found and resolved, positions move.
-/// Returns the force on the tool [N], the impulse over the full step.
+/// Returns the force on the tool (N), the impulse over the full step.
 ///
 /// Velocities of nodes with zero inverse mass must be zero.
 ///

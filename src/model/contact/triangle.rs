@@ -2,15 +2,13 @@
 
 use super::super::Vec3;
 
-/// Twice the area below which corners are no triangle [m^2].
+/// Twice the area below which corners are no triangle (m^2).
 const SLIVER: f64 = 1e-14;
 
 /// A point seen from a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Projection {
-    /// Unit normal of the triangle.
-    pub normal: Vec3,
-    /// Signed distance along it [m]; positive outside.
+    /// Signed distance along the triangle's normal (m); positive outside.
     pub distance: f64,
     /// Barycentric weights of the projected point.
     pub weights: [f64; 3],
@@ -29,7 +27,7 @@ impl Projection {
         let r = point - corners[0];
         let beta = r.cross(&e2).dot(&normal) / area;
         let gamma = e1.cross(&r).dot(&normal) / area;
-        Some(Self { normal, distance: normal.dot(&r), weights: [1.0 - beta - gamma, beta, gamma] })
+        Some(Self { distance: normal.dot(&r), weights: [1.0 - beta - gamma, beta, gamma] })
     }
 
     /// True if the projected point is inside the triangle up to `tolerance` in the weights.
@@ -53,7 +51,8 @@ mod tests {
         let point = Vec3::new(0.1, 0.1, 0.5);
         let seen = Projection::new(&corners, &point).unwrap();
         let foot = interpolate(&seen.weights, &corners);
-        assert!((foot + seen.normal * seen.distance - point).norm() < 1e-15);
+        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
+        assert!((foot + normal * seen.distance - point).norm() < 1e-15);
     }
 
     #[test]

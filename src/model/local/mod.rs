@@ -65,7 +65,7 @@ pub struct PatchGeometry {
     pub tick: u64,
     /// Global ids of the patch nodes.
     pub nodes: Vec<u32>,
-    /// Their positions [m] and velocities [m/s].
+    /// Their positions (m) and velocities (m/s).
     pub state: State,
     /// The contact; its triangle is a global id.
     pub contact: Contact,
@@ -96,7 +96,7 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// For the global actor: allocates at first use and whenever it grows.
     fn rebuild(&mut self, resync: ResyncView<'_>);
 
-    /// Advances one haptic tick while the tool moves along `tool`; returns the mean force on the tool [N].
+    /// Advances one haptic tick while the tool moves along `tool`; returns the mean force on the tool (N).
     ///
     /// # Real-time
     /// Bounded, real-time safe.
@@ -111,10 +111,10 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// The contact; its triangle is a global id.
     fn contact(&self) -> Contact;
 
-    /// Where `node` (a global id) is in this model [m]; `None` if the model does not hold it.
+    /// Where `node` (a global id) is in this model (m); `None` if the model does not hold it.
     fn position(&self, node: u32) -> Option<Vec3>;
 
-    /// Where `node` was in the global model that this one was built from [m]; `None` if that is not known.
+    /// Where `node` was in the global model that this one was built from (m); `None` if that is not known.
     fn global_position(&self, probe: usize) -> Option<Vec3>;
 
     /// Nodes whose global position is to be remembered at each rebuild, by place in this list.

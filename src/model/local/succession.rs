@@ -13,7 +13,7 @@ const HISTORY: usize = 1024;
 /// What one tick gave.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
-    /// Mean force on the tool, blended [N]; may be other than finite if a model diverged.
+    /// Mean force on the tool, blended (N); may be other than finite if a model diverged.
     pub force: Vec3,
     /// The resync whose blend ended with this tick.
     pub resync: Option<Resynced>,
@@ -43,14 +43,14 @@ pub struct Succession {
     blend: Crossfade,
     version: u32,
     resync: Resynced,
-    /// Tool position at the end of tick t at place t % HISTORY [m].
+    /// Tool position at the end of tick t at place t % HISTORY (m).
     history: Vec<Vec3>,
     /// The last tick.
     now: u64,
 }
 
 impl Succession {
-    /// Starts with `models` to rotate through and a blend over `blend_ticks`; the tool is at `tool` [m] at tick 0.
+    /// Starts with `models` to rotate through and a blend over `blend_ticks`; the tool is at `tool` (m) at tick 0.
     /// The first serves until another is offered.
     pub fn new(models: [Box<dyn LocalModel>; 3], blend_ticks: u32, tool: Vec3) -> Self {
         let [serving, fading, arriving] = models;
@@ -67,7 +67,7 @@ impl Succession {
         }
     }
 
-    /// Puts the tool at `tool` [m] and lets `model` serve at once: for tick 0. `model` gets a spare in exchange.
+    /// Puts the tool at `tool` (m) and lets `model` serve at once: for tick 0. `model` gets a spare in exchange.
     pub fn begin(&mut self, tool: Vec3, first: Option<(&mut Box<dyn LocalModel>, u32)>) {
         self.history.fill(tool);
         if let Some((model, version)) = first {
@@ -90,7 +90,7 @@ impl Succession {
         self.arrival = Some((version, reached));
     }
 
-    /// Advances one tick: the tool moves in a straight line to `tool` [m].
+    /// Advances one tick: the tool moves in a straight line to `tool` (m).
     ///
     /// # Real-time
     /// Bounded, real-time safe.
@@ -156,7 +156,7 @@ impl Succession {
         self.now
     }
 
-    /// Where the tool is [m].
+    /// Where the tool is (m).
     pub fn tool(&self) -> Vec3 {
         self.position(self.now)
     }

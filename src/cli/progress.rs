@@ -1,0 +1,25 @@
+//! A progress bar for a run, on a terminal only.
+
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use palpate::session::Running;
+
+/// How much of the run passes between two drawings.
+const STEP: Duration = Duration::from_millis(50);
+
+/// Waits for the end of `running` and shows how far it is.
+pub fn wait(running: &Running, what: &str) {
+    let Some(until) = running.until() else { return running.wait() };
+    let bar = ProgressBar::with_draw_target(Some(until.0 / 1_000_000), ProgressDrawTarget::stderr_with_hz(15));
+    let style = ProgressStyle::with_template("{msg} [{bar:40}] {prefix}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+    bar.set_message(what.to_owned());
+    while !running.finished() {
+        running.wait_for(STEP);
+        let elapsed = running.elapsed().min(until);
+        bar.set_position(elapsed.0 / 1_000_000);
+        bar.set_prefix(format!("{:.1} of {:.1} s", elapsed.as_secs_f64(), until.as_secs_f64()));
+    }
+    bar.finish_and_clear();
+}

@@ -1,0 +1,81 @@
+//! `palpate` and `palpate run SCENE`: runs a scene, writes its log and reports how it went.
+
+use std::path::{Path, PathBuf};
+
+use palpate::scene::{LocalModelKind, Scene};
+use palpate::session::{Session, SessionBuilder};
+use palpate::{Error, ErrorKind};
+
+use super::{output, progress};
+
+/// Where the log goes if nothing is said.
+const DEFAULT_LOG: &str = "palpate-run.mcap";
+
+/// The arguments of `palpate run`.
+#[derive(Debug, clap::Args)]
+pub struct RunArgs {
+    /// The scene file (TOML)
+    pub scene: PathBuf,
+    /// Run in simulated time, as fast as the machine allows and bit-identically every time
+    #[arg(long = "virtual")]
+    pub virtual_time: bool,
+    /// Run for this many seconds instead of the scene's own duration
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub duration: Option<f64>,
+    /// Use this local model instead of the scene's own
+    #[arg(long, value_name = "NAME", value_parser = model)]
+    pub model: Option<LocalModelKind>,
+    /// The log to write; overwritten if it exists
+    #[arg(long, value_name = "LOG.mcap", default_value = DEFAULT_LOG)]
+    pub out: PathBuf,
+}
+
+/// Runs the built-in demo scene in real time.
+///
+/// # Errors
+/// If the log cannot be written or the run fails.
+pub fn demo() -> Result<(), Error> {
+    execute(Session::from_scene(Scene::demo()), Path::new(DEFAULT_LOG), "demo scene")
+}
+
+/// Runs a scene file.
+///
+/// # Errors
+/// Input errors of the scene, or a failed run.
+pub fn run(args: &RunArgs) -> Result<(), Error> {
+    let mut scene = Scene::load(&args.scene)?;
+    let name = args.scene.display().to_string();
+    if let Some(model) = args.model {
+        scene = scene.with_model(model);
+    }
+    let mut builder = Session::from_scene(scene);
+    if let Some(seconds) = args.duration {
+        builder = builder.duration_s(seconds);
+    }
+    if args.virtual_time {
+        builder = builder.virtual_time();
+    }
+    execute(builder, &args.out, &name)
+}
+
+fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error> {
+    let running = builder.log(log).build().map_err(|error| error.at(name))?.start()?;
+    progress::wait(&running, name);
+    let summary = running.stop()?;
+    output::print(&summary.to_string())?;
+    if let Some(fault) = summary.runtime.fault {
+        return Err(Error::new(ErrorKind::Fault, fault.to_string()).at(name));
+    }
+    if let Some(error) = summary.log_error {
+        // The run itself went well; but what was promised, a log, is not there.
+        return Err(Error::new(ErrorKind::Fault, format!("the log is incomplete: {error}")));
+    }
+    output::print(&format!("log: {0} (`palpate timing {0}`, `palpate export {0} --topic /force`)\n", log.display()))
+}
+
+fn model(name: &str) -> Result<LocalModelKind, String> {
+    LocalModelKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
+        let names: Vec<_> = LocalModelKind::ALL.iter().map(|kind| kind.name()).collect();
+        format!("the local models are {}", names.join(", "))
+    })
+}
