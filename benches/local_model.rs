@@ -1,0 +1,99 @@
+//! What the local model and the whole body cost: one 1 kHz tick of `patch` with contact, building it on bodies of three
+//! sizes (the paper's O(1) claim), and one substep of the whole 12^3 body.
+//!
+//! `cargo bench --bench local_model`
+
+use std::hint::black_box;
+
+use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
+use palpate::model::Vec3;
+use palpate::model::body::{Block, Body, State};
+use palpate::model::contact::{Contact, Law, ToolMotion};
+use palpate::model::local::{Kind, LocalModel, ResyncView};
+use palpate::model::mesh::Face;
+use palpate::model::simulation::{Simulation, Stepping};
+
+/// The reference material, two substeps per tick, a tool pressed 5 mm into the top.
+fn pressed(nodes: usize) -> (Simulation, Vec3) {
+    let builder = Block::builder([nodes; 3], [0.1; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
+    let body = builder.fix(Face::ZMin).build().expect("a valid block");
+    let state = State::at_rest(body.rest());
+    let law = Law { friction: 0.5, ..Law::default() };
+    let stepping = Stepping { tick: 1e-3, substeps: 2 };
+    let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).expect("it fits");
+    let at = |k: i32| Vec3::new(0.047, 0.0512, 0.101 - 0.006 * f64::from(k) / 100.0);
+    for k in 0..100 {
+        sim.tick(ToolMotion { from: at(k), to: at(k + 1) });
+    }
+    assert!(sim.contact().is_touching());
+    (sim, at(100))
+}
+
+fn patch(sim: &Simulation) -> Box<dyn LocalModel> {
+    let mut patch = Kind::Patch([4, 4, 2]).empty().expect("a patch is built from a global model");
+    rebuild(&mut *patch, sim);
+    patch
+}
+
+fn rebuild(patch: &mut dyn LocalModel, sim: &Simulation) {
+    let triangle = sim.contact().triangle.expect("the tool touches");
+    patch.rebuild(ResyncView { global: sim, tick: 100, triangle });
+}
+
+fn patch_tick(c: &mut Criterion) {
+    let (sim, tool) = pressed(12);
+    let circle = |k: usize| {
+        let angle = k as f64 * 0.01;
+        tool + Vec3::new(angle.cos() - 1.0, angle.sin(), 0.0) * 1e-3
+    };
+    let (mut patch, mut k) = (patch(&sim), 0);
+    c.bench_function("patch 4x4x2: one 1 kHz tick with contact, 2 substeps", |b| {
+        b.iter(|| {
+            k += 1;
+            black_box(patch.tick(ToolMotion { from: circle(k - 1), to: circle(k) }))
+        });
+    });
+    assert!(patch.contact().is_touching(), "the tick measured has a contact in it");
+}
+
+fn patch_build(c: &mut Criterion) {
+    let mut group = c.benchmark_group("patch 4x4x2: build at a resync");
+    for nodes in [8, 12, 20] {
+        let (sim, _) = pressed(nodes);
+        let mut patch = patch(&sim);
+        group.bench_function(BenchmarkId::from_parameter(format!("{nodes}^3 body")), |b| {
+            b.iter(|| rebuild(&mut *patch, &sim));
+        });
+    }
+    group.finish();
+}
+
+fn whole_body(c: &mut Criterion) {
+    let (mut sim, tool) = pressed(12);
+    let resting = ToolMotion { from: tool, to: tool };
+    c.bench_function("12^3 body: one substep with contact (half a tick)", |b| {
+        // A tick is two substeps; criterion's time per iteration is for one.
+        b.iter_custom(|iterations| {
+            let start = std::time::Instant::now();
+            for _ in 0..iterations.div_ceil(2) {
+                black_box(sim.tick(resting));
+            }
+            start.elapsed()
+        });
+    });
+    let builder = Block::builder([12; 3], [0.1; 3]).fix(Face::ZMin);
+    c.bench_function("12^3 body: largest eigenvalues and substeps", |b| {
+        b.iter_batched(
+            || builder.clone().build().expect("a valid block"),
+            |mut body| palpate::model::simulation::stable_substeps(&mut body, 1e-3),
+            BatchSize::LargeInput,
+        );
+    });
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(60);
+    targets = patch_tick, patch_build, whole_body
+}
+criterion_main!(benches);
