@@ -104,7 +104,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let contact = attach.map_or_else(Contact::default, |node| glued(&*body, node));
     let device = match parts.device {
         Some(device) => device,
-        None => scripted(scene.device.path, attach.map(|node| body.rest()[node as usize]))?,
+        None => scripted(scene.device.path, attach.map(|node| state.positions[node as usize]))?,
     };
     let law = Law {
         friction: scene.contact.friction.coefficient(),
@@ -239,9 +239,19 @@ fn glued(body: &dyn Body, node: u32) -> Contact {
     Contact::glued(triangle, weights)
 }
 
-/// A tool that follows `path`, or stays where the node that it is glued to rests.
-fn scripted(path: Option<ToolPath>, resting: Option<Vec3>) -> Result<Box<dyn Device>, Error> {
-    let path = match (path, resting) {
+/// A glued tool that starts farther from its node would tear it there in the first tick (m).
+const LARGEST_START_GAP: f64 = 1e-3;
+
+/// A tool that follows `path`, or stays where the node that it is glued to is at the start.
+fn scripted(path: Option<ToolPath>, glued_at: Option<Vec3>) -> Result<Box<dyn Device>, Error> {
+    let path = match (path, glued_at) {
+        (Some(path), Some(node)) if (Vec3::from(path.at(0.0)) - node).norm() > LARGEST_START_GAP => {
+            let gap = (Vec3::from(path.at(0.0)) - node).norm();
+            let place: [f64; 3] = node.into();
+            let message =
+                format!("starts {gap} m away from the node that the tool is glued to, must start at {place:?}");
+            return Err(Error::scene("device.path_csv", message));
+        }
         (Some(path), _) => path,
         (None, Some(position)) => ToolPath::constant(position.into())?,
         (None, None) => {

@@ -161,3 +161,123 @@ impl Succession {
         self.position(self.now)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{PatchGeometry, ResyncView};
+    use super::*;
+    use crate::model::contact::Contact;
+
+    /// Adds up the motion that it was given; its force is its base plus that.
+    #[derive(Debug)]
+    struct Counting {
+        base: f64,
+        built_at: u64,
+        catches_up: bool,
+        travelled: Vec3,
+        ticks: u64,
+    }
+
+    impl LocalModel for Counting {
+        fn rebuild(&mut self, _: ResyncView<'_>) {}
+        fn tick(&mut self, tool: ToolMotion) -> Vec3 {
+            self.travelled += tool.to - tool.from;
+            self.ticks += 1;
+            Vec3::new(self.base, self.travelled.y, self.ticks as f64)
+        }
+        fn built_at(&self) -> u64 {
+            self.built_at
+        }
+        fn catches_up(&self) -> bool {
+            self.catches_up
+        }
+        fn contact(&self) -> Contact {
+            Contact::default()
+        }
+        fn position(&self, _: u32) -> Option<Vec3> {
+            None
+        }
+        fn global_position(&self, _: usize) -> Option<Vec3> {
+            None
+        }
+        fn watch(&mut self, _: &[u32]) {}
+        fn geometry(&self, _: &mut PatchGeometry) -> bool {
+            false
+        }
+    }
+
+    fn model(base: f64, built_at: u64, catches_up: bool) -> Box<dyn LocalModel> {
+        Box::new(Counting { base, built_at, catches_up, travelled: Vec3::zeros(), ticks: 0 })
+    }
+
+    fn succession(blend_ticks: u32) -> Succession {
+        let mut models =
+            Succession::new([1.0, -1.0, -1.0].map(|base| model(base, 0, true)), blend_ticks, Vec3::zeros());
+        models.begin(Vec3::zeros(), None);
+        models
+    }
+
+    /// The tool at the end of tick t: it never moves evenly.
+    fn tool(t: u64) -> Vec3 {
+        Vec3::y() * (t * t) as f64
+    }
+
+    #[test]
+    fn a_model_that_is_in_time_serves_from_the_next_tick() {
+        let mut models = succession(0);
+        (1..=33).for_each(|t| assert_eq!(models.tick(tool(t)).force.x, 1.0));
+        models.offer(&mut model(2.0, 33, true), 7);
+        let served = models.tick(tool(34));
+        assert_eq!((served.force.x, models.version()), (2.0, 7));
+        assert_eq!(served.force.y, tool(34).y - tool(33).y, "its motion is that of the tick alone");
+        assert_eq!(served.resync.map(|resync| (resync.version, resync.age)), Some((7, 0)));
+    }
+
+    #[test]
+    fn a_late_model_replays_the_tools_own_path_while_the_old_one_serves() {
+        let mut models = succession(0);
+        (1..=60).for_each(|t| drop(models.tick(tool(t))));
+        models.offer(&mut model(2.0, 33, true), 1);
+        let served: Vec<Vec3> = (61..=70).map(|t| models.tick(tool(t)).force).collect();
+        // 27 ticks late, 8 caught up per tick while one more falls due: the old model serves ticks 61 to 63.
+        let swap = served.iter().position(|force| force.x == 2.0).unwrap();
+        assert_eq!(swap, 3);
+        assert!(served[..swap].iter().all(|force| force.x == 1.0));
+        assert_eq!(served[swap].y, tool(64).y - tool(33).y, "nothing of the path is missing");
+        assert_eq!(served[swap].z, 31.0, "each tick once");
+    }
+
+    #[test]
+    fn a_model_without_a_state_of_its_own_serves_at_once() {
+        let mut models = succession(0);
+        (1..=60).for_each(|t| drop(models.tick(tool(t))));
+        models.offer(&mut model(2.0, 33, false), 1);
+        assert_eq!(models.tick(tool(61)).force.x, 2.0);
+    }
+
+    #[test]
+    fn a_newer_model_waits_for_the_end_of_a_blend_and_an_ancient_one_is_refused() {
+        let mut models = succession(10);
+        (1..=33).for_each(|t| drop(models.tick(tool(t))));
+        models.offer(&mut model(2.0, 33, true), 1);
+        assert_eq!(models.tick(tool(34)).force.x, 1.0, "a crossfade begins with the old force");
+        models.offer(&mut model(3.0, 34, true), 2);
+        let forces: Vec<f64> = (35..=60).map(|t| models.tick(tool(t)).force.x).collect();
+        assert!(forces.windows(2).all(|f| f[1] >= f[0] && f[1] - f[0] < 0.11), "{forces:?}");
+        assert_eq!(*forces.last().unwrap(), 3.0);
+
+        let mut models = succession(0);
+        (1..=2000).for_each(|t| drop(models.tick(tool(t))));
+        models.offer(&mut model(2.0, 33, true), 1);
+        assert_eq!(models.tick(tool(2001)).force.x, 1.0);
+    }
+
+    #[test]
+    fn a_diverged_old_model_does_not_spoil_the_blend() {
+        let mut models = succession(10);
+        models.offer(&mut model(f64::NAN, 0, true), 1);
+        (1..=33).for_each(|t| drop(models.tick(tool(t))));
+        models.offer(&mut model(2.0, 33, true), 2);
+        assert!((34..=44).all(|t| models.tick(tool(t)).force.x == 2.0));
+    }
+}
