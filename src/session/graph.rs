@@ -23,12 +23,15 @@ const RECORDS_PER_TICK: usize = 4;
 /// A logger or a global model that is stuck for this long loses nothing.
 const SECONDS_BUFFERED: f64 = 4.0;
 
+/// However slow the haptic rate is: release 0 makes several records before the first drain.
+const MIN_TICKS_BUFFERED: usize = 64;
+
 pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let first = first_state(&mut *prepared.device)?;
     let environment = environment(&prepared);
     let (sinks, memory) = sinks(&prepared, &environment)?;
     let mut graph = Runtime::builder(prepared.execution);
-    let ticks_buffered = (SECONDS_BUFFERED * prepared.haptic.as_hz()) as usize;
+    let ticks_buffered = ((SECONDS_BUFFERED * prepared.haptic.as_hz()) as usize).max(MIN_TICKS_BUFFERED);
     let per_tick = RECORDS_PER_TICK + prepared.probes.len();
 
     let positions = prepared.simulation.state().positions.clone();
