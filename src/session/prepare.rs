@@ -129,7 +129,12 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         BlendKind::None => 0,
         BlendKind::Crossfade => (scene.local.blend.ms * 1e-3 / tick).round().max(1.0) as u32,
     };
-    let latency = Nanos::from_secs_f64(scene.global.compute_latency_ms * 1e-3);
+    let global = parts.global.unwrap_or_else(|| RateGroup::new(global_rate)).name("global");
+    let global = match scene.global.compute_latency_ms {
+        // Not given: the latency of a group that the program brings stays.
+        0.0 => global,
+        latency_ms => global.latency(Nanos::from_secs_f64(latency_ms * 1e-3)),
+    };
     let last_core = std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1);
     let local = parts.local.unwrap_or_else(|| {
         let group = RateGroup::new(haptic).realtime(HAPTIC_PRIORITY);
@@ -147,7 +152,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         haptic,
         global_rate,
         local: local.name("local"),
-        global: parts.global.unwrap_or_else(|| RateGroup::new(global_rate)).name("global").latency(latency),
+        global,
         execution: parts.execution,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
         log: parts.log,
