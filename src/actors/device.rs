@@ -8,6 +8,7 @@ use crate::log::{CommandSample, ToolSample};
 use crate::model::Vec3;
 use crate::runtime::{Actor, Outcome, Reader, Recorder, TickContext, Writer};
 use crate::safety::Pipeline;
+use crate::time::Nanos;
 
 /// Releases without a new command after which zero is the command.
 const COMMAND_EXPIRES: u32 = 2;
@@ -25,15 +26,17 @@ pub struct DeviceActor {
 }
 
 impl DeviceActor {
-    /// An actor for `device`.
+    /// An actor for `device`, which has given its `first` state.
     pub fn new(
         device: Box<dyn Device>,
+        first: DeviceState,
         samples: Writer<DeviceSample>,
         commands: Reader<ForceCommand>,
         safety: Pipeline,
         recorder: Recorder,
     ) -> Self {
-        Self { device, samples, commands, safety, recorder, last: DeviceSample::default(), missed_commands: 0 }
+        let last = DeviceSample { id: 0, state: first };
+        Self { device, samples, commands, safety, recorder, last, missed_commands: 0 }
     }
 
     fn read(&mut self, ctx: &TickContext) -> Outcome {
@@ -51,18 +54,6 @@ impl DeviceActor {
 impl Actor for DeviceActor {
     fn name(&self) -> &str {
         self.device.name()
-    }
-
-    fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
-        // Without a first position there is no tool; a wrong one could start inside the body.
-        match self.device.read(ctx.scheduled) {
-            Ok(state) if is_finite(&state) => {
-                self.last.state = state;
-                Ok(())
-            }
-            Ok(_) => Err(Error::new(ErrorKind::Device, "its first state is not finite").at(self.device.name())),
-            Err(fault) => Err(Error::new(ErrorKind::Device, format!("no first state: {fault}")).at(self.device.name())),
-        }
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
@@ -103,6 +94,20 @@ impl Actor for DeviceActor {
         // A device that is gone cannot be told; there is nobody left to report to.
         let _ = self.device.write(Vec3::zeros());
     }
+}
+
+/// The state of `device` before the start: without a first position there is no tool, a wrong one could lie inside the
+/// body, and the first local model is built around it.
+///
+/// # Errors
+/// [`ErrorKind::Device`] if it gives none or one that is not finite.
+pub fn first_state(device: &mut dyn Device) -> Result<DeviceState, Error> {
+    let message = match device.read(Nanos::ZERO) {
+        Ok(state) if is_finite(&state) => return Ok(state),
+        Ok(_) => "its first state is not finite".to_owned(),
+        Err(fault) => format!("no first state: {fault}"),
+    };
+    Err(Error::new(ErrorKind::Device, message).at(format!("device `{}`", device.name())))
 }
 
 fn degraded(fault: DeviceFault) -> Outcome {

@@ -10,6 +10,10 @@ use crate::runtime::record::Event;
 use crate::runtime::{Actor, GrantHandle, Outcome, Record, RecordDrain, TickContext};
 use crate::time::Nanos;
 
+/// The target of the event that says that a log could not be written, for programs that report the summary's
+/// `log_error` instead.
+pub const LOG_FAILURE: &str = "palpate::log_failure";
+
 /// Where log entries go, besides the statistics.
 pub trait LogSink: Send {
     /// Takes one record.
@@ -110,7 +114,7 @@ impl LoggerActor {
         if let Some(sink) = &mut self.sink
             && let Err(error) = write(&mut **sink)
         {
-            tracing::error!("the log ends here: {error}");
+            tracing::error!(target: LOG_FAILURE, "the log ends here: {error}");
             self.failure.get_or_insert(error);
             self.sink = None;
         }

@@ -15,8 +15,8 @@ mod logger;
 mod messages;
 
 pub use cause::Cause;
-pub use device::DeviceActor;
+pub use device::{DeviceActor, first_state};
 pub use global::{GlobalActor, GlobalPorts};
 pub use local::{LocalActor, LocalPorts, ModelSource};
-pub use logger::{LogSink, LoggerActor, LoggerOutcome};
+pub use logger::{LOG_FAILURE, LogSink, LoggerActor, LoggerOutcome};
 pub use messages::{DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};

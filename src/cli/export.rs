@@ -8,7 +8,7 @@ use palpate::log::LogReader;
 use palpate::report::{Format, export};
 use palpate::{Error, ErrorKind};
 
-use super::output::{forgive_closed_pipe, warn_of_damage};
+use super::output::{forgive_closed_pipe, refuse_to_overwrite, warn_of_damage};
 
 /// The arguments of `palpate export`.
 #[derive(Debug, clap::Args)]
@@ -35,6 +35,7 @@ pub fn run(args: &ExportArgs) -> Result<(), Error> {
     let mut reader = LogReader::open(&args.log)?;
     match &args.out {
         Some(path) => {
+            refuse_to_overwrite(&args.log, path)?;
             let mut out = BufWriter::new(LazyFile { path: path.clone(), file: None });
             export(&mut reader, &args.topic, args.format, &mut out).map_err(|e| match e.kind() {
                 ErrorKind::Io => e.at(path.display().to_string()),

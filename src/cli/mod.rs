@@ -12,7 +12,11 @@ mod progress;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use palpate::actors::LOG_FAILURE;
 use palpate::{Error, ErrorKind};
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Feel deformable objects: a detailed simulation at 30 Hz, a local model at 1 kHz, and a log of every tick.
 ///
@@ -37,12 +41,15 @@ enum Command {
 /// Parses the command line, runs it and says how it ended.
 pub fn main() -> ExitCode {
     // Warnings of actors go to standard error; nothing real-time ever writes there itself.
+    // A log that cannot be written ends the command with an error of its own: once is enough.
+    let shown = Targets::new().with_default(LevelFilter::WARN).with_target(LOG_FAILURE, LevelFilter::OFF);
     tracing_subscriber::fmt()
-        .with_max_level(tracing::Level::WARN)
         .with_target(false)
         .without_time()
         .with_ansi(false)
         .with_writer(std::io::stderr)
+        .finish()
+        .with(shown)
         .init();
     let result = match Cli::try_parse() {
         Ok(Cli { command }) => match command {

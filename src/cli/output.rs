@@ -3,13 +3,23 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use palpate::Error;
+use palpate::{Error, ErrorKind};
 
 /// Writes `text` to standard output. A reader that has gone away, such as `head`, is not an error.
 pub fn print(text: &str) -> Result<(), Error> {
     let mut out = io::stdout().lock();
     let result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     forgive_closed_pipe(result.map_err(|e| Error::io(Path::new("standard output"), e)))
+}
+
+/// Refuses to write `out` over `input`: opening it for writing would destroy what is being read.
+pub fn refuse_to_overwrite(input: &Path, out: &Path) -> Result<(), Error> {
+    let real = |path: &Path| path.canonicalize().ok();
+    if real(input).is_some_and(|input| real(out) == Some(input)) {
+        let message = "is the input itself, name another file for the output";
+        return Err(Error::new(ErrorKind::Usage, message).at(out.display().to_string()));
+    }
+    Ok(())
 }
 
 /// Takes the error of a closed pipe for the end of the output.

@@ -44,6 +44,11 @@ pub fn demo() -> Result<(), Error> {
 /// Input errors of the scene, or a failed run.
 pub fn run(args: &RunArgs) -> Result<(), Error> {
     let mut scene = Scene::load(&args.scene)?;
+    output::refuse_to_overwrite(&args.scene, &args.out)?;
+    if let Some(path_csv) = &scene.device.path_csv {
+        let folder = args.scene.parent().unwrap_or(Path::new(""));
+        output::refuse_to_overwrite(&folder.join(path_csv), &args.out)?;
+    }
     let name = args.scene.display().to_string();
     if let Some(model) = args.model {
         scene = scene.with_model(model);

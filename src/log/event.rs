@@ -56,6 +56,8 @@ impl TextEvent {
             Event::STOPPED => {
                 (Level::Error, format!("{group}: stopped by its overrun policy, {} periods behind", event.detail))
             }
+            Event::DEGRADED if event.detail == Event::RECOVERED => (Level::Info, format!("{group}: back to normal")),
+            Event::DEGRADED => (Level::Warning, format!("{group}: degraded, cause {}", event.detail)),
             code => (Level::Warning, format!("{group}: event {code}, detail {}", event.detail)),
         };
         Self { time: event.stamp, level, message }
@@ -65,6 +67,16 @@ impl TextEvent {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_degraded_group_and_its_recovery_are_told_apart() {
+        let mut event = Event { stamp: Nanos(5), group: 0, code: Event::DEGRADED, detail: 7 };
+        let text = TextEvent::describe(&event, "local");
+        assert_eq!((text.level, text.message.as_str()), (Level::Warning, "local: degraded, cause 7"));
+        event.detail = Event::RECOVERED;
+        let text = TextEvent::describe(&event, "local");
+        assert_eq!((text.level, text.message.as_str()), (Level::Info, "local: back to normal"));
+    }
 
     #[test]
     fn a_panic_is_an_error_that_names_group_and_actor() {

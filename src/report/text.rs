@@ -2,6 +2,8 @@
 //!
 //! It fits a screen of 80 columns and 40 lines for a run of up to four rate groups.
 
+use std::fmt;
+
 use super::units::{duration, force, seconds};
 use super::verdict::verdict;
 use crate::log::{CauseCounts, Environment, Execution, GroupReport, Percentiles, RunReport};
@@ -10,6 +12,12 @@ const WIDTH: usize = 80;
 const EVENTS_SHOWN: usize = 4;
 /// Lines for what the system granted.
 const GRANT_LINES: usize = 6;
+
+impl fmt::Display for RunReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&to_text(self))
+    }
+}
 
 /// The report as text, every line ended by a newline.
 pub fn to_text(report: &RunReport) -> String {

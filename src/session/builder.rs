@@ -49,7 +49,7 @@ impl SessionBuilder {
         self
     }
 
-    /// The global model's rate group: rate, pinning, priority.
+    /// The global model's rate group: rate, pinning, priority, compute latency (unless the scene gives one).
     #[must_use]
     pub fn global(mut self, group: RateGroup) -> Self {
         self.parts.scene.global.rate_hz = group.rate().as_hz();

@@ -5,7 +5,7 @@ use super::running::{Running, Viewer};
 use super::sink::{Memory, Sinks};
 use crate::actors::{
     DeviceActor, DeviceSample, ForceCommand, GlobalActor, GlobalPorts, LocalActor, LocalPorts, LoggerActor,
-    LoggerOutcome, ModelSource, SurfaceView, ToolTick, ToolView,
+    LoggerOutcome, ModelSource, SurfaceView, ToolTick, ToolView, first_state,
 };
 use crate::error::Error;
 use crate::log::{Environment, Execution as LogExecution, GroupInfo};
@@ -23,11 +23,15 @@ const RECORDS_PER_TICK: usize = 4;
 /// A logger or a global model that is stuck for this long loses nothing.
 const SECONDS_BUFFERED: f64 = 4.0;
 
-pub(super) fn start(prepared: Prepared) -> Result<Running, Error> {
+/// However slow the haptic rate is: release 0 makes several records before the first drain.
+const MIN_TICKS_BUFFERED: usize = 64;
+
+pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
+    let first = first_state(&mut *prepared.device)?;
     let environment = environment(&prepared);
     let (sinks, memory) = sinks(&prepared, &environment)?;
     let mut graph = Runtime::builder(prepared.execution);
-    let ticks_buffered = (SECONDS_BUFFERED * prepared.haptic.as_hz()) as usize;
+    let ticks_buffered = ((SECONDS_BUFFERED * prepared.haptic.as_hz()) as usize).max(MIN_TICKS_BUFFERED);
     let per_tick = RECORDS_PER_TICK + prepared.probes.len();
 
     let positions = prepared.simulation.state().positions.clone();
@@ -69,13 +73,15 @@ pub(super) fn start(prepared: Prepared) -> Result<Running, Error> {
                 surface: surface_writer,
                 recorder: graph.recorder(ticks_buffered),
             };
-            let global = GlobalActor::new(prepared.simulation, ToolTick::default(), prepared.haptic, ports)?;
+            let tool = ToolTick { tick: 0, position: first.position };
+            let global = GlobalActor::new(prepared.simulation, tool, prepared.haptic, ports)?;
             let source = ModelSource::Global { models: model_reader, ticks: tick_writer, geometry: geometry_writer };
             (source, rotating, Some(global))
         }
     };
     let device = DeviceActor::new(
         prepared.device,
+        first,
         sample_writer,
         commands,
         Pipeline::new(prepared.limits),

@@ -77,6 +77,9 @@ pub(super) struct Prepared {
 /// The priority of the haptic thread: above everything but the kernel's own.
 const HAPTIC_PRIORITY: u8 = 80;
 
+/// Steps of 0.1 us, the limit of `global.substeps_per_ms` too: a body that needs more would seem to hang.
+const MAX_SUBSTEPS_PER_MS: f64 = 1e4;
+
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let scene = parts.scene;
     scene.validate()?;
@@ -126,7 +129,12 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         BlendKind::None => 0,
         BlendKind::Crossfade => (scene.local.blend.ms * 1e-3 / tick).round().max(1.0) as u32,
     };
-    let latency = Nanos::from_secs_f64(scene.global.compute_latency_ms * 1e-3);
+    let global = parts.global.unwrap_or_else(|| RateGroup::new(global_rate)).name("global");
+    let global = match scene.global.compute_latency_ms {
+        // Not given: the latency of a group that the program brings stays.
+        0.0 => global,
+        latency_ms => global.latency(Nanos::from_secs_f64(latency_ms * 1e-3)),
+    };
     let last_core = std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1);
     let local = parts.local.unwrap_or_else(|| {
         let group = RateGroup::new(haptic).realtime(HAPTIC_PRIORITY);
@@ -144,7 +152,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         haptic,
         global_rate,
         local: local.name("local"),
-        global: parts.global.unwrap_or_else(|| RateGroup::new(global_rate)).name("global").latency(latency),
+        global,
         execution: parts.execution,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
         log: parts.log,
@@ -211,7 +219,17 @@ fn check_nodes(body: &dyn Body, attach: Option<u32>, probes: &[u32]) -> Result<(
 /// Substeps per haptic tick: as asked, unless that is unstable, or from the stability limit.
 fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<u32, Error> {
     let spectrum = Spectrum::estimate(body);
-    let Some(per_ms) = per_ms else { return Ok(spectrum.substeps(tick)) };
+    let Some(per_ms) = per_ms else {
+        let substeps = spectrum.substeps(tick);
+        if f64::from(substeps) > MAX_SUBSTEPS_PER_MS * (tick * 1e3).max(1.0) {
+            let message = format!(
+                "needs {substeps} explicit steps per haptic tick to be stable, which no machine can do: less stiffness or \
+                 damping, or more mass"
+            );
+            return Err(Error::scene("body", message));
+        }
+        return Ok(substeps);
+    };
     let substeps = (f64::from(per_ms) * tick * 1e3 - 1e-9).ceil().max(1.0);
     let stable = spectrum.stable_step();
     if tick / substeps >= stable {

@@ -137,7 +137,7 @@ pub struct Summary {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&crate::report::to_text(&self.report))?;
+        self.report.fmt(f)?;
         if let Some(fault) = &self.runtime.fault {
             writeln!(f, "fault: {fault}")?;
         }

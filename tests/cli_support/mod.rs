@@ -1,0 +1,110 @@
+//! Runs the `palpate` command in a folder of its own.
+#![allow(dead_code)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// What a call left behind.
+#[derive(Debug)]
+pub struct Called {
+    pub code: Option<i32>,
+    pub out: String,
+    pub err: String,
+}
+
+/// A folder with a small good scene and its path; gone when dropped.
+#[derive(Debug)]
+pub struct Folder(tempfile::TempDir);
+
+/// A block of 6^3 nodes that a tool touches after 9 ms, slips along and leaves.
+pub const SCENE: &str = r#"[body.block]
+nodes = [6, 6, 6]
+size_m = [0.1, 0.1, 0.1]
+fixed = ["z_min"]
+[body.material]
+node_mass_kg = 0.0005
+stiffness_n_per_m = 30.0
+damping_ratio = 0.3
+[contact]
+friction = 0.5
+[global]
+rate_hz = 30
+compute_latency_ms = 0
+[local]
+rate_hz = 1000
+model = "patch"
+patch = [3, 3, 2]
+blend = { kind = "crossfade", ms = 10 }
+[device]
+path_csv = "path.csv"
+[safety]
+max_force_n = 8.0
+max_slew_n_per_ms = 0.5
+[[probe]]
+node = [3, 3, 5]
+[run]
+duration_s = 0.2
+"#;
+
+pub const PATH: &str = "t_s,x_m,y_m,z_m\n0,0.05,0.05,0.101\n0.1,0.05,0.05,0.092\n0.2,0.06,0.05,0.092\n";
+
+impl Folder {
+    pub fn new() -> Self {
+        let folder = Self(tempfile::tempdir().expect("a temporary folder"));
+        folder.write("scene.toml", SCENE);
+        folder.write("path.csv", PATH);
+        folder
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, contents: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), contents).expect("a file in a temporary folder");
+    }
+
+    /// The scene with one piece of its text replaced.
+    pub fn spoil(&self, good: &str, bad: &str) {
+        assert!(SCENE.contains(good), "no {good:?} to spoil");
+        self.write("scene.toml", SCENE.replacen(good, bad, 1));
+    }
+
+    /// The names of the files in it.
+    pub fn files(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.0.path()).expect("it exists");
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.expect("readable").file_name().into_string().expect("UTF-8")).collect();
+        names.sort();
+        names
+    }
+
+    /// Runs `palpate` with `args` in this folder.
+    pub fn call(&self, args: &[&str]) -> Called {
+        palpate(self.0.path(), args)
+    }
+
+    /// Runs it, expects success without a word on standard error, and gives standard output.
+    pub fn succeed(&self, args: &[&str]) -> String {
+        let called = self.call(args);
+        assert_eq!((called.code, &*called.err), (Some(0), ""), "{args:?}");
+        called.out
+    }
+}
+
+fn palpate(folder: &Path, args: &[&str]) -> Called {
+    let output = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(args)
+        .current_dir(folder)
+        .env("RUST_BACKTRACE", "1")
+        .stdin(Stdio::null())
+        .output()
+        .expect("the command starts");
+    let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
+    Called { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+}
+
+/// The rows of a CSV text below its header.
+pub fn rows(csv: &str) -> Vec<Vec<f64>> {
+    csv.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect()).collect()
+}

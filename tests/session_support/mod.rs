@@ -1,0 +1,70 @@
+//! Small bodies, paths and records for tests of whole sessions.
+#![allow(dead_code)]
+
+use palpate::devices::ToolPath;
+use palpate::log::{CommandSample, ForceSample, GlobalTick, LogRecord, Resync};
+use palpate::model::Vec3;
+use palpate::model::body::{Block, Body};
+use palpate::model::mesh::Face;
+use palpate::runtime::TickTiming;
+use palpate::session::Summary;
+
+/// A block of 6^3 nodes, 2 cm apart, held at the bottom.
+pub fn block() -> Block {
+    Block::builder([6; 3], [0.1; 3]).node_mass(0.5e-3).stiffness(30.0).damping_ratio(0.3).fix(Face::ZMin).build().unwrap()
+}
+
+/// A node in the middle of the top.
+pub fn top() -> u32 {
+    block().lattice().id([3, 3, 5])
+}
+
+/// Presses into the top within 50 ms, then moves along it, for as long as anybody asks.
+pub fn pressing() -> ToolPath {
+    let position = |t: f64| {
+        let pressed = (t / 0.05).min(1.0);
+        [0.05 + 0.01 * (9.0 * t).sin(), 0.052, 0.101 - 0.009 * pressed - 0.002 * (23.0 * t).sin()]
+    };
+    sampled(position)
+}
+
+/// Moves the node [`top`] about like a hand.
+pub fn wiggling() -> ToolPath {
+    let rest = block().rest()[top() as usize];
+    sampled(|t| (rest + Vec3::new(0.004 * (19.0 * t).sin(), 0.003 * (13.0 * t).sin(), -0.008 * (12.6 * t).sin())).into())
+}
+
+fn sampled(position: impl Fn(f64) -> [f64; 3]) -> ToolPath {
+    let times: Vec<f64> = (0..4000).map(|n| f64::from(n) * 1e-3).collect();
+    let positions = times.iter().map(|&t| position(t)).collect();
+    ToolPath::new(times, positions).unwrap()
+}
+
+fn of<T>(summary: &Summary, pick: impl Fn(&LogRecord) -> Option<T>) -> Vec<T> {
+    summary.records.iter().filter_map(pick).collect()
+}
+
+macro_rules! pick {
+    ($name:ident, $variant:ident, $record:ty) => {
+        pub fn $name(summary: &Summary) -> Vec<$record> {
+            of(summary, |record| match record {
+                LogRecord::$variant(record) => Some(*record),
+                _ => None,
+            })
+        }
+    };
+}
+pick!(forces, Force, ForceSample);
+pick!(commands, Command, CommandSample);
+pick!(global_ticks, Global, GlobalTick);
+pick!(resyncs, Resync, Resync);
+pick!(timings, Tick, TickTiming);
+
+/// The forces as bits, so that -0.0 differs from 0.0 and NaN equals itself.
+pub fn bits(force: [f64; 3]) -> [u64; 3] {
+    force.map(f64::to_bits)
+}
+
+pub fn norm(force: [f64; 3]) -> f64 {
+    Vec3::from(force).norm()
+}
