@@ -258,7 +258,13 @@ fn main() -> Result<(), Error> {
     println!("Virtual time, against the whole ball at 1 kHz (full, peak {:.2} N), in % of that peak:", peak(&full));
     for model in [LocalModelKind::Hold, LocalModelKind::Patch] {
         let off = Difference::of(&run(model)?, &full, peak(&full));
-        println!("  {:<5}  rms {:4.1}   max {:5.1}   worst one-tick jump {:4.1}", model.name(), off.rms, off.max, off.jump);
+        println!(
+            "  {:<5}  rms {:4.1}   max {:5.1}   worst one-tick jump {:4.1}",
+            model.name(),
+            off.rms,
+            off.max,
+            off.jump
+        );
     }
     Ok(())
 }
