@@ -4,7 +4,6 @@
 
 use std::time::Duration;
 
-use palpate::devices::ToolPath;
 use palpate::prelude::*;
 
 fn main() -> Result<(), Error> {

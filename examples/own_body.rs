@@ -15,10 +15,10 @@ mod forces;
 use std::collections::{BTreeMap, BTreeSet};
 
 use forces::{Difference, forces, peak};
-use palpate::devices::ToolPath;
-use palpate::model::body::{Spring, State, TangentBlock};
+use palpate::model::body::{Body, Spring, State, TangentBlock};
 use palpate::model::mesh::Surface;
 use palpate::prelude::*;
+use palpate::scene::LocalModelKind;
 use palpate::session::SessionBuilder;
 
 /// Radius of the skin, and of the flesh's nodes below it (m).
@@ -147,8 +147,7 @@ impl Body for Ball {
             for &(column, spring) in &self.neighbours[row as usize] {
                 let (along, closing) = between(state, row, column);
                 let tangent = spring.tangent(along, closing, clamp);
-                emit(TangentBlock { row, column, position: tangent.position, velocity: tangent.velocity });
-                emit(TangentBlock { row, column: row, position: -tangent.position, velocity: -tangent.velocity });
+                TangentBlock::pair(row, column, &tangent).into_iter().for_each(&mut *emit);
             }
         }
     }

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use palpate::log::{LogRecord, ProbeSample};
 use palpate::prelude::*;
+use palpate::scene::LocalModelKind;
 
 use crate::delay::Delay;
 use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet};

@@ -6,6 +6,7 @@ use std::path::Path;
 use palpate::Summary;
 use palpate::log::LogRecord;
 use palpate::prelude::*;
+use palpate::scene::LocalModelKind;
 use palpate::scene::Scene;
 
 use crate::forces::{Difference, forces, peak};

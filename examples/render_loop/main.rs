@@ -88,7 +88,7 @@ fn compare() -> Result<(), Box<dyn Error>> {
 
 /// Draws at the frame rate until the other end of `stopped` is dropped.
 fn render(mut viewer: Viewer, stopped: &Receiver<()>, folder: &Path) -> Result<Frames, std::io::Error> {
-    let triangles = viewer.triangles().to_vec();
+    let triangles = viewer.triangles();
     let mut kept = KEPT.into_iter().peekable();
     let mut frames = Frames::default();
     let start = Instant::now();
@@ -117,7 +117,7 @@ fn draw_readme() -> Result<(), Box<dyn Error>> {
     let mut running = Session::from_scene(Scene::demo()).virtual_time().build()?.start()?;
     let mut viewer = running.take_viewer().ok_or("the viewer is already taken")?;
     running.wait_for(README_TIME);
-    let triangles = viewer.triangles().to_vec();
+    let triangles = viewer.triangles();
     let tool = viewer.tool();
     let svg = picture::draw(&triangles, &viewer.surface().positions, &tool);
     running.stop()?;

@@ -1,5 +1,6 @@
 //! Turns a validated description into bodies, states and models that can start.
 
+#[cfg(feature = "log")]
 use std::path::PathBuf;
 
 use crate::devices::{Device, Scripted, ToolPath};
@@ -29,6 +30,7 @@ pub(super) struct Parts {
     pub global: Option<RateGroup>,
     pub local: Option<RateGroup>,
     pub execution: Execution,
+    #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
     pub endless: bool,
@@ -46,6 +48,7 @@ impl Parts {
             global: None,
             local: None,
             execution: Execution::Threaded,
+            #[cfg(feature = "log")]
             log: None,
             keep_records: false,
         }
@@ -68,6 +71,7 @@ pub(super) struct Prepared {
     pub global: RateGroup,
     pub execution: Execution,
     pub until: Option<Nanos>,
+    #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
     /// The scene file's text, for the log.
@@ -155,6 +159,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         global,
         execution: parts.execution,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
+        #[cfg(feature = "log")]
         log: parts.log,
         keep_records: parts.keep_records,
         source: scene.source,

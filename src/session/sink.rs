@@ -22,7 +22,6 @@ impl Memory {
 }
 
 /// All sinks that a session asked for, one after the other.
-#[derive(Default)]
 pub(super) struct Sinks {
     memory: Option<Memory>,
     #[cfg(feature = "log")]
@@ -32,7 +31,11 @@ pub(super) struct Sinks {
 impl Sinks {
     /// Keeps records in `memory`, if there is one.
     pub(super) fn new(memory: Option<Memory>) -> Self {
-        Self { memory, ..Self::default() }
+        Self {
+            memory,
+            #[cfg(feature = "log")]
+            file: None,
+        }
     }
 
     /// Also writes a file.
