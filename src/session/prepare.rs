@@ -224,6 +224,10 @@ fn check_nodes(body: &dyn Body, attach: Option<u32>, probes: &[u32]) -> Result<(
 /// Substeps per haptic tick: as asked, unless that is unstable, or from the stability limit.
 fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<u32, Error> {
     let spectrum = Spectrum::estimate(body);
+    let stable = spectrum.stable_step();
+    if stable.is_nan() || stable <= 0.0 {
+        return Err(Error::scene("body", "gives forces near its rest positions that are not finite"));
+    }
     let Some(per_ms) = per_ms else {
         let substeps = spectrum.substeps(tick);
         if f64::from(substeps) > MAX_SUBSTEPS_PER_MS * (tick * 1e3).max(1.0) {
@@ -236,7 +240,6 @@ fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<u32, 
         return Ok(substeps);
     };
     let substeps = (f64::from(per_ms) * tick * 1e3 - 1e-9).ceil().max(1.0);
-    let stable = spectrum.stable_step();
     if tick / substeps >= stable {
         let needed = (1.3e-3 / stable).ceil();
         let message = format!(
