@@ -1,7 +1,5 @@
 //! Turns a validated description into bodies, states and models that can start.
 
-use std::path::PathBuf;
-
 use crate::devices::{Device, Scripted, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::Vec3;
@@ -29,7 +27,8 @@ pub(super) struct Parts {
     pub global: Option<RateGroup>,
     pub local: Option<RateGroup>,
     pub execution: Execution,
-    pub log: Option<PathBuf>,
+    #[cfg(feature = "log")]
+    pub log: Option<std::path::PathBuf>,
     pub keep_records: bool,
     pub endless: bool,
 }
@@ -46,6 +45,7 @@ impl Parts {
             global: None,
             local: None,
             execution: Execution::Threaded,
+            #[cfg(feature = "log")]
             log: None,
             keep_records: false,
         }
@@ -68,7 +68,8 @@ pub(super) struct Prepared {
     pub global: RateGroup,
     pub execution: Execution,
     pub until: Option<Nanos>,
-    pub log: Option<PathBuf>,
+    #[cfg(feature = "log")]
+    pub log: Option<std::path::PathBuf>,
     pub keep_records: bool,
     /// The scene file's text, for the log.
     pub source: Option<String>,
@@ -155,6 +156,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         global,
         execution: parts.execution,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
+        #[cfg(feature = "log")]
         log: parts.log,
         keep_records: parts.keep_records,
         source: scene.source,

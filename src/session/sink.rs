@@ -35,7 +35,11 @@ pub(super) struct Sinks {
 impl Sinks {
     /// Keeps records in `memory`, if there is one.
     pub(super) fn new(memory: Option<Memory>) -> Self {
-        Self { memory, ..Self::default() }
+        Self {
+            memory,
+            #[cfg(feature = "log")]
+            file: None,
+        }
     }
 
     /// Also writes a file.

@@ -236,7 +236,9 @@ mod tests {
     #[test]
     fn a_late_model_replays_the_tools_own_path_while_the_old_one_serves() {
         let mut models = succession(0);
-        (1..=60).for_each(|t| drop(models.tick(tool(t))));
+        (1..=60).for_each(|t| {
+            models.tick(tool(t));
+        });
         models.offer(&mut model(2.0, 33, true), 1);
         let served: Vec<Vec3> = (61..=70).map(|t| models.tick(tool(t)).force).collect();
         // 27 ticks late, 8 caught up per tick while one more falls due: the old model serves ticks 61 to 63.
@@ -250,7 +252,9 @@ mod tests {
     #[test]
     fn a_model_without_a_state_of_its_own_serves_at_once() {
         let mut models = succession(0);
-        (1..=60).for_each(|t| drop(models.tick(tool(t))));
+        (1..=60).for_each(|t| {
+            models.tick(tool(t));
+        });
         models.offer(&mut model(2.0, 33, false), 1);
         assert_eq!(models.tick(tool(61)).force.x, 2.0);
     }
@@ -258,7 +262,9 @@ mod tests {
     #[test]
     fn a_newer_model_waits_for_the_end_of_a_blend_and_an_ancient_one_is_refused() {
         let mut models = succession(10);
-        (1..=33).for_each(|t| drop(models.tick(tool(t))));
+        (1..=33).for_each(|t| {
+            models.tick(tool(t));
+        });
         models.offer(&mut model(2.0, 33, true), 1);
         assert_eq!(models.tick(tool(34)).force.x, 1.0, "a crossfade begins with the old force");
         models.offer(&mut model(3.0, 34, true), 2);
@@ -267,7 +273,9 @@ mod tests {
         assert_eq!(*forces.last().unwrap(), 3.0);
 
         let mut models = succession(0);
-        (1..=2000).for_each(|t| drop(models.tick(tool(t))));
+        (1..=2000).for_each(|t| {
+            models.tick(tool(t));
+        });
         models.offer(&mut model(2.0, 33, true), 1);
         assert_eq!(models.tick(tool(2001)).force.x, 1.0);
     }
@@ -276,7 +284,9 @@ mod tests {
     fn a_diverged_old_model_does_not_spoil_the_blend() {
         let mut models = succession(10);
         models.offer(&mut model(f64::NAN, 0, true), 1);
-        (1..=33).for_each(|t| drop(models.tick(tool(t))));
+        (1..=33).for_each(|t| {
+            models.tick(tool(t));
+        });
         models.offer(&mut model(2.0, 33, true), 2);
         assert!((34..=44).all(|t| models.tick(tool(t)).force.x == 2.0));
     }
