@@ -8,6 +8,17 @@ use palpate::session::Running;
 /// How much of the run passes between two drawings.
 const STEP: Duration = Duration::from_millis(50);
 
+/// Shows that a scene is being prepared until the returned bar is cleared: a large body's equilibrium takes a while.
+pub fn preparing(what: &str) -> ProgressBar {
+    let spinner = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
+    spinner.set_style(
+        ProgressStyle::with_template("{msg} {elapsed}").unwrap_or_else(|_| ProgressStyle::default_spinner()),
+    );
+    spinner.set_message(format!("preparing {what}"));
+    spinner.enable_steady_tick(STEP);
+    spinner
+}
+
 /// Waits for the end of `running` and shows how far it is.
 pub fn wait(running: &Running, what: &str) {
     let Some(until) = running.until() else { return running.wait() };

@@ -64,7 +64,10 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
 }
 
 fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error> {
-    let running = builder.log(log).build().map_err(|error| error.at(name))?.start()?;
+    let preparing = progress::preparing(name);
+    let session = builder.log(log).build().map_err(|error| error.at(name));
+    preparing.finish_and_clear();
+    let running = session?.start()?;
     progress::wait(&running, name);
     let summary = running.stop()?;
     output::print(&summary.to_string())?;

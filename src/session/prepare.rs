@@ -1,5 +1,8 @@
 //! Turns a validated description into bodies, states and models that can start.
 
+#[cfg(feature = "log")]
+use std::path::PathBuf;
+
 use crate::devices::{Device, Scripted, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::Vec3;
@@ -28,7 +31,7 @@ pub(super) struct Parts {
     pub local: Option<RateGroup>,
     pub execution: Execution,
     #[cfg(feature = "log")]
-    pub log: Option<std::path::PathBuf>,
+    pub log: Option<PathBuf>,
     pub keep_records: bool,
     pub endless: bool,
 }
@@ -69,7 +72,7 @@ pub(super) struct Prepared {
     pub execution: Execution,
     pub until: Option<Nanos>,
     #[cfg(feature = "log")]
-    pub log: Option<std::path::PathBuf>,
+    pub log: Option<PathBuf>,
     pub keep_records: bool,
     /// The scene file's text, for the log.
     pub source: Option<String>,

@@ -25,7 +25,6 @@ impl Memory {
 type FileWriter = crate::log::McapWriter<std::io::BufWriter<std::fs::File>>;
 
 /// All sinks that a session asked for, one after the other.
-#[derive(Default)]
 pub(super) struct Sinks {
     memory: Option<Memory>,
     #[cfg(feature = "log")]

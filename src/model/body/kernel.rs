@@ -6,11 +6,8 @@
 //! set chosen at run time; it uses no fused multiply-add and no approximate roots, so every set gives the same bits.
 
 use super::super::Vec3;
-use super::lattice_springs::LatticeSprings;
+use super::lattice_springs::{LANES, LatticeSprings};
 use super::spring::Spring;
-
-/// Nodes per block.
-pub(super) const LANES: usize = 8;
 
 type Lane = [f64; LANES];
 

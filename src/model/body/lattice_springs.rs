@@ -1,8 +1,10 @@
 //! The springs of a lattice, by forward offset and lower node.
 
 use super::super::mesh::Lattice;
-use super::kernel::LANES;
 use super::spring::Spring;
+
+/// Nodes that the force kernel takes at once; arrays are padded to whole blocks of them.
+pub(super) const LANES: usize = 8;
 
 /// All springs in one direction: `stiffness[p]` and `damping[p]` belong to the spring from node p to p + delta and are
 /// zero where the lattice has no such spring.

@@ -11,6 +11,7 @@
 //! force on the tool: J / d
 //! ```
 
+mod deformable;
 mod normal;
 mod paper;
 mod resolve;
@@ -21,7 +22,8 @@ mod walk;
 
 use super::Vec3;
 
-pub use step::{Deformable, step};
+pub use deformable::Deformable;
+pub use step::step;
 
 /// The state of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -8,10 +8,13 @@
 //! the paper does not give, are those of the corrected equations.
 
 use super::super::{Vec3, integrator};
+use super::deformable::Deformable;
 use super::normal::contact_normal;
-use super::step::{Deformable, detect, reseat};
 use super::triangle::interpolate;
 use super::{Contact, Law, Mode, ToolMotion};
+
+/// Without a movable node there is nothing to project (sum of the squared weights).
+const IMMOVABLE: f64 = 1e-12;
 
 /// One step with the printed equations; same contract as [`super::step`].
 pub(super) fn step(
@@ -22,93 +25,112 @@ pub(super) fn step(
     tool: ToolMotion,
     d: f64,
 ) -> Vec3 {
-    let was_slipping = contact.mode == Mode::Slip;
-    let predicted = |body: &Deformable<'_>, node: usize| {
-        let force = forces.get(node).copied().unwrap_or_default();
-        body.velocities[node] + force * (d * body.inverse_masses[node])
-    };
-    // Detection looks at the motion that the predicted velocities make.
-    let touching = contact.triangle.is_some();
-    if !touching {
-        integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
-        if detect(body, contact, tool, d).is_none() {
-            body.drift(d);
-            return Vec3::zeros();
-        }
-    }
-    let Some(triangle) = contact.triangle else { return Vec3::zeros() };
-    let nodes = body.surface.triangles[triangle as usize].map(|node| node as usize);
-    let weights = contact.weights;
-    let normal = contact_normal(law.normals, body.surface, body.positions, triangle, &weights);
-    contact.normal = normal;
-    let sum_squares: f64 =
-        nodes.iter().zip(&weights).map(|(&i, w)| if body.inverse_masses[i] > 0.0 { w * w } else { 0.0 }).sum();
-    let velocities =
-        if touching { nodes.map(|node| predicted(body, node)) } else { nodes.map(|node| body.velocities[node]) };
-    let point_velocity = interpolate(&weights, &velocities);
-    // Net of the node forces m_i w_i u / (d sum w^2) for a contact point slowed by u.
-    let inertia: f64 = nodes
-        .iter()
-        .zip(&weights)
-        .filter(|&(&i, _)| body.inverse_masses[i] > 0.0)
-        .map(|(&i, w)| w / body.inverse_masses[i])
-        .sum();
-    if sum_squares < 1e-12 {
-        contact.mode = Mode::Lost;
-        if touching {
-            integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
-        }
+    let (was_touching, was_slipping) = (contact.triangle.is_some(), contact.mode == Mode::Slip);
+    integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
+    let Some((triangle, _)) = body.detect(contact, tool, d) else {
         body.drift(d);
         return Vec3::zeros();
-    }
-    let force_of = |slowed: Vec3| slowed * (inertia / (sum_squares * d));
-
-    let (along, across) = (normal * point_velocity.dot(&normal), point_velocity - normal * point_velocity.dot(&normal));
+    };
+    contact.normal = contact_normal(law.normals, body.surface, body.positions, triangle, &contact.weights);
+    let Some(point) = Point::new(body, triangle, contact.weights) else {
+        contact.mode = Mode::Lost;
+        body.drift(d);
+        body.reseat(contact, law, triangle, &tool.to);
+        return Vec3::zeros();
+    };
+    let velocity = point.of(body.velocities);
     let slowed;
     (contact.mode, slowed) = if contact.glued {
-        (Mode::Stick, point_velocity)
-    } else if point_velocity.dot(&normal) <= 0.0 && touching {
+        (Mode::Stick, velocity)
+    } else if was_touching && velocity.dot(&contact.normal) <= 0.0 {
         (Mode::Free, Vec3::zeros())
     } else {
-        let limit = law.friction * along.norm();
-        if was_slipping || across.norm() > limit {
-            // (27): scaled to the limit whether above or below it; 0/0 is read as no friction.
-            let friction = if across.norm() > 0.0 { across * (limit.min(f64::MAX) / across.norm()) } else { across };
-            (Mode::Slip, along + friction)
-        } else {
-            (Mode::Stick, point_velocity)
-        }
+        cone(velocity, &contact.normal, law.friction, was_slipping)
     };
-
-    // (13) moves with the old velocity, (21) and (29) with the new one.
     if contact.mode == Mode::Stick {
+        drift_with_old_velocities(body, forces, d);
+        point.slow(body, slowed);
+    } else {
+        point.slow(body, slowed);
         body.drift(d);
     }
-    if touching {
-        integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
-    }
-    for (&node, w) in nodes.iter().zip(&weights) {
-        if body.inverse_masses[node] > 0.0 {
-            body.velocities[node] -= slowed * (w / sum_squares);
-        }
+    if contact.mode != Mode::Free {
+        // Section 4.1: the surface is pushed to the tool, along the normal without friction, along its motion with it.
+        let gap = tool.to - point.of(body.positions);
+        let follows = contact.glued || law.friction > 0.0;
+        point.push(body, if follows { gap } else { contact.normal * gap.dot(&contact.normal) });
     }
     if contact.mode != Mode::Stick {
-        body.drift(d);
+        body.reseat(contact, law, triangle, &tool.to);
+    }
+    point.net_force(slowed, d)
+}
+
+/// What of the contact point's velocity is taken away, (24) to (29).
+fn cone(velocity: Vec3, normal: &Vec3, friction: f64, was_slipping: bool) -> (Mode, Vec3) {
+    let along = normal * velocity.dot(normal);
+    let across = velocity - along;
+    let limit = friction * along.norm();
+    if !was_slipping && across.norm() <= limit {
+        return (Mode::Stick, velocity);
+    }
+    // (27) scales to the limit whether above or below it; 0/0 is read as no friction, an infinite limit as sticking.
+    let scale = if limit.is_finite() && across.norm() > 0.0 { limit / across.norm() } else { 1.0 };
+    (Mode::Slip, along + across * scale)
+}
+
+/// (13): the positions of a sticking step move with the velocities before it.
+fn drift_with_old_velocities(body: &mut Deformable<'_>, forces: &[Vec3], d: f64) {
+    for (i, force) in forces.iter().enumerate() {
+        body.positions[i] += (body.velocities[i] - force * (d * body.inverse_masses[i])) * d;
+    }
+}
+
+/// The contact point with the un-weighted projection of (7) to (10).
+struct Point {
+    nodes: [usize; 3],
+    weights: [f64; 3],
+    /// Of the nodes that can move: each one's share w_i / sum w^2 of a change at the point.
+    shares: [f64; 3],
+    /// sum m_i w_i / sum w^2 (kg): what the net of the node forces makes of a change of velocity.
+    inertia: f64,
+}
+
+impl Point {
+    fn new(body: &Deformable<'_>, triangle: u32, weights: [f64; 3]) -> Option<Self> {
+        let nodes = body.corners(triangle);
+        let mobility = nodes.map(|node| body.inverse_masses[node]);
+        let movable = |i: usize| if mobility[i] > 0.0 { weights[i] } else { 0.0 };
+        let sum_squares: f64 = (0..3).map(|i| movable(i) * movable(i)).sum();
+        if sum_squares < IMMOVABLE {
+            return None;
+        }
+        let shares = std::array::from_fn(|i| movable(i) / sum_squares);
+        let inertia = (0..3).filter(|&i| mobility[i] > 0.0).map(|i| shares[i] / mobility[i]).sum();
+        Some(Self { nodes, weights, shares, inertia })
     }
 
-    // Section 4.1: the surface is pushed to the tool, along the normal without friction, along its motion with it.
-    if contact.mode != Mode::Free {
-        let point = interpolate(&weights, &nodes.map(|node| body.positions[node]));
-        let gap = tool.to - point;
-        let push = if law.friction > 0.0 || contact.glued { gap } else { normal * gap.dot(&normal) };
-        for (&node, w) in nodes.iter().zip(&weights) {
-            if body.inverse_masses[node] > 0.0 {
-                body.positions[node] += push * (w / sum_squares);
-            }
+    /// The value of a node quantity at the point.
+    fn of(&self, values: &[Vec3]) -> Vec3 {
+        interpolate(&self.weights, &self.nodes.map(|node| values[node]))
+    }
+
+    /// Takes `velocity` away at the point (P and Q).
+    fn slow(&self, body: &mut Deformable<'_>, velocity: Vec3) {
+        for (&node, share) in self.nodes.iter().zip(&self.shares) {
+            body.velocities[node] -= velocity * *share;
         }
     }
-    if contact.mode != Mode::Stick {
-        reseat(body, contact, law, triangle, &tool.to);
+
+    /// Moves the point by `way`.
+    fn push(&self, body: &mut Deformable<'_>, way: Vec3) {
+        for (&node, share) in self.nodes.iter().zip(&self.shares) {
+            body.positions[node] += way * *share;
+        }
     }
-    force_of(slowed)
+
+    /// (15), (23), (31): the net of the node forces that slowed the point within `d` seconds.
+    fn net_force(&self, slowed: Vec3, d: f64) -> Vec3 {
+        slowed * (self.inertia / d)
+    }
 }

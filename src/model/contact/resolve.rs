@@ -1,8 +1,8 @@
 //! The corrected contact equations: velocity level, mass-weighted, with Coulomb friction.
 
 use super::super::Vec3;
+use super::deformable::Deformable;
 use super::normal::contact_normal;
-use super::step::Deformable;
 use super::triangle::interpolate;
 use super::{Law, Mode, ToolMotion};
 
@@ -43,7 +43,7 @@ pub(super) fn resolve(
     d_c: f64,
     d: f64,
 ) -> Resolution {
-    let nodes = body.surface.triangles[triangle as usize].map(|node| node as usize);
+    let nodes = body.corners(triangle);
     let compliance: f64 = nodes.iter().zip(weights).map(|(&node, w)| w * w * body.inverse_masses[node]).sum();
     let normal = contact_normal(law.normals, body.surface, body.positions, triangle, weights);
     if compliance < IMMOVABLE || d_c < NO_TIME {
