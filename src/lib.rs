@@ -72,13 +72,14 @@ pub use session::{Running, Session, SessionBuilder, Summary, Viewer};
 
 /// What most programs need.
 pub mod prelude {
-    pub use crate::devices::{Capabilities, Device, DeviceFault, DeviceState};
+    pub use crate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
     pub use crate::error::Error;
     pub use crate::model::Vec3;
-    pub use crate::model::body::{Block, Body};
+    pub use crate::model::body::Block;
+    // For its methods; who implements it names it.
+    pub use crate::model::body::Body as _;
     pub use crate::model::mesh::Face;
     pub use crate::runtime::RateGroup;
-    pub use crate::scene::LocalModelKind;
     pub use crate::session::Session;
     pub use crate::time::Nanos;
 }

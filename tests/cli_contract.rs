@@ -25,7 +25,11 @@ fn a_bad_scene_is_refused_in_one_line_and_creates_no_file() {
         ("node_mass_kg = 0.0005", "node_mass_kg = 1e-15", &["body: ", "more mass"]),
         ("damping_ratio = 0.3", "damping_ratio = 1e9", &["body: ", "less stiffness or damping"]),
         ("patch = [3, 3, 2]", "patch = [7, 3, 2]", &["scene.toml:17: local.patch: is [7, 3, 2]"]),
-        ("path_csv =", "attach_node = [6, 0, 5]\npath_csv =", &["scene.toml:20: device.attach_node: [6, 0, 5] is outside"]),
+        (
+            "path_csv =",
+            "attach_node = [6, 0, 5]\npath_csv =",
+            &["scene.toml:20: device.attach_node: [6, 0, 5] is outside"],
+        ),
         ("compute_latency_ms = 0", "compute_latency_ms = -1", &["scene.toml:13: global.compute_latency_ms: is -1"]),
         ("rate_hz = 30\n", "rate_hz = 30\nsubsteps_per_ms = 1\n", &["global.substeps_per_ms: is 1", "unstable"]),
         ("duration_s = 0.2", "duration_s = -0.2", &["run.duration_s: is -0.2"]),
@@ -172,8 +176,26 @@ fn timing_names_every_figure_it_promises() {
     folder.succeed(&["run", "scene.toml", "--virtual"]);
     let text = folder.succeed(&["timing", "palpate-run.mcap"]);
     for word in [
-        "released", "skipped", "missed", "lateness", "execution", "p50", "p90", "p99", "p99.9", "max", "resyncs", "jump",
-        "before blending", "after blending", "age", "granted", "local", "global", "contact", "force",
+        "released",
+        "skipped",
+        "missed",
+        "lateness",
+        "execution",
+        "p50",
+        "p90",
+        "p99",
+        "p99.9",
+        "max",
+        "resyncs",
+        "jump",
+        "before blending",
+        "after blending",
+        "age",
+        "granted",
+        "local",
+        "global",
+        "contact",
+        "force",
     ] {
         assert!(text.contains(word), "no {word:?} in\n{text}");
     }

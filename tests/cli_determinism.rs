@@ -113,9 +113,15 @@ fn a_compute_latency_ages_the_model_and_nothing_else_breaks() {
 #[test]
 fn rates_other_than_the_usual_give_the_right_number_of_rows() {
     let folder = Folder::new();
-    for (haptic, global, ticks) in
-        [("500", "30", 100), ("2000", "30", 400), ("4000", "60", 800), ("1000", "10", 200), ("1000", "29.97", 200), ("100", "100", 20), ("2.5", "0.5", 1)]
-    {
+    for (haptic, global, ticks) in [
+        ("500", "30", 100),
+        ("2000", "30", 400),
+        ("4000", "60", 800),
+        ("1000", "10", 200),
+        ("1000", "29.97", 200),
+        ("100", "100", 20),
+        ("2.5", "0.5", 1),
+    ] {
         let scene = cli_support::SCENE
             .replace("rate_hz = 30", &format!("rate_hz = {global}"))
             .replace("rate_hz = 1000", &format!("rate_hz = {haptic}"))

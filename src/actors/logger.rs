@@ -19,7 +19,8 @@ pub trait LogSink: Send {
     /// Takes one record.
     ///
     /// # Errors
-    /// If it cannot be kept; the sink is then not used any more.
+    /// If it cannot be kept. The first error is reported when the run ends; what follows is still offered, because a
+    /// sink may have other places to keep it.
     fn record(&mut self, record: &LogRecord) -> Result<(), Error>;
 
     /// Takes an event in words.
@@ -64,7 +65,7 @@ impl LoggerOutcome {
 /// Drains records at a low rate on a low-priority thread.
 pub struct LoggerActor {
     drain: RecordDrain,
-    sink: Option<Box<dyn LogSink>>,
+    sink: Box<dyn LogSink>,
     environment: Environment,
     grants: GrantHandle,
     grants_known: bool,
@@ -96,7 +97,7 @@ impl LoggerActor {
         analysis.set_environment(&environment);
         Self {
             drain,
-            sink: Some(Box::new(sink)),
+            sink: Box::new(sink),
             environment,
             grants,
             grants_known: false,
@@ -109,14 +110,13 @@ impl LoggerActor {
         }
     }
 
-    /// A sink that failed is given up; the run goes on, its report says so.
+    /// A sink that fails does not end the run; its report says so.
     fn keep(&mut self, write: impl FnOnce(&mut dyn LogSink) -> Result<(), Error>) {
-        if let Some(sink) = &mut self.sink
-            && let Err(error) = write(&mut **sink)
+        if let Err(error) = write(&mut *self.sink)
+            && self.failure.is_none()
         {
             tracing::error!(target: LOG_FAILURE, "the log ends here: {error}");
-            self.failure.get_or_insert(error);
-            self.sink = None;
+            self.failure = Some(error);
         }
     }
 
@@ -159,9 +159,7 @@ impl LoggerActor {
             self.grants_known = true;
             self.environment.granted = granted(&grant);
             self.analysis.set_environment(&self.environment);
-            if let Some(sink) = &mut self.sink {
-                sink.environment(&self.environment);
-            }
+            self.sink.environment(&self.environment);
         }
     }
 }

@@ -1,7 +1,5 @@
 //! Collects what a session is made of.
 
-use std::path::PathBuf;
-
 use super::Session;
 use super::prepare::{Parts, prepare};
 use crate::devices::{Device, ToolPath};
@@ -126,7 +124,7 @@ impl SessionBuilder {
     /// Writes a log to `path`, overwriting what is there.
     #[cfg(feature = "log")]
     #[must_use]
-    pub fn log(mut self, path: impl Into<PathBuf>) -> Self {
+    pub fn log(mut self, path: impl Into<std::path::PathBuf>) -> Self {
         self.parts.log = Some(path.into());
         self
     }

@@ -1,5 +1,6 @@
 //! Turns a validated description into bodies, states and models that can start.
 
+#[cfg(feature = "log")]
 use std::path::PathBuf;
 
 use crate::devices::{Device, Scripted, ToolPath};
@@ -29,6 +30,7 @@ pub(super) struct Parts {
     pub global: Option<RateGroup>,
     pub local: Option<RateGroup>,
     pub execution: Execution,
+    #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
     pub endless: bool,
@@ -46,6 +48,7 @@ impl Parts {
             global: None,
             local: None,
             execution: Execution::Threaded,
+            #[cfg(feature = "log")]
             log: None,
             keep_records: false,
         }
@@ -68,6 +71,7 @@ pub(super) struct Prepared {
     pub global: RateGroup,
     pub execution: Execution,
     pub until: Option<Nanos>,
+    #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
     /// The scene file's text, for the log.
@@ -155,6 +159,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         global,
         execution: parts.execution,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
+        #[cfg(feature = "log")]
         log: parts.log,
         keep_records: parts.keep_records,
         source: scene.source,
@@ -219,6 +224,10 @@ fn check_nodes(body: &dyn Body, attach: Option<u32>, probes: &[u32]) -> Result<(
 /// Substeps per haptic tick: as asked, unless that is unstable, or from the stability limit.
 fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<u32, Error> {
     let spectrum = Spectrum::estimate(body);
+    let stable = spectrum.stable_step();
+    if stable.is_nan() || stable <= 0.0 {
+        return Err(Error::scene("body", "gives forces near its rest positions that are not finite"));
+    }
     let Some(per_ms) = per_ms else {
         let substeps = spectrum.substeps(tick);
         if f64::from(substeps) > MAX_SUBSTEPS_PER_MS * (tick * 1e3).max(1.0) {
@@ -231,7 +240,6 @@ fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<u32, 
         return Ok(substeps);
     };
     let substeps = (f64::from(per_ms) * tick * 1e3 - 1e-9).ceil().max(1.0);
-    let stable = spectrum.stable_step();
     if tick / substeps >= stable {
         let needed = (1.3e-3 / stable).ceil();
         let message = format!(

@@ -1,6 +1,7 @@
 //! A session that runs, and what is left of it afterwards.
 
 use std::fmt;
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::sink::Memory;
@@ -84,7 +85,7 @@ impl Running {
 /// What a program that draws can see, without disturbing a tick.
 #[derive(Debug)]
 pub struct Viewer {
-    triangles: Vec<[u32; 3]>,
+    triangles: Arc<[[u32; 3]]>,
     surface: OutletReader<SurfaceView>,
     tool: OutletReader<ToolView>,
 }
@@ -95,12 +96,12 @@ impl Viewer {
         surface: OutletReader<SurfaceView>,
         tool: OutletReader<ToolView>,
     ) -> Self {
-        Self { triangles, surface, tool }
+        Self { triangles: triangles.into(), surface, tool }
     }
 
     /// Node ids of the surface triangles, counter-clockwise seen from outside; they never change.
-    pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+    pub fn triangles(&self) -> Arc<[[u32; 3]]> {
+        Arc::clone(&self.triangles)
     }
 
     /// The newest positions of all nodes, at the rate of the global model.

@@ -21,18 +21,24 @@ impl Memory {
     }
 }
 
+#[cfg(feature = "log")]
+type FileWriter = crate::log::McapWriter<std::io::BufWriter<std::fs::File>>;
+
 /// All sinks that a session asked for, one after the other.
-#[derive(Default)]
 pub(super) struct Sinks {
     memory: Option<Memory>,
     #[cfg(feature = "log")]
-    file: Option<crate::log::McapWriter<std::io::BufWriter<std::fs::File>>>,
+    file: Option<FileWriter>,
 }
 
 impl Sinks {
     /// Keeps records in `memory`, if there is one.
     pub(super) fn new(memory: Option<Memory>) -> Self {
-        Self { memory, ..Self::default() }
+        Self {
+            memory,
+            #[cfg(feature = "log")]
+            file: None,
+        }
     }
 
     /// Also writes a file.
@@ -40,6 +46,16 @@ impl Sinks {
     pub(super) fn with_file(mut self, path: &std::path::Path, environment: &Environment) -> Result<Self, Error> {
         self.file = Some(crate::log::McapWriter::create(path, environment)?);
         Ok(self)
+    }
+
+    /// Writes to the file, if there is one. A file that failed is given up with what it has; memory goes on.
+    #[cfg(feature = "log")]
+    fn on_file(&mut self, write: impl FnOnce(&mut FileWriter) -> Result<(), Error>) -> Result<(), Error> {
+        let result = self.file.as_mut().map_or(Ok(()), write);
+        if result.is_err() {
+            self.file = None;
+        }
+        result
     }
 }
 
@@ -49,27 +65,21 @@ impl LogSink for Sinks {
             memory.push(*record);
         }
         #[cfg(feature = "log")]
-        if let Some(file) = &mut self.file {
-            file.write(record)?;
-        }
+        self.on_file(|file| file.write(record))?;
         Ok(())
     }
 
     #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn text(&mut self, event: &TextEvent) -> Result<(), Error> {
         #[cfg(feature = "log")]
-        if let Some(file) = &mut self.file {
-            file.write_text(event)?;
-        }
+        self.on_file(|file| file.write_text(event))?;
         Ok(())
     }
 
     #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
         #[cfg(feature = "log")]
-        if let Some(file) = &mut self.file {
-            file.write_stats(stats)?;
-        }
+        self.on_file(|file| file.write_stats(stats))?;
         Ok(())
     }
 
@@ -84,9 +94,7 @@ impl LogSink for Sinks {
     #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error> {
         #[cfg(feature = "log")]
-        if let Some(file) = &mut self.file {
-            file.flush_if_due(log_time, now)?;
-        }
+        self.on_file(|file| file.flush_if_due(log_time, now))?;
         Ok(())
     }
 

@@ -11,7 +11,13 @@ use palpate::session::Summary;
 
 /// A block of 6^3 nodes, 2 cm apart, held at the bottom.
 pub fn block() -> Block {
-    Block::builder([6; 3], [0.1; 3]).node_mass(0.5e-3).stiffness(30.0).damping_ratio(0.3).fix(Face::ZMin).build().unwrap()
+    Block::builder([6; 3], [0.1; 3])
+        .node_mass(0.5e-3)
+        .stiffness(30.0)
+        .damping_ratio(0.3)
+        .fix(Face::ZMin)
+        .build()
+        .unwrap()
 }
 
 /// A node in the middle of the top.
@@ -31,7 +37,9 @@ pub fn pressing() -> ToolPath {
 /// Moves the node [`top`] about like a hand.
 pub fn wiggling() -> ToolPath {
     let rest = block().rest()[top() as usize];
-    sampled(|t| (rest + Vec3::new(0.004 * (19.0 * t).sin(), 0.003 * (13.0 * t).sin(), -0.008 * (12.6 * t).sin())).into())
+    sampled(|t| {
+        (rest + Vec3::new(0.004 * (19.0 * t).sin(), 0.003 * (13.0 * t).sin(), -0.008 * (12.6 * t).sin())).into()
+    })
 }
 
 fn sampled(position: impl Fn(f64) -> [f64; 3]) -> ToolPath {

@@ -155,8 +155,7 @@ impl Body for Block {
                 let along = state.positions[column as usize] - x;
                 let closing = state.velocities[column as usize] - v;
                 let tangent = spring.tangent(along, closing, clamp);
-                emit(TangentBlock { row, column, position: tangent.position, velocity: tangent.velocity });
-                emit(TangentBlock { row, column: row, position: -tangent.position, velocity: -tangent.velocity });
+                TangentBlock::pair(row, column, &tangent).into_iter().for_each(&mut *emit);
             }
         }
     }

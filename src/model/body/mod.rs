@@ -45,6 +45,19 @@ pub struct TangentBlock {
     pub velocity: Mat3,
 }
 
+impl TangentBlock {
+    /// The two blocks of `row` that a spring to `column` makes: on the diagonal stands the opposite of the coupling.
+    pub fn pair(row: u32, column: u32, tangent: &SpringTangent) -> [Self; 2] {
+        let block = |column, sign: f64| Self {
+            row,
+            column,
+            position: tangent.position * sign,
+            velocity: tangent.velocity * sign,
+        };
+        [block(column, 1.0), block(row, -1.0)]
+    }
+}
+
 /// A deformable body: nodes, masses, internal forces, tangent and surface.
 ///
 /// The block of springs is one implementation; a program brings its own by implementing this trait. Forces may be

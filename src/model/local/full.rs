@@ -28,7 +28,9 @@ impl LocalModel for Full {
     fn rebuild(&mut self, _: ResyncView<'_>) {}
 
     fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-        self.simulation.tick(tool)
+        let force = self.simulation.tick(tool);
+        // A state that is not finite touches nothing: its zero force would look like a free tool.
+        if self.simulation.state().is_finite() { force } else { Vec3::repeat(f64::NAN) }
     }
 
     fn built_at(&self) -> u64 {

@@ -96,7 +96,8 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// For the global actor: allocates at first use and whenever it grows.
     fn rebuild(&mut self, resync: ResyncView<'_>);
 
-    /// Advances one haptic tick while the tool moves along `tool`; returns the mean force on the tool (N).
+    /// Advances one haptic tick while the tool moves along `tool`; returns the mean force on the tool (N), which is not
+    /// finite if the model has diverged.
     ///
     /// # Real-time
     /// Bounded, real-time safe.

@@ -78,7 +78,7 @@ impl LocalModel for Patch {
 
     fn tick(&mut self, tool: ToolMotion) -> Vec3 {
         let Self { window, tangent, state, inverse_masses, forces, contact, law, stepping, .. } = self;
-        stepping.tick(tool, |tool, d| {
+        let force = stepping.tick(tool, |tool, d| {
             tangent.forces(&state.positions, &state.velocities, forces);
             let mut deformable = Deformable {
                 positions: &mut state.positions,
@@ -88,7 +88,9 @@ impl LocalModel for Patch {
                 candidates: &window.candidates,
             };
             step(&mut deformable, forces, contact, law, tool, d)
-        })
+        });
+        // A state that is not finite touches nothing: its zero force would look like a free tool.
+        if self.state.is_finite() { force } else { Vec3::repeat(f64::NAN) }
     }
 
     fn built_at(&self) -> u64 {
