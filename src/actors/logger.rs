@@ -66,7 +66,7 @@ impl LoggerOutcome {
     }
 }
 
-/// Drains records at a low rate on a low-priority thread.
+/// Drains records at a low rate, on a thread without real-time priority.
 pub struct LoggerActor {
     drain: RecordDrain,
     sink: Box<dyn LogSink>,
