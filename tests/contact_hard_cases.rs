@@ -6,6 +6,7 @@ use common::*;
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, Mode, ToolMotion};
+use palpate::model::local::{Kind, ResyncView};
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
 use proptest::prelude::*;
@@ -70,6 +71,44 @@ fn a_tool_on_a_fixed_face_is_lost_without_force() {
     let felt = forces(&mut sim, &path);
     assert!(felt.iter().all(|force| *force == Vec3::zeros()));
     assert_eq!(sim.contact().mode, Mode::Lost);
+    // It lets go like any other contact: below the face, nothing is tracked any more.
+    let away = Vec3::new(0.05, 0.0512, -0.01);
+    sim.tick(ToolMotion { from: *path.last().unwrap(), to: away });
+    assert_eq!((sim.contact().mode, sim.contact().triangle), (Mode::Lost, None));
+}
+
+#[test]
+fn a_patch_on_a_held_face_reports_the_lost_contact_too() {
+    let sim = simulation(block(STD), Contact::default(), 1.0);
+    // In the middle of the bottom, away from the side faces.
+    let in_the_middle = |node: u32| {
+        let x = sim.body().rest()[node as usize];
+        x.z == 0.0 && (x.xy() - nalgebra::Vector2::repeat(0.05)).norm() < 0.01
+    };
+    let bottom = (0..sim.body().surface().triangles.len() as u32)
+        .find(|&t| sim.body().surface().triangles[t as usize].iter().all(|&n| in_the_middle(n)))
+        .unwrap();
+    let mut patch = Kind::Patch([4, 4, 2]).empty().unwrap();
+    patch.rebuild(ResyncView { global: &sim, tick: 0, triangle: bottom });
+    let corners = sim.body().surface().triangles[bottom as usize].map(|n| sim.body().rest()[n as usize]);
+    let below = (corners[0] + corners[1] + corners[2]) / 3.0 - Vec3::z() * 0.001;
+    let force = patch.tick(ToolMotion { from: below, to: below + Vec3::z() * 0.002 });
+    assert_eq!((force, patch.contact().mode), (Vec3::zeros(), Mode::Lost));
+    assert_eq!(patch.contact().triangle, Some(bottom));
+}
+
+#[test]
+fn a_frictionless_tool_that_jumps_far_over_a_flat_surface_feels_no_sideways_force() {
+    // Farther than one step may walk: 40 nodes per edge, 60 mm in one tick.
+    let body = Block::builder([40, 40, 3], [0.1, 0.1, 0.01]).fix(Face::ZMin).build().unwrap();
+    let mut sim = simulation(body, Contact::default(), 0.0);
+    let at = |x: f64| Vec3::new(x, 0.0512, 0.0099);
+    sim.tick(ToolMotion { from: at(0.02) + Vec3::z() * 0.001, to: at(0.02) });
+    assert!(sim.contact().is_touching());
+    for (from, to) in [(0.02, 0.08), (0.08, 0.08), (0.08, 0.08)] {
+        let force = sim.tick(ToolMotion { from: at(from), to: at(to) });
+        assert!(force.xy().norm() < 0.2 * force.z.abs() + 1e-9, "{force}");
+    }
 }
 
 proptest! {

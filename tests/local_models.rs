@@ -91,3 +91,29 @@ fn a_drag_with_friction_has_the_known_errors() {
     assert!(blended.jump < 8.0, "{blended:?}");
     assert!(late.rms > patch.rms && late.rms < 60.0, "lateness costs, but nothing diverges: {late:?}");
 }
+
+/// `hold` renders what the 30 Hz global model computed in blocks of 33 or 34 ticks; at every resync that must be the
+/// force that `full` computed tick by tick, bit for bit.
+#[test]
+fn the_global_model_in_blocks_gives_the_same_bits_as_full_tick_by_tick() {
+    for name in ["hand", "drag_friction", "wave"] {
+        let full = forces(scene(name).with_model(LocalModelKind::Full));
+        let hold = scene(name).with_model(LocalModelKind::Hold);
+        let summary = Session::from_scene(hold).virtual_time().keep_records().build().unwrap().run().unwrap();
+        let mut compared = 0;
+        for record in &summary.records {
+            let LogRecord::Global(resync) = record else { continue };
+            let served = summary.records.iter().filter_map(|record| match record {
+                LogRecord::Force(sample) if sample.model_version == resync.version => Some(sample.force_n),
+                _ => None,
+            });
+            for force in served {
+                let expected: [f64; 3] = full[resync.last_tick as usize - 1].into();
+                assert_eq!(force, expected, "{name}, resync {}", resync.version);
+                compared += 1;
+            }
+            assert!(matches!(resync.last_tick + 1 - resync.first_tick, 33 | 34), "{name}: {resync:?}");
+        }
+        assert!(compared > 500, "{name}: {compared} forces compared");
+    }
+}

@@ -84,18 +84,3 @@ fn a_wave_reaches_a_resting_tool_with_the_reference_force() {
     println!("wave: {rms:.4} %");
     assert!(rms <= 0.3, "{rms} %");
 }
-
-#[test]
-fn blocks_of_33_or_34_ticks_give_the_same_bits_as_single_ticks() {
-    let path: Vec<Vec3> = (0..=1000).map(|k| drag_path(k as f64 * 1e-3)).collect();
-    let mut single = simulation(block(STD), Contact::default(), 0.5);
-    let expected = forces(&mut single, &path);
-    let mut blocked = simulation(block(STD), Contact::default(), 0.5);
-    let (mut at, mut felt) = (0, Vec::new());
-    while at + 1 < path.len() {
-        let end = (at + if felt.len() % 2 == 0 { 33 } else { 34 }).min(path.len() - 1);
-        felt.extend(forces(&mut blocked, &path[at..=end]));
-        at = end;
-    }
-    assert_eq!(felt, expected);
-}

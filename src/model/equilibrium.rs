@@ -63,8 +63,10 @@ pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<S
             break;
         }
     }
-    let message =
-        format!("no static equilibrium found (residual {:.1e} N): is the body held anywhere?", residual(&forces));
+    let message = format!(
+        "no static equilibrium found (residual {:.1e} N left): move the nodes less far, and hold the body somewhere",
+        residual(&forces)
+    );
     Err(Error::new(ErrorKind::Scene, message).at("initial"))
 }
 

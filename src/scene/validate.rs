@@ -16,6 +16,10 @@ const MAX_LENGTH_M: f64 = 1e3;
 const MIN_TRIANGLE_M2: f64 = 1e-14;
 /// Steps of 0.1 us: whatever needs more is no deformable body.
 const MAX_SUBSTEPS_PER_MS: u32 = 10_000;
+/// A dense tangent of 38 MB, far above what a haptic tick can multiply with.
+const MAX_PATCH_NODES: usize = 512;
+/// Longer than any global model is worth waiting for (ms).
+const MAX_LATENCY_MS: f64 = 60_000.0;
 /// Eleven days.
 const MAX_DURATION_S: f64 = 1e6;
 
@@ -145,7 +149,12 @@ fn global(global: &GlobalSpec) -> Result<(), Error> {
         );
         return Err(Error::scene("global.substeps_per_ms", message));
     }
-    not_negative("global.compute_latency_ms", global.compute_latency_ms)
+    not_negative("global.compute_latency_ms", global.compute_latency_ms)?;
+    if global.compute_latency_ms > MAX_LATENCY_MS {
+        let message = format!("is {}, must be at most {MAX_LATENCY_MS} ms", global.compute_latency_ms);
+        return Err(Error::scene("global.compute_latency_ms", message));
+    }
+    Ok(())
 }
 
 fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
@@ -168,24 +177,29 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
     Ok(())
 }
 
-/// The tool may wander over an edge, so the window must fit every face that can be touched: the ones that are not fixed.
+/// The window is clamped at thin faces, so it has to fit one of the faces that can be touched: those that are not fixed.
 fn patch(patch: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
-    let mut largest = [usize::MAX; 3];
-    for face in Face::ALL.iter().filter(|face| !block.fixed.contains(face)) {
+    let limits = |face: &Face| {
         let across = face.axis();
         let [first, second] = [[1, 2], [0, 2], [0, 1]][across];
-        for (limit, axis) in largest.iter_mut().zip([first, second, across]) {
-            *limit = (*limit).min(block.nodes[axis]);
-        }
+        [first, second, across].map(|axis| block.nodes[axis])
+    };
+    let free = || Face::ALL.iter().filter(|face| !block.fixed.contains(face));
+    let fits = |face: &Face| (0..3).all(|part| (2..=limits(face)[part]).contains(&patch[part]));
+    if !free().any(fits) {
+        let largest =
+            free().map(|face| format!("{:?} on {}", limits(face), face.name())).collect::<Vec<_>>().join(", ");
+        let message = format!("is {patch:?}, must be at least [2, 2, 2] and fit a free face: at most {largest}");
+        return Err(Error::scene("local.patch", message));
     }
-    if (0..3).all(|part| (2..=largest[part]).contains(&patch[part])) {
-        return Ok(());
+    let nodes: usize = patch.iter().product();
+    if nodes > MAX_PATCH_NODES {
+        let message = format!(
+            "is {patch:?}, {nodes} nodes, must be at most {MAX_PATCH_NODES}: its tangent is dense; use model = \"full\""
+        );
+        return Err(Error::scene("local.patch", message));
     }
-    let message = format!(
-        "is {patch:?}, must be [2, 2, 2] to {largest:?} to fit every free face of the body of {:?} nodes",
-        block.nodes
-    );
-    Err(Error::scene("local.patch", message))
+    Ok(())
 }
 
 fn device(device: &DeviceSpec) -> Result<(), Error> {

@@ -5,7 +5,7 @@ use super::super::{Vec3, integrator};
 use super::normal::contact_normal;
 use super::triangle::interpolate;
 use super::walk::walk;
-use super::{Contact, Law, Mode, ToolMotion, swept};
+use super::{Contact, Law, ToolMotion, swept};
 
 /// A released tool that is nearer than this is still tracked (m): touching again needs no new detection.
 const TRACKED_GAP: f64 = 3e-4;
@@ -47,11 +47,11 @@ impl Deformable<'_> {
         Some((hit.triangle, hit.share))
     }
 
-    /// After a slip or a release: to the triangle under the tool, or off when the tool has left the surface.
+    /// After a step without sticking: to the triangle under the tool, or off when the tool has left the surface.
     pub(super) fn reseat(&self, contact: &mut Contact, law: &Law, from: u32, tool: &Vec3) {
         let (triangle, weights) = walk(self.surface, self.positions, from, tool);
         (contact.triangle, contact.weights) = (Some(triangle), weights);
-        if contact.mode == Mode::Free {
+        if !contact.is_touching() {
             let normal = contact_normal(law.normals, self.surface, self.positions, triangle, &weights);
             let point = interpolate(&weights, &self.corners(triangle).map(|node| self.positions[node]));
             if normal.dot(&(tool - point)) > TRACKED_GAP {

@@ -46,8 +46,12 @@ pub(super) fn resolve(
     let nodes = body.corners(triangle);
     let compliance: f64 = nodes.iter().zip(weights).map(|(&node, w)| w * w * body.inverse_masses[node]).sum();
     let normal = contact_normal(law.normals, body.surface, body.positions, triangle, weights);
-    if compliance < IMMOVABLE || d_c < NO_TIME {
+    if compliance < IMMOVABLE {
         return Resolution::without_force(Mode::Lost, normal);
+    }
+    if d_c < NO_TIME {
+        // Found at the very end of the step: tracked, and resolved in the next one.
+        return Resolution::without_force(Mode::Free, normal);
     }
     let point = interpolate(weights, &nodes.map(|node| body.positions[node]));
     let velocity = interpolate(weights, &nodes.map(|node| body.velocities[node]));

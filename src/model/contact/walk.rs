@@ -14,7 +14,7 @@ const INSIDE: f64 = 1e-9;
 pub(super) fn walk(surface: &Surface, x: &[Vec3], from: u32, point: &Vec3) -> (u32, [f64; 3]) {
     let (mut t, mut previous) = (from, NONE);
     let mut weights = [1.0 / 3.0; 3];
-    for _ in 0..MAX_HOPS {
+    for hop in 0..=MAX_HOPS {
         let corners = surface.triangles[t as usize].map(|node| x[node as usize]);
         // A sliver has no weights of its own: stay in its middle.
         weights = Projection::new(&corners, point).map_or([1.0 / 3.0; 3], |seen| seen.weights);
@@ -23,7 +23,7 @@ pub(super) fn walk(surface: &Surface, x: &[Vec3], from: u32, point: &Vec3) -> (u
             return (t, weights);
         }
         let next = surface.neighbours[t as usize][lowest];
-        if next == NONE || next == previous {
+        if next == NONE || next == previous || hop == MAX_HOPS {
             break;
         }
         (previous, t) = (t, next);

@@ -15,7 +15,7 @@ pub(super) struct Window {
     pub surface: Surface,
     /// Global id of each local triangle.
     pub triangles: Vec<u32>,
-    /// Local triangles with a movable node: those that detection looks at.
+    /// Local triangles with a movable node, and those around the centre: those that detection looks at.
     pub candidates: Vec<u32>,
     /// Local place of each global node and triangle, or [`NONE`]; as long as the body, only touched entries change.
     local_node: Vec<u32>,
@@ -34,10 +34,15 @@ impl Window {
         for (place, &node) in self.nodes.iter().enumerate() {
             self.local_node[node as usize] = place as u32;
         }
+        // On a held face nothing moves, but the tool is to be found there too.
+        for node in whole.triangles[triangle as usize] {
+            self.add_node(node);
+        }
+        let centre = self.nodes.len();
         // First the triangles of movable nodes (the candidates), then those around their corners (for normals).
-        self.grow(whole, 0);
+        self.grow(whole, 0..centre);
         let candidates = self.triangles.len();
-        self.grow(whole, self.movable);
+        self.grow(whole, self.movable..self.nodes.len());
         self.candidates.clear();
         self.candidates.extend(0..candidates as u32);
 
@@ -51,10 +56,17 @@ impl Window {
         self.surface.index_nodes(self.nodes.len());
     }
 
-    /// Adds the triangles at all present nodes from `first` on, and then their missing corners.
-    fn grow(&mut self, whole: &Surface, first: usize) {
-        let (start, end) = (self.triangles.len(), self.nodes.len());
-        for place in first..end {
+    fn add_node(&mut self, node: u32) {
+        if self.local_node[node as usize] == NONE {
+            self.local_node[node as usize] = self.nodes.len() as u32;
+            self.nodes.push(node);
+        }
+    }
+
+    /// Adds the triangles at the nodes of `places`, and then their missing corners.
+    fn grow(&mut self, whole: &Surface, places: std::ops::Range<usize>) {
+        let start = self.triangles.len();
+        for place in places {
             for &t in whole.at_node(self.nodes[place]) {
                 if self.local_triangle[t as usize] == NONE {
                     self.local_triangle[t as usize] = self.triangles.len() as u32;
@@ -64,10 +76,7 @@ impl Window {
         }
         for place in start..self.triangles.len() {
             for node in whole.triangles[self.triangles[place] as usize] {
-                if self.local_node[node as usize] == NONE {
-                    self.local_node[node as usize] = self.nodes.len() as u32;
-                    self.nodes.push(node);
-                }
+                self.add_node(node);
             }
         }
     }
