@@ -139,7 +139,9 @@ impl LoggerActor {
                 }
                 LogRecord::Tick(timing) => {
                     let counter = self.stats.get_mut(usize::from(timing.group));
-                    if let Some(stats) = counter.and_then(|counter| counter.push(timing)) {
+                    if let Some(mut stats) = counter.and_then(|counter| counter.push(timing)) {
+                        // Known with the release that begins the next second; earlier ones may be on disk already.
+                        stats.time = timing.scheduled;
                         self.keep(|sink| sink.stats(&stats));
                     }
                 }
@@ -181,7 +183,9 @@ impl Actor for LoggerActor {
         self.learn_grants();
         self.take_records();
         for counter in std::mem::take(&mut self.stats) {
-            let stats = counter.finish();
+            // What a group did in all is known at the end of the run, whenever its own last release was.
+            let mut stats = counter.finish();
+            stats.time = stats.time.max(self.log_time);
             self.keep(|sink| sink.stats(&stats));
         }
         self.keep(|sink| sink.finish());

@@ -1,0 +1,8 @@
+#!/usr/bin/env bash
+# No warnings of compiler and clippy, with every set of features that an embedding program can choose.
+source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
+need_component clippy clippy
+cargo clippy --locked --all-targets --all-features -- -D warnings
+for features in "" scene log scene,log cli; do
+    cargo clippy --locked --all-targets --no-default-features --features "$features" -- -D warnings
+done

@@ -1,0 +1,7 @@
+#!/usr/bin/env bash
+# The lock-free exchange and ring under every interleaving that loom finds.
+source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
+# A folder of its own: the flag changes every dependency. None of them runs here, so none is optimised.
+CARGO_TARGET_DIR="$CARGO_TARGET_DIR/loom" RUSTFLAGS="--cfg loom" \
+    cargo test --locked --no-default-features --lib --config 'profile.dev.package."*".opt-level=0' \
+    --config 'profile.dev.debug=false' loom

@@ -1,0 +1,27 @@
+# Sourced by every job: the root of the repository as the current folder, and the tools that a bare machine lacks.
+# shellcheck shell=bash
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
+
+# Installs Debian packages if that is possible here: install_packages REASON PACKAGE...
+install_packages() {
+    local reason=$1
+    shift
+    if [ "$(id -u)" -ne 0 ] || ! command -v apt-get >/dev/null; then
+        echo "missing: $reason; install it ($*) and run again" >&2
+        return 1
+    fi
+    apt-get update -qq
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
+# Adds a component of the toolchain: need_component COMPONENT COMMAND
+need_component() {
+    cargo "$2" --version >/dev/null 2>&1 || rustup component add "$1"
+}
+
+command -v cargo >/dev/null || { echo "missing: cargo; see https://rustup.rs" >&2; exit 1; }
+# lz4 is compiled from C.
+command -v cc >/dev/null || install_packages "a C compiler" gcc libc6-dev
