@@ -22,6 +22,6 @@ need_component() {
     cargo "$2" --version >/dev/null 2>&1 || rustup component add "$1"
 }
 
-command -v cargo >/dev/null || { echo "missing: cargo; see https://rustup.rs" >&2; exit 1; }
+command -v cargo >/dev/null || { echo "missing: cargo; install the Rust toolchain" >&2; exit 1; }
 # lz4 is compiled from C.
 command -v cc >/dev/null || install_packages "a C compiler" gcc libc6-dev

@@ -25,7 +25,7 @@ fn main() -> Result<(), Error> {
         .crossfade_ms(10.0)
         .log("minimal.mcap")
         .build()?; // refuses what cannot work, and says why
-    let running = session.start()?; // threads are up, the force ramps in
+    let running = session.start()?; // threads are up
     running.wait_for(Duration::from_millis(2500));
     println!("{}", running.stop()?); // lateness, slips, jumps, what the system granted
     Ok(())

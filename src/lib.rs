@@ -76,6 +76,8 @@ pub mod prelude {
     pub use crate::error::Error;
     pub use crate::model::Vec3;
     pub use crate::model::body::Block;
+    // For its methods; who implements it names it.
+    pub use crate::model::body::Body as _;
     pub use crate::model::mesh::Face;
     pub use crate::runtime::RateGroup;
     pub use crate::session::Session;

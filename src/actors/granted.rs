@@ -24,6 +24,6 @@ fn kernel(kernel: &str) -> String {
 fn in_words(group: &GroupGrant) -> String {
     let priority = if group.priority > 0 { format!(" {}", group.priority) } else { String::new() };
     let cpu = group.cpu.map_or("any cpu".to_owned(), |cpu| format!("cpu {cpu}"));
-    let refused = if group.refused.is_empty() { String::new() } else { format!("; refused: {}", group.refused) };
+    let refused = if group.refused.is_empty() { String::new() } else { format!("; {}", group.refused) };
     format!("{}{priority} on {cpu}, {}{refused}", group.policy, group.wait)
 }

@@ -14,6 +14,10 @@ use crate::time::Nanos;
 /// `log_error` instead.
 pub const LOG_FAILURE: &str = "palpate::log_failure";
 
+/// Records younger than this wait for the next drain: a slow group stamps its records with the start of a release and
+/// hands them over at its end, and the log is to be in the order of time.
+const HELD_BACK: Nanos = Nanos(100_000_000);
+
 /// Where log entries go, besides the statistics.
 pub trait LogSink: Send {
     /// Takes one record.
@@ -62,7 +66,7 @@ impl LoggerOutcome {
     }
 }
 
-/// Drains records at a low rate on a low-priority thread.
+/// Drains records at a low rate, on a thread without real-time priority.
 pub struct LoggerActor {
     drain: RecordDrain,
     sink: Box<dyn LogSink>,
@@ -73,6 +77,7 @@ pub struct LoggerActor {
     stats: Vec<StatsCounter>,
     outcome: LoggerOutcome,
     failure: Option<Error>,
+    /// Taken and not yet passed on.
     records: Vec<Record>,
     log_time: Nanos,
 }
@@ -120,10 +125,14 @@ impl LoggerActor {
         }
     }
 
-    fn take_records(&mut self) {
+    /// Takes what was recorded and passes on, in the order of time, what is older than `horizon`.
+    fn take_records(&mut self, horizon: Nanos) {
         let mut records = std::mem::take(&mut self.records);
         self.drain.drain(&mut records);
-        for record in records.drain(..).filter_map(|record| LogRecord::from_record(&record)) {
+        // Stable: what a thread records at one time keeps its order.
+        records.sort_by_key(|record| record.stamp);
+        let ready = records.partition_point(|record| record.stamp < horizon);
+        for record in records.drain(..ready).filter_map(|record| LogRecord::from_record(&record)) {
             self.log_time = self.log_time.max(record.time());
             match &record {
                 LogRecord::Event(event) => {
@@ -139,9 +148,7 @@ impl LoggerActor {
                 }
                 LogRecord::Tick(timing) => {
                     let counter = self.stats.get_mut(usize::from(timing.group));
-                    if let Some(mut stats) = counter.and_then(|counter| counter.push(timing)) {
-                        // Known with the release that begins the next second; earlier ones may be on disk already.
-                        stats.time = timing.scheduled;
+                    if let Some(stats) = counter.and_then(|counter| counter.push(timing)) {
                         self.keep(|sink| sink.stats(&stats));
                     }
                 }
@@ -173,7 +180,7 @@ impl Actor for LoggerActor {
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         self.learn_grants();
-        self.take_records();
+        self.take_records(ctx.scheduled.saturating_sub(HELD_BACK));
         let log_time = self.log_time;
         self.keep(|sink| sink.flush(log_time, ctx.now));
         Outcome::Continue
@@ -181,11 +188,9 @@ impl Actor for LoggerActor {
 
     fn stop(&mut self, _: &TickContext) {
         self.learn_grants();
-        self.take_records();
+        self.take_records(Nanos(u64::MAX));
         for counter in std::mem::take(&mut self.stats) {
-            // What a group did in all is known at the end of the run, whenever its own last release was.
-            let mut stats = counter.finish();
-            stats.time = stats.time.max(self.log_time);
+            let stats = counter.finish(self.log_time);
             self.keep(|sink| sink.stats(&stats));
         }
         self.keep(|sink| sink.finish());

@@ -15,7 +15,7 @@ use super::output::{forgive_closed_pipe, refuse_to_overwrite, warn_of_damage};
 pub struct ExportArgs {
     /// The log to read.
     pub log: PathBuf,
-    /// The topic to write, such as /force or /timing/haptic.
+    /// The topic to write, such as /force or /timing/local.
     #[arg(long)]
     pub topic: String,
     /// The format of the table.

@@ -25,7 +25,7 @@ pub struct CommandSample {
     pub time: Nanos,
     /// The force after the safety pipeline (N).
     pub force_n: [f64; 3],
-    /// Safety stages that acted: a bit each, see `safety::Limits`.
+    /// Safety stages that acted: a bit each, see `safety::Actions`.
     pub limits: u16,
 }
 
@@ -93,7 +93,7 @@ pub struct ContactSample {
 /// A resync: the local model was replaced by a newer one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Resync {
-    /// The tick that swapped it in.
+    /// The tick in which its blend ended and it served alone.
     pub time: Nanos,
     /// Its version.
     pub version: u32,

@@ -9,7 +9,7 @@ const SECOND: u64 = 1_000_000_000;
 /// The state of a group at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GroupStats {
-    /// When: the scheduled time of the last release counted.
+    /// When: the release that closed the second, or the end of the run.
     pub time: Nanos,
     /// Which group.
     pub group: u16,
@@ -50,7 +50,8 @@ impl StatsCounter {
     /// Counts one release. Returns the statistics of the second before if this release begins another one. Allocates.
     pub fn push(&mut self, timing: &TickTiming) -> Option<GroupStats> {
         let closed = self.now.released > 0 && timing.scheduled.0 / SECOND > self.now.time.0 / SECOND;
-        let stats = closed.then(|| self.close_second());
+        // Stamped with the release that closes the second, so that messages stay in the order of time.
+        let stats = closed.then(|| self.close_second(timing.scheduled));
         let lateness = timing.woke.saturating_sub(timing.scheduled).0;
         let execution = timing.end.saturating_sub(timing.start).0;
         self.now.time = timing.scheduled;
@@ -69,13 +70,14 @@ impl StatsCounter {
         self.now.lost_records = total;
     }
 
-    /// The statistics up to the last release, for the end of a run.
-    pub fn finish(mut self) -> GroupStats {
-        self.close_second()
+    /// The statistics up to the last release, for a run that ends at `time`.
+    pub fn finish(mut self, time: Nanos) -> GroupStats {
+        self.close_second(time)
     }
 
-    fn close_second(&mut self) -> GroupStats {
+    fn close_second(&mut self, time: Nanos) -> GroupStats {
         let stats = GroupStats {
+            time,
             lateness: self.lateness.percentiles(),
             lateness_last_second: self.lateness_second.percentiles(),
             execution: self.execution.percentiles(),
@@ -111,11 +113,12 @@ mod tests {
             reports.extend(counter.push(&timing));
         }
         counter.set_lost(3);
-        reports.push(counter.finish());
+        reports.push(counter.finish(Nanos(2_500_000_000)));
         let last_second: Vec<u64> = reports.iter().map(|r| r.lateness_last_second.count).collect();
         assert_eq!(last_second, [1000, 1000, 500]);
         assert_eq!((reports[1].lateness.p50, reports[1].lateness_last_second.p50), (0, 100));
         assert_eq!((reports[2].group, reports[2].released, reports[2].lost_records), (2, 2500, 3));
         assert_eq!(reports[2].execution.max, 7);
+        assert_eq!(reports.iter().map(|r| r.time.0).collect::<Vec<_>>(), [1_000_000_000, 2_000_000_000, 2_500_000_000]);
     }
 }

@@ -9,6 +9,7 @@ use super::verdict::verdict;
 use crate::log::{CauseCounts, Environment, Execution, GroupReport, Percentiles, RunReport};
 
 const WIDTH: usize = 80;
+const NAME_WIDTH: usize = 11;
 const EVENTS_SHOWN: usize = 4;
 /// Lines for what the system granted.
 const GRANT_LINES: usize = 6;
@@ -53,9 +54,24 @@ impl Page {
         self.text.push('\n');
     }
 
+    /// Adds text with a name in front, on as many lines as it needs.
+    fn wrapped(&mut self, name: &str, text: &str) {
+        let (mut name, mut line) = (name, String::new());
+        for word in text.split(' ') {
+            if !line.is_empty() && NAME_WIDTH + line.len() + 1 + word.len() > WIDTH {
+                self.named(name, std::mem::replace(&mut line, "  ".to_owned()));
+                name = "";
+            } else if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+        self.named(name, line);
+    }
+
     /// Adds a line with a name in front.
     fn named(&mut self, name: &str, text: String) {
-        self.line(format!("{name:<11}{text}"));
+        self.line(format!("{name:<NAME_WIDTH$}{text}"));
     }
 }
 
@@ -72,7 +88,7 @@ fn about(page: &mut Page, environment: &Environment) {
         ),
     );
     for (i, (what, granted)) in environment.granted.iter().take(GRANT_LINES).enumerate() {
-        page.named(if i == 0 { "granted" } else { "" }, format!("{what}: {granted}"));
+        page.wrapped(if i == 0 { "granted" } else { "" }, &format!("{what}: {granted}"));
     }
     if let Some(hidden) = environment.granted.len().checked_sub(GRANT_LINES).filter(|&hidden| hidden > 0) {
         page.named("", format!("and {hidden} more"));
@@ -109,7 +125,7 @@ fn groups(page: &mut Page, report: &RunReport) {
         percentiles(page, "", "period error", group.period_error);
     }
     if report.is_virtual() {
-        page.line("virtual time: lateness and period error are zero by construction".to_owned());
+        page.line("virtual time: lateness, execution and period error are declared, not measured: zero".to_owned());
     }
 }
 
@@ -243,6 +259,21 @@ mod tests {
         analysis.push(&LogRecord::Resync(Resync::default()));
         let text = to_text(&analysis.report());
         assert!(text.lines().count() <= 40, "{text}");
-        assert!(text.contains("zero by construction"), "{text}");
+        assert!(text.contains("declared, not measured"), "{text}");
+    }
+
+    #[test]
+    fn a_long_grant_is_wrapped_and_nothing_of_it_is_lost() {
+        let refusal =
+            "SCHED_OTHER on cpu 1, sleep; SCHED_FIFO 80 refused: Operation not permitted (os error 1), see ulimit -r";
+        let mut analysis = Analysis::default();
+        analysis.set_environment(&Environment {
+            granted: [("local".to_owned(), refusal.to_owned())].into(),
+            ..Environment::default()
+        });
+        let text = to_text(&analysis.report());
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>().join(" ");
+        assert!(words(&text).contains(refusal), "{text}");
     }
 }
