@@ -288,6 +288,23 @@ fn every_topic_of_a_log_can_be_exported() {
     }
 }
 
+/// Check across chunks too: a viewer that reads from front to back never has to go back.
+#[test]
+fn a_virtual_log_is_in_time_order_from_front_to_back() {
+    let folder = Folder::new();
+    folder.succeed(&["run", "scene.toml", "--virtual", "--duration", "2.1"]);
+    let times: Vec<u64> = LogReader::open(&folder.path("palpate-run.mcap"))
+        .unwrap()
+        .filter_map(|entry| match entry {
+            LogEntry::Environment(_) => None,
+            LogEntry::Record(record) => Some(record.time().0),
+            LogEntry::Stats(stats) => Some(stats.time.0),
+            LogEntry::Text(event) => Some(event.time.0),
+        })
+        .collect();
+    assert!(times.len() > 10_000 && times.is_sorted());
+}
+
 #[test]
 fn a_damaged_log_gives_what_is_readable_and_one_warning() {
     let folder = Folder::new();

@@ -91,6 +91,35 @@ fn the_command_exits_with_0_and_one_warning() {
     }
 }
 
+/// Check what a process leaves behind that has no chance to close anything.
+#[test]
+fn a_killed_run_leaves_a_readable_log() {
+    use std::process::{Command, Stdio};
+    let folder = Folder::new();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["run", "scene.toml", "--duration", "1000", "--out", "killed.mcap"])
+        .current_dir(folder.path(""))
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    // Two chunks of real time; how long that takes is the machine's affair.
+    let size = || std::fs::metadata(folder.path("killed.mcap")).map_or(0, |file| file.len());
+    let mut sizes = std::collections::BTreeSet::new();
+    while sizes.len() < 4 {
+        assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        sizes.insert(size());
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let called = folder.call(&["export", "killed.mcap", "--topic", "/force"]);
+    assert_eq!((called.code, called.err.lines().count()), (Some(0), 1), "{called:?}");
+    assert!(called.err.contains("the run was cut off"), "{called:?}");
+    assert!(cli_support::rows(&called.out).len() > 100);
+}
+
 #[test]
 fn a_cut_below_the_magic_is_no_log() {
     let folder = Folder::new();

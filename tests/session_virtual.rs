@@ -228,6 +228,24 @@ fn other_rates_keep_the_convention() {
 }
 
 #[test]
+fn a_group_that_would_break_the_convention_is_refused() {
+    let haptic = || RateGroup::new(HAPTIC);
+    let late = Nanos(5_000_000);
+    for (session, words) in [
+        (session().local(haptic().offset(late)), "local: has an offset"),
+        (session().local(haptic().latency(late)), "local: has a latency"),
+        (session().local(haptic().observer()), "local: is an observer"),
+        (session().global(RateGroup::hz(30).offset(late)), "global: has an offset"),
+        (session().global(RateGroup::hz(30).observer()), "global: is an observer"),
+    ] {
+        let error = session.build().unwrap_err();
+        assert_eq!(error.kind(), palpate::ErrorKind::Runtime);
+        assert!(error.to_string().starts_with(words), "{error}");
+    }
+    session().local(haptic().pin(0).realtime(50)).global(latency(5_000)).build().unwrap();
+}
+
+#[test]
 fn the_first_local_model_is_built_around_the_tool() {
     let top = block().lattice().id([3, 3, 5]);
     let summary = run(session().probe(top), 0.033);

@@ -87,6 +87,9 @@ const MAX_SUBSTEPS_PER_MS: f64 = 1e4;
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let scene = parts.scene;
     scene.validate()?;
+    for (field, group) in [("local", &parts.local), ("global", &parts.global)] {
+        group.as_ref().map_or(Ok(()), |group| check_group(field, group))?;
+    }
     let haptic = rate("local.rate_hz", scene.local.rate_hz)?;
     let global_rate = rate("global.rate_hz", scene.global.rate_hz)?;
     let mut body = match (parts.body, &scene.body) {
@@ -176,6 +179,21 @@ fn block(spec: &BodySpec) -> Result<Block, Error> {
         .stiffness(spec.material.stiffness_n_per_m)
         .damping_ratio(spec.material.damping_ratio);
     spec.block.fixed.iter().fold(builder, |builder, &face| builder.fix(face)).build().map_err(|error| error.at("body"))
+}
+
+/// What a rate group can ask for and a session cannot give.
+fn check_group(field: &str, group: &RateGroup) -> Result<(), Error> {
+    let own = || group.clone();
+    let wrong = if own().offset(Nanos::ZERO) != own() {
+        "has an offset, but device and models count from release 0: leave it out"
+    } else if own().observer() == own() {
+        "is an observer, which a session's groups cannot be: leave it out"
+    } else if field == "local" && own().latency(Nanos::ZERO) != own() {
+        "has a latency, which only the global group's results can have: leave it out"
+    } else {
+        return Ok(());
+    };
+    Err(Error::new(ErrorKind::Runtime, wrong).at(field))
 }
 
 /// What a program's own body can get wrong.
