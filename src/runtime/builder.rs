@@ -3,12 +3,14 @@
 use super::actor::Actor;
 use super::grant::GrantHandle;
 use super::outlet::{self, OutletReader, OutletWriter};
-use super::port::{self, QueueReader, QueueWriter, Reader, Writer};
+use super::port::{QueueReader, QueueWriter, Reader, Writer};
 use super::rate_group::RateGroup;
 use super::recorder::{RecordDrain, Recorder, Registry};
 use super::release::GroupRun;
+use super::rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};
 use super::running::Runtime;
 use super::schedule::admit;
+use super::virtual_port::flight;
 use crate::error::Error;
 use crate::time::{Nanos, Rate};
 use std::fmt;
@@ -38,18 +40,33 @@ impl RuntimeBuilder {
     }
 
     /// A port for the newest value of a large state; every buffer is filled by `init`.
-    pub fn exchange<T: Send>(&mut self, init: impl FnMut() -> T + Send + 'static) -> (Writer<T>, Reader<T>) {
+    pub fn exchange<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> (Writer<T>, Reader<T>) {
+        let port = self.exchange_port(init);
+        (port.writer(), port.reader())
+    }
+
+    /// As [`exchange`](Self::exchange), with halves that a [restarted](Self::restartable) group can take again.
+    pub fn exchange_port<T: Send + 'static>(
+        &mut self,
+        init: impl FnMut() -> T + Send + 'static,
+    ) -> ExchangePort<T> {
         match self.execution {
-            Execution::Virtual => port::virtual_exchange(init),
-            Execution::Threaded => port::threaded_exchange(init),
+            Execution::Virtual => ExchangePort::in_virtual_time(flight(init)),
+            Execution::Threaded => ExchangePort::threaded(init),
         }
     }
 
     /// A port for ordered samples that holds at least `capacity` of them, rounded up to a power of two.
-    pub fn queue<T: Copy + Send>(&mut self, capacity: usize) -> (QueueWriter<T>, QueueReader<T>) {
+    pub fn queue<T: Copy + Send + 'static>(&mut self, capacity: usize) -> (QueueWriter<T>, QueueReader<T>) {
+        let port = self.queue_port(capacity);
+        (port.writer(), port.reader())
+    }
+
+    /// As [`queue`](Self::queue), with halves that a [restarted](Self::restartable) group can take again.
+    pub fn queue_port<T: Copy + Send + 'static>(&mut self, capacity: usize) -> QueuePort<T> {
         match self.execution {
-            Execution::Virtual => port::virtual_queue(capacity),
-            Execution::Threaded => port::threaded_queue(capacity),
+            Execution::Virtual => QueuePort::in_virtual_time(capacity),
+            Execution::Threaded => QueuePort::threaded(capacity),
         }
     }
 
@@ -58,9 +75,19 @@ impl RuntimeBuilder {
         outlet::outlet(init)
     }
 
+    /// As [`outlet`](Self::outlet), with halves that a [restarted](Self::restartable) group can take again.
+    pub fn outlet_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> OutletPort<T> {
+        OutletPort::new(init)
+    }
+
     /// A record sink for one actor, holding at least `capacity` records between two drains.
     pub fn recorder(&mut self, capacity: usize) -> Recorder {
         self.registry.recorder(capacity)
+    }
+
+    /// As [`recorder`](Self::recorder), one that a [restarted](Self::restartable) group can take again.
+    pub fn recorder_port(&mut self, capacity: usize) -> RecorderPort {
+        RecorderPort::new(&self.registry, capacity)
     }
 
     /// Takes the records of all recorders, made before or after this call, and of every group's timing and events.

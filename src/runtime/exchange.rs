@@ -104,8 +104,13 @@ impl<T> ExchangeWriter<T> {
     /// Wait-free (one atomic swap), real-time safe.
     #[inline]
     pub fn publish(&mut self, stamp: Nanos) -> u64 {
-        self.version += 1;
-        let version = self.version;
+        self.publish_as(self.version + 1, stamp)
+    }
+
+    /// As [`publish`](Self::publish), with the version counted by the caller.
+    #[inline]
+    pub(super) fn publish_as(&mut self, version: u64, stamp: Nanos) -> u64 {
+        self.version = version;
         self.shared.slots[self.slot].with_mut(|slot| {
             // SAFETY: `slot` is ours until the swap below.
             unsafe {

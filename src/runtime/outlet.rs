@@ -2,28 +2,34 @@
 
 use super::actor::TickContext;
 use super::exchange::{ExchangeReader, ExchangeWriter, exchange};
+use super::link::{Linked, linked};
+use super::port::VersionCounter;
 use crate::time::Nanos;
 
 /// The actor's side of an outlet.
 #[derive(Debug)]
-pub struct OutletWriter<T>(ExchangeWriter<T>);
+pub struct OutletWriter<T>(Linked<ExchangeWriter<T>>, VersionCounter);
 
 /// The outside thread's side of an outlet. It owns its buffer until the next successful refresh.
 #[derive(Debug)]
-pub struct OutletReader<T>(ExchangeReader<T>);
+pub struct OutletReader<T>(Linked<ExchangeReader<T>>);
 
 pub(super) fn outlet<T: Send>(init: impl FnMut() -> T) -> (OutletWriter<T>, OutletReader<T>) {
     let (writer, reader) = exchange(init);
-    (OutletWriter(writer), OutletReader(reader))
+    (OutletWriter::new(linked(writer).0, VersionCounter::default()), OutletReader::new(linked(reader).0))
 }
 
 impl<T> OutletWriter<T> {
+    pub(super) fn new(half: Linked<ExchangeWriter<T>>, versions: VersionCounter) -> Self {
+        Self(half, versions)
+    }
+
     /// The buffer to write the next value into; it holds an old value, of no particular age.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn buffer(&mut self) -> &mut T {
-        self.0.buffer()
+        self.0.half_mut().buffer()
     }
 
     /// Makes the buffer the newest value and returns its version, counting from 1.
@@ -31,17 +37,24 @@ impl<T> OutletWriter<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn publish(&mut self, ctx: &TickContext) -> u64 {
-        self.0.publish(ctx.scheduled)
+        let version = self.0.half_mut().publish_as(self.1.next(), ctx.scheduled);
+        // Only now: a buffer half written must not be changed for another.
+        self.0.current();
+        version
     }
 }
 
 impl<T> OutletReader<T> {
+    pub(super) fn new(half: Linked<ExchangeReader<T>>) -> Self {
+        Self(half)
+    }
+
     /// Takes the newest value if there is one that was not taken yet; returns whether there was.
     ///
     /// # Real-time
     /// Wait-free, real-time safe; never disturbs the writer.
     pub fn refresh(&mut self) -> bool {
-        self.0.refresh()
+        self.0.current().refresh()
     }
 
     /// The value of the last refresh, or the initial value.
@@ -49,7 +62,7 @@ impl<T> OutletReader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn get(&self) -> &T {
-        self.0.get()
+        self.0.half().get()
     }
 
     /// The same to change or to swap out: the reader owns the buffer until the next refresh.
@@ -57,7 +70,7 @@ impl<T> OutletReader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn get_mut(&mut self) -> &mut T {
-        self.0.get_mut()
+        self.0.half_mut().get_mut()
     }
 
     /// The version of the value, counting from 1; 0 before the first.
@@ -65,7 +78,7 @@ impl<T> OutletReader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn version(&self) -> u64 {
-        self.0.version()
+        self.0.half().version()
     }
 
     /// The scheduled time of the release that published the value; zero before the first.
@@ -73,6 +86,6 @@ impl<T> OutletReader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn published(&self) -> Nanos {
-        self.0.published()
+        self.0.half().published()
     }
 }

@@ -6,30 +6,46 @@
 //! ticks after the writer: later in the group, or in a later group.
 
 use super::actor::TickContext;
-use super::exchange::{ExchangeReader, ExchangeWriter, exchange};
-use super::ring::{Consumer, Producer, ring};
-use super::virtual_port::{self, VirtualQueue, VirtualReader, VirtualWriter};
+use super::exchange::{ExchangeReader, ExchangeWriter};
+use super::link::Linked;
+use super::ring::{Consumer, Producer};
+use super::sync::{AtomicU64, Ordering};
+use super::virtual_port::{SharedFlight, VirtualQueue, VirtualReader, VirtualWriter};
 use crate::time::Nanos;
 use std::fmt;
+use std::sync::Arc;
 
 enum WriterKind<T> {
-    Threaded(ExchangeWriter<T>),
+    Threaded(Linked<ExchangeWriter<T>>, VersionCounter),
     Virtual(VirtualWriter<T>),
 }
 
 enum ReaderKind<T> {
-    Threaded(ExchangeReader<T>),
+    Threaded(Linked<ExchangeReader<T>>),
     Virtual(VirtualReader<T>),
 }
 
 enum QueueWriterKind<T> {
-    Threaded(Producer<T>),
+    Threaded(Linked<Producer<T>>),
     Virtual(VirtualQueue<T>),
 }
 
 enum QueueReaderKind<T> {
-    Threaded(Consumer<T>),
+    Threaded(Linked<Consumer<T>>),
     Virtual(VirtualQueue<T>),
+}
+
+/// Counts the versions of a port, on through every writer that it had.
+#[derive(Clone, Debug, Default)]
+pub(super) struct VersionCounter(Arc<AtomicU64>);
+
+impl VersionCounter {
+    pub(super) fn next(&self) -> u64 {
+        // Relaxed, and no read-modify-write: there is one writer; one that was fenced may still count, to no effect.
+        let version = self.0.load(Ordering::Relaxed) + 1;
+        self.0.store(version, Ordering::Relaxed);
+        version
+    }
 }
 
 /// Publishes the newest value of a state.
@@ -44,34 +60,22 @@ pub struct QueueWriter<T>(QueueWriterKind<T>);
 /// Receives samples in the order they were sent.
 pub struct QueueReader<T>(QueueReaderKind<T>);
 
-pub(super) fn threaded_exchange<T: Send>(init: impl FnMut() -> T) -> (Writer<T>, Reader<T>) {
-    let (writer, reader) = exchange(init);
-    (Writer(WriterKind::Threaded(writer)), Reader(ReaderKind::Threaded(reader)))
-}
-
-pub(super) fn virtual_exchange<T: Send>(init: impl FnMut() -> T + Send + 'static) -> (Writer<T>, Reader<T>) {
-    let (writer, reader) = virtual_port::exchange(init);
-    (Writer(WriterKind::Virtual(writer)), Reader(ReaderKind::Virtual(reader)))
-}
-
-pub(super) fn threaded_queue<T: Copy + Send>(capacity: usize) -> (QueueWriter<T>, QueueReader<T>) {
-    let (producer, consumer) = ring(capacity);
-    (QueueWriter(QueueWriterKind::Threaded(producer)), QueueReader(QueueReaderKind::Threaded(consumer)))
-}
-
-pub(super) fn virtual_queue<T: Copy + Send>(capacity: usize) -> (QueueWriter<T>, QueueReader<T>) {
-    let queue = VirtualQueue::new(capacity);
-    (QueueWriter(QueueWriterKind::Virtual(queue.clone())), QueueReader(QueueReaderKind::Virtual(queue)))
-}
-
 impl<T> Writer<T> {
+    pub(super) fn threaded(half: Linked<ExchangeWriter<T>>, versions: VersionCounter) -> Self {
+        Self(WriterKind::Threaded(half, versions))
+    }
+
+    pub(super) fn in_virtual_time(flight: &SharedFlight<T>) -> Self {
+        Self(WriterKind::Virtual(VirtualWriter::new(flight)))
+    }
+
     /// The buffer to write the next value into; it holds an old value, of no particular age.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn buffer(&mut self) -> &mut T {
         match &mut self.0 {
-            WriterKind::Threaded(writer) => writer.buffer(),
+            WriterKind::Threaded(writer, _) => writer.half_mut().buffer(),
             WriterKind::Virtual(writer) => writer.buffer(),
         }
     }
@@ -82,20 +86,33 @@ impl<T> Writer<T> {
     /// Wait-free, real-time safe.
     pub fn publish(&mut self, ctx: &TickContext) -> u64 {
         match &mut self.0 {
-            WriterKind::Threaded(writer) => writer.publish(ctx.scheduled),
+            WriterKind::Threaded(writer, versions) => {
+                let version = writer.half_mut().publish_as(versions.next(), ctx.scheduled);
+                // Only now: a buffer half written must not be changed for another.
+                writer.current();
+                version
+            }
             WriterKind::Virtual(writer) => writer.publish(ctx),
         }
     }
 }
 
 impl<T> Reader<T> {
+    pub(super) fn threaded(half: Linked<ExchangeReader<T>>) -> Self {
+        Self(ReaderKind::Threaded(half))
+    }
+
+    pub(super) fn in_virtual_time(flight: &SharedFlight<T>) -> Self {
+        Self(ReaderKind::Virtual(VirtualReader::new(flight)))
+    }
+
     /// Takes the newest value if there is one that was not taken yet; returns whether there was.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn refresh(&mut self, ctx: &TickContext) -> bool {
         match &mut self.0 {
-            ReaderKind::Threaded(reader) => reader.refresh(),
+            ReaderKind::Threaded(reader) => reader.current().refresh(),
             ReaderKind::Virtual(reader) => reader.refresh(ctx),
         }
     }
@@ -106,7 +123,7 @@ impl<T> Reader<T> {
     /// Wait-free, real-time safe.
     pub fn get(&self) -> &T {
         match &self.0 {
-            ReaderKind::Threaded(reader) => reader.get(),
+            ReaderKind::Threaded(reader) => reader.half().get(),
             ReaderKind::Virtual(reader) => reader.get(),
         }
     }
@@ -117,7 +134,7 @@ impl<T> Reader<T> {
     /// Wait-free, real-time safe.
     pub fn get_mut(&mut self) -> &mut T {
         match &mut self.0 {
-            ReaderKind::Threaded(reader) => reader.get_mut(),
+            ReaderKind::Threaded(reader) => reader.half_mut().get_mut(),
             ReaderKind::Virtual(reader) => reader.get_mut(),
         }
     }
@@ -128,7 +145,7 @@ impl<T> Reader<T> {
     /// Wait-free, real-time safe.
     pub fn version(&self) -> u64 {
         match &self.0 {
-            ReaderKind::Threaded(reader) => reader.version(),
+            ReaderKind::Threaded(reader) => reader.half().version(),
             ReaderKind::Virtual(reader) => reader.version(),
         }
     }
@@ -139,20 +156,28 @@ impl<T> Reader<T> {
     /// Wait-free, real-time safe.
     pub fn published(&self) -> Nanos {
         match &self.0 {
-            ReaderKind::Threaded(reader) => reader.published(),
+            ReaderKind::Threaded(reader) => reader.half().published(),
             ReaderKind::Virtual(reader) => reader.published(),
         }
     }
 }
 
 impl<T: Copy> QueueWriter<T> {
+    pub(super) fn threaded(half: Linked<Producer<T>>) -> Self {
+        Self(QueueWriterKind::Threaded(half))
+    }
+
+    pub(super) fn in_virtual_time(queue: &VirtualQueue<T>) -> Self {
+        Self(QueueWriterKind::Virtual(queue.clone()))
+    }
+
     /// Sends a sample; false if the queue is full: the sample is then dropped and counted.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn push(&mut self, ctx: &TickContext, sample: T) -> bool {
         match &mut self.0 {
-            QueueWriterKind::Threaded(producer) => producer.push(sample),
+            QueueWriterKind::Threaded(producer) => producer.current().push(sample),
             QueueWriterKind::Virtual(queue) => queue.push(ctx, sample),
         }
     }
@@ -163,20 +188,28 @@ impl<T: Copy> QueueWriter<T> {
     /// Wait-free, real-time safe.
     pub fn dropped(&self) -> u64 {
         match &self.0 {
-            QueueWriterKind::Threaded(producer) => producer.lost(),
+            QueueWriterKind::Threaded(producer) => producer.half().lost(),
             QueueWriterKind::Virtual(queue) => queue.dropped(),
         }
     }
 }
 
 impl<T: Copy> QueueReader<T> {
+    pub(super) fn threaded(half: Linked<Consumer<T>>) -> Self {
+        Self(QueueReaderKind::Threaded(half))
+    }
+
+    pub(super) fn in_virtual_time(queue: &VirtualQueue<T>) -> Self {
+        Self(QueueReaderKind::Virtual(queue.clone()))
+    }
+
     /// The oldest visible sample, left in the queue.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn peek(&mut self, ctx: &TickContext) -> Option<T> {
         match &mut self.0 {
-            QueueReaderKind::Threaded(consumer) => consumer.peek(),
+            QueueReaderKind::Threaded(consumer) => consumer.current().peek(),
             QueueReaderKind::Virtual(queue) => queue.peek(ctx),
         }
     }
@@ -187,7 +220,7 @@ impl<T: Copy> QueueReader<T> {
     /// Wait-free, real-time safe.
     pub fn pop(&mut self, ctx: &TickContext) -> Option<T> {
         match &mut self.0 {
-            QueueReaderKind::Threaded(consumer) => consumer.pop(),
+            QueueReaderKind::Threaded(consumer) => consumer.current().pop(),
             QueueReaderKind::Virtual(queue) => queue.pop(ctx),
         }
     }
@@ -198,7 +231,7 @@ impl<T: Copy> QueueReader<T> {
     /// Wait-free, real-time safe.
     pub fn dropped(&self) -> u64 {
         match &self.0 {
-            QueueReaderKind::Threaded(consumer) => consumer.lost(),
+            QueueReaderKind::Threaded(consumer) => consumer.half().lost(),
             QueueReaderKind::Virtual(queue) => queue.dropped(),
         }
     }

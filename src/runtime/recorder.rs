@@ -8,9 +8,17 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// All rings of a graph. The lock is taken when a ring is added and by the logger, never by a real-time tick.
 #[derive(Debug)]
 pub(crate) struct Registry {
-    rings: Mutex<Vec<Consumer<Record>>>,
+    rings: Mutex<Rings>,
     /// Whether anybody wants the records.
     wanted: AtomicBool,
+}
+
+#[derive(Debug, Default)]
+struct Rings {
+    all: Vec<Consumer<Record>>,
+    /// What was left in rings that were replaced, and how many records those had lost.
+    kept: Vec<Record>,
+    lost: u64,
 }
 
 impl Registry {
@@ -19,9 +27,24 @@ impl Registry {
     }
 
     pub(crate) fn recorder(&self, capacity: usize) -> Recorder {
+        self.replace(None, capacity).0
+    }
+
+    /// A new ring in place of number `old`, whose records up to now are kept; and its own number.
+    pub(crate) fn replace(&self, old: Option<usize>, capacity: usize) -> (Recorder, usize) {
         let (producer, consumer) = ring(capacity);
-        self.rings().push(consumer);
-        Recorder(producer)
+        let mut rings = self.rings();
+        let index = old.unwrap_or(rings.all.len());
+        if old.is_some() {
+            let mut replaced = std::mem::replace(&mut rings.all[index], consumer);
+            let capacity = replaced.capacity();
+            let wanted = self.wanted();
+            rings.kept.extend(std::iter::from_fn(|| replaced.pop()).take(if wanted { capacity } else { 0 }));
+            rings.lost += replaced.lost();
+        } else {
+            rings.all.push(consumer);
+        }
+        (Recorder(producer), index)
     }
 
     pub(crate) fn drain(self: &Arc<Self>) -> RecordDrain {
@@ -36,10 +59,14 @@ impl Registry {
 
     /// Records dropped because a ring was full; without a drain none is lost, since nobody asked.
     pub(crate) fn lost(&self) -> u64 {
-        if self.wanted() { self.rings().iter().map(Consumer::lost).sum() } else { 0 }
+        if !self.wanted() {
+            return 0;
+        }
+        let rings = self.rings();
+        rings.lost + rings.all.iter().map(Consumer::lost).sum::<u64>()
     }
 
-    fn rings(&self) -> MutexGuard<'_, Vec<Consumer<Record>>> {
+    fn rings(&self) -> MutexGuard<'_, Rings> {
         // Nothing that can panic half-way runs under the lock.
         self.rings.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -72,7 +99,9 @@ impl RecordDrain {
     /// Takes a lock and allocates: for loggers.
     pub fn drain(&mut self, records: &mut Vec<Record>) {
         let first = records.len();
-        for ring in self.0.rings().iter_mut() {
+        let mut rings = self.0.rings();
+        records.append(&mut rings.kept);
+        for ring in &mut rings.all {
             // At most one ring full, so that a fast producer cannot keep the logger here.
             let capacity = ring.capacity();
             records.extend(std::iter::from_fn(|| ring.pop()).take(capacity));

@@ -19,7 +19,9 @@ struct Publication<T> {
     buffer: Box<Versioned<T>>,
 }
 
-struct Flight<T> {
+pub(super) struct Flight<T> {
+    /// Publications so far: versions go on through every writer that the port had.
+    versions: u64,
     /// In order of publication, hence of visibility.
     waiting: VecDeque<Publication<T>>,
     /// Buffers that nobody needs, kept for the writer: once warm, nothing is allocated.
@@ -42,41 +44,44 @@ impl<T> Flight<T> {
     }
 }
 
-type SharedFlight<T> = Arc<Mutex<Flight<T>>>;
+pub(super) type SharedFlight<T> = Arc<Mutex<Flight<T>>>;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // A panic while the lock is held can only come from a user's `init`, which leaves the queues whole.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-pub(super) fn exchange<T: Send>(init: impl FnMut() -> T + Send + 'static) -> (VirtualWriter<T>, VirtualReader<T>) {
-    let mut flight = Flight { waiting: VecDeque::new(), free: Vec::new(), init: Box::new(init) };
-    let (back, front) = (flight.fresh(), flight.fresh());
-    let shared = Arc::new(Mutex::new(flight));
-    (VirtualWriter { shared: Arc::clone(&shared), buffer: back, version: 0 }, VirtualReader { shared, buffer: front })
+pub(super) fn flight<T: Send>(init: impl FnMut() -> T + Send + 'static) -> SharedFlight<T> {
+    let flight = Flight { versions: 0, waiting: VecDeque::new(), free: Vec::new(), init: Box::new(init) };
+    Arc::new(Mutex::new(flight))
 }
 
 pub(super) struct VirtualWriter<T> {
     shared: SharedFlight<T>,
     buffer: Box<Versioned<T>>,
-    version: u64,
 }
 
 impl<T> VirtualWriter<T> {
+    pub(super) fn new(shared: &SharedFlight<T>) -> Self {
+        let buffer = lock(shared).fresh();
+        Self { shared: Arc::clone(shared), buffer }
+    }
+
     pub(super) fn buffer(&mut self) -> &mut T {
         &mut self.buffer.value
     }
 
     pub(super) fn publish(&mut self, ctx: &TickContext) -> u64 {
-        self.version += 1;
-        self.buffer.version = self.version;
-        self.buffer.published = ctx.scheduled;
         let mut flight = lock(&self.shared);
+        flight.versions += 1;
+        let version = flight.versions;
+        self.buffer.version = version;
+        self.buffer.published = ctx.scheduled;
         flight.recycle(ctx.scheduled);
         let fresh = flight.fresh();
         let buffer = std::mem::replace(&mut self.buffer, fresh);
         flight.waiting.push_back(Publication { visible_at: ctx.visible_at, buffer });
-        self.version
+        version
     }
 }
 
@@ -86,6 +91,11 @@ pub(super) struct VirtualReader<T> {
 }
 
 impl<T> VirtualReader<T> {
+    pub(super) fn new(shared: &SharedFlight<T>) -> Self {
+        let buffer = lock(shared).fresh();
+        Self { shared: Arc::clone(shared), buffer }
+    }
+
     pub(super) fn refresh(&mut self, ctx: &TickContext) -> bool {
         let mut flight = lock(&self.shared);
         flight.recycle(ctx.scheduled);
@@ -156,5 +166,10 @@ impl<T: Copy> VirtualQueue<T> {
 
     pub(super) fn dropped(&self) -> u64 {
         lock(&self.0).dropped
+    }
+
+    /// Drops what waits, as a reader does that takes the place of another.
+    pub(super) fn clear(&self) {
+        lock(&self.0).waiting.clear();
     }
 }
