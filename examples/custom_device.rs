@@ -114,6 +114,6 @@ fn main() -> Result<(), Error> {
         );
     }
     running.wait();
-    println!("\n{}", running.stop()?);
+    println!("\n{}", running.stop());
     Ok(())
 }

@@ -27,6 +27,6 @@ fn main() -> Result<(), Error> {
         .build()?; // refuses what cannot work, and says why
     let running = session.start()?; // threads are up
     running.wait_for(Duration::from_millis(2500));
-    println!("{}", running.stop()?); // lateness, slips, jumps, what the system granted
+    println!("{}", running.stop()); // lateness, slips, jumps, what the system granted
     Ok(())
 }

@@ -49,7 +49,7 @@ fn a_soak_with_stalls_accounts_for_every_period_and_record() {
         .start()
         .unwrap();
     running.wait_for(Duration::from_secs(120));
-    let report = running.stop().unwrap();
+    let report = running.stop();
     assert_eq!((&report.fault, report.lost_records), (&None, 0));
     let timings = timings.lock().unwrap();
     for (index, (group, periods)) in report.groups.iter().zip([2001, 1001, 61]).enumerate() {
@@ -85,7 +85,7 @@ fn the_actor_is_told_how_many_periods_were_skipped() {
     });
     let running = graph.group(RateGroup::hz(1000), vec![actor]).until(Nanos(50 * MS)).build().unwrap().start().unwrap();
     running.wait_for(Duration::from_secs(60));
-    let report = running.stop().unwrap();
+    let report = running.stop();
     assert_eq!(report.fault, None);
     assert!(report.groups[0].skipped >= 8, "{report}");
 }
@@ -107,7 +107,7 @@ fn the_stop_policy_ends_the_run_at_the_first_overrun() {
         .unwrap();
     running.wait_for(Duration::from_secs(60));
     assert!(running.finished());
-    let report = running.stop().unwrap();
+    let report = running.stop();
     let fault = report.fault.unwrap();
     assert_eq!((&*fault.group, &*fault.actor), ("strict", ""));
     let strict = &report.groups[0];
@@ -126,7 +126,7 @@ fn a_refused_privilege_is_reported_and_the_run_goes_on() {
     let actor = actor_fn("a", |_| Outcome::Continue);
     let running = graph.group(group, vec![actor]).until(Nanos(20 * MS)).build().unwrap().start().unwrap();
     running.wait_for(Duration::from_secs(60));
-    let report = running.stop().unwrap();
+    let report = running.stop();
     assert_eq!((report.groups[0].elapsed_periods, &report.fault), (21, &None));
     let grant = &report.grant.groups[0];
     // No machine has that core.
@@ -162,7 +162,7 @@ fn a_thread_made_by_a_real_time_actor_does_not_inherit_its_policy() {
     let running =
         graph.group(RateGroup::hz(100).realtime(10), vec![actor]).until(Nanos::ZERO).build().unwrap().start().unwrap();
     running.wait_for(Duration::from_secs(60));
-    let report = running.stop().unwrap();
+    let report = running.stop();
     if report.grant.groups[0].priority == 0 {
         println!("skipped: {}", report.grant.groups[0].refused);
         return;

@@ -269,7 +269,7 @@ fn a_run_can_be_taken_in_steps_and_ended_early() {
     }
     assert!(!running.finished());
     assert_eq!(running.elapsed(), Nanos(200_000_000));
-    let steps = running.stop().unwrap();
+    let steps = running.stop();
     assert_eq!(forces(&steps), forces(&whole));
 }
 
@@ -286,7 +286,7 @@ fn a_renderer_sees_the_newest_surface_tool_and_force() {
     assert_ne!(viewer.surface().positions, body.rest());
     let tool = viewer.tool();
     running.wait();
-    let summary = running.stop().unwrap();
+    let summary = running.stop();
     let row = forces(&summary).into_iter().find(|row| row.time == tool.time).unwrap();
     assert_eq!((tool.time, <[f64; 3]>::from(tool.force)), (Nanos(150_000_000), row.force_n));
 }

@@ -10,11 +10,12 @@
 //! `cargo run --release --example paper_figures [-- [--readme] [FOLDER]]`; FOLDER is `out/paper_figures` if not given.
 //! `--readme` also renews the two plots in `docs/img/`.
 
+#[path = "../common/drawing.rs"]
+mod drawing;
 #[path = "../common/forces.rs"]
 mod forces;
 
 mod delay;
-mod drawing;
 mod figures;
 mod probe;
 mod runs;

@@ -68,7 +68,7 @@ fn compare() -> Result<(), Box<dyn Error>> {
     let renderer = std::thread::spawn(move || render(viewer, &stopped, folder));
     running.wait();
     drop(stop);
-    let drawn = running.stop()?;
+    let drawn = running.stop();
     let frames = renderer.join().map_err(|_| "the renderer panicked")??;
 
     println!("Lateness of the haptic group (1 kHz):");
@@ -120,7 +120,7 @@ fn draw_readme() -> Result<(), Box<dyn Error>> {
     let triangles = viewer.triangles();
     let tool = viewer.tool();
     let svg = picture::draw(&triangles, &viewer.surface().positions, &tool);
-    running.stop()?;
+    running.stop();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/img");
     fs::create_dir_all(&folder)?;
     fs::write(folder.join("demo.svg"), &svg)?;

@@ -1,4 +1,7 @@
 //! The device actor: reads the tool at the start of a release, writes the force of the same release at its end.
+//!
+//! When the run stops, when nothing computes a force any more or when the device itself panicked, the force goes to zero
+//! within the ramp time; after a gap in which nobody drove the device it starts from zero.
 
 use super::cause::Cause;
 use super::messages::{DeviceSample, ForceCommand};
@@ -6,12 +9,15 @@ use crate::devices::{Device, DeviceFault, DeviceState};
 use crate::error::{Error, ErrorKind};
 use crate::log::{CommandSample, ToolSample};
 use crate::model::Vec3;
-use crate::runtime::{Actor, Outcome, Reader, Recorder, TickContext, Writer};
-use crate::safety::Pipeline;
+use crate::runtime::{Actor, Mode, Outcome, Reader, Recorder, TickContext, Writer};
+use crate::safety::{Pipeline, Request};
 use crate::time::Nanos;
 
-/// Releases without a new command after which zero is the command.
+/// Releases without a new command after which the force goes to rest.
 const COMMAND_EXPIRES: u32 = 2;
+
+/// A time without a command (s) after which the device may have done anything: the force starts from zero.
+const GAP_S: f64 = 0.1;
 
 /// Reads and writes one device; everything that is written passes the safety pipeline.
 #[derive(Debug)]
@@ -23,6 +29,8 @@ pub struct DeviceActor {
     recorder: Recorder,
     last: DeviceSample,
     missed_commands: u32,
+    /// Set while the device reads: still set after it panicked there.
+    reading: bool,
 }
 
 impl DeviceActor {
@@ -36,11 +44,18 @@ impl DeviceActor {
         recorder: Recorder,
     ) -> Self {
         let last = DeviceSample { id: 0, state: first };
-        Self { device, samples, commands, safety, recorder, last, missed_commands: 0 }
+        Self { device, samples, commands, safety, recorder, last, missed_commands: 0, reading: false }
     }
 
     fn read(&mut self, ctx: &TickContext) -> Outcome {
-        match self.device.read(ctx.scheduled) {
+        if self.reading {
+            // It panicked: the last state is all there will be.
+            return Outcome::Continue;
+        }
+        self.reading = true;
+        let state = self.device.read(ctx.scheduled);
+        self.reading = false;
+        match state {
             Ok(state) if is_finite(&state) => {
                 self.last = DeviceSample { id: self.last.id.wrapping_add(1), state };
                 Outcome::Continue
@@ -81,13 +96,23 @@ impl Actor for DeviceActor {
             self.missed_commands = self.missed_commands.saturating_add(1);
         }
         let command = *self.commands.get();
-        let force = if self.missed_commands > COMMAND_EXPIRES { Vec3::zeros() } else { command.force };
-        let dt = ctx.dt_nominal * f64::from(ctx.slips + 1);
-        let (force_n, actions) = self.safety.apply(force.into(), dt);
+        let dt = ctx.dt_nominal * (f64::from(ctx.slips) + 1.0);
+        let (force_n, actions) = if dt >= GAP_S {
+            self.safety.release()
+        } else if ctx.mode == Mode::Stopping || self.missed_commands > COMMAND_EXPIRES {
+            self.safety.apply(Request::Rest, dt)
+        } else {
+            self.safety.apply(Request::Force(command.force.into()), dt)
+        };
         let outcome = self.device.write(Vec3::from(force_n)).map_or_else(degraded, |()| Outcome::Continue);
         let time = if self.missed_commands == 0 { command.time } else { ctx.scheduled };
         self.recorder.push(CommandSample { time, force_n, limits: actions.0 });
         outcome
+    }
+
+    fn recover(&mut self) -> bool {
+        // Wherever the device panicked, a last chance to ramp out is better than a force that stays.
+        true
     }
 
     fn stop(&mut self, _: &TickContext) {

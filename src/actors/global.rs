@@ -1,7 +1,7 @@
 //! The global actor: advances the whole body along the tool's path and publishes the next local model.
 
 use super::cause::Cause;
-use super::messages::{SurfaceView, ToolTick};
+use super::messages::{Checkpoint, SurfaceView, ToolTick};
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::contact::ToolMotion;
@@ -22,6 +22,8 @@ pub struct GlobalPorts {
     pub models: Writer<Box<dyn LocalModel>>,
     /// The newest surface for a program that draws.
     pub surface: OutletWriter<SurfaceView>,
+    /// The newest good state, for a restart.
+    pub checkpoint: OutletWriter<Checkpoint>,
     /// Records.
     pub recorder: Recorder,
 }
@@ -38,7 +40,8 @@ pub struct GlobalActor {
 }
 
 impl GlobalActor {
-    /// A global model that starts with `simulation` and the tool at `tool`; haptic ticks come at rate `haptic`.
+    /// A global model that starts with `simulation` and the tool at `tool`, also in the midst of a run; haptic ticks come
+    /// at rate `haptic`.
     ///
     /// # Errors
     /// If the body's surface has no triangles.
@@ -85,6 +88,14 @@ impl GlobalActor {
         self.ports.models.publish(ctx)
     }
 
+    fn publish_checkpoint(&mut self, ctx: &TickContext) {
+        let checkpoint = self.ports.checkpoint.buffer();
+        checkpoint.tool = self.tool;
+        checkpoint.state.clone_from(self.simulation.state());
+        checkpoint.contact = *self.simulation.contact();
+        self.ports.checkpoint.publish(ctx);
+    }
+
     fn publish_surface(&mut self, ctx: &TickContext) {
         let view = self.ports.surface.buffer();
         view.time = self.haptic.release(self.tool.tick);
@@ -117,6 +128,7 @@ impl Actor for GlobalActor {
         }
         let version = self.publish_model(ctx);
         self.publish_surface(ctx);
+        self.publish_checkpoint(ctx);
         self.ports.recorder.push(GlobalTick {
             time: ctx.scheduled,
             version: version as u32,

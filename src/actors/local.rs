@@ -6,7 +6,9 @@ use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync};
 use crate::model::Vec3;
 use crate::model::contact::{Contact, Mode};
 use crate::model::local::{LocalModel, PatchGeometry, Resynced, Served, Succession};
-use crate::runtime::{Actor, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer};
+use crate::runtime::{
+    Actor, Mode as RunMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
+};
 use crate::time::{Nanos, Rate};
 
 /// Haptic ticks that one release advances at most. After a long stall the rest is made up by the releases that follow:
@@ -169,6 +171,10 @@ impl Actor for LocalActor {
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        if ctx.mode == RunMode::Stopping {
+            // The device brings itself to rest.
+            return Outcome::Continue;
+        }
         self.ports.samples.refresh(ctx);
         if !self.begun {
             self.begin(ctx);

@@ -2,7 +2,8 @@
 
 use crate::devices::DeviceState;
 use crate::model::Vec3;
-use crate::model::contact::Mode;
+use crate::model::body::State;
+use crate::model::contact::{Contact, Mode};
 use crate::time::Nanos;
 
 /// The device's newest state, numbered.
@@ -52,4 +53,15 @@ pub struct SurfaceView {
     pub time: Nanos,
     /// Position of every node (m); the triangles are those of the body's surface.
     pub positions: Vec<Vec3>,
+}
+
+/// The global model after its last good resync: what it goes on from when it is started again.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Checkpoint {
+    /// The tool, and the haptic tick that the state belongs to.
+    pub tool: ToolTick,
+    /// Positions (m) and velocities (m/s) of all nodes.
+    pub state: State,
+    /// The contact.
+    pub contact: Contact,
 }

@@ -19,4 +19,4 @@ pub use device::{DeviceActor, first_state};
 pub use global::{GlobalActor, GlobalPorts};
 pub use local::{LocalActor, LocalPorts, ModelSource};
 pub use logger::{LOG_FAILURE, LogSink, LoggerActor, LoggerOutcome};
-pub use messages::{DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
+pub use messages::{Checkpoint, DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};

@@ -1,11 +1,13 @@
 //! The subcommands of `palpate`, one file each, and the contract that they share.
 //!
-//! Exit code 0 on success, 2 on a usage or input error (one line on standard error), 1 on a failed run.
+//! Exit code 0 on success, 2 on a usage or input error (one line on standard error), 1 on a failed run, 130 on a run that
+//! the user interrupted.
 
 pub mod export;
 pub mod run;
 pub mod timing;
 
+mod interrupt;
 mod output;
 mod progress;
 
@@ -63,6 +65,10 @@ pub fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
+        Err(error) if error.kind() == ErrorKind::Interrupted => {
+            eprintln!("{error}");
+            ExitCode::from(interrupt::EXIT_CODE)
+        }
         Err(error) => {
             eprintln!("error: {error}");
             if error.kind().is_input() { ExitCode::from(2) } else { ExitCode::from(1) }

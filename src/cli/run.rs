@@ -6,7 +6,7 @@ use palpate::scene::{LocalModelKind, Scene};
 use palpate::session::{Session, SessionBuilder};
 use palpate::{Error, ErrorKind};
 
-use super::{output, progress};
+use super::{interrupt, output, progress};
 
 /// Where the log goes if nothing is said.
 const DEFAULT_LOG: &str = "palpate-run.mcap";
@@ -68,8 +68,11 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
     let session = builder.log(log).build().map_err(|error| error.at(name));
     preparing.finish_and_clear();
     let running = session?.start()?;
+    let interrupt = interrupt::stops(&running)?;
     progress::wait(&running, name);
-    let summary = running.stop()?;
+    let ended = running.elapsed();
+    let until = running.until();
+    let summary = running.stop();
     output::print(&summary.to_string())?;
     if let Some(fault) = summary.runtime.fault {
         return Err(Error::new(ErrorKind::Fault, fault.to_string()).at(name));
@@ -78,7 +81,15 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
         // The run itself went well; but what was promised, a log, is not there.
         return Err(Error::new(ErrorKind::Fault, format!("the log is incomplete: {error}")));
     }
-    output::print(&format!("log: {0} (`palpate timing {0}`, `palpate export {0} --topic /force`)\n", log.display()))
+    output::print(&format!("log: {0} (`palpate timing {0}`, `palpate export {0} --topic /force`)\n", log.display()))?;
+    match until.filter(|_| interrupt.came()) {
+        Some(until) if ended < until => {
+            let (ended, until) = (ended.as_secs_f64(), until.as_secs_f64());
+            let message = format!("interrupted after {ended:.2} of {until} s; the log is complete up to there");
+            Err(Error::new(ErrorKind::Interrupted, message))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn model(name: &str) -> Result<LocalModelKind, String> {

@@ -72,6 +72,11 @@ pub trait Device: Send + std::fmt::Debug {
     /// What it can do.
     fn capabilities(&self) -> Capabilities;
 
+    /// False for a device whose [`write`](Self::write) moves nothing: nobody needs to wait for its force to fade.
+    fn exerts_force(&self) -> bool {
+        true
+    }
+
     /// The state at `time`, the scheduled time of the release.
     ///
     /// # Errors

@@ -30,6 +30,10 @@ impl Device for Scripted {
         Capabilities { max_force_n: Self::MAX_FORCE_N }
     }
 
+    fn exerts_force(&self) -> bool {
+        false
+    }
+
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
         let position = Vec3::from(self.path.at(time.as_secs_f64()));
         let velocity = match self.last {

@@ -58,6 +58,14 @@ impl TextEvent {
             }
             Event::DEGRADED if event.detail == Event::RECOVERED => (Level::Info, format!("{group}: back to normal")),
             Event::DEGRADED => (Level::Warning, format!("{group}: degraded, cause {}", event.detail)),
+            Event::RESTARTED => (Level::Warning, format!("{group}: restarted after a fault, restart {}", event.detail)),
+            Event::ABANDONED => {
+                let waited = Nanos(event.detail);
+                (Level::Error, format!("{group}: a release did not return within {waited}, its thread was left behind"))
+            }
+            Event::WINDING_DOWN => {
+                (Level::Info, format!("{group}: winding down, {} more periods to come to rest", event.detail))
+            }
             code => (Level::Warning, format!("{group}: event {code}, detail {}", event.detail)),
         };
         Self { time: event.stamp, level, message }

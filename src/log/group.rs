@@ -6,12 +6,9 @@ use crate::time::Nanos;
 
 /// How often each cause of a slip or a missed deadline occurred.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CauseCounts([u64; 5]);
+pub struct CauseCounts([u64; SlipCause::ALL.len()]);
 
 impl CauseCounts {
-    const CAUSES: [SlipCause; 5] =
-        [SlipCause::LateWake, SlipCause::LongTick, SlipCause::StalledPeer, SlipCause::Policy, SlipCause::None];
-
     fn add(&mut self, cause: SlipCause, count: u64) {
         self.0[cause as usize] += count;
     }
@@ -23,7 +20,7 @@ impl CauseCounts {
 
     /// Every cause with its count, those without a recorded cause last.
     pub fn iter(&self) -> impl Iterator<Item = (SlipCause, u64)> {
-        Self::CAUSES.into_iter().map(|cause| (cause, self.of(cause)))
+        SlipCause::ALL[1..].iter().chain(&SlipCause::ALL[..1]).map(|&cause| (cause, self.of(cause)))
     }
 
     /// The sum of all causes.

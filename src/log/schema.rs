@@ -98,7 +98,7 @@ macro_rules! proto_schema {
 }
 
 proto_schema! {
-    enum SlipCause { None, LateWake, LongTick, StalledPeer, Policy }
+    enum SlipCause { None, LateWake, LongTick, StalledPeer, Policy, Fault }
     enum ContactMode { Free, Stick, Slip, Lost }
     enum Level { Info, Warning, Error }
 

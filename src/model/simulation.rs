@@ -78,6 +78,21 @@ impl Simulation {
         Ok(new)
     }
 
+    /// A copy, if the body can make one.
+    pub fn duplicate(&self) -> Option<Self> {
+        Some(Self {
+            body: self.body.duplicate()?,
+            state: self.state.clone(),
+            forces: self.forces.clone(),
+            contact: self.contact,
+            law: self.law,
+            stepping: self.stepping,
+            candidates: self.candidates.clone(),
+            inverse_masses: self.inverse_masses.clone(),
+            force: self.force,
+        })
+    }
+
     /// The force that holds the contact point still in the present state (N): what a tool feels before the first tick.
     fn resting_force(&mut self) -> Vec3 {
         let Some(triangle) = self.contact.triangle else { return Vec3::zeros() };

@@ -121,6 +121,7 @@ fn causes(counts: CauseCounts) -> Value {
         SlipCause::LongTick => "long_tick",
         SlipCause::StalledPeer => "stalled_peer",
         SlipCause::Policy => "policy",
+        SlipCause::Fault => "fault",
     };
     Value::Object(counts.iter().map(|(cause, count)| (name(cause).to_owned(), json!(count))).collect())
 }

@@ -41,7 +41,15 @@ pub trait Actor: Send {
         Outcome::Continue
     }
 
-    /// Ends the actor: on the group's own thread after its last release, also after a fault of this or another actor.
+    /// Asked after a panic of this actor in a group that [winds down](super::RateGroup::wind_down): true if it can still
+    /// bring to rest what it drives. It is then called on like the others; a second panic is its last. The others are
+    /// stopped at once.
+    fn recover(&mut self) -> bool {
+        false
+    }
+
+    /// Ends the actor: on the group's own thread after its last release, also after a fault of this or another actor. An
+    /// actor that failed in a group that [winds down](super::RateGroup::wind_down) is stopped at once.
     fn stop(&mut self, ctx: &TickContext) {
         let _ = ctx;
     }
@@ -56,8 +64,9 @@ pub enum Outcome {
     /// The release was done with less than full quality, for the program's cause with this code. The run goes on; the
     /// report counts such releases, and a change of the code is recorded as [`Event::DEGRADED`](super::Event::DEGRADED).
     Degraded(u32),
-    /// The actor cannot go on, for the program's cause with this code. Nothing of its group ticks or commits any more,
-    /// the whole runtime stops in order.
+    /// The actor cannot go on, for the program's cause with this code. A [restartable](super::RuntimeBuilder::restartable)
+    /// group is started again; otherwise the whole runtime stops in order. Nothing of the actor's group ticks or commits
+    /// any more, unless the group [winds down](super::RateGroup::wind_down): then the other actors do.
     Fault(u32),
 }
 
@@ -70,6 +79,9 @@ pub enum Mode {
     /// The least that keeps the system useful. Set by an overrun policy only, never by measured time; no policy of this
     /// version sets it.
     Degraded,
+    /// Bring what it drives to rest: the run is ending or another actor of the group has failed. The group has
+    /// [that long](super::RateGroup::wind_down).
+    Stopping,
 }
 
 /// What an actor is told at a release. All times count from the start of the run.

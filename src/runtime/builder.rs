@@ -1,12 +1,14 @@
 //! The builder: it hands out ports, collects rate groups and refuses graphs that cannot work.
 
 use super::actor::Actor;
+use super::deadline::Ledger;
 use super::grant::GrantHandle;
 use super::outlet::{self, OutletReader, OutletWriter};
 use super::port::{QueueReader, QueueWriter, Reader, Writer};
 use super::rate_group::RateGroup;
 use super::recorder::{RecordDrain, Recorder, Registry};
 use super::release::GroupRun;
+use super::restart::{Factory, Restart, Restarter};
 use super::rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};
 use super::running::Runtime;
 use super::schedule::admit;
@@ -25,10 +27,16 @@ pub enum Execution {
     Threaded,
 }
 
+/// Who plays in a group.
+enum Cast {
+    Once(Vec<Box<dyn Actor>>),
+    Restartable(Restart, Factory),
+}
+
 /// Collects the ports and rate groups of a graph; see [`Runtime::builder`].
 pub struct RuntimeBuilder {
     execution: Execution,
-    groups: Vec<(RateGroup, Vec<Box<dyn Actor>>)>,
+    groups: Vec<(RateGroup, Cast)>,
     until: Option<Nanos>,
     registry: Arc<Registry>,
     grants: GrantHandle,
@@ -46,10 +54,7 @@ impl RuntimeBuilder {
     }
 
     /// As [`exchange`](Self::exchange), with halves that a [restarted](Self::restartable) group can take again.
-    pub fn exchange_port<T: Send + 'static>(
-        &mut self,
-        init: impl FnMut() -> T + Send + 'static,
-    ) -> ExchangePort<T> {
+    pub fn exchange_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> ExchangePort<T> {
         match self.execution {
             Execution::Virtual => ExchangePort::in_virtual_time(flight(init)),
             Execution::Threaded => ExchangePort::threaded(init),
@@ -103,7 +108,24 @@ impl RuntimeBuilder {
 
     /// Adds a rate group; its actors tick in this order. At equal times groups tick in the order they were added.
     pub fn group(&mut self, group: RateGroup, actors: Vec<Box<dyn Actor>>) -> &mut Self {
-        self.groups.push((group, actors));
+        self.groups.push((group, Cast::Once(actors)));
+        self
+    }
+
+    /// Adds a rate group whose actors are made by `factory`: once when the graph is built, and again whenever one of them
+    /// panicked, reported a fault or did not return, as often as `restart` allows. The other groups run on meanwhile.
+    ///
+    /// The factory takes the halves of the actors' ports from ports that can be taken again
+    /// ([`exchange_port`](Self::exchange_port) and the like), which cuts the failed actors off. It runs on a thread of its
+    /// own, so it may take its time and allocate; the new actors are started there too. Periods that passed meanwhile are
+    /// skipped with the cause [`Fault`](super::SlipCause::Fault).
+    pub fn restartable(
+        &mut self,
+        group: RateGroup,
+        restart: Restart,
+        factory: impl FnMut() -> Result<Vec<Box<dyn Actor>>, Error> + Send + 'static,
+    ) -> &mut Self {
+        self.groups.push((group, Cast::Restartable(restart, Box::new(factory))));
         self
     }
 
@@ -119,6 +141,7 @@ impl RuntimeBuilder {
     /// [`ErrorKind::Runtime`](crate::ErrorKind::Runtime), naming the group and the values, for a graph that cannot work:
     /// a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core, equal real-time
     /// priorities pinned to one core, a priority outside 1 to 99, a name used twice, no group that is not an observer.
+    /// Or what a [factory](Self::restartable) says.
     pub fn build(&mut self) -> Result<Runtime, Error> {
         for (index, (group, _)) in self.groups.iter_mut().enumerate() {
             if group.name.is_empty() {
@@ -128,15 +151,34 @@ impl RuntimeBuilder {
         admit(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>())?;
         let built = std::mem::replace(self, Self::new(self.execution));
         let registry = built.registry;
-        let run = |(index, (spec, actors)): (usize, (RateGroup, Vec<Box<dyn Actor>>))| {
-            let recorder = registry.wanted().then(|| registry.recorder(ring_capacity(spec.rate)));
+        let mut groups = Vec::with_capacity(built.groups.len());
+        let mut restarters = Vec::with_capacity(built.groups.len());
+        for (index, (spec, cast)) in built.groups.into_iter().enumerate() {
             // The admission check keeps the number of groups far below this.
-            GroupRun::new(index as u16, spec, actors, recorder, built.until)
-        };
-        let groups = built.groups.into_iter().enumerate().map(run).collect();
-        Ok(Runtime::new(built.execution, groups, registry, built.grants))
+            let index = index as u16;
+            let records = registry.wanted().then(|| RecorderPort::new(&registry, ring_capacity(spec.rate)));
+            let (group, restarter) = match cast {
+                Cast::Once(actors) => {
+                    let ledger = Ledger::new(index, &spec, built.until);
+                    let recorder = records.as_ref().map(RecorderPort::recorder);
+                    (GroupRun::new(index, spec, actors, recorder, ledger), None)
+                }
+                Cast::Restartable(policy, factory) => {
+                    let events = registry.wanted().then(|| registry.recorder(SUPERVISOR_EVENTS));
+                    let mut restarter = Restarter::new(policy, factory, index, spec, built.until, records, events);
+                    let (group, books) = restarter.first()?;
+                    (group, Some((restarter, books)))
+                }
+            };
+            groups.push(group);
+            restarters.push(restarter);
+        }
+        Ok(Runtime::new(built.execution, groups, restarters, registry, built.grants))
     }
 }
+
+/// Events of the supervisor about one group between two drains.
+const SUPERVISOR_EVENTS: usize = 64;
 
 /// Room for four seconds of timing, so that a logger stuck for that long loses nothing; at most 4 MB.
 fn ring_capacity(rate: Rate) -> usize {

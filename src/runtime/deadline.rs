@@ -4,6 +4,7 @@
 
 use super::rate_group::{OverrunPolicy, RateGroup};
 use super::record::{SlipCause, TickTiming};
+use super::report::GroupReport;
 use crate::time::{Nanos, Rate};
 
 /// When the releases of a group are due.
@@ -62,7 +63,7 @@ pub(crate) fn decide(policy: OverrunPolicy, next: u64, latest: u64) -> Decision 
 
 /// Skipped periods by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SlipCounts([u64; 5]);
+pub struct SlipCounts([u64; SlipCause::ALL.len()]);
 
 impl SlipCounts {
     /// Periods skipped for this cause.
@@ -96,6 +97,10 @@ pub(crate) struct Ledger {
     pub(crate) released: u64,
     pub(crate) skipped: SlipCounts,
     pub(crate) missed: u64,
+    /// Releases with a degraded result.
+    pub(crate) degraded: u64,
+    /// Set while the group is down after a fault.
+    down: bool,
 }
 
 impl Ledger {
@@ -113,7 +118,20 @@ impl Ledger {
             released: 0,
             skipped: SlipCounts::default(),
             missed: 0,
+            degraded: 0,
+            down: false,
         }
+    }
+
+    /// Goes on with the books of a group that failed: what was due since is skipped because of the fault.
+    pub(crate) fn resume(&mut self) {
+        self.down = true;
+    }
+
+    /// Releases `periods` more, however late they are, and then no others.
+    pub(crate) fn end_after(&mut self, periods: u64) {
+        self.timeline.count = self.next.saturating_add(periods);
+        self.policy = OverrunPolicy::Skip;
     }
 
     /// When the next release is due; `None` after the last.
@@ -131,11 +149,27 @@ impl Ledger {
         self.next
     }
 
+    /// The sums.
+    pub(crate) fn report(&self, spec: &RateGroup) -> GroupReport {
+        GroupReport {
+            name: spec.name.clone(),
+            rate: spec.rate,
+            released: self.released,
+            skipped: self.skipped.total(),
+            slips: self.skipped,
+            elapsed_periods: self.elapsed_periods(),
+            missed_deadlines: self.missed,
+            degraded: self.degraded,
+        }
+    }
+
     /// Decides what to do now that the wait for the next release is over, and books what is skipped.
     pub(crate) fn decide(&mut self, woke: Nanos) -> Decision {
         // Late because it was asleep, because its own work went on for more than a period, or else for the reason that
         // the release before was late already.
-        if self.previous_end <= self.timeline.due(self.next) {
+        if std::mem::take(&mut self.down) {
+            self.lateness = SlipCause::Fault;
+        } else if self.previous_end <= self.timeline.due(self.next) {
             self.lateness = SlipCause::LateWake;
         } else if self.previous_work > self.period {
             self.lateness = SlipCause::LongTick;

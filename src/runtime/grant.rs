@@ -77,6 +77,7 @@ const OTHER: &str = "SCHED_OTHER";
 
 /// Sets the calling thread up for `spec` as far as the system allows.
 pub(super) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
+    os::block_signals();
     let mut refused = Vec::new();
     let mut granted = |result: Result<(), String>| result.map_err(|reason| refused.push(reason)).is_ok();
     let timer_slack = os::set_timer_slack().map_or_else(|reason| reason, |()| "1 ns".to_owned());

@@ -50,7 +50,7 @@
 //! assert_eq!(*display.get(), 0.040); // published at 40 ms, visible from 45 ms on
 //!
 //! running.wait_for(Duration::MAX);
-//! let report = running.stop()?;
+//! let report = running.stop();
 //! assert_eq!(report.groups[0].released, 101);
 //! assert_eq!(report.fault, None);
 //! # Ok::<(), palpate::Error>(())
@@ -72,6 +72,7 @@ pub mod record;
 mod recorder;
 mod release;
 mod report;
+mod restart;
 mod rewire;
 pub mod ring;
 mod running;
@@ -92,6 +93,7 @@ pub use rate_group::{OverrunPolicy, RateGroup, Wait};
 pub use record::{Channel, Event, Record, SlipCause, TickTiming};
 pub use recorder::{RecordDrain, Recorder};
 pub use report::{GroupReport, RuntimeFault, RuntimeReport};
+pub use restart::Restart;
 pub use rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};
 pub use running::{Running, Runtime, STOP_BOUND};
 pub use supervisor::StopHandle;

@@ -2,7 +2,7 @@
 //!
 //! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
 
-pub(crate) use imp::{lock_memory, monotonic, set_realtime, set_timer_slack, sleep_until};
+pub(crate) use imp::{block_signals, lock_memory, monotonic, set_realtime, set_timer_slack, sleep_until};
 
 use std::fs::read_to_string;
 
@@ -70,6 +70,23 @@ mod imp {
         if result == 0 { Ok(()) } else { Err(format!("SCHED_FIFO {priority} refused: {}", Error::last_os_error())) }
     }
 
+    /// Leaves signals to the program's other threads: a handler on this one would make system calls in a tick. Those that
+    /// a thread causes itself, by a bad access for example, stay.
+    pub(crate) fn block_signals() {
+        const OWN: [libc::c_int; 6] =
+            [libc::SIGSEGV, libc::SIGBUS, libc::SIGFPE, libc::SIGILL, libc::SIGTRAP, libc::SIGABRT];
+        let mut set = std::mem::MaybeUninit::<libc::sigset_t>::uninit();
+        // SAFETY: `sigfillset` initialises the set, which the others then read and write; none keeps the pointer.
+        unsafe {
+            libc::sigfillset(set.as_mut_ptr());
+            for signal in OWN {
+                libc::sigdelset(set.as_mut_ptr(), signal);
+            }
+            // Cannot fail with this first argument.
+            libc::pthread_sigmask(libc::SIG_BLOCK, set.as_ptr(), std::ptr::null_mut());
+        }
+    }
+
     /// Makes the calling thread's sleeps end as close to their time as the timer can.
     pub(crate) fn set_timer_slack() -> Result<(), String> {
         // SAFETY: PR_SET_TIMERSLACK takes a number and touches no memory.
@@ -131,6 +148,8 @@ mod imp {
     pub(crate) fn set_realtime(_priority: u8) -> Result<(), String> {
         Err(NOT_AVAILABLE.to_owned())
     }
+
+    pub(crate) fn block_signals() {}
 
     pub(crate) fn set_timer_slack() -> Result<(), String> {
         Err(NOT_AVAILABLE.to_owned())

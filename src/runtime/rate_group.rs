@@ -79,6 +79,8 @@ pub struct RateGroup {
     pub(super) overrun: OverrunPolicy,
     pub(super) wait: Wait,
     pub(super) observer: bool,
+    pub(super) wind_down: Nanos,
+    pub(super) wind_down_at_end: bool,
 }
 
 impl RateGroup {
@@ -96,6 +98,8 @@ impl RateGroup {
             overrun: OverrunPolicy::default(),
             wait: Wait::default(),
             observer: false,
+            wind_down: Nanos::ZERO,
+            wind_down_at_end: false,
         }
     }
 
@@ -177,6 +181,22 @@ impl RateGroup {
     #[must_use]
     pub fn observer(mut self) -> Self {
         self.observer = true;
+        self
+    }
+
+    /// When a stop is requested or an actor of the group has failed, the group is released for this long in
+    /// [`Mode::Stopping`](super::Mode::Stopping), without the failed actor, so that it can bring what it drives to rest.
+    #[must_use]
+    pub fn wind_down(mut self, time: Nanos) -> Self {
+        self.wind_down = time;
+        self
+    }
+
+    /// It also [winds down](Self::wind_down) after its last release when the run ends
+    /// [by itself](super::RuntimeBuilder::until).
+    #[must_use]
+    pub fn wind_down_at_end(mut self) -> Self {
+        self.wind_down_at_end = true;
         self
     }
 

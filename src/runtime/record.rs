@@ -60,18 +60,18 @@ pub enum SlipCause {
     StalledPeer = 3,
     /// The overrun policy gave the period up.
     Policy = 4,
+    /// The group had failed and was not yet started again.
+    Fault = 5,
 }
 
 impl SlipCause {
+    /// All of them, by number.
+    pub const ALL: [Self; 6] =
+        [Self::None, Self::LateWake, Self::LongTick, Self::StalledPeer, Self::Policy, Self::Fault];
+
     /// The cause with this number; unknown numbers read as [`SlipCause::None`].
     pub fn from_code(code: u8) -> Self {
-        match code {
-            1 => Self::LateWake,
-            2 => Self::LongTick,
-            3 => Self::StalledPeer,
-            4 => Self::Policy,
-            _ => Self::None,
-        }
+        Self::ALL.get(usize::from(code)).copied().unwrap_or_default()
     }
 
     /// A short name for tables and logs.
@@ -82,6 +82,7 @@ impl SlipCause {
             Self::LongTick => "long tick",
             Self::StalledPeer => "stalled peer",
             Self::Policy => "policy",
+            Self::Fault => "fault",
         }
     }
 }
@@ -172,6 +173,13 @@ impl Event {
     pub const STOPPED: u32 = 3;
     /// The code of a group's degraded releases changed; `detail` is the code, [`Event::RECOVERED`] when there is none.
     pub const DEGRADED: u32 = 4;
+    /// A group that had failed was started again; `detail` counts its restarts.
+    pub const RESTARTED: u32 = 16;
+    /// A thread did not return from its release and was left behind; `detail` is the time that it was given, in
+    /// nanoseconds.
+    pub const ABANDONED: u32 = 17;
+    /// The group began to bring what it drives to rest; `detail` is the number of periods that it has.
+    pub const WINDING_DOWN: u32 = 18;
     /// The detail of [`Event::DEGRADED`] when the group is back to normal.
     pub const RECOVERED: u64 = u64::MAX;
 }

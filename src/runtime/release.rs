@@ -2,29 +2,41 @@
 
 use super::actor::{Actor, Mode, Outcome, TickContext};
 use super::deadline::{Decision, Ledger};
+use super::exchange::ExchangeWriter;
+use super::panic_hook::{place, quietly};
 use super::rate_group::RateGroup;
 use super::record::Event;
 use super::recorder::Recorder;
 use super::report::{GroupReport, RuntimeFault};
+use super::restart::start_context;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// An actor in its group.
+struct Member {
+    actor: Box<dyn Actor>,
+    /// Kept apart: after a panic an actor is not asked anything but to stop.
+    name: String,
+    /// It panicked or reported a fault while the others wind down: it was stopped and is not called again.
+    failed: bool,
+}
 
 /// A group with its actors, its books and its own record ring.
 pub(crate) struct GroupRun {
     pub(crate) index: u16,
     pub(crate) spec: RateGroup,
     pub(crate) ledger: Ledger,
-    actors: Vec<Box<dyn Actor>>,
-    /// Kept apart: after a panic an actor is not asked anything but to stop.
-    names: Vec<String>,
+    members: Vec<Member>,
     recorder: Option<Recorder>,
+    /// Where a supervisor reads how far a group is that may have to be left behind.
+    books: Option<ExchangeWriter<Ledger>>,
     last: TickContext,
     started: usize,
-    degraded: u64,
     degraded_code: Option<u32>,
-    /// After a fault the actors are stopped and nothing else.
+    winding_down: bool,
+    /// After a fault the actors are stopped and nothing else, unless the group winds down.
     faulted: bool,
 }
 
@@ -40,40 +52,40 @@ impl GroupRun {
         spec: RateGroup,
         actors: Vec<Box<dyn Actor>>,
         recorder: Option<Recorder>,
-        until: Option<Nanos>,
+        ledger: Ledger,
     ) -> Self {
-        let dt = spec.rate.period_s();
-        let last = TickContext {
-            tick: 0,
-            scheduled: Nanos::ZERO,
-            now: Nanos::ZERO,
-            dt_nominal: dt,
-            dt_measured: dt,
-            slips: 0,
-            mode: Mode::Normal,
-            visible_at: Nanos::ZERO,
-        };
-        let names = actors.iter().map(|actor| actor.name().to_owned()).collect();
-        let ledger = Ledger::new(index, &spec, until);
+        let last = start_context(&spec, &ledger, Nanos::ZERO);
+        let member = |actor: Box<dyn Actor>| Member { name: actor.name().to_owned(), actor, failed: false };
         Self {
             index,
             spec,
             ledger,
-            actors,
-            names,
+            members: actors.into_iter().map(member).collect(),
             recorder,
+            books: None,
             last,
             started: 0,
-            degraded: 0,
             degraded_code: None,
+            winding_down: false,
             faulted: false,
         }
+    }
+
+    /// Publishes the books after every release from now on.
+    pub(super) fn publish_books(&mut self, books: ExchangeWriter<Ledger>) {
+        self.books = Some(books);
+    }
+
+    /// Starts the actors between two releases, in the place of ones that failed.
+    pub(super) fn start_at(&mut self, now: Nanos) -> Result<(), Error> {
+        self.last = start_context(&self.spec, &self.ledger, now);
+        self.start()
     }
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
     pub(crate) fn start(&mut self) -> Result<(), Error> {
         let ctx = self.last;
-        for (actor, name) in self.actors.iter_mut().zip(&self.names) {
+        for Member { actor, name, .. } in &mut self.members {
             let place = || format!("rate group `{}`, actor `{name}`", self.spec.name);
             // Counted first: an actor that fails half-way may hold something to give back.
             self.started += 1;
@@ -91,10 +103,27 @@ impl GroupRun {
     /// Stops the actors that were started, when another one's start failed.
     pub(crate) fn undo_start(&mut self) {
         let ctx = self.last;
-        for actor in self.actors.iter_mut().take(self.started) {
+        for member in self.members.iter_mut().take(self.started) {
             // The start's error is the one to report.
-            let _ = catch_unwind(AssertUnwindSafe(|| actor.stop(&ctx)));
+            let _ = catch_unwind(AssertUnwindSafe(|| member.actor.stop(&ctx)));
         }
+    }
+
+    /// Goes on in [`Mode::Stopping`] for as long as the group asked for; false if it did not or has done so already.
+    pub(crate) fn begin_wind_down(&mut self) -> bool {
+        let periods = self.spec.rate.last_release(self.spec.wind_down);
+        if self.winding_down || periods == 0 {
+            return false;
+        }
+        self.winding_down = true;
+        self.faulted = false;
+        self.ledger.end_after(periods);
+        self.event(self.ledger.due(self.ledger.elapsed_periods()), Event::WINDING_DOWN, periods);
+        true
+    }
+
+    pub(crate) fn is_winding_down(&self) -> bool {
+        self.winding_down
     }
 
     /// Runs what is to run after a wait that ended at `woke`: at most one release.
@@ -121,7 +150,7 @@ impl GroupRun {
             dt_nominal,
             dt_measured: if first { dt_nominal } else { now.saturating_sub(self.last.now).as_secs_f64() },
             slips: u32::try_from(skipped).unwrap_or(u32::MAX),
-            mode: Mode::Normal,
+            mode: if self.winding_down { Mode::Stopping } else { Mode::Normal },
             visible_at: scheduled + self.spec.latency,
         };
         self.last = ctx;
@@ -130,6 +159,10 @@ impl GroupRun {
         if let Some(recorder) = &mut self.recorder {
             recorder.push(timing);
         }
+        if let Some(books) = &mut self.books {
+            *books.buffer() = self.ledger;
+            books.publish(scheduled);
+        }
         result
     }
 
@@ -137,9 +170,8 @@ impl GroupRun {
     fn work(&mut self, ctx: &TickContext) -> Result<(), RuntimeFault> {
         let mut current = 0;
         let mut degraded = None;
-        let actors = &mut self.actors;
-        // Unwind safe: after a panic the actors are stopped and dropped, nothing else.
-        let done = catch_unwind(AssertUnwindSafe(|| {
+        let members = &mut self.members;
+        let work = || {
             let mut note = |outcome| match outcome {
                 Outcome::Continue => Ok(()),
                 Outcome::Degraded(code) => {
@@ -148,17 +180,18 @@ impl GroupRun {
                 }
                 Outcome::Fault(code) => Err(code),
             };
-            for (index, actor) in actors.iter_mut().enumerate() {
+            for (index, member) in members.iter_mut().enumerate().filter(|(_, member)| !member.failed) {
                 current = index;
-                note(actor.tick(ctx))?;
+                note(member.actor.tick(ctx))?;
             }
-            for (index, actor) in actors.iter_mut().enumerate().rev() {
+            for (index, member) in members.iter_mut().enumerate().rev().filter(|(_, member)| !member.failed) {
                 current = index;
-                note(actor.commit(ctx))?;
+                note(member.actor.commit(ctx))?;
             }
             Ok(())
-        }));
-        match done {
+        };
+        // Unwind safe: after a panic the actor is stopped and dropped, nothing else.
+        match quietly(|| catch_unwind(AssertUnwindSafe(work))) {
             Ok(Ok(())) => {
                 self.note_degraded(ctx, degraded);
                 Ok(())
@@ -169,7 +202,7 @@ impl GroupRun {
     }
 
     fn note_degraded(&mut self, ctx: &TickContext, code: Option<u32>) {
-        self.degraded += u64::from(code.is_some());
+        self.ledger.degraded += u64::from(code.is_some());
         if code != self.degraded_code {
             self.degraded_code = code;
             self.event(ctx.scheduled, Event::DEGRADED, code.map_or(Event::RECOVERED, u64::from));
@@ -178,18 +211,43 @@ impl GroupRun {
 
     fn fatal(&mut self, actor: usize, fatal: Fatal) -> RuntimeFault {
         self.faulted = true;
+        let name = self.members[actor].name.clone();
+        let may_recover = matches!(fatal, Fatal::Panic(_)) && !self.winding_down;
+        let fault = self.describe(&name, actor, fatal);
+        // The others go on for a while: what this one holds must not wait for that.
+        if self.spec.wind_down > Nanos::ZERO && !(may_recover && self.recovers(actor)) {
+            self.fail(actor);
+        }
+        fault
+    }
+
+    fn recovers(&mut self, actor: usize) -> bool {
+        let member = &mut self.members[actor];
+        quietly(|| catch_unwind(AssertUnwindSafe(|| member.actor.recover()))).unwrap_or(false)
+    }
+
+    fn describe(&mut self, name: &str, actor: usize, fatal: Fatal) -> RuntimeFault {
         let at = self.last.scheduled;
         let what = match fatal {
             Fatal::Panic(text) => {
                 self.event(at, Event::PANIC, actor as u64);
-                format!("panicked: {text}")
+                format!("panicked{}: {text}", place())
             }
             Fatal::Fault(code) => {
                 self.event(at, Event::FAULT, code.into());
                 format!("reported fault {code}")
             }
         };
-        RuntimeFault { group: self.spec.name.clone(), actor: self.names[actor].clone(), at, what }
+        RuntimeFault { group: self.spec.name.clone(), actor: name.to_owned(), at, what }
+    }
+
+    fn fail(&mut self, actor: usize) {
+        let ctx = self.last;
+        let member = &mut self.members[actor];
+        if !std::mem::replace(&mut member.failed, true) {
+            // The fault that led here is the one to report.
+            let _ = quietly(|| catch_unwind(AssertUnwindSafe(|| member.actor.stop(&ctx))));
+        }
     }
 
     fn overrun(&mut self, skipped: u64) -> RuntimeFault {
@@ -222,23 +280,21 @@ impl GroupRun {
     pub(crate) fn finish(mut self, now: Nanos) -> (GroupReport, Option<RuntimeFault>) {
         let ctx = TickContext { now, ..self.last };
         let mut fault = None;
-        for (index, mut actor) in std::mem::take(&mut self.actors).into_iter().enumerate() {
-            let stopped = catch_unwind(AssertUnwindSafe(|| actor.stop(&ctx)));
-            let dropped = catch_unwind(AssertUnwindSafe(move || drop(actor)));
+        let names: Vec<String> = self.members.iter().map(|member| member.name.clone()).collect();
+        for (index, Member { mut actor, failed, .. }) in std::mem::take(&mut self.members).into_iter().enumerate() {
+            let stop = || {
+                if !failed {
+                    actor.stop(&ctx);
+                }
+            };
+            let stopped = quietly(|| catch_unwind(AssertUnwindSafe(stop)));
+            let dropped = quietly(|| catch_unwind(AssertUnwindSafe(move || drop(actor))));
             if let Err(panic) = stopped.and(dropped) {
-                fault.get_or_insert_with(|| self.fatal(index, Fatal::Panic(format!("{} (in stop)", text_of(&*panic)))));
+                let fatal = Fatal::Panic(format!("{} (in stop)", text_of(&*panic)));
+                fault.get_or_insert_with(|| self.describe(&names[index], index, fatal));
             }
         }
-        let report = GroupReport {
-            name: self.spec.name,
-            rate: self.spec.rate,
-            released: self.ledger.released,
-            skipped: self.ledger.skipped.total(),
-            slips: self.ledger.skipped,
-            elapsed_periods: self.ledger.elapsed_periods(),
-            missed_deadlines: self.ledger.missed,
-            degraded: self.degraded,
-        };
+        let report = self.ledger.report(&self.spec);
         (report, fault)
     }
 }

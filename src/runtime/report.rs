@@ -50,14 +50,18 @@ impl fmt::Display for RuntimeFault {
 }
 
 /// The report of a run.
+///
+/// A group that did not end when it was told to has no sums and is the fault, unless there was one before.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RuntimeReport {
-    /// One per rate group, in graph order.
+    /// One per rate group that ended, in graph order.
     pub groups: Vec<GroupReport>,
     /// What the system granted.
     pub grant: SystemGrant,
     /// The fault that ended the run, if one did.
     pub fault: Option<RuntimeFault>,
+    /// Faults that were answered by starting the group again, group by group.
+    pub restarts: Vec<RuntimeFault>,
     /// Records that a full ring dropped; 0 if the graph has no drain.
     pub lost_records: u64,
 }
@@ -82,6 +86,9 @@ impl fmt::Display for RuntimeReport {
         }
         if self.lost_records > 0 {
             writeln!(f, "{} records lost", self.lost_records)?;
+        }
+        for fault in &self.restarts {
+            writeln!(f, "restarted after a fault: {fault}")?;
         }
         match &self.fault {
             Some(fault) => write!(f, "stopped by a fault: {fault}"),

@@ -63,7 +63,7 @@ impl<W, R> Pair<W, R> {
 }
 
 enum ExchangeParts<T> {
-    Threaded { pair: Pair<ExchangeWriter<T>, ExchangeReader<T>>, versions: VersionCounter },
+    Threaded { pair: Box<Pair<ExchangeWriter<T>, ExchangeReader<T>>>, versions: VersionCounter },
     Virtual(SharedFlight<T>),
 }
 
@@ -72,7 +72,7 @@ pub struct ExchangePort<T>(Arc<Mutex<ExchangeParts<T>>>);
 
 impl<T: Send + 'static> ExchangePort<T> {
     pub(super) fn threaded(init: impl FnMut() -> T + Send + 'static) -> Self {
-        let pair = Pair::<ExchangeWriter<T>, ExchangeReader<T>>::of_exchange(init);
+        let pair = Box::new(Pair::<ExchangeWriter<T>, ExchangeReader<T>>::of_exchange(init));
         Self(Arc::new(Mutex::new(ExchangeParts::Threaded { pair, versions: VersionCounter::default() })))
     }
 
@@ -104,7 +104,7 @@ impl<T: Send + 'static> ExchangePort<T> {
 }
 
 enum QueueParts<T> {
-    Threaded(Pair<Producer<T>, Consumer<T>>),
+    Threaded(Box<Pair<Producer<T>, Consumer<T>>>),
     Virtual(VirtualQueue<T>),
 }
 
@@ -113,7 +113,7 @@ pub struct QueuePort<T>(Arc<Mutex<QueueParts<T>>>);
 
 impl<T: Copy + Send + 'static> QueuePort<T> {
     pub(super) fn threaded(capacity: usize) -> Self {
-        let pair = Pair::<Producer<T>, Consumer<T>>::of_ring(capacity);
+        let pair = Box::new(Pair::<Producer<T>, Consumer<T>>::of_ring(capacity));
         Self(Arc::new(Mutex::new(QueueParts::Threaded(pair))))
     }
 

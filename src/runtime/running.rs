@@ -1,10 +1,13 @@
 //! A built graph and a run in progress.
 
 use super::builder::{Execution, RuntimeBuilder};
+use super::deadline::Ledger;
+use super::exchange::ExchangeReader;
 use super::grant::{GrantHandle, SystemGrant};
 use super::recorder::Registry;
 use super::release::GroupRun;
-use super::report::RuntimeReport;
+use super::report::{RuntimeFault, RuntimeReport};
+use super::restart::Restarter;
 use super::supervisor::{Control, StopHandle};
 use super::threaded::{Threads, start_actors};
 use super::virtual_time::VirtualRun;
@@ -24,6 +27,7 @@ const POLL: Duration = Duration::from_millis(5);
 pub struct Runtime {
     execution: Execution,
     groups: Vec<GroupRun>,
+    restarters: Vec<Option<(Restarter, ExchangeReader<Ledger>)>>,
     registry: Arc<Registry>,
     grants: GrantHandle,
 }
@@ -37,10 +41,11 @@ impl Runtime {
     pub(super) fn new(
         execution: Execution,
         groups: Vec<GroupRun>,
+        restarters: Vec<Option<(Restarter, ExchangeReader<Ledger>)>>,
         registry: Arc<Registry>,
         grants: GrantHandle,
     ) -> Self {
-        Self { execution, groups, registry, grants }
+        Self { execution, groups, restarters, registry, grants }
     }
 
     /// Sets the threads up, then starts all actors one after the other on this thread, then releases the groups.
@@ -51,19 +56,51 @@ impl Runtime {
     /// The error of the first actor whose start failed, after those already started were stopped; or
     /// [`ErrorKind::Runtime`] if the system gives no thread.
     pub fn start(self) -> Result<Running, Error> {
-        let Self { execution, mut groups, registry, grants } = self;
+        let Self { execution, mut groups, restarters, registry, grants } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names = groups.iter().map(|group| group.spec.name.clone()).collect();
         let executor = match execution {
-            Execution::Threaded => Executor::Threaded(Threads::start(groups, Arc::clone(&control), &grants)?),
+            Execution::Threaded => {
+                Executor::Threaded(Threads::start(groups, restarters, Arc::clone(&control), &grants)?)
+            }
             Execution::Virtual => {
                 grants.set(SystemGrant::of_virtual_time(groups.iter().map(|group| &group.spec)));
                 start_actors(&mut groups)?;
-                Executor::Virtual(VirtualRun::new(groups, Arc::clone(&control)))
+                let restarters =
+                    restarters.into_iter().map(|restart| restart.map(|(restarter, _)| restarter)).collect();
+                Executor::Virtual(VirtualRun::new(groups, restarters, Arc::clone(&control)))
             }
         };
-        Ok(Running { executor: Mutex::new(executor), control, names, registry, grants })
+        let executor = Arc::new(Mutex::new(executor));
+        watch(&executor)?;
+        Ok(Running { executor, control, names, registry, grants })
     }
+}
+
+/// Starts a thread that answers faults while the program does not look, if there is a group that can be started again.
+/// It ends with the run.
+fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), Error> {
+    let needed = matches!(&*lock(executor), Executor::Threaded(threads) if threads.need_watching());
+    if !needed {
+        return Ok(());
+    }
+    let watched = Arc::downgrade(executor);
+    let over = |executor: &mut Executor| match executor {
+        Executor::Threaded(threads) => threads.poll(),
+        Executor::Virtual(_) => true,
+    };
+    let watch = move || {
+        while watched.upgrade().is_some_and(|executor| !over(&mut lock(&executor))) {
+            std::thread::sleep(POLL);
+        }
+    };
+    let thread = std::thread::Builder::new().name("supervisor".to_owned()).spawn(watch);
+    thread.map(drop).map_err(|error| Error::new(ErrorKind::Runtime, format!("no thread for the supervisor: {error}")))
+}
+
+fn lock(executor: &Mutex<Executor>) -> MutexGuard<'_, Executor> {
+    // Actors' panics are caught before they get here; the executor's own state stays whole.
+    executor.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl fmt::Debug for Runtime {
@@ -80,7 +117,7 @@ enum Executor {
 
 /// A run in progress. Dropping it stops it, within [`STOP_BOUND`] for each group that does not end.
 pub struct Running {
-    executor: Mutex<Executor>,
+    executor: Arc<Mutex<Executor>>,
     control: Arc<Control>,
     names: Vec<String>,
     registry: Arc<Registry>,
@@ -131,28 +168,28 @@ impl Running {
         StopHandle(Arc::clone(&self.control))
     }
 
-    /// Stops the run in order and reports. A fault of an actor is in the report, not an error.
-    ///
-    /// # Errors
-    /// [`ErrorKind::Fault`] naming the groups that did not end within [`STOP_BOUND`]; their threads are given up.
-    pub fn stop(self) -> Result<RuntimeReport, Error> {
-        let stuck = self.end();
-        if !stuck.is_empty() {
-            return Err(Error::new(
-                ErrorKind::Fault,
-                format!(
-                    "rate group `{}` did not end within {STOP_BOUND:?} of a stop and was given up; its tick or stop \
-                     must return",
-                    stuck.join("`, `")
-                ),
-            ));
-        }
-        let (groups, fault) = match &*self.lock() {
+    /// Stops the run in order and reports. A fault of an actor is in the report, not an error; so is a group that did not
+    /// end within [`STOP_BOUND`] and was given up with its thread.
+    pub fn stop(self) -> RuntimeReport {
+        let given_up = self.end();
+        let executor = self.lock();
+        let (groups, fault) = match &*executor {
             Executor::Threaded(threads) => threads.supervisor.results(),
             Executor::Virtual(run) => run.supervisor.results(),
         };
+        let (restarts, at) = match &*executor {
+            Executor::Threaded(threads) => (threads.restarts(), threads.elapsed()),
+            Executor::Virtual(run) => (run.restarts(), run.now()),
+        };
+        let stuck = || RuntimeFault {
+            group: given_up.join("`, `"),
+            actor: String::new(),
+            at,
+            what: format!("did not end within {STOP_BOUND:?} of a stop and was given up; its tick or stop must return"),
+        };
+        let fault = fault.or_else(|| (!given_up.is_empty()).then(stuck));
         let grant = self.grants.get().unwrap_or_default();
-        Ok(RuntimeReport { groups, grant, fault, lost_records: self.registry.lost() })
+        RuntimeReport { groups, grant, fault, restarts, lost_records: self.registry.lost() }
     }
 
     /// Ends the run if it has not ended; returns the groups that had to be given up.
@@ -167,8 +204,7 @@ impl Running {
     }
 
     fn lock(&self) -> MutexGuard<'_, Executor> {
-        // Actors' panics are caught before they get here; the executor's own state stays whole.
-        self.executor.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.executor)
     }
 }
 
@@ -218,9 +254,9 @@ mod tests {
         let again = Instant::now();
         assert_eq!(given_up(STOP_BOUND), ["stuck"]);
         assert!(again.elapsed() < STOP_BOUND);
-        let error = running.stop().unwrap_err();
-        assert_eq!(error.kind(), ErrorKind::Fault);
-        assert!(error.to_string().contains("`stuck`"), "{error}");
+        let report = running.stop();
+        assert_eq!(report.fault.map(|fault| fault.group).as_deref(), Some("stuck"));
+        assert_eq!(report.groups.iter().map(|group| group.name.as_str()).collect::<Vec<_>>(), ["log"]);
         drop(release);
     }
 }

@@ -1,8 +1,10 @@
 //! Who is still running, what went wrong first, and in which order things stop.
 //!
-//! Order: a stop is requested (by the program, by a signal, by a fault); every group that is no observer ends after the
-//! release it is in and stops its actors; then every observer ticks once more, sees all they left behind, and stops.
+//! Order: a stop is requested (by the program, by a signal, by a fault); every group that is no observer winds down if it
+//! asked for that, ends after the release it is in and stops its actors; then every observer ticks once more, sees all
+//! they left behind, and stops.
 
+use super::deadline::Ledger;
 use super::report::{GroupReport, RuntimeFault};
 use super::sync::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::Arc;
@@ -49,6 +51,27 @@ impl Control {
     }
 }
 
+/// Something that is once true and stays so.
+#[derive(Debug)]
+pub(crate) struct Flag(AtomicBool);
+
+impl Default for Flag {
+    fn default() -> Self {
+        Self(AtomicBool::new(false))
+    }
+}
+
+impl Flag {
+    pub(crate) fn raise(&self) {
+        // Relaxed, here and where it is read: no data depends on it.
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    pub(crate) fn is_raised(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
 /// Asks a run to stop, from any thread, also from one that handles signals.
 #[derive(Clone, Debug)]
 pub struct StopHandle(pub(super) Arc<Control>);
@@ -78,6 +101,21 @@ pub(crate) enum Message {
     Fault(RuntimeFault),
     /// The group with this number has ended, its actors are gone.
     Ended(usize, Box<GroupReport>),
+    /// The actors of a restartable group failed and are gone; nobody has been told to stop.
+    Failed(Box<Failure>),
+}
+
+/// A restartable group after a fault.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    pub(crate) group: usize,
+    /// Which of its threads says so, counting from 0: one that was left behind has nothing to say any more.
+    pub(crate) incarnation: usize,
+    pub(crate) fault: RuntimeFault,
+    /// The group's sums, should it not be started again.
+    pub(crate) report: GroupReport,
+    /// Its books, should it be.
+    pub(crate) books: Ledger,
 }
 
 /// Collects what the groups report.
@@ -99,6 +137,10 @@ impl Supervisor {
                 self.fault.get_or_insert(fault);
             }
             Message::Ended(group, report) => self.reports[group] = Some(*report),
+            Message::Failed(failure) => {
+                self.fault.get_or_insert(failure.fault);
+                self.reports[failure.group] = Some(failure.report);
+            }
         }
     }
 

@@ -3,8 +3,10 @@
 //! A release begins when it is scheduled and ends after the declared latency of its group; nothing is ever late, and two
 //! runs of the same graph are bit-identical.
 
+use super::panic_hook;
 use super::release::GroupRun;
 use super::report::RuntimeFault;
+use super::restart::Restarter;
 use super::supervisor::{Control, Message, Supervisor};
 use crate::time::Nanos;
 use std::sync::Arc;
@@ -13,15 +15,20 @@ use std::sync::Arc;
 pub(crate) struct VirtualRun {
     /// `None` for groups that have ended.
     groups: Vec<Option<GroupRun>>,
+    restarters: Vec<Option<Restarter>>,
     now: Nanos,
+    /// Set once every group was told to stop.
+    stopping: bool,
     control: Arc<Control>,
     pub(crate) supervisor: Supervisor,
 }
 
 impl VirtualRun {
-    pub(crate) fn new(groups: Vec<GroupRun>, control: Arc<Control>) -> Self {
+    pub(crate) fn new(groups: Vec<GroupRun>, restarters: Vec<Option<Restarter>>, control: Arc<Control>) -> Self {
+        panic_hook::install();
         let supervisor = Supervisor::new(groups.len());
-        let mut run = Self { groups: groups.into_iter().map(Some).collect(), now: Nanos::ZERO, control, supervisor };
+        let groups = groups.into_iter().map(Some).collect();
+        let mut run = Self { groups, restarters, now: Nanos::ZERO, stopping: false, control, supervisor };
         run.end_what_is_over();
         run
     }
@@ -34,8 +41,9 @@ impl VirtualRun {
     pub(crate) fn advance(&mut self, span: Nanos) {
         let horizon = self.now + span;
         while !self.supervisor.all_ended() {
-            if self.control.stop_requested() {
-                return self.end_all();
+            if self.control.stop_requested() && !self.stopping {
+                self.begin_stop();
+                continue;
             }
             let Some((due, index)) = self.next() else { return self.end_all() };
             if due > horizon {
@@ -45,20 +53,58 @@ impl VirtualRun {
             self.now = due;
             if let Some(group) = &mut self.groups[index] {
                 let latency = group.spec.latency;
-                let result = group.release(due, |scheduled| scheduled, |scheduled| scheduled + latency);
-                self.note(result);
+                if let Err(fault) = group.release(due, |scheduled| scheduled, |scheduled| scheduled + latency) {
+                    self.answer(index, fault);
+                }
             }
             self.end_what_is_over();
         }
     }
 
-    /// Ends the run in order.
+    /// Ends the run in order: groups that wind down do so, in virtual time.
     pub(crate) fn end_all(&mut self) {
         self.control.request_stop();
-        for index in self.indices(false) {
-            self.end(index);
+        if !self.stopping {
+            self.advance(Nanos(u64::MAX));
         }
+        self.indices(false).into_iter().for_each(|index| self.end(index));
         self.end_observers();
+    }
+
+    /// Groups that wind down go on, the others end.
+    fn begin_stop(&mut self) {
+        self.stopping = true;
+        for index in self.indices(false) {
+            if !self.groups[index].as_mut().is_some_and(GroupRun::begin_wind_down) {
+                self.end(index);
+            }
+        }
+        self.end_what_is_over();
+    }
+
+    /// Starts a group again that has failed, or stops the run.
+    fn answer(&mut self, index: usize, fault: RuntimeFault) {
+        let now = self.now;
+        let restarter = self.restarters[index].as_mut().filter(|restarter| restarter.may_restart());
+        let Some(restarter) = restarter.filter(|_| !self.stopping) else { return self.note(Err(fault)) };
+        let Some(group) = self.groups[index].take() else { return };
+        let books = group.ledger;
+        // A fault in the stop of what has failed is its consequence.
+        let (report, _) = group.finish(now);
+        match restarter.again(fault.clone(), books, now) {
+            Ok((group, _)) => self.groups[index] = Some(group),
+            Err(error) => {
+                let what = format!("{}; it could not be started again: {error}", fault.what);
+                self.note(Err(RuntimeFault { what, ..fault }));
+                self.supervisor.note(Message::Ended(index, Box::new(report)));
+                self.control.group_ended();
+            }
+        }
+    }
+
+    /// Faults that were answered by a restart.
+    pub(crate) fn restarts(&self) -> Vec<RuntimeFault> {
+        self.restarters.iter().flatten().flat_map(|restarter| restarter.restarts.clone()).collect()
     }
 
     /// The next release; at equal times the group that was added first.
@@ -77,7 +123,10 @@ impl VirtualRun {
         for index in 0..self.groups.len() {
             let over = |group: &GroupRun| !group.spec.observer && group.ledger.next_due().is_none();
             if self.groups[index].as_ref().is_some_and(over) {
-                self.end(index);
+                let winds_down = |group: &mut GroupRun| group.spec.wind_down_at_end && group.begin_wind_down();
+                if !self.groups[index].as_mut().is_some_and(winds_down) {
+                    self.end(index);
+                }
             }
         }
         if self.control.observers_may_end() {

@@ -34,10 +34,12 @@ pub struct SafetySpec {
     pub max_force_n: Option<f64>,
     /// Largest change of the force (N/ms).
     pub max_slew_n_per_ms: f64,
+    /// Time in which the force goes to zero when the run stops or fails, and comes back after a gap (ms).
+    pub ramp_ms: f64,
 }
 
 impl Default for SafetySpec {
     fn default() -> Self {
-        Self { max_force_n: None, max_slew_n_per_ms: 0.5 }
+        Self { max_force_n: None, max_slew_n_per_ms: 0.5, ramp_ms: 100.0 }
     }
 }

@@ -220,11 +220,20 @@ fn attached(node: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
     Ok(())
 }
 
+/// A force that fades longer than this is no stop any more.
+const LONGEST_RAMP_MS: f64 = 2000.0;
+
 fn safety(safety: &SafetySpec) -> Result<(), Error> {
     if let Some(force_n) = safety.max_force_n {
         positive("safety.max_force_n", force_n)?;
     }
-    positive("safety.max_slew_n_per_ms", safety.max_slew_n_per_ms)
+    positive("safety.max_slew_n_per_ms", safety.max_slew_n_per_ms)?;
+    positive("safety.ramp_ms", safety.ramp_ms)?;
+    if safety.ramp_ms > LONGEST_RAMP_MS {
+        let message = format!("is {}, a stop may take {LONGEST_RAMP_MS} ms at most", safety.ramp_ms);
+        return Err(Error::scene("safety.ramp_ms", message));
+    }
+    Ok(())
 }
 
 fn initial(initial: &InitialSpec, block: &BlockSpec) -> Result<(), Error> {

@@ -1,18 +1,19 @@
 //! Wires actors and ports into a runtime and starts it.
 
+use super::global::{GlobalMaker, GlobalSide};
 use super::prepare::Prepared;
 use super::running::{Running, Viewer};
 use super::sink::{Memory, Sinks};
 use crate::actors::{
-    DeviceActor, DeviceSample, ForceCommand, GlobalActor, GlobalPorts, LocalActor, LocalPorts, LoggerActor,
-    LoggerOutcome, ModelSource, SurfaceView, ToolTick, ToolView, first_state,
+    Checkpoint, DeviceActor, DeviceSample, ForceCommand, LocalActor, LocalPorts, LoggerActor, LoggerOutcome,
+    ModelSource, SurfaceView, ToolTick, ToolView, first_state,
 };
 use crate::error::Error;
 use crate::log::{Environment, Execution as LogExecution, GroupInfo};
 use crate::model::Vec3;
 use crate::model::body::Block;
 use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
-use crate::runtime::{Actor, Execution, RateGroup, Runtime};
+use crate::runtime::{ExchangePort, Execution, RateGroup, Restart, Runtime};
 use crate::safety::{Actions, Pipeline};
 use crate::time::Rate;
 
@@ -37,8 +38,9 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let positions = prepared.simulation.state().positions.clone();
     let triangles = prepared.simulation.body().surface().triangles.clone();
     let (view_writer, view) = graph.outlet(ToolView::default);
-    let (surface_writer, surface) =
-        graph.outlet(|| SurfaceView { positions: positions.clone(), ..SurfaceView::default() });
+    let surface_port =
+        graph.outlet_port(move || SurfaceView { positions: positions.clone(), ..SurfaceView::default() });
+    let surface = surface_port.reader();
     let (sample_writer, samples) = graph.exchange(DeviceSample::default);
     let (command_writer, commands) = graph.exchange(ForceCommand::default);
 
@@ -51,32 +53,27 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let (source, models, global) = match prepared.kind.empty() {
         None => {
             let full = watching(Box::new(Full::new(prepared.simulation)), &probes);
-            (ModelSource::Alone(surface_writer), [full, spare(), spare()], None)
+            (ModelSource::Alone(surface_port.writer()), [full, spare(), spare()], None)
         }
         Some(_) => {
             let (kind, watched) = (prepared.kind, probes.clone());
             let model = move || watching(kind.empty().unwrap_or_else(spare), &watched);
             let rotating = [model(), model(), model()];
-            let (model_writer, model_reader) = graph.exchange(model);
-            let (tick_writer, ticks) = graph.queue(ticks_buffered);
-            let (geometry_writer, geometry) = match prepared.geometry_feedback {
-                true => {
-                    let (writer, reader) = graph.exchange(PatchGeometry::default);
-                    (Some(writer), Some(reader))
-                }
-                false => (None, None),
+            let ports = GlobalSide {
+                ticks: graph.queue_port(ticks_buffered),
+                geometry: prepared.geometry_feedback.then(|| graph.exchange_port(PatchGeometry::default)),
+                models: graph.exchange_port(model),
+                surface: surface_port,
+                checkpoint: graph.outlet_port(Checkpoint::default),
+                recorder: graph.recorder_port(ticks_buffered),
             };
-            let ports = GlobalPorts {
-                ticks,
-                geometry,
-                models: model_writer,
-                surface: surface_writer,
-                recorder: graph.recorder(ticks_buffered),
+            let source = ModelSource::Global {
+                models: ports.models.reader(),
+                ticks: ports.ticks.writer(),
+                geometry: ports.geometry.as_ref().map(ExchangePort::writer),
             };
             let tool = ToolTick { tick: 0, position: first.position };
-            let global = GlobalActor::new(prepared.simulation, tool, prepared.haptic, ports)?;
-            let source = ModelSource::Global { models: model_reader, ticks: tick_writer, geometry: geometry_writer };
-            (source, rotating, Some(global))
+            (source, rotating, Some(GlobalMaker::new(prepared.simulation, tool, prepared.haptic, ports)))
         }
     };
     let device = DeviceActor::new(
@@ -100,8 +97,13 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let outcome = LoggerOutcome::default();
     let logger = LoggerActor::new(graph.drain(), sinks, environment, graph.grants(), outcome.clone());
     graph.group(prepared.local, vec![Box::new(device), Box::new(local)]);
-    if let Some(global) = global {
-        graph.group(prepared.global, vec![Box::new(global) as Box<dyn Actor>]);
+    if let Some(mut maker) = global {
+        if maker.can_restart() {
+            graph.restartable(prepared.global, Restart::default(), move || maker.make());
+        } else {
+            let actors = maker.make()?;
+            graph.group(prepared.global, actors);
+        }
     }
     graph.group(RateGroup::new(LOGGER).name("logger").observer(), vec![Box::new(logger)]);
     if let Some(until) = prepared.until {

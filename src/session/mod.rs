@@ -13,6 +13,7 @@
 //! ```
 
 mod builder;
+mod global;
 mod graph;
 mod prepare;
 mod running;
@@ -54,10 +55,10 @@ impl Session {
     /// Runs it to its end, see [`SessionBuilder::duration_s`].
     ///
     /// # Errors
-    /// As [`start`](Self::start) and [`Running::stop`].
+    /// As [`start`](Self::start).
     pub fn run(self) -> Result<Summary, Error> {
         let running = self.start()?;
         running.wait();
-        running.stop()
+        Ok(running.stop())
     }
 }

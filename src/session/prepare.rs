@@ -116,6 +116,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         Some(device) => device,
         None => scripted(scene.device.path, attach.map(|node| state.positions[node as usize]))?,
     };
+    let exerts_force = device.exerts_force();
     let law = Law {
         friction: scene.contact.friction.coefficient(),
         normals: scene.contact.normals,
@@ -124,7 +125,9 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let limits = Limits {
         max_force_n: scene.safety.max_force_n.unwrap_or(device.capabilities().max_force_n),
         max_slew_n_per_s: scene.safety.max_slew_n_per_ms * 1e3,
+        ramp_s: scene.safety.ramp_ms * 1e-3,
     };
+    check_ramp(&limits)?;
     let kind = match scene.local.model {
         LocalModelKind::Full => Kind::Full,
         LocalModelKind::Hold => Kind::Hold,
@@ -158,7 +161,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         probes,
         haptic,
         global_rate,
-        local: local.name("local"),
+        local: winding_down(local.name("local"), limits.ramp_s, exerts_force),
         global,
         execution: parts.execution,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
@@ -179,6 +182,32 @@ fn block(spec: &BodySpec) -> Result<Block, Error> {
         .stiffness(spec.material.stiffness_n_per_m)
         .damping_ratio(spec.material.damping_ratio);
     spec.block.fixed.iter().fold(builder, |builder, &face| builder.fix(face)).build().map_err(|error| error.at("body"))
+}
+
+/// The haptic group as it ends: with time for the force to go to zero. A device that exerts none needs it only to show
+/// in the log what would have been done.
+fn winding_down(local: RateGroup, ramp_s: f64, exerts_force: bool) -> RateGroup {
+    let group = local.wind_down(Nanos::from_secs_f64(ramp_s + RAMP_MARGIN_S));
+    if exerts_force { group.wind_down_at_end() } else { group }
+}
+
+/// Releases of the wind-down that may be skipped without shortening the ramp (s).
+const RAMP_MARGIN_S: f64 = 0.005;
+
+/// The slew limit must not keep the force from being gone when the ramp is over.
+fn check_ramp(limits: &Limits) -> Result<(), Error> {
+    let needed_s = limits.max_force_n / limits.max_slew_n_per_s;
+    if limits.ramp_s >= needed_s {
+        return Ok(());
+    }
+    let message = format!(
+        "is {} ms, but the largest force of {} N takes {} ms at the slew limit: use that or more, or raise \
+         safety.max_slew_n_per_ms",
+        limits.ramp_s * 1e3,
+        limits.max_force_n,
+        (needed_s * 1e3).ceil()
+    );
+    Err(Error::scene("safety.ramp_ms", message))
 }
 
 /// What a rate group can ask for and a session cannot give.

@@ -70,15 +70,13 @@ impl Running {
         self.viewer.take()
     }
 
-    /// Ends the run and says how it went. A fault or a log that could not be written is part of the summary.
-    ///
-    /// # Errors
-    /// If a thread cannot be joined.
-    pub fn stop(self) -> Result<Summary, Error> {
-        let runtime = self.runtime.stop()?;
+    /// Ends the run and says how it went. A fault, a group that had to be given up or a log that could not be written is
+    /// part of the summary.
+    pub fn stop(self) -> Summary {
+        let runtime = self.runtime.stop();
         let (report, log_error) = self.outcome.take();
         let records = self.memory.map(|memory| memory.take()).unwrap_or_default();
-        Ok(Summary { report, runtime, log_error, records })
+        Summary { report, runtime, log_error, records }
     }
 }
 
@@ -138,7 +136,14 @@ pub struct Summary {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.report.groups.is_empty() {
+            // The logger, which counts all that, was given up: the runtime's own sums are what is left.
+            return writeln!(f, "{}", self.runtime);
+        }
         self.report.fmt(f)?;
+        for fault in &self.runtime.restarts {
+            writeln!(f, "restarted: {fault}")?;
+        }
         if let Some(fault) = &self.runtime.fault {
             writeln!(f, "fault: {fault}")?;
         }

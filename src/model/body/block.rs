@@ -160,6 +160,10 @@ impl Body for Block {
         }
     }
 
+    fn duplicate(&self) -> Option<Box<dyn Body>> {
+        Some(Box::new(self.clone()))
+    }
+
     fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
         self.lattice.window(self.surface.triangles[triangle as usize], size, nodes);
         nodes.retain(|&node| self.inverse_masses[node as usize] > 0.0);

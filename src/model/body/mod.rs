@@ -87,6 +87,12 @@ pub trait Body: Send + std::fmt::Debug {
     /// it diverges within one resync period.
     fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock));
 
+    /// A copy for a global model that is started again after a fault; `None`, the default, if there cannot be one: a
+    /// fault of the global model then stops the run.
+    fn duplicate(&self) -> Option<Box<dyn Body>> {
+        None
+    }
+
     /// Appends the nodes of a patch around surface triangle `triangle` to `nodes`, in increasing order and without
     /// held ones; `size` = nodes along the surface, along it, into depth.
     ///

@@ -1,0 +1,88 @@
+//! The force at the device through each fault: a table and a picture, from runs on real threads.
+//!
+//!     cargo run --release --example fault_traces              writes out/fault_traces/fault_traces.svg
+//!     cargo run --release --example fault_traces -- --docs    writes docs/img/fault_traces.svg too
+//!
+//! `tests/session_faults.rs` runs the same scenarios and checks them.
+
+#[path = "../common/drawing.rs"]
+mod drawing;
+mod scenarios;
+
+use drawing::{BLUE, Curve, Panel, Sheet};
+use palpate::log::LogRecord;
+use scenarios::{FAULT_S, Fault, RAMP_S, Trace};
+use std::path::Path;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    println!("Fault injected at {FAULT_S} s; declared ramp time {} ms.\n", RAMP_S * 1e3);
+    println!(
+        "| fault | force before (N) | answer | force gone (ms after the fault) | largest step (N) | model age at most (ms) |"
+    );
+    println!("| --- | ---: | --- | ---: | ---: | ---: |");
+    let mut panels = Vec::new();
+    for fault in Fault::ALL {
+        eprintln!("{} ...", fault.title());
+        let trace = scenarios::run(fault)?;
+        println!("{}", row(fault, &trace));
+        panels.push(panel(fault, &trace));
+    }
+    let mut rows = Vec::new();
+    while !panels.is_empty() {
+        rows.push(panels.drain(..panels.len().min(2)).collect());
+    }
+    let sheet = Sheet {
+        title: "The force at the device through each fault".to_owned(),
+        subtitle: format!("magnitude of the commanded force; the fault comes at {FAULT_S} s"),
+        legend: vec![("commanded force (N)".to_owned(), BLUE)],
+        rows,
+    };
+    let mut folders = vec!["out/fault_traces"];
+    if std::env::args().any(|argument| argument == "--docs") {
+        folders.push("docs/img");
+    }
+    for folder in folders {
+        std::fs::create_dir_all(folder)?;
+        let path = Path::new(folder).join("fault_traces.svg");
+        sheet.write(&path)?;
+        println!("\n{}", path.display());
+    }
+    Ok(())
+}
+
+fn row(fault: Fault, trace: &Trace) -> String {
+    let (before, rest) = trace.before_and_rest();
+    let gone = match rest.filter(|_| !fault.leaves_the_force()) {
+        Some(rest) => format!("{:.0}", (rest - FAULT_S) * 1e3),
+        None => "stays".to_owned(),
+    };
+    let magnitudes: Vec<f64> = trace.magnitudes().filter(|sample| sample.0 > FAULT_S - 0.01).map(|s| s.1).collect();
+    let step = magnitudes.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    let summary = trace.summary.as_ref();
+    let answer = match summary.map(|summary| &summary.runtime) {
+        None => "ramps out, threads joined".to_owned(),
+        Some(runtime) if runtime.fault.is_some() => "ramps out, run stops with the fault".to_owned(),
+        Some(runtime) if !runtime.restarts.is_empty() => "the haptic side runs on, the group is restarted".to_owned(),
+        Some(_) if fault == Fault::StopRequested => "ramps out, run ends".to_owned(),
+        Some(_) => "the haptic side runs on".to_owned(),
+    };
+    let ages = summary.into_iter().flat_map(|summary| &summary.records).filter_map(|record| match record {
+        LogRecord::Force(force) => Some(force.model_age_s),
+        _ => None,
+    });
+    let age = ages.fold(0.0, f64::max);
+    format!("| {} | {before:.2} | {answer} | {gone} | {step:.3} | {:.0} |", fault.title(), age * 1e3)
+}
+
+fn panel(fault: Fault, trace: &Trace) -> Panel {
+    let end = if fault.leaves_the_force() { trace.written.last().map_or(1.0, |last| last.0) } else { 0.8 };
+    let (times, values): (Vec<f64>, Vec<f64>) = trace.magnitudes().unzip();
+    Panel {
+        caption: fault.title().to_owned(),
+        y_label: "N",
+        times: 0.3..end,
+        curves: vec![Curve::new(&times, values, BLUE, 1.5)],
+        marks: vec![FAULT_S],
+        zoomed: None,
+    }
+}

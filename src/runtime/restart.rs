@@ -1,0 +1,136 @@
+//! Restarting a group whose actors failed, in place of stopping the whole run.
+
+use super::actor::{Actor, TickContext};
+use super::deadline::Ledger;
+use super::exchange::{ExchangeReader, exchange};
+use super::rate_group::RateGroup;
+use super::record::Event;
+use super::recorder::Recorder;
+use super::release::GroupRun;
+use super::report::{GroupReport, RuntimeFault};
+use super::rewire::RecorderPort;
+use crate::error::Error;
+use crate::time::Nanos;
+use std::fmt;
+
+/// Makes the actors of a group anew, with fresh halves of their ports.
+pub(super) type Factory = Box<dyn FnMut() -> Result<Vec<Box<dyn Actor>>, Error> + Send>;
+
+/// When and how often a group is started again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Restart {
+    /// Restarts in one run; the fault after the last of them stops the run.
+    pub at_most: u32,
+    /// Threads: a release that is due for this long and has not returned counts as one that never will. Its thread is
+    /// left behind with its ports, and a new one is started. Virtual time cannot see it.
+    pub hung_after: Nanos,
+}
+
+impl Default for Restart {
+    /// Three restarts; hung after two seconds.
+    fn default() -> Self {
+        Self { at_most: 3, hung_after: Nanos(2_000_000_000) }
+    }
+}
+
+/// What it takes to start a group again.
+pub(super) struct Restarter {
+    pub(super) policy: Restart,
+    factory: Factory,
+    index: u16,
+    spec: RateGroup,
+    until: Option<Nanos>,
+    records: Option<RecorderPort>,
+    /// Events of the supervisor about this group.
+    events: Option<Recorder>,
+    /// Every fault that was answered by a restart.
+    pub(super) restarts: Vec<RuntimeFault>,
+}
+
+impl Restarter {
+    pub(super) fn new(
+        policy: Restart,
+        factory: Factory,
+        index: u16,
+        spec: RateGroup,
+        until: Option<Nanos>,
+        records: Option<RecorderPort>,
+        events: Option<Recorder>,
+    ) -> Self {
+        Self { policy, factory, index, spec, until, records, events, restarts: Vec::new() }
+    }
+
+    /// The group as it is when the run starts.
+    pub(super) fn first(&mut self) -> Result<(GroupRun, ExchangeReader<Ledger>), Error> {
+        let ledger = Ledger::new(self.index, &self.spec, self.until);
+        self.make(ledger)
+    }
+
+    pub(super) fn may_restart(&self) -> bool {
+        self.restarts.len() < self.policy.at_most as usize
+    }
+
+    /// Makes the group again after `fault`, with the books of the one before, and starts its actors at `now`.
+    ///
+    /// # Errors
+    /// What the factory or a start says; the group then stays down.
+    pub(super) fn again(
+        &mut self,
+        fault: RuntimeFault,
+        mut ledger: Ledger,
+        now: Nanos,
+    ) -> Result<(GroupRun, ExchangeReader<Ledger>), Error> {
+        ledger.resume();
+        let (mut group, books) = self.make(ledger).map_err(|error| error.at(format!("restart after {fault}")))?;
+        group.start_at(now).inspect_err(|_| group.undo_start())?;
+        self.restarts.push(fault);
+        self.event(now, Event::RESTARTED, self.restarts.len() as u64);
+        Ok((group, books))
+    }
+
+    pub(super) fn group(&self) -> &str {
+        &self.spec.name
+    }
+
+    /// The sums of a group whose actors cannot be asked.
+    pub(super) fn report(&self, books: &Ledger) -> GroupReport {
+        books.report(&self.spec)
+    }
+
+    /// Notes that a thread was left behind.
+    pub(super) fn abandoned(&mut self, now: Nanos) {
+        self.event(now, Event::ABANDONED, self.policy.hung_after.0);
+    }
+
+    fn make(&mut self, ledger: Ledger) -> Result<(GroupRun, ExchangeReader<Ledger>), Error> {
+        let actors = (self.factory)()?;
+        let recorder = self.records.as_ref().map(RecorderPort::recorder);
+        let (writer, reader) = exchange(|| ledger);
+        let mut group = GroupRun::new(self.index, self.spec.clone(), actors, recorder, ledger);
+        group.publish_books(writer);
+        Ok((group, reader))
+    }
+
+    fn event(&mut self, stamp: Nanos, code: u32, detail: u64) {
+        if let Some(events) = &mut self.events {
+            events.push(Event { stamp, group: self.index, code, detail });
+        }
+    }
+}
+
+impl fmt::Debug for Restarter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Restarter").field("policy", &self.policy).finish_non_exhaustive()
+    }
+}
+
+/// The context of a start at `now`, before release 0 or between two releases.
+pub(super) fn start_context(spec: &RateGroup, ledger: &Ledger, now: Nanos) -> TickContext {
+    TickContext {
+        tick: ledger.elapsed_periods(),
+        scheduled: now,
+        now,
+        visible_at: now,
+        ..TickContext::by_hand(spec.rate(), 0)
+    }
+}

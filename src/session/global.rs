@@ -1,0 +1,83 @@
+//! Makes the global actor: once at the start, and again after a fault, from its last good state.
+
+use crate::actors::{Checkpoint, GlobalActor, GlobalPorts, SurfaceView, ToolTick};
+use crate::error::{Error, ErrorKind};
+use crate::model::local::{LocalModel, PatchGeometry};
+use crate::model::simulation::Simulation;
+use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RecorderPort};
+use crate::time::Rate;
+
+/// The ports whose global halves a new actor takes again.
+pub(super) struct GlobalSide {
+    pub(super) ticks: QueuePort<ToolTick>,
+    pub(super) geometry: Option<ExchangePort<PatchGeometry>>,
+    pub(super) models: ExchangePort<Box<dyn LocalModel>>,
+    pub(super) surface: OutletPort<SurfaceView>,
+    pub(super) checkpoint: OutletPort<Checkpoint>,
+    pub(super) recorder: RecorderPort,
+}
+
+impl GlobalSide {
+    fn take(&self) -> GlobalPorts {
+        GlobalPorts {
+            ticks: self.ticks.reader(),
+            geometry: self.geometry.as_ref().map(ExchangePort::reader),
+            models: self.models.writer(),
+            surface: self.surface.writer(),
+            checkpoint: self.checkpoint.writer(),
+            recorder: self.recorder.recorder(),
+        }
+    }
+}
+
+/// What a global actor is made of.
+pub(super) struct GlobalMaker {
+    /// For the first actor.
+    first: Option<Simulation>,
+    /// For all others; `None` if the body cannot be copied.
+    spare: Option<Simulation>,
+    /// The last state that was good; the start if there was none.
+    last: Checkpoint,
+    saved: OutletReader<Checkpoint>,
+    haptic: Rate,
+    side: GlobalSide,
+}
+
+impl GlobalMaker {
+    pub(super) fn new(simulation: Simulation, tool: ToolTick, haptic: Rate, side: GlobalSide) -> Self {
+        let spare = simulation.duplicate();
+        let last = Checkpoint { tool, state: simulation.state().clone(), contact: *simulation.contact() };
+        let saved = side.checkpoint.reader();
+        Self { first: Some(simulation), spare, last, saved, haptic, side }
+    }
+
+    pub(super) fn can_restart(&self) -> bool {
+        self.spare.is_some()
+    }
+
+    /// The actor, connected; the one before is cut off.
+    ///
+    /// # Errors
+    /// If the body has no surface, or was said to be copied and cannot be.
+    pub(super) fn make(&mut self) -> Result<Vec<Box<dyn Actor>>, Error> {
+        // First: taking the ports again cuts off the checkpoint too.
+        if self.saved.refresh() {
+            self.last.clone_from(self.saved.get());
+        }
+        let ports = self.side.take();
+        let simulation = match self.first.take() {
+            Some(first) => first,
+            None => self.restored()?,
+        };
+        Ok(vec![Box::new(GlobalActor::new(simulation, self.last.tool, self.haptic, ports)?)])
+    }
+
+    fn restored(&self) -> Result<Simulation, Error> {
+        let copy = self.spare.as_ref().and_then(Simulation::duplicate);
+        let mut simulation = copy.ok_or_else(|| Error::new(ErrorKind::Fault, "the body cannot be copied"))?;
+        let (state, contact) = simulation.state_mut();
+        state.clone_from(&self.last.state);
+        *contact = self.last.contact;
+        Ok(simulation)
+    }
+}

@@ -1,0 +1,119 @@
+//! What the system does to a run of the command: signals, a stopped process, a full disk, a log that nobody takes.
+#![cfg(all(target_os = "linux", feature = "cli", feature = "log"))]
+
+mod cli_support;
+
+use cli_support::{Folder, rows};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// The scene's default ramp (s).
+const RAMP_S: f64 = 0.1;
+
+/// Starts `palpate run` for at most `seconds` and waits until it has run for a while.
+fn start(folder: &Folder, seconds: &str, out: &str) -> Child {
+    let child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["run", "scene.toml", "--duration", seconds, "--out", out])
+        .current_dir(folder.path("."))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    child
+}
+
+fn signal(child: &Child, signal: &str) {
+    let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+}
+
+fn finish(child: Child) -> (Option<i32>, String, String) {
+    let output = child.wait_with_output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+/// Time and magnitude of every commanded force.
+fn commanded(folder: &Folder, log: &str) -> Vec<(f64, f64)> {
+    let csv = folder.succeed(&["export", log, "--topic", "/force_commanded"]);
+    rows(&csv).iter().map(|row| (row[0], row[1..4].iter().map(|c| c * c).sum::<f64>().sqrt())).collect()
+}
+
+#[test]
+fn an_interrupt_ramps_the_force_out_closes_the_log_and_says_so() {
+    for name in ["-INT", "-TERM"] {
+        let folder = Folder::new();
+        let child = start(&folder, "60", "run.mcap");
+        signal(&child, name);
+        let (code, out, err) = finish(child);
+        assert_eq!(code, Some(130), "{err}");
+        assert!(err.contains("interrupted after") && err.contains("of 60 s"), "{err}");
+        assert!(out.contains("released"), "{out}");
+        let commanded = commanded(&folder, "run.mcap");
+        let rest = commanded.iter().position(|sample| sample.0 > 0.5 && sample.1 == 0.0).expect("it comes to rest");
+        assert!(commanded[rest..].iter().all(|sample| sample.1 == 0.0));
+        // Check that it faded within the declared time, and did not drop
+        let full = commanded[..rest].iter().rposition(|sample| sample.1 > 0.999 * commanded[rest - 150].1).unwrap();
+        let fading = commanded[rest].0 - commanded[full].0;
+        assert!(fading > 0.5 * RAMP_S && fading < RAMP_S + 0.01, "{fading} s");
+    }
+}
+
+#[test]
+fn after_a_stopped_process_goes_on_the_first_command_is_zero_and_then_ramps_in() {
+    let folder = Folder::new();
+    let child = start(&folder, "4", "run.mcap");
+    signal(&child, "-STOP");
+    std::thread::sleep(Duration::from_millis(600));
+    signal(&child, "-CONT");
+    let (code, out, err) = finish(child);
+    assert_eq!(code, Some(0), "{out}{err}");
+    let commanded = commanded(&folder, "run.mcap");
+    let zero = commanded.iter().position(|sample| sample.0 > 0.5 && sample.1 == 0.0).expect("a zero command");
+    let before = commanded[zero - 1].1;
+    assert!(before > 0.1, "the tool must feel something before: {before} N");
+    // Check that the force comes back in small steps and is all there after the ramp
+    let back: Vec<f64> = commanded[zero..zero + 200].iter().map(|sample| sample.1).collect();
+    let largest = back.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    assert!(largest < 0.05 * before, "{largest} N in one tick of {before} N");
+    assert!((back[150] - before).abs() < 0.1 * before, "{} N of {before} N", back[150]);
+    // Check that the periods of the pause are accounted for
+    let timing = folder.succeed(&["timing", "run.mcap", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&timing).unwrap();
+    let local = &report["groups"][0];
+    assert!(local["skipped_by_cause"]["late_wake"].as_u64().unwrap() >= 500, "{local}");
+    let count = |name: &str| local[name].as_u64().unwrap();
+    assert_eq!(count("released") + count("skipped"), count("elapsed_periods"));
+}
+
+#[test]
+fn a_full_disk_costs_the_log_and_not_the_run() {
+    let folder = Folder::new();
+    let called = folder.call(&["run", "scene.toml", "--out", "/dev/full"]);
+    assert_eq!(called.code, Some(1), "{called:?}");
+    assert!(called.err.starts_with("error: the log is incomplete: ") && called.err.lines().count() == 1, "{called:?}");
+    assert!(called.out.contains("released"), "{called:?}");
+}
+
+#[test]
+fn a_log_that_nobody_takes_costs_records_and_not_the_run() {
+    let folder = Folder::new();
+    assert!(Command::new("mkfifo").arg(folder.path("log.mcap")).status().unwrap().success());
+    // Opens it, which lets the run start, and reads nothing.
+    let mut reader =
+        Command::new("sh").args(["-c", "exec sleep 60 < log.mcap"]).current_dir(folder.path(".")).spawn().unwrap();
+    let begun = Instant::now();
+    let child = start(&folder, "3", "log.mcap");
+    let (code, out, err) = finish(child);
+    let took = begun.elapsed();
+    reader.kill().unwrap();
+    reader.wait().unwrap();
+    assert_eq!(code, Some(1), "{out}{err}");
+    assert!(err.contains("rate group `logger`") && err.contains("given up"), "{err}");
+    // Check that the haptic group ran on to its end, and that the command did not wait for ever
+    let local = out.lines().find(|line| line.starts_with("local: ")).unwrap_or_else(|| panic!("no local group: {out}"));
+    assert!(local.contains("= 3001 periods"), "{local}");
+    assert!(took < Duration::from_secs(40), "{took:?}");
+}
