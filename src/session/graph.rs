@@ -61,7 +61,9 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
             let (tick_writer, ticks) = graph.queue(ticks_buffered);
             let (geometry_writer, geometry) = match prepared.geometry_feedback {
                 true => {
-                    let (writer, reader) = graph.exchange(PatchGeometry::default);
+                    // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
+                    let nodes = positions.len();
+                    let (writer, reader) = graph.exchange(move || PatchGeometry::with_room(nodes));
                     (Some(writer), Some(reader))
                 }
                 false => (None, None),
