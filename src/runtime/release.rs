@@ -2,6 +2,7 @@
 
 use super::actor::{Actor, Mode, Outcome, TickContext};
 use super::deadline::{Decision, Ledger};
+use super::live::{LiveReader, LiveWriter, live};
 use super::rate_group::RateGroup;
 use super::record::Event;
 use super::recorder::Recorder;
@@ -16,6 +17,8 @@ pub(crate) struct GroupRun {
     pub(crate) index: u16,
     pub(crate) spec: RateGroup,
     pub(crate) ledger: Ledger,
+    live: LiveWriter,
+    shown: LiveReader,
     actors: Vec<Box<dyn Actor>>,
     /// Kept apart: after a panic an actor is not asked anything but to stop.
     names: Vec<String>,
@@ -55,10 +58,13 @@ impl GroupRun {
         };
         let names = actors.iter().map(|actor| actor.name().to_owned()).collect();
         let ledger = Ledger::new(index, &spec, until);
+        let (live, shown) = live(&spec);
         Self {
             index,
             spec,
             ledger,
+            live,
+            shown,
             actors,
             names,
             recorder,
@@ -68,6 +74,11 @@ impl GroupRun {
             degraded_code: None,
             faulted: false,
         }
+    }
+
+    /// What shows this group while it runs.
+    pub(crate) fn live(&self) -> LiveReader {
+        self.shown.clone()
     }
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
@@ -127,6 +138,7 @@ impl GroupRun {
         self.last = ctx;
         let result = self.work(&ctx);
         let timing = self.ledger.close(release, skipped, [woke, now, end(scheduled)]);
+        self.live.release(&timing, &self.ledger);
         if let Some(recorder) = &mut self.recorder {
             recorder.push(timing);
         }
@@ -194,6 +206,7 @@ impl GroupRun {
 
     fn overrun(&mut self, skipped: u64) -> RuntimeFault {
         self.faulted = true;
+        self.live.count(&self.ledger);
         let at = self.ledger.due(self.ledger.elapsed_periods() - 1);
         self.event(at, Event::STOPPED, skipped);
         let what = format!("stopped by its overrun policy with {skipped} releases due at once");

@@ -2,6 +2,7 @@
 
 use super::builder::{Execution, RuntimeBuilder};
 use super::grant::{GrantHandle, SystemGrant};
+use super::live::{GroupLive, LiveReader};
 use super::recorder::Registry;
 use super::release::GroupRun;
 use super::report::RuntimeReport;
@@ -54,6 +55,7 @@ impl Runtime {
         let Self { execution, mut groups, registry, grants } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names = groups.iter().map(|group| group.spec.name.clone()).collect();
+        let live = groups.iter().map(GroupRun::live).collect();
         let executor = match execution {
             Execution::Threaded => Executor::Threaded(Threads::start(groups, Arc::clone(&control), &grants)?),
             Execution::Virtual => {
@@ -62,7 +64,7 @@ impl Runtime {
                 Executor::Virtual(VirtualRun::new(groups, Arc::clone(&control)))
             }
         };
-        Ok(Running { executor: Mutex::new(executor), control, names, registry, grants })
+        Ok(Running { executor: Mutex::new(executor), control, names, live, registry, grants })
     }
 }
 
@@ -83,6 +85,7 @@ pub struct Running {
     executor: Mutex<Executor>,
     control: Arc<Control>,
     names: Vec<String>,
+    live: Vec<LiveReader>,
     registry: Arc<Registry>,
     grants: GrantHandle,
 }
@@ -116,6 +119,14 @@ impl Running {
             Executor::Threaded(threads) => threads.poll(),
             Executor::Virtual(run) => run.supervisor.all_ended(),
         }
+    }
+
+    /// Every group as it is now, in graph order: counts, lateness and execution time since the start.
+    ///
+    /// # Real-time
+    /// Never disturbs a tick: wait-free on both sides. It allocates: for threads that show it.
+    pub fn live(&self) -> Vec<GroupLive> {
+        self.live.iter().map(LiveReader::read).collect()
     }
 
     /// Asks every group to end after the release it is in; returns at once.
