@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The lock-free exchange and ring under every interleaving that loom finds.
+# The lock-free exchange and ring, and the flags that stop a run, under every interleaving that loom finds.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 # A folder of its own: the flag changes every dependency. None of them runs here, so none is optimised.
 CARGO_TARGET_DIR="$CARGO_TARGET_DIR/loom" RUSTFLAGS="--cfg loom" \

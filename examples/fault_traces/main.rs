@@ -9,7 +9,7 @@
 mod drawing;
 mod scenarios;
 
-use drawing::{BLUE, Curve, Panel, Sheet};
+use drawing::{BLUE, Curve, ORANGE, Panel, Sheet};
 use palpate::log::LogRecord;
 use scenarios::{FAULT_S, Fault, RAMP_S, Trace};
 use std::path::Path;
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("| --- | ---: | --- | ---: | ---: | ---: |");
     let mut panels = Vec::new();
     for fault in Fault::ALL {
-        eprintln!("{} ...", fault.title());
+        eprintln!("{} ...", title(fault));
         let trace = scenarios::run(fault)?;
         println!("{}", row(fault, &trace));
         panels.push(panel(fault, &trace));
@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sheet = Sheet {
         title: "The force at the device through each fault".to_owned(),
         subtitle: format!("magnitude of the commanded force; the fault comes at {FAULT_S} s"),
-        legend: vec![("commanded force (N)".to_owned(), BLUE)],
+        legend: vec![("goes to rest".to_owned(), BLUE), ("stays".to_owned(), ORANGE)],
         rows,
     };
     let mut folders = vec!["out/fault_traces"];
@@ -48,6 +48,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("\n{}", path.display());
     }
     Ok(())
+}
+
+fn title(fault: Fault) -> &'static str {
+    match fault {
+        Fault::LocalPanics => "the haptic model panics in a tick",
+        Fault::LocalNotFinite => "the haptic model's state turns NaN",
+        Fault::DeviceReadPanics => "the device panics while it is read",
+        Fault::DeviceWritePanics => "the device panics while it is written",
+        Fault::DeviceNotFinite => "the device reports NaN for 50 ms",
+        Fault::GlobalPanics => "the global model panics",
+        Fault::GlobalStalls => "the global model stalls for 1 s",
+        Fault::GlobalNeverReturns => "the global model never returns",
+        Fault::StopRequested => "a stop is requested (Ctrl-C)",
+        Fault::Dropped => "the running session is dropped",
+    }
 }
 
 fn row(fault: Fault, trace: &Trace) -> String {
@@ -71,17 +86,17 @@ fn row(fault: Fault, trace: &Trace) -> String {
         _ => None,
     });
     let age = ages.fold(0.0, f64::max);
-    format!("| {} | {before:.2} | {answer} | {gone} | {step:.3} | {:.0} |", fault.title(), age * 1e3)
+    format!("| {} | {before:.2} | {answer} | {gone} | {step:.3} | {:.0} |", title(fault), age * 1e3)
 }
 
 fn panel(fault: Fault, trace: &Trace) -> Panel {
     let end = if fault.leaves_the_force() { trace.written.last().map_or(1.0, |last| last.0) } else { 0.8 };
     let (times, values): (Vec<f64>, Vec<f64>) = trace.magnitudes().unzip();
     Panel {
-        caption: fault.title().to_owned(),
+        caption: title(fault).to_owned(),
         y_label: "N",
         times: 0.3..end,
-        curves: vec![Curve::new(&times, values, BLUE, 1.5)],
+        curves: vec![Curve::new(&times, values, if fault.leaves_the_force() { ORANGE } else { BLUE }, 1.5)],
         marks: vec![FAULT_S],
         zoomed: None,
     }

@@ -45,21 +45,6 @@ impl Fault {
         Self::Dropped,
     ];
 
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::LocalPanics => "the haptic model panics in a tick",
-            Self::LocalNotFinite => "the haptic model's state turns NaN",
-            Self::DeviceReadPanics => "the device panics while it is read",
-            Self::DeviceWritePanics => "the device panics while it is written",
-            Self::DeviceNotFinite => "the device reports NaN for 50 ms",
-            Self::GlobalPanics => "the global model panics",
-            Self::GlobalStalls => "the global model stalls for 1 s",
-            Self::GlobalNeverReturns => "the global model never returns",
-            Self::StopRequested => "a stop is requested (Ctrl-C)",
-            Self::Dropped => "the running session is dropped",
-        }
-    }
-
     /// True where the haptic side runs on as if nothing had happened.
     pub fn leaves_the_force(self) -> bool {
         matches!(self, Self::DeviceNotFinite | Self::GlobalPanics | Self::GlobalStalls | Self::GlobalNeverReturns)

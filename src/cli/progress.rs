@@ -1,9 +1,11 @@
-//! A progress bar for a run, on a terminal only.
+//! A progress bar for a run and a line for each of its rate groups, on a terminal only.
 
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use palpate::runtime::GroupLive;
 use palpate::session::Running;
+use palpate::time::Nanos;
 
 /// How much of the run passes between two drawings.
 const STEP: Duration = Duration::from_millis(50);
@@ -19,18 +21,80 @@ pub fn preparing(what: &str) -> ProgressBar {
     spinner
 }
 
-/// Waits for the end of `running` and shows how far it is.
+/// Waits for the end of `running`; shows how far it is and how its groups keep their time.
 pub fn wait(running: &Running, what: &str) {
     let Some(until) = running.until() else { return running.wait() };
-    let bar = ProgressBar::with_draw_target(Some(until.0 / 1_000_000), ProgressDrawTarget::stderr_with_hz(15));
+    let shown = MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(15));
+    if shown.is_hidden() {
+        return running.wait();
+    }
+    let bar = shown.add(ProgressBar::new(until.0 / 1_000_000));
     let style = ProgressStyle::with_template("{msg} [{bar:40}] {prefix}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
     bar.set_message(what.to_owned());
+    let style = ProgressStyle::with_template("{msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
+    let lines: Vec<ProgressBar> =
+        running.live().iter().map(|_| shown.add(ProgressBar::no_length().with_style(style.clone()))).collect();
     while !running.finished() {
         running.wait_for(STEP);
         let elapsed = running.elapsed().min(until);
         bar.set_position(elapsed.0 / 1_000_000);
         bar.set_prefix(format!("{:.1} of {:.1} s", elapsed.as_secs_f64(), until.as_secs_f64()));
+        for (line, group) in lines.iter().zip(running.live()) {
+            line.set_message(in_words(&group, elapsed));
+        }
     }
+    lines.iter().for_each(ProgressBar::finish_and_clear);
     bar.finish_and_clear();
+}
+
+/// A group in one line.
+fn in_words(group: &GroupLive, elapsed: Nanos) -> String {
+    let late = |q| short(group.lateness.percentile(q));
+    format!(
+        "{:8} {:>8}  {:>7} released  {} skipped  late p50 {} p99 {} max {}  busy {:.0} %",
+        group.name,
+        group.rate.to_string(),
+        group.released,
+        group.skipped,
+        late(0.5),
+        late(0.99),
+        short(group.lateness.max()),
+        100.0 * group.busy(elapsed)
+    )
+}
+
+/// A time with two or three digits.
+fn short(time: Nanos) -> String {
+    match time.0 {
+        ..10_000 => format!("{:.1} us", time.0 as f64 / 1e3),
+        10_000..1_000_000 => format!("{} us", time.0 / 1_000),
+        _ => format!("{:.1} ms", time.0 as f64 / 1e6),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate::runtime::{Execution, RateGroup, Runtime};
+
+    #[test]
+    fn a_group_is_shown_in_one_line() {
+        let mut graph = Runtime::builder(Execution::Virtual);
+        let group = RateGroup::hz(1000).name("local").latency(Nanos(20_000));
+        let running = graph.group(group, vec![]).until(Nanos(99_000_000)).build().unwrap().start().unwrap();
+        running.wait_for(Duration::MAX);
+        assert_eq!(
+            in_words(&running.live()[0], Nanos(100_000_000)),
+            "local     1000 Hz      100 released  0 skipped  late p50 0.0 us p99 0.0 us max 0.0 us  busy 2 %"
+        );
+    }
+
+    #[test]
+    fn times_are_short() {
+        assert_eq!(
+            [80, 9_960, 12_345, 123_456, 1_234_567].map(|ns| short(Nanos(ns))),
+            ["0.1 us", "10.0 us", "12 us", "123 us", "1.2 ms"]
+        );
+    }
 }

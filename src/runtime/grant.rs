@@ -80,6 +80,7 @@ pub(super) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
     os::block_signals();
     let mut refused = Vec::new();
     let mut granted = |result: Result<(), String>| result.map_err(|reason| refused.push(reason)).is_ok();
+    os::touch_stack();
     let timer_slack = os::set_timer_slack().map_or_else(|reason| reason, |()| "1 ns".to_owned());
     let cpu = spec.cpu.filter(|&cpu| granted(os::pin(cpu)));
     let priority = spec.priority.filter(|&priority| granted(os::set_realtime(priority)));

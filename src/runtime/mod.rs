@@ -9,6 +9,7 @@
 //! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
 //!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
 //! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each.
+//! - Introspection: [`Running::live`] shows counts, lateness and execution time of every group at any moment.
 //! - Faults: a panic or a reported fault stops the whole graph in order and is in the [report](RuntimeReport).
 //!
 //! Words with a fixed meaning in these docs: *wait-free* (done in a bounded number of steps whatever others do),
@@ -61,7 +62,9 @@ mod builder;
 mod deadline;
 pub mod exchange;
 mod grant;
+pub mod histogram;
 mod link;
+mod live;
 pub mod mailbox;
 mod os;
 mod outlet;
@@ -87,6 +90,7 @@ pub use actor::{Actor, Mode, Outcome, TickContext, actor_fn};
 pub use builder::{Execution, RuntimeBuilder};
 pub use deadline::SlipCounts;
 pub use grant::{GrantHandle, GroupGrant, SystemGrant};
+pub use live::GroupLive;
 pub use outlet::{OutletReader, OutletWriter};
 pub use port::{QueueReader, QueueWriter, Reader, Writer};
 pub use rate_group::{OverrunPolicy, RateGroup, Wait};

@@ -15,6 +15,14 @@ pub(crate) fn pin(cpu: usize) -> Result<(), String> {
     if core_affinity::set_for_current(core) { Ok(()) } else { Err(format!("pinning to core {cpu} was refused")) }
 }
 
+/// Writes to as much of the calling thread's stack as a tick may need, so that where memory is not locked its first
+/// deep call faults no page.
+#[inline(never)]
+pub(crate) fn touch_stack() {
+    const DEEPEST_TICK: usize = 128 * 1024;
+    std::hint::black_box(&mut [1_u8; DEEPEST_TICK]);
+}
+
 /// The kernel's release and build.
 pub(crate) fn kernel() -> String {
     match (read_to_string("/proc/sys/kernel/osrelease"), read_to_string("/proc/sys/kernel/version")) {

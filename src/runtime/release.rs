@@ -3,16 +3,19 @@
 use super::actor::{Actor, Mode, Outcome, TickContext};
 use super::deadline::{Decision, Ledger};
 use super::exchange::ExchangeWriter;
+use super::live::{LiveReader, LiveWriter, live};
 use super::panic_hook::{place, quietly};
 use super::rate_group::RateGroup;
 use super::record::Event;
 use super::recorder::Recorder;
 use super::report::{GroupReport, RuntimeFault};
 use super::restart::start_context;
+use super::supervisor::Flag;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 /// An actor in its group.
 struct Member {
@@ -28,6 +31,10 @@ pub(crate) struct GroupRun {
     pub(crate) index: u16,
     pub(crate) spec: RateGroup,
     pub(crate) ledger: Ledger,
+    live: LiveWriter,
+    shown: LiveReader,
+    /// Raised when nobody waits for this thread any more: its books are closed.
+    left_behind: Option<Arc<Flag>>,
     members: Vec<Member>,
     recorder: Option<Recorder>,
     /// Where a supervisor reads how far a group is that may have to be left behind.
@@ -56,10 +63,14 @@ impl GroupRun {
     ) -> Self {
         let last = start_context(&spec, &ledger, Nanos::ZERO);
         let member = |actor: Box<dyn Actor>| Member { name: actor.name().to_owned(), actor, failed: false };
+        let (live, shown) = live(&spec);
         Self {
             index,
             spec,
             ledger,
+            live,
+            shown,
+            left_behind: None,
             members: actors.into_iter().map(member).collect(),
             recorder,
             books: None,
@@ -80,6 +91,22 @@ impl GroupRun {
     pub(super) fn start_at(&mut self, now: Nanos) -> Result<(), Error> {
         self.last = start_context(&self.spec, &self.ledger, now);
         self.start()
+    }
+
+    /// Goes on showing where the actors before left off.
+    pub(super) fn show_on(&mut self, shown: LiveReader) {
+        self.live = shown.next_writer();
+        self.shown = shown;
+    }
+
+    /// Closes the books when `flag` is raised.
+    pub(super) fn close_when(&mut self, flag: Arc<Flag>) {
+        self.left_behind = Some(flag);
+    }
+
+    /// What shows this group while it runs.
+    pub(crate) fn live(&self) -> LiveReader {
+        self.shown.clone()
     }
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
@@ -155,7 +182,11 @@ impl GroupRun {
         };
         self.last = ctx;
         let result = self.work(&ctx);
+        if self.left_behind.as_ref().is_some_and(|flag| flag.is_raised()) {
+            return Ok(());
+        }
         let timing = self.ledger.close(release, skipped, [woke, now, end(scheduled)]);
+        self.live.release(&timing, &self.ledger);
         if let Some(recorder) = &mut self.recorder {
             recorder.push(timing);
         }
@@ -252,6 +283,7 @@ impl GroupRun {
 
     fn overrun(&mut self, skipped: u64) -> RuntimeFault {
         self.faulted = true;
+        self.live.count(&self.ledger);
         let at = self.ledger.due(self.ledger.elapsed_periods() - 1);
         self.event(at, Event::STOPPED, skipped);
         let what = format!("stopped by its overrun policy with {skipped} releases due at once");

@@ -3,6 +3,7 @@
 use super::actor::{Actor, TickContext};
 use super::deadline::Ledger;
 use super::exchange::{ExchangeReader, exchange};
+use super::live::LiveReader;
 use super::rate_group::RateGroup;
 use super::record::Event;
 use super::recorder::Recorder;
@@ -43,6 +44,8 @@ pub(super) struct Restarter {
     records: Option<RecorderPort>,
     /// Events of the supervisor about this group.
     events: Option<Recorder>,
+    /// What the group shows of itself, once it was made.
+    shown: Option<LiveReader>,
     /// Every fault that was answered by a restart.
     pub(super) restarts: Vec<RuntimeFault>,
 }
@@ -57,7 +60,7 @@ impl Restarter {
         records: Option<RecorderPort>,
         events: Option<Recorder>,
     ) -> Self {
-        Self { policy, factory, index, spec, until, records, events, restarts: Vec::new() }
+        Self { policy, factory, index, spec, until, records, events, shown: None, restarts: Vec::new() }
     }
 
     /// The group as it is when the run starts.
@@ -108,6 +111,10 @@ impl Restarter {
         let (writer, reader) = exchange(|| ledger);
         let mut group = GroupRun::new(self.index, self.spec.clone(), actors, recorder, ledger);
         group.publish_books(writer);
+        match &self.shown {
+            Some(shown) => group.show_on(shown.clone()),
+            None => self.shown = Some(group.live()),
+        }
         Ok((group, reader))
     }
 

@@ -34,8 +34,15 @@ unsafe impl<T: Send> Sync for Shared<T> {}
 
 impl<T> Shared<T> {
     fn new(capacity: usize) -> Self {
+        let slots: Box<[UnsafeCell<MaybeUninit<T>>]> =
+            (0..rounded(capacity)).map(|_| UnsafeCell::new(MaybeUninit::uninit())).collect();
+        for slot in &slots {
+            // Where memory is not locked, a page that nothing was written to would be faulted in by the first push to it.
+            // SAFETY: nobody else has the slot yet. Volatile: the compiler may leave out a write that nothing reads.
+            slot.with_mut(|slot| unsafe { slot.write_volatile(MaybeUninit::zeroed()) });
+        }
         Self {
-            slots: (0..rounded(capacity)).map(|_| UnsafeCell::new(MaybeUninit::uninit())).collect(),
+            slots,
             head: CachePadded(AtomicUsize::new(0)),
             tail: CachePadded(AtomicUsize::new(0)),
             lost: CachePadded(AtomicU64::new(0)),

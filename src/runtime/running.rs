@@ -4,6 +4,7 @@ use super::builder::{Execution, RuntimeBuilder};
 use super::deadline::Ledger;
 use super::exchange::ExchangeReader;
 use super::grant::{GrantHandle, SystemGrant};
+use super::live::{GroupLive, LiveReader};
 use super::recorder::Registry;
 use super::release::GroupRun;
 use super::report::{RuntimeFault, RuntimeReport};
@@ -59,6 +60,7 @@ impl Runtime {
         let Self { execution, mut groups, restarters, registry, grants } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names = groups.iter().map(|group| group.spec.name.clone()).collect();
+        let live = groups.iter().map(GroupRun::live).collect();
         let executor = match execution {
             Execution::Threaded => {
                 Executor::Threaded(Threads::start(groups, restarters, Arc::clone(&control), &grants)?)
@@ -73,7 +75,7 @@ impl Runtime {
         };
         let executor = Arc::new(Mutex::new(executor));
         watch(&executor)?;
-        Ok(Running { executor, control, names, registry, grants })
+        Ok(Running { executor, control, names, live, registry, grants })
     }
 }
 
@@ -120,6 +122,7 @@ pub struct Running {
     executor: Arc<Mutex<Executor>>,
     control: Arc<Control>,
     names: Vec<String>,
+    live: Vec<LiveReader>,
     registry: Arc<Registry>,
     grants: GrantHandle,
 }
@@ -153,6 +156,14 @@ impl Running {
             Executor::Threaded(threads) => threads.poll(),
             Executor::Virtual(run) => run.supervisor.all_ended(),
         }
+    }
+
+    /// Every group as it is now, in graph order: counts, lateness and execution time since the start.
+    ///
+    /// # Real-time
+    /// Never disturbs a tick: wait-free on both sides. It allocates: for threads that show it.
+    pub fn live(&self) -> Vec<GroupLive> {
+        self.live.iter().map(LiveReader::read).collect()
     }
 
     /// Asks every group to end after the release it is in; returns at once.

@@ -45,6 +45,8 @@ struct Seat {
     handle: Option<JoinHandle<()>>,
     restart: Option<(Restarter, ExchangeReader<Ledger>)>,
     incarnation: usize,
+    /// When the present thread was started.
+    started: Nanos,
     /// Tells the present thread that it is not waited for any more.
     left_behind: Arc<Flag>,
 }
@@ -100,7 +102,7 @@ impl Threads {
             let go = Go { group, base_ns, incarnation: 0, restartable, left_behind: Arc::clone(&left_behind) };
             // A thread waits at its gate until it gets its group, so this cannot fail.
             let _ = gate.send(go);
-            seats.push(Seat { handle: Some(handle), restart, incarnation: 0, left_behind });
+            seats.push(Seat { handle: Some(handle), restart, incarnation: 0, started: Nanos::ZERO, left_behind });
         }
         Ok(Self { seats, post, mail, control, base_ns, given_up: false, closing: None, ended_at: None, supervisor })
     }
@@ -169,6 +171,7 @@ impl Threads {
         *reader = fresh;
         let (thread, gate, _) = spawn(&group.spec, &self.control, &self.post)?;
         seat.incarnation += 1;
+        seat.started = since(self.base_ns);
         seat.left_behind = Arc::new(Flag::default());
         seat.handle = Some(thread);
         let go = Go {
@@ -192,7 +195,8 @@ impl Threads {
         }
         books.refresh();
         let books = *books.get();
-        let limit = books.next_due()? + restarter.policy.hung_after;
+        // What was due before its thread was there is not its fault.
+        let limit = books.next_due()?.max(seat.started) + restarter.policy.hung_after;
         (since(self.base_ns) > limit).then_some(books)
     }
 
@@ -307,6 +311,7 @@ fn spawn(
 fn group_thread(go: &Receiver<Go>, wait: Wait, control: &Control, post: &MailSender<Message>) {
     // A closed gate means that the start failed elsewhere: nothing to run.
     let Ok(Go { mut group, base_ns, incarnation, restartable, left_behind }) = go.recv() else { return };
+    group.close_when(Arc::clone(&left_behind));
     let index = usize::from(group.index);
     let observer = group.spec.observer;
     let now = || since(base_ns);

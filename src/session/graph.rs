@@ -36,6 +36,8 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let per_tick = RECORDS_PER_TICK + prepared.probes.len();
 
     let positions = prepared.simulation.state().positions.clone();
+    // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
+    let nodes = positions.len();
     let triangles = prepared.simulation.body().surface().triangles.clone();
     let (view_writer, view) = graph.outlet(ToolView::default);
     let surface_port =
@@ -61,7 +63,9 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
             let rotating = [model(), model(), model()];
             let ports = GlobalSide {
                 ticks: graph.queue_port(ticks_buffered),
-                geometry: prepared.geometry_feedback.then(|| graph.exchange_port(PatchGeometry::default)),
+                geometry: prepared
+                    .geometry_feedback
+                    .then(|| graph.exchange_port(move || PatchGeometry::with_room(nodes))),
                 models: graph.exchange_port(model),
                 surface: surface_port,
                 checkpoint: graph.outlet_port(Checkpoint::default),

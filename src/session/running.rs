@@ -8,7 +8,7 @@ use super::sink::Memory;
 use crate::actors::{LoggerOutcome, SurfaceView, ToolView};
 use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
-use crate::runtime::{OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
+use crate::runtime::{GroupLive, OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
 use crate::time::Nanos;
 
 /// A session that runs. Dropping it commands zero force and joins its threads, within
@@ -58,6 +58,14 @@ impl Running {
     /// True once it has ended, by itself or by a fault.
     pub fn finished(&self) -> bool {
         self.runtime.finished()
+    }
+
+    /// Every rate group as it is now: counts, lateness and execution time since the start.
+    ///
+    /// # Real-time
+    /// Never disturbs a tick: wait-free on both sides. It allocates: for threads that show it.
+    pub fn live(&self) -> Vec<GroupLive> {
+        self.runtime.live()
     }
 
     /// Stops the run from another thread or a signal handler's.

@@ -72,6 +72,18 @@ pub struct PatchGeometry {
 }
 
 impl PatchGeometry {
+    /// An empty geometry with room for a patch of `nodes` nodes, in pages that have been written to: a real-time tick
+    /// that fills it neither allocates nor faults.
+    pub fn with_room(nodes: usize) -> Self {
+        // Zeros could come from the system as pages that are still to be faulted in.
+        let (mut ids, mut vectors) = (vec![u32::MAX; nodes], vec![Vec3::repeat(f64::NAN); nodes]);
+        let mut more = vectors.clone();
+        ids.clear();
+        vectors.clear();
+        more.clear();
+        Self { nodes: ids, state: State { positions: vectors, velocities: more }, ..Self::default() }
+    }
+
     /// True if there is something to take and every number is finite.
     pub fn is_usable(&self) -> bool {
         !self.nodes.is_empty() && self.state.is_finite()
@@ -124,7 +136,7 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// Writes its geometry for feedback; false if it has none.
     ///
     /// # Real-time
-    /// Bounded and real-time safe once `geometry` is as large as the patch.
+    /// Bounded and real-time safe if `geometry` has room for the patch, see [`PatchGeometry::with_room`].
     fn geometry(&self, geometry: &mut PatchGeometry) -> bool;
 }
 
