@@ -1,7 +1,8 @@
 //! What the system granted: asked for and given, so that a refused privilege is reported and never silent.
 
 use super::os;
-use super::rate_group::{RateGroup, Wait};
+use super::rate_group::RateGroup;
+use super::wait::Waiter;
 use std::sync::{Arc, OnceLock};
 
 /// What a run got from the system. Plain texts and numbers, easy to serialise.
@@ -69,7 +70,7 @@ impl GrantHandle {
 pub(super) struct ThreadGrant {
     pub(super) group: GroupGrant,
     pub(super) timer_slack: String,
-    pub(super) wait: Wait,
+    pub(super) waiter: Waiter,
 }
 
 const FIFO: &str = "SCHED_FIFO";
@@ -84,7 +85,7 @@ pub(super) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
     let timer_slack = os::set_timer_slack().map_or_else(|reason| reason, |()| "1 ns".to_owned());
     let cpu = spec.cpu.filter(|&cpu| granted(os::pin(cpu)));
     let priority = spec.priority.filter(|&priority| granted(os::set_realtime(priority)));
-    let wait = spec.wait.granted(priority.is_some());
+    let waiter = Waiter::new(spec.wait, priority.is_some(), spec.rate.period());
     let group = GroupGrant {
         name: spec.name.clone(),
         policy_asked: if spec.priority.is_some() { FIFO } else { OTHER }.to_owned(),
@@ -93,10 +94,10 @@ pub(super) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
         priority: priority.unwrap_or(0),
         cpu_asked: spec.cpu,
         cpu,
-        wait: wait.to_string(),
+        wait: waiter.to_string(),
         refused: refused.join("; "),
     };
-    ThreadGrant { group, timer_slack, wait }
+    ThreadGrant { group, timer_slack, waiter }
 }
 
 impl SystemGrant {

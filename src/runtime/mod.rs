@@ -85,6 +85,7 @@ mod sync;
 mod threaded;
 mod virtual_port;
 mod virtual_time;
+mod wait;
 
 pub use actor::{Actor, Mode, Outcome, TickContext, actor_fn};
 pub use builder::{Execution, RuntimeBuilder};

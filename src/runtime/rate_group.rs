@@ -1,7 +1,6 @@
 //! A rate group: actors that are released together, at one rate, on one thread.
 
 use crate::time::{Nanos, Rate};
-use std::fmt;
 
 /// What happens to releases that were due while the group was still busy or asleep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,43 +23,19 @@ pub enum OverrunPolicy {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Wait {
-    /// `SleepSpin` with 100 us where a real-time policy was granted, otherwise `Sleep`.
+    /// Sleep until shortly before the release, then spin, where a real-time policy was granted; otherwise `Sleep`. How
+    /// long before is learnt from how late the sleeps end: at most 120 us and 15 % of the period.
     #[default]
     Auto,
     /// One absolute sleep.
     Sleep,
-    /// Sleep until `margin` before the release, then spin. Only under a real-time policy; otherwise it sleeps.
+    /// Sleep until a fixed `margin` before the release, then spin. Only under a real-time policy; otherwise it sleeps.
     SleepSpin {
         /// How long to spin at most.
         margin: Nanos,
     },
     /// Spin all the time. Only under a real-time policy; otherwise it sleeps.
     Spin,
-}
-
-impl Wait {
-    /// The default margin: above the usual wake-up latency of an idle core, a tenth of a 1 kHz period.
-    const MARGIN: Nanos = Nanos(100_000);
-
-    /// What is really done: spinning without a real-time policy only takes time from the threads one waits for.
-    pub(crate) fn granted(self, realtime: bool) -> Self {
-        match self {
-            Self::Auto if realtime => Self::SleepSpin { margin: Self::MARGIN },
-            Self::SleepSpin { .. } | Self::Spin if realtime => self,
-            _ => Self::Sleep,
-        }
-    }
-}
-
-impl fmt::Display for Wait {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Auto => f.write_str("auto"),
-            Self::Sleep => f.write_str("sleep"),
-            Self::SleepSpin { margin } => write!(f, "sleep, then spin {margin}"),
-            Self::Spin => f.write_str("spin"),
-        }
-    }
 }
 
 /// The rate, the timing contract and the thread of a group of actors.

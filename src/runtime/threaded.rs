@@ -8,12 +8,13 @@ use super::grant::{GrantHandle, SystemGrant, ThreadGrant, set_up_thread};
 use super::mailbox::{MailReceiver, MailSender, mailbox};
 use super::os;
 use super::panic_hook;
-use super::rate_group::{RateGroup, Wait};
+use super::rate_group::RateGroup;
 use super::release::GroupRun;
 use super::report::RuntimeFault;
 use super::restart::Restarter;
 use super::running::STOP_BOUND;
 use super::supervisor::{Control, Failure, Flag, Message, Supervisor};
+use super::wait::Waiter;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -21,8 +22,6 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// A slow group looks at the stop flag this often; longer than the period of 30 Hz, which so keeps its one sleep.
-const SLICE_NS: u64 = 50_000_000;
 /// Time for all threads to wake up and wait for release 0.
 const LEAD_NS: u64 = 2_000_000;
 /// A fault in a tick, one in a stop and the end, or as many failures as a poll can find.
@@ -295,9 +294,9 @@ fn spawn(
     let (control, post, own) = (Arc::clone(control), post.clone(), spec.clone());
     let body = move || {
         let grant = set_up_thread(&own);
-        let wait = grant.wait;
+        let waiter = grant.waiter;
         if set_up.send(grant).is_ok() {
-            group_thread(&go, wait, &control, &post);
+            group_thread(&go, waiter, &control, &post);
         }
     };
     let failed =
@@ -308,7 +307,7 @@ fn spawn(
     Ok((thread, gate, granted))
 }
 
-fn group_thread(go: &Receiver<Go>, wait: Wait, control: &Control, post: &MailSender<Message>) {
+fn group_thread(go: &Receiver<Go>, mut waiter: Waiter, control: &Control, post: &MailSender<Message>) {
     // A closed gate means that the start failed elsewhere: nothing to run.
     let Ok(Go { mut group, base_ns, incarnation, restartable, left_behind }) = go.recv() else { return };
     group.close_when(Arc::clone(&left_behind));
@@ -328,13 +327,13 @@ fn group_thread(go: &Receiver<Go>, wait: Wait, control: &Control, post: &MailSen
             true => control.observers_may_end(),
             false => !winding_down && control.stop_requested(),
         };
-        if !wait_until(base_ns + due.0, wait, leave) {
+        let Some(woke_ns) = waiter.until(base_ns + due.0, leave) else {
             if group.begin_wind_down() {
                 continue;
             }
             break;
-        }
-        let result = group.release(now(), |_| now(), |_| now());
+        };
+        let result = group.release(Nanos(woke_ns - base_ns), |_| now(), |_| now());
         if left_behind.is_raised() {
             // Its place is taken: it says nothing any more, and its actors go with it.
             return;
@@ -376,28 +375,4 @@ fn group_thread(go: &Receiver<Go>, wait: Wait, control: &Control, post: &MailSen
 fn post_fault(post: &MailSender<Message>, control: &Control, fault: RuntimeFault) {
     post.try_send(Message::Fault(fault));
     control.request_stop();
-}
-
-/// Waits until the clock has reached `due_ns`; false if it is time to leave instead.
-fn wait_until(due_ns: u64, wait: Wait, leave: impl Fn() -> bool) -> bool {
-    let margin_ns = match wait {
-        Wait::SleepSpin { margin } => margin.0,
-        Wait::Spin => u64::MAX,
-        Wait::Auto | Wait::Sleep => 0,
-    };
-    let wake_ns = due_ns.saturating_sub(margin_ns);
-    loop {
-        if leave() {
-            return false;
-        }
-        let now_ns = os::monotonic();
-        if now_ns >= due_ns {
-            return true;
-        }
-        if now_ns < wake_ns {
-            os::sleep_until(wake_ns.min(now_ns + SLICE_NS));
-        } else {
-            std::hint::spin_loop();
-        }
-    }
 }
