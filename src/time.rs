@@ -89,6 +89,11 @@ impl Rate {
             .map(|(releases, seconds)| Self::new(releases as u32, seconds))
     }
 
+    /// As releases per seconds, as it was made.
+    pub fn as_fraction(self) -> (u32, u32) {
+        (self.releases, self.seconds)
+    }
+
     /// In hertz.
     pub fn as_hz(self) -> f64 {
         f64::from(self.releases) / f64::from(self.seconds)

@@ -25,6 +25,9 @@ pub struct RunArgs {
     /// Use this local model instead of the scene's own
     #[arg(long, value_name = "NAME", value_parser = model)]
     pub model: Option<LocalModelKind>,
+    /// Print the schedule and what this system would refuse, and run nothing
+    #[arg(long)]
+    pub plan: bool,
     /// The log to write; overwritten if it exists
     #[arg(long, value_name = "LOG.mcap", default_value = DEFAULT_LOG)]
     pub out: PathBuf,
@@ -60,7 +63,12 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
     if args.virtual_time {
         builder = builder.virtual_time();
     }
-    execute(builder, &args.out, &name)
+    if args.plan { plan(builder, &name) } else { execute(builder, &args.out, &name) }
+}
+
+fn plan(builder: SessionBuilder, name: &str) -> Result<(), Error> {
+    let plan = builder.build().and_then(|session| session.plan()).map_err(|error| error.at(name))?;
+    output::print(&format!("{name}: {plan}"))
 }
 
 fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error> {

@@ -11,7 +11,7 @@ use super::release::GroupRun;
 use super::restart::{Factory, Restart, Restarter};
 use super::rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};
 use super::running::Runtime;
-use super::schedule::admit;
+use super::schedule::admit_here;
 use super::virtual_port::flight;
 use crate::error::Error;
 use crate::time::{Nanos, Rate};
@@ -139,16 +139,16 @@ impl RuntimeBuilder {
     ///
     /// # Errors
     /// [`ErrorKind::Runtime`](crate::ErrorKind::Runtime), naming the group and the values, for a graph that cannot work:
-    /// a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core, equal real-time
-    /// priorities pinned to one core, a priority outside 1 to 99, a name used twice, no group that is not an observer.
-    /// Or what a [factory](Self::restartable) says.
+    /// a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all cores together, on
+    /// threads a latency beyond the period, equal real-time priorities pinned to one core, a priority outside 1 to 99, a
+    /// name used twice, no group that is not an observer. Or what a [factory](Self::restartable) says.
     pub fn build(&mut self) -> Result<Runtime, Error> {
         for (index, (group, _)) in self.groups.iter_mut().enumerate() {
             if group.name.is_empty() {
                 group.name = format!("group-{index}");
             }
         }
-        admit(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>())?;
+        admit_here(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>(), self.execution)?;
         let built = std::mem::replace(self, Self::new(self.execution));
         let registry = built.registry;
         let mut groups = Vec::with_capacity(built.groups.len());

@@ -100,6 +100,34 @@ pub(super) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
     ThreadGrant { group, timer_slack, waiter }
 }
 
+/// What a threaded run of `groups` would be refused now, a sentence each: the same set-up on threads that end at once.
+pub(super) fn refusals(groups: &[RateGroup]) -> Vec<String> {
+    let mut refused = Vec::new();
+    for spec in groups {
+        let own = spec.clone();
+        let probe = std::thread::Builder::new().name(spec.name.clone()).spawn(move || set_up_thread(&own));
+        let grant = match probe.map(std::thread::JoinHandle::join) {
+            Ok(Ok(grant)) => grant,
+            _ => {
+                refused.push(format!("{}: the system gives no thread", spec.name));
+                continue;
+            }
+        };
+        if !grant.group.refused.is_empty() {
+            refused.push(format!("{}: {}", spec.name, grant.group.refused));
+        }
+        if grant.timer_slack.starts_with("refused") {
+            refused.push(format!("{}: timer slack {}", spec.name, grant.timer_slack));
+        }
+    }
+    if groups.iter().any(|spec| spec.priority.is_some())
+        && let Err(reason) = os::may_lock_everything()
+    {
+        refused.push(format!("memory: {reason}"));
+    }
+    refused
+}
+
 impl SystemGrant {
     /// The facts about the machine; groups and privileges are left to the caller.
     pub(super) fn of_machine() -> Self {
@@ -109,7 +137,7 @@ impl SystemGrant {
             timer_slack: "not asked".to_owned(),
             clock_source: os::clock_source(),
             kernel: os::kernel(),
-            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            cores: os::cores(),
             groups: Vec::new(),
         }
     }

@@ -28,11 +28,11 @@ use std::sync::Arc;
 /// Buckets per octave, and the first time that shares its bucket (ns).
 const FINE: u64 = 32;
 const FINE_BITS: u32 = FINE.ilog2();
-/// Times from 2^34 ns on (17 s) are counted as the last one below.
+/// Times from 2^34 ns on (17 s) share the last bucket.
 const LIMIT: u64 = 1 << 34;
-const BUCKETS: usize = bucket(LIMIT - 1) + 1;
+const BUCKETS: usize = bucket(LIMIT) + 1;
 
-/// The bucket of a time below [`LIMIT`].
+/// The bucket of a time up to [`LIMIT`].
 const fn bucket(time: u64) -> usize {
     if time < FINE {
         return time as usize;
@@ -82,7 +82,7 @@ impl HistogramWriter {
             max.store(time.0, Ordering::Relaxed);
         }
         sum.store(sum.load(Ordering::Relaxed).wrapping_add(time.0), Ordering::Relaxed);
-        let count = &counts[bucket(time.0.min(LIMIT - 1))];
+        let count = &counts[bucket(time.0.min(LIMIT))];
         // Release: with the acquire in `snapshot`, so that a reader that sees the count also sees a maximum and a sum that
         // hold it.
         count.store(count.load(Ordering::Relaxed) + 1, Ordering::Release);
@@ -206,9 +206,9 @@ mod tests {
 
     #[test]
     fn buckets_cover_every_time_without_a_gap() {
-        assert_eq!(BUCKETS, 960);
-        assert_eq!(last_of(BUCKETS - 1), LIMIT - 1);
-        assert!((1..BUCKETS).all(|n| bucket(last_of(n - 1) + 1) == n && bucket(last_of(n)) == n));
+        assert_eq!(BUCKETS, 961);
+        assert_eq!(last_of(BUCKETS - 2), LIMIT - 1);
+        assert!((1..BUCKETS - 1).all(|n| bucket(last_of(n - 1) + 1) == n && bucket(last_of(n)) == n));
     }
 
     #[test]

@@ -9,6 +9,8 @@
 //! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
 //!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
 //! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each.
+//! - Admission: a graph that cannot work is refused when it is built, with the sum that failed; its
+//!   [plan](Runtime::plan) says what it asks for and what this system would refuse.
 //! - Introspection: [`Running::live`] shows counts, lateness and execution time of every group at any moment.
 //! - Faults: a panic or a reported fault stops the whole graph in order and is in the [report](RuntimeReport).
 //!
@@ -69,6 +71,7 @@ pub mod mailbox;
 mod os;
 mod outlet;
 mod panic_hook;
+mod plan;
 mod port;
 mod rate_group;
 pub mod record;
@@ -93,6 +96,7 @@ pub use deadline::SlipCounts;
 pub use grant::{GrantHandle, GroupGrant, SystemGrant};
 pub use live::GroupLive;
 pub use outlet::{OutletReader, OutletWriter};
+pub use plan::{Coincidence, GroupPlan, Plan};
 pub use port::{QueueReader, QueueWriter, Reader, Writer};
 pub use rate_group::{OverrunPolicy, RateGroup, Wait};
 pub use record::{Channel, Event, Record, SlipCause, TickTiming};
@@ -101,4 +105,5 @@ pub use report::{GroupReport, RuntimeFault, RuntimeReport};
 pub use restart::Restart;
 pub use rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};
 pub use running::{Running, Runtime, STOP_BOUND};
+pub(crate) use schedule::admit_here;
 pub use supervisor::StopHandle;

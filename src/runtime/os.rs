@@ -2,7 +2,9 @@
 //!
 //! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
 
-pub(crate) use imp::{block_signals, lock_memory, monotonic, set_realtime, set_timer_slack, sleep_until};
+pub(crate) use imp::{
+    block_signals, lock_memory, may_lock_everything, monotonic, set_realtime, set_timer_slack, sleep_until,
+};
 
 use std::fs::read_to_string;
 
@@ -21,6 +23,11 @@ pub(crate) fn pin(cpu: usize) -> Result<(), String> {
 pub(crate) fn touch_stack() {
     const DEEPEST_TICK: usize = 128 * 1024;
     std::hint::black_box(&mut [1_u8; DEEPEST_TICK]);
+}
+
+/// Processor cores that the process may use.
+pub(crate) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// The kernel's release and build.
@@ -115,9 +122,11 @@ mod imp {
             .clone()
     }
 
+    /// Whether locking would work, without locking anything.
+    ///
     /// Under a finite limit the lock itself can succeed and a later allocation then fails, which would be a crash for a
     /// refused privilege.
-    fn may_lock_everything() -> Result<(), String> {
+    pub(crate) fn may_lock_everything() -> Result<(), String> {
         let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
         // SAFETY: the pointer is to an rlimit of our own.
         let known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &mut limit) } == 0;
@@ -164,6 +173,10 @@ mod imp {
     }
 
     pub(crate) fn lock_memory() -> Result<(), String> {
+        Err(NOT_AVAILABLE.to_owned())
+    }
+
+    pub(crate) fn may_lock_everything() -> Result<(), String> {
         Err(NOT_AVAILABLE.to_owned())
     }
 }

@@ -116,7 +116,7 @@ impl RateGroup {
 
     /// Virtual time: when its publications become visible, counted from the release. It may exceed the period; several
     /// publications are then in flight and become visible in order. A latency beyond the deadline misses it each time.
-    /// Threads take the time that they take.
+    /// Threads take the time that they take, and a latency beyond the period is refused there.
     #[must_use]
     pub fn latency(mut self, latency: Nanos) -> Self {
         self.latency = latency;
@@ -173,6 +173,11 @@ impl RateGroup {
     pub fn wind_down_at_end(mut self) -> Self {
         self.wind_down_at_end = true;
         self
+    }
+
+    /// True if a [budget](Self::budget) was given.
+    pub fn has_budget(&self) -> bool {
+        self.budget.is_some()
     }
 
     /// The rate.

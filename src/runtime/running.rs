@@ -5,6 +5,7 @@ use super::deadline::Ledger;
 use super::exchange::ExchangeReader;
 use super::grant::{GrantHandle, SystemGrant};
 use super::live::{GroupLive, LiveReader};
+use super::plan::Plan;
 use super::recorder::Registry;
 use super::release::GroupRun;
 use super::report::{RuntimeFault, RuntimeReport};
@@ -47,6 +48,15 @@ impl Runtime {
         grants: GrantHandle,
     ) -> Self {
         Self { execution, groups, restarters, registry, grants }
+    }
+
+    /// The schedule: what each group asks for, what the cores bear, which releases coincide, and what this system would
+    /// refuse now. Nothing is started.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Runtime`] if the process has been moved to fewer cores since the graph was built and no longer fits.
+    pub fn plan(&self) -> Result<Plan, Error> {
+        Plan::of(self.execution, &self.groups.iter().map(|group| group.spec.clone()).collect::<Vec<_>>())
     }
 
     /// Sets the threads up, then starts all actors one after the other on this thread, then releases the groups.

@@ -1,5 +1,7 @@
 //! The admission check: a graph that cannot work is refused when it is built, with the values that failed.
 
+use super::builder::Execution;
+use super::os;
 use super::rate_group::{OverrunPolicy, RateGroup};
 use crate::error::{Error, ErrorKind};
 use std::collections::BTreeMap;
@@ -7,8 +9,15 @@ use std::collections::BTreeMap;
 /// Records carry the group's number in 16 bits; far fewer make sense.
 const MAX_GROUPS: usize = 256;
 
-/// Checks the groups of a graph against each other and against themselves.
-pub(crate) fn admit(groups: &[RateGroup]) -> Result<(), Error> {
+/// Checks the groups of a graph for this machine.
+pub(crate) fn admit_here(groups: &[RateGroup], execution: Execution) -> Result<(), Error> {
+    admit(groups, execution, os::cores())
+}
+
+/// Checks the groups of a graph against themselves, each other and `cores` processor cores.
+///
+/// Virtual time may stand for any machine: how many cores this one has and how long a result takes are no matter there.
+pub(super) fn admit(groups: &[RateGroup], execution: Execution, cores: usize) -> Result<(), Error> {
     if groups.iter().all(|group| group.observer) {
         return Err(refuse("the graph has no group that is not an observer: it would end at once; add one"));
     }
@@ -21,7 +30,11 @@ pub(crate) fn admit(groups: &[RateGroup]) -> Result<(), Error> {
             check_pair(earlier, group)?;
         }
     }
-    check_cores(groups)
+    check_cores(groups)?;
+    match execution {
+        Execution::Virtual => Ok(()),
+        Execution::Threaded => groups.iter().try_for_each(check_latency).and_then(|()| check_all(groups, cores)),
+    }
 }
 
 fn check_group(group: &RateGroup) -> Result<(), Error> {
@@ -69,27 +82,69 @@ fn check_pair(a: &RateGroup, b: &RateGroup) -> Result<(), Error> {
     Ok(())
 }
 
+/// A thread whose results take longer than its period would fall behind for ever.
+fn check_latency(group: &RateGroup) -> Result<(), Error> {
+    let period = group.rate.period();
+    if group.latency <= period {
+        return Ok(());
+    }
+    let message = format!(
+        "latency {} is above the period {period}: on threads a result must be there before the next release; lower the \
+         latency or the rate, or run in virtual time",
+        group.latency
+    );
+    Err(refuse(message).at(place(group)))
+}
+
+/// Budgets as parts of their periods: the sum and its terms.
+#[derive(Default)]
+struct Load {
+    sum: f64,
+    terms: Vec<String>,
+}
+
+impl Load {
+    fn add(&mut self, group: &RateGroup) {
+        if let Some(budget) = group.budget {
+            self.sum += budget.as_secs_f64() / group.rate.period_s();
+            self.terms.push(format!("`{}` {budget} of {}", group.name, group.rate.period()));
+        }
+    }
+
+    /// One part in a million of slack: budgets that fill a core exactly must not fail on the last bit.
+    fn exceeds(&self, cores: usize) -> bool {
+        self.sum > cores as f64 * (1.0 + 1e-6)
+    }
+
+    fn in_words(&self) -> String {
+        format!("{:.1} % ({})", 100.0 * self.sum, self.terms.join(" + "))
+    }
+}
+
 /// The budgets of the groups pinned to one core must fit into its time.
 fn check_cores(groups: &[RateGroup]) -> Result<(), Error> {
-    let mut cores = BTreeMap::<usize, (f64, Vec<String>)>::new();
+    let mut cores = BTreeMap::<usize, Load>::new();
     for group in groups {
-        if let (Some(cpu), Some(budget)) = (group.cpu, group.budget) {
-            let (sum, terms) = cores.entry(cpu).or_default();
-            *sum += budget.as_secs_f64() / group.rate.period_s();
-            terms.push(format!("`{}` {budget} of {}", group.name, group.rate.period()));
-        }
+        group.cpu.into_iter().for_each(|cpu| cores.entry(cpu).or_default().add(group));
     }
-    for (cpu, (sum, terms)) in cores {
-        // One part in a million of slack: budgets that fill a core exactly must not fail on the last bit.
-        if sum > 1.0 + 1e-6 {
-            return Err(refuse(format!(
-                "the budgets on core {cpu} need {:.1} % of it ({}); lower them or use another core",
-                100.0 * sum,
-                terms.join(" + ")
-            )));
-        }
+    match cores.iter().find(|(_, load)| load.exceeds(1)) {
+        None => Ok(()),
+        Some((cpu, load)) => Err(refuse(format!(
+            "the budgets on core {cpu} need {} of its 100 %; lower them or use another core",
+            load.in_words()
+        ))),
     }
-    Ok(())
+}
+
+/// All budgets must fit into the time of all cores.
+fn check_all(groups: &[RateGroup], cores: usize) -> Result<(), Error> {
+    let mut load = Load::default();
+    groups.iter().for_each(|group| load.add(group));
+    if !load.exceeds(cores) {
+        return Ok(());
+    }
+    let cores = if cores == 1 { "1 core".to_owned() } else { format!("{cores} cores") };
+    Err(refuse(format!("the budgets need {} of {cores}; lower them, or allow the process more cores", load.in_words())))
 }
 
 fn place(group: &RateGroup) -> String {
@@ -107,6 +162,11 @@ mod tests {
 
     fn named(name: &str) -> RateGroup {
         RateGroup::hz(1000).name(name)
+    }
+
+    /// On threads, on a machine of two cores.
+    fn admit(groups: &[RateGroup]) -> Result<(), Error> {
+        super::admit(groups, Execution::Threaded, 2)
     }
 
     #[track_caller]
@@ -132,8 +192,11 @@ mod tests {
     }
 
     #[test]
-    fn a_latency_beyond_the_period_is_allowed() {
-        assert!(admit(&[named("a").latency(Nanos(5_000_000))]).is_ok());
+    fn a_latency_beyond_the_period_is_refused_on_threads_and_allowed_in_virtual_time() {
+        let late = [named("a").latency(Nanos(1_000_001))];
+        refused(&late, &["rate group `a`", "1.000001ms", "1ms", "virtual time"]);
+        assert!(super::admit(&late, Execution::Virtual, 2).is_ok());
+        assert!(admit(&[named("a").latency(Nanos(1_000_000))]).is_ok());
     }
 
     #[test]
@@ -154,6 +217,16 @@ mod tests {
             &["core 1", "110.0 %", "`fast`", "`slow`"],
         );
         assert!(admit(&[named("fast").pin(0).budget(Nanos(500_000)), slow]).is_ok());
+    }
+
+    #[test]
+    fn budgets_that_overfill_all_cores_together_are_refused_on_threads_with_the_sum() {
+        let groups = ["a", "b", "c"].map(|name| named(name).budget(Nanos(700_000)));
+        refused(&groups, &["210.0 %", "`a` 700µs of 1ms + `b`", "2 cores"]);
+        assert!(super::admit(&groups, Execution::Threaded, 3).is_ok());
+        assert!(super::admit(&groups, Execution::Virtual, 1).is_ok());
+        // Check that budgets which fill every core exactly fit
+        assert!(admit(&[named("a").budget(Nanos(1_000_000)), named("b").budget(Nanos(1_000_000))]).is_ok());
     }
 
     #[test]

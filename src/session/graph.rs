@@ -27,6 +27,16 @@ const SECONDS_BUFFERED: f64 = 4.0;
 /// However slow the haptic rate is: release 0 makes several records before the first drain.
 const MIN_TICKS_BUFFERED: usize = 64;
 
+/// The rate groups of a session, in graph order.
+pub(super) fn groups(prepared: &Prepared) -> Vec<RateGroup> {
+    let global = (prepared.kind != Kind::Full).then(|| prepared.global.clone());
+    [prepared.local.clone()].into_iter().chain(global).chain([logger_group()]).collect()
+}
+
+fn logger_group() -> RateGroup {
+    RateGroup::new(LOGGER).name("logger").observer()
+}
+
 pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let first = first_state(&mut *prepared.device)?;
     let environment = environment(&prepared);
@@ -109,7 +119,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
             graph.group(prepared.global, actors);
         }
     }
-    graph.group(RateGroup::new(LOGGER).name("logger").observer(), vec![Box::new(logger)]);
+    graph.group(logger_group(), vec![Box::new(logger)]);
     if let Some(until) = prepared.until {
         graph.until(until);
     }

@@ -12,6 +12,7 @@
 //! # }
 //! ```
 
+mod budget;
 mod builder;
 mod global;
 mod graph;
@@ -24,6 +25,7 @@ pub use running::{Running, Summary, Viewer};
 
 use crate::error::Error;
 use crate::model::body::Body;
+use crate::runtime::Plan;
 use crate::scene::Scene;
 use prepare::Prepared;
 
@@ -42,6 +44,15 @@ impl Session {
     /// A session as a scene describes it; the builder can still change it.
     pub fn from_scene(scene: Scene) -> SessionBuilder {
         SessionBuilder::new(None, scene)
+    }
+
+    /// The schedule: what each rate group asks for, what the cores bear, which releases coincide, and what this system
+    /// would refuse now. Nothing is started, no device is asked, no file is created.
+    ///
+    /// # Errors
+    /// If the process has been moved to fewer cores since the session was built and no longer fits.
+    pub fn plan(&self) -> Result<Plan, Error> {
+        Plan::of(self.prepared.execution, &graph::groups(&self.prepared))
     }
 
     /// Starts it: threads are up and the first local model is built when this returns.

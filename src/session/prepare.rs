@@ -3,6 +3,8 @@
 #[cfg(feature = "log")]
 use std::path::PathBuf;
 
+use super::budget;
+use super::graph::groups;
 use crate::devices::{Device, Scripted, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::Vec3;
@@ -13,7 +15,7 @@ use crate::model::integrator::Spectrum;
 use crate::model::local::Kind;
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
-use crate::runtime::{Execution, RateGroup};
+use crate::runtime::{Execution, RateGroup, admit_here};
 use crate::safety::Limits;
 use crate::scene::{BlendKind, BodySpec, Feedback, InitialSpec, LocalModelKind, Scene};
 use crate::time::{Nanos, Rate};
@@ -76,6 +78,13 @@ pub(super) struct Prepared {
     pub keep_records: bool,
     /// The scene file's text, for the log.
     pub source: Option<String>,
+}
+
+/// How often the whole body's forces are evaluated: `substeps` times per haptic tick.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Timing {
+    pub haptic: Rate,
+    pub substeps: u32,
 }
 
 /// The priority of the haptic thread: above everything but the kernel's own.
@@ -143,6 +152,14 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let global = match scene.global.compute_latency_ms {
         // Not given: the latency of a group that the program brings stays.
         0.0 => global,
+        latency_ms if parts.execution == Execution::Threaded && latency_ms > 1e3 * global_rate.period_s() => {
+            let message = format!(
+                "is {latency_ms}, which is above the period of {:.3} ms: in real time a result must be there before the next \
+                 release; lower it, or run in virtual time (--virtual)",
+                1e3 * global_rate.period_s()
+            );
+            return Err(Error::scene("global.compute_latency_ms", message));
+        }
         latency_ms => global.latency(Nanos::from_secs_f64(latency_ms * 1e-3)),
     };
     let last_core = std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1);
@@ -151,7 +168,12 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         // On a single core the haptic thread preempts the others; pinning would gain nothing.
         if last_core > 0 { group.pin(last_core) } else { group }
     });
-    Ok(Prepared {
+    let local = winding_down(local.name("local"), limits.ramp_s, exerts_force);
+    let [local, global] = match parts.execution {
+        Execution::Virtual => [local, global],
+        Execution::Threaded => budget::declare(&mut *body, &state, Timing { haptic, substeps }, kind, [local, global])?,
+    };
+    let prepared = Prepared {
         simulation: Simulation::new(body, state, contact, law, Stepping { tick, substeps })?,
         kind,
         geometry_feedback: feedback == Feedback::Geometry && matches!(kind, Kind::Patch(_)),
@@ -161,7 +183,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         probes,
         haptic,
         global_rate,
-        local: winding_down(local.name("local"), limits.ramp_s, exerts_force),
+        local,
         global,
         execution: parts.execution,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
@@ -169,7 +191,10 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         log: parts.log,
         keep_records: parts.keep_records,
         source: scene.source,
-    })
+    };
+    // Before anything is started or written.
+    admit_here(&groups(&prepared), prepared.execution)?;
+    Ok(prepared)
 }
 
 fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
