@@ -72,6 +72,19 @@ pub enum Mode {
     Degraded,
 }
 
+/// The part of a group's life in which its actors are called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Phase {
+    /// Starts run one after the other before anything is released: what they see is the same in every run.
+    Start,
+    /// A release, which a recording can repeat.
+    Release,
+    /// A release of an observer: it follows its own schedule, also when a recording is re-executed.
+    Observer,
+    /// After the last release.
+    Stop,
+}
+
 /// What an actor is told at a release. All times count from the start of the run.
 #[derive(Clone, Copy, Debug)]
 pub struct TickContext {
@@ -89,8 +102,12 @@ pub struct TickContext {
     pub slips: u32,
     /// How much to do.
     pub mode: Mode,
-    /// When publications made in this release become visible to others; only virtual time looks at it.
+    /// When publications made in this release become visible to other groups; only virtual time looks at it.
     pub(super) visible_at: Nanos,
+    /// The rate group that is called: ports tell by it what comes from another group.
+    pub(super) group: u16,
+    /// In which part of its life.
+    pub(super) phase: Phase,
 }
 
 impl TickContext {
@@ -106,6 +123,8 @@ impl TickContext {
             slips: 0,
             mode: Mode::Normal,
             visible_at: scheduled,
+            group: 0,
+            phase: Phase::Release,
         }
     }
 }

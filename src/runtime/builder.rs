@@ -3,12 +3,16 @@
 use super::actor::Actor;
 use super::grant::GrantHandle;
 use super::outlet::{self, OutletReader, OutletWriter};
-use super::port::{self, QueueReader, QueueWriter, Reader, Writer};
+use super::port::{self, PortPlan, Reader, Writer};
+use super::queue_port::{self, QueueReader, QueueWriter};
 use super::rate_group::RateGroup;
 use super::recorder::{RecordDrain, Recorder, Registry};
+use super::recording::Recording;
+use super::reexecution::Reexecution;
 use super::release::GroupRun;
 use super::running::Runtime;
 use super::schedule::admit;
+use super::script::Script;
 use crate::error::Error;
 use crate::time::{Nanos, Rate};
 use std::fmt;
@@ -30,26 +34,52 @@ pub struct RuntimeBuilder {
     until: Option<Nanos>,
     registry: Arc<Registry>,
     grants: GrantHandle,
+    /// Exchanges and queues made so far.
+    ports: u32,
+    /// What to repeat, and what its ports must show.
+    recording: Option<(Recording, Script)>,
 }
 
 impl RuntimeBuilder {
-    pub(super) fn new(execution: Execution) -> Self {
-        Self { execution, groups: Vec::new(), until: None, registry: Registry::new(), grants: GrantHandle::default() }
+    pub(super) fn new(execution: Execution, recording: Option<Recording>) -> Self {
+        Self {
+            execution,
+            groups: Vec::new(),
+            until: None,
+            registry: Registry::new(),
+            grants: GrantHandle::default(),
+            ports: 0,
+            recording: recording.map(|recording| {
+                let script = recording.script();
+                (recording, script)
+            }),
+        }
+    }
+
+    fn plan_port(&mut self) -> PortPlan<'_> {
+        let port = self.ports;
+        self.ports += 1;
+        let script = self.recording.as_ref().map(|(_, script)| script.port(port));
+        PortPlan { port, registry: &self.registry, script }
     }
 
     /// A port for the newest value of a large state; every buffer is filled by `init`.
+    ///
+    /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
     pub fn exchange<T: Send>(&mut self, init: impl FnMut() -> T + Send + 'static) -> (Writer<T>, Reader<T>) {
         match self.execution {
-            Execution::Virtual => port::virtual_exchange(init),
-            Execution::Threaded => port::threaded_exchange(init),
+            Execution::Virtual => port::virtual_exchange(self.plan_port(), init),
+            Execution::Threaded => port::threaded_exchange(self.plan_port(), init),
         }
     }
 
     /// A port for ordered samples that holds at least `capacity` of them, rounded up to a power of two.
+    ///
+    /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
     pub fn queue<T: Copy + Send>(&mut self, capacity: usize) -> (QueueWriter<T>, QueueReader<T>) {
         match self.execution {
-            Execution::Virtual => port::virtual_queue(capacity),
-            Execution::Threaded => port::threaded_queue(capacity),
+            Execution::Virtual => queue_port::virtual_queue(self.plan_port(), capacity),
+            Execution::Threaded => queue_port::threaded_queue(self.plan_port(), capacity),
         }
     }
 
@@ -64,7 +94,7 @@ impl RuntimeBuilder {
     }
 
     /// Takes the records of all recorders, made before or after this call, and of every group's timing and events.
-    /// Without a drain the groups record nothing.
+    /// Without a drain the groups record nothing, and ports made before the first call record nothing either.
     pub fn drain(&mut self) -> RecordDrain {
         self.registry.drain()
     }
@@ -91,7 +121,9 @@ impl RuntimeBuilder {
     /// # Errors
     /// [`ErrorKind::Runtime`](crate::ErrorKind::Runtime), naming the group and the values, for a graph that cannot work:
     /// a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core, equal real-time
-    /// priorities pinned to one core, a priority outside 1 to 99, a name used twice, no group that is not an observer.
+    /// priorities pinned to one core, a priority outside 1 to 99, a name used twice, no group that is not an observer. For a
+    /// re-execution also if the recording is one of another graph, and [`ErrorKind::Log`](crate::ErrorKind::Log) if it
+    /// has gaps.
     pub fn build(&mut self) -> Result<Runtime, Error> {
         for (index, (group, _)) in self.groups.iter_mut().enumerate() {
             if group.name.is_empty() {
@@ -99,15 +131,19 @@ impl RuntimeBuilder {
             }
         }
         admit(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>())?;
-        let built = std::mem::replace(self, Self::new(self.execution));
+        let built = std::mem::replace(self, Self::new(self.execution, None));
         let registry = built.registry;
         let run = |(index, (spec, actors)): (usize, (RateGroup, Vec<Box<dyn Actor>>))| {
             let recorder = registry.wanted().then(|| registry.recorder(ring_capacity(spec.rate)));
             // The admission check keeps the number of groups far below this.
             GroupRun::new(index as u16, spec, actors, recorder, built.until)
         };
-        let groups = built.groups.into_iter().enumerate().map(run).collect();
-        Ok(Runtime::new(built.execution, groups, registry, built.grants))
+        let groups: Vec<GroupRun> = built.groups.into_iter().enumerate().map(run).collect();
+        let reexecution = match built.recording {
+            Some((recording, script)) => Some(Reexecution::new(recording, script, &groups, built.ports)?),
+            None => None,
+        };
+        Ok(Runtime::new(built.execution, groups, reexecution, registry, built.grants))
     }
 }
 

@@ -156,6 +156,13 @@ impl Ledger {
         decision
     }
 
+    /// Books that release `release` is to run after `skipped` periods, as it was recorded.
+    pub(crate) fn book(&mut self, release: u64, skipped: u64, cause: SlipCause) {
+        self.lateness = cause;
+        self.skipped.add(cause, skipped);
+        self.next = release + 1;
+    }
+
     /// Books a release that has run and returns its timing.
     pub(crate) fn close(&mut self, release: u64, skipped: u64, [woke, start, end]: [Nanos; 3]) -> TickTiming {
         let scheduled = self.timeline.due(release);

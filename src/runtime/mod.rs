@@ -8,6 +8,7 @@
 //!   [`queue`](RuntimeBuilder::queue) for ordered samples, [`outlet`](RuntimeBuilder::outlet) for threads outside.
 //! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
 //!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
+//! - Re-execution: a run on threads, [recorded](Recording), is repeated in virtual time bit for bit.
 //! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each.
 //! - Faults: a panic or a reported fault stops the whole graph in order and is in the [report](RuntimeReport).
 //!
@@ -65,18 +66,25 @@ pub mod mailbox;
 mod os;
 mod outlet;
 mod port;
+mod port_memory;
+mod port_use;
+mod queue_port;
 mod rate_group;
 pub mod record;
 mod recorder;
+mod recording;
+mod reexecution;
 mod release;
 mod report;
 pub mod ring;
 mod running;
 mod schedule;
+mod script;
 mod supervisor;
 mod sync;
 mod threaded;
 mod virtual_port;
+mod virtual_queue;
 mod virtual_time;
 
 pub use actor::{Actor, Mode, Outcome, TickContext, actor_fn};
@@ -84,10 +92,13 @@ pub use builder::{Execution, RuntimeBuilder};
 pub use deadline::SlipCounts;
 pub use grant::{GrantHandle, GroupGrant, SystemGrant};
 pub use outlet::{OutletReader, OutletWriter};
-pub use port::{QueueReader, QueueWriter, Reader, Writer};
+pub use port::{Reader, Writer};
+pub use port_use::{PortUse, PortUseKind};
+pub use queue_port::{QueueReader, QueueWriter};
 pub use rate_group::{OverrunPolicy, RateGroup, Wait};
 pub use record::{Channel, Event, Record, SlipCause, TickTiming};
 pub use recorder::{RecordDrain, Recorder};
+pub use recording::Recording;
 pub use report::{GroupReport, RuntimeFault, RuntimeReport};
 pub use running::{Running, Runtime, STOP_BOUND};
 pub use supervisor::StopHandle;

@@ -1,16 +1,30 @@
-//! Typed ports between actors: the newest value of a large state, and ordered samples.
+//! Typed ports between actors for the newest value of a large state.
 //!
-//! The same types in both executions. Between threads they are the [exchange](super::exchange) and the
-//! [ring](super::ring); in virtual time the executor owns visibility: what a group with latency L publishes at release
-//! t is visible to readers whose scheduled time is at least t + L. With L = 0 a reader at the same time sees it if it
-//! ticks after the writer: later in the group, or in a later group.
+//! The same types in both executions. Between threads they are the [exchange](super::exchange); in virtual time the
+//! executor owns visibility: what a group with latency L publishes at release t is visible to readers in other groups
+//! whose scheduled time is at least t + L. With L = 0 a reader at the same time sees it if its group comes later. Within
+//! the group it is visible at once, to the actors that tick after the writer.
+//!
+//! A release looks at a port once. What it took from another group is recorded, so that the run can be
+//! [re-executed](super::Recording).
 
-use super::actor::TickContext;
+use super::actor::{Phase, TickContext};
 use super::exchange::{ExchangeReader, ExchangeWriter, exchange};
-use super::ring::{Consumer, Producer, ring};
-use super::virtual_port::{self, VirtualQueue, VirtualReader, VirtualWriter};
+use super::port_memory::{Looks, UseRecorder, WriterGroup};
+use super::port_use::PortUseKind;
+use super::recorder::Registry;
+use super::script::ScriptedPort;
+use super::virtual_port::{self, VirtualReader, VirtualWriter};
 use crate::time::Nanos;
 use std::fmt;
+
+/// A port that is about to be made: its number and who wants to know what it shows.
+pub(super) struct PortPlan<'a> {
+    pub(super) port: u32,
+    pub(super) registry: &'a Registry,
+    /// Says what the port shows, in a re-execution.
+    pub(super) script: Option<ScriptedPort>,
+}
 
 enum WriterKind<T> {
     Threaded(ExchangeWriter<T>),
@@ -22,46 +36,37 @@ enum ReaderKind<T> {
     Virtual(VirtualReader<T>),
 }
 
-enum QueueWriterKind<T> {
-    Threaded(Producer<T>),
-    Virtual(VirtualQueue<T>),
-}
-
-enum QueueReaderKind<T> {
-    Threaded(Consumer<T>),
-    Virtual(VirtualQueue<T>),
-}
-
 /// Publishes the newest value of a state.
-pub struct Writer<T>(WriterKind<T>);
+pub struct Writer<T> {
+    kind: WriterKind<T>,
+    group: WriterGroup,
+}
 
 /// Reads the newest value of a state. The reader owns its buffer until the next successful refresh.
-pub struct Reader<T>(ReaderKind<T>);
+pub struct Reader<T> {
+    kind: ReaderKind<T>,
+    group: WriterGroup,
+    looks: Looks,
+    took: UseRecorder,
+}
 
-/// Sends samples that all count, in order.
-pub struct QueueWriter<T>(QueueWriterKind<T>);
-
-/// Receives samples in the order they were sent.
-pub struct QueueReader<T>(QueueReaderKind<T>);
-
-pub(super) fn threaded_exchange<T: Send>(init: impl FnMut() -> T) -> (Writer<T>, Reader<T>) {
+pub(super) fn threaded_exchange<T: Send>(plan: PortPlan<'_>, init: impl FnMut() -> T) -> (Writer<T>, Reader<T>) {
     let (writer, reader) = exchange(init);
-    (Writer(WriterKind::Threaded(writer)), Reader(ReaderKind::Threaded(reader)))
+    pair(plan.registry, plan.port, WriterKind::Threaded(writer), ReaderKind::Threaded(reader))
 }
 
-pub(super) fn virtual_exchange<T: Send>(init: impl FnMut() -> T + Send + 'static) -> (Writer<T>, Reader<T>) {
-    let (writer, reader) = virtual_port::exchange(init);
-    (Writer(WriterKind::Virtual(writer)), Reader(ReaderKind::Virtual(reader)))
+pub(super) fn virtual_exchange<T: Send>(
+    plan: PortPlan<'_>,
+    init: impl FnMut() -> T + Send + 'static,
+) -> (Writer<T>, Reader<T>) {
+    let (writer, reader) = virtual_port::exchange(plan.script, init);
+    pair(plan.registry, plan.port, WriterKind::Virtual(writer), ReaderKind::Virtual(reader))
 }
 
-pub(super) fn threaded_queue<T: Copy + Send>(capacity: usize) -> (QueueWriter<T>, QueueReader<T>) {
-    let (producer, consumer) = ring(capacity);
-    (QueueWriter(QueueWriterKind::Threaded(producer)), QueueReader(QueueReaderKind::Threaded(consumer)))
-}
-
-pub(super) fn virtual_queue<T: Copy + Send>(capacity: usize) -> (QueueWriter<T>, QueueReader<T>) {
-    let queue = VirtualQueue::new(capacity);
-    (QueueWriter(QueueWriterKind::Virtual(queue.clone())), QueueReader(QueueReaderKind::Virtual(queue)))
+fn pair<T>(registry: &Registry, port: u32, writer: WriterKind<T>, reader: ReaderKind<T>) -> (Writer<T>, Reader<T>) {
+    let group = WriterGroup::new();
+    let took = UseRecorder::new(registry, port, PortUseKind::Took);
+    (Writer { kind: writer, group: group.clone() }, Reader { kind: reader, group, looks: Looks::default(), took })
 }
 
 impl<T> Writer<T> {
@@ -70,7 +75,7 @@ impl<T> Writer<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn buffer(&mut self) -> &mut T {
-        match &mut self.0 {
+        match &mut self.kind {
             WriterKind::Threaded(writer) => writer.buffer(),
             WriterKind::Virtual(writer) => writer.buffer(),
         }
@@ -81,7 +86,8 @@ impl<T> Writer<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn publish(&mut self, ctx: &TickContext) -> u64 {
-        match &mut self.0 {
+        self.group.set(ctx);
+        match &mut self.kind {
             WriterKind::Threaded(writer) => writer.publish(ctx.scheduled),
             WriterKind::Virtual(writer) => writer.publish(ctx),
         }
@@ -91,13 +97,22 @@ impl<T> Writer<T> {
 impl<T> Reader<T> {
     /// Takes the newest value if there is one that was not taken yet; returns whether there was.
     ///
+    /// A release looks once: further calls in the same release return false.
+    ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn refresh(&mut self, ctx: &TickContext) -> bool {
-        match &mut self.0 {
-            ReaderKind::Threaded(reader) => reader.refresh(),
-            ReaderKind::Virtual(reader) => reader.refresh(ctx),
+        if !self.looks.is_first(ctx) {
+            return false;
         }
+        let fresh = match &mut self.kind {
+            ReaderKind::Threaded(reader) => reader.refresh(),
+            ReaderKind::Virtual(reader) => reader.refresh(ctx, self.group.is(ctx)),
+        };
+        if fresh && ctx.phase == Phase::Release && !self.group.is(ctx) {
+            self.took.push(ctx, self.version());
+        }
+        fresh
     }
 
     /// The value of the last refresh, or the initial value.
@@ -105,7 +120,7 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn get(&self) -> &T {
-        match &self.0 {
+        match &self.kind {
             ReaderKind::Threaded(reader) => reader.get(),
             ReaderKind::Virtual(reader) => reader.get(),
         }
@@ -116,7 +131,7 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn get_mut(&mut self) -> &mut T {
-        match &mut self.0 {
+        match &mut self.kind {
             ReaderKind::Threaded(reader) => reader.get_mut(),
             ReaderKind::Virtual(reader) => reader.get_mut(),
         }
@@ -127,7 +142,7 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn version(&self) -> u64 {
-        match &self.0 {
+        match &self.kind {
             ReaderKind::Threaded(reader) => reader.version(),
             ReaderKind::Virtual(reader) => reader.version(),
         }
@@ -138,68 +153,9 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn published(&self) -> Nanos {
-        match &self.0 {
+        match &self.kind {
             ReaderKind::Threaded(reader) => reader.published(),
             ReaderKind::Virtual(reader) => reader.published(),
-        }
-    }
-}
-
-impl<T: Copy> QueueWriter<T> {
-    /// Sends a sample; false if the queue is full: the sample is then dropped and counted.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn push(&mut self, ctx: &TickContext, sample: T) -> bool {
-        match &mut self.0 {
-            QueueWriterKind::Threaded(producer) => producer.push(sample),
-            QueueWriterKind::Virtual(queue) => queue.push(ctx, sample),
-        }
-    }
-
-    /// Samples dropped so far because the queue was full.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn dropped(&self) -> u64 {
-        match &self.0 {
-            QueueWriterKind::Threaded(producer) => producer.lost(),
-            QueueWriterKind::Virtual(queue) => queue.dropped(),
-        }
-    }
-}
-
-impl<T: Copy> QueueReader<T> {
-    /// The oldest visible sample, left in the queue.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn peek(&mut self, ctx: &TickContext) -> Option<T> {
-        match &mut self.0 {
-            QueueReaderKind::Threaded(consumer) => consumer.peek(),
-            QueueReaderKind::Virtual(queue) => queue.peek(ctx),
-        }
-    }
-
-    /// Takes the oldest visible sample.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn pop(&mut self, ctx: &TickContext) -> Option<T> {
-        match &mut self.0 {
-            QueueReaderKind::Threaded(consumer) => consumer.pop(),
-            QueueReaderKind::Virtual(queue) => queue.pop(ctx),
-        }
-    }
-
-    /// Samples dropped so far because the queue was full.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn dropped(&self) -> u64 {
-        match &self.0 {
-            QueueReaderKind::Threaded(consumer) => consumer.lost(),
-            QueueReaderKind::Virtual(queue) => queue.dropped(),
         }
     }
 }
@@ -213,17 +169,5 @@ impl<T> fmt::Debug for Writer<T> {
 impl<T> fmt::Debug for Reader<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Reader").field("version", &self.version()).finish_non_exhaustive()
-    }
-}
-
-impl<T> fmt::Debug for QueueWriter<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("QueueWriter").finish_non_exhaustive()
-    }
-}
-
-impl<T> fmt::Debug for QueueReader<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("QueueReader").finish_non_exhaustive()
     }
 }

@@ -11,6 +11,8 @@ impl Channel {
     pub const TICK: Self = Self(0);
     /// Something that happened once, `code` says what: see [`Event`].
     pub const EVENT: Self = Self(1);
+    /// What a release saw through a port: see [`PortUse`](super::PortUse).
+    pub const PORT: Self = Self(2);
     /// The first number that programs may use.
     pub const FIRST_USER: Self = Self(16);
 }

@@ -1,10 +1,11 @@
 //! One group at work: starts, releases, faults and the stop, the same in both executions.
 
-use super::actor::{Actor, Mode, Outcome, TickContext};
+use super::actor::{Actor, Mode, Outcome, Phase, TickContext};
 use super::deadline::{Decision, Ledger};
 use super::rate_group::RateGroup;
 use super::record::Event;
 use super::recorder::Recorder;
+use super::recording::RecordedRelease;
 use super::report::{GroupReport, RuntimeFault};
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
@@ -52,6 +53,8 @@ impl GroupRun {
             slips: 0,
             mode: Mode::Normal,
             visible_at: Nanos::ZERO,
+            group: index,
+            phase: Phase::Start,
         };
         let names = actors.iter().map(|actor| actor.name().to_owned()).collect();
         let ledger = Ledger::new(index, &spec, until);
@@ -111,6 +114,27 @@ impl GroupRun {
             Decision::Stop { skipped } => return Err(self.overrun(skipped)),
         };
         let scheduled = self.ledger.due(release);
+        self.run(release, scheduled, skipped, woke, start, end)
+    }
+
+    /// Runs a release that was recorded: its number, its time and its slips are given, nothing is decided.
+    pub(crate) fn rerun(&mut self, recorded: &RecordedRelease) -> Result<(), RuntimeFault> {
+        let RecordedRelease { tick, scheduled, slips, cause } = *recorded;
+        self.ledger.book(tick, slips.into(), cause);
+        let latency = self.spec.latency;
+        self.run(tick, scheduled, slips.into(), scheduled, |at| at, |at| at + latency)
+    }
+
+    /// Runs release `release`, due at `scheduled`, after `skipped` periods without one.
+    fn run(
+        &mut self,
+        release: u64,
+        scheduled: Nanos,
+        skipped: u64,
+        woke: Nanos,
+        start: impl FnOnce(Nanos) -> Nanos,
+        end: impl FnOnce(Nanos) -> Nanos,
+    ) -> Result<(), RuntimeFault> {
         let now = start(scheduled);
         let dt_nominal = self.last.dt_nominal;
         let first = self.ledger.released == 0;
@@ -123,6 +147,8 @@ impl GroupRun {
             slips: u32::try_from(skipped).unwrap_or(u32::MAX),
             mode: Mode::Normal,
             visible_at: scheduled + self.spec.latency,
+            group: self.index,
+            phase: if self.spec.observer { Phase::Observer } else { Phase::Release },
         };
         self.last = ctx;
         let result = self.work(&ctx);
@@ -214,13 +240,14 @@ impl GroupRun {
         let tick = self.ledger.elapsed_periods();
         let dt_measured = now.saturating_sub(self.last.now).as_secs_f64();
         self.last = TickContext { tick, scheduled: now, now, dt_measured, slips: 0, visible_at: now, ..self.last };
+        self.last.phase = Phase::Observer;
         let ctx = self.last;
         self.work(&ctx)
     }
 
     /// Stops and drops the actors and gives the sums. A panic on the way is reported, the other actors still stop.
     pub(crate) fn finish(mut self, now: Nanos) -> (GroupReport, Option<RuntimeFault>) {
-        let ctx = TickContext { now, ..self.last };
+        let ctx = TickContext { now, phase: Phase::Stop, ..self.last };
         let mut fault = None;
         for (index, mut actor) in std::mem::take(&mut self.actors).into_iter().enumerate() {
             let stopped = catch_unwind(AssertUnwindSafe(|| actor.stop(&ctx)));

@@ -3,6 +3,8 @@
 use super::builder::{Execution, RuntimeBuilder};
 use super::grant::{GrantHandle, SystemGrant};
 use super::recorder::Registry;
+use super::recording::Recording;
+use super::reexecution::Reexecution;
 use super::release::GroupRun;
 use super::report::RuntimeReport;
 use super::supervisor::{Control, StopHandle};
@@ -24,6 +26,7 @@ const POLL: Duration = Duration::from_millis(5);
 pub struct Runtime {
     execution: Execution,
     groups: Vec<GroupRun>,
+    reexecution: Option<Reexecution>,
     registry: Arc<Registry>,
     grants: GrantHandle,
 }
@@ -31,16 +34,26 @@ pub struct Runtime {
 impl Runtime {
     /// A builder for a graph that runs in this execution.
     pub fn builder(execution: Execution) -> RuntimeBuilder {
-        RuntimeBuilder::new(execution)
+        RuntimeBuilder::new(execution, None)
+    }
+
+    /// A builder for a graph that repeats `recording` in virtual time: it must be built as the recorded one was, with
+    /// the same groups and ports in the same order. Exactly the recorded releases run, whatever rates, policies and
+    /// [`until`](RuntimeBuilder::until) say, and every one of them sees through its ports what it saw then.
+    ///
+    /// A recording that lacks a record ends in a [fault](RuntimeReport::fault) that names what is missing.
+    pub fn reexecution(recording: Recording) -> RuntimeBuilder {
+        RuntimeBuilder::new(Execution::Virtual, Some(recording))
     }
 
     pub(super) fn new(
         execution: Execution,
         groups: Vec<GroupRun>,
+        reexecution: Option<Reexecution>,
         registry: Arc<Registry>,
         grants: GrantHandle,
     ) -> Self {
-        Self { execution, groups, registry, grants }
+        Self { execution, groups, reexecution, registry, grants }
     }
 
     /// Sets the threads up, then starts all actors one after the other on this thread, then releases the groups.
@@ -51,7 +64,7 @@ impl Runtime {
     /// The error of the first actor whose start failed, after those already started were stopped; or
     /// [`ErrorKind::Runtime`] if the system gives no thread.
     pub fn start(self) -> Result<Running, Error> {
-        let Self { execution, mut groups, registry, grants } = self;
+        let Self { execution, mut groups, reexecution, registry, grants } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names = groups.iter().map(|group| group.spec.name.clone()).collect();
         let executor = match execution {
@@ -59,7 +72,7 @@ impl Runtime {
             Execution::Virtual => {
                 grants.set(SystemGrant::of_virtual_time(groups.iter().map(|group| &group.spec)));
                 start_actors(&mut groups)?;
-                Executor::Virtual(VirtualRun::new(groups, Arc::clone(&control)))
+                Executor::Virtual(VirtualRun::new(groups, reexecution, Arc::clone(&control)))
             }
         };
         Ok(Running { executor: Mutex::new(executor), control, names, registry, grants })
