@@ -14,6 +14,7 @@ use prost_types::{
 
 use super::event::Level;
 use super::records::ContactMode;
+use crate::runtime::PortUseKind;
 use crate::runtime::record::SlipCause;
 
 /// The version of the schema that this build writes.
@@ -99,6 +100,7 @@ macro_rules! proto_schema {
 
 proto_schema! {
     enum SlipCause { None, LateWake, LongTick, StalledPeer, Policy }
+    enum PortUseKind { Took, Saw, Dropped }
     enum ContactMode { Free, Stick, Slip, Lost }
     enum Level { Info, Warning, Error }
 
@@ -188,6 +190,17 @@ proto_schema! {
         last_tick: uint64 = 4,
     }
 
+    /// `/ports`: what a release saw through a port from another group; see `PortUseKind` for the count.
+    message PortUse {
+        time_ns: uint64 = 1,
+        group: uint32 = 2,
+        port: uint32 = 3,
+        kind: int32 as PortUseKind = 4,
+        tick: uint64 = 5,
+        count: uint64 = 6,
+        sequence: uint64 = 7,
+    }
+
     /// `/probe`: a probed node.
     message Probe {
         time_ns: uint64 = 1,
@@ -208,6 +221,7 @@ proto_schema! {
         lateness_last_second: message of Percentiles = 8,
         execution: message of Percentiles = 9,
         execution_last_second: message of Percentiles = 10,
+        port_uses: uint64 = 11,
     }
 
     /// `/log`: something that happened once. `coded` ones came from a rate group as numbers.

@@ -15,10 +15,14 @@
 mod builder;
 mod graph;
 mod prepare;
+#[cfg(all(feature = "log", feature = "scene"))]
+mod replay;
 mod running;
 mod sink;
 
 pub use builder::SessionBuilder;
+#[cfg(all(feature = "log", feature = "scene"))]
+pub use replay::{Compared, Difference, Replay, ReplayReport};
 pub use running::{Running, Summary, Viewer};
 
 use crate::error::Error;
@@ -41,6 +45,18 @@ impl Session {
     /// A session as a scene describes it; the builder can still change it.
     pub fn from_scene(scene: Scene) -> SessionBuilder {
         SessionBuilder::new(None, scene)
+    }
+
+    /// Reads the log of a scene's run, in real or in simulated time, to execute it again in simulated time from what was
+    /// logged: the states that the device gave and what each tick saw of the other rate group. Logged forces are only
+    /// compared with.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read; [`ErrorKind::Log`](crate::ErrorKind::Log) if it is
+    /// damaged, if a record is missing, if it was made with another instruction set, or if the body was a program's own.
+    #[cfg(all(feature = "log", feature = "scene"))]
+    pub fn replay(log: &std::path::Path) -> Result<Replay, Error> {
+        Replay::of_scene(log)
     }
 
     /// Starts it: threads are up and the first local model is built when this returns.
