@@ -277,6 +277,7 @@ fn every_topic_of_a_log_can_be_exported() {
         ("/contact", "t_s,mode", 200),
         ("/resync", "t_s,version", 5),
         ("/global", "t_s,version", 6),
+        ("/ports", "t_s,group,port", 12),
         ("/probe", "t_s,node", 200),
         ("/log", "t_s,level,message", 0),
         ("/timing/local", "tick,scheduled_ns", 201),
@@ -296,7 +297,7 @@ fn a_virtual_log_is_in_time_order_from_front_to_back() {
     let times: Vec<u64> = LogReader::open(&folder.path("palpate-run.mcap"))
         .unwrap()
         .filter_map(|entry| match entry {
-            LogEntry::Environment(_) => None,
+            LogEntry::Environment(_) | LogEntry::Attachment { .. } => None,
             LogEntry::Record(record) => Some(record.time().0),
             LogEntry::Stats(stats) => Some(stats.time.0),
             LogEntry::Text(event) => Some(event.time.0),

@@ -10,13 +10,14 @@ use std::path::{Path, PathBuf};
 const SECONDS: &str = "0.3";
 const TICKS: usize = 300;
 
-const TOPICS: [&str; 14] = [
+const TOPICS: [&str; 15] = [
     "/force",
     "/force_commanded",
     "/tool",
     "/contact",
     "/resync",
     "/global",
+    "/ports",
     "/probe",
     "/log",
     "/timing/local",

@@ -69,7 +69,7 @@ fn without_latency_the_order_of_the_groups_decides_at_equal_times() {
 }
 
 #[test]
-fn readers_in_the_writers_own_group_wait_for_its_latency_too() {
+fn readers_in_the_writers_own_group_see_at_once_what_others_wait_for() {
     let mut graph = Runtime::builder(Execution::Virtual);
     let (mut writer, mut reader) = graph.exchange(|| 0);
     let write = actor_fn("writer", move |ctx| {
@@ -78,8 +78,9 @@ fn readers_in_the_writers_own_group_wait_for_its_latency_too() {
         Outcome::Continue
     });
     let read = actor_fn("reader", move |ctx| {
-        assert_eq!(reader.refresh(ctx), ctx.tick >= 2);
-        assert_eq!(reader.version(), (ctx.tick + 1).saturating_sub(2));
+        // Check that a group's own actors see what they would see on a thread, where one ticks after the other
+        assert!(reader.refresh(ctx));
+        assert_eq!(reader.version(), ctx.tick + 1);
         Outcome::Continue
     });
     let group = RateGroup::hz(1000).latency(Nanos(2 * MS));

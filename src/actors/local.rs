@@ -17,6 +17,7 @@ const MAX_TICKS_PER_RELEASE: u64 = 8;
 
 /// Where local models come from.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per session, and it does not move")]
 pub enum ModelSource {
     /// One model that needs no other (`full`); it publishes the surface itself.
     Alone(OutletWriter<SurfaceView>),

@@ -132,6 +132,10 @@ impl LoggerActor {
         // Stable: what a thread records at one time keeps its order.
         records.sort_by_key(|record| record.stamp);
         let ready = records.partition_point(|record| record.stamp < horizon);
+        // Which group a lost record was of is not known: the first one's statistics hold the sum, as the report does.
+        if let Some(first) = self.stats.first_mut() {
+            first.set_lost(self.drain.lost());
+        }
         for record in records.drain(..ready).filter_map(|record| LogRecord::from_record(&record)) {
             self.log_time = self.log_time.max(record.time());
             match &record {
@@ -151,6 +155,9 @@ impl LoggerActor {
                     if let Some(stats) = counter.and_then(|counter| counter.push(timing)) {
                         self.keep(|sink| sink.stats(&stats));
                     }
+                }
+                LogRecord::Port(used) => {
+                    self.stats.get_mut(usize::from(used.group)).into_iter().for_each(StatsCounter::push_port_use);
                 }
                 _ => {}
             }

@@ -4,6 +4,7 @@
 //! the user interrupted.
 
 pub mod export;
+pub mod replay;
 pub mod run;
 pub mod timing;
 
@@ -36,6 +37,8 @@ enum Command {
     Run(run::RunArgs),
     /// Say how well a recorded run kept its time, and what that did to the force
     Timing(timing::TimingArgs),
+    /// Execute a log again in simulated time and compare every force with the logged one, bit for bit
+    Replay(replay::ReplayArgs),
     /// Write one topic of a log as a table
     Export(export::ExportArgs),
 }
@@ -59,6 +62,7 @@ pub fn main() -> ExitCode {
             Some(Command::Run(args)) => run::run(&args),
             Some(Command::Timing(args)) => timing::run(&args),
             Some(Command::Export(args)) => export::run(&args),
+            Some(Command::Replay(args)) => replay::run(&args),
         },
         Err(error) if error.use_stderr() => Err(usage_error(&error)),
         Err(help) => return print_help(&help),

@@ -28,24 +28,53 @@ pub fn wait(running: &Running, what: &str) {
     if shown.is_hidden() {
         return running.wait();
     }
-    let bar = shown.add(ProgressBar::new(until.0 / 1_000_000));
-    let style = ProgressStyle::with_template("{msg} [{bar:40}] {prefix}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
-    bar.set_message(what.to_owned());
+    let bar = RunBar::of(shown.add(ProgressBar::no_length()), what, until);
     let style = ProgressStyle::with_template("{msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
     let lines: Vec<ProgressBar> =
         running.live().iter().map(|_| shown.add(ProgressBar::no_length().with_style(style.clone()))).collect();
     while !running.finished() {
         running.wait_for(STEP);
         let elapsed = running.elapsed().min(until);
-        bar.set_position(elapsed.0 / 1_000_000);
-        bar.set_prefix(format!("{:.1} of {:.1} s", elapsed.as_secs_f64(), until.as_secs_f64()));
+        bar.show(elapsed);
         for (line, group) in lines.iter().zip(running.live()) {
             line.set_message(in_words(&group, elapsed));
         }
     }
     lines.iter().for_each(ProgressBar::finish_and_clear);
-    bar.finish_and_clear();
+    bar.clear();
+}
+
+/// How much of a run has passed.
+pub struct RunBar {
+    bar: ProgressBar,
+    until: Nanos,
+}
+
+impl RunBar {
+    /// A bar for a run of `what` that ends at `until`.
+    pub fn new(what: &str, until: Nanos) -> Self {
+        Self::of(ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(15)), what, until)
+    }
+
+    fn of(bar: ProgressBar, what: &str, until: Nanos) -> Self {
+        bar.set_length(until.0 / 1_000_000);
+        let style = ProgressStyle::with_template("{msg} [{bar:40}] {prefix}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+        bar.set_message(what.to_owned());
+        Self { bar, until }
+    }
+
+    /// Shows that the run has come to `elapsed`.
+    pub fn show(&self, elapsed: Nanos) {
+        let elapsed = elapsed.min(self.until);
+        self.bar.set_position(elapsed.0 / 1_000_000);
+        self.bar.set_prefix(format!("{:.1} of {:.1} s", elapsed.as_secs_f64(), self.until.as_secs_f64()));
+    }
+
+    /// Takes the bar from the screen.
+    pub fn clear(self) {
+        self.bar.finish_and_clear();
+    }
 }
 
 /// A group in one line.

@@ -1,9 +1,11 @@
 //! Devices: what moves the tool and feels the force. One file per device; a program brings its own.
 
 mod path_csv;
+mod replayed;
 mod scripted;
 mod tool_path;
 
+pub use replayed::{Replayed, ReplayedSample};
 pub use scripted::Scripted;
 pub use tool_path::ToolPath;
 

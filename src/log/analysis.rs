@@ -100,7 +100,7 @@ impl Analysis {
             LogRecord::Command(r) => self.haptics.push_command(r),
             LogRecord::Contact(r) => self.haptics.push_contact(r),
             LogRecord::Resync(r) => self.haptics.push_resync(r),
-            LogRecord::Tool(_) | LogRecord::Global(_) | LogRecord::Probe(_) => {}
+            LogRecord::Tool(_) | LogRecord::Global(_) | LogRecord::Port(_) | LogRecord::Probe(_) => {}
         }
     }
 
@@ -108,6 +108,7 @@ impl Analysis {
     pub fn push_entry(&mut self, entry: &LogEntry) {
         match entry {
             LogEntry::Environment(environment) => self.set_environment(environment),
+            LogEntry::Attachment { .. } => {}
             LogEntry::Record(record) => self.push(record),
             LogEntry::Stats(stats) => self.set_lost(stats.group, stats.lost_records),
             LogEntry::Text(event) => self.push_text(event),
@@ -195,6 +196,7 @@ mod tests {
             deadline,
             slips,
             cause,
+            ..TickTiming::default()
         })
     }
 

@@ -7,7 +7,9 @@ use super::records::{
 };
 use super::schema::{self, Vector3};
 use super::stats::GroupStats;
+use crate::runtime::Mode;
 use crate::runtime::record::{Event, SlipCause, TickTiming};
+use crate::runtime::{PortUse, PortUseKind};
 use crate::time::Nanos;
 
 impl From<[f64; 3]> for Vector3 {
@@ -43,6 +45,7 @@ impl From<&TickTiming> for schema::TickTiming {
             deadline_ns: r.deadline.0,
             slips: r.slips,
             cause: r.cause as i32,
+            mode: r.mode as i32,
         }
     }
 }
@@ -59,6 +62,7 @@ impl From<schema::TickTiming> for TickTiming {
             deadline: Nanos(m.deadline_ns),
             slips: m.slips,
             cause: SlipCause::from_code(u8::try_from(m.cause).unwrap_or(u8::MAX)),
+            mode: Mode::from_code(u8::try_from(m.mode).unwrap_or(u8::MAX)),
         }
     }
 }
@@ -192,6 +196,35 @@ impl From<schema::GlobalTick> for GlobalTick {
     }
 }
 
+impl From<&PortUse> for schema::PortUse {
+    fn from(r: &PortUse) -> Self {
+        Self {
+            time_ns: r.time.0,
+            group: r.group.into(),
+            port: r.port,
+            kind: r.kind as i32,
+            tick: r.tick,
+            count: r.count,
+            sequence: r.sequence,
+        }
+    }
+}
+
+impl From<schema::PortUse> for PortUse {
+    fn from(m: schema::PortUse) -> Self {
+        Self {
+            time: Nanos(m.time_ns),
+            group: narrow(m.group),
+            port: m.port,
+            // An unknown kind reads as one that its sequence number does not fit.
+            kind: PortUseKind::from_code(m.kind.cast_unsigned()).unwrap_or_default(),
+            tick: m.tick,
+            count: m.count,
+            sequence: m.sequence,
+        }
+    }
+}
+
 impl From<&ProbeSample> for schema::Probe {
     fn from(r: &ProbeSample) -> Self {
         Self { time_ns: r.time.0, node: r.node, local_m: r.local_m.into(), global_m: r.global_m.into() }
@@ -229,6 +262,7 @@ impl From<&GroupStats> for schema::Stats {
             lateness_last_second: s.lateness_last_second.into(),
             execution: s.execution.into(),
             execution_last_second: s.execution_last_second.into(),
+            port_uses: s.port_uses,
         }
     }
 }
@@ -246,6 +280,7 @@ impl From<schema::Stats> for GroupStats {
             lateness_last_second: m.lateness_last_second.into(),
             execution: m.execution.into(),
             execution_last_second: m.execution_last_second.into(),
+            port_uses: m.port_uses,
         }
     }
 }

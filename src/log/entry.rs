@@ -10,6 +10,13 @@ use super::stats::GroupStats;
 pub enum LogEntry {
     /// About the run as a whole; a later one replaces an earlier one.
     Environment(Environment),
+    /// A file inside the log: [`Environment::SCENE`] or [`Environment::SESSION`].
+    Attachment {
+        /// Its name.
+        name: String,
+        /// Its bytes.
+        data: Vec<u8>,
+    },
     /// A record of a tick, or an event.
     Record(LogRecord),
     /// The state of a rate group, once a second.

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use super::records::ToolSample;
+
 /// How a run was executed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Execution {
@@ -45,11 +47,30 @@ pub struct Environment {
     pub limit_stages: Vec<String>,
     /// What the system granted: policy, priority, cpu, mlock, ...
     pub granted: BTreeMap<String, String>,
-    /// The scene file as text. It travels as the attachment `scene.toml`; a reader leaves it empty.
+    /// The first state that the device gave, before the start.
+    pub first_tool: Option<ToolSample>,
+    /// The scene file as text. It travels as the attachment [`SCENE`](Self::SCENE); a reader leaves it empty.
     pub scene: Option<String>,
+    /// What was run, as a scene file: the scene with everything that a program or the command line changed. It travels as
+    /// the attachment [`SESSION`](Self::SESSION); a reader leaves it empty.
+    pub session: Option<String>,
 }
 
 impl Environment {
+    /// The attachment that is the user's scene file.
+    pub const SCENE: &str = "scene.toml";
+    /// The attachment that says what was run.
+    pub const SESSION: &str = "session.toml";
+
+    /// The text of an attachment, if it is known.
+    pub fn attachment(&self, name: &str) -> Option<&str> {
+        match name {
+            Self::SCENE => self.scene.as_deref(),
+            Self::SESSION => self.session.as_deref(),
+            _ => None,
+        }
+    }
+
     /// The name of rate group `group`: its own, or `group-N` if the environment does not know it.
     pub fn group_name(&self, group: u16) -> String {
         match self.groups.get(usize::from(group)) {
@@ -91,6 +112,11 @@ impl Environment {
         for (i, stage) in self.limit_stages.iter().enumerate() {
             map.insert(format!("limit_stage.{i}"), stage.clone());
         }
+        if let Some(first) = &self.first_tool {
+            map.insert(format!("{FIRST_TOOL}.position_m"), spaced(first.position_m));
+            map.insert(format!("{FIRST_TOOL}.velocity_m_s"), spaced(first.velocity_m_s));
+            map.insert(format!("{FIRST_TOOL}.buttons"), first.buttons.to_string());
+        }
         map.extend(self.granted.iter().map(|(key, value)| (format!("granted.{key}"), value.clone())));
         map
     }
@@ -122,9 +148,33 @@ impl Environment {
             groups,
             limit_stages: (0..).map_while(|i| map.get(&format!("limit_stage.{i}")).cloned()).collect(),
             granted,
+            first_tool: first_tool(map),
             scene: None,
+            session: None,
         }
     }
+}
+
+/// Where the keys of the device's first state begin.
+const FIRST_TOOL: &str = "first_tool";
+
+/// Numbers as text that reads back exactly.
+fn spaced(vector: [f64; 3]) -> String {
+    vector.map(|component| component.to_string()).join(" ")
+}
+
+fn first_tool(map: &BTreeMap<String, String>) -> Option<ToolSample> {
+    let text = |key: &str| map.get(&format!("{FIRST_TOOL}.{key}"));
+    let vector = |key: &str| -> Option<[f64; 3]> {
+        let numbers: Option<Vec<f64>> = text(key)?.split(' ').map(|number| number.parse().ok()).collect();
+        numbers?.try_into().ok()
+    };
+    Some(ToolSample {
+        position_m: vector("position_m")?,
+        velocity_m_s: vector("velocity_m_s")?,
+        buttons: text("buttons")?.parse().ok()?,
+        ..ToolSample::default()
+    })
 }
 
 #[cfg(test)]
@@ -146,7 +196,14 @@ mod tests {
             ],
             limit_stages: vec!["clamp".into(), "slew".into()],
             granted: [("policy".to_owned(), "other".to_owned())].into(),
+            first_tool: Some(ToolSample {
+                position_m: [0.1, -0.0, 1.0 / 3.0],
+                velocity_m_s: [1e-300, 5.0, -1e12],
+                buttons: 3,
+                ..ToolSample::default()
+            }),
             scene: None,
+            session: None,
         };
         assert_eq!(Environment::from_map(&environment.to_map(1)), environment);
         assert_eq!(environment.group_name(1), "global");

@@ -97,7 +97,7 @@ impl<R: Read> RecordStream<R> {
         let length = u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]]);
         let cut = |offset: u64| format!("the log is cut off at byte {offset}, in the record at byte {start}");
         match opcode {
-            op::CHUNK | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::STATISTICS => {
+            op::CHUNK | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::STATISTICS | op::ATTACHMENT => {
                 if length > MAX_RECORD_BYTES {
                     return Err(format!("the record at byte {start} is damaged: it claims {length} bytes"));
                 }

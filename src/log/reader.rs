@@ -82,7 +82,7 @@ impl<R: Read> LogReader<R> {
         &self.place
     }
 
-    /// The topic of the entry before; empty for an environment.
+    /// The topic of the entry before; empty for an environment or an attachment.
     pub fn topic(&self) -> &str {
         &self.topic
     }
@@ -119,6 +119,10 @@ impl<R: Read> LogReader<R> {
             Record::Metadata(metadata) if metadata.name == "environment" => {
                 self.topic.clear();
                 return Ok(Some(LogEntry::Environment(Environment::from_map(&metadata.metadata))));
+            }
+            Record::Attachment { header, data, .. } => {
+                self.topic.clear();
+                return Ok(Some(LogEntry::Attachment { name: header.name, data: data.into_owned() }));
             }
             Record::Statistics(statistics) if statistics.message_count != self.messages => {
                 return Err(format!(
@@ -189,6 +193,7 @@ fn decode_data(kind: Kind, data: &[u8]) -> Result<LogEntry, prost::DecodeError> 
         Kind::Contact => LogRecord::Contact(parse::<schema::Contact>(data)?.into()),
         Kind::Resync => LogRecord::Resync(parse::<schema::Resync>(data)?.into()),
         Kind::Global => LogRecord::Global(parse::<schema::GlobalTick>(data)?.into()),
+        Kind::Ports => LogRecord::Port(parse::<schema::PortUse>(data)?.into()),
         Kind::Probe => LogRecord::Probe(parse::<schema::Probe>(data)?.into()),
         Kind::Stats => return Ok(LogEntry::Stats(parse::<schema::Stats>(data)?.into())),
         Kind::Log => {

@@ -1,5 +1,6 @@
 //! The records of a haptic run, each fitting the runtime's 64-byte [`Record`].
 
+use crate::runtime::PortUse;
 use crate::runtime::record::{Channel, Event, Record, TickTiming};
 use crate::time::Nanos;
 
@@ -139,6 +140,7 @@ pub struct ProbeSample {
 pub enum LogRecord {
     Tick(TickTiming),
     Event(Event),
+    Port(PortUse),
     Force(ForceSample),
     Command(CommandSample),
     Tool(ToolSample),
@@ -162,6 +164,7 @@ impl LogRecord {
         match self {
             Self::Tick(r) => r.scheduled,
             Self::Event(r) => r.stamp,
+            Self::Port(r) => r.time,
             Self::Force(r) => r.time,
             Self::Command(r) => r.time,
             Self::Tool(r) => r.time,
@@ -179,6 +182,7 @@ impl LogRecord {
         Some(match record.channel {
             Channel::TICK => Self::Tick(TickTiming::from_record(record)?),
             Channel::EVENT => Self::Event(Event::from_record(record)?),
+            Channel::PORT => Self::Port(PortUse::from_record(record)?),
             FORCE => Self::Force(ForceSample {
                 time,
                 force_n: [a, b, c],
@@ -292,6 +296,7 @@ impl From<LogRecord> for Record {
         match record {
             LogRecord::Tick(r) => r.into(),
             LogRecord::Event(r) => r.into(),
+            LogRecord::Port(r) => r.into(),
             LogRecord::Force(r) => r.into(),
             LogRecord::Command(r) => r.into(),
             LogRecord::Tool(r) => r.into(),
@@ -343,6 +348,7 @@ mod tests {
                 jump_after_n: 0.125,
                 energy_j: -1e-6,
             }),
+            LogRecord::Port(PortUse { time, port: 3, tick: 33, count: 1, ..PortUse::default() }),
             LogRecord::Global(GlobalTick { time, version: 2, first_tick: 1, last_tick: 33 }),
             LogRecord::Probe(ProbeSample { time, node: 5, local_m: [1.0, 2.0, 3.0], global_m: [4.0, 5.0, 6.0] }),
         ];

@@ -15,6 +15,7 @@ use prost_types::{
 use super::event::Level;
 use super::records::ContactMode;
 use crate::runtime::record::SlipCause;
+use crate::runtime::{Mode, PortUseKind};
 
 /// The version of the schema that this build writes.
 pub(crate) const SCHEMA_VERSION: u32 = 1;
@@ -99,6 +100,8 @@ macro_rules! proto_schema {
 
 proto_schema! {
     enum SlipCause { None, LateWake, LongTick, StalledPeer, Policy, Fault }
+    enum PortUseKind { Took, Saw, Dropped }
+    enum Mode { Normal, Degraded, Stopping }
     enum ContactMode { Free, Stick, Slip, Lost }
     enum Level { Info, Warning, Error }
 
@@ -130,6 +133,7 @@ proto_schema! {
         deadline_ns: uint64 = 7,
         slips: uint32 = 8,
         cause: int32 as SlipCause = 9,
+        mode: int32 as Mode = 11,
     }
 
     /// `/force`: the force on the tool before the safety pipeline.
@@ -188,6 +192,17 @@ proto_schema! {
         last_tick: uint64 = 4,
     }
 
+    /// `/ports`: what a release saw through a port from another group; see `PortUseKind` for the count.
+    message PortUse {
+        time_ns: uint64 = 1,
+        group: uint32 = 2,
+        port: uint32 = 3,
+        kind: int32 as PortUseKind = 4,
+        tick: uint64 = 5,
+        count: uint64 = 6,
+        sequence: uint64 = 7,
+    }
+
     /// `/probe`: a probed node.
     message Probe {
         time_ns: uint64 = 1,
@@ -208,6 +223,7 @@ proto_schema! {
         lateness_last_second: message of Percentiles = 8,
         execution: message of Percentiles = 9,
         execution_last_second: message of Percentiles = 10,
+        port_uses: uint64 = 11,
     }
 
     /// `/log`: something that happened once. `coded` ones came from a rate group as numbers.

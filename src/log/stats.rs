@@ -29,6 +29,8 @@ pub struct GroupStats {
     pub execution: Percentiles<u64>,
     /// Execution time in the last second (ns).
     pub execution_last_second: Percentiles<u64>,
+    /// Uses of ports recorded since the start: what `/ports` holds of this group.
+    pub port_uses: u64,
 }
 
 /// Counts the releases of one group and gives a [`GroupStats`] for each second.
@@ -63,6 +65,11 @@ impl StatsCounter {
         self.execution.push(execution);
         self.execution_second.push(execution);
         stats
+    }
+
+    /// Counts one use of a port.
+    pub fn push_port_use(&mut self) {
+        self.now.port_uses += 1;
     }
 
     /// Sets the number of records of this group lost since the start.

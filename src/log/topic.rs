@@ -15,6 +15,7 @@ pub(crate) enum Topic {
     Contact,
     Resync,
     Global,
+    Ports,
     Probe,
     Log,
 }
@@ -30,19 +31,21 @@ pub(crate) enum Kind {
     Contact,
     Resync,
     Global,
+    Ports,
     Probe,
     Log,
 }
 
 impl Topic {
     /// The topics that every log declares, beside those of its groups.
-    pub(crate) const FIXED: [Self; 8] = [
+    pub(crate) const FIXED: [Self; 9] = [
         Self::Force,
         Self::ForceCommanded,
         Self::Tool,
         Self::Contact,
         Self::Resync,
         Self::Global,
+        Self::Ports,
         Self::Probe,
         Self::Log,
     ];
@@ -58,6 +61,7 @@ impl Topic {
             LogRecord::Contact(_) => Self::Contact,
             LogRecord::Resync(_) => Self::Resync,
             LogRecord::Global(_) => Self::Global,
+            LogRecord::Port(_) => Self::Ports,
             LogRecord::Probe(_) => Self::Probe,
         }
     }
@@ -72,6 +76,7 @@ impl Topic {
             Self::Contact => "/contact".into(),
             Self::Resync => "/resync".into(),
             Self::Global => "/global".into(),
+            Self::Ports => "/ports".into(),
             Self::Probe => "/probe".into(),
             Self::Log => "/log".into(),
         }
@@ -87,6 +92,7 @@ impl Topic {
             Self::Contact => Kind::Contact,
             Self::Resync => Kind::Resync,
             Self::Global => Kind::Global,
+            Self::Ports => Kind::Ports,
             Self::Probe => Kind::Probe,
             Self::Log => Kind::Log,
         }
@@ -94,7 +100,7 @@ impl Topic {
 }
 
 impl Kind {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::Timing,
         Self::Stats,
         Self::Force,
@@ -103,6 +109,7 @@ impl Kind {
         Self::Contact,
         Self::Resync,
         Self::Global,
+        Self::Ports,
         Self::Probe,
         Self::Log,
     ];
@@ -118,6 +125,7 @@ impl Kind {
             Self::Contact => schema::Contact::NAME,
             Self::Resync => schema::Resync::NAME,
             Self::Global => schema::GlobalTick::NAME,
+            Self::Ports => schema::PortUse::NAME,
             Self::Probe => schema::Probe::NAME,
             Self::Log => schema::Log::NAME,
         }

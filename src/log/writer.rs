@@ -47,7 +47,7 @@ pub struct McapWriter<W: Write> {
     place: String,
     environment: Environment,
     environment_is_written: bool,
-    scene_is_written: bool,
+    attached: Vec<&'static str>,
     channels: BTreeMap<Topic, (u16, u32)>,
     pending: Vec<Pending>,
     bytes: Vec<u8>,
@@ -83,7 +83,7 @@ impl<W: Write> McapWriter<W> {
             place: place.to_owned(),
             environment: environment.clone(),
             environment_is_written: false,
-            scene_is_written: false,
+            attached: Vec::new(),
             channels: BTreeMap::new(),
             pending: Vec::new(),
             bytes: Vec::with_capacity(CHUNK_BYTES),
@@ -118,6 +118,7 @@ impl<W: Write> McapWriter<W> {
             LogRecord::Contact(r) => self.push(topic, time, &schema::Contact::from(r)),
             LogRecord::Resync(r) => self.push(topic, time, &schema::Resync::from(r)),
             LogRecord::Global(r) => self.push(topic, time, &schema::GlobalTick::from(r)),
+            LogRecord::Port(r) => self.push(topic, time, &schema::PortUse::from(r)),
             LogRecord::Probe(r) => self.push(topic, time, &schema::Probe::from(r)),
         }
     }
@@ -201,7 +202,8 @@ impl<W: Write> McapWriter<W> {
             output.write_metadata(&Metadata { name: "environment".into(), metadata })?;
             self.environment_is_written = true;
         }
-        self.write_scene(output)?;
+        self.attach(output, Environment::SCENE)?;
+        self.attach(output, Environment::SESSION)?;
         if self.channels.is_empty() {
             let groups = 0..u16::try_from(self.environment.groups.len()).unwrap_or(u16::MAX);
             let of_groups = groups.flat_map(|group| [Topic::Timing(group), Topic::Stats(group)]);
@@ -223,19 +225,20 @@ impl<W: Write> McapWriter<W> {
         output.flush()
     }
 
-    fn write_scene(&mut self, output: &mut mcap::Writer<NoSeek<W>>) -> mcap::McapResult<()> {
-        let Some(scene) = self.environment.scene.as_deref().filter(|_| !self.scene_is_written) else {
+    /// Attaches the text with this name once it is known.
+    fn attach(&mut self, output: &mut mcap::Writer<NoSeek<W>>, name: &'static str) -> mcap::McapResult<()> {
+        let Some(text) = self.environment.attachment(name).filter(|_| !self.attached.contains(&name)) else {
             return Ok(());
         };
         let time = self.environment.epoch_ns();
         output.attach(&Attachment {
             log_time: time,
             create_time: time,
-            name: "scene.toml".into(),
+            name: name.into(),
             media_type: "application/toml".into(),
-            data: scene.as_bytes().into(),
+            data: text.as_bytes().into(),
         })?;
-        self.scene_is_written = true;
+        self.attached.push(name);
         Ok(())
     }
 

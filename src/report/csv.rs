@@ -14,13 +14,14 @@ pub(super) fn header(kind: Kind) -> &'static str {
         Kind::Timing => "tick,scheduled_ns,woke_ns,start_ns,end_ns,deadline_ns,slips,cause\n",
         Kind::Stats => {
             "t_s,released,skipped,missed,lost_records,lateness_p50_ns,lateness_p99_ns,lateness_max_ns,\
-             execution_p50_ns,execution_p99_ns,execution_max_ns\n"
+             execution_p50_ns,execution_p99_ns,execution_max_ns,port_uses\n"
         }
         Kind::Force | Kind::ForceCommanded => "t_s,fx_n,fy_n,fz_n\n",
         Kind::Tool => "t_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,sample_id,buttons\n",
         Kind::Contact => "t_s,mode,triangle,weight_a,weight_b,weight_c,nx,ny,nz,normal_force_n,tangential_force_n\n",
         Kind::Resync => "t_s,version,age_s,jump_before_n,jump_after_n,energy_j\n",
         Kind::Global => "t_s,version,first_tick,last_tick\n",
+        Kind::Ports => "t_s,group,port,kind,tick,count,sequence\n",
         Kind::Probe => "t_s,node,local_x_m,local_y_m,local_z_m,global_x_m,global_y_m,global_z_m\n",
         Kind::Log => "t_s,level,message\n",
     }
@@ -29,7 +30,7 @@ pub(super) fn header(kind: Kind) -> &'static str {
 /// Writes one entry as a row under the header of its kind.
 pub(super) fn row(entry: &LogEntry, out: &mut impl Write) -> io::Result<()> {
     match entry {
-        LogEntry::Environment(_) => Ok(()),
+        LogEntry::Environment(_) | LogEntry::Attachment { .. } => Ok(()),
         LogEntry::Record(record) => record_row(record, out),
         LogEntry::Stats(stats) => stats_row(stats, out),
         LogEntry::Text(event) => text_row(event, out),
@@ -56,6 +57,10 @@ fn record_row(record: &LogRecord, out: &mut impl Write) -> io::Result<()> {
             writeln!(out, "{t_s},{},{age_s},{},{},{energy_j}", r.version, r.jump_before_n, r.jump_after_n)
         }
         LogRecord::Global(r) => writeln!(out, "{t_s},{},{},{}", r.version, r.first_tick, r.last_tick),
+        LogRecord::Port(r) => {
+            let (group, port, kind) = (r.group, r.port, r.kind.name());
+            writeln!(out, "{t_s},{group},{port},{kind},{},{},{}", r.tick, r.count, r.sequence)
+        }
         LogRecord::Probe(r) => {
             let ([x, y, z], [gx, gy, gz]) = (r.local_m, r.global_m);
             writeln!(out, "{t_s},{},{x},{y},{z},{gx},{gy},{gz}", r.node)
@@ -88,7 +93,7 @@ fn stats_row(s: &GroupStats, out: &mut impl Write) -> io::Result<()> {
     for p in [s.lateness, s.execution] {
         write!(out, ",{},{},{}", p.p50, p.p99, p.max)?;
     }
-    writeln!(out)
+    writeln!(out, ",{}", s.port_uses)
 }
 
 fn text_row(event: &TextEvent, out: &mut impl Write) -> io::Result<()> {

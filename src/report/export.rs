@@ -36,7 +36,7 @@ pub fn export<R: Read, W: Write>(
     let output = |e| Error::io(Path::new("output"), e);
     let mut header = None;
     while let Some(entry) = reader.next() {
-        if reader.topic() != topic || matches!(entry, LogEntry::Environment(_)) {
+        if reader.topic() != topic || matches!(entry, LogEntry::Environment(_) | LogEntry::Attachment { .. }) {
             continue;
         }
         if header.is_none() {

@@ -72,16 +72,41 @@ pub enum Outcome {
 
 /// How much an actor should do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u8)]
 pub enum Mode {
     /// All of it.
     #[default]
-    Normal,
+    Normal = 0,
     /// The least that keeps the system useful. Set by an overrun policy only, never by measured time; no policy of this
     /// version sets it.
-    Degraded,
+    Degraded = 1,
     /// Bring what it drives to rest: the run is ending or another actor of the group has failed. The group has
     /// [that long](super::RateGroup::wind_down).
-    Stopping,
+    Stopping = 2,
+}
+
+impl Mode {
+    /// The mode with this number; unknown numbers read as [`Mode::Normal`].
+    pub fn from_code(code: u8) -> Self {
+        match code {
+            1 => Self::Degraded,
+            2 => Self::Stopping,
+            _ => Self::Normal,
+        }
+    }
+}
+
+/// The part of a group's life in which its actors are called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Phase {
+    /// Starts run one after the other before anything is released: what they see is the same in every run.
+    Start,
+    /// A release, which a recording can repeat.
+    Release,
+    /// A release of an observer: it follows its own schedule, also when a recording is re-executed.
+    Observer,
+    /// After the last release.
+    Stop,
 }
 
 /// What an actor is told at a release. All times count from the start of the run.
@@ -101,8 +126,12 @@ pub struct TickContext {
     pub slips: u32,
     /// How much to do.
     pub mode: Mode,
-    /// When publications made in this release become visible to others; only virtual time looks at it.
+    /// When publications made in this release become visible to other groups; only virtual time looks at it.
     pub(super) visible_at: Nanos,
+    /// The rate group that is called: ports tell by it what comes from another group.
+    pub(super) group: u16,
+    /// In which part of its life.
+    pub(super) phase: Phase,
 }
 
 impl TickContext {
@@ -118,6 +147,8 @@ impl TickContext {
             slips: 0,
             mode: Mode::Normal,
             visible_at: scheduled,
+            group: 0,
+            phase: Phase::Release,
         }
     }
 }

@@ -4,15 +4,21 @@ use super::actor::Actor;
 use super::deadline::Ledger;
 use super::grant::GrantHandle;
 use super::outlet::{self, OutletReader, OutletWriter};
-use super::port::{QueueReader, QueueWriter, Reader, Writer};
+use super::port::{Reader, Writer};
+use super::port_memory::PortPlan;
+use super::queue_port::{QueueReader, QueueWriter};
 use super::rate_group::RateGroup;
 use super::recorder::{RecordDrain, Recorder, Registry};
+use super::recording::Recording;
+use super::reexecution::Reexecution;
 use super::release::GroupRun;
 use super::restart::{Factory, Restart, Restarter};
 use super::rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};
 use super::running::Runtime;
 use super::schedule::admit_here;
+use super::script::{Script, ScriptedPort};
 use super::virtual_port::flight;
+use super::virtual_queue::VirtualQueue;
 use crate::error::Error;
 use crate::time::{Nanos, Rate};
 use std::fmt;
@@ -40,14 +46,39 @@ pub struct RuntimeBuilder {
     until: Option<Nanos>,
     registry: Arc<Registry>,
     grants: GrantHandle,
+    /// Exchanges and queues made so far.
+    ports: u32,
+    /// What to repeat, and what its ports must show.
+    recording: Option<(Recording, Script)>,
 }
 
 impl RuntimeBuilder {
-    pub(super) fn new(execution: Execution) -> Self {
-        Self { execution, groups: Vec::new(), until: None, registry: Registry::new(), grants: GrantHandle::default() }
+    pub(super) fn new(execution: Execution, recording: Option<Recording>) -> Self {
+        Self {
+            execution,
+            groups: Vec::new(),
+            until: None,
+            registry: Registry::new(),
+            grants: GrantHandle::default(),
+            ports: 0,
+            recording: recording.map(|recording| {
+                let script = recording.script();
+                (recording, script)
+            }),
+        }
+    }
+
+    /// The next port's number, and what it must show in a re-execution.
+    fn plan_port(&mut self) -> (PortPlan, Option<ScriptedPort>) {
+        let port = self.ports;
+        self.ports += 1;
+        let script = self.recording.as_ref().map(|(_, script)| script.port(port));
+        (PortPlan::new(port, &self.registry), script)
     }
 
     /// A port for the newest value of a large state; every buffer is filled by `init`.
+    ///
+    /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
     pub fn exchange<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> (Writer<T>, Reader<T>) {
         let port = self.exchange_port(init);
         (port.writer(), port.reader())
@@ -55,13 +86,16 @@ impl RuntimeBuilder {
 
     /// As [`exchange`](Self::exchange), with halves that a [restarted](Self::restartable) group can take again.
     pub fn exchange_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> ExchangePort<T> {
+        let (plan, script) = self.plan_port();
         match self.execution {
-            Execution::Virtual => ExchangePort::in_virtual_time(flight(init)),
-            Execution::Threaded => ExchangePort::threaded(init),
+            Execution::Virtual => ExchangePort::in_virtual_time(plan, flight(script, init)),
+            Execution::Threaded => ExchangePort::threaded(plan, init),
         }
     }
 
     /// A port for ordered samples that holds at least `capacity` of them, rounded up to a power of two.
+    ///
+    /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
     pub fn queue<T: Copy + Send + 'static>(&mut self, capacity: usize) -> (QueueWriter<T>, QueueReader<T>) {
         let port = self.queue_port(capacity);
         (port.writer(), port.reader())
@@ -69,9 +103,10 @@ impl RuntimeBuilder {
 
     /// As [`queue`](Self::queue), with halves that a [restarted](Self::restartable) group can take again.
     pub fn queue_port<T: Copy + Send + 'static>(&mut self, capacity: usize) -> QueuePort<T> {
+        let (plan, script) = self.plan_port();
         match self.execution {
-            Execution::Virtual => QueuePort::in_virtual_time(capacity),
-            Execution::Threaded => QueuePort::threaded(capacity),
+            Execution::Virtual => QueuePort::in_virtual_time(plan, VirtualQueue::new(script, capacity)),
+            Execution::Threaded => QueuePort::threaded(plan, capacity),
         }
     }
 
@@ -96,7 +131,7 @@ impl RuntimeBuilder {
     }
 
     /// Takes the records of all recorders, made before or after this call, and of every group's timing and events.
-    /// Without a drain the groups record nothing.
+    /// Without a drain the groups record nothing, and ports made before the first call record nothing either.
     pub fn drain(&mut self) -> RecordDrain {
         self.registry.drain()
     }
@@ -141,7 +176,8 @@ impl RuntimeBuilder {
     /// [`ErrorKind::Runtime`](crate::ErrorKind::Runtime), naming the group and the values, for a graph that cannot work:
     /// a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all cores together, on
     /// threads a latency beyond the period, equal real-time priorities pinned to one core, a priority outside 1 to 99, a
-    /// name used twice, no group that is not an observer. Or what a [factory](Self::restartable) says.
+    /// name used twice, no group that is not an observer. Or what a [factory](Self::restartable) says. For a re-execution
+    /// also if the recording is one of another graph, and [`ErrorKind::Log`](crate::ErrorKind::Log) if it has gaps.
     pub fn build(&mut self) -> Result<Runtime, Error> {
         for (index, (group, _)) in self.groups.iter_mut().enumerate() {
             if group.name.is_empty() {
@@ -149,7 +185,7 @@ impl RuntimeBuilder {
             }
         }
         admit_here(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>(), self.execution)?;
-        let built = std::mem::replace(self, Self::new(self.execution));
+        let built = std::mem::replace(self, Self::new(self.execution, None));
         let registry = built.registry;
         let mut groups = Vec::with_capacity(built.groups.len());
         let mut restarters = Vec::with_capacity(built.groups.len());
@@ -173,7 +209,11 @@ impl RuntimeBuilder {
             groups.push(group);
             restarters.push(restarter);
         }
-        Ok(Runtime::new(built.execution, groups, restarters, registry, built.grants))
+        let reexecution = match built.recording {
+            Some((recording, script)) => Some(Reexecution::new(recording, script, &groups, built.ports)?),
+            None => None,
+        };
+        Ok(Runtime::new(built.execution, groups, restarters, reexecution, registry, built.grants))
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! For every group `released + skipped = elapsed periods` holds exactly, and every skipped period has a cause.
 
+use super::actor::Mode;
 use super::rate_group::{OverrunPolicy, RateGroup};
 use super::record::{SlipCause, TickTiming};
 use super::report::GroupReport;
@@ -190,6 +191,13 @@ impl Ledger {
         decision
     }
 
+    /// Books that release `release` is to run after `skipped` periods, as it was recorded.
+    pub(crate) fn book(&mut self, release: u64, skipped: u64, cause: SlipCause) {
+        self.lateness = cause;
+        self.skipped.add(cause, skipped);
+        self.next = release + 1;
+    }
+
     /// Books a release that has run and returns its timing.
     pub(crate) fn close(&mut self, release: u64, skipped: u64, [woke, start, end]: [Nanos; 3]) -> TickTiming {
         let scheduled = self.timeline.due(release);
@@ -204,6 +212,7 @@ impl Ledger {
             deadline: scheduled + self.deadline,
             slips: u32::try_from(skipped).unwrap_or(u32::MAX),
             cause: SlipCause::None,
+            mode: Mode::default(),
         };
         // Without lateness it would have met its deadline unless the work alone is longer than that.
         let blame = if work > self.deadline { SlipCause::LongTick } else { self.lateness };

@@ -8,6 +8,7 @@
 //!   [`queue`](RuntimeBuilder::queue) for ordered samples, [`outlet`](RuntimeBuilder::outlet) for threads outside.
 //! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
 //!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
+//! - Re-execution: a run on threads, [recorded](Recording), is repeated in virtual time bit for bit.
 //! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each.
 //! - Admission: a graph that cannot work is refused when it is built, with the sum that failed; its
 //!   [plan](Runtime::plan) says what it asks for and what this system would refuse.
@@ -73,9 +74,14 @@ mod outlet;
 mod panic_hook;
 mod plan;
 mod port;
+mod port_memory;
+mod port_use;
+mod queue_port;
 mod rate_group;
 pub mod record;
 mod recorder;
+mod recording;
+mod reexecution;
 mod release;
 mod report;
 mod restart;
@@ -83,10 +89,12 @@ mod rewire;
 pub mod ring;
 mod running;
 mod schedule;
+mod script;
 mod supervisor;
 mod sync;
 mod threaded;
 mod virtual_port;
+mod virtual_queue;
 mod virtual_time;
 mod wait;
 
@@ -97,10 +105,13 @@ pub use grant::{GrantHandle, GroupGrant, SystemGrant};
 pub use live::GroupLive;
 pub use outlet::{OutletReader, OutletWriter};
 pub use plan::{Coincidence, GroupPlan, Plan};
-pub use port::{QueueReader, QueueWriter, Reader, Writer};
+pub use port::{Reader, Writer};
+pub use port_use::{PortUse, PortUseKind};
+pub use queue_port::{QueueReader, QueueWriter};
 pub use rate_group::{OverrunPolicy, RateGroup, Wait};
 pub use record::{Channel, Event, Record, SlipCause, TickTiming};
 pub use recorder::{RecordDrain, Recorder};
+pub use recording::Recording;
 pub use report::{GroupReport, RuntimeFault, RuntimeReport};
 pub use restart::Restart;
 pub use rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};

@@ -1,16 +1,20 @@
-//! Typed ports between actors: the newest value of a large state, and ordered samples.
+//! Typed ports between actors for the newest value of a large state.
 //!
-//! The same types in both executions. Between threads they are the [exchange](super::exchange) and the
-//! [ring](super::ring); in virtual time the executor owns visibility: what a group with latency L publishes at release
-//! t is visible to readers whose scheduled time is at least t + L. With L = 0 a reader at the same time sees it if it
-//! ticks after the writer: later in the group, or in a later group.
+//! The same types in both executions. Between threads they are the [exchange](super::exchange); in virtual time the
+//! executor owns visibility: what a group with latency L publishes at release t is visible to readers in other groups
+//! whose scheduled time is at least t + L. With L = 0 a reader at the same time sees it if its group comes later. Within
+//! the group it is visible at once, to the actors that tick after the writer.
+//!
+//! A release looks at a port once. What it took from another group is recorded, so that the run can be
+//! [re-executed](super::Recording).
 
-use super::actor::TickContext;
+use super::actor::{Phase, TickContext};
 use super::exchange::{ExchangeReader, ExchangeWriter};
 use super::link::Linked;
-use super::ring::{Consumer, Producer};
+use super::port_memory::{Looks, PortPlan, UseRecorder, WriterGroup};
+use super::port_use::PortUseKind;
 use super::sync::{AtomicU64, Ordering};
-use super::virtual_port::{SharedFlight, VirtualQueue, VirtualReader, VirtualWriter};
+use super::virtual_port::{SharedFlight, VirtualReader, VirtualWriter};
 use crate::time::Nanos;
 use std::fmt;
 use std::sync::Arc;
@@ -23,16 +27,6 @@ enum WriterKind<T> {
 enum ReaderKind<T> {
     Threaded(Linked<ExchangeReader<T>>),
     Virtual(VirtualReader<T>),
-}
-
-enum QueueWriterKind<T> {
-    Threaded(Linked<Producer<T>>),
-    Virtual(VirtualQueue<T>),
-}
-
-enum QueueReaderKind<T> {
-    Threaded(Linked<Consumer<T>>),
-    Virtual(VirtualQueue<T>),
 }
 
 /// Counts the versions of a port, on through every writer that it had.
@@ -49,24 +43,26 @@ impl VersionCounter {
 }
 
 /// Publishes the newest value of a state.
-pub struct Writer<T>(WriterKind<T>);
+pub struct Writer<T> {
+    kind: WriterKind<T>,
+    group: WriterGroup,
+}
 
 /// Reads the newest value of a state. The reader owns its buffer until the next successful refresh.
-pub struct Reader<T>(ReaderKind<T>);
-
-/// Sends samples that all count, in order.
-pub struct QueueWriter<T>(QueueWriterKind<T>);
-
-/// Receives samples in the order they were sent.
-pub struct QueueReader<T>(QueueReaderKind<T>);
+pub struct Reader<T> {
+    kind: ReaderKind<T>,
+    group: WriterGroup,
+    looks: Looks,
+    took: UseRecorder,
+}
 
 impl<T> Writer<T> {
-    pub(super) fn threaded(half: Linked<ExchangeWriter<T>>, versions: VersionCounter) -> Self {
-        Self(WriterKind::Threaded(half, versions))
+    pub(super) fn threaded(plan: &PortPlan, half: Linked<ExchangeWriter<T>>, versions: VersionCounter) -> Self {
+        Self { kind: WriterKind::Threaded(half, versions), group: plan.group.clone() }
     }
 
-    pub(super) fn in_virtual_time(flight: &SharedFlight<T>) -> Self {
-        Self(WriterKind::Virtual(VirtualWriter::new(flight)))
+    pub(super) fn in_virtual_time(plan: &PortPlan, flight: &SharedFlight<T>) -> Self {
+        Self { kind: WriterKind::Virtual(VirtualWriter::new(flight)), group: plan.group.clone() }
     }
 
     /// The buffer to write the next value into; it holds an old value, of no particular age.
@@ -74,7 +70,7 @@ impl<T> Writer<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn buffer(&mut self) -> &mut T {
-        match &mut self.0 {
+        match &mut self.kind {
             WriterKind::Threaded(writer, _) => writer.half_mut().buffer(),
             WriterKind::Virtual(writer) => writer.buffer(),
         }
@@ -85,7 +81,8 @@ impl<T> Writer<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn publish(&mut self, ctx: &TickContext) -> u64 {
-        match &mut self.0 {
+        self.group.set(ctx);
+        match &mut self.kind {
             WriterKind::Threaded(writer, versions) => {
                 let version = writer.half_mut().publish_as(versions.next(), ctx.scheduled);
                 // Only now: a buffer half written must not be changed for another.
@@ -98,23 +95,37 @@ impl<T> Writer<T> {
 }
 
 impl<T> Reader<T> {
-    pub(super) fn threaded(half: Linked<ExchangeReader<T>>) -> Self {
-        Self(ReaderKind::Threaded(half))
+    pub(super) fn threaded(plan: &PortPlan, half: Linked<ExchangeReader<T>>) -> Self {
+        Self::of(plan, ReaderKind::Threaded(half))
     }
 
-    pub(super) fn in_virtual_time(flight: &SharedFlight<T>) -> Self {
-        Self(ReaderKind::Virtual(VirtualReader::new(flight)))
+    pub(super) fn in_virtual_time(plan: &PortPlan, flight: &SharedFlight<T>) -> Self {
+        Self::of(plan, ReaderKind::Virtual(VirtualReader::new(flight)))
+    }
+
+    fn of(plan: &PortPlan, kind: ReaderKind<T>) -> Self {
+        let took = plan.recorder(PortUseKind::Took);
+        Self { kind, group: plan.group.clone(), looks: Looks::default(), took }
     }
 
     /// Takes the newest value if there is one that was not taken yet; returns whether there was.
     ///
+    /// A release looks once: further calls in the same release return false.
+    ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn refresh(&mut self, ctx: &TickContext) -> bool {
-        match &mut self.0 {
-            ReaderKind::Threaded(reader) => reader.current().refresh(),
-            ReaderKind::Virtual(reader) => reader.refresh(ctx),
+        if !self.looks.is_first(ctx) {
+            return false;
         }
+        let fresh = match &mut self.kind {
+            ReaderKind::Threaded(reader) => reader.current().refresh(),
+            ReaderKind::Virtual(reader) => reader.refresh(ctx, self.group.is(ctx)),
+        };
+        if fresh && ctx.phase == Phase::Release && !self.group.is(ctx) {
+            self.took.push(ctx, self.version());
+        }
+        fresh
     }
 
     /// The value of the last refresh, or the initial value.
@@ -122,7 +133,7 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn get(&self) -> &T {
-        match &self.0 {
+        match &self.kind {
             ReaderKind::Threaded(reader) => reader.half().get(),
             ReaderKind::Virtual(reader) => reader.get(),
         }
@@ -133,7 +144,7 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn get_mut(&mut self) -> &mut T {
-        match &mut self.0 {
+        match &mut self.kind {
             ReaderKind::Threaded(reader) => reader.half_mut().get_mut(),
             ReaderKind::Virtual(reader) => reader.get_mut(),
         }
@@ -144,7 +155,7 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn version(&self) -> u64 {
-        match &self.0 {
+        match &self.kind {
             ReaderKind::Threaded(reader) => reader.half().version(),
             ReaderKind::Virtual(reader) => reader.version(),
         }
@@ -155,84 +166,9 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn published(&self) -> Nanos {
-        match &self.0 {
+        match &self.kind {
             ReaderKind::Threaded(reader) => reader.half().published(),
             ReaderKind::Virtual(reader) => reader.published(),
-        }
-    }
-}
-
-impl<T: Copy> QueueWriter<T> {
-    pub(super) fn threaded(half: Linked<Producer<T>>) -> Self {
-        Self(QueueWriterKind::Threaded(half))
-    }
-
-    pub(super) fn in_virtual_time(queue: &VirtualQueue<T>) -> Self {
-        Self(QueueWriterKind::Virtual(queue.clone()))
-    }
-
-    /// Sends a sample; false if the queue is full: the sample is then dropped and counted.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn push(&mut self, ctx: &TickContext, sample: T) -> bool {
-        match &mut self.0 {
-            QueueWriterKind::Threaded(producer) => producer.current().push(sample),
-            QueueWriterKind::Virtual(queue) => queue.push(ctx, sample),
-        }
-    }
-
-    /// Samples dropped so far because the queue was full.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn dropped(&self) -> u64 {
-        match &self.0 {
-            QueueWriterKind::Threaded(producer) => producer.half().lost(),
-            QueueWriterKind::Virtual(queue) => queue.dropped(),
-        }
-    }
-}
-
-impl<T: Copy> QueueReader<T> {
-    pub(super) fn threaded(half: Linked<Consumer<T>>) -> Self {
-        Self(QueueReaderKind::Threaded(half))
-    }
-
-    pub(super) fn in_virtual_time(queue: &VirtualQueue<T>) -> Self {
-        Self(QueueReaderKind::Virtual(queue.clone()))
-    }
-
-    /// The oldest visible sample, left in the queue.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn peek(&mut self, ctx: &TickContext) -> Option<T> {
-        match &mut self.0 {
-            QueueReaderKind::Threaded(consumer) => consumer.current().peek(),
-            QueueReaderKind::Virtual(queue) => queue.peek(ctx),
-        }
-    }
-
-    /// Takes the oldest visible sample.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn pop(&mut self, ctx: &TickContext) -> Option<T> {
-        match &mut self.0 {
-            QueueReaderKind::Threaded(consumer) => consumer.current().pop(),
-            QueueReaderKind::Virtual(queue) => queue.pop(ctx),
-        }
-    }
-
-    /// Samples dropped so far because the queue was full.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn dropped(&self) -> u64 {
-        match &self.0 {
-            QueueReaderKind::Threaded(consumer) => consumer.half().lost(),
-            QueueReaderKind::Virtual(queue) => queue.dropped(),
         }
     }
 }
@@ -246,17 +182,5 @@ impl<T> fmt::Debug for Writer<T> {
 impl<T> fmt::Debug for Reader<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Reader").field("version", &self.version()).finish_non_exhaustive()
-    }
-}
-
-impl<T> fmt::Debug for QueueWriter<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("QueueWriter").finish_non_exhaustive()
-    }
-}
-
-impl<T> fmt::Debug for QueueReader<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("QueueReader").finish_non_exhaustive()
     }
 }

@@ -114,7 +114,7 @@ impl RateGroup {
         self
     }
 
-    /// Virtual time: when its publications become visible, counted from the release. It may exceed the period; several
+    /// Virtual time: when its publications become visible to other groups, counted from the release. It may exceed the period; several
     /// publications are then in flight and become visible in order. A latency beyond the deadline misses it each time.
     /// Threads take the time that they take, and a latency beyond the period is refused there.
     #[must_use]

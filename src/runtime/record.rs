@@ -1,5 +1,6 @@
 //! The 64-byte records that leave real-time threads: no pointers, no strings, nothing to format.
 
+use super::actor::Mode;
 use crate::time::Nanos;
 
 /// What a [`Record`] is about. The runtime owns numbers below 16; programs number their own from 16.
@@ -11,6 +12,8 @@ impl Channel {
     pub const TICK: Self = Self(0);
     /// Something that happened once, `code` says what: see [`Event`].
     pub const EVENT: Self = Self(1);
+    /// What a release saw through a port: see [`PortUse`](super::PortUse).
+    pub const PORT: Self = Self(2);
     /// The first number that programs may use.
     pub const FIRST_USER: Self = Self(16);
 }
@@ -108,6 +111,8 @@ pub struct TickTiming {
     pub slips: u32,
     /// Why they were skipped or, without slips, why the deadline was missed.
     pub cause: SlipCause,
+    /// How much the release did.
+    pub mode: Mode,
 }
 
 impl TickTiming {
@@ -119,7 +124,7 @@ impl TickTiming {
 
 impl From<TickTiming> for Record {
     fn from(t: TickTiming) -> Self {
-        let slips = u64::from(t.slips) << 8 | t.cause as u64;
+        let slips = u64::from(t.slips) << 8 | t.cause as u64 | (t.mode as u64) << 48;
         Self {
             stamp: t.scheduled,
             channel: Channel::TICK,
@@ -147,6 +152,7 @@ impl TickTiming {
             deadline: Nanos(deadline),
             slips: (slips >> 8) as u32,
             cause: SlipCause::from_code(slips as u8),
+            mode: Mode::from_code((slips >> 48) as u8),
         })
     }
 }
@@ -218,6 +224,7 @@ mod tests {
             deadline: Nanos(5),
             slips: u32::MAX,
             cause: SlipCause::Policy,
+            mode: Mode::Stopping,
         };
         assert_eq!(TickTiming::from_record(&timing.into()), Some(timing));
         assert_eq!(Event::from_record(&timing.into()), None);

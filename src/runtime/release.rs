@@ -1,13 +1,14 @@
 //! One group at work: starts, releases, faults and the stop, the same in both executions.
 
-use super::actor::{Actor, Mode, Outcome, TickContext};
+use super::actor::{Actor, Mode, Outcome, Phase, TickContext};
 use super::deadline::{Decision, Ledger};
 use super::exchange::ExchangeWriter;
 use super::live::{LiveReader, LiveWriter, live};
 use super::panic_hook::{place, quietly};
 use super::rate_group::RateGroup;
-use super::record::Event;
+use super::record::{Event, TickTiming};
 use super::recorder::Recorder;
+use super::recording::RecordedRelease;
 use super::report::{GroupReport, RuntimeFault};
 use super::restart::start_context;
 use super::supervisor::Flag;
@@ -47,6 +48,15 @@ pub(crate) struct GroupRun {
     faulted: bool,
 }
 
+/// A release that is to run.
+struct Due {
+    tick: u64,
+    scheduled: Nanos,
+    /// Periods without a release before it.
+    skipped: u64,
+    mode: Mode,
+}
+
 /// Why a release ended early.
 enum Fatal {
     Panic(String),
@@ -61,7 +71,7 @@ impl GroupRun {
         recorder: Option<Recorder>,
         ledger: Ledger,
     ) -> Self {
-        let last = start_context(&spec, &ledger, Nanos::ZERO);
+        let last = start_context(index, &spec, &ledger, Nanos::ZERO);
         let member = |actor: Box<dyn Actor>| Member { name: actor.name().to_owned(), actor, failed: false };
         let (live, shown) = live(&spec);
         Self {
@@ -89,7 +99,7 @@ impl GroupRun {
 
     /// Starts the actors between two releases, in the place of ones that failed.
     pub(super) fn start_at(&mut self, now: Nanos) -> Result<(), Error> {
-        self.last = start_context(&self.spec, &self.ledger, now);
+        self.last = start_context(self.index, &self.spec, &self.ledger, now);
         self.start()
     }
 
@@ -167,25 +177,46 @@ impl GroupRun {
             Decision::Stop { skipped } => return Err(self.overrun(skipped)),
         };
         let scheduled = self.ledger.due(release);
+        let mode = if self.winding_down { Mode::Stopping } else { Mode::Normal };
+        self.run(Due { tick: release, scheduled, skipped, mode }, woke, start, end)
+    }
+
+    /// Runs a release that was recorded: its number, its time and its slips are given, nothing is decided.
+    pub(crate) fn rerun(&mut self, recorded: &RecordedRelease) -> Result<(), RuntimeFault> {
+        let RecordedRelease { tick, scheduled, slips, cause, mode } = *recorded;
+        self.ledger.book(tick, slips.into(), cause);
+        let latency = self.spec.latency;
+        self.run(Due { tick, scheduled, skipped: slips.into(), mode }, scheduled, |at| at, |at| at + latency)
+    }
+
+    fn run(
+        &mut self,
+        Due { tick, scheduled, skipped, mode }: Due,
+        woke: Nanos,
+        start: impl FnOnce(Nanos) -> Nanos,
+        end: impl FnOnce(Nanos) -> Nanos,
+    ) -> Result<(), RuntimeFault> {
         let now = start(scheduled);
         let dt_nominal = self.last.dt_nominal;
         let first = self.ledger.released == 0;
         let ctx = TickContext {
-            tick: release,
+            tick,
             scheduled,
             now,
             dt_nominal,
             dt_measured: if first { dt_nominal } else { now.saturating_sub(self.last.now).as_secs_f64() },
             slips: u32::try_from(skipped).unwrap_or(u32::MAX),
-            mode: if self.winding_down { Mode::Stopping } else { Mode::Normal },
+            mode,
             visible_at: scheduled + self.spec.latency,
+            group: self.index,
+            phase: if self.spec.observer { Phase::Observer } else { Phase::Release },
         };
         self.last = ctx;
         let result = self.work(&ctx);
         if self.left_behind.as_ref().is_some_and(|flag| flag.is_raised()) {
             return Ok(());
         }
-        let timing = self.ledger.close(release, skipped, [woke, now, end(scheduled)]);
+        let timing = TickTiming { mode, ..self.ledger.close(tick, skipped, [woke, now, end(scheduled)]) };
         self.live.release(&timing, &self.ledger);
         if let Some(recorder) = &mut self.recorder {
             recorder.push(timing);
@@ -304,13 +335,14 @@ impl GroupRun {
         let tick = self.ledger.elapsed_periods();
         let dt_measured = now.saturating_sub(self.last.now).as_secs_f64();
         self.last = TickContext { tick, scheduled: now, now, dt_measured, slips: 0, visible_at: now, ..self.last };
+        self.last.phase = Phase::Observer;
         let ctx = self.last;
         self.work(&ctx)
     }
 
     /// Stops and drops the actors and gives the sums. A panic on the way is reported, the other actors still stop.
     pub(crate) fn finish(mut self, now: Nanos) -> (GroupReport, Option<RuntimeFault>) {
-        let ctx = TickContext { now, ..self.last };
+        let ctx = TickContext { now, phase: Phase::Stop, ..self.last };
         let mut fault = None;
         let names: Vec<String> = self.members.iter().map(|member| member.name.clone()).collect();
         for (index, Member { mut actor, failed, .. }) in std::mem::take(&mut self.members).into_iter().enumerate() {

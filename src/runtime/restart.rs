@@ -1,6 +1,6 @@
 //! Restarting a group whose actors failed, in place of stopping the whole run.
 
-use super::actor::{Actor, TickContext};
+use super::actor::{Actor, Phase, TickContext};
 use super::deadline::Ledger;
 use super::exchange::{ExchangeReader, exchange};
 use super::live::LiveReader;
@@ -132,12 +132,14 @@ impl fmt::Debug for Restarter {
 }
 
 /// The context of a start at `now`, before release 0 or between two releases.
-pub(super) fn start_context(spec: &RateGroup, ledger: &Ledger, now: Nanos) -> TickContext {
+pub(super) fn start_context(group: u16, spec: &RateGroup, ledger: &Ledger, now: Nanos) -> TickContext {
     TickContext {
         tick: ledger.elapsed_periods(),
         scheduled: now,
         now,
         visible_at: now,
+        group,
+        phase: Phase::Start,
         ..TickContext::by_hand(spec.rate(), 0)
     }
 }

@@ -6,10 +6,13 @@
 use super::exchange::{ExchangeReader, ExchangeWriter, exchange};
 use super::link::{Linked, Relink, linked};
 use super::outlet::{OutletReader, OutletWriter};
-use super::port::{QueueReader, QueueWriter, Reader, VersionCounter, Writer};
+use super::port::{Reader, VersionCounter, Writer};
+use super::port_memory::PortPlan;
+use super::queue_port::{QueueReader, QueueWriter};
 use super::recorder::{Recorder, Registry};
 use super::ring::{Consumer, Producer, ring};
-use super::virtual_port::{SharedFlight, VirtualQueue};
+use super::virtual_port::SharedFlight;
+use super::virtual_queue::VirtualQueue;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -68,16 +71,16 @@ enum ExchangeParts<T> {
 }
 
 /// An [exchange](super::RuntimeBuilder::exchange) whose halves can be taken again; clones are the same port.
-pub struct ExchangePort<T>(Arc<Mutex<ExchangeParts<T>>>);
+pub struct ExchangePort<T>(Arc<(PortPlan, Mutex<ExchangeParts<T>>)>);
 
 impl<T: Send + 'static> ExchangePort<T> {
-    pub(super) fn threaded(init: impl FnMut() -> T + Send + 'static) -> Self {
+    pub(super) fn threaded(plan: PortPlan, init: impl FnMut() -> T + Send + 'static) -> Self {
         let pair = Box::new(Pair::<ExchangeWriter<T>, ExchangeReader<T>>::of_exchange(init));
-        Self(Arc::new(Mutex::new(ExchangeParts::Threaded { pair, versions: VersionCounter::default() })))
+        Self(Arc::new((plan, Mutex::new(ExchangeParts::Threaded { pair, versions: VersionCounter::default() }))))
     }
 
-    pub(super) fn in_virtual_time(flight: SharedFlight<T>) -> Self {
-        Self(Arc::new(Mutex::new(ExchangeParts::Virtual(flight))))
+    pub(super) fn in_virtual_time(plan: PortPlan, flight: SharedFlight<T>) -> Self {
+        Self(Arc::new((plan, Mutex::new(ExchangeParts::Virtual(flight)))))
     }
 
     /// The publishing half; fences the one taken before. Versions go on.
@@ -85,9 +88,10 @@ impl<T: Send + 'static> ExchangePort<T> {
     /// # Real-time
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn writer(&self) -> Writer<T> {
-        match &mut *lock(&self.0) {
-            ExchangeParts::Threaded { pair, versions } => Writer::threaded(pair.writer(), versions.clone()),
-            ExchangeParts::Virtual(flight) => Writer::in_virtual_time(flight),
+        let (plan, parts) = &*self.0;
+        match &mut *lock(parts) {
+            ExchangeParts::Threaded { pair, versions } => Writer::threaded(plan, pair.writer(), versions.clone()),
+            ExchangeParts::Virtual(flight) => Writer::in_virtual_time(plan, flight),
         }
     }
 
@@ -96,9 +100,10 @@ impl<T: Send + 'static> ExchangePort<T> {
     /// # Real-time
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn reader(&self) -> Reader<T> {
-        match &mut *lock(&self.0) {
-            ExchangeParts::Threaded { pair, .. } => Reader::threaded(pair.reader()),
-            ExchangeParts::Virtual(flight) => Reader::in_virtual_time(flight),
+        let (plan, parts) = &*self.0;
+        match &mut *lock(parts) {
+            ExchangeParts::Threaded { pair, .. } => Reader::threaded(plan, pair.reader()),
+            ExchangeParts::Virtual(flight) => Reader::in_virtual_time(plan, flight),
         }
     }
 }
@@ -109,16 +114,16 @@ enum QueueParts<T> {
 }
 
 /// A [queue](super::RuntimeBuilder::queue) whose halves can be taken again; clones are the same port.
-pub struct QueuePort<T>(Arc<Mutex<QueueParts<T>>>);
+pub struct QueuePort<T>(Arc<(PortPlan, Mutex<QueueParts<T>>)>);
 
 impl<T: Copy + Send + 'static> QueuePort<T> {
-    pub(super) fn threaded(capacity: usize) -> Self {
+    pub(super) fn threaded(plan: PortPlan, capacity: usize) -> Self {
         let pair = Box::new(Pair::<Producer<T>, Consumer<T>>::of_ring(capacity));
-        Self(Arc::new(Mutex::new(QueueParts::Threaded(pair))))
+        Self(Arc::new((plan, Mutex::new(QueueParts::Threaded(pair)))))
     }
 
-    pub(super) fn in_virtual_time(capacity: usize) -> Self {
-        Self(Arc::new(Mutex::new(QueueParts::Virtual(VirtualQueue::new(capacity)))))
+    pub(super) fn in_virtual_time(plan: PortPlan, queue: VirtualQueue<T>) -> Self {
+        Self(Arc::new((plan, Mutex::new(QueueParts::Virtual(queue)))))
     }
 
     /// The sending half; fences the one taken before.
@@ -126,9 +131,10 @@ impl<T: Copy + Send + 'static> QueuePort<T> {
     /// # Real-time
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn writer(&self) -> QueueWriter<T> {
-        match &mut *lock(&self.0) {
-            QueueParts::Threaded(pair) => QueueWriter::threaded(pair.writer()),
-            QueueParts::Virtual(queue) => QueueWriter::in_virtual_time(queue),
+        let (plan, parts) = &*self.0;
+        match &mut *lock(parts) {
+            QueueParts::Threaded(pair) => QueueWriter::threaded(plan, pair.writer()),
+            QueueParts::Virtual(queue) => QueueWriter::in_virtual_time(plan, queue),
         }
     }
 
@@ -137,12 +143,10 @@ impl<T: Copy + Send + 'static> QueuePort<T> {
     /// # Real-time
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn reader(&self) -> QueueReader<T> {
-        match &mut *lock(&self.0) {
-            QueueParts::Threaded(pair) => QueueReader::threaded(pair.reader()),
-            QueueParts::Virtual(queue) => {
-                queue.clear();
-                QueueReader::in_virtual_time(queue)
-            }
+        let (plan, parts) = &*self.0;
+        match &mut *lock(parts) {
+            QueueParts::Threaded(pair) => QueueReader::threaded(plan, pair.reader()),
+            QueueParts::Virtual(queue) => QueueReader::in_virtual_time(plan, queue),
         }
     }
 }

@@ -176,6 +176,17 @@ impl<T: Copy> Consumer<T> {
         Some(value)
     }
 
+    /// How many values there are to take now.
+    ///
+    /// # Real-time
+    /// Wait-free (one load), real-time safe.
+    #[inline]
+    pub fn available(&mut self) -> usize {
+        // Acquire: as in `peek`.
+        self.tail = self.shared.tail.load(Ordering::Acquire);
+        self.tail.wrapping_sub(self.head)
+    }
+
     /// How many values fit.
     ///
     /// # Real-time

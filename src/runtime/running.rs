@@ -7,6 +7,8 @@ use super::grant::{GrantHandle, SystemGrant};
 use super::live::{GroupLive, LiveReader};
 use super::plan::Plan;
 use super::recorder::Registry;
+use super::recording::Recording;
+use super::reexecution::Reexecution;
 use super::release::GroupRun;
 use super::report::{RuntimeFault, RuntimeReport};
 use super::restart::Restarter;
@@ -30,6 +32,7 @@ pub struct Runtime {
     execution: Execution,
     groups: Vec<GroupRun>,
     restarters: Vec<Option<(Restarter, ExchangeReader<Ledger>)>>,
+    reexecution: Option<Reexecution>,
     registry: Arc<Registry>,
     grants: GrantHandle,
 }
@@ -37,17 +40,27 @@ pub struct Runtime {
 impl Runtime {
     /// A builder for a graph that runs in this execution.
     pub fn builder(execution: Execution) -> RuntimeBuilder {
-        RuntimeBuilder::new(execution)
+        RuntimeBuilder::new(execution, None)
+    }
+
+    /// A builder for a graph that repeats `recording` in virtual time: it must be built as the recorded one was, with
+    /// the same groups and ports in the same order. Exactly the recorded releases run, whatever rates, policies and
+    /// [`until`](RuntimeBuilder::until) say, and every one of them sees through its ports what it saw then.
+    ///
+    /// A recording that lacks a record ends in a [fault](RuntimeReport::fault) that names what is missing.
+    pub fn reexecution(recording: Recording) -> RuntimeBuilder {
+        RuntimeBuilder::new(Execution::Virtual, Some(recording))
     }
 
     pub(super) fn new(
         execution: Execution,
         groups: Vec<GroupRun>,
         restarters: Vec<Option<(Restarter, ExchangeReader<Ledger>)>>,
+        reexecution: Option<Reexecution>,
         registry: Arc<Registry>,
         grants: GrantHandle,
     ) -> Self {
-        Self { execution, groups, restarters, registry, grants }
+        Self { execution, groups, restarters, reexecution, registry, grants }
     }
 
     /// The schedule: what each group asks for, what the cores bear, which releases coincide, and what this system would
@@ -67,7 +80,7 @@ impl Runtime {
     /// The error of the first actor whose start failed, after those already started were stopped; or
     /// [`ErrorKind::Runtime`] if the system gives no thread.
     pub fn start(self) -> Result<Running, Error> {
-        let Self { execution, mut groups, restarters, registry, grants } = self;
+        let Self { execution, mut groups, restarters, reexecution, registry, grants } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names = groups.iter().map(|group| group.spec.name.clone()).collect();
         let live = groups.iter().map(GroupRun::live).collect();
@@ -80,7 +93,7 @@ impl Runtime {
                 start_actors(&mut groups)?;
                 let restarters =
                     restarters.into_iter().map(|restart| restart.map(|(restarter, _)| restarter)).collect();
-                Executor::Virtual(VirtualRun::new(groups, restarters, Arc::clone(&control)))
+                Executor::Virtual(VirtualRun::new(groups, restarters, reexecution, Arc::clone(&control)))
             }
         };
         let executor = Arc::new(Mutex::new(executor));

@@ -1,9 +1,9 @@
-//! Ports of virtual time: a publication waits until the release that may see it.
+//! Newest-value ports of virtual time: a publication waits until the release that may see it.
 //!
 //! One thread runs everything, in time order, so the locks here are never contended; they only make the halves `Send`.
 
-use super::actor::TickContext;
-use super::ring::rounded;
+use super::actor::{Phase, TickContext};
+use super::script::ScriptedPort;
 use crate::time::Nanos;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -27,6 +27,8 @@ pub(super) struct Flight<T> {
     /// Buffers that nobody needs, kept for the writer: once warm, nothing is allocated.
     free: Vec<Box<Versioned<T>>>,
     init: Box<dyn FnMut() -> T + Send>,
+    /// Says which versions are taken, in a re-execution.
+    script: Option<ScriptedPort>,
 }
 
 impl<T> Flight<T> {
@@ -36,23 +38,47 @@ impl<T> Flight<T> {
             .unwrap_or_else(|| Box::new(Versioned { value: (self.init)(), version: 0, published: Nanos::ZERO }))
     }
 
-    /// Takes back what no reader can get any more: time only moves on, and at `now` a newer one is visible.
-    fn recycle(&mut self, now: Nanos) {
-        while self.waiting.get(1).is_some_and(|second| second.visible_at <= now) {
-            self.free.extend(self.waiting.pop_front().map(|old| old.buffer));
-        }
+    /// Takes back the oldest `count` publications.
+    fn recycle(&mut self, count: usize) {
+        self.free.extend(self.waiting.drain(..count).map(|old| old.buffer));
+    }
+
+    /// Takes back what no reader can get any more: time only moves on, and at `now` a newer one is visible. In a
+    /// re-execution, what is older than the version that is taken next.
+    fn recycle_unreachable(&mut self, now: Nanos) {
+        let count = match self.script.as_ref().and_then(ScriptedPort::next_count) {
+            Some(version) => self.waiting.partition_point(|old| old.buffer.version < version),
+            None => self.waiting.partition_point(|old| old.visible_at <= now).saturating_sub(1),
+        };
+        self.recycle(count);
+    }
+
+    /// The newest publication for which `is_visible` holds; it holds for older ones too.
+    fn newest(&mut self, is_visible: impl Fn(&Publication<T>) -> bool) -> Option<Box<Versioned<T>>> {
+        let visible = self.waiting.partition_point(is_visible);
+        self.recycle(visible.checked_sub(1)?);
+        self.waiting.pop_front().map(|newest| newest.buffer)
+    }
+
+    /// The publication of this version; older ones are overtaken.
+    fn version(&mut self, version: u64) -> Option<Box<Versioned<T>>> {
+        self.recycle(self.waiting.partition_point(|old| old.buffer.version < version));
+        self.waiting.pop_front_if(|first| first.buffer.version == version).map(|found| found.buffer)
     }
 }
 
 pub(super) type SharedFlight<T> = Arc<Mutex<Flight<T>>>;
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // A panic while the lock is held can only come from a user's `init`, which leaves the queues whole.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-pub(super) fn flight<T: Send>(init: impl FnMut() -> T + Send + 'static) -> SharedFlight<T> {
-    let flight = Flight { versions: 0, waiting: VecDeque::new(), free: Vec::new(), init: Box::new(init) };
+pub(super) fn flight<T: Send>(
+    script: Option<ScriptedPort>,
+    init: impl FnMut() -> T + Send + 'static,
+) -> SharedFlight<T> {
+    let flight = Flight { versions: 0, waiting: VecDeque::new(), free: Vec::new(), init: Box::new(init), script };
     Arc::new(Mutex::new(flight))
 }
 
@@ -77,10 +103,13 @@ impl<T> VirtualWriter<T> {
         let version = flight.versions;
         self.buffer.version = version;
         self.buffer.published = ctx.scheduled;
-        flight.recycle(ctx.scheduled);
+        flight.recycle_unreachable(ctx.scheduled);
         let fresh = flight.fresh();
         let buffer = std::mem::replace(&mut self.buffer, fresh);
         flight.waiting.push_back(Publication { visible_at: ctx.visible_at, buffer });
+        if let Some(script) = &flight.script {
+            script.produced(version);
+        }
         version
     }
 }
@@ -96,13 +125,19 @@ impl<T> VirtualReader<T> {
         Self { shared: Arc::clone(shared), buffer }
     }
 
-    pub(super) fn refresh(&mut self, ctx: &TickContext) -> bool {
+    /// `own` if the release's own group writes the port.
+    pub(super) fn refresh(&mut self, ctx: &TickContext, own: bool) -> bool {
         let mut flight = lock(&self.shared);
-        flight.recycle(ctx.scheduled);
-        let Some(newest) = flight.waiting.pop_front_if(|first| first.visible_at <= ctx.scheduled) else {
-            return false;
+        let found = match &flight.script {
+            _ if own => flight.newest(|_| true),
+            Some(script) if ctx.phase == Phase::Release => {
+                let version = script.took(ctx);
+                version.and_then(|version| flight.version(version))
+            }
+            _ => flight.newest(|publication| publication.visible_at <= ctx.scheduled),
         };
-        let old = std::mem::replace(&mut self.buffer, newest.buffer);
+        let Some(newest) = found else { return false };
+        let old = std::mem::replace(&mut self.buffer, newest);
         flight.free.push(old);
         true
     }
@@ -121,55 +156,5 @@ impl<T> VirtualReader<T> {
 
     pub(super) fn published(&self) -> Nanos {
         self.buffer.published
-    }
-}
-
-struct Samples<T> {
-    waiting: VecDeque<(Nanos, T)>,
-    capacity: usize,
-    dropped: u64,
-}
-
-pub(super) struct VirtualQueue<T>(Arc<Mutex<Samples<T>>>);
-
-impl<T> Clone for VirtualQueue<T> {
-    fn clone(&self) -> Self {
-        Self(Arc::clone(&self.0))
-    }
-}
-
-impl<T: Copy> VirtualQueue<T> {
-    pub(super) fn new(capacity: usize) -> Self {
-        // The same capacity as the ring that takes its place between threads.
-        let capacity = rounded(capacity);
-        Self(Arc::new(Mutex::new(Samples { waiting: VecDeque::with_capacity(capacity), capacity, dropped: 0 })))
-    }
-
-    pub(super) fn push(&self, ctx: &TickContext, value: T) -> bool {
-        let mut samples = lock(&self.0);
-        let fits = samples.waiting.len() < samples.capacity;
-        if fits {
-            samples.waiting.push_back((ctx.visible_at, value));
-        } else {
-            samples.dropped += 1;
-        }
-        fits
-    }
-
-    pub(super) fn peek(&self, ctx: &TickContext) -> Option<T> {
-        lock(&self.0).waiting.front().filter(|sample| sample.0 <= ctx.scheduled).map(|sample| sample.1)
-    }
-
-    pub(super) fn pop(&self, ctx: &TickContext) -> Option<T> {
-        lock(&self.0).waiting.pop_front_if(|sample| sample.0 <= ctx.scheduled).map(|sample| sample.1)
-    }
-
-    pub(super) fn dropped(&self) -> u64 {
-        lock(&self.0).dropped
-    }
-
-    /// Drops what waits, as a reader does that takes the place of another.
-    pub(super) fn clear(&self) {
-        lock(&self.0).waiting.clear();
     }
 }

@@ -4,7 +4,7 @@ use crate::model::mesh::Face;
 
 /// A block of nodes joined by springs to all 26 neighbours.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
 pub struct BodySpec {
     /// The kind of body; `mass_spring` is the only one in scene files.
     #[cfg_attr(feature = "scene", serde(default))]
@@ -17,7 +17,7 @@ pub struct BodySpec {
 
 /// The kinds of body that a scene file can name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum BodyKind {
     /// Point masses and springs.
     #[default]
@@ -26,7 +26,7 @@ pub enum BodyKind {
 
 /// A block's lattice.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
 pub struct BlockSpec {
     /// Nodes per axis, at least 2 each; node id = i + nx (j + ny k).
     pub nodes: [usize; 3],
@@ -44,7 +44,7 @@ fn default_fixed() -> Vec<Face> {
 
 /// One material for all springs and nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
 pub struct MaterialSpec {
     /// Mass of every node (kg).
     pub node_mass_kg: f64,

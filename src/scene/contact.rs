@@ -4,7 +4,7 @@ use crate::model::contact::{Equations, Normals};
 
 /// How the tool touches the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
 pub struct ContactSpec {
     /// Coulomb friction.
     pub friction: Friction,

@@ -4,7 +4,7 @@ use super::ToolPath;
 
 /// What moves the tool.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
 pub struct DeviceSpec {
     /// The kind of device.
     pub kind: DeviceKind,
@@ -19,7 +19,7 @@ pub struct DeviceSpec {
 
 /// The devices that a scene file can name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum DeviceKind {
     /// A tool that follows a path and ignores the force.
     #[default]
@@ -28,7 +28,7 @@ pub enum DeviceKind {
 
 /// Limits on what reaches the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
 pub struct SafetySpec {
     /// Largest force (N); the device's own limit if absent.
     pub max_force_n: Option<f64>,

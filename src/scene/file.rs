@@ -42,19 +42,10 @@ impl Scene {
         name: &str,
         read_path: impl FnOnce(&Path) -> Result<ToolPath, Error>,
     ) -> Result<Self, Error> {
-        let (document, syntax) = DeTable::parse_recoverable(text);
+        let (document, _) = DeTable::parse_recoverable(text);
         let root = document.get_ref();
         let on_line = |error: Error, offset: usize| error.at(format!("{name}:{}", line_of(text, offset)));
-        let refuse = |fault: Fault| {
-            let error = Error::new(ErrorKind::Scene, fault.message);
-            let error = if fault.field.is_empty() { error } else { error.at(fault.field) };
-            on_line(error, fault.offset.unwrap_or(0))
-        };
-
-        if let Some(error) = syntax.first() {
-            return Err(refuse(syntax_fault(text, root, error)));
-        }
-        let mut scene: Self = reader::read(root).map_err(refuse)?;
+        let mut scene = Self::parse(text, name)?;
         if scene.body.is_none() {
             let message = "is missing, a scene needs the tables [body.block] and [body.material]";
             return Err(on_line(Error::scene("body", message), 0));
@@ -72,6 +63,42 @@ impl Scene {
             let offset = offset_of(root, error.place());
             on_line(error, offset)
         })?;
+        Ok(scene)
+    }
+
+    /// The scene in `text` as it stands: nothing is fetched, completed or validated.
+    fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        let (document, syntax) = DeTable::parse_recoverable(text);
+        let root = document.get_ref();
+        let refuse = |fault: Fault| {
+            let error = Error::new(ErrorKind::Scene, fault.message);
+            let error = if fault.field.is_empty() { error } else { error.at(fault.field) };
+            error.at(format!("{name}:{}", line_of(text, fault.offset.unwrap_or(0))))
+        };
+        if let Some(error) = syntax.first() {
+            return Err(refuse(syntax_fault(text, root, error)));
+        }
+        reader::read(root).map_err(refuse)
+    }
+
+    /// The scene as the text of a scene file, every number to its last bit. The tool's path itself is not part of it,
+    /// only the name of its file.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] if the name of the path's file is not UTF-8.
+    pub fn to_toml(&self) -> Result<String, Error> {
+        toml::to_string(self)
+            .map_err(|error| Error::new(ErrorKind::Scene, format!("cannot be written as TOML: {error}")))
+    }
+
+    /// The scene in the text that a log keeps of what was run: with a body or without, and without a tool, which is in the
+    /// log itself. `name` stands for the text in errors.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] if it is no scene or one that cannot work.
+    pub fn from_session_toml(text: &str, name: &str) -> Result<Self, Error> {
+        let scene = Self::parse(text, name)?;
+        scene.validate().map_err(|error| error.at(name))?;
         Ok(scene)
     }
 

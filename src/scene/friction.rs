@@ -3,12 +3,22 @@
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
+use serde::ser::{Serialize, Serializer};
 
 use super::Friction;
 
 impl<'de> Deserialize<'de> for Friction {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(FrictionVisitor)
+    }
+}
+
+impl Serialize for Friction {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match *self {
+            Self::Coefficient(coefficient) => serializer.serialize_f64(coefficient),
+            Self::Stick => serializer.serialize_str("stick"),
+        }
     }
 }
 

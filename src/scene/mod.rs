@@ -38,7 +38,7 @@ pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, Loc
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
 pub struct Scene {
     /// The soft body; a scene file must have one, `None` stands for a program's own.
     pub body: Option<BodySpec>,
@@ -73,7 +73,7 @@ pub struct Scene {
 
 /// A static equilibrium to start from, at rest, released at t = 0.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
 pub struct InitialSpec {
     /// The node that is pulled.
     pub pull: PullSpec,
@@ -84,7 +84,7 @@ pub struct InitialSpec {
 
 /// One pulled node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
 pub struct PullSpec {
     /// Which.
     pub node: [usize; 3],
@@ -94,7 +94,7 @@ pub struct PullSpec {
 
 /// One probed node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
 pub struct ProbeSpec {
     /// Which.
     pub node: [usize; 3],
@@ -102,7 +102,7 @@ pub struct ProbeSpec {
 
 /// How long a run lasts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
 pub struct RunSpec {
     /// Simulated time (s).
     pub duration_s: f64,

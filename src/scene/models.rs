@@ -2,7 +2,7 @@
 
 /// The slow, detailed simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
 pub struct GlobalSpec {
     /// Releases per second.
     pub rate_hz: f64,
@@ -20,7 +20,7 @@ impl Default for GlobalSpec {
 
 /// The fast, small simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
 pub struct LocalSpec {
     /// Releases per second.
     pub rate_hz: f64,
@@ -48,7 +48,7 @@ impl Default for LocalSpec {
 
 /// The local models.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum LocalModelKind {
     /// The whole body at the haptic rate: the reference that the others are measured against.
     Full,
@@ -75,7 +75,7 @@ impl LocalModelKind {
 
 /// What the global model learns from the local one, besides the tool's trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Feedback {
     /// Nothing: it resolves the contact along the tool's trajectory itself.
     Trajectory,
@@ -92,7 +92,7 @@ impl Feedback {
 
 /// How a resync's discontinuity is spread over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
 pub struct BlendSpec {
     /// The way.
     pub kind: BlendKind,
@@ -103,7 +103,7 @@ pub struct BlendSpec {
 
 /// The ways of blending.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum BlendKind {
     /// The new model's force at once.
     #[default]

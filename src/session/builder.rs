@@ -136,6 +136,17 @@ impl SessionBuilder {
         self
     }
 
+    /// Reads the log of an earlier run of this session, to execute it again in simulated time, as
+    /// [`Session::replay`] does for a scene. The builder must be filled as it was for that run, without the device: a body
+    /// of the program's own is not in the log.
+    ///
+    /// # Errors
+    /// As [`Session::replay`]; also [`ErrorKind::Log`](crate::ErrorKind::Log) if the log is one of another session.
+    #[cfg(all(feature = "log", feature = "scene"))]
+    pub fn replay(self, log: &std::path::Path) -> Result<super::Replay, Error> {
+        super::Replay::of_parts(self.parts, log)
+    }
+
     /// Checks everything and makes the session ready to start.
     ///
     /// # Errors

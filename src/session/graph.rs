@@ -2,18 +2,21 @@
 
 use super::global::{GlobalMaker, GlobalSide};
 use super::prepare::Prepared;
+#[cfg(all(feature = "log", feature = "scene"))]
+use super::replay::{Comparer, Reexecuted};
 use super::running::{Running, Viewer};
 use super::sink::{Memory, Sinks};
 use crate::actors::{
     Checkpoint, DeviceActor, DeviceSample, ForceCommand, LocalActor, LocalPorts, LoggerActor, LoggerOutcome,
     ModelSource, SurfaceView, ToolTick, ToolView, first_state,
 };
+use crate::devices::DeviceState;
 use crate::error::Error;
-use crate::log::{Environment, Execution as LogExecution, GroupInfo};
+use crate::log::{Environment, Execution as LogExecution, GroupInfo, ToolSample};
 use crate::model::Vec3;
 use crate::model::body::Block;
 use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
-use crate::runtime::{ExchangePort, Execution, RateGroup, Restart, Runtime};
+use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, Restart, Runtime};
 use crate::safety::{Actions, Pipeline};
 use crate::time::Rate;
 
@@ -39,9 +42,17 @@ fn logger_group() -> RateGroup {
 
 pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let first = first_state(&mut *prepared.device)?;
-    let environment = environment(&prepared);
+    let environment = environment(&prepared, &first)?;
     let (sinks, memory) = sinks(&prepared, &environment)?;
+    #[cfg(all(feature = "log", feature = "scene"))]
+    let (mut graph, comparison) = match prepared.reexecuted.take() {
+        Some(Reexecuted { recording, comparison }) => (Runtime::reexecution(recording), Some(comparison)),
+        None => (Runtime::builder(prepared.execution), None),
+    };
+    #[cfg(not(all(feature = "log", feature = "scene")))]
     let mut graph = Runtime::builder(prepared.execution);
+    // Before the ports, so that they record what a replay needs. The order of the ports below numbers them in the log.
+    let drain = graph.drain();
     let ticks_buffered = ((SECONDS_BUFFERED * prepared.haptic.as_hz()) as usize).max(MIN_TICKS_BUFFERED);
     let per_tick = RECORDS_PER_TICK + prepared.probes.len();
 
@@ -109,7 +120,16 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let local = LocalActor::new(succession, prepared.haptic, prepared.global_rate, probes, ports);
 
     let outcome = LoggerOutcome::default();
-    let logger = LoggerActor::new(graph.drain(), sinks, environment, graph.grants(), outcome.clone());
+    let logger = |drain| -> Box<dyn Actor> {
+        Box::new(LoggerActor::new(drain, sinks, environment, graph.grants(), outcome.clone()))
+    };
+    #[cfg(all(feature = "log", feature = "scene"))]
+    let logger = match comparison {
+        Some(comparison) => Box::new(Comparer::new(drain, comparison)),
+        None => logger(drain),
+    };
+    #[cfg(not(all(feature = "log", feature = "scene")))]
+    let logger = logger(drain);
     graph.group(prepared.local, vec![Box::new(device), Box::new(local)]);
     if let Some(mut maker) = global {
         if maker.can_restart() {
@@ -119,7 +139,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
             graph.group(prepared.global, actors);
         }
     }
-    graph.group(logger_group(), vec![Box::new(logger)]);
+    graph.group(logger_group(), vec![logger]);
     if let Some(until) = prepared.until {
         graph.until(until);
     }
@@ -127,7 +147,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     Ok(Running::new(running, outcome, memory, Viewer::new(triangles, surface, view), prepared.until))
 }
 
-fn environment(prepared: &Prepared) -> Environment {
+fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, Error> {
     let group = |name: &str, rate: Rate| GroupInfo { name: name.to_owned(), rate_hz: rate.as_hz() };
     let is_multi_rate = prepared.kind != Kind::Full;
     let mut groups = vec![group("local", prepared.haptic)];
@@ -135,7 +155,11 @@ fn environment(prepared: &Prepared) -> Environment {
         groups.push(group("global", prepared.global_rate));
     }
     groups.push(group("logger", LOGGER));
-    Environment {
+    #[cfg(feature = "scene")]
+    let session = Some(prepared.as_run.to_toml()?);
+    #[cfg(not(feature = "scene"))]
+    let session = None;
+    Ok(Environment {
         palpate_version: env!("CARGO_PKG_VERSION").to_owned(),
         instruction_set: Block::instruction_set().to_owned(),
         execution: match prepared.execution {
@@ -148,8 +172,15 @@ fn environment(prepared: &Prepared) -> Environment {
         groups,
         limit_stages: Actions::NAMES.map(str::to_owned).into(),
         granted: Default::default(),
+        first_tool: Some(ToolSample {
+            position_m: first.position.into(),
+            velocity_m_s: first.velocity.into(),
+            buttons: first.buttons,
+            ..ToolSample::default()
+        }),
         scene: prepared.source.clone(),
-    }
+        session,
+    })
 }
 
 fn unix_now_ns() -> u64 {

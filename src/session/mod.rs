@@ -17,10 +17,14 @@ mod builder;
 mod global;
 mod graph;
 mod prepare;
+#[cfg(all(feature = "log", feature = "scene"))]
+mod replay;
 mod running;
 mod sink;
 
 pub use builder::SessionBuilder;
+#[cfg(all(feature = "log", feature = "scene"))]
+pub use replay::{Compared, Difference, Replay, ReplayReport};
 pub use running::{Running, Summary, Viewer};
 
 use crate::error::Error;
@@ -53,6 +57,18 @@ impl Session {
     /// If the process has been moved to fewer cores since the session was built and no longer fits.
     pub fn plan(&self) -> Result<Plan, Error> {
         Plan::of(self.prepared.execution, &graph::groups(&self.prepared))
+    }
+
+    /// Reads the log of a scene's run, in real or in simulated time, to execute it again in simulated time from what was
+    /// logged: the states that the device gave and what each tick saw of the other rate group. Logged forces are only
+    /// compared with.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read; [`ErrorKind::Log`](crate::ErrorKind::Log) if it is
+    /// damaged, if a record is missing, if it was made with another instruction set, or if the body was a program's own.
+    #[cfg(all(feature = "log", feature = "scene"))]
+    pub fn replay(log: &std::path::Path) -> Result<Replay, Error> {
+        Replay::of_scene(log)
     }
 
     /// Starts it: threads are up and the first local model is built when this returns.

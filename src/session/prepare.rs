@@ -17,6 +17,8 @@ use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, RateGroup, admit_here};
 use crate::safety::Limits;
+#[cfg(feature = "scene")]
+use crate::scene::ProbeSpec;
 use crate::scene::{BlendKind, BodySpec, Feedback, InitialSpec, LocalModelKind, Scene};
 use crate::time::{Nanos, Rate};
 
@@ -78,6 +80,12 @@ pub(super) struct Prepared {
     pub keep_records: bool,
     /// The scene file's text, for the log.
     pub source: Option<String>,
+    /// The scene as it is run, with everything that a program or the command line changed.
+    #[cfg(feature = "scene")]
+    pub as_run: Scene,
+    /// The recording that is executed again in place of a run of its own.
+    #[cfg(all(feature = "log", feature = "scene"))]
+    pub reexecuted: Option<super::replay::Reexecuted>,
 }
 
 /// How often the whole body's forces are evaluated: `substeps` times per haptic tick.
@@ -121,6 +129,8 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         None => State::at_rest(body.rest()),
     };
     let contact = attach.map_or_else(Contact::default, |node| glued(&*body, node));
+    #[cfg(feature = "scene")]
+    let mut as_run = as_run(&scene, Some((attach, &probes)));
     let device = match parts.device {
         Some(device) => device,
         None => scripted(scene.device.path, attach.map(|node| state.positions[node as usize]))?,
@@ -137,6 +147,11 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         ramp_s: scene.safety.ramp_ms * 1e-3,
     };
     check_ramp(&limits)?;
+    #[cfg(feature = "scene")]
+    {
+        // The device's own limit too; one without a limit has none to note.
+        as_run.safety.max_force_n = limits.max_force_n.is_finite().then_some(limits.max_force_n);
+    }
     let kind = match scene.local.model {
         LocalModelKind::Full => Kind::Full,
         LocalModelKind::Hold => Kind::Hold,
@@ -191,10 +206,28 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         log: parts.log,
         keep_records: parts.keep_records,
         source: scene.source,
+        #[cfg(feature = "scene")]
+        as_run,
+        #[cfg(all(feature = "log", feature = "scene"))]
+        reexecuted: None,
     };
     // Before anything is started or written.
     admit_here(&groups(&prepared), prepared.execution)?;
     Ok(prepared)
+}
+
+/// The scene without what a log holds in other places, and with the nodes that a program named, if it has a lattice.
+#[cfg(feature = "scene")]
+pub(super) fn as_run(scene: &Scene, named: Option<(Option<u32>, &[u32])>) -> Scene {
+    let mut scene = scene.clone();
+    scene.source = None;
+    (scene.device.path_csv, scene.device.path) = (None, None);
+    if let (Some(body), Some((attach, probes))) = (&scene.body, named) {
+        let lattice = Lattice { nodes: body.block.nodes };
+        scene.device.attach_node = attach.map(|node| lattice.place(node));
+        scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.place(node) }).collect();
+    }
+    scene
 }
 
 fn rate(field: &str, hz: f64) -> Result<Rate, Error> {

@@ -4,6 +4,7 @@ use palpate::log::{
     CommandSample, ContactMode, ContactSample, Environment, Execution, ForceSample, GlobalTick, GroupInfo, GroupStats,
     Level, LogEntry, LogRecord, McapWriter, Percentiles, ProbeSample, Resync, TextEvent, ToolSample,
 };
+use palpate::runtime::PortUse;
 use palpate::runtime::record::{Event, SlipCause, TickTiming};
 use palpate::time::{Nanos, Rate};
 
@@ -24,7 +25,7 @@ pub fn environment() -> Environment {
         granted: [("policy", "SCHED_OTHER"), ("mlock", "refused")]
             .map(|(key, value)| (key.to_owned(), value.to_owned()))
             .into(),
-        scene: None,
+        ..Environment::default()
     }
 }
 
@@ -73,6 +74,7 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
                     buttons: 3,
                 }),
                 LogRecord::Contact(contact),
+                LogRecord::Port(PortUse { time, port: 2, tick: n, count: n + 1, sequence: n, ..PortUse::default() }),
                 LogRecord::Probe(ProbeSample { time, node: 851, local_m: [phase; 3], global_m: [0.1; 3] }),
             ]
             .map(LogEntry::Record),
@@ -99,7 +101,7 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
 /// When an entry happened.
 pub fn time_of(entry: &LogEntry) -> Nanos {
     match entry {
-        LogEntry::Environment(_) => Nanos::ZERO,
+        LogEntry::Environment(_) | LogEntry::Attachment { .. } => Nanos::ZERO,
         LogEntry::Record(record) => record.time(),
         LogEntry::Stats(stats) => stats.time,
         LogEntry::Text(event) => event.time,
@@ -120,6 +122,7 @@ fn timing(group: u16, tick: u64, scheduled: Nanos, period: u64) -> TickTiming {
         deadline: scheduled + Nanos(period),
         slips: u32::from(after_long),
         cause: if long || after_long { SlipCause::LongTick } else { SlipCause::None },
+        ..TickTiming::default()
     }
 }
 
@@ -147,6 +150,7 @@ pub fn log_of(entries: &[LogEntry], chunk: usize) -> Vec<u8> {
             LogEntry::Text(event) => writer.write_text(event).unwrap(),
             LogEntry::Stats(stats) => writer.write_stats(stats).unwrap(),
             LogEntry::Environment(environment) => writer.set_environment(environment),
+            LogEntry::Attachment { .. } => {}
         }
         if i % chunk == chunk - 1 {
             writer.flush().unwrap();

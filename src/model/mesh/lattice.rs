@@ -2,7 +2,7 @@
 
 /// A face of the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Face {
     /// x = 0.
     XMin,
@@ -67,6 +67,13 @@ impl Lattice {
         [0, 1, 1],
         [1, 1, 1],
     ];
+
+    /// The node with this id: the inverse of [`id`](Self::id).
+    pub fn place(&self, id: u32) -> [usize; 3] {
+        let [nx, ny, _] = self.nodes;
+        let id = id as usize;
+        [id % nx, id / nx % ny, id / (nx * ny)]
+    }
 
     /// Number of nodes.
     pub fn len(&self) -> usize {

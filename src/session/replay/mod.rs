@@ -1,0 +1,120 @@
+//! A logged run, executed again from what it was given, and its forces compared with the logged ones bit for bit.
+
+mod compare;
+mod logged;
+mod report;
+
+pub(super) use compare::{Comparer, Comparison};
+pub use report::{Compared, Difference, ReplayReport};
+
+use std::path::Path;
+use std::time::Duration;
+
+use super::Session;
+use super::prepare::{Parts, as_run, prepare};
+use crate::devices::Replayed;
+use crate::error::{Error, ErrorKind};
+use crate::runtime::{Execution, Recording};
+use crate::time::Nanos;
+use logged::Logged;
+
+/// Simulated time between two reports of progress.
+const STEP: Duration = Duration::from_millis(200);
+
+/// What a session executes again, and what it is compared with.
+#[derive(Debug)]
+pub(super) struct Reexecuted {
+    pub(super) recording: Recording,
+    pub(super) comparison: Comparison,
+}
+
+/// A log that has passed every check and can be replayed; made by [`Session::replay`] or
+/// [`SessionBuilder::replay`](super::SessionBuilder::replay).
+#[derive(Debug)]
+pub struct Replay {
+    session: Session,
+    comparison: Comparison,
+    end: Nanos,
+    fault: Option<(Nanos, String)>,
+}
+
+impl Replay {
+    /// Of a scene's log: everything is in it.
+    pub(super) fn of_scene(log: &Path) -> Result<Self, Error> {
+        let logged = Logged::read(log)?;
+        if logged.scene.body.is_none() {
+            let message = "its body is a program's own: only that program can replay it, with `SessionBuilder::replay`";
+            return Err(Error::new(ErrorKind::Log, message).at(log.display().to_string()));
+        }
+        let parts = Parts::new(None, logged.scene.clone());
+        Self::new(parts, logged, log)
+    }
+
+    /// Of a log that was written by a session built as `parts` are.
+    pub(super) fn of_parts(parts: Parts, log: &Path) -> Result<Self, Error> {
+        Self::new(parts, Logged::read(log)?, log)
+    }
+
+    fn new(mut parts: Parts, logged: Logged, log: &Path) -> Result<Self, Error> {
+        let place = log.display().to_string();
+        let max_force_n = logged.scene.safety.max_force_n;
+        parts.scene.safety.max_force_n = max_force_n;
+        parts.device =
+            Some(Box::new(Replayed::new(logged.first, logged.samples, max_force_n.unwrap_or(f64::INFINITY))));
+        parts.execution = Execution::Virtual;
+        parts.log = None;
+        parts.keep_records = false;
+        let mut prepared = prepare(parts).map_err(|error| error.at(&place))?;
+        let difference = first_difference(&prepared.as_run.to_toml()?, &as_run(&logged.scene, None).to_toml()?);
+        if let Some((here, there)) = difference {
+            let message = format!("it is the log of another session: `{there}` was run, this one has `{here}`");
+            return Err(Error::new(ErrorKind::Log, message).at(place));
+        }
+        let comparison = logged.comparison;
+        let end = logged.recording.end();
+        prepared.reexecuted = Some(Reexecuted { recording: logged.recording, comparison: comparison.clone() });
+        Ok(Self { session: Session { prepared }, comparison, end, fault: logged.fault })
+    }
+
+    /// The scheduled time of the last release.
+    pub fn end(&self) -> Nanos {
+        self.end
+    }
+
+    /// Executes the log in simulated time and compares every force.
+    ///
+    /// # Errors
+    /// If the session cannot be started again. A difference, or a re-execution that does not get to the end, is part of
+    /// the report.
+    pub fn run(self) -> Result<ReplayReport, Error> {
+        self.run_with(|_| ())
+    }
+
+    /// As [`run`](Self::run), and tells `progress` from time to time how much has been executed.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn run_with(self, mut progress: impl FnMut(Nanos)) -> Result<ReplayReport, Error> {
+        let running = self.session.start()?;
+        while !running.finished() {
+            running.wait_for(STEP);
+            progress(running.elapsed().min(self.end));
+        }
+        let summary = running.stop();
+        Ok(self.comparison.report(self.fault, summary.runtime.fault))
+    }
+}
+
+/// The first line in which two texts differ.
+fn first_difference(one: &str, other: &str) -> Option<(String, String)> {
+    if one == other {
+        return None;
+    }
+    let (mut one, mut other) = (one.lines(), other.lines());
+    loop {
+        let pair = (one.next().unwrap_or_default(), other.next().unwrap_or_default());
+        if pair.0 != pair.1 {
+            return Some((pair.0.to_owned(), pair.1.to_owned()));
+        }
+    }
+}
