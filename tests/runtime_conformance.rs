@@ -258,7 +258,7 @@ fn what_start_publishes_is_there_at_release_zero(execution: Execution) {
     });
     graph
         .group(group("reader", 1000), vec![read])
-        .group(group("early", 30).latency(Nanos(50 * MS)), vec![Box::new(Early(writer, tx))])
+        .group(group("early", 30).latency(Nanos(30 * MS)), vec![Box::new(Early(writer, tx))])
         .until(Nanos(MS));
     assert_eq!(run(&mut graph).fault, None);
 }
@@ -547,7 +547,7 @@ fn an_outlet_shows_the_newest_value_outside(execution: Execution) {
         Outcome::Continue
     });
     // The declared latency does not delay what leaves the graph.
-    run(graph.group(group("g", 1000).latency(Nanos(50 * MS)), vec![actor]).until(Nanos(5 * MS)));
+    run(graph.group(group("g", 1000).latency(Nanos(MS)), vec![actor]).until(Nanos(5 * MS)));
     assert!(reader.refresh());
     assert_eq!((*reader.get(), reader.version(), reader.published()), (5, 6, Nanos(5 * MS)));
 }
