@@ -96,7 +96,7 @@ impl Actor for Mixer {
         self.state = mixed(self.state, *self.answers.get() ^ u64::from(ctx.slips));
         *self.inner.buffer() = self.state;
         self.inner.publish(ctx);
-        if self.stalls && self.state % 7 == 0 {
+        if self.stalls && self.state.is_multiple_of(7) {
             std::thread::sleep(Duration::from_micros(self.state % 5000));
         }
         Outcome::Continue
