@@ -6,12 +6,17 @@ use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync};
 use crate::model::Vec3;
 use crate::model::contact::{Contact, Mode};
 use crate::model::local::{LocalModel, PatchGeometry, Resynced, Served, Succession};
-use crate::runtime::{Actor, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer};
+use crate::runtime::{
+    Actor, Mode as TickMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
+};
 use crate::time::{Nanos, Rate};
 
 /// Haptic ticks that one release advances at most. After a long stall the rest is made up by the releases that follow:
 /// simulated time never stretches, and no release takes longer than this many ticks.
 const MAX_TICKS_PER_RELEASE: u64 = 8;
+
+/// The same in degraded mode: still one more than a period asks for, so that what is owed is made up in the end.
+const MAX_TICKS_WHEN_DEGRADED: u64 = 2;
 
 /// Where local models come from.
 #[derive(Debug)]
@@ -85,7 +90,11 @@ impl LocalActor {
     fn advance(&mut self, ctx: &TickContext, target: Vec3) -> Served {
         let mut served = Served::default();
         let owed = ctx.tick.saturating_sub(self.models.now());
-        for i in 0..owed.min(MAX_TICKS_PER_RELEASE) {
+        let most = match ctx.mode {
+            TickMode::Normal => MAX_TICKS_PER_RELEASE,
+            TickMode::Degraded => MAX_TICKS_WHEN_DEGRADED,
+        };
+        for i in 0..owed.min(most) {
             // The tool is interpolated over all periods that are owed.
             let from = self.models.tool();
             let tool = from + (target - from) / (owed - i) as f64;

@@ -43,6 +43,8 @@ impl From<&TickTiming> for schema::TickTiming {
             deadline_ns: r.deadline.0,
             slips: r.slips,
             cause: r.cause as i32,
+            given_up: r.given_up.into(),
+            degraded: r.degraded,
         }
     }
 }
@@ -59,6 +61,8 @@ impl From<schema::TickTiming> for TickTiming {
             deadline: Nanos(m.deadline_ns),
             slips: m.slips,
             cause: SlipCause::from_code(u8::try_from(m.cause).unwrap_or(u8::MAX)),
+            given_up: u8::try_from(m.given_up).unwrap_or(u8::MAX),
+            degraded: m.degraded,
         }
     }
 }

@@ -130,6 +130,8 @@ proto_schema! {
         deadline_ns: uint64 = 7,
         slips: uint32 = 8,
         cause: int32 as SlipCause = 9,
+        given_up: uint32 = 10,
+        degraded: bool = 11,
     }
 
     /// `/force`: the force on the tool before the safety pipeline.

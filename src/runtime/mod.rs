@@ -8,7 +8,9 @@
 //!   [`queue`](RuntimeBuilder::queue) for ordered samples, [`outlet`](RuntimeBuilder::outlet) for threads outside.
 //! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
 //!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
-//! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each.
+//! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each and a
+//!   [policy](OverrunPolicy) for what is late. Virtual time [injects](Disturbance) what threads only suffer.
+//! - Release modes: the clock, or a [device](Release::DevicePaced) whose blocking read drives its group.
 //! - Faults: a panic or a reported fault stops the whole graph in order and is in the [report](RuntimeReport).
 //!
 //! Words with a fixed meaning in these docs: *wait-free* (done in a bounded number of steps whatever others do),
@@ -59,11 +61,14 @@
 mod actor;
 mod builder;
 mod deadline;
+mod disturbance;
 pub mod exchange;
 mod grant;
 pub mod mailbox;
 mod os;
 mod outlet;
+mod overrun;
+mod pace;
 mod port;
 mod rate_group;
 pub mod record;
@@ -76,16 +81,19 @@ mod schedule;
 mod supervisor;
 mod sync;
 mod threaded;
+mod timeline;
 mod virtual_port;
 mod virtual_time;
+mod wake;
 
 pub use actor::{Actor, Mode, Outcome, TickContext, actor_fn};
 pub use builder::{Execution, RuntimeBuilder};
 pub use deadline::SlipCounts;
+pub use disturbance::Disturbance;
 pub use grant::{GrantHandle, GroupGrant, SystemGrant};
 pub use outlet::{OutletReader, OutletWriter};
 pub use port::{QueueReader, QueueWriter, Reader, Writer};
-pub use rate_group::{OverrunPolicy, RateGroup, Wait};
+pub use rate_group::{OverrunPolicy, RateGroup, Release, Wait};
 pub use record::{Channel, Event, Record, SlipCause, TickTiming};
 pub use recorder::{RecordDrain, Recorder};
 pub use report::{GroupReport, RuntimeFault, RuntimeReport};

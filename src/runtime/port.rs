@@ -2,8 +2,9 @@
 //!
 //! The same types in both executions. Between threads they are the [exchange](super::exchange) and the
 //! [ring](super::ring); in virtual time the executor owns visibility: what a group with latency L publishes at release
-//! t is visible to readers whose scheduled time is at least t + L. With L = 0 a reader at the same time sees it if it
-//! ticks after the writer: later in the group, or in a later group.
+//! t is visible to readers whose work begins at t + L or later, which is their scheduled time unless a
+//! [disturbance](super::Disturbance) delays them. With L = 0 a reader at the same time sees it if it ticks after the writer:
+//! later in the group, or in a later group.
 
 use super::actor::TickContext;
 use super::exchange::{ExchangeReader, ExchangeWriter, exchange};

@@ -1,11 +1,14 @@
 //! One group at work: starts, releases, faults and the stop, the same in both executions.
 
 use super::actor::{Actor, Mode, Outcome, TickContext};
-use super::deadline::{Decision, Ledger};
+use super::deadline::Ledger;
+use super::disturbance::Disturb;
+use super::overrun::Decision;
 use super::rate_group::RateGroup;
 use super::record::Event;
 use super::recorder::Recorder;
 use super::report::{GroupReport, RuntimeFault};
+use super::wake::Wake;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
 use std::any::Any;
@@ -20,10 +23,13 @@ pub(crate) struct GroupRun {
     /// Kept apart: after a panic an actor is not asked anything but to stop.
     names: Vec<String>,
     recorder: Option<Recorder>,
+    /// Virtual time: what disturbs the group, for the executor to take.
+    pub(crate) disturb: Option<Disturb>,
     last: TickContext,
     started: usize,
     degraded: u64,
     degraded_code: Option<u32>,
+    takeovers: u64,
     /// After a fault the actors are stopped and nothing else.
     faulted: bool,
 }
@@ -62,12 +68,20 @@ impl GroupRun {
             actors,
             names,
             recorder,
+            disturb: None,
             last,
             started: 0,
             degraded: 0,
             degraded_code: None,
+            takeovers: 0,
             faulted: false,
         }
+    }
+
+    /// In virtual time `disturb` makes it late.
+    pub(crate) fn disturbed_by(mut self, disturb: Option<Disturb>) -> Self {
+        self.disturb = disturb;
+        self
     }
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
@@ -97,16 +111,38 @@ impl GroupRun {
         }
     }
 
-    /// Runs what is to run after a wait that ended at `woke`: at most one release.
+    /// Asks the first actor to wait for its device; `None` if it panicked.
+    pub(crate) fn wait_for_device(&mut self, timeout: Nanos) -> Option<bool> {
+        let Some(actor) = self.actors.first_mut() else { return Some(false) };
+        // Unwind safe: after a panic the actor is not asked to wait again.
+        match catch_unwind(AssertUnwindSafe(|| actor.wait(timeout))) {
+            Ok(delivered) => Some(delivered),
+            Err(_) => {
+                let due = self.ledger.next_due().unwrap_or(self.last.scheduled);
+                self.event(due, Event::PANIC, 0);
+                None
+            }
+        }
+    }
+
+    /// Notes that the watchdog took over at the next release, or that the device is back.
+    pub(crate) fn note_watchdog(&mut self, took_over: bool) {
+        let next = self.ledger.elapsed_periods();
+        let due = self.ledger.next_due().unwrap_or(self.last.scheduled);
+        self.takeovers += u64::from(took_over);
+        self.event(due, Event::WATCHDOG, if took_over { next } else { Event::RECOVERED });
+    }
+
+    /// Runs what is to run after a wait: at most one release.
     ///
     /// `start` reads the clock when the work begins and `end` when it is done; both get the scheduled time.
     pub(crate) fn release(
         &mut self,
-        woke: Nanos,
+        wake: Wake,
         start: impl FnOnce(Nanos) -> Nanos,
         end: impl FnOnce(Nanos) -> Nanos,
     ) -> Result<(), RuntimeFault> {
-        let (release, skipped) = match self.ledger.decide(woke) {
+        let (release, skipped) = match self.ledger.decide(&wake) {
             Decision::Run { release, skipped } => (release, skipped),
             Decision::Stop { skipped } => return Err(self.overrun(skipped)),
         };
@@ -114,6 +150,10 @@ impl GroupRun {
         let now = start(scheduled);
         let dt_nominal = self.last.dt_nominal;
         let first = self.ledger.released == 0;
+        let mode = self.ledger.mode();
+        if mode != self.last.mode {
+            self.event(scheduled, Event::MODE, if mode == Mode::Degraded { skipped } else { Event::RECOVERED });
+        }
         let ctx = TickContext {
             tick: release,
             scheduled,
@@ -121,12 +161,13 @@ impl GroupRun {
             dt_nominal,
             dt_measured: if first { dt_nominal } else { now.saturating_sub(self.last.now).as_secs_f64() },
             slips: u32::try_from(skipped).unwrap_or(u32::MAX),
-            mode: Mode::Normal,
-            visible_at: scheduled + self.spec.latency,
+            mode,
+            visible_at: (scheduled + self.spec.latency).max(wake.free.unwrap_or(Nanos::ZERO)),
         };
         self.last = ctx;
         let result = self.work(&ctx);
-        let timing = self.ledger.close(release, skipped, [woke, now, end(scheduled)]);
+        let end = end(scheduled);
+        let timing = self.ledger.close(release, skipped, [wake.woke, now, end], wake.free.unwrap_or(end));
         if let Some(recorder) = &mut self.recorder {
             recorder.push(timing);
         }
@@ -238,6 +279,8 @@ impl GroupRun {
             elapsed_periods: self.ledger.elapsed_periods(),
             missed_deadlines: self.ledger.missed,
             degraded: self.degraded,
+            in_degraded_mode: self.ledger.in_degraded_mode,
+            watchdog_takeovers: self.takeovers,
         };
         (report, fault)
     }

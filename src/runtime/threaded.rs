@@ -5,10 +5,12 @@
 use super::grant::{GrantHandle, SystemGrant, ThreadGrant, set_up_thread};
 use super::mailbox::{MailReceiver, MailSender, mailbox};
 use super::os;
+use super::pace::Pace;
 use super::rate_group::{RateGroup, Wait};
 use super::release::GroupRun;
 use super::report::RuntimeFault;
 use super::supervisor::{Control, Message, Supervisor};
+use super::wake::Wake;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -163,11 +165,15 @@ fn group_thread(go: &Receiver<Go>, wait: Wait, control: &Control, post: &MailSen
     let observer = group.spec.observer;
     let now = || since(base_ns);
     let leave = || if observer { control.observers_may_end() } else { control.stop_requested() };
+    let sleep = |until: Nanos| wait_until(base_ns + until.0, wait, leave);
+    let mut pace = Pace::new(&group);
     while let Some(due) = group.ledger.next_due() {
-        if !wait_until(base_ns + due.0, wait, leave) {
-            break;
-        }
-        if let Err(fault) = group.release(now(), |_| now(), |_| now()) {
+        let wake = match &mut pace {
+            None => sleep(due).then(|| Wake::by_timer(due, now())),
+            Some(pace) => pace.wait(&mut group, due, now, sleep),
+        };
+        let Some(wake) = wake else { break };
+        if let Err(fault) = group.release(wake, |_| now(), |_| now()) {
             post_fault(post, control, fault);
             break;
         }

@@ -72,7 +72,7 @@ impl<T> VirtualWriter<T> {
         self.buffer.version = self.version;
         self.buffer.published = ctx.scheduled;
         let mut flight = lock(&self.shared);
-        flight.recycle(ctx.scheduled);
+        flight.recycle(ctx.now);
         let fresh = flight.fresh();
         let buffer = std::mem::replace(&mut self.buffer, fresh);
         flight.waiting.push_back(Publication { visible_at: ctx.visible_at, buffer });
@@ -88,8 +88,8 @@ pub(super) struct VirtualReader<T> {
 impl<T> VirtualReader<T> {
     pub(super) fn refresh(&mut self, ctx: &TickContext) -> bool {
         let mut flight = lock(&self.shared);
-        flight.recycle(ctx.scheduled);
-        let Some(newest) = flight.waiting.pop_front_if(|first| first.visible_at <= ctx.scheduled) else {
+        flight.recycle(ctx.now);
+        let Some(newest) = flight.waiting.pop_front_if(|first| first.visible_at <= ctx.now) else {
             return false;
         };
         let old = std::mem::replace(&mut self.buffer, newest.buffer);
@@ -147,11 +147,11 @@ impl<T: Copy> VirtualQueue<T> {
     }
 
     pub(super) fn peek(&self, ctx: &TickContext) -> Option<T> {
-        lock(&self.0).waiting.front().filter(|sample| sample.0 <= ctx.scheduled).map(|sample| sample.1)
+        lock(&self.0).waiting.front().filter(|sample| sample.0 <= ctx.now).map(|sample| sample.1)
     }
 
     pub(super) fn pop(&self, ctx: &TickContext) -> Option<T> {
-        lock(&self.0).waiting.pop_front_if(|sample| sample.0 <= ctx.scheduled).map(|sample| sample.1)
+        lock(&self.0).waiting.pop_front_if(|sample| sample.0 <= ctx.now).map(|sample| sample.1)
     }
 
     pub(super) fn dropped(&self) -> u64 {

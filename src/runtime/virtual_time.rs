@@ -1,8 +1,9 @@
 //! The virtual executor: one thread, releases in the order (time, group), as fast as the machine allows.
 //!
-//! A release begins when it is scheduled and ends after the declared latency of its group; nothing is ever late, and two
-//! runs of the same graph are bit-identical.
+//! A release begins when it is scheduled and ends after the declared latency of its group; nothing is ever late but by a
+//! [disturbance](super::Disturbance), and two runs of the same graph are bit-identical.
 
+use super::disturbance::VirtualPace;
 use super::release::GroupRun;
 use super::report::RuntimeFault;
 use super::supervisor::{Control, Message, Supervisor};
@@ -13,15 +14,19 @@ use std::sync::Arc;
 pub(crate) struct VirtualRun {
     /// `None` for groups that have ended.
     groups: Vec<Option<GroupRun>>,
+    /// When each group wakes next.
+    paces: Vec<VirtualPace>,
     now: Nanos,
     control: Arc<Control>,
     pub(crate) supervisor: Supervisor,
 }
 
 impl VirtualRun {
-    pub(crate) fn new(groups: Vec<GroupRun>, control: Arc<Control>) -> Self {
+    pub(crate) fn new(mut groups: Vec<GroupRun>, control: Arc<Control>) -> Self {
         let supervisor = Supervisor::new(groups.len());
-        let mut run = Self { groups: groups.into_iter().map(Some).collect(), now: Nanos::ZERO, control, supervisor };
+        let paces = groups.iter_mut().map(VirtualPace::new).collect();
+        let groups = groups.into_iter().map(Some).collect();
+        let mut run = Self { groups, paces, now: Nanos::ZERO, control, supervisor };
         run.end_what_is_over();
         run
     }
@@ -43,9 +48,12 @@ impl VirtualRun {
                 return;
             }
             self.now = due;
-            if let Some(group) = &mut self.groups[index] {
-                let latency = group.spec.latency;
-                let result = group.release(due, |scheduled| scheduled, |scheduled| scheduled + latency);
+            if let (Some(group), Some(planned)) = (&mut self.groups[index], self.paces[index].take()) {
+                planned.took_over.into_iter().for_each(|took_over| group.note_watchdog(took_over));
+                let (latency, wake) = (group.spec.latency, planned.wake);
+                let end = |scheduled: Nanos| (scheduled + latency).max(wake.free.unwrap_or(wake.woke));
+                let result = group.release(wake, |_| wake.woke, end);
+                self.paces[index].plan(group);
                 self.note(result);
             }
             self.end_what_is_over();
@@ -61,10 +69,12 @@ impl VirtualRun {
         self.end_observers();
     }
 
-    /// The next release; at equal times the group that was added first.
+    /// The next wake-up; at equal times the group that was added first.
     fn next(&self) -> Option<(Nanos, usize)> {
-        let due = |(index, group): (usize, &Option<GroupRun>)| Some((group.as_ref()?.ledger.next_due()?, index));
-        self.groups.iter().enumerate().filter_map(due).min()
+        let woke = |(index, group): (usize, &Option<GroupRun>)| {
+            group.as_ref().and_then(|_| Some((self.paces[index].next()?, index)))
+        };
+        self.groups.iter().enumerate().filter_map(woke).min()
     }
 
     fn indices(&self, observer: bool) -> Vec<usize> {

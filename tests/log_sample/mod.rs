@@ -120,6 +120,8 @@ fn timing(group: u16, tick: u64, scheduled: Nanos, period: u64) -> TickTiming {
         deadline: scheduled + Nanos(period),
         slips: u32::from(after_long),
         cause: if long || after_long { SlipCause::LongTick } else { SlipCause::None },
+        given_up: u8::from(after_long && tick.is_multiple_of(100)),
+        degraded: after_long,
     }
 }
 
