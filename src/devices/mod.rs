@@ -74,7 +74,8 @@ pub trait Device: Send + std::fmt::Debug {
     fn capabilities(&self) -> Capabilities;
 
     /// The blocking read of a device that owns the clock: blocks until there is something new, at most `timeout`; true if
-    /// there is. What it fetched is for the next [`read`](Self::read), the newest if there were several.
+    /// there is. New is what has come since it last said so, also between two calls. What it fetched is for the next
+    /// [`read`](Self::read), the newest if there were several.
     ///
     /// Only asked where the local group is [device-paced](crate::runtime::Release::DevicePaced). A device without a clock
     /// of its own leaves it as it is: nothing waits, and the clock of the group goes on.

@@ -28,8 +28,9 @@ pub trait Actor: Send {
 
     /// Blocks until the device that this actor reads has something new, at most `timeout`; true if it has.
     ///
-    /// Only the first actor of a [device-paced](super::Release::DevicePaced) group on threads is asked. Everything that the
-    /// device has delivered up to the return counts as one frame. Asked with a timeout of zero it only looks. An actor that
+    /// Only the first actor of a [device-paced](super::Release::DevicePaced) group on threads is asked. New is what has come
+    /// since it last said so, also between two questions; everything up to the return counts as one frame. Asked with a
+    /// timeout of zero it only looks. An actor that
     /// returns false before its time, as the default does, is waited for by the clock, and after a panic it is not asked
     /// again.
     ///
@@ -95,7 +96,7 @@ pub struct TickContext {
     /// When the release was due. Decisions that change results depend on this, never on `now`.
     pub scheduled: Nanos,
     /// When the group's work began; equal to `scheduled` in undisturbed virtual time. In a device-paced group it may be up
-    /// to half a period earlier than `scheduled`.
+    /// to seven eighths of a period earlier than `scheduled`.
     pub now: Nanos,
     /// The period, in seconds.
     pub dt_nominal: f64,

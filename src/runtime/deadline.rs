@@ -96,10 +96,10 @@ impl Ledger {
         self.free
     }
 
-    /// From when on a device's frame belongs to the next release or a later one. An earlier one comes in a period that
-    /// has had its release.
+    /// From when on a device's frame runs the next release or a later one. An earlier one comes in a period that has had
+    /// its release.
     pub(crate) fn next_frame_from(&self) -> Nanos {
-        self.timeline.nearest_from(self.next)
+        self.timeline.frames_from(self.next)
     }
 
     /// How much the actors should do in the release that was decided on.
@@ -113,7 +113,7 @@ impl Ledger {
         self.given_up = 0;
         let latest = match wake.by {
             WokenBy::Timer => self.timeline.latest_due(self.next, wake.woke),
-            WokenBy::Frame => self.timeline.nearest(wake.woke).max(self.next),
+            WokenBy::Frame => self.timeline.of_frame(self.next, wake.woke),
         };
         let mut decision = decide(self.policy, self.next, latest);
         match &mut decision {
@@ -300,6 +300,32 @@ mod tests {
                 prop_assert!(last == Some(80) || policy == OverrunPolicy::Rephase);
             }
         }
+
+        #[test]
+        fn a_device_with_a_clock_of_its_own_loses_what_the_clocks_differ_by_and_no_more(
+            per_mille in 980_u64..1020,
+            first in 0..MS,
+            jitter in prop::collection::vec(0..3 * MS / 10, 1..50),
+        ) {
+            const FRAMES: u64 = 2000;
+            let mut ledger = Ledger::new(0, &RateGroup::hz(1000).device_paced(Nanos(50 * MS)), None);
+            let mut left_out = 0;
+            for n in 0..FRAMES {
+                let at = Nanos(first + n * MS * 1000 / per_mille + jitter[n as usize % jitter.len()]);
+                if at >= ledger.next_frame_from() {
+                    release(&mut ledger, Wake::by_frame(at), at.0);
+                } else {
+                    left_out += 1;
+                }
+            }
+            prop_assert_eq!(ledger.released + left_out, FRAMES);
+            prop_assert_eq!(ledger.released + ledger.skipped.total(), ledger.elapsed_periods());
+            // Check that a slower device makes the group skip, a faster one leave out, and neither does both for long
+            let drift = (FRAMES * 1000 / per_mille).abs_diff(FRAMES);
+            let (slow, fast) = if per_mille < 1000 { (drift + 2, 0) } else { (2, drift + 2) };
+            prop_assert!(ledger.skipped.total() <= slow, "{} skipped", ledger.skipped.total());
+            prop_assert!(left_out <= fast, "{left_out} left out");
+        }
     }
 
     fn release(ledger: &mut Ledger, wake: Wake, end: u64) -> TickTiming {
@@ -398,10 +424,10 @@ mod tests {
         let mut ledger = Ledger::new(0, &RateGroup::hz(1000).device_paced(Nanos(50 * MS)), None);
         let frame = |at: u64| Wake::by_frame(Nanos(at));
         release(&mut ledger, frame(100_000), 300_000);
-        // A frame that comes early runs the release that it is nearest to.
+        // A frame that comes early runs the next release.
         let early = release(&mut ledger, frame(600_000), 800_000);
         assert_eq!((early.tick, early.slips, early.missed()), (1, 0, false));
-        assert_eq!(ledger.next_frame_from(), Nanos(MS + MS / 2));
+        assert_eq!(ledger.next_frame_from(), Nanos(MS + MS / 8));
         let stalled = release(&mut ledger, frame(5 * MS + 400_000), 5 * MS + 500_000);
         assert_eq!((stalled.tick, stalled.slips, stalled.cause), (5, 3, SlipCause::StalledPeer));
         // A long tick is none of its faults, even if the frame comes up to a period later.

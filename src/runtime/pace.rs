@@ -1,7 +1,7 @@
 //! The wait of a device-paced group on its thread: the device's blocking read, and a watchdog beside it.
 //!
-//! The thread asks the group's first actor to wait, in slices, so that a stop is noticed. A frame is mapped to the nearest
-//! release of the nominal grid; one that comes in a period which has had its release is left out. When the device stays
+//! The thread asks the group's first actor to wait, in slices, so that a stop is noticed. A frame runs the next
+//! release of the nominal grid, or a later one if it comes late; one in a period that has had its release is left out. When the device stays
 //! silent the clock takes over, and an actor that does not wait, or panics in it, is waited for by the clock: the thread
 //! never spins.
 

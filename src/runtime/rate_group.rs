@@ -42,10 +42,11 @@ pub enum Release {
     Periodic,
     /// A device, by a blocking read: the first actor of the group is asked to [wait](super::Actor::wait) for it.
     ///
-    /// What it delivers at a time w runs the release whose due time is nearest to w, up to half a period early: the grid of
-    /// ticks stays that of the nominal rate, whatever the device's own clock does. A second frame in the period of one
-    /// release is left out; periods without a frame are skipped with the cause
-    /// [`StalledPeer`](super::SlipCause::StalledPeer).
+    /// What it delivers runs the next release, up to seven eighths of a period before that is due; from half a period after
+    /// it was due on, the release nearest in time, and the periods between are skipped with the cause
+    /// [`StalledPeer`](super::SlipCause::StalledPeer). An earlier frame, the second in the period of one release, is left
+    /// out. So the grid of ticks stays that of the nominal rate whatever the device's own clock does: a device 2 per mille
+    /// slow skips 2 periods in a thousand. That a thread was woken late cannot be told from a late frame.
     DevicePaced {
         /// How long after a due time the device may stay silent. Then the group goes on at its nominal period by the
         /// clock, until the device delivers again; both are recorded as [`Event::WATCHDOG`](super::Event::WATCHDOG).

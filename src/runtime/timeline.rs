@@ -11,7 +11,7 @@ use crate::time::{Nanos, Rate};
 pub(crate) struct Timeline {
     rate: Rate,
     offset: Nanos,
-    half_period: Nanos,
+    period: Nanos,
     phase: Nanos,
     until: Nanos,
     /// The number of nominal periods that begin at or before `until`; the last is `count - 1`.
@@ -29,7 +29,7 @@ impl Timeline {
         Self {
             rate: group.rate,
             offset: group.offset,
-            half_period: Nanos(group.rate.period().0 / 2),
+            period: group.rate.period(),
             phase: Nanos::ZERO,
             until: until.unwrap_or(Nanos(u64::MAX)),
             count,
@@ -57,14 +57,20 @@ impl Timeline {
         self.rate.last_release(since).min(self.count - 1).max(next)
     }
 
-    /// The release whose due time is nearest to `time`, of those that the run has.
-    pub(crate) fn nearest(&self, time: Nanos) -> u64 {
-        self.rate.last_release((time + self.half_period).saturating_sub(self.offset)).min(self.count - 1)
+    /// The release that a device's frame at `time` runs: `next` up to half a period after it is due, then the nearest that
+    /// the run has.
+    pub(crate) fn of_frame(&self, next: u64, time: Nanos) -> u64 {
+        let half_period = Nanos(self.period.0 / 2);
+        self.rate.last_release((time + half_period).saturating_sub(self.offset)).min(self.count - 1).max(next)
     }
 
-    /// From when on release `n` is the one that is [nearest](Self::nearest).
-    pub(crate) fn nearest_from(&self, n: u64) -> Nanos {
-        self.due(n).saturating_sub(self.half_period)
+    /// From when on a frame runs release `n` or a later one: seven eighths of a period before it is due.
+    ///
+    /// More than the half that a nearest release would give, and that is what keeps a device whose frames drift across the
+    /// grid from losing many: after a slip at half a period late it is half a period early, and jitter of three eighths of
+    /// a period does not make it skip and leave out by turns.
+    pub(crate) fn frames_from(&self, n: u64) -> Nanos {
+        self.due(n).saturating_sub(Nanos(self.period.0 / 8 * 7))
     }
 
     /// Shifts the grid so that the latest nominal release is due at `now`, and returns its number; `None`, and no shift,
@@ -104,13 +110,13 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_belongs_to_the_release_that_is_nearest() {
+    fn a_frame_runs_the_next_release_or_the_nearest_later_one() {
         let timeline = Timeline::new(&RateGroup::hz(1000).offset(Nanos(2 * MS)), Some(Nanos(9 * MS)));
         // Release 3 is due at 5 ms.
-        let [early, late] = [4 * MS + MS / 2, 5 * MS + MS / 2];
-        assert_eq!([early - 1, early, late - 1, late].map(|time| timeline.nearest(Nanos(time))), [2, 3, 3, 4]);
-        assert_eq!(timeline.nearest_from(3), Nanos(early));
-        assert_eq!([Nanos::ZERO, Nanos(100 * MS)].map(|time| timeline.nearest(time)), [0, 7]);
+        let [early, late] = [4 * MS + MS / 8, 5 * MS + MS / 2];
+        assert_eq!([early, late - 1, late, late + MS].map(|time| timeline.of_frame(3, Nanos(time))), [3, 3, 4, 5]);
+        assert_eq!(timeline.frames_from(3), Nanos(early));
+        assert_eq!((timeline.frames_from(0), timeline.of_frame(3, Nanos(100 * MS))), (Nanos(MS + MS / 8), 7));
     }
 
     #[test]
