@@ -1,13 +1,16 @@
 //! One suite, run against both executors: the same actors see the same order, ports, starts, stops and faults.
 
+mod device_clock;
+
+use device_clock::DeviceClock;
 use palpate::runtime::{
-    Actor, Event, Execution, GrantHandle, Outcome, OverrunPolicy, RateGroup, Record, Runtime, RuntimeBuilder,
-    RuntimeReport, TickContext, TickTiming, actor_fn,
+    Actor, Disturbance, Event, Execution, GrantHandle, Mode, Outcome, OverrunPolicy, RateGroup, Record, Runtime,
+    RuntimeBuilder, RuntimeReport, SlipCause, TickContext, TickTiming, actor_fn,
 };
 use palpate::time::Nanos;
 use palpate::{Error, ErrorKind};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const MS: u64 = 1_000_000;
 
@@ -42,6 +45,13 @@ in_both_executions! {
     the_grant_is_known_when_actors_start
     dropping_a_run_stops_its_actors
     an_outlet_shows_the_newest_value_outside
+    a_rephased_group_keeps_its_distance_and_accounts_for_every_period
+    a_degraded_group_tells_its_actors_and_recovers
+    a_group_that_catches_up_runs_what_is_due_in_order
+    the_stop_policy_ends_the_run_at_an_overrun
+    groups_with_offsets_keep_their_distance
+    a_device_paced_group_keeps_the_nominal_grid
+    a_watchdog_takes_over_from_a_silent_device_and_hands_back
 }
 
 type Log = Arc<Mutex<Vec<String>>>;
@@ -550,4 +560,183 @@ fn an_outlet_shows_the_newest_value_outside(execution: Execution) {
     run(graph.group(group("g", 1000).latency(Nanos(MS)), vec![actor]).until(Nanos(5 * MS)));
     assert!(reader.refresh());
     assert_eq!((*reader.get(), reader.version(), reader.published()), (5, 6, Nanos(5 * MS)));
+}
+
+/// Runs a group at 1 kHz for 60 ms whose release 10, or the first after it, works for 5.4 ms; its report, timings, events
+/// and what its actor was told. In virtual time that work is injected, on threads it is done.
+fn overrun(
+    execution: Execution,
+    policy: OverrunPolicy,
+) -> (RuntimeReport, Vec<TickTiming>, Vec<Event>, Vec<TickContext>) {
+    const WORK: Duration = Duration::from_micros(5400);
+    let mut graph = Runtime::builder(execution);
+    let mut drain = graph.drain();
+    let contexts: Arc<Mutex<Vec<TickContext>>> = Arc::default();
+    let sink = Arc::clone(&contexts);
+    let mut done = false;
+    let actor = actor_fn("a", move |ctx| {
+        sink.lock().unwrap().push(*ctx);
+        if execution == Execution::Threaded && ctx.tick >= 10 && !std::mem::replace(&mut done, ctx.tick >= 10) {
+            let start = Instant::now();
+            while start.elapsed() < WORK {
+                std::hint::spin_loop();
+            }
+        }
+        Outcome::Continue
+    });
+    if execution == Execution::Virtual {
+        let work = |release| Nanos(if release == 10 { WORK.as_nanos() as u64 } else { 0 });
+        graph.disturb("g", move |release| Disturbance { work: work(release), ..Disturbance::default() });
+    }
+    let report = run(graph.group(RateGroup::hz(1000).name("g").overrun(policy), vec![actor]).until(Nanos(60 * MS)));
+    let mut records = Vec::new();
+    drain.drain(&mut records);
+    let group = &report.groups[0];
+    assert_eq!(group.released + group.skipped, group.elapsed_periods);
+    let timings: Vec<_> = records.iter().filter_map(TickTiming::from_record).collect();
+    let contexts = contexts.lock().unwrap().clone();
+    let told = |ctx: &TickContext| (ctx.tick, ctx.scheduled, ctx.slips, ctx.mode);
+    let recorded = timings.iter().map(|t| (t.tick, t.scheduled, t.slips, t.mode));
+    // Check that actors are told what is recorded
+    assert_eq!(contexts.iter().map(told).collect::<Vec<_>>(), recorded.collect::<Vec<_>>());
+    (report, timings, records.iter().filter_map(Event::from_record).collect(), contexts)
+}
+
+fn a_rephased_group_keeps_its_distance_and_accounts_for_every_period(execution: Execution) {
+    let (report, timings, _, _) = overrun(execution, OverrunPolicy::Rephase);
+    let group = &report.groups[0];
+    assert_eq!(group.elapsed_periods, 61);
+    assert!(group.slips.of(SlipCause::LongTick) >= 4, "{group:?}");
+    for pair in timings.windows(2) {
+        let distance = pair[1].scheduled.0 - pair[0].scheduled.0;
+        if pair[1].slips > 0 && pair[1].woke <= Nanos(60 * MS) {
+            // It runs at once, and that is when it was due.
+            assert!(pair[1].scheduled == pair[1].woke && distance > MS, "{pair:?}");
+        } else {
+            assert_eq!(distance, (pair[1].tick - pair[0].tick) * MS);
+        }
+    }
+    // Tick numbers stay true to the clock, and nothing is due after the end.
+    assert!(timings.iter().all(|t| t.scheduled.0 / MS == t.tick && t.scheduled <= Nanos(60 * MS)));
+}
+
+fn a_degraded_group_tells_its_actors_and_recovers(execution: Execution) {
+    let (report, timings, events, _) = overrun(execution, OverrunPolicy::Degrade { recover_after: 4 });
+    let group = &report.groups[0];
+    assert_eq!(group.elapsed_periods, 61);
+    let is_degraded = |t: &TickTiming| t.mode == Mode::Degraded;
+    let long = timings.iter().position(|t| t.slips >= 4 && t.cause == SlipCause::LongTick).unwrap();
+    // The release after the overrun is degraded, and four more if they are in time.
+    assert!(timings.iter().skip(long).take(5).all(is_degraded));
+    if execution == Execution::Virtual {
+        assert_eq!(group.in_degraded_mode, 5);
+    }
+    assert_eq!(group.in_degraded_mode, timings.iter().filter(|t| is_degraded(t)).count() as u64);
+    let changes: Vec<_> = events.iter().map(|e| (e.stamp, e.code, e.detail == Event::RECOVERED)).collect();
+    let of = |pair: &[TickTiming]| {
+        let [before, after] = [0, 1].map(|index: usize| is_degraded(&pair[index]));
+        (before != after).then_some((pair[1].scheduled, before))
+    };
+    let expected: Vec<_> = timings.windows(2).filter_map(of).map(|(at, back)| (at, Event::MODE, back)).collect();
+    assert_eq!(changes, expected);
+    assert_eq!(events[0].detail, u64::from(timings.iter().find(|t| is_degraded(t)).unwrap().slips));
+}
+
+fn a_group_that_catches_up_runs_what_is_due_in_order(execution: Execution) {
+    let (report, timings, _, _) = overrun(execution, OverrunPolicy::CatchUp { max: 2 });
+    assert_eq!(report.groups[0].elapsed_periods, 61);
+    let after = timings.iter().position(|t| t.slips > 0 && t.cause == SlipCause::LongTick).unwrap();
+    // Two more were due when the first of them ran, and they follow.
+    assert!(timings[after].woke >= timings[after].scheduled + Nanos(2 * MS));
+    assert!(timings[after + 1..after + 3].iter().all(|t| t.slips == 0 && t.woke >= t.scheduled));
+}
+
+fn the_stop_policy_ends_the_run_at_an_overrun(execution: Execution) {
+    let (report, timings, events, _) = overrun(execution, OverrunPolicy::Stop);
+    let group = &report.groups[0];
+    assert_eq!(report.fault.unwrap().group, "g");
+    assert_eq!((group.slips.of(SlipCause::Policy), timings.iter().filter(|t| t.slips > 0).count()), (1, 0));
+    assert_eq!(events.iter().map(|e| (e.code, e.detail)).collect::<Vec<_>>(), [(Event::STOPPED, group.skipped)]);
+}
+
+fn groups_with_offsets_keep_their_distance(execution: Execution) {
+    let order: Arc<Mutex<Vec<(u64, Nanos)>>> = Arc::default();
+    let mut graph = Runtime::builder(execution);
+    for k in 0..3_u64 {
+        let sink = Arc::clone(&order);
+        let note = actor_fn("note", move |ctx| {
+            assert!(ctx.now >= ctx.scheduled);
+            sink.lock().unwrap().push((k, ctx.scheduled));
+            Outcome::Continue
+        });
+        graph.group(group(&format!("g{k}"), 100).offset(Nanos(k * 3 * MS)), vec![note]);
+    }
+    let report = run(graph.until(Nanos(45 * MS)));
+    // The last releases that are due by the end: at 40, 43 and 36 ms.
+    assert_eq!(report.groups.iter().map(|group| group.elapsed_periods).collect::<Vec<_>>(), [5, 5, 4]);
+    let order = order.lock().unwrap();
+    for k in 0..3 {
+        let own: Vec<u64> = order.iter().filter(|(group, _)| *group == k).map(|(_, at)| at.0 / MS).collect();
+        assert_eq!(own, (0..5).map(|n| 10 * n + 3 * k).filter(|&at| at <= 45).collect::<Vec<_>>());
+    }
+}
+
+/// Reads a device.
+struct Reads(DeviceClock);
+
+impl Actor for Reads {
+    fn name(&self) -> &str {
+        "reads"
+    }
+
+    fn wait(&mut self, timeout: Nanos) -> bool {
+        self.0.wait(timeout.to_duration())
+    }
+
+    fn tick(&mut self, _: &TickContext) -> Outcome {
+        Outcome::Continue
+    }
+}
+
+/// Runs a device-paced group for 100 ms whose device is silent between two times; the watchdog waits for 10 ms.
+fn device_paced(execution: Execution, silent_ms: [u64; 2]) -> (RuntimeReport, Vec<TickTiming>, Vec<Event>) {
+    let mut graph = Runtime::builder(execution);
+    let mut drain = graph.drain();
+    let actor = Reads(DeviceClock::new(Duration::from_millis(1), silent_ms.map(Duration::from_millis)));
+    if execution == Execution::Virtual {
+        let [from, to] = silent_ms;
+        let stall = move |release: u64| if release == from { Nanos((to - from) * MS) } else { Nanos::ZERO };
+        graph.disturb("g", move |release| Disturbance { stall: stall(release), ..Disturbance::default() });
+    }
+    let spec = RateGroup::hz(1000).name("g").device_paced(Nanos(10 * MS));
+    let report = run(graph.group(spec, vec![Box::new(actor)]).until(Nanos(100 * MS)));
+    let mut records = Vec::new();
+    drain.drain(&mut records);
+    let group = &report.groups[0];
+    // Check that simulated time does not stretch against the clock, whatever the device does
+    assert_eq!((group.released + group.skipped, group.elapsed_periods, &report.fault), (101, 101, &None));
+    let timings: Vec<_> = records.iter().filter_map(TickTiming::from_record).collect();
+    assert!(timings.iter().all(|t| t.scheduled == Nanos(t.tick * MS)));
+    (report, timings, records.iter().filter_map(Event::from_record).collect())
+}
+
+fn a_device_paced_group_keeps_the_nominal_grid(execution: Execution) {
+    let (report, timings, _) = device_paced(execution, [200, 200]);
+    let group = &report.groups[0];
+    assert!(group.released > 50, "{group:?}");
+    assert!(group.skipped == 0 || execution == Execution::Threaded, "{group:?}");
+    assert!(timings.iter().all(|t| t.woke + Nanos(MS) > t.scheduled));
+}
+
+fn a_watchdog_takes_over_from_a_silent_device_and_hands_back(execution: Execution) {
+    let (report, timings, events) = device_paced(execution, [20, 60]);
+    assert!(report.groups[0].watchdog_takeovers >= 1);
+    assert!(report.groups[0].slips.of(SlipCause::StalledPeer) >= 9);
+    let changes: Vec<_> = events.iter().map(|e| (e.code, e.detail == Event::RECOVERED)).collect();
+    let pairs = [(Event::WATCHDOG, false), (Event::WATCHDOG, true)];
+    assert_eq!(changes[..2], pairs);
+    assert!(changes.chunks(2).all(|chunk| chunk == &pairs[..chunk.len()]));
+    // The clock released the group while the device was silent.
+    let takeover = timings.iter().find(|t| t.slips >= 9 && t.cause == SlipCause::StalledPeer).unwrap();
+    assert!(timings.iter().filter(|t| t.tick > takeover.tick && t.tick < 59).count() >= 5);
 }

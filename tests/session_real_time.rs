@@ -1,12 +1,15 @@
 //! Sessions on real threads: identities and limits that hold however busy the machine is, and whatever devices and
 //! bodies do. No test here asserts an absolute time.
 
+mod device_clock;
 mod session_support;
 
+use device_clock::DeviceClock;
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State, TangentBlock};
 use palpate::model::mesh::Surface;
+use palpate::runtime::{OverrunPolicy, RateGroup, SlipCause};
 use palpate::scene::LocalModelKind;
 use palpate::session::{Session, SessionBuilder, Summary};
 use palpate::time::{Nanos, Rate};
@@ -118,6 +121,72 @@ fn stages(summary: &Summary) -> Vec<&str> {
 
 fn events(summary: &Summary) -> String {
     summary.report.events.iter().map(|event| format!("{}: {}\n", event.level.name(), event.message)).collect()
+}
+
+/// A device that owns the clock.
+#[derive(Debug)]
+struct Pacing {
+    inner: Probing,
+    clock: DeviceClock,
+}
+
+impl Device for Pacing {
+    fn name(&self) -> &str {
+        "pacing"
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        self.inner.capabilities()
+    }
+
+    fn wait(&mut self, timeout: Duration) -> bool {
+        self.clock.wait(timeout)
+    }
+
+    fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
+        self.inner.read(time)
+    }
+
+    fn write(&mut self, force: Vec3) -> Result<(), DeviceFault> {
+        self.inner.write(force)
+    }
+}
+
+#[test]
+fn a_device_that_owns_the_clock_paces_the_local_group_and_time_does_not_stretch() {
+    let (inner, written) = Probing::new(pressing(), |_, state| Ok(state));
+    let clock = DeviceClock::new(Duration::from_secs(1) / 998, [Duration::MAX; 2]);
+    let device = Pacing { inner, clock };
+    let local = RateGroup::hz(1000).device_paced(Nanos(100_000_000));
+    let summary = run(session(device).local(local), 1.0);
+    assert_sound(&summary, &written);
+    let group = &summary.runtime.groups[0];
+    assert_eq!((group.elapsed_periods, &summary.runtime.fault), (1001, &None));
+    // Check that what the slower clock lacks is the device's, and that the model has kept up with the nominal time
+    assert!(group.slips.of(SlipCause::StalledPeer) >= 1, "{:?}", group.slips);
+    let last = forces(&summary).last().unwrap().time;
+    assert!(last >= Nanos(900_000_000), "{last}");
+}
+
+#[test]
+fn a_degraded_group_advances_two_ticks_per_release_at_most() {
+    let longest = |policy| {
+        let (device, written) = Probing::new(pressing(), |read, state| {
+            if read % 100 == 0 {
+                std::thread::sleep(Duration::from_millis(12));
+            }
+            Ok(state)
+        });
+        let summary = run(session(device).local(RateGroup::hz(1000).overrun(policy)), 0.5);
+        assert_sound(&summary, &written);
+        let times: Vec<u64> = forces(&summary).iter().map(|r| r.time.0).collect();
+        let steps = times.windows(2).map(|pair| (pair[1] - pair[0]) / 1_000_000).max().unwrap();
+        (steps, summary.runtime.groups[0].in_degraded_mode)
+    };
+    // Twelve periods are owed: the usual release makes up eight of them, one in degraded mode two.
+    assert_eq!(longest(OverrunPolicy::Skip), (8, 0));
+    let (steps, degraded) = longest(OverrunPolicy::Degrade { recover_after: 1000 });
+    assert!(steps == 2 && degraded > 100, "{steps} ticks, {degraded} releases");
 }
 
 #[test]

@@ -11,7 +11,7 @@ use palpate::model::contact::{Contact, Law, ToolMotion};
 use palpate::model::integrator::Spectrum;
 use palpate::model::local::{Full, Hold, LocalModel, Succession};
 use palpate::model::simulation::{Simulation, Stepping};
-use palpate::runtime::{Actor, Execution, Outcome, RateGroup, Runtime, TickContext};
+use palpate::runtime::{Actor, Execution, Outcome, OverrunPolicy, RateGroup, Runtime, TickContext};
 use palpate::scene::{Feedback, LocalModelKind};
 use palpate::session::{Session, SessionBuilder, Summary};
 use palpate::time::{Nanos, Rate};
@@ -237,12 +237,16 @@ fn a_group_that_would_break_the_convention_is_refused() {
         (session().local(haptic().observer()), "local: is an observer"),
         (session().global(RateGroup::hz(30).offset(late)), "global: has an offset"),
         (session().global(RateGroup::hz(30).observer()), "global: is an observer"),
+        (session().local(haptic().overrun(OverrunPolicy::Rephase)), "local: has the policy Rephase"),
+        (session().global(RateGroup::hz(30).device_paced(Nanos(50_000_000))), "global: is paced by a device"),
     ] {
         let error = session.build().unwrap_err();
         assert_eq!(error.kind(), palpate::ErrorKind::Runtime);
         assert!(error.to_string().starts_with(words), "{error}");
     }
     session().local(haptic().pin(0).realtime(50)).global(latency(5_000)).build().unwrap();
+    session().local(haptic().device_paced(late)).build().unwrap();
+    session().global(latency(0).overrun(OverrunPolicy::Rephase)).build().unwrap();
 }
 
 #[test]

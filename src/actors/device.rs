@@ -71,6 +71,10 @@ impl Actor for DeviceActor {
         self.device.name()
     }
 
+    fn wait(&mut self, timeout: Nanos) -> bool {
+        self.device.wait(timeout.to_duration())
+    }
+
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         let outcome = self.read(ctx);
         *self.samples.buffer() = self.last;

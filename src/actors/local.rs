@@ -15,6 +15,9 @@ use crate::time::{Nanos, Rate};
 /// simulated time never stretches, and no release takes longer than this many ticks.
 const MAX_TICKS_PER_RELEASE: u64 = 8;
 
+/// The same in degraded mode: still one more than a period asks for, so that what is owed is made up in the end.
+const MAX_TICKS_WHEN_DEGRADED: u64 = 2;
+
 /// Where local models come from.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one per session, and it does not move")]
@@ -88,7 +91,11 @@ impl LocalActor {
     fn advance(&mut self, ctx: &TickContext, target: Vec3) -> Served {
         let mut served = Served::default();
         let owed = ctx.tick.saturating_sub(self.models.now());
-        for i in 0..owed.min(MAX_TICKS_PER_RELEASE) {
+        let most = match ctx.mode {
+            RunMode::Normal | RunMode::Stopping => MAX_TICKS_PER_RELEASE,
+            RunMode::Degraded => MAX_TICKS_WHEN_DEGRADED,
+        };
+        for i in 0..owed.min(most) {
             // The tool is interpolated over all periods that are owed.
             let from = self.models.tool();
             let tool = from + (target - from) / (owed - i) as f64;

@@ -11,6 +11,7 @@ pub use tool_path::ToolPath;
 
 use crate::model::Vec3;
 use crate::time::Nanos;
+use std::time::Duration;
 
 /// What a device can do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,13 +80,28 @@ pub trait Device: Send + std::fmt::Debug {
         true
     }
 
+    /// The blocking read of a device that owns the clock: blocks until there is something new, at most `timeout`; true if
+    /// there is. New is what has come since it last said so, also between two calls. What it fetched is for the next
+    /// [`read`](Self::read), the newest if there were several.
+    ///
+    /// Only asked where the local group is [device-paced](crate::runtime::Release::DevicePaced). A device without a clock
+    /// of its own leaves it as it is: nothing waits, and the clock of the group goes on.
+    ///
+    /// # Real-time
+    /// May block, at most for `timeout`: the one wait of such a tick, and it costs what the device costs. With a timeout of
+    /// zero it only looks.
+    fn wait(&mut self, timeout: Duration) -> bool {
+        let _ = timeout;
+        false
+    }
+
     /// The state at `time`, the scheduled time of the release.
     ///
     /// # Errors
     /// A [`DeviceFault`]; the run goes on with the last state.
     ///
     /// # Real-time
-    /// Called in the haptic tick: must not allocate; may block only if the device paces its group.
+    /// Called in the haptic tick: must neither allocate nor block.
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault>;
 
     /// Exerts `force` (N) until the next call.

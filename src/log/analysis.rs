@@ -180,6 +180,7 @@ impl Analysis {
 mod tests {
     use super::*;
     use crate::log::{CommandSample, ContactMode, ContactSample, ForceSample, GroupInfo, Resync};
+    use crate::runtime::Mode;
     use crate::runtime::record::{SlipCause, TickTiming};
 
     fn tick(tick: u64, late: u64, work: u64, slips: u32, cause: SlipCause) -> LogRecord {
@@ -198,6 +199,16 @@ mod tests {
             cause,
             ..TickTiming::default()
         })
+    }
+
+    #[test]
+    fn slips_that_a_policy_gave_up_and_degraded_releases_are_counted_apart() {
+        let mut analysis = Analysis::default();
+        let timing = TickTiming { tick: 4, slips: 3, cause: SlipCause::LongTick, ..TickTiming::default() };
+        analysis.push(&LogRecord::Tick(TickTiming { given_up: 1, mode: Mode::Degraded, ..timing }));
+        let group = &analysis.report().groups[0];
+        assert_eq!((group.skipped.of(SlipCause::LongTick), group.skipped.of(SlipCause::Policy)), (2, 1));
+        assert_eq!(group.in_degraded_mode, 1);
     }
 
     // Check that every period is accounted for and every slip and miss keeps its cause.

@@ -45,6 +45,7 @@ impl From<&TickTiming> for schema::TickTiming {
             deadline_ns: r.deadline.0,
             slips: r.slips,
             cause: r.cause as i32,
+            given_up: r.given_up.into(),
             mode: r.mode as i32,
         }
     }
@@ -62,6 +63,7 @@ impl From<schema::TickTiming> for TickTiming {
             deadline: Nanos(m.deadline_ns),
             slips: m.slips,
             cause: SlipCause::from_code(u8::try_from(m.cause).unwrap_or(u8::MAX)),
+            given_up: u8::try_from(m.given_up).unwrap_or(u8::MAX),
             mode: Mode::from_code(u8::try_from(m.mode).unwrap_or(u8::MAX)),
         }
     }

@@ -66,6 +66,17 @@ impl TextEvent {
             Event::WINDING_DOWN => {
                 (Level::Info, format!("{group}: winding down, {} more periods to come to rest", event.detail))
             }
+            Event::MODE if event.detail == Event::RECOVERED => (Level::Info, format!("{group}: back in normal mode")),
+            Event::MODE => {
+                (Level::Warning, format!("{group}: in degraded mode after an overrun of {} periods", event.detail))
+            }
+            Event::WATCHDOG if event.detail == Event::RECOVERED => {
+                (Level::Info, format!("{group}: the device delivers again"))
+            }
+            Event::WATCHDOG => (
+                Level::Warning,
+                format!("{group}: the device is silent, the watchdog took over at release {}", event.detail),
+            ),
             code => (Level::Warning, format!("{group}: event {code}, detail {}", event.detail)),
         };
         Self { time: event.stamp, level, message }
@@ -84,6 +95,23 @@ mod tests {
         event.detail = Event::RECOVERED;
         let text = TextEvent::describe(&event, "local");
         assert_eq!((text.level, text.message.as_str()), (Level::Info, "local: back to normal"));
+    }
+
+    #[test]
+    fn a_change_of_mode_and_of_the_watchdog_is_told_from_its_end() {
+        let text = |code, detail| {
+            let text = TextEvent::describe(&Event { stamp: Nanos(5), group: 0, code, detail }, "local");
+            (text.level, text.message)
+        };
+        let degraded = "local: in degraded mode after an overrun of 3 periods".to_owned();
+        assert_eq!(text(Event::MODE, 3), (Level::Warning, degraded));
+        assert_eq!(text(Event::MODE, Event::RECOVERED), (Level::Info, "local: back in normal mode".to_owned()));
+        let silent = "local: the device is silent, the watchdog took over at release 40".to_owned();
+        assert_eq!(text(Event::WATCHDOG, 40), (Level::Warning, silent));
+        assert_eq!(
+            text(Event::WATCHDOG, Event::RECOVERED),
+            (Level::Info, "local: the device delivers again".to_owned())
+        );
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The timing of one rate group over a run.
 
 use super::percentiles::{Distribution, Percentiles};
+use crate::runtime::Mode;
 use crate::runtime::record::{SlipCause, TickTiming};
 use crate::time::Nanos;
 
@@ -44,6 +45,8 @@ pub struct GroupReport {
     pub missed: CauseCounts,
     /// Periods between the first and the last release, both counted: `released + skipped` unless records were lost.
     pub elapsed_periods: u64,
+    /// Releases in degraded mode, which an overrun policy sets.
+    pub in_degraded_mode: u64,
     /// Records that were lost because a ring was full.
     pub lost_records: u64,
     /// Wake-up lateness, woke - scheduled (ns).
@@ -62,6 +65,7 @@ pub(super) struct GroupCounter {
     released: u64,
     skipped: CauseCounts,
     missed: CauseCounts,
+    in_degraded_mode: u64,
     first_tick: u64,
     last: TickTiming,
     lost_records: u64,
@@ -72,7 +76,10 @@ pub(super) struct GroupCounter {
 
 impl GroupCounter {
     pub(super) fn push(&mut self, timing: &TickTiming) {
-        self.skipped.add(timing.cause, timing.slips.into());
+        for (cause, slips) in timing.slips_by_cause() {
+            self.skipped.add(cause, slips.into());
+        }
+        self.in_degraded_mode += u64::from(timing.mode == Mode::Degraded);
         if timing.missed() {
             self.missed.add(timing.cause, 1);
         }
@@ -104,6 +111,7 @@ impl GroupCounter {
             skipped: self.skipped,
             missed: self.missed,
             elapsed_periods: if self.released == 0 { 0 } else { elapsed },
+            in_degraded_mode: self.in_degraded_mode,
             lost_records: self.lost_records,
             lateness: self.lateness.percentiles(),
             execution: self.execution.percentiles(),

@@ -133,6 +133,7 @@ proto_schema! {
         deadline_ns: uint64 = 7,
         slips: uint32 = 8,
         cause: int32 as SlipCause = 9,
+        given_up: uint32 = 10,
         mode: int32 as Mode = 11,
     }
 

@@ -11,7 +11,7 @@ use crate::log::{ContactMode, ContactSample, GroupStats, LogEntry, LogRecord, Te
 /// The header line of a topic of this kind.
 pub(super) fn header(kind: Kind) -> &'static str {
     match kind {
-        Kind::Timing => "tick,scheduled_ns,woke_ns,start_ns,end_ns,deadline_ns,slips,cause\n",
+        Kind::Timing => "tick,scheduled_ns,woke_ns,start_ns,end_ns,deadline_ns,slips,cause,given_up,mode\n",
         Kind::Stats => {
             "t_s,released,skipped,missed,lost_records,lateness_p50_ns,lateness_p99_ns,lateness_max_ns,\
              execution_p50_ns,execution_p99_ns,execution_max_ns,port_uses\n"
@@ -43,7 +43,12 @@ fn record_row(record: &LogRecord, out: &mut impl Write) -> io::Result<()> {
         LogRecord::Tick(r) => {
             let (woke, start, end) = (r.woke.0, r.start.0, r.end.0);
             let (scheduled, deadline, cause) = (r.scheduled.0, r.deadline.0, r.cause.name());
-            writeln!(out, "{},{scheduled},{woke},{start},{end},{deadline},{},{cause}", r.tick, r.slips)
+            let (given_up, mode) = (r.given_up, r.mode.name());
+            writeln!(
+                out,
+                "{},{scheduled},{woke},{start},{end},{deadline},{},{cause},{given_up},{mode}",
+                r.tick, r.slips
+            )
         }
         LogRecord::Force(r) => vector_row(t_s, r.force_n, out),
         LogRecord::Command(r) => vector_row(t_s, r.force_n, out),

@@ -12,7 +12,7 @@
 //! | `damage` | what is wrong with the log and where, or `null` |
 //! | `messages` | number of messages read, by topic |
 //! | `environment` | versions, rates, and in `granted` what the system granted; `null` if unknown |
-//! | `groups[]` | `name`, `rate_hz`, `released`, `skipped`, `missed`, `elapsed_periods`, `lost_records`, `skipped_by_cause`, `missed_by_cause`, `lateness_ns`, `execution_ns`, `period_error_ns` |
+//! | `groups[]` | `name`, `rate_hz`, `released`, `skipped`, `missed`, `elapsed_periods`, `in_degraded_mode`, `lost_records`, `skipped_by_cause`, `missed_by_cause`, `lateness_ns`, `execution_ns`, `period_error_ns` |
 //! | `resyncs` | `count`, `jump_before_n`, `jump_after_n`, `age_ns` |
 //! | `force` | `ticks`, `peak_n`, `peak_commanded_n`, `not_finite`, `model_age_s` |
 //! | `contact` | haptic ticks `free`, `stick`, `slip`, `lost` |
@@ -105,6 +105,7 @@ fn group(group: &GroupReport) -> Value {
         "skipped": group.skipped.total(),
         "missed": group.missed.total(),
         "elapsed_periods": group.elapsed_periods,
+        "in_degraded_mode": group.in_degraded_mode,
         "lost_records": group.lost_records,
         "skipped_by_cause": causes(group.skipped),
         "missed_by_cause": causes(group.missed),

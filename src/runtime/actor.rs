@@ -26,6 +26,22 @@ pub trait Actor: Send {
         Ok(())
     }
 
+    /// Blocks until the device that this actor reads has something new, at most `timeout`; true if it has.
+    ///
+    /// Only the first actor of a [device-paced](super::Release::DevicePaced) group on threads is asked. New is what has come
+    /// since it last said so, also between two questions; everything up to the return counts as one frame. Asked with a
+    /// timeout of zero it only looks. An actor that
+    /// returns false before its time, as the default does, is waited for by the clock, and after a panic it is not asked
+    /// again.
+    ///
+    /// # Real-time
+    /// May block, at most for `timeout`: the one wait of a device-paced tick. It costs what the device costs; what else is
+    /// said about a tick's system calls and allocations does not include it.
+    fn wait(&mut self, timeout: Nanos) -> bool {
+        let _ = timeout;
+        false
+    }
+
     /// Does the work of one release.
     ///
     /// # Real-time
@@ -77,8 +93,8 @@ pub enum Mode {
     /// All of it.
     #[default]
     Normal = 0,
-    /// The least that keeps the system useful. Set by an overrun policy only, never by measured time; no policy of this
-    /// version sets it.
+    /// The least that keeps the system useful. Set by [`OverrunPolicy::Degrade`](super::OverrunPolicy::Degrade) from its
+    /// books of slips and deadlines, and recorded with every release: an input of the release like any other.
     Degraded = 1,
     /// Bring what it drives to rest: the run is ending or another actor of the group has failed. The group has
     /// [that long](super::RateGroup::wind_down).
@@ -92,6 +108,15 @@ impl Mode {
             1 => Self::Degraded,
             2 => Self::Stopping,
             _ => Self::Normal,
+        }
+    }
+
+    /// Its name in reports and exports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::Degraded => "degraded",
+            Self::Stopping => "stopping",
         }
     }
 }
@@ -116,7 +141,8 @@ pub struct TickContext {
     pub tick: u64,
     /// When the release was due. Decisions that change results depend on this, never on `now`.
     pub scheduled: Nanos,
-    /// When the group's work began; equal to `scheduled` in virtual time.
+    /// When the group's work began; equal to `scheduled` in undisturbed virtual time. In a device-paced group it may be up
+    /// to seven eighths of a period earlier than `scheduled`.
     pub now: Nanos,
     /// The period, in seconds.
     pub dt_nominal: f64,

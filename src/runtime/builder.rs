@@ -2,6 +2,7 @@
 
 use super::actor::Actor;
 use super::deadline::Ledger;
+use super::disturbance::{Disturb, Disturbance};
 use super::grant::GrantHandle;
 use super::outlet::{self, OutletReader, OutletWriter};
 use super::port::{Reader, Writer};
@@ -19,7 +20,7 @@ use super::schedule::admit_here;
 use super::script::{Script, ScriptedPort};
 use super::virtual_port::flight;
 use super::virtual_queue::VirtualQueue;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::time::{Nanos, Rate};
 use std::fmt;
 use std::sync::Arc;
@@ -43,6 +44,7 @@ enum Cast {
 pub struct RuntimeBuilder {
     execution: Execution,
     groups: Vec<(RateGroup, Cast)>,
+    disturbed: Vec<(String, Disturb)>,
     until: Option<Nanos>,
     registry: Arc<Registry>,
     grants: GrantHandle,
@@ -57,6 +59,7 @@ impl RuntimeBuilder {
         Self {
             execution,
             groups: Vec::new(),
+            disturbed: Vec::new(),
             until: None,
             registry: Registry::new(),
             grants: GrantHandle::default(),
@@ -164,6 +167,19 @@ impl RuntimeBuilder {
         self
     }
 
+    /// Virtual time: makes the releases of a group late, as `disturbance` says.
+    ///
+    /// It is asked once per wait, in the order of the releases, with the number of the release that the group waits for. If
+    /// the group wakes so late that another release runs, what was said holds for that one.
+    pub fn disturb(
+        &mut self,
+        group: impl Into<String>,
+        disturbance: impl FnMut(u64) -> Disturbance + Send + 'static,
+    ) -> &mut Self {
+        self.disturbed.push((group.into(), Disturb::new(disturbance)));
+        self
+    }
+
     /// Ends the run by itself: the last release of each group is the last one due at or before `time`.
     pub fn until(&mut self, time: Nanos) -> &mut Self {
         self.until = Some(time);
@@ -176,8 +192,10 @@ impl RuntimeBuilder {
     /// [`ErrorKind::Runtime`](crate::ErrorKind::Runtime), naming the group and the values, for a graph that cannot work:
     /// a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all cores together, on
     /// threads a latency beyond the period, equal real-time priorities pinned to one core, a priority outside 1 to 99, a
-    /// name used twice, no group that is not an observer. Or what a [factory](Self::restartable) says. For a re-execution
-    /// also if the recording is one of another graph, and [`ErrorKind::Log`](crate::ErrorKind::Log) if it has gaps.
+    /// name used twice, no group that is not an observer; an overrun policy that says nothing or contradicts the release
+    /// mode, a watchdog below a period, a device-paced group without an actor; a disturbance of threads, of no group, or a
+    /// second one of the same. Or what a [factory](Self::restartable) says. For a re-execution also if the recording is one
+    /// of another graph, and [`ErrorKind::Log`](crate::ErrorKind::Log) if it has gaps.
     pub fn build(&mut self) -> Result<Runtime, Error> {
         for (index, (group, _)) in self.groups.iter_mut().enumerate() {
             if group.name.is_empty() {
@@ -185,7 +203,8 @@ impl RuntimeBuilder {
             }
         }
         admit_here(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>(), self.execution)?;
-        let built = std::mem::replace(self, Self::new(self.execution, None));
+        self.check_disturbances()?;
+        let mut built = std::mem::replace(self, Self::new(self.execution, None));
         let registry = built.registry;
         let mut groups = Vec::with_capacity(built.groups.len());
         let mut restarters = Vec::with_capacity(built.groups.len());
@@ -193,6 +212,8 @@ impl RuntimeBuilder {
             // The admission check keeps the number of groups far below this.
             let index = index as u16;
             let records = registry.wanted().then(|| RecorderPort::new(&registry, ring_capacity(spec.rate)));
+            let place = built.disturbed.iter().position(|(name, _)| *name == spec.name);
+            let disturb = place.map(|place| built.disturbed.swap_remove(place).1);
             let (group, restarter) = match cast {
                 Cast::Once(actors) => {
                     let ledger = Ledger::new(index, &spec, built.until);
@@ -206,7 +227,8 @@ impl RuntimeBuilder {
                     (group, Some((restarter, books)))
                 }
             };
-            groups.push(group);
+            group.check_listener()?;
+            groups.push(group.disturbed_by(disturb));
             restarters.push(restarter);
         }
         let reexecution = match built.recording {
@@ -219,6 +241,26 @@ impl RuntimeBuilder {
 
 /// Events of the supervisor about one group between two drains.
 const SUPERVISOR_EVENTS: usize = 64;
+
+impl RuntimeBuilder {
+    fn check_disturbances(&self) -> Result<(), Error> {
+        for (index, (name, _)) in self.disturbed.iter().enumerate() {
+            let wrong = if self.execution == Execution::Threaded {
+                "threads cannot be disturbed: real time brings its own; use Execution::Virtual"
+            } else if self.recording.is_some() {
+                "a re-execution cannot be disturbed: its releases are those of the recording"
+            } else if self.groups.iter().all(|(group, _)| group.name != *name) {
+                "is to be disturbed and is not in the graph; add it or correct its name"
+            } else if self.disturbed[..index].iter().any(|(other, _)| other == name) {
+                "is disturbed twice; use one disturbance that does both"
+            } else {
+                continue;
+            };
+            return Err(Error::new(ErrorKind::Runtime, wrong).at(format!("rate group `{name}`")));
+        }
+        Ok(())
+    }
+}
 
 /// Room for four seconds of timing, so that a logger stuck for that long loses nothing; at most 4 MB.
 fn ring_capacity(rate: Rate) -> usize {

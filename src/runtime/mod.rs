@@ -8,8 +8,10 @@
 //!   [`queue`](RuntimeBuilder::queue) for ordered samples, [`outlet`](RuntimeBuilder::outlet) for threads outside.
 //! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
 //!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
+//! - Release modes: the clock, or a [device](Release::DevicePaced) whose blocking read drives its group.
+//! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each and a
+//!   [policy](OverrunPolicy) for what is late. Virtual time [injects](Disturbance) what threads only suffer.
 //! - Re-execution: a run on threads, [recorded](Recording), is repeated in virtual time bit for bit.
-//! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each.
 //! - Admission: a graph that cannot work is refused when it is built, with the sum that failed; its
 //!   [plan](Runtime::plan) says what it asks for and what this system would refuse.
 //! - Introspection: [`Running::live`] shows counts, lateness and execution time of every group at any moment.
@@ -63,6 +65,7 @@
 mod actor;
 mod builder;
 mod deadline;
+mod disturbance;
 pub mod exchange;
 mod grant;
 pub mod histogram;
@@ -71,6 +74,8 @@ mod live;
 pub mod mailbox;
 mod os;
 mod outlet;
+mod overrun;
+mod pace;
 mod panic_hook;
 mod plan;
 mod port;
@@ -93,14 +98,17 @@ mod script;
 mod supervisor;
 mod sync;
 mod threaded;
+mod timeline;
 mod virtual_port;
 mod virtual_queue;
 mod virtual_time;
 mod wait;
+mod wake;
 
 pub use actor::{Actor, Mode, Outcome, TickContext, actor_fn};
 pub use builder::{Execution, RuntimeBuilder};
 pub use deadline::SlipCounts;
+pub use disturbance::Disturbance;
 pub use grant::{GrantHandle, GroupGrant, SystemGrant};
 pub use live::GroupLive;
 pub use outlet::{OutletReader, OutletWriter};
@@ -108,7 +116,7 @@ pub use plan::{Coincidence, GroupPlan, Plan};
 pub use port::{Reader, Writer};
 pub use port_use::{PortUse, PortUseKind};
 pub use queue_port::{QueueReader, QueueWriter};
-pub use rate_group::{OverrunPolicy, RateGroup, Wait};
+pub use rate_group::{OverrunPolicy, RateGroup, Release, Wait};
 pub use record::{Channel, Event, Record, SlipCause, TickTiming};
 pub use recorder::{RecordDrain, Recorder};
 pub use recording::Recording;

@@ -2,8 +2,9 @@
 //!
 //! The same types in both executions. Between threads they are the [exchange](super::exchange); in virtual time the
 //! executor owns visibility: what a group with latency L publishes at release t is visible to readers in other groups
-//! whose scheduled time is at least t + L. With L = 0 a reader at the same time sees it if its group comes later. Within
-//! the group it is visible at once, to the actors that tick after the writer.
+//! whose work begins at t + L or later, which is their scheduled time unless a [disturbance](super::Disturbance) delays
+//! them. With L = 0 a reader at the same time sees it if its group comes later. Within the group it is visible at once, to
+//! the actors that tick after the writer.
 //!
 //! A release looks at a port once. What it took from another group is recorded, so that the run can be
 //! [re-executed](super::Recording).

@@ -15,8 +15,42 @@ pub enum OverrunPolicy {
         /// Late releases that may wait behind the one that runs.
         max: u32,
     },
+    /// Run at once and shift the group's phase: the next release is due one period after this one began.
+    ///
+    /// As `Skip`, but the group keeps its distance between releases instead of its place in time. Release n is the latest
+    /// one that the nominal grid has at that time, so that tick numbers stay true to the clock. Where phases have added up
+    /// to a period, that period is skipped with the cause [`Policy`](super::SlipCause::Policy); so is the last one of a
+    /// run whose shifted release would come after the end.
+    Rephase,
+    /// As `Skip`, and from then on ask for less: [`Mode::Degraded`](super::Mode::Degraded) until `recover_after` releases
+    /// in a row had no slips and met their deadlines. The mode of each release is recorded with its timing.
+    Degrade {
+        /// Releases in time that make the mode normal again.
+        recover_after: u32,
+    },
     /// Stop the whole runtime, in order, at the first release that had to be skipped.
     Stop,
+}
+
+/// What releases a group.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Release {
+    /// The clock.
+    #[default]
+    Periodic,
+    /// A device, by a blocking read: the first actor of the group is asked to [wait](super::Actor::wait) for it.
+    ///
+    /// What it delivers runs the next release, up to seven eighths of a period before that is due; from half a period after
+    /// it was due on, the release nearest in time, and the periods between are skipped with the cause
+    /// [`StalledPeer`](super::SlipCause::StalledPeer). An earlier frame, the second in the period of one release, is left
+    /// out. So the grid of ticks stays that of the nominal rate whatever the device's own clock does: a device 2 per mille
+    /// slow skips 2 periods in a thousand. That a thread was woken late cannot be told from a late frame.
+    DevicePaced {
+        /// How long after a due time the device may stay silent. Then the group goes on at its nominal period by the
+        /// clock, until the device delivers again; both are recorded as [`Event::WATCHDOG`](super::Event::WATCHDOG).
+        watchdog: Nanos,
+    },
 }
 
 /// How a group's thread waits for its next release.
@@ -40,6 +74,10 @@ pub enum Wait {
 
 /// The rate, the timing contract and the thread of a group of actors.
 ///
+/// What releases it is its [`Release`] mode: the clock, or a device that has one of its own. The third way, virtual time,
+/// is a property of the executor: there every group is released by the virtual clock, a device-paced one as if its device
+/// delivered on time, unless a [disturbance](super::Disturbance) delays it.
+///
 /// Values that cannot work are refused by [`RuntimeBuilder::build`](super::RuntimeBuilder::build).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RateGroup {
@@ -52,6 +90,7 @@ pub struct RateGroup {
     pub(super) cpu: Option<usize>,
     pub(super) priority: Option<u8>,
     pub(super) overrun: OverrunPolicy,
+    pub(super) release: Release,
     pub(super) wait: Wait,
     pub(super) observer: bool,
     pub(super) wind_down: Nanos,
@@ -71,6 +110,7 @@ impl RateGroup {
             cpu: None,
             priority: None,
             overrun: OverrunPolicy::default(),
+            release: Release::default(),
             wait: Wait::default(),
             observer: false,
             wind_down: Nanos::ZERO,
@@ -144,6 +184,20 @@ impl RateGroup {
         self
     }
 
+    /// What releases the group.
+    #[must_use]
+    pub fn release(mut self, release: Release) -> Self {
+        self.release = release;
+        self
+    }
+
+    /// Lets a device release the group: [`Release::DevicePaced`] with this watchdog, at least one period. Under the
+    /// policies [`Skip`](OverrunPolicy::Skip), [`Degrade`](OverrunPolicy::Degrade) and [`Stop`](OverrunPolicy::Stop).
+    #[must_use]
+    pub fn device_paced(self, watchdog: Nanos) -> Self {
+        self.release(Release::DevicePaced { watchdog })
+    }
+
     /// Threads: how to wait for the next release.
     #[must_use]
     pub fn wait(mut self, wait: Wait) -> Self {
@@ -183,6 +237,14 @@ impl RateGroup {
     /// The rate.
     pub fn rate(&self) -> Rate {
         self.rate
+    }
+
+    /// The watchdog of a device-paced group.
+    pub(super) fn watchdog(&self) -> Option<Nanos> {
+        match self.release {
+            Release::Periodic => None,
+            Release::DevicePaced { watchdog } => Some(watchdog),
+        }
     }
 
     /// The deadline in force, counted from the release.

@@ -111,6 +111,8 @@ pub struct TickTiming {
     pub slips: u32,
     /// Why they were skipped or, without slips, why the deadline was missed.
     pub cause: SlipCause,
+    /// Of the slips, those that the overrun policy gave up by itself: their cause is [`SlipCause::Policy`].
+    pub given_up: u8,
     /// How much the release did.
     pub mode: Mode,
 }
@@ -120,11 +122,18 @@ impl TickTiming {
     pub fn missed(&self) -> bool {
         self.end > self.deadline
     }
+
+    /// The skipped periods by cause, counts of zero among them.
+    pub fn slips_by_cause(&self) -> [(SlipCause, u32); 2] {
+        let given_up = self.slips.min(self.given_up.into());
+        [(self.cause, self.slips - given_up), (SlipCause::Policy, given_up)]
+    }
 }
 
 impl From<TickTiming> for Record {
     fn from(t: TickTiming) -> Self {
-        let slips = u64::from(t.slips) << 8 | t.cause as u64 | (t.mode as u64) << 48;
+        let how = (t.mode as u64) << 48 | u64::from(t.given_up) << 40;
+        let slips = how | u64::from(t.slips) << 8 | t.cause as u64;
         Self {
             stamp: t.scheduled,
             channel: Channel::TICK,
@@ -152,6 +161,7 @@ impl TickTiming {
             deadline: Nanos(deadline),
             slips: (slips >> 8) as u32,
             cause: SlipCause::from_code(slips as u8),
+            given_up: (slips >> 40) as u8,
             mode: Mode::from_code((slips >> 48) as u8),
         })
     }
@@ -179,14 +189,20 @@ impl Event {
     pub const STOPPED: u32 = 3;
     /// The code of a group's degraded releases changed; `detail` is the code, [`Event::RECOVERED`] when there is none.
     pub const DEGRADED: u32 = 4;
+    /// The overrun policy changed the group's [`Mode`](super::Mode); `detail` is the number of periods skipped,
+    /// [`Event::RECOVERED`] when the mode is normal again.
+    pub const MODE: u32 = 5;
+    /// The watchdog of a device-paced group took over; `detail` is the number of the release that was due,
+    /// [`Event::RECOVERED`] when the device delivers again.
+    pub const WATCHDOG: u32 = 6;
     /// A group that had failed was started again; `detail` counts its restarts.
-    pub const RESTARTED: u32 = 16;
-    /// A thread did not return from its release and was left behind; `detail` is the time that it was given, in
-    /// nanoseconds.
-    pub const ABANDONED: u32 = 17;
+    pub const RESTARTED: u32 = 7;
+    /// A thread did not return from the release due at `stamp` and was left behind; `detail` is the time that it was
+    /// given, in nanoseconds.
+    pub const ABANDONED: u32 = 8;
     /// The group began to bring what it drives to rest; `detail` is the number of periods that it has.
-    pub const WINDING_DOWN: u32 = 18;
-    /// The detail of [`Event::DEGRADED`] when the group is back to normal.
+    pub const WINDING_DOWN: u32 = 9;
+    /// The detail of events about a state when it is normal again.
     pub const RECOVERED: u64 = u64::MAX;
 }
 
@@ -224,9 +240,18 @@ mod tests {
             deadline: Nanos(5),
             slips: u32::MAX,
             cause: SlipCause::Policy,
+            given_up: u8::MAX,
             mode: Mode::Stopping,
         };
-        assert_eq!(TickTiming::from_record(&timing.into()), Some(timing));
-        assert_eq!(Event::from_record(&timing.into()), None);
+        for timing in [timing, TickTiming { given_up: 0, ..timing }, TickTiming { mode: Mode::Normal, ..timing }] {
+            assert_eq!(TickTiming::from_record(&timing.into()), Some(timing));
+            assert_eq!(Event::from_record(&timing.into()), None);
+        }
+    }
+
+    #[test]
+    fn slips_that_the_policy_gave_up_are_told_from_the_others() {
+        let timing = TickTiming { slips: 4, cause: SlipCause::LongTick, given_up: 1, ..TickTiming::default() };
+        assert_eq!(timing.slips_by_cause(), [(SlipCause::LongTick, 3), (SlipCause::Policy, 1)]);
     }
 }

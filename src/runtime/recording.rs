@@ -14,6 +14,7 @@ pub(super) struct RecordedRelease {
     pub(super) tick: u64,
     pub(super) scheduled: Nanos,
     pub(super) slips: u32,
+    pub(super) given_up: u8,
     pub(super) cause: SlipCause,
     pub(super) mode: Mode,
 }
@@ -24,6 +25,7 @@ impl From<&TickTiming> for RecordedRelease {
             tick: timing.tick,
             scheduled: timing.scheduled,
             slips: timing.slips,
+            given_up: timing.given_up,
             cause: timing.cause,
             mode: timing.mode,
         }

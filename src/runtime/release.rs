@@ -1,9 +1,11 @@
 //! One group at work: starts, releases, faults and the stop, the same in both executions.
 
 use super::actor::{Actor, Mode, Outcome, Phase, TickContext};
-use super::deadline::{Decision, Ledger};
+use super::deadline::Ledger;
+use super::disturbance::Disturb;
 use super::exchange::ExchangeWriter;
 use super::live::{LiveReader, LiveWriter, live};
+use super::overrun::Decision;
 use super::panic_hook::{place, quietly};
 use super::rate_group::RateGroup;
 use super::record::{Event, TickTiming};
@@ -12,6 +14,7 @@ use super::recording::RecordedRelease;
 use super::report::{GroupReport, RuntimeFault};
 use super::restart::start_context;
 use super::supervisor::Flag;
+use super::wake::Wake;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
 use std::any::Any;
@@ -40,6 +43,8 @@ pub(crate) struct GroupRun {
     recorder: Option<Recorder>,
     /// Where a supervisor reads how far a group is that may have to be left behind.
     books: Option<ExchangeWriter<Ledger>>,
+    /// Virtual time: what disturbs the group, for the executor to take.
+    pub(crate) disturb: Option<Disturb>,
     last: TickContext,
     started: usize,
     degraded_code: Option<u32>,
@@ -84,12 +89,31 @@ impl GroupRun {
             members: actors.into_iter().map(member).collect(),
             recorder,
             books: None,
+            disturb: None,
             last,
             started: 0,
             degraded_code: None,
             winding_down: false,
             faulted: false,
         }
+    }
+
+    /// Refuses a device-paced group that has nobody to wait for its device.
+    pub(crate) fn check_listener(&self) -> Result<(), Error> {
+        if self.spec.watchdog().is_some() && self.members.is_empty() {
+            return Err(Error::new(
+                ErrorKind::Runtime,
+                "is paced by a device and has no actor to wait for it; add one",
+            )
+            .at(format!("rate group `{}`", self.spec.name)));
+        }
+        Ok(())
+    }
+
+    /// In virtual time `disturb` makes it late.
+    pub(crate) fn disturbed_by(mut self, disturb: Option<Disturb>) -> Self {
+        self.disturb = disturb;
+        self
     }
 
     /// Publishes the books after every release from now on.
@@ -163,42 +187,70 @@ impl GroupRun {
         self.winding_down
     }
 
-    /// Runs what is to run after a wait that ended at `woke`: at most one release.
+    /// Asks the first actor to wait for its device: true if that has something new.
+    ///
+    /// # Errors
+    /// The actor's panic.
+    pub(crate) fn wait_for_device(&mut self, timeout: Nanos) -> Result<bool, RuntimeFault> {
+        let Some(member) = self.members.first_mut().filter(|member| !member.failed) else { return Ok(false) };
+        // Unwind safe: after a panic the actor is asked whether it can go on, or stopped and dropped.
+        match quietly(|| catch_unwind(AssertUnwindSafe(|| member.actor.wait(timeout)))) {
+            Ok(delivered) => Ok(delivered),
+            Err(panic) => {
+                // It was waiting for the next release: that is the one that failed.
+                self.last.scheduled = self.ledger.next_due().unwrap_or(self.last.scheduled);
+                Err(self.fatal(0, Fatal::Panic(format!("{} (in wait)", text_of(&*panic)))))
+            }
+        }
+    }
+
+    /// Notes that the watchdog took over at the next release, or that the device is back.
+    pub(crate) fn note_watchdog(&mut self, took_over: bool) {
+        let next = self.ledger.elapsed_periods();
+        let due = self.ledger.next_due().unwrap_or(self.last.scheduled);
+        self.ledger.takeovers += u64::from(took_over);
+        self.event(due, Event::WATCHDOG, if took_over { next } else { Event::RECOVERED });
+    }
+
+    /// Runs what is to run after a wait: at most one release.
     ///
     /// `start` reads the clock when the work begins and `end` when it is done; both get the scheduled time.
     pub(crate) fn release(
         &mut self,
-        woke: Nanos,
+        wake: Wake,
         start: impl FnOnce(Nanos) -> Nanos,
         end: impl FnOnce(Nanos) -> Nanos,
     ) -> Result<(), RuntimeFault> {
-        let (release, skipped) = match self.ledger.decide(woke) {
+        let (release, skipped) = match self.ledger.decide(&wake) {
             Decision::Run { release, skipped } => (release, skipped),
             Decision::Stop { skipped } => return Err(self.overrun(skipped)),
         };
         let scheduled = self.ledger.due(release);
-        let mode = if self.winding_down { Mode::Stopping } else { Mode::Normal };
-        self.run(Due { tick: release, scheduled, skipped, mode }, woke, start, end)
+        let mode = if self.winding_down { Mode::Stopping } else { self.ledger.mode() };
+        self.run(Due { tick: release, scheduled, skipped, mode }, wake, start, end)
     }
 
     /// Runs a release that was recorded: its number, its time and its slips are given, nothing is decided.
     pub(crate) fn rerun(&mut self, recorded: &RecordedRelease) -> Result<(), RuntimeFault> {
-        let RecordedRelease { tick, scheduled, slips, cause, mode } = *recorded;
-        self.ledger.book(tick, slips.into(), cause);
-        let latency = self.spec.latency;
-        self.run(Due { tick, scheduled, skipped: slips.into(), mode }, scheduled, |at| at, |at| at + latency)
+        let RecordedRelease { tick, scheduled, slips, mode, .. } = *recorded;
+        self.ledger.book(recorded);
+        let (wake, latency) = (Wake::by_timer(scheduled, scheduled), self.spec.latency);
+        self.run(Due { tick, scheduled, skipped: slips.into(), mode }, wake, |at| at, |at| at + latency)
     }
 
     fn run(
         &mut self,
         Due { tick, scheduled, skipped, mode }: Due,
-        woke: Nanos,
+        wake: Wake,
         start: impl FnOnce(Nanos) -> Nanos,
         end: impl FnOnce(Nanos) -> Nanos,
     ) -> Result<(), RuntimeFault> {
         let now = start(scheduled);
         let dt_nominal = self.last.dt_nominal;
         let first = self.ledger.released == 0;
+        if mode != self.last.mode && mode != Mode::Stopping {
+            self.event(scheduled, Event::MODE, if mode == Mode::Degraded { skipped } else { Event::RECOVERED });
+        }
         let ctx = TickContext {
             tick,
             scheduled,
@@ -207,7 +259,7 @@ impl GroupRun {
             dt_measured: if first { dt_nominal } else { now.saturating_sub(self.last.now).as_secs_f64() },
             slips: u32::try_from(skipped).unwrap_or(u32::MAX),
             mode,
-            visible_at: scheduled + self.spec.latency,
+            visible_at: (scheduled + self.spec.latency).max(wake.free.unwrap_or(Nanos::ZERO)),
             group: self.index,
             phase: if self.spec.observer { Phase::Observer } else { Phase::Release },
         };
@@ -216,7 +268,9 @@ impl GroupRun {
         if self.left_behind.as_ref().is_some_and(|flag| flag.is_raised()) {
             return Ok(());
         }
-        let timing = TickTiming { mode, ..self.ledger.close(tick, skipped, [woke, now, end(scheduled)]) };
+        let end = end(scheduled);
+        let closed = self.ledger.close(tick, skipped, [wake.woke, now, end], wake.free.unwrap_or(end));
+        let timing = TickTiming { mode, ..closed };
         self.live.release(&timing, &self.ledger);
         if let Some(recorder) = &mut self.recorder {
             recorder.push(timing);

@@ -24,6 +24,10 @@ pub struct GroupReport {
     pub missed_deadlines: u64,
     /// Releases in which an actor reported a degraded result.
     pub degraded: u64,
+    /// Releases in [`Mode::Degraded`](super::Mode::Degraded), which an overrun policy sets.
+    pub in_degraded_mode: u64,
+    /// How often the watchdog of a device-paced group took over.
+    pub watchdog_takeovers: u64,
 }
 
 /// Why a run ended before it should: the first fatal event.

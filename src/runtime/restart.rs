@@ -100,9 +100,9 @@ impl Restarter {
         books.report(&self.spec)
     }
 
-    /// Notes that a thread was left behind.
-    pub(super) fn abandoned(&mut self, now: Nanos) {
-        self.event(now, Event::ABANDONED, self.policy.hung_after.0);
+    /// Notes that a thread was left behind in the release due at `at`.
+    pub(super) fn abandoned(&mut self, at: Nanos) {
+        self.event(at, Event::ABANDONED, self.policy.hung_after.0);
     }
 
     fn make(&mut self, ledger: Ledger) -> Result<(GroupRun, ExchangeReader<Ledger>), Error> {

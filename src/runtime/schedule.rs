@@ -63,7 +63,32 @@ fn check_group(group: &RateGroup) -> Result<(), Error> {
             "catching up with at most 0 releases is the policy Skip; use that or a larger number".to_owned(),
         );
     }
-    Ok(())
+    check_policy(group)
+}
+
+/// Policies that say nothing, and release modes that contradict them.
+fn check_policy(group: &RateGroup) -> Result<(), Error> {
+    let refuse = |message: String| Err(refuse(message).at(place(group)));
+    if group.overrun == (OverrunPolicy::Degrade { recover_after: 0 }) {
+        return refuse(
+            "degrading until 0 releases were in time is the policy Skip; use that or a larger number".to_owned(),
+        );
+    }
+    let Some(watchdog) = group.watchdog() else { return Ok(()) };
+    let period = group.rate.period();
+    if watchdog < period {
+        return refuse(format!("watchdog {watchdog} must be at least the period {period}: a device may be that late"));
+    }
+    if group.observer {
+        return refuse("an observer ends after the others and cannot wait for a device; leave one out".to_owned());
+    }
+    match group.overrun {
+        OverrunPolicy::CatchUp { .. } | OverrunPolicy::Rephase => refuse(format!(
+            "the policy {:?} contradicts a device that paces the group: it has one frame per release and sets the phase;              use Skip, Degrade or Stop",
+            group.overrun
+        )),
+        _ => Ok(()),
+    }
 }
 
 fn check_pair(a: &RateGroup, b: &RateGroup) -> Result<(), Error> {
@@ -227,6 +252,26 @@ mod tests {
         assert!(super::admit(&groups, Execution::Virtual, 1).is_ok());
         // Check that budgets which fill every core exactly fit
         assert!(admit(&[named("a").budget(Nanos(1_000_000)), named("b").budget(Nanos(1_000_000))]).is_ok());
+    }
+
+    #[test]
+    fn a_policy_that_says_nothing_is_refused() {
+        refused(&[named("a").overrun(OverrunPolicy::CatchUp { max: 0 })], &["rate group `a`", "Skip"]);
+        refused(&[named("a").overrun(OverrunPolicy::Degrade { recover_after: 0 })], &["rate group `a`", "Skip"]);
+        assert!(admit(&[named("a").overrun(OverrunPolicy::Degrade { recover_after: 1 })]).is_ok());
+        assert!(admit(&[named("a").overrun(OverrunPolicy::Rephase)]).is_ok());
+    }
+
+    #[test]
+    fn a_device_paced_group_needs_a_watchdog_of_a_period_and_a_policy_that_fits() {
+        let paced = || named("a").device_paced(Nanos(1_000_000));
+        for policy in [OverrunPolicy::Skip, OverrunPolicy::Degrade { recover_after: 9 }, OverrunPolicy::Stop] {
+            assert!(admit(&[paced().overrun(policy)]).is_ok());
+        }
+        refused(&[named("a").device_paced(Nanos(999_999))], &["watchdog 999.999µs", "period 1ms"]);
+        refused(&[paced().overrun(OverrunPolicy::CatchUp { max: 3 })], &["CatchUp { max: 3 }", "Skip"]);
+        refused(&[paced().overrun(OverrunPolicy::Rephase)], &["Rephase", "phase"]);
+        refused(&[named("b"), paced().observer()], &["rate group `a`", "observer"]);
     }
 
     #[test]

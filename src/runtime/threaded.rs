@@ -7,6 +7,7 @@ use super::exchange::ExchangeReader;
 use super::grant::{GrantHandle, SystemGrant, ThreadGrant, set_up_thread};
 use super::mailbox::{MailReceiver, MailSender, mailbox};
 use super::os;
+use super::pace::Pace;
 use super::panic_hook;
 use super::rate_group::RateGroup;
 use super::release::GroupRun;
@@ -15,6 +16,7 @@ use super::restart::Restarter;
 use super::running::STOP_BOUND;
 use super::supervisor::{Control, Failure, Flag, Message, Supervisor};
 use super::wait::Waiter;
+use super::wake::Wake;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -206,16 +208,12 @@ impl Threads {
         seat.left_behind.raise();
         // Its thread may never end: nobody joins it.
         seat.handle = None;
-        restarter.abandoned(now);
+        let at = books.next_due().unwrap_or(now);
+        restarter.abandoned(at);
         let waited = restarter.policy.hung_after;
         let allowed = restarter.may_restart();
         let what = format!("did not return within {waited} and was left behind");
-        let fault = RuntimeFault {
-            group: restarter.group().to_owned(),
-            actor: String::new(),
-            at: books.next_due().unwrap_or(now),
-            what,
-        };
+        let fault = RuntimeFault { group: restarter.group().to_owned(), actor: String::new(), at, what };
         let report = restarter.report(&books);
         let failure = Failure { group: index, incarnation: seat.incarnation, fault, report, books };
         seat.incarnation += 1;
@@ -314,6 +312,7 @@ fn group_thread(go: &Receiver<Go>, mut waiter: Waiter, control: &Control, post: 
     let index = usize::from(group.index);
     let observer = group.spec.observer;
     let now = || since(base_ns);
+    let mut pace = Pace::new(&group);
     let mut failed = None;
     loop {
         let Some(due) = group.ledger.next_due() else {
@@ -327,13 +326,17 @@ fn group_thread(go: &Receiver<Go>, mut waiter: Waiter, control: &Control, post: 
             true => control.observers_may_end(),
             false => !winding_down && control.stop_requested(),
         };
-        let Some(woke_ns) = waiter.until(base_ns + due.0, leave) else {
-            if group.begin_wind_down() {
-                continue;
-            }
-            break;
+        let mut sleep = |until: Nanos| waiter.until(base_ns + until.0, leave).map(|woke_ns| Nanos(woke_ns - base_ns));
+        let wake = match &mut pace {
+            None => Ok(sleep(due).map(|woke| Wake::by_timer(due, woke))),
+            Some(pace) => pace.wait(&mut group, due, now, |until| sleep(until).is_some()),
         };
-        let result = group.release(Nanos(woke_ns - base_ns), |_| now(), |_| now());
+        let result = match wake {
+            Ok(Some(wake)) => group.release(wake, |_| now(), |_| now()),
+            Ok(None) if group.begin_wind_down() => continue,
+            Ok(None) => break,
+            Err(fault) => Err(fault),
+        };
         if left_behind.is_raised() {
             // Its place is taken: it says nothing any more, and its actors go with it.
             return;

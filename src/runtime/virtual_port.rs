@@ -103,7 +103,7 @@ impl<T> VirtualWriter<T> {
         let version = flight.versions;
         self.buffer.version = version;
         self.buffer.published = ctx.scheduled;
-        flight.recycle_unreachable(ctx.scheduled);
+        flight.recycle_unreachable(ctx.now);
         let fresh = flight.fresh();
         let buffer = std::mem::replace(&mut self.buffer, fresh);
         flight.waiting.push_back(Publication { visible_at: ctx.visible_at, buffer });
@@ -134,7 +134,7 @@ impl<T> VirtualReader<T> {
                 let version = script.took(ctx);
                 version.and_then(|version| flight.version(version))
             }
-            _ => flight.newest(|publication| publication.visible_at <= ctx.scheduled),
+            _ => flight.newest(|publication| publication.visible_at <= ctx.now),
         };
         let Some(newest) = found else { return false };
         let old = std::mem::replace(&mut self.buffer, newest);

@@ -62,7 +62,7 @@ impl<T: Copy> VirtualQueue<T> {
         }
         match &samples.script {
             Some(script) if ctx.phase == Phase::Release => script.saw(ctx).max(taken),
-            _ => taken + samples.waiting.partition_point(|sample| sample.0 <= ctx.scheduled) as u64,
+            _ => taken + samples.waiting.partition_point(|sample| sample.0 <= ctx.now) as u64,
         }
     }
 

@@ -1,9 +1,10 @@
 //! The virtual executor: one thread, releases in the order (time, group), as fast as the machine allows.
 //!
-//! A release begins when it is scheduled and ends after the declared latency of its group; nothing is ever late, and two
-//! runs of the same graph are bit-identical. A [re-execution](super::Recording) runs the recorded releases instead, and
-//! observers along with them.
+//! A release begins when it is scheduled and ends after the declared latency of its group; nothing is ever late but by a
+//! [disturbance](super::Disturbance), and two runs of the same graph are bit-identical. A
+//! [re-execution](super::Recording) runs the recorded releases instead, and observers along with them.
 
+use super::disturbance::VirtualPace;
 use super::panic_hook;
 use super::recording::RecordedRelease;
 use super::reexecution::{Reexecution, Step};
@@ -27,6 +28,8 @@ pub(crate) struct VirtualRun {
     /// `None` for groups that have ended.
     groups: Vec<Option<GroupRun>>,
     restarters: Vec<Option<Restarter>>,
+    /// When each group wakes next.
+    paces: Vec<VirtualPace>,
     now: Nanos,
     /// Set once every group was told to stop.
     stopping: bool,
@@ -37,15 +40,17 @@ pub(crate) struct VirtualRun {
 
 impl VirtualRun {
     pub(crate) fn new(
-        groups: Vec<GroupRun>,
+        mut groups: Vec<GroupRun>,
         restarters: Vec<Option<Restarter>>,
         reexecution: Option<Reexecution>,
         control: Arc<Control>,
     ) -> Self {
         panic_hook::install();
         let supervisor = Supervisor::new(groups.len());
+        let paces = groups.iter_mut().map(VirtualPace::new).collect();
         let groups = groups.into_iter().map(Some).collect();
-        let mut run = Self { groups, restarters, now: Nanos::ZERO, stopping: false, reexecution, control, supervisor };
+        let (now, stopping) = (Nanos::ZERO, false);
+        let mut run = Self { groups, restarters, paces, now, stopping, reexecution, control, supervisor };
         run.end_what_is_over();
         run
     }
@@ -69,15 +74,12 @@ impl VirtualRun {
             }
             // What is re-executed late was due before.
             self.now = self.now.max(due);
-            if let Some(group) = &mut self.groups[index] {
-                let latency = group.spec.latency;
-                let result = match (&recorded, &mut self.reexecution) {
-                    (Some(release), Some(script)) => group.rerun(release).and_then(|()| script.done(index, group)),
-                    _ => group.release(due, |scheduled| scheduled, |scheduled| scheduled + latency),
-                };
-                if let Err(fault) = result {
-                    self.answer(index, fault);
-                }
+            let result = match recorded {
+                Some(release) => self.rerun(index, &release),
+                None => self.release(index),
+            };
+            if let Err(fault) = result {
+                self.answer(index, fault);
             }
             self.end_what_is_over();
         }
@@ -93,16 +95,43 @@ impl VirtualRun {
         self.end_observers();
     }
 
+    /// The next release that the schedule plans for a group.
+    fn release(&mut self, index: usize) -> Result<(), RuntimeFault> {
+        let (Some(group), Some(planned)) = (&mut self.groups[index], self.paces[index].take()) else { return Ok(()) };
+        planned.took_over.into_iter().for_each(|took_over| group.note_watchdog(took_over));
+        let (latency, wake) = (group.spec.latency, planned.wake);
+        let end = |scheduled: Nanos| (scheduled + latency).max(wake.free.unwrap_or(wake.woke));
+        let result = group.release(wake, |_| wake.woke, end);
+        self.paces[index].plan(group);
+        result
+    }
+
+    /// The next recorded release of a group.
+    fn rerun(&mut self, index: usize, release: &RecordedRelease) -> Result<(), RuntimeFault> {
+        let (Some(group), Some(script)) = (&mut self.groups[index], &mut self.reexecution) else { return Ok(()) };
+        group.rerun(release)?;
+        script.done(index, group)
+    }
+
     /// Groups that wind down go on, the others end. In a re-execution all of them do: how a run wound down was recorded.
     fn begin_stop(&mut self) {
         self.stopping = true;
         let repeats = self.reexecution.is_some();
         for index in self.indices(false) {
-            if repeats || !self.groups[index].as_mut().is_some_and(GroupRun::begin_wind_down) {
+            if repeats || !self.begin_wind_down(index) {
                 self.end(index);
             }
         }
         self.end_what_is_over();
+    }
+
+    fn begin_wind_down(&mut self, index: usize) -> bool {
+        let Some(group) = self.groups[index].as_mut().filter(|group| !group.is_winding_down()) else { return false };
+        let begun = group.begin_wind_down();
+        if begun {
+            self.paces[index].plan(group);
+        }
+        begun
     }
 
     /// Starts a group again that has failed, or stops the run.
@@ -117,7 +146,10 @@ impl VirtualRun {
         // A fault in the stop of what has failed is its consequence.
         let (report, _) = group.finish(now);
         match restarter.again(fault.clone(), books, now) {
-            Ok((group, _)) => self.groups[index] = Some(group),
+            Ok((group, _)) => {
+                self.paces[index].plan(&group);
+                self.groups[index] = Some(group);
+            }
             Err(error) => {
                 let what = format!("{}; it could not be started again: {error}", fault.what);
                 self.note(Err(RuntimeFault { what, ..fault }));
@@ -135,11 +167,11 @@ impl VirtualRun {
     /// The next release; at equal times the group that was added first. `None` if there is none any more.
     fn next(&mut self) -> Option<Next> {
         let Some(script) = &self.reexecution else {
-            return self.next_due(|_| true);
+            return self.next_planned(|_| true);
         };
         match script.next(&self.groups) {
             Step::Run(index, release) => {
-                let observer = self.next_due(|group| group.spec.observer);
+                let observer = self.next_planned(|group| group.spec.observer);
                 let recorded = Next { due: release.scheduled, index, recorded: Some(release) };
                 Some(observer.filter(|observer| observer.due < recorded.due).unwrap_or(recorded))
             }
@@ -151,12 +183,12 @@ impl VirtualRun {
         }
     }
 
-    /// The next release by schedule among the groups that are asked for.
-    fn next_due(&self, is_asked: impl Fn(&GroupRun) -> bool) -> Option<Next> {
+    /// The next wake-up by schedule among the groups that are asked for.
+    fn next_planned(&self, is_asked: impl Fn(&GroupRun) -> bool) -> Option<Next> {
         let groups = self.groups.iter().enumerate();
         let due = |(index, group): (usize, &Option<GroupRun>)| {
-            let group = group.as_ref().filter(|group| is_asked(group))?;
-            Some((group.ledger.next_due()?, index))
+            group.as_ref().filter(|group| is_asked(group))?;
+            Some((self.paces[index].next()?, index))
         };
         groups.filter_map(due).min().map(|(due, index)| Next { due, index, recorded: None })
     }
@@ -175,8 +207,8 @@ impl VirtualRun {
                     && scripted.map_or_else(|| group.ledger.next_due().is_none(), |script| script.is_over(index))
             };
             if self.groups[index].as_ref().is_some_and(over) {
-                let winds_down = |group: &mut GroupRun| group.spec.wind_down_at_end && group.begin_wind_down();
-                if !self.groups[index].as_mut().is_some_and(winds_down) {
+                let asks = self.groups[index].as_ref().is_some_and(|group| group.spec.wind_down_at_end);
+                if !asks || !self.begin_wind_down(index) {
                     self.end(index);
                 }
             }

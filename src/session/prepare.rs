@@ -15,7 +15,7 @@ use crate::model::integrator::Spectrum;
 use crate::model::local::Kind;
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
-use crate::runtime::{Execution, RateGroup, admit_here};
+use crate::runtime::{Execution, OverrunPolicy, RateGroup, Release, admit_here};
 use crate::safety::Limits;
 #[cfg(feature = "scene")]
 use crate::scene::ProbeSpec;
@@ -277,6 +277,10 @@ fn check_group(field: &str, group: &RateGroup) -> Result<(), Error> {
         "is an observer, which a session's groups cannot be: leave it out"
     } else if field == "local" && own().latency(Nanos::ZERO) != own() {
         "has a latency, which only the global group's results can have: leave it out"
+    } else if field == "local" && own().overrun(OverrunPolicy::Rephase) == own() {
+        "has the policy Rephase, but the tool's samples and the models belong to the nominal grid of ticks: use another"
+    } else if field == "global" && own().release(Release::Periodic) != own() {
+        "is paced by a device, which only the local group has: leave it out"
     } else {
         return Ok(());
     };
