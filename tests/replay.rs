@@ -1,0 +1,464 @@
+//! A logged run is executed again to the same forces, bit for bit, whatever happened to its threads; a log that does not
+//! hold everything is refused, and a force or a tool sample that was changed is found.
+#![cfg(all(feature = "log", feature = "scene"))]
+
+mod session_support;
+
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
+use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter};
+use palpate::model::Vec3;
+use palpate::model::body::{Block, Body, State, TangentBlock};
+use palpate::model::mesh::Surface;
+use palpate::runtime::{PortUseKind, RateGroup};
+use palpate::scene::{Feedback, LocalModelKind, Scene};
+use palpate::session::{ReplayReport, Session, SessionBuilder, Summary};
+use palpate::time::Nanos;
+use palpate::{Error, ErrorKind};
+use session_support::{block, pressing, top, wiggling};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Runs it with a log in `folder`.
+fn record(builder: SessionBuilder, folder: &tempfile::TempDir) -> (Summary, PathBuf) {
+    let log = folder.path().join("run.mcap");
+    let summary = builder.log(&log).build().unwrap().run().unwrap();
+    assert!(summary.log_error.is_none());
+    (summary, log)
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+/// Check that every force of the log was computed again, and that there were as many as the run reported.
+fn assert_identical(report: &ReplayReport, summary: &Summary) {
+    assert!(report.is_identical(), "{report}");
+    assert!(report.force.is_identical() && report.commanded.is_identical(), "{report}");
+    assert_eq!(report.logged_fault, None);
+    assert_eq!(
+        (report.force.logged, report.commanded.logged),
+        (summary.report.force.ticks, summary.report.limits.ticks)
+    );
+    assert!(report.force.logged > 50, "{report}");
+}
+
+fn demo(seconds: f64) -> SessionBuilder {
+    Session::from_scene(Scene::demo()).duration_s(seconds)
+}
+
+#[test]
+fn the_demo_in_real_time_is_replayed_bit_for_bit() {
+    let folder = folder();
+    let (summary, log) = record(demo(2.0), &folder);
+    assert!(summary.report.resyncs.age_ns.count > 0 && summary.report.contact.slip > 0);
+    assert_identical(&Session::replay(&log).unwrap().run().unwrap(), &summary);
+}
+
+#[test]
+fn every_local_model_and_feedback_is_replayed_bit_for_bit() {
+    for model in LocalModelKind::ALL {
+        let folder = folder();
+        let (summary, log) = record(demo(0.7).model(model), &folder);
+        assert_identical(&Session::replay(&log).unwrap().run().unwrap(), &summary);
+    }
+    let folder = folder();
+    let (summary, log) = record(demo(0.7).feedback(Feedback::Trajectory), &folder);
+    assert_identical(&Session::replay(&log).unwrap().run().unwrap(), &summary);
+}
+
+#[test]
+fn a_virtual_log_is_replayed_whatever_its_latency() {
+    for latency_ms in [0, 20, 70] {
+        let folder = folder();
+        let global = RateGroup::hz(30).latency(Nanos(latency_ms * 1_000_000));
+        let (summary, log) = record(demo(0.6).global(global).virtual_time(), &folder);
+        assert_identical(&Session::replay(&log).unwrap().run().unwrap(), &summary);
+    }
+}
+
+/// Follows a path, stalls now and then and fails to read now and then.
+#[derive(Debug)]
+struct Moody {
+    path: ToolPath,
+    reads: u64,
+    panics_at: u64,
+}
+
+impl Device for Moody {
+    fn name(&self) -> &str {
+        "moody"
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { max_force_n: 1.25 }
+    }
+
+    fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
+        self.reads += 1;
+        assert!(self.reads < self.panics_at, "the device gave way");
+        if self.reads % 97 == 0 {
+            std::thread::sleep(Duration::from_micros(700 * (self.reads / 97 % 20)));
+        }
+        // The state before the start is not the one of release 0.
+        let offset = if self.reads == 1 { 1e-3 } else { 0.0 };
+        let position = Vec3::from(self.path.at(time.as_secs_f64())) + Vec3::repeat(offset);
+        match self.reads % 13 {
+            5 => Err(DeviceFault::Stale),
+            7 => Err(DeviceFault::NotReady),
+            9 => Ok(DeviceState { position: Vec3::repeat(f64::NAN), ..DeviceState::default() }),
+            _ => Ok(DeviceState { position, velocity: position, buttons: self.reads as u16 }),
+        }
+    }
+
+    fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
+        if self.reads % 11 == 0 { Err(DeviceFault::NotReady) } else { Ok(()) }
+    }
+}
+
+fn moody(path: ToolPath) -> Moody {
+    Moody { path, reads: 0, panics_at: u64::MAX }
+}
+
+/// A block whose forces take their time now and then, so that local models come late.
+#[derive(Debug)]
+struct Slow {
+    block: Block,
+    calls: u64,
+    /// How long call number 2000 takes.
+    longest: Duration,
+}
+
+impl Body for Slow {
+    fn rest(&self) -> &[Vec3] {
+        self.block.rest()
+    }
+    fn inverse_masses(&self) -> &[f64] {
+        self.block.inverse_masses()
+    }
+    fn surface(&self) -> &Surface {
+        self.block.surface()
+    }
+    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
+        self.calls += 1;
+        match self.calls {
+            2000 => std::thread::sleep(self.longest),
+            calls if calls % 331 == 0 => std::thread::sleep(Duration::from_millis(calls % 60)),
+            _ => {}
+        }
+        self.block.forces(state, forces);
+    }
+    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
+        self.block.node_forces(state, nodes, forces);
+    }
+    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
+        self.block.tangent(state, nodes, clamp, emit);
+    }
+    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
+        self.block.patch(triangle, size, nodes);
+    }
+}
+
+/// A session around a program's own body; the program fills it in the same way for the run and for the replay.
+fn own(body: impl Body + 'static) -> SessionBuilder {
+    Session::builder(body).substeps_per_ms(2).friction(0.5).crossfade_ms(10.0).probe(top())
+}
+
+#[test]
+fn stalls_late_models_and_failed_reads_are_replayed_bit_for_bit() {
+    let folder = folder();
+    let slow = Slow { block: block(), calls: 0, longest: Duration::from_millis(300) };
+    let (summary, log) = record(own(slow).device(moody(pressing())).duration_s(2.0), &folder);
+    // Check that it was such a run: releases skipped on both sides, models that came late, reads that failed
+    assert!(summary.runtime.groups.iter().take(2).all(|group| group.skipped > 0), "{summary}");
+    assert!(summary.runtime.groups[0].degraded > 0 && summary.report.force.peak_n > 0.05, "{summary}");
+    let report = own(block()).duration_s(2.0).replay(&log).unwrap().run().unwrap();
+    assert_identical(&report, &summary);
+}
+
+#[test]
+fn a_queue_that_overflowed_is_replayed_bit_for_bit() {
+    let folder = folder();
+    let slow = Slow { block: block(), calls: 0, longest: Duration::from_millis(4600) };
+    let (summary, log) = record(own(slow).path(pressing()).duration_s(6.0), &folder);
+    let dropped = |entry: &LogEntry| matches!(entry, LogEntry::Record(LogRecord::Port(used)) if used.kind == PortUseKind::Dropped);
+    assert!(entries(&log).iter().any(dropped), "the queue of four seconds never overflowed");
+    assert_identical(&own(block()).duration_s(6.0).replay(&log).unwrap().run().unwrap(), &summary);
+}
+
+#[test]
+fn a_glued_tool_and_a_changed_scene_are_replayed_from_the_log_alone() {
+    let folder = folder();
+    let mut scene = Scene::demo();
+    scene.body.as_mut().unwrap().block.nodes = [6; 3];
+    scene.local.patch = [3, 3, 2];
+    scene.probes.clear();
+    scene.safety.max_force_n = None;
+    let builder = Session::from_scene(scene).attach_node(top()).probe(top()).friction(f64::INFINITY).patch([4, 3, 2]);
+    let builder = builder.device(moody(wiggling())).crossfade_ms(7.0).duration_s(0.8);
+    let (summary, log) = record(builder, &folder);
+    assert!(summary.report.force.peak_n > 0.05, "{summary}");
+    assert_identical(&Session::replay(&log).unwrap().run().unwrap(), &summary);
+}
+
+#[test]
+fn a_run_that_a_panic_ended_is_compared_up_to_there() {
+    let folder = folder();
+    let device = Moody { panics_at: 300, ..moody(pressing()) };
+    let (summary, log) = record(own(block()).device(device).duration_s(1.0), &folder);
+    let fault = summary.runtime.fault.unwrap();
+    let report = own(block()).duration_s(1.0).replay(&log).unwrap().run().unwrap();
+    assert!(report.is_identical() && report.force.is_identical(), "{report}");
+    assert_eq!(report.logged_fault.as_ref().map(|(time, _)| *time), Some(fault.at));
+    assert!(report.force.logged > 50 && report.to_string().contains("panicked"), "{report}");
+}
+
+fn entries(log: &Path) -> Vec<LogEntry> {
+    let mut reader = LogReader::open(log).unwrap();
+    let entries = reader.by_ref().collect();
+    assert_eq!(reader.damage(), None);
+    entries
+}
+
+/// The log at `log` written once more, to a file beside it.
+fn rewritten(log: &Path, entries: Vec<LogEntry>) -> PathBuf {
+    let path = log.with_file_name("rewritten.mcap");
+    let mut environment = Environment::default();
+    let mut attachments = [None, None];
+    for entry in &entries {
+        match entry {
+            LogEntry::Environment(found) => environment = found.clone(),
+            LogEntry::Attachment { name, data } => {
+                attachments[usize::from(name == Environment::SESSION)] = Some(String::from_utf8(data.clone()).unwrap());
+            }
+            _ => {}
+        }
+    }
+    [environment.scene, environment.session] = attachments;
+    let mut writer = McapWriter::create(&path, &environment).unwrap();
+    for entry in &entries {
+        match entry {
+            LogEntry::Record(record) => writer.write(record).unwrap(),
+            LogEntry::Text(event) => writer.write_text(event).unwrap(),
+            LogEntry::Stats(stats) => writer.write_stats(stats).unwrap(),
+            LogEntry::Environment(_) | LogEntry::Attachment { .. } => {}
+        }
+    }
+    writer.finish().unwrap();
+    path
+}
+
+/// A short virtual run of the demo, in contact at its end.
+fn short(folder: &tempfile::TempDir) -> PathBuf {
+    record(demo(0.5).virtual_time(), folder).1
+}
+
+fn replayed(log: &Path) -> Result<ReplayReport, Error> {
+    Session::replay(log)?.run()
+}
+
+fn flip(value: &mut f64, bit: u32) {
+    *value = f64::from_bits(value.to_bits() ^ 1 << bit);
+}
+
+#[test]
+fn a_log_written_once_more_is_as_good() {
+    let folder = folder();
+    let log = short(&folder);
+    let again = rewritten(&log, entries(&log));
+    assert_eq!(replayed(&again).unwrap(), replayed(&log).unwrap());
+    assert!(replayed(&again).unwrap().is_identical());
+}
+
+#[test]
+fn one_bit_of_one_logged_force_is_found_at_its_time() {
+    let folder = folder();
+    let log = short(&folder);
+    let time = Nanos(123_000_000);
+    for topic in ["/force", "/force_commanded"] {
+        let mut changed = entries(&log);
+        for entry in &mut changed {
+            match entry {
+                LogEntry::Record(LogRecord::Force(r)) if topic == "/force" && r.time == time => {
+                    flip(&mut r.force_n[1], 0);
+                }
+                LogEntry::Record(LogRecord::Command(r)) if topic != "/force" && r.time == time => {
+                    flip(&mut r.force_n[1], 0);
+                }
+                _ => {}
+            }
+        }
+        let report = replayed(&rewritten(&log, changed)).unwrap();
+        let found = report.first_difference.as_ref().unwrap();
+        assert_eq!((found.time, found.topic, found.what), (time, topic, "force_n"));
+        assert!(!report.is_identical());
+        let (this, other) =
+            if topic == "/force" { (report.force, report.commanded) } else { (report.commanded, report.force) };
+        assert_eq!((this.logged, this.computed, this.identical), (500, 500, 499));
+        assert!(other.is_identical());
+    }
+}
+
+#[test]
+fn one_bit_of_one_logged_tool_sample_is_found() {
+    let folder = folder();
+    let log = short(&folder);
+    let time = Nanos(450_000_000);
+    let mut changed = entries(&log);
+    for entry in &mut changed {
+        if let LogEntry::Record(LogRecord::Tool(r)) = entry
+            && r.time == time
+        {
+            flip(&mut r.position_m[2], 30);
+        }
+    }
+    let report = replayed(&rewritten(&log, changed)).unwrap();
+    let found = report.first_difference.as_ref().unwrap();
+    assert_eq!((found.time, found.topic, found.what), (time, "/force", "force_n"), "{report}");
+    assert!(report.force.identical >= 449 && report.force.computed == 500, "{report}");
+}
+
+#[test]
+fn a_missing_force_is_found() {
+    let folder = folder();
+    let log = short(&folder);
+    for gone in [Nanos(200_000_000), Nanos(500_000_000)] {
+        let is_kept = |entry: &LogEntry| !matches!(entry, LogEntry::Record(LogRecord::Force(r)) if r.time == gone);
+        let report = replayed(&rewritten(&log, entries(&log).into_iter().filter(is_kept).collect())).unwrap();
+        assert_eq!((report.force.logged, report.force.computed), (499, 500));
+        assert!(!report.is_identical());
+        assert_eq!(report.first_difference.unwrap().time, gone.max(Nanos(gone.0 + 1_000_000).min(Nanos(500_000_000))));
+    }
+}
+
+/// A change that makes a log incomplete: its name, what the refusal must say, and the change.
+type Loss = (&'static str, &'static str, fn(&mut Vec<LogEntry>));
+
+/// Takes away the first or last entry for which it holds.
+fn take(entries: &mut Vec<LogEntry>, last: bool, is_it: impl Fn(&LogEntry) -> bool) {
+    let place = if last { entries.iter().rposition(is_it) } else { entries.iter().position(is_it) };
+    entries.remove(place.expect("there is one"));
+}
+
+fn is_timing(entry: &LogEntry, group: u16, tick: u64) -> bool {
+    matches!(entry, LogEntry::Record(LogRecord::Tick(r)) if r.group == group && r.tick == tick)
+}
+
+fn is_use(entry: &LogEntry, kind: PortUseKind) -> bool {
+    matches!(entry, LogEntry::Record(LogRecord::Port(r)) if r.kind == kind)
+}
+
+fn is_tool(entry: &LogEntry) -> bool {
+    matches!(entry, LogEntry::Record(LogRecord::Tool(_)))
+}
+
+fn environment(entries: &mut [LogEntry]) -> &mut Environment {
+    let found = entries.iter_mut().rev().find_map(|entry| match entry {
+        LogEntry::Environment(environment) => Some(environment),
+        _ => None,
+    });
+    found.unwrap()
+}
+
+const LOSSES: [Loss; 14] = [
+    ("a local release", "`local` made 501 releases, but 500", |all| take(all, false, |e| is_timing(e, 0, 77))),
+    ("the last local release", "`local` made 501 releases", |all| take(all, false, |e| is_timing(e, 0, 500))),
+    ("a global release", "`global` made 16 releases", |all| take(all, false, |e| is_timing(e, 1, 7))),
+    ("the first use", "uses of ports", |all| take(all, false, |e| is_use(e, PortUseKind::Took))),
+    ("the last value taken", "uses of ports", |all| take(all, true, |e| is_use(e, PortUseKind::Took))),
+    ("the last samples seen", "uses of ports", |all| take(all, true, |e| is_use(e, PortUseKind::Saw))),
+    ("a tool sample", "no sample of the tool", |all| take(all, false, is_tool)),
+    ("the last tool sample", "no sample of the tool", |all| take(all, true, is_tool)),
+    ("statistics", "statistics of rate group `local`", |all| all.retain(|e| !matches!(e, LogEntry::Stats(_)))),
+    ("the session", "no attachment session.toml", |all| {
+        all.retain(|e| !matches!(e, LogEntry::Attachment { name, .. } if name == Environment::SESSION));
+    }),
+    ("the first state", "first state", |all| environment(all).first_tool = None),
+    ("lost records", "9 records were lost", |all| {
+        for entry in all {
+            if let LogEntry::Stats(stats) = entry {
+                stats.lost_records = 3;
+            }
+        }
+    }),
+    ("another instruction set", "instruction set sparc", |all| {
+        environment(all).instruction_set = "sparc".into();
+    }),
+    ("a use twice", "uses of ports", |all| {
+        let used = all.iter().find(|e| is_use(e, PortUseKind::Saw)).unwrap().clone();
+        all.push(used);
+    }),
+];
+
+#[test]
+fn a_log_that_lacks_anything_is_refused_with_what_it_lacks() {
+    let folder = folder();
+    let log = short(&folder);
+    let whole = entries(&log);
+    for (name, says, change) in LOSSES {
+        let mut changed = whole.clone();
+        change(&mut changed);
+        let error = replayed(&rewritten(&log, changed)).unwrap_err();
+        let text = error.to_string();
+        assert_eq!(error.kind(), ErrorKind::Log, "{name}: {text}");
+        assert!(text.contains("rewritten.mcap: ") && text.contains(says) && !text.contains('\n'), "{name}: {text}");
+    }
+}
+
+// Check that gaps are found by the records' own numbers too, where the sums were made to fit.
+#[test]
+fn a_gap_is_refused_even_if_the_sums_fit() {
+    let folder = folder();
+    let log = short(&folder);
+    let whole = entries(&log);
+    let gaps: [(&str, fn(&LogEntry) -> bool); 2] =
+        [("release 78 of rate group `local`", |e| is_timing(e, 0, 77)), ("`took`", |e| is_use(e, PortUseKind::Took))];
+    for (says, is_it) in gaps {
+        let mut changed = whole.clone();
+        take(&mut changed, false, is_it);
+        let count = |group: u16, what: fn(&LogRecord) -> Option<u16>| {
+            let records = changed.iter().filter_map(|e| if let LogEntry::Record(r) = e { what(r) } else { None });
+            records.filter(|of| *of == group).count() as u64
+        };
+        let sums: Vec<(u64, u64)> = (0..3)
+            .map(|group| {
+                let released = count(group, |r| if let LogRecord::Tick(r) = r { Some(r.group) } else { None });
+                (released, count(group, |r| if let LogRecord::Port(r) = r { Some(r.group) } else { None }))
+            })
+            .collect();
+        for entry in &mut changed {
+            if let LogEntry::Stats(stats) = entry {
+                (stats.released, stats.port_uses) = sums[usize::from(stats.group)];
+            }
+        }
+        let text = replayed(&rewritten(&log, changed)).unwrap_err().to_string();
+        assert!(text.contains("the recording is not complete") && text.contains(says), "{text}");
+    }
+}
+
+#[test]
+fn a_cut_log_and_a_log_without_ports_are_refused() {
+    let folder = folder();
+    let log = short(&folder);
+    let bytes = std::fs::read(&log).unwrap();
+    std::fs::write(&log, &bytes[..bytes.len() * 3 / 4]).unwrap();
+    let error = replayed(&log).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Log);
+    assert!(error.to_string().contains("a damaged log cannot be replayed"), "{error}");
+    // A file of somebody else's, or of a version before ports were recorded.
+    let mut foreign = mcap::Writer::new(std::fs::File::create(&log).unwrap()).unwrap();
+    foreign.finish().unwrap();
+    let error = replayed(&log).unwrap_err();
+    assert!(error.kind() == ErrorKind::Log && error.to_string().contains("no topic /ports"), "{error}");
+}
+
+#[test]
+fn a_programs_own_body_needs_the_program_and_the_same_session() {
+    let folder = folder();
+    let (summary, log) = record(own(block()).path(pressing()).duration_s(0.3).virtual_time(), &folder);
+    let error = replayed(&log).unwrap_err();
+    assert!(error.kind() == ErrorKind::Log && error.to_string().contains("`SessionBuilder::replay`"), "{error}");
+    let error = own(block()).friction(0.25).duration_s(0.3).replay(&log).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Log);
+    assert!(error.to_string().contains("`friction = 0.5` was run, this one has `friction = 0.25`"), "{error}");
+    assert_identical(&own(block()).duration_s(0.3).replay(&log).unwrap().run().unwrap(), &summary);
+}

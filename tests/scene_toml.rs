@@ -1,0 +1,115 @@
+//! A scene is written as TOML and read back as the same scene, every number to its last bit.
+#![cfg(feature = "scene")]
+
+use std::path::Path;
+
+use palpate::scene::{
+    BlendKind, BlendSpec, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, InitialSpec, LocalModelKind,
+    MaterialSpec, Normals, ProbeSpec, PullSpec, Scene,
+};
+use proptest::prelude::*;
+
+/// The scene without what its text does not hold.
+fn without_path(mut scene: Scene) -> Scene {
+    (scene.source, scene.device.path) = (None, None);
+    scene
+}
+
+#[test]
+fn every_scene_that_comes_with_palpate_survives_the_trip() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let mut scenes = 0;
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|ending| ending != "toml") {
+            continue;
+        }
+        let scene = Scene::load(&path).unwrap();
+        let text = scene.to_toml().unwrap();
+        let again = Scene::from_toml(&text, "again.toml", Some(&folder)).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        assert_eq!(again.device.path, scene.device.path, "the path is found by its name");
+        assert_eq!(without_path(again), without_path(scene), "{}", path.display());
+        scenes += 1;
+    }
+    assert!(scenes >= 8);
+}
+
+/// Positive numbers of every size that validation lets pass, with all their bits.
+fn number(lowest: f64, highest: f64) -> impl Strategy<Value = f64> {
+    (lowest.ln()..highest.ln(), any::<u16>())
+        .prop_map(move |(log, bits)| f64::from_bits(log.exp().to_bits() ^ u64::from(bits)).clamp(lowest, highest))
+}
+
+fn body() -> impl Strategy<Value = BodySpec> {
+    let size = [number(0.05, 5.0), number(0.05, 5.0), number(0.05, 5.0)];
+    let fixed = prop::sample::subsequence(vec![Face::XMin, Face::YMax, Face::ZMin], 0..=3);
+    ([6_usize..20, 6_usize..20, 6_usize..20], size, fixed, number(1e-6, 1.0), number(0.1, 1e4), number(0.01, 5.0))
+        .prop_map(|(nodes, size_m, fixed, node_mass_kg, stiffness_n_per_m, damping_ratio)| BodySpec {
+            block: BlockSpec { nodes, size_m, fixed },
+            material: MaterialSpec { node_mass_kg, stiffness_n_per_m, damping_ratio },
+            kind: Default::default(),
+        })
+}
+
+fn scenes() -> impl Strategy<Value = Scene> {
+    let friction = prop_oneof![
+        Just(Friction::Stick),
+        Just(Friction::Coefficient(0.0)),
+        number(1e-3, 10.0).prop_map(Friction::Coefficient)
+    ];
+    let contact = (friction, any::<bool>(), any::<bool>());
+    let node = [1_usize..5, 1_usize..5, 1_usize..5];
+    let initial = prop::option::of((node.clone(), number(1e-4, 0.1), any::<bool>()));
+    let local =
+        (prop::sample::select(LocalModelKind::ALL.to_vec()), any::<bool>(), prop::option::of(number(1.0, 30.0)));
+    let rest = (
+        prop::option::of(1_u32..100),
+        prop_oneof![Just(0.0), number(0.1, 100.0)],
+        prop::option::of(number(0.1, 50.0)),
+        number(0.01, 10.0),
+        prop::collection::vec(node, 0..3),
+        number(0.1, 100.0),
+    );
+    (prop::option::of(body()), contact, initial, local, rest).prop_map(|(body, contact, initial, local, rest)| {
+        let (substeps_per_ms, latency_ms, max_force_n, slew, probes, duration_s) = rest;
+        let (model, feeds_back, blend_ms) = local;
+        let mut scene = Scene::of_program();
+        scene.contact.friction = contact.0;
+        scene.contact.normals = if contact.1 { Normals::Face } else { Normals::Interpolated };
+        scene.contact.equations = if contact.2 { Equations::Paper } else { Equations::Corrected };
+        if body.is_some() {
+            scene.initial = initial.map(|(node, offset, holds)| InitialSpec {
+                pull: PullSpec { node, offset_m: [offset, -0.0, -offset] },
+                hold: if holds {
+                    vec![[2, 2, 2].map(|n: usize| n + usize::from(node == [2, 2, 2]))]
+                } else {
+                    Vec::new()
+                },
+            });
+            scene.probes = probes.into_iter().map(|node| ProbeSpec { node }).collect();
+            scene.device.attach_node = scene.initial.is_none().then_some([2, 2, 5]);
+        }
+        scene.body = body;
+        scene = scene.with_model(model);
+        scene.local.feedback = feeds_back.then_some(Feedback::Trajectory);
+        scene.local.blend = blend_ms.map_or(BlendSpec::default(), |ms| BlendSpec { kind: BlendKind::Crossfade, ms });
+        (scene.global.substeps_per_ms, scene.global.compute_latency_ms) = (substeps_per_ms, latency_ms);
+        (scene.safety.max_force_n, scene.safety.max_slew_n_per_ms) = (max_force_n, slew);
+        scene.run.duration_s = duration_s;
+        scene
+    })
+}
+
+proptest! {
+    #[test]
+    fn any_scene_survives_the_trip(scene in scenes()) {
+        // Some combinations name nodes that are not there; they are no scenes.
+        prop_assume!(scene.validate().is_ok());
+        let text = scene.to_toml().unwrap();
+        let again = Scene::from_session_toml(&text, "again.toml");
+        let again = again.map_err(|error| TestCaseError::fail(format!("{error}\n{text}")))?;
+        // Not only equal: -0.0 equals 0.0
+        prop_assert_eq!(format!("{again:?}"), format!("{scene:?}"));
+        prop_assert_eq!(again.to_toml().unwrap(), text);
+    }
+}
