@@ -216,5 +216,34 @@ fn a_log_on_disk_is_read_through_its_path() {
     assert_eq!(reader.topic(), "/timing/haptic");
     assert_eq!(reader.next(), None);
     assert_eq!(reader.damage(), None);
-    assert_eq!(reader.topics().len(), 12);
+    assert_eq!(reader.topics().len(), 13);
+}
+
+// What the frame holds besides chunk contents has no checksum: opcodes, lengths, the headers of chunks.
+#[test]
+fn one_wrong_bit_in_the_frame_of_the_file_never_forges_a_message() {
+    const CHUNK: u8 = 6;
+    let sent = entries(60);
+    let clean = log_of(&sent, 120);
+    let known = bits(&sent);
+    let mut bytes = clean.clone();
+    let mut at = 8;
+    let mut tried = 0;
+    while at + 9 < clean.len() - 8 {
+        let length = usize::try_from(u64::from_le_bytes(clean[at + 1..at + 9].try_into().unwrap())).unwrap();
+        let head = 9 + if clean[at] == CHUNK { 44 } else { 0 };
+        for place in at..at + head {
+            for bit in 0..8 {
+                bytes[place] ^= 1 << bit;
+                let (got, damage) = read(&bytes);
+                let records: Vec<_> = got.into_iter().filter(|entry| matches!(entry, LogEntry::Record(_))).collect();
+                let forged = bits(&records).into_iter().find(|record| !known.contains(record));
+                assert_eq!(forged, None, "bit {bit} of byte {place}, record {} at byte {at}: {damage:?}", clean[at]);
+                bytes[place] = clean[place];
+                tried += 1;
+            }
+        }
+        at += 9 + length;
+    }
+    assert!(tried > 5000, "{tried}");
 }

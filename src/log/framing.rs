@@ -20,6 +20,8 @@ pub(super) struct RecordStream<R> {
     offset: u64,
     record: Vec<u8>,
     chunk: Option<(ChunkRecords, u64)>,
+    /// A file either keeps its messages in chunks or does not: one beside them is a wrong opcode.
+    has_chunks: bool,
     damage: Option<String>,
     ended: bool,
 }
@@ -39,7 +41,7 @@ impl<R: Read> RecordStream<R> {
             return Err(io::ErrorKind::InvalidData.into());
         }
         let offset = magic.len() as u64;
-        Ok(Self { source, offset, record: Vec::new(), chunk: None, damage: None, ended: false })
+        Ok(Self { source, offset, record: Vec::new(), chunk: None, has_chunks: false, damage: None, ended: false })
     }
 
     /// What is wrong with the file, as far as it has been read.
@@ -104,7 +106,11 @@ impl<R: Read> RecordStream<R> {
                 self.record.clear();
                 self.read_body(length)?;
                 let complete = self.record.len() as u64 == length;
+                if opcode == op::MESSAGE && self.has_chunks {
+                    return Err(format!("the log is damaged at byte {start}: a message outside of the chunks"));
+                }
                 if opcode == op::CHUNK {
+                    self.has_chunks = true;
                     let chunk = ChunkRecords::new(std::mem::take(&mut self.record), length);
                     self.chunk =
                         Some((chunk.map_err(|e| format!("the chunk at byte {start} is damaged: {e}"))?, start));
