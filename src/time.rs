@@ -4,6 +4,9 @@ use std::fmt;
 use std::time::Duration;
 
 /// Nanoseconds since the start of a run.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Nanos(pub u64);
 
@@ -52,6 +55,9 @@ impl fmt::Display for Nanos {
 }
 
 /// A rate as a fraction: `releases` per `seconds`. 30 Hz is exact, and release n falls on `n * seconds / releases`.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rate {
     releases: u32,

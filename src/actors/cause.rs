@@ -3,6 +3,9 @@
 use crate::devices::DeviceFault;
 
 /// The causes that palpate's actors report with an outcome.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Cause {
     /// The device could not be read or written.

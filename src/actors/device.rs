@@ -20,6 +20,9 @@ const COMMAND_EXPIRES: u32 = 2;
 const GAP_S: f64 = 0.1;
 
 /// Reads and writes one device; everything that is written passes the safety pipeline.
+///
+/// # Real-time
+/// Bounded and real-time safe if the device is.
 #[derive(Debug)]
 pub struct DeviceActor {
     device: Box<dyn Device>,
@@ -130,6 +133,9 @@ impl Actor for DeviceActor {
 ///
 /// # Errors
 /// [`ErrorKind::Device`] if it gives none or one that is not finite.
+///
+/// # Real-time
+/// Not called in a tick: an error allocates.
 pub fn first_state(device: &mut dyn Device) -> Result<DeviceState, Error> {
     let message = match device.read(Nanos::ZERO) {
         Ok(state) if is_finite(&state) => return Ok(state),

@@ -29,6 +29,10 @@ pub struct GlobalPorts {
 }
 
 /// Runs the slow, detailed simulation.
+///
+/// # Real-time
+/// Allocates in its first releases and where the patch changes its size. Its work grows with the tool samples that
+/// wait.
 #[derive(Debug)]
 pub struct GlobalActor {
     simulation: Simulation,

@@ -51,6 +51,9 @@ pub struct LocalPorts {
 }
 
 /// Runs the fast, small simulation.
+///
+/// # Real-time
+/// Bounded, by eight haptic ticks a release, and real-time safe if its models are.
 #[derive(Debug)]
 pub struct LocalActor {
     models: Succession,

@@ -19,6 +19,9 @@ pub const LOG_FAILURE: &str = "palpate::log_failure";
 const HELD_BACK: Nanos = Nanos(100_000_000);
 
 /// Where log entries go, besides the statistics.
+///
+/// # Real-time
+/// Called by the logger alone: may allocate, block and write files. Records wait in their rings meanwhile.
 pub trait LogSink: Send {
     /// Takes one record.
     ///
@@ -61,12 +64,18 @@ pub struct LoggerOutcome(Arc<Mutex<(RunReport, Option<Error>)>>);
 
 impl LoggerOutcome {
     /// Takes the report and the error that ended the log before its time.
+    ///
+    /// # Real-time
+    /// Not real-time safe: takes a lock. For the time after a run.
     pub fn take(&self) -> (RunReport, Option<Error>) {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 /// Drains records at a low rate, on a thread without real-time priority.
+///
+/// # Real-time
+/// Not real-time safe: takes locks, allocates and writes to its sink.
 pub struct LoggerActor {
     drain: RecordDrain,
     sink: Box<dyn LogSink>,

@@ -32,6 +32,9 @@ pub struct DeviceState {
 }
 
 /// Why a device could not be read or written. `Copy`, so that a real-time tick can pass it on.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum DeviceFault {
@@ -70,12 +73,21 @@ impl std::fmt::Display for DeviceFault {
 /// [`write`](Self::write) once with the force of the same release.
 pub trait Device: Send + std::fmt::Debug {
     /// Its name in reports and logs.
+    ///
+    /// # Real-time
+    /// Not called in a tick.
     fn name(&self) -> &str;
 
     /// What it can do.
+    ///
+    /// # Real-time
+    /// Asked before the run, not in a tick.
     fn capabilities(&self) -> Capabilities;
 
     /// False for a device whose [`write`](Self::write) moves nothing: nobody needs to wait for its force to fade.
+    ///
+    /// # Real-time
+    /// Asked before the run, not in a tick.
     fn exerts_force(&self) -> bool {
         true
     }

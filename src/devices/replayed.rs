@@ -16,6 +16,9 @@ pub struct ReplayedSample {
 }
 
 /// Gives the states of an earlier run, bit for bit, and fails where the device of that run failed.
+///
+/// # Real-time
+/// Real-time safe; bounded by the number of samples between two reads.
 #[derive(Clone, Debug)]
 pub struct Replayed {
     /// The state before the start, until it has been read.

@@ -5,6 +5,9 @@ use crate::model::Vec3;
 use crate::time::Nanos;
 
 /// Follows a path; exerts nothing.
+///
+/// # Real-time
+/// Real-time safe; bounded by a binary search over the samples of the path.
 #[derive(Clone, Debug)]
 pub struct Scripted {
     path: ToolPath,

@@ -23,6 +23,9 @@ impl ToolPath {
     /// # Errors
     /// [`ErrorKind::Scene`] if there is no sample, the lengths differ, a number is not finite, the first time is negative
     /// or a time is not after the one before.
+    ///
+    /// # Real-time
+    /// Not real-time safe: an error allocates and frees what was given.
     pub fn new(times_s: Vec<f64>, positions_m: Vec<[f64; 3]>) -> Result<Self, Error> {
         if times_s.len() != positions_m.len() {
             let (times, positions) = (times_s.len(), positions_m.len());
@@ -45,6 +48,9 @@ impl ToolPath {
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] if a coordinate is not finite.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn constant(position_m: [f64; 3]) -> Result<Self, Error> {
         Self::new(vec![0.0], vec![position_m])
     }
@@ -53,6 +59,9 @@ impl ToolPath {
     ///
     /// # Errors
     /// [`ErrorKind::Io`] if the file cannot be read, [`ErrorKind::Scene`] with its name and line if a row is unusable.
+    ///
+    /// # Real-time
+    /// Not real-time safe: reads a file, allocates.
     pub fn read_csv(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
         Self::from_csv(&text, &path.display().to_string())
@@ -62,6 +71,9 @@ impl ToolPath {
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] with `name` and the line if the header or a row is unusable.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn from_csv(text: &str, name: &str) -> Result<Self, Error> {
         let (times_s, positions_m) = path_csv::parse(text, name)?;
         Ok(Self { times_s, positions_m })
@@ -95,11 +107,17 @@ impl ToolPath {
     }
 
     /// The times of the samples (s), strictly increasing.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn times_s(&self) -> &[f64] {
         &self.times_s
     }
 
     /// The positions of the samples (m), one per time.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn positions_m(&self) -> &[[f64; 3]] {
         &self.positions_m
     }

@@ -3,6 +3,10 @@
 //! [`LogRecord`] is what actors record and [`Analysis`] reads; both are there without the `log` feature too, for
 //! programs that keep records in memory. With it, [`McapWriter`] and [`LogReader`] keep them in files that any MCAP
 //! viewer opens.
+//!
+//! # Real-time
+//! The records are plain values: to make them and to convert them is wait-free and real-time safe. All else here
+//! allocates: it is for the logger, and for the time after a run.
 
 mod analysis;
 mod entry;

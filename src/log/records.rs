@@ -46,6 +46,9 @@ pub struct ToolSample {
 }
 
 /// The state of a contact.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u16)]
 pub enum ContactMode {
@@ -135,6 +138,9 @@ pub struct ProbeSample {
 }
 
 /// Everything that a log can hold per tick.
+///
+/// # Real-time
+/// Plain values: to make one of these a [`Record`], and to read it back, is wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum LogRecord {

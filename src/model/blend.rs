@@ -3,6 +3,9 @@
 use super::Vec3;
 
 /// A crossfade of two running models: the weight of the new one grows linearly over `ticks`; 0 ticks is a switch.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Crossfade {
     ticks: u32,

@@ -16,6 +16,9 @@ const MAX_ITERATIONS: usize = 200;
 ///
 /// # Errors
 /// If no equilibrium is found, for instance because nothing anchors the body.
+///
+/// # Real-time
+/// Not real-time safe: allocates, and solves a linear system per iteration.
 pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<State, Error> {
     let mut state = State::at_rest(body.rest());
     for &(node, position) in held {

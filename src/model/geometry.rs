@@ -28,6 +28,9 @@ impl NearestTriangle {
     ///
     /// # Errors
     /// If the surface has no triangles.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn new(surface: &Surface, positions: &[Vec3]) -> Result<Self, Error> {
         let nodes: Vec<u32> = (0..positions.len() as u32).filter(|&node| surface.has_node(node)).collect();
         let vertices: Vec<Vector> = nodes.iter().map(|&node| Vector::from(positions[node as usize])).collect();

@@ -43,6 +43,9 @@ pub struct Spectrum {
 
 impl Spectrum {
     /// Estimates both by power iteration on the body's own forces: central differences for K, exact for C.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates, and evaluates the body's forces hundreds of times.
     pub fn estimate(body: &mut dyn Body) -> Self {
         let rest = body.rest().to_vec();
         let mut state = State::at_rest(&rest);
@@ -74,6 +77,9 @@ impl Spectrum {
     }
 
     /// The largest stable explicit step d (s): w^2 d^2 + 2 c d = 4.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn stable_step(&self) -> f64 {
         if self.stiffness <= 0.0 && self.damping <= 0.0 {
             return f64::INFINITY;
@@ -83,6 +89,9 @@ impl Spectrum {
     }
 
     /// Substeps per tick of `dt` (s): 1.3 times what stability asks for, at least one.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn substeps(&self, dt: f64) -> u32 {
         (1.3 * dt / self.stable_step()).ceil().max(1.0) as u32
     }

@@ -7,6 +7,9 @@ use super::integrator::Spectrum;
 use crate::error::Error;
 
 /// How time is divided: ticks of the haptic rate, each of several explicit substeps.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stepping {
     /// Haptic period (s).
@@ -53,6 +56,9 @@ impl Simulation {
     ///
     /// # Errors
     /// If the state does not fit the body or is not finite.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn new(
         body: Box<dyn Body>,
         state: State,
@@ -79,6 +85,9 @@ impl Simulation {
     }
 
     /// A copy, if the body can make one.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn duplicate(&self) -> Option<Self> {
         Some(Self {
             body: self.body.duplicate()?,
@@ -129,42 +138,66 @@ impl Simulation {
     }
 
     /// The body.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn body(&self) -> &dyn Body {
         &*self.body
     }
 
     /// Positions and velocities.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn state(&self) -> &State {
         &self.state
     }
 
     /// Positions, velocities and contact, to put in what a local model found.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn state_mut(&mut self) -> (&mut State, &mut Contact) {
         (&mut self.state, &mut self.contact)
     }
 
     /// The tool's contact; triangles are the body's.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn contact(&self) -> &Contact {
         &self.contact
     }
 
     /// How contacts are resolved.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn law(&self) -> &Law {
         &self.law
     }
 
     /// How time is divided.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn stepping(&self) -> Stepping {
         self.stepping
     }
 
     /// Mean force of the last tick on the tool (N).
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn force(&self) -> Vec3 {
         self.force
     }
 }
 
 /// Substeps per tick of `tick` (s) from the body's stability limit.
+///
+/// # Real-time
+/// Not real-time safe: as [`Spectrum::estimate`].
 pub fn stable_substeps(body: &mut dyn Body, tick: f64) -> u32 {
     Spectrum::estimate(body).substeps(tick)
 }

@@ -28,7 +28,7 @@ impl PatchTangent {
     /// geometric stiffness of compressed springs is left out.
     ///
     /// # Real-time
-    /// Allocates when `nodes` is longer than ever before.
+    /// For the global actor: allocates when the number of nodes is not that of the call before.
     pub fn rebuild(&mut self, body: &dyn Body, state: &State, nodes: &[u32], place: &dyn Fn(u32) -> Option<usize>) {
         let n = nodes.len();
         if self.force.len() != 3 * n {
@@ -84,6 +84,9 @@ impl PatchTangent {
     }
 
     /// Number of patch nodes n.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn nodes(&self) -> usize {
         self.origin.positions.len()
     }

@@ -13,14 +13,20 @@ use crate::time::{Nanos, Rate};
 /// others computed in the same release).
 pub trait Actor: Send {
     /// A short name for reports and errors.
+    ///
+    /// # Real-time
+    /// Asked once, when the group is made, not in a tick.
     fn name(&self) -> &str;
 
     /// Prepares the actor. All starts run one after the other, in group order, on the thread that calls
     /// [`Runtime::start`](super::Runtime::start), before release 0. What is published here is visible from release 0 on,
-    /// whatever the group's latency.
+    /// whatever the group's latency. Actors that take the place of failed ones are started between two releases.
     ///
     /// # Errors
     /// An error ends the start of the whole runtime and is returned from it.
+    ///
+    /// # Real-time
+    /// Not called in a tick: may allocate and block. Where a group is started again, the others tick meanwhile.
     fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
         let _ = ctx;
         Ok(())
@@ -60,12 +66,19 @@ pub trait Actor: Send {
     /// Asked after a panic of this actor in a group that [winds down](super::RateGroup::wind_down): true if it can still
     /// bring to rest what it drives. It is then called on like the others; a second panic is its last. The others are
     /// stopped at once.
+    ///
+    /// # Real-time
+    /// As [`tick`](Self::tick): called on the group's thread between two releases.
     fn recover(&mut self) -> bool {
         false
     }
 
     /// Ends the actor: on the group's own thread after its last release, also after a fault of this or another actor. An
     /// actor that failed in a group that [winds down](super::RateGroup::wind_down) is stopped at once.
+    ///
+    /// # Real-time
+    /// May allocate and block for less than [`STOP_BOUND`](super::STOP_BOUND): nothing is released afterwards. Only the
+    /// stop of an actor that failed in a group that winds down is as [`tick`](Self::tick): the others are released on.
     fn stop(&mut self, ctx: &TickContext) {
         let _ = ctx;
     }
@@ -103,6 +116,9 @@ pub enum Mode {
 
 impl Mode {
     /// The mode with this number; unknown numbers read as [`Mode::Normal`].
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn from_code(code: u8) -> Self {
         match code {
             1 => Self::Degraded,
@@ -112,6 +128,9 @@ impl Mode {
     }
 
     /// Its name in reports and exports.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn name(self) -> &'static str {
         match self {
             Self::Normal => "normal",
@@ -135,6 +154,9 @@ pub(super) enum Phase {
 }
 
 /// What an actor is told at a release. All times count from the start of the run.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug)]
 pub struct TickContext {
     /// The number of the release, counting skipped ones: release n is due at n periods after the group's offset.
@@ -180,6 +202,9 @@ impl TickContext {
 }
 
 /// An actor made of a name and a closure, for programs that need no more.
+///
+/// # Real-time
+/// Allocates: before the run. The closure is called as [`Actor::tick`].
 pub fn actor_fn(name: &str, tick: impl FnMut(&TickContext) -> Outcome + Send + 'static) -> Box<dyn Actor> {
     Box::new(FnActor { name: name.to_owned(), tick })
 }

@@ -41,6 +41,9 @@ enum Cast {
 }
 
 /// Collects the ports and rate groups of a graph; see [`Runtime::builder`].
+///
+/// # Real-time
+/// Not real-time safe: allocates. It is gone before anything ticks.
 pub struct RuntimeBuilder {
     execution: Execution,
     groups: Vec<(RateGroup, Cast)>,
@@ -154,9 +157,12 @@ impl RuntimeBuilder {
     /// panicked, reported a fault or did not return, as often as `restart` allows. The other groups run on meanwhile.
     ///
     /// The factory takes the halves of the actors' ports from ports that can be taken again
-    /// ([`exchange_port`](Self::exchange_port) and the like), which cuts the failed actors off. It runs on a thread of its
-    /// own, so it may take its time and allocate; the new actors are started there too. Periods that passed meanwhile are
-    /// skipped with the cause [`Fault`](super::SlipCause::Fault).
+    /// ([`exchange_port`](Self::exchange_port) and the like), which cuts the failed actors off. Periods that passed meanwhile
+    /// are skipped with the cause [`Fault`](super::SlipCause::Fault).
+    ///
+    /// # Real-time
+    /// On threads the factory runs on none of the groups' own, and the new actors are started there too: both may allocate
+    /// and take their time, but a stop and the restart of another group wait for them.
     pub fn restartable(
         &mut self,
         group: RateGroup,
@@ -171,6 +177,9 @@ impl RuntimeBuilder {
     ///
     /// It is asked once per wait, in the order of the releases, with the number of the release that the group waits for. If
     /// the group wakes so late that another release runs, what was said holds for that one.
+    ///
+    /// # Real-time
+    /// Asked by virtual time only, between two releases: may allocate.
     pub fn disturb(
         &mut self,
         group: impl Into<String>,

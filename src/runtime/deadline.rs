@@ -13,6 +13,9 @@ use super::wake::{Wake, WokenBy};
 use crate::time::Nanos;
 
 /// Skipped periods by cause.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SlipCounts([u64; SlipCause::ALL.len()]);
 

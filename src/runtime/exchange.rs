@@ -65,6 +65,9 @@ impl<T> Shared<T> {
 }
 
 /// Makes an exchange whose three slots are filled by `init`.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn exchange<T: Send>(mut init: impl FnMut() -> T) -> (ExchangeWriter<T>, ExchangeReader<T>) {
     let mut slot = || CachePadded(UnsafeCell::new(Slot { value: init(), version: 0, published: Nanos::ZERO }));
     pair(Shared {

@@ -58,6 +58,9 @@ struct Shared {
 }
 
 /// Makes an empty histogram.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn histogram() -> (HistogramWriter, HistogramReader) {
     let counts = std::array::from_fn(|_| AtomicU64::new(0));
     let shared = Arc::new(CachePadded(Shared { counts, sum: AtomicU64::new(0), max: AtomicU64::new(0) }));
@@ -124,6 +127,9 @@ impl fmt::Debug for HistogramReader {
 }
 
 /// What a histogram held at one moment.
+///
+/// # Real-time
+/// Its methods are bounded and real-time safe; cloning it allocates, and dropping it frees memory.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Snapshot {
     counts: Box<[u64]>,

@@ -46,8 +46,8 @@ impl<H> Linked<H> {
     /// The half in force: the one delivered last.
     ///
     /// # Real-time
-    /// Wait-free but for a delivery, which is lock-free and happens once per restart; makes no system call because
-    /// nobody ever waits on either channel.
+    /// Wait-free but for a delivery, which comes once per restart: that call takes no lock and allocates nothing, but it
+    /// spins while a second `deliver` is in the midst of taking back the first. Nobody ever parks on either channel.
     #[inline]
     pub(super) fn current(&mut self) -> &mut H {
         // Acquire: with the release in `deliver`, so that what was counted is in the inbox.

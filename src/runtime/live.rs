@@ -113,6 +113,9 @@ impl LiveReader {
 
 impl GroupLive {
     /// The share of `elapsed` that the group was at work, from 0 to 1; waiting, also by spinning, is no work.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn busy(&self, elapsed: Nanos) -> f64 {
         if elapsed == Nanos::ZERO { 0.0 } else { self.execution.sum().0 as f64 / elapsed.0 as f64 }
     }

@@ -8,6 +8,9 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use std::sync::Arc;
 
 /// Makes a mailbox for up to `capacity` messages; it has any number of senders and one receiver.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn mailbox<T: Send>(capacity: usize) -> (MailSender<T>, MailReceiver<T>) {
     let (sender, receiver) = bounded(capacity.max(1));
     let dropped = Arc::new(AtomicU64::new(0));
@@ -31,8 +34,8 @@ impl<T> MailSender<T> {
     /// Posts a message; false if the mailbox is full or its receiver is gone: the message is then dropped and counted.
     ///
     /// # Real-time
-    /// Lock-free, makes no system call because the receiver never parks. A dropped message is freed here: send plain
-    /// values from a real-time tick.
+    /// Lock-free, makes no system call because the receiver never parks; at a full mailbox it spins while the receiver
+    /// is in the midst of a poll. A dropped message is freed here: send plain values from a real-time tick.
     pub fn try_send(&self, message: T) -> bool {
         let sent = self.sender.try_send(message).is_ok();
         if !sent {
@@ -54,7 +57,8 @@ impl<T> MailReceiver<T> {
     /// The oldest message, if there is one.
     ///
     /// # Real-time
-    /// Lock-free, never blocks.
+    /// Takes no lock, makes no system call, allocates nothing. Not lock-free: it spins while the sender of the oldest
+    /// message is in the midst of posting it. So a real-time tick polls only senders that it cannot keep from running.
     pub fn poll(&self) -> Option<T> {
         self.receiver.try_recv().ok()
     }

@@ -21,6 +21,9 @@
 //! *lock-free* (some thread always gets on), *bounded*, *allocates*, *may block*, *real-time safe* (no allocation, no
 //! lock, no system call).
 //!
+//! What a tick may call says under *Real-time* which of these it is. That holds on threads. Virtual time has no deadline
+//! to meet: ports take locks there, which nobody contends for, and allocate until they are warm.
+//!
 //! # Example
 //!
 //! A slow producer and a fast consumer in virtual time; with `Execution::Threaded` the same graph runs in real time.

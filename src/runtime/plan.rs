@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 /// The schedule of a graph; its `Display` is a table.
+///
+/// # Real-time
+/// Not real-time safe: allocates, starts threads. Before the run.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Plan {
@@ -33,6 +36,9 @@ pub struct Plan {
 }
 
 /// What one rate group asks for.
+///
+/// # Real-time
+/// Not real-time safe: allocates. Before the run.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct GroupPlan {

@@ -80,7 +80,7 @@ impl<T> Writer<T> {
     /// Makes the buffer the newest value and returns its version, counting from 1.
     ///
     /// # Real-time
-    /// Wait-free, real-time safe.
+    /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock and may allocate.
     pub fn publish(&mut self, ctx: &TickContext) -> u64 {
         self.group.set(ctx);
         match &mut self.kind {
@@ -114,7 +114,7 @@ impl<T> Reader<T> {
     /// A release looks once: further calls in the same release return false.
     ///
     /// # Real-time
-    /// Wait-free, real-time safe.
+    /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock and may allocate.
     pub fn refresh(&mut self, ctx: &TickContext) -> bool {
         if !self.looks.is_first(ctx) {
             return false;

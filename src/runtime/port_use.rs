@@ -4,6 +4,9 @@ use super::record::{Channel, Record};
 use crate::time::Nanos;
 
 /// What a release did with a port.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum PortUseKind {
@@ -40,6 +43,9 @@ impl PortUseKind {
 /// One use of a port that decides what a release computes and that no order within a group fixes.
 ///
 /// What stays within a group needs no record: its actors run in a fixed order.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortUse {
     /// Scheduled time of the release.

@@ -61,7 +61,7 @@ impl<T: Copy> QueueWriter<T> {
     /// Sends a sample; false if the queue is full: the sample is then dropped and counted.
     ///
     /// # Real-time
-    /// Wait-free, real-time safe.
+    /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock and may allocate.
     pub fn push(&mut self, ctx: &TickContext, sample: T) -> bool {
         self.group.set(ctx);
         self.attempts += 1;
@@ -78,7 +78,7 @@ impl<T: Copy> QueueWriter<T> {
     /// Samples dropped so far because the queue was full.
     ///
     /// # Real-time
-    /// Wait-free, real-time safe.
+    /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock.
     pub fn dropped(&self) -> u64 {
         match &self.kind {
             WriterKind::Threaded(producer) => producer.half().lost(),
@@ -106,7 +106,7 @@ impl<T: Copy> QueueReader<T> {
     /// The oldest sample that this release can see, left in the queue.
     ///
     /// # Real-time
-    /// Wait-free, real-time safe.
+    /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock.
     pub fn peek(&mut self, ctx: &TickContext) -> Option<T> {
         self.look(ctx);
         if self.taken >= self.visible {
@@ -121,7 +121,7 @@ impl<T: Copy> QueueReader<T> {
     /// Takes the oldest sample that this release can see: one that was there when the release looked first.
     ///
     /// # Real-time
-    /// Wait-free, real-time safe.
+    /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock.
     pub fn pop(&mut self, ctx: &TickContext) -> Option<T> {
         self.look(ctx);
         if self.taken >= self.visible {

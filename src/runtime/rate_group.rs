@@ -79,6 +79,9 @@ pub enum Wait {
 /// delivered on time, unless a [disturbance](super::Disturbance) delays it.
 ///
 /// Values that cannot work are refused by [`RuntimeBuilder::build`](super::RuntimeBuilder::build).
+///
+/// # Real-time
+/// Not real-time safe: its name allocates. Before the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RateGroup {
     pub(super) name: String,

@@ -19,6 +19,9 @@ impl Channel {
 }
 
 /// One record: a stamp, what it is about, and six words whose meaning the channel defines.
+///
+/// # Real-time
+/// A plain value: to make one, from any of the records here too, and to read it back is wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C, align(64))]
 pub struct Record {
@@ -49,6 +52,9 @@ impl Record {
 }
 
 /// Why a period was skipped or a deadline missed.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum SlipCause {
@@ -91,6 +97,9 @@ impl SlipCause {
 }
 
 /// The timing of one release. All times count from the start of the run.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TickTiming {
     /// The rate group, in the order the groups were added.
@@ -168,6 +177,9 @@ impl TickTiming {
 }
 
 /// Something that happened once and that a reader of the log wants to know.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Event {
     /// When.
@@ -189,7 +201,7 @@ impl Event {
     pub const STOPPED: u32 = 3;
     /// The code of a group's degraded releases changed; `detail` is the code, [`Event::RECOVERED`] when there is none.
     pub const DEGRADED: u32 = 4;
-    /// The overrun policy changed the group's [`Mode`](super::Mode); `detail` is the number of periods skipped,
+    /// The overrun policy changed the group's [`Mode`]; `detail` is the number of periods skipped,
     /// [`Event::RECOVERED`] when the mode is normal again.
     pub const MODE: u32 = 5;
     /// The watchdog of a device-paced group took over; `detail` is the number of the release that was due,

@@ -82,6 +82,9 @@ impl From<&TickTiming> for RecordedRelease {
 /// let (again, _) = graph(Runtime::reexecution(recording));
 /// assert_eq!(again, counts);
 /// ```
+///
+/// # Real-time
+/// Not real-time safe: allocates. For loggers, and for the time after a run.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
     releases: BTreeMap<u16, Vec<RecordedRelease>>,

@@ -71,6 +71,10 @@ enum ExchangeParts<T> {
 }
 
 /// An [exchange](super::RuntimeBuilder::exchange) whose halves can be taken again; clones are the same port.
+///
+/// # Real-time
+/// The half that stays takes the new one over in its next `publish` or `refresh`. That one call is not wait-free: it
+/// takes no lock and allocates nothing, but it may spin while the other half is just being taken once more.
 pub struct ExchangePort<T>(Arc<(PortPlan, Mutex<ExchangeParts<T>>)>);
 
 impl<T: Send + 'static> ExchangePort<T> {
@@ -114,6 +118,10 @@ enum QueueParts<T> {
 }
 
 /// A [queue](super::RuntimeBuilder::queue) whose halves can be taken again; clones are the same port.
+///
+/// # Real-time
+/// The half that stays takes the new one over in its next `push`, `peek` or `pop`. That one call is not wait-free: it
+/// takes no lock and allocates nothing, but it may spin while the other half is just being taken once more.
 pub struct QueuePort<T>(Arc<(PortPlan, Mutex<QueueParts<T>>)>);
 
 impl<T: Copy + Send + 'static> QueuePort<T> {
@@ -152,6 +160,10 @@ impl<T: Copy + Send + 'static> QueuePort<T> {
 }
 
 /// An [outlet](super::RuntimeBuilder::outlet) whose writer can be taken again; clones are the same port.
+///
+/// # Real-time
+/// The half that stays takes the new one over in its next `publish` or `refresh`. That one call is not wait-free: it
+/// takes no lock and allocates nothing, but it may spin while the other half is just being taken once more.
 pub struct OutletPort<T>(Arc<Mutex<Pair<ExchangeWriter<T>, ExchangeReader<T>>>>, VersionCounter);
 
 impl<T: Send + 'static> OutletPort<T> {

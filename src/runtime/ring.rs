@@ -70,6 +70,9 @@ pub(crate) fn rounded(capacity: usize) -> usize {
 }
 
 /// Makes a ring for at least `capacity` values, rounded up to a power of two.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn ring<T: Copy + Send>(capacity: usize) -> (Producer<T>, Consumer<T>) {
     pair(Shared::new(capacity))
 }

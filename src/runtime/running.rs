@@ -28,6 +28,9 @@ pub const STOP_BOUND: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(5);
 
 /// A graph that was checked and can be started.
+///
+/// # Real-time
+/// Not real-time safe: allocates, and starting it makes threads.
 pub struct Runtime {
     execution: Execution,
     groups: Vec<GroupRun>,
@@ -154,6 +157,9 @@ impl Running {
     /// Lets the run go on for `span`, less if it ends before.
     ///
     /// Threads: sleeps and looks at the supervisor's mailbox. Virtual time: executes the releases of that span.
+    ///
+    /// # Real-time
+    /// Not real-time safe: sleeps, or executes the run. Never from an actor: in virtual time it would wait for itself.
     pub fn wait_for(&self, span: Duration) {
         if let Executor::Virtual(run) = &mut *self.lock() {
             return run.advance(Nanos::from_duration(span));
@@ -166,6 +172,9 @@ impl Running {
     }
 
     /// Time since the start of the run: the clock's, or virtual time executed so far.
+    ///
+    /// # Real-time
+    /// Not real-time safe: takes a lock. Never from an actor: in virtual time [`wait_for`](Self::wait_for) holds it.
     pub fn elapsed(&self) -> Nanos {
         match &*self.lock() {
             Executor::Threaded(threads) => threads.elapsed(),
@@ -174,6 +183,9 @@ impl Running {
     }
 
     /// True when every group has ended: by [`until`](RuntimeBuilder::until), by a stop or by a fault.
+    ///
+    /// # Real-time
+    /// Not real-time safe: takes a lock, may start a group again. Never from an actor, as [`elapsed`](Self::elapsed).
     pub fn finished(&self) -> bool {
         match &mut *self.lock() {
             Executor::Threaded(threads) => threads.poll(),
@@ -198,12 +210,18 @@ impl Running {
     }
 
     /// A handle that asks for the same from another thread, also from one that handles signals.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn stop_handle(&self) -> StopHandle {
         StopHandle(Arc::clone(&self.control))
     }
 
     /// Stops the run in order and reports. A fault of an actor is in the report, not an error; so is a group that did not
     /// end within [`STOP_BOUND`] and was given up with its thread.
+    ///
+    /// # Real-time
+    /// Not real-time safe: waits for every group. Never from an actor: its own group is one of them.
     pub fn stop(self) -> RuntimeReport {
         let given_up = self.end();
         let executor = self.lock();

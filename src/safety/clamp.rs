@@ -3,6 +3,9 @@
 use super::{Force, norm};
 
 /// The force shortened to `limit` (N), direction kept; and whether it acted.
+///
+/// # Real-time
+/// Bounded, real-time safe.
 pub fn clamp(force: Force, limit: f64) -> (Force, bool) {
     // Scaled first: the square of a huge component overflows.
     let largest = force.iter().fold(0.0_f64, |largest, c| largest.max(c.abs()));

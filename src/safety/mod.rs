@@ -16,6 +16,9 @@ pub use slew::slew;
 pub type Force = [f64; 3];
 
 /// The stages that acted on a command, a bit each.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Actions(pub u16);
 
@@ -77,6 +80,9 @@ pub struct Pipeline {
 
 impl Pipeline {
     /// A pipeline that starts from zero force.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn new(limits: Limits) -> Self {
         Self { limits, ramp: Ramp::new(limits.ramp_s), held: [0.0; 3], last: [0.0; 3] }
     }

@@ -13,6 +13,9 @@ const SMALLEST_GAIN: f64 = 1e-9;
 
 impl Ramp {
     /// A ramp that is fully in.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn new(time_s: f64) -> Self {
         Self { gain: 1.0, time_s }
     }

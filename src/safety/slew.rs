@@ -3,6 +3,9 @@
 use super::{Force, norm};
 
 /// `to`, or as far towards it as `limit` (N) from `from` allows; and whether it acted.
+///
+/// # Real-time
+/// Bounded, real-time safe.
 pub fn slew(from: Force, to: Force, limit: f64) -> (Force, bool) {
     let change: Force = std::array::from_fn(|i| to[i] - from[i]);
     let length = norm(change);

@@ -13,6 +13,10 @@ use crate::time::Nanos;
 
 /// A session that runs. Dropping it commands zero force and joins its threads, within
 /// [`STOP_BOUND`](crate::runtime::STOP_BOUND) per group.
+///
+/// # Real-time
+/// As [`runtime::Running`](crate::runtime::Running): not for actors and devices, which stop a run by its
+/// [`stop_handle`](Self::stop_handle).
 #[derive(Debug)]
 pub struct Running {
     runtime: RuntimeRunning,

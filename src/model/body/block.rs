@@ -8,6 +8,9 @@ use super::{Body, State, TangentBlock};
 use crate::error::Error;
 
 /// A block of nodes and springs; made by [`Block::builder`].
+///
+/// # Real-time
+/// Its forces are bounded and real-time safe; to make it or a copy of it allocates.
 #[derive(Clone, Debug)]
 pub struct Block {
     lattice: Lattice,
@@ -19,6 +22,9 @@ pub struct Block {
 }
 
 /// Collects what a [`Block`] is made of. Defaults: k 30 N/m, zeta 0.3, node mass 0.5 g, nothing held.
+///
+/// # Real-time
+/// Not real-time safe: allocates. Before the run.
 #[derive(Clone, Debug)]
 pub struct BlockBuilder {
     nodes: [usize; 3],

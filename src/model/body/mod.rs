@@ -22,17 +22,26 @@ pub struct State {
 
 impl State {
     /// At rest at `positions`.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn at_rest(positions: &[Vec3]) -> Self {
         Self { positions: positions.to_vec(), velocities: vec![Vec3::zeros(); positions.len()] }
     }
 
     /// True if every number is finite.
+    ///
+    /// # Real-time
+    /// Bounded, by the number of nodes; real-time safe.
     pub fn is_finite(&self) -> bool {
         self.positions.iter().chain(&self.velocities).all(|vector| vector.iter().all(|c| c.is_finite()))
     }
 }
 
 /// One block of a tangent: how the force on node `row` answers to node `column`.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug)]
 pub struct TangentBlock {
     /// The node that feels the force.
@@ -64,12 +73,21 @@ impl TangentBlock {
 /// non-linear in the positions and must be linear in the velocities. Masses need not be equal.
 pub trait Body: Send + std::fmt::Debug {
     /// Rest positions (m), one per node.
+    ///
+    /// # Real-time
+    /// Bounded, must not allocate or block.
     fn rest(&self) -> &[Vec3];
 
     /// Inverse masses (1/kg), one per node; zero for a node that is held stationary.
+    ///
+    /// # Real-time
+    /// Bounded, must not allocate or block.
     fn inverse_masses(&self) -> &[f64];
 
     /// The surface that tools touch.
+    ///
+    /// # Real-time
+    /// Called once per substep: bounded, must not allocate or block.
     fn surface(&self) -> &Surface;
 
     /// Writes the internal force on every node (N) to `forces` (one per node).
@@ -79,16 +97,25 @@ pub trait Body: Send + std::fmt::Debug {
     fn forces(&mut self, state: &State, forces: &mut [Vec3]);
 
     /// Writes the internal force on each of `nodes` (N) to `forces` (one per entry of `nodes`).
+    ///
+    /// # Real-time
+    /// For the global actor, at each resync: bounded.
     fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]);
 
     /// Calls `emit` for every tangent block in the rows of `nodes`; blocks of the same place are added.
     ///
     /// With `clamp` the negative geometric stiffness of compressed springs is left out: an explicit linear model with
     /// it diverges within one resync period.
+    ///
+    /// # Real-time
+    /// For the global actor, at each resync: bounded.
     fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock));
 
     /// A copy for a global model that is started again after a fault; `None`, the default, if there cannot be one: a
     /// fault of the global model then stops the run.
+    ///
+    /// # Real-time
+    /// Not called in a tick: may allocate.
     fn duplicate(&self) -> Option<Box<dyn Body>> {
         None
     }
@@ -97,6 +124,9 @@ pub trait Body: Send + std::fmt::Debug {
     /// held ones; `size` = nodes along the surface, along it, into depth.
     ///
     /// The default grows rings of triangles along the surface until there are enough nodes; it has no depth.
+    ///
+    /// # Real-time
+    /// For the global actor, at each resync: bounded; `nodes` may grow.
     fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
         let surface = self.surface();
         let wanted = size[0] * size[1];

@@ -3,6 +3,9 @@
 use super::super::{Mat3, Vec3};
 
 /// A spring and a damper in parallel between two nodes.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spring {
     /// Stiffness k (N/m).

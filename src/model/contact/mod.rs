@@ -73,6 +73,9 @@ pub struct Law {
 }
 
 /// Where the tool touches: a surface triangle, barycentric weights and the mode.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact {
     /// Triangle id; `None` when nothing is tracked.
@@ -100,6 +103,9 @@ impl Contact {
 }
 
 /// The tool's motion during one step: a straight line.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolMotion {
     /// Position at the start (m).

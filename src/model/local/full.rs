@@ -6,6 +6,9 @@ use super::super::simulation::Simulation;
 use super::{LocalModel, PatchGeometry, ResyncView};
 
 /// The global model itself, run at the haptic rate. There is nothing to resync with.
+///
+/// # Real-time
+/// Bounded and real-time safe if the body's forces are.
 #[derive(Debug)]
 pub struct Full {
     simulation: Simulation,
@@ -14,11 +17,17 @@ pub struct Full {
 
 impl Full {
     /// Around a simulation.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn new(simulation: Simulation) -> Self {
         Self { simulation, watched: Vec::new() }
     }
 
     /// The simulation.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn simulation(&self) -> &Simulation {
         &self.simulation
     }

@@ -29,6 +29,9 @@ pub enum Kind {
 
 impl Kind {
     /// Its name in tables and logs.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn name(self) -> &'static str {
         match self {
             Self::Full => "full",
@@ -38,6 +41,9 @@ impl Kind {
     }
 
     /// An empty model of this kind, to be rebuilt in place; `None` for [`Full`], which is the simulation itself.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn empty(self) -> Option<Box<dyn LocalModel>> {
         match self {
             Self::Full => None,
@@ -74,6 +80,9 @@ pub struct PatchGeometry {
 impl PatchGeometry {
     /// An empty geometry with room for a patch of `nodes` nodes, in pages that have been written to: a real-time tick
     /// that fills it neither allocates nor faults.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn with_room(nodes: usize) -> Self {
         // Zeros could come from the system as pages that are still to be faulted in.
         let (mut ids, mut vectors) = (vec![u32::MAX; nodes], vec![Vec3::repeat(f64::NAN); nodes]);
@@ -85,11 +94,17 @@ impl PatchGeometry {
     }
 
     /// True if there is something to take and every number is finite.
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
     pub fn is_usable(&self) -> bool {
         !self.nodes.is_empty() && self.state.is_finite()
     }
 
     /// Puts the patch's state and contact in place of the global model's own.
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
     pub fn write_to(&self, global: &mut Simulation) {
         let (state, contact) = global.state_mut();
         for ((&node, x), v) in self.nodes.iter().zip(&self.state.positions).zip(&self.state.velocities) {
@@ -105,7 +120,7 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// Makes it anew, in place, from the global model.
     ///
     /// # Real-time
-    /// For the global actor: allocates at first use and whenever it grows.
+    /// For the global actor: may allocate, at first use and where its size changes.
     fn rebuild(&mut self, resync: ResyncView<'_>);
 
     /// Advances one haptic tick while the tool moves along `tool`; returns the mean force on the tool (N), which is not
@@ -116,21 +131,39 @@ pub trait LocalModel: Send + std::fmt::Debug {
     fn tick(&mut self, tool: ToolMotion) -> Vec3;
 
     /// The haptic tick that its state was built at; catching up starts there.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     fn built_at(&self) -> u64;
 
     /// True if its state has to be advanced to the present before it can serve.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     fn catches_up(&self) -> bool;
 
     /// The contact; its triangle is a global id.
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
     fn contact(&self) -> Contact;
 
     /// Where `node` (a global id) is in this model (m); `None` if the model does not hold it.
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
     fn position(&self, node: u32) -> Option<Vec3>;
 
     /// Where `node` was in the global model that this one was built from (m); `None` if that is not known.
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
     fn global_position(&self, probe: usize) -> Option<Vec3>;
 
     /// Nodes whose global position is to be remembered at each rebuild, by place in this list.
+    ///
+    /// # Real-time
+    /// Not called in a tick: may allocate.
     fn watch(&mut self, nodes: &[u32]);
 
     /// Writes its geometry for feedback; false if it has none.

@@ -29,6 +29,9 @@ pub struct Patch {
 
 impl Patch {
     /// An empty patch of `size` = nodes along the surface, along it, into depth.
+    ///
+    /// # Real-time
+    /// Not called in a tick. Memory comes with the first [`rebuild`](LocalModel::rebuild).
     pub fn new(size: [usize; 3]) -> Self {
         Self {
             size,
@@ -46,6 +49,9 @@ impl Patch {
     }
 
     /// Number of nodes that move.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn nodes(&self) -> usize {
         self.window.movable
     }

@@ -52,6 +52,9 @@ pub struct Succession {
 impl Succession {
     /// Starts with `models` to rotate through and a blend over `blend_ticks`; the tool is at `tool` (m) at tick 0.
     /// The first serves until another is offered.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn new(models: [Box<dyn LocalModel>; 3], blend_ticks: u32, tool: Vec3) -> Self {
         let [serving, fading, arriving] = models;
         Self {
@@ -68,6 +71,9 @@ impl Succession {
     }
 
     /// Puts the tool at `tool` (m) and lets `model` serve at once: for tick 0. `model` gets a spare in exchange.
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
     pub fn begin(&mut self, tool: Vec3, first: Option<(&mut Box<dyn LocalModel>, u32)>) {
         self.history.fill(tool);
         if let Some((model, version)) = first {
@@ -142,21 +148,33 @@ impl Succession {
     }
 
     /// The model that serves.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn serving(&self) -> &dyn LocalModel {
         &*self.serving
     }
 
     /// Its version.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn version(&self) -> u32 {
         self.version
     }
 
     /// The last tick.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn now(&self) -> u64 {
         self.now
     }
 
     /// Where the tool is (m).
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn tool(&self) -> Vec3 {
         self.position(self.now)
     }

@@ -1,6 +1,9 @@
 //! The regular lattice of a block: numbering, neighbours and faces.
 
 /// A face of the block.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Face {
@@ -44,6 +47,9 @@ impl Face {
 }
 
 /// A block of nx x ny x nz nodes; node id = i + nx (j + ny k).
+///
+/// # Real-time
+/// Wait-free and real-time safe, but for the lists of triangles and nodes, which allocate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lattice {
     /// Nodes per axis.

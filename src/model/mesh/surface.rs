@@ -25,6 +25,9 @@ impl Surface {
     ///
     /// # Errors
     /// If a triangle names a node that does not exist or twice the same, or an edge has more than two triangles.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn new(nodes: usize, triangles: Vec<[u32; 3]>) -> Result<Self, Error> {
         let mut edges: HashMap<(u32, u32), (u32, usize)> = HashMap::with_capacity(triangles.len() * 2);
         let mut neighbours = vec![[NONE; 3]; triangles.len()];
@@ -86,12 +89,18 @@ impl Surface {
     }
 
     /// The triangles at `node`.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn at_node(&self, node: u32) -> &[u32] {
         let range = self.node_start[node as usize] as usize..self.node_start[node as usize + 1] as usize;
         &self.node_triangles[range]
     }
 
     /// True if `node` is a corner of some triangle.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn has_node(&self, node: u32) -> bool {
         !self.at_node(node).is_empty()
     }
