@@ -17,7 +17,7 @@ use crate::time::Nanos;
 const COMMAND_EXPIRES: u32 = 2;
 
 /// A time without a command (s) after which the device may have done anything: the force starts from zero.
-const GAP_S: f64 = 0.1;
+pub(crate) const GAP_S: f64 = 0.1;
 
 /// Reads and writes one device; everything that is written passes the safety pipeline.
 ///

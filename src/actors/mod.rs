@@ -15,6 +15,7 @@ mod logger;
 mod messages;
 
 pub use cause::Cause;
+pub(crate) use device::GAP_S;
 pub use device::{DeviceActor, first_state};
 pub use global::{GlobalActor, GlobalPorts};
 pub use local::{LocalActor, LocalPorts, ModelSource};

@@ -212,6 +212,7 @@ impl RuntimeBuilder {
             }
         }
         admit_here(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>(), self.execution)?;
+        self.check_restartable()?;
         self.check_disturbances()?;
         let mut built = std::mem::replace(self, Self::new(self.execution, None));
         let registry = built.registry;
@@ -252,6 +253,15 @@ impl RuntimeBuilder {
 const SUPERVISOR_EVENTS: usize = 64;
 
 impl RuntimeBuilder {
+    /// An observer ends after all others: what fails in it ends the run, and there is nothing it could go on with.
+    fn check_restartable(&self) -> Result<(), Error> {
+        let wrong = |(group, cast): &&(RateGroup, Cast)| group.observer && matches!(cast, Cast::Restartable(..));
+        self.groups.iter().find(wrong).map_or(Ok(()), |(group, _)| {
+            Err(Error::new(ErrorKind::Runtime, "an observer cannot be restartable; add it with `group`")
+                .at(format!("rate group `{}`", group.name)))
+        })
+    }
+
     fn check_disturbances(&self) -> Result<(), Error> {
         for (index, (name, _)) in self.disturbed.iter().enumerate() {
             let wrong = if self.execution == Execution::Threaded {

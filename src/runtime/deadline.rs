@@ -95,9 +95,10 @@ impl Ledger {
         self.down = true;
     }
 
-    /// Releases `periods` more, however late they are, and then no others.
-    pub(crate) fn end_after(&mut self, periods: u64) {
-        self.timeline.end_before(self.next.saturating_add(periods));
+    /// Releases `periods` more from `now` on, and then no others. What is overdue by then is skipped.
+    pub(crate) fn end_after(&mut self, now: Nanos, periods: u64) {
+        let first = self.timeline.unbounded().latest_due(self.next, now);
+        self.timeline.end_before(first.saturating_add(periods));
         self.policy = OverrunPolicy::Skip;
         self.recovering = 0;
     }
@@ -151,17 +152,19 @@ impl Ledger {
 
     /// Decides what to do now that the wait for the next release is over, and books what is skipped.
     pub(crate) fn decide(&mut self, wake: &Wake) -> Decision {
+        // What was due while it was down is skipped, whatever the policy: it is not an overrun, and nobody catches it up.
+        let policy = if self.down { OverrunPolicy::Skip } else { self.policy };
         self.lateness = self.blame(wake);
         self.given_up = 0;
         let latest = match wake.by {
             WokenBy::Timer => self.timeline.latest_due(self.next, wake.woke),
             WokenBy::Frame => self.timeline.of_frame(self.next, wake.woke),
         };
-        let mut decision = decide(self.policy, self.next, latest);
+        let mut decision = decide(policy, self.next, latest);
         match &mut decision {
             Decision::Run { release, skipped } => {
                 self.skipped.add(self.lateness, *skipped);
-                if self.policy == OverrunPolicy::Rephase
+                if policy == OverrunPolicy::Rephase
                     && *skipped > 0
                     && let Some(rephased) = self.timeline.rephase(wake.woke)
                 {
@@ -172,7 +175,7 @@ impl Ledger {
                     *skipped += given_up;
                     *release = rephased;
                 }
-                if let OverrunPolicy::Degrade { recover_after } = self.policy
+                if let OverrunPolicy::Degrade { recover_after } = policy
                     && *skipped > 0
                 {
                     self.recovering = recover_after;

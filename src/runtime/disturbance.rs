@@ -84,9 +84,27 @@ impl VirtualPace {
         self.next.take()
     }
 
-    /// Plans the wake-up for the group's next release.
+    /// Plans the wake-up for the group's next release, unless that has been done.
     pub(crate) fn plan(&mut self, group: &GroupRun) {
-        self.next = group.ledger.next_due().map(|due| self.planned(group, due));
+        if self.next.is_none() {
+            self.next = group.ledger.next_due().map(|due| self.planned(group, due));
+        }
+    }
+
+    /// The group begins to wind down at `now`: the clock releases it from here on, and if it waits for its device, it does
+    /// not wait any longer.
+    pub(crate) fn wind_down(&mut self, group: &GroupRun, now: Nanos) {
+        if self.watchdog.take().is_some()
+            && let (Some(planned), Some(due)) = (&mut self.next, group.ledger.next_due())
+            && planned.wake.ready > due.max(now)
+        {
+            let ready = due.max(now);
+            let work = planned.wake.free.unwrap_or(planned.wake.woke).saturating_sub(planned.wake.woke);
+            let woke = ready.max(group.ledger.free());
+            *planned =
+                Planned { wake: Wake { woke, by: WokenBy::Timer, ready, free: Some(woke + work) }, took_over: None };
+        }
+        self.plan(group);
     }
 
     fn planned(&mut self, group: &GroupRun, due: Nanos) -> Planned {

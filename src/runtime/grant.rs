@@ -3,7 +3,7 @@
 use super::os;
 use super::rate_group::RateGroup;
 use super::wait::Waiter;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What a run got from the system. Plain texts and numbers, easy to serialise.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -49,20 +49,31 @@ pub struct GroupGrant {
 
 /// Gives what the system granted, once it is known: before the first actor is started.
 #[derive(Clone, Debug, Default)]
-pub struct GrantHandle(Arc<OnceLock<SystemGrant>>);
+pub struct GrantHandle(Arc<Mutex<Option<SystemGrant>>>);
 
 impl GrantHandle {
     /// What the system granted; `None` before the runtime is started.
     ///
     /// # Real-time
-    /// Allocates: for loggers.
+    /// Takes a lock and allocates: for loggers.
     pub fn get(&self) -> Option<SystemGrant> {
-        self.0.get().cloned()
+        self.lock().clone()
     }
 
     pub(super) fn set(&self, grant: SystemGrant) {
-        // A runtime is started once, so the handle is set once.
-        let _ = self.0.set(grant);
+        *self.lock() = Some(grant);
+    }
+
+    /// A group has got a new thread.
+    pub(super) fn replace(&self, group: usize, grant: GroupGrant) {
+        if let Some(place) = self.lock().as_mut().and_then(|system| system.groups.get_mut(group)) {
+            *place = grant;
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<SystemGrant>> {
+        // Nothing panics while it is held.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -3,7 +3,8 @@
 //! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
 
 pub(crate) use imp::{
-    block_signals, lock_memory, may_lock_everything, monotonic, set_realtime, set_timer_slack, sleep_until,
+    block_signals, give_up_realtime, lock_memory, may_lock_everything, monotonic, set_realtime, set_timer_slack,
+    sleep_until,
 };
 
 use std::fs::read_to_string;
@@ -47,7 +48,9 @@ pub(crate) fn clock_source() -> String {
 #[cfg(target_os = "linux")]
 mod imp {
     use std::io::Error;
+    use std::os::unix::thread::JoinHandleExt;
     use std::sync::OnceLock;
+    use std::thread::JoinHandle;
 
     const NANOS_PER_S: u64 = 1_000_000_000;
 
@@ -83,6 +86,14 @@ mod imp {
         // SAFETY: the pointer is to a sched_param of our own and outlives the call.
         let result = unsafe { libc::syscall(libc::SYS_sched_setscheduler, 0, policy, &raw const parameter) };
         if result == 0 { Ok(()) } else { Err(format!("SCHED_FIFO {priority} refused: {}", Error::last_os_error())) }
+    }
+
+    /// Takes the real-time policy from another thread, which may be spinning and would keep its core from its successor.
+    pub(crate) fn give_up_realtime(thread: &JoinHandle<()>) {
+        let parameter = libc::sched_param { sched_priority: 0 };
+        // SAFETY: the thread has not been joined or detached, so the handle is valid; the pointer is to a sched_param of our
+        // own. A refusal leaves the thread as it is.
+        unsafe { libc::pthread_setschedparam(thread.as_pthread_t(), libc::SCHED_OTHER, &raw const parameter) };
     }
 
     /// Leaves signals to the program's other threads: a handler on this one would make system calls in a tick. Those that
@@ -165,6 +176,8 @@ mod imp {
     pub(crate) fn set_realtime(_priority: u8) -> Result<(), String> {
         Err(NOT_AVAILABLE.to_owned())
     }
+
+    pub(crate) fn give_up_realtime(_thread: &std::thread::JoinHandle<()>) {}
 
     pub(crate) fn block_signals() {}
 

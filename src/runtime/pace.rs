@@ -43,10 +43,13 @@ impl Pace {
         mut sleep: impl FnMut(Nanos) -> bool,
     ) -> Result<Option<Wake>, RuntimeFault> {
         let earliest = group.ledger.next_frame_from();
+        let entered = now();
         // Nothing comes before the start of the run, for which the device does not wait.
         let mut go_on = sleep(Nanos::ZERO);
         while go_on {
-            let limit = if self.driving { due } else { due + self.watchdog };
+            // What is to come to rest does not wait for a device that may be gone.
+            let patient = !self.driving && !group.is_winding_down();
+            let limit = if patient { due + self.watchdog } else { due };
             let asked = now();
             let timeout = limit.saturating_sub(asked).min(SLICE);
             if group.wait_for_device(timeout)? {
@@ -64,10 +67,12 @@ impl Pace {
             go_on = sleep((asked + timeout).min(now() + self.period));
             let woke = now();
             if go_on && woke >= limit {
-                if !std::mem::replace(&mut self.driving, true) {
+                if patient {
+                    self.driving = true;
                     group.note_watchdog(true);
                 }
-                return Ok(Some(Wake::by_timer(limit, woke)));
+                // If it was due before, what kept it was the device that the wait before this one was for.
+                return Ok(Some(Wake::by_timer(limit.max(entered), woke)));
             }
         }
         Ok(None)

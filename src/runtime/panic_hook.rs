@@ -3,6 +3,7 @@
 //! The standard hook takes the lock of standard error and writes there, which a real-time thread must not do. Ours does
 //! so only for panics outside of actors; for those inside it copies the place into a buffer of the thread's own.
 
+use std::any::Any;
 use std::cell::Cell;
 use std::panic::{Location, set_hook, take_hook};
 use std::sync::Once;
@@ -66,6 +67,12 @@ pub(super) fn place() -> String {
     let place = PLACE.replace(Place { file: [0; LONGEST], length: 0, line: 0 });
     let file = String::from_utf8_lossy(&place.file[..place.length]).into_owned();
     if file.is_empty() { file } else { format!(" at {file}:{}", place.line) }
+}
+
+/// What a panic said.
+pub(super) fn text_of(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no text was given".to_owned())
 }
 
 #[cfg(all(test, not(loom)))]

@@ -242,6 +242,14 @@ impl RateGroup {
         self.rate
     }
 
+    /// The longest time that it makes up release by release instead of skipping it.
+    pub(crate) fn catches_up(&self) -> Nanos {
+        match self.overrun {
+            OverrunPolicy::CatchUp { max } => self.rate.release(max.into()),
+            _ => Nanos::ZERO,
+        }
+    }
+
     /// The watchdog of a device-paced group.
     pub(super) fn watchdog(&self) -> Option<Nanos> {
         match self.release {

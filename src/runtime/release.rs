@@ -1,34 +1,24 @@
 //! One group at work: starts, releases, faults and the stop, the same in both executions.
 
-use super::actor::{Actor, Mode, Outcome, Phase, TickContext};
+use super::actor::{Actor, Mode, Phase, TickContext};
 use super::deadline::Ledger;
 use super::disturbance::Disturb;
 use super::exchange::ExchangeWriter;
 use super::live::{LiveReader, LiveWriter, live};
+use super::members::{Fatal, Members};
 use super::overrun::Decision;
-use super::panic_hook::{place, quietly};
+use super::panic_hook::place;
 use super::rate_group::RateGroup;
 use super::record::{Event, TickTiming};
 use super::recorder::Recorder;
 use super::recording::RecordedRelease;
 use super::report::{GroupReport, RuntimeFault};
 use super::restart::start_context;
-use super::supervisor::Flag;
+use super::tenure::Tenure;
 use super::wake::Wake;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
-use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-
-/// An actor in its group.
-struct Member {
-    actor: Box<dyn Actor>,
-    /// Kept apart: after a panic an actor is not asked anything but to stop.
-    name: String,
-    /// It panicked or reported a fault while the others wind down: it was stopped and is not called again.
-    failed: bool,
-}
 
 /// A group with its actors, its books and its own record ring.
 pub(crate) struct GroupRun {
@@ -37,18 +27,19 @@ pub(crate) struct GroupRun {
     pub(crate) ledger: Ledger,
     live: LiveWriter,
     shown: LiveReader,
-    /// Raised when nobody waits for this thread any more: its books are closed.
-    left_behind: Option<Arc<Flag>>,
-    members: Vec<Member>,
+    /// Who keeps the books, if a supervisor may take them away.
+    tenure: Option<Arc<Tenure>>,
+    members: Members,
     recorder: Option<Recorder>,
     /// Where a supervisor reads how far a group is that may have to be left behind.
     books: Option<ExchangeWriter<Ledger>>,
     /// Virtual time: what disturbs the group, for the executor to take.
     pub(crate) disturb: Option<Disturb>,
     last: TickContext,
-    started: usize,
     degraded_code: Option<u32>,
     winding_down: bool,
+    /// Its overrun policy has stopped the run.
+    overran: bool,
     /// After a fault the actors are stopped and nothing else, unless the group winds down.
     faulted: bool,
 }
@@ -62,10 +53,15 @@ struct Due {
     mode: Mode,
 }
 
-/// Why a release ended early.
-enum Fatal {
-    Panic(String),
-    Fault(u32),
+/// What becomes of a group after a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum AfterFault {
+    /// Its actors are made anew.
+    Restart,
+    /// The fault stops the run, and the group winds down without the actor that failed.
+    GoOn,
+    /// The fault stops the run, and the group ends at once.
+    End,
 }
 
 impl GroupRun {
@@ -77,7 +73,6 @@ impl GroupRun {
         ledger: Ledger,
     ) -> Self {
         let last = start_context(index, &spec, &ledger, Nanos::ZERO);
-        let member = |actor: Box<dyn Actor>| Member { name: actor.name().to_owned(), actor, failed: false };
         let (live, shown) = live(&spec);
         Self {
             index,
@@ -85,15 +80,15 @@ impl GroupRun {
             ledger,
             live,
             shown,
-            left_behind: None,
-            members: actors.into_iter().map(member).collect(),
+            tenure: None,
+            members: Members::new(actors),
             recorder,
             books: None,
             disturb: None,
             last,
-            started: 0,
             degraded_code: None,
             winding_down: false,
+            overran: false,
             faulted: false,
         }
     }
@@ -133,9 +128,9 @@ impl GroupRun {
         self.shown = shown;
     }
 
-    /// Closes the books when `flag` is raised.
-    pub(super) fn close_when(&mut self, flag: Arc<Flag>) {
-        self.left_behind = Some(flag);
+    /// Books releases for as long as `tenure` lasts.
+    pub(super) fn book_under(&mut self, tenure: Arc<Tenure>) {
+        self.tenure = Some(tenure);
     }
 
     /// What shows this group while it runs.
@@ -145,42 +140,38 @@ impl GroupRun {
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
     pub(crate) fn start(&mut self) -> Result<(), Error> {
-        let ctx = self.last;
-        for Member { actor, name, .. } in &mut self.members {
-            let place = || format!("rate group `{}`, actor `{name}`", self.spec.name);
-            // Counted first: an actor that fails half-way may hold something to give back.
-            self.started += 1;
-            match catch_unwind(AssertUnwindSafe(|| actor.start(&ctx))) {
-                Ok(result) => result.map_err(|error| error.at(place()))?,
-                Err(panic) => {
-                    let message = format!("panicked in start: {}", text_of(&*panic));
-                    return Err(Error::new(ErrorKind::Fault, message).at(place()));
-                }
-            }
-        }
-        Ok(())
+        self.members.start(&self.last, &self.spec.name)
     }
 
     /// Stops the actors that were started, when another one's start failed.
     pub(crate) fn undo_start(&mut self) {
-        let ctx = self.last;
-        for member in self.members.iter_mut().take(self.started) {
-            // The start's error is the one to report.
-            let _ = catch_unwind(AssertUnwindSafe(|| member.actor.stop(&ctx)));
-        }
+        self.members.undo_start(&self.last);
     }
 
-    /// Goes on in [`Mode::Stopping`] for as long as the group asked for; false if it did not or has done so already.
-    pub(crate) fn begin_wind_down(&mut self) -> bool {
+    /// Goes on in [`Mode::Stopping`] from `now` for as long as the group asked for; false if it did not or has done so already.
+    pub(crate) fn begin_wind_down(&mut self, now: Nanos) -> bool {
         let periods = self.spec.rate.last_release(self.spec.wind_down);
         if self.winding_down || periods == 0 {
             return false;
         }
         self.winding_down = true;
         self.faulted = false;
-        self.ledger.end_after(periods);
-        self.event(self.ledger.due(self.ledger.elapsed_periods()), Event::WINDING_DOWN, periods);
+        self.event(self.ledger.due(self.ledger.elapsed_periods()).max(now), Event::WINDING_DOWN, periods);
+        self.ledger.end_after(now, periods);
         true
+    }
+
+    /// Decides what comes after a fault, the same in both executions; a wind-down has then begun.
+    pub(crate) fn after_fault(&mut self, now: Nanos, restartable: bool, stop_requested: bool) -> AfterFault {
+        if self.winding_down {
+            // What has already begun to come to rest is not begun anew.
+            return if self.members.all_failed() { AfterFault::End } else { AfterFault::GoOn };
+        }
+        // A policy that stops the run at an overrun means what it says.
+        if restartable && !stop_requested && !self.overran {
+            return AfterFault::Restart;
+        }
+        if self.begin_wind_down(now) { AfterFault::GoOn } else { AfterFault::End }
     }
 
     pub(crate) fn is_winding_down(&self) -> bool {
@@ -192,16 +183,11 @@ impl GroupRun {
     /// # Errors
     /// The actor's panic.
     pub(crate) fn wait_for_device(&mut self, timeout: Nanos) -> Result<bool, RuntimeFault> {
-        let Some(member) = self.members.first_mut().filter(|member| !member.failed) else { return Ok(false) };
-        // Unwind safe: after a panic the actor is asked whether it can go on, or stopped and dropped.
-        match quietly(|| catch_unwind(AssertUnwindSafe(|| member.actor.wait(timeout)))) {
-            Ok(delivered) => Ok(delivered),
-            Err(panic) => {
-                // It was waiting for the next release: that is the one that failed.
-                self.last.scheduled = self.ledger.next_due().unwrap_or(self.last.scheduled);
-                Err(self.fatal(0, Fatal::Panic(format!("{} (in wait)", text_of(&*panic)))))
-            }
-        }
+        self.members.wait(timeout).map_err(|(index, fatal)| {
+            // It was waiting for the next release: that is the one that failed.
+            self.last.scheduled = self.ledger.next_due().unwrap_or(self.last.scheduled);
+            self.fatal(index, fatal)
+        })
     }
 
     /// Notes that the watchdog took over at the next release, or that the device is back.
@@ -265,7 +251,7 @@ impl GroupRun {
         };
         self.last = ctx;
         let result = self.work(&ctx);
-        if self.left_behind.as_ref().is_some_and(|flag| flag.is_raised()) {
+        if self.tenure.as_ref().is_some_and(|tenure| !tenure.begin_booking()) {
             return Ok(());
         }
         let end = end(scheduled);
@@ -279,41 +265,19 @@ impl GroupRun {
             *books.buffer() = self.ledger;
             books.publish(scheduled);
         }
+        if let Some(tenure) = &self.tenure {
+            tenure.end_booking();
+        }
         result
     }
 
-    /// All ticks, then all commits in reverse.
     fn work(&mut self, ctx: &TickContext) -> Result<(), RuntimeFault> {
-        let mut current = 0;
-        let mut degraded = None;
-        let members = &mut self.members;
-        let work = || {
-            let mut note = |outcome| match outcome {
-                Outcome::Continue => Ok(()),
-                Outcome::Degraded(code) => {
-                    degraded.get_or_insert(code);
-                    Ok(())
-                }
-                Outcome::Fault(code) => Err(code),
-            };
-            for (index, member) in members.iter_mut().enumerate().filter(|(_, member)| !member.failed) {
-                current = index;
-                note(member.actor.tick(ctx))?;
-            }
-            for (index, member) in members.iter_mut().enumerate().rev().filter(|(_, member)| !member.failed) {
-                current = index;
-                note(member.actor.commit(ctx))?;
-            }
-            Ok(())
-        };
-        // Unwind safe: after a panic the actor is stopped and dropped, nothing else.
-        match quietly(|| catch_unwind(AssertUnwindSafe(work))) {
-            Ok(Ok(())) => {
+        match self.members.work(ctx) {
+            Ok(degraded) => {
                 self.note_degraded(ctx, degraded);
                 Ok(())
             }
-            Ok(Err(code)) => Err(self.fatal(current, Fatal::Fault(code))),
-            Err(panic) => Err(self.fatal(current, Fatal::Panic(text_of(&*panic)))),
+            Err((index, fatal)) => Err(self.fatal(index, fatal)),
         }
     }
 
@@ -327,26 +291,21 @@ impl GroupRun {
 
     fn fatal(&mut self, actor: usize, fatal: Fatal) -> RuntimeFault {
         self.faulted = true;
-        let name = self.members[actor].name.clone();
-        let may_recover = matches!(fatal, Fatal::Panic(_)) && !self.winding_down;
-        let fault = self.describe(&name, actor, fatal);
-        // The others go on for a while: what this one holds must not wait for that.
-        if self.spec.wind_down > Nanos::ZERO && !(may_recover && self.recovers(actor)) {
-            self.fail(actor);
+        let name = self.members.name(actor).to_owned();
+        let is_panic = matches!(fatal, Fatal::Panic(_));
+        let fault = self.describe(name, actor, fatal);
+        // The others go on for a while.
+        if self.spec.wind_down > Nanos::ZERO && !(is_panic && self.members.recovers(actor)) {
+            self.members.fail(actor, &self.last);
         }
         fault
     }
 
-    fn recovers(&mut self, actor: usize) -> bool {
-        let member = &mut self.members[actor];
-        quietly(|| catch_unwind(AssertUnwindSafe(|| member.actor.recover()))).unwrap_or(false)
-    }
-
-    fn describe(&mut self, name: &str, actor: usize, fatal: Fatal) -> RuntimeFault {
+    fn describe(&mut self, actor: String, index: usize, fatal: Fatal) -> RuntimeFault {
         let at = self.last.scheduled;
         let what = match fatal {
             Fatal::Panic(text) => {
-                self.event(at, Event::PANIC, actor as u64);
+                self.event(at, Event::PANIC, index as u64);
                 format!("panicked{}: {text}", place())
             }
             Fatal::Fault(code) => {
@@ -354,20 +313,12 @@ impl GroupRun {
                 format!("reported fault {code}")
             }
         };
-        RuntimeFault { group: self.spec.name.clone(), actor: name.to_owned(), at, what }
-    }
-
-    fn fail(&mut self, actor: usize) {
-        let ctx = self.last;
-        let member = &mut self.members[actor];
-        if !std::mem::replace(&mut member.failed, true) {
-            // The fault that led here is the one to report.
-            let _ = quietly(|| catch_unwind(AssertUnwindSafe(|| member.actor.stop(&ctx))));
-        }
+        RuntimeFault { group: self.spec.name.clone(), actor, at, what }
     }
 
     fn overrun(&mut self, skipped: u64) -> RuntimeFault {
         self.faulted = true;
+        self.overran = true;
         self.live.count(&self.ledger);
         let at = self.ledger.due(self.ledger.elapsed_periods() - 1);
         self.event(at, Event::STOPPED, skipped);
@@ -398,26 +349,14 @@ impl GroupRun {
     pub(crate) fn finish(mut self, now: Nanos) -> (GroupReport, Option<RuntimeFault>) {
         let ctx = TickContext { now, phase: Phase::Stop, ..self.last };
         let mut fault = None;
-        let names: Vec<String> = self.members.iter().map(|member| member.name.clone()).collect();
-        for (index, Member { mut actor, failed, .. }) in std::mem::take(&mut self.members).into_iter().enumerate() {
-            let stop = || {
-                if !failed {
-                    actor.stop(&ctx);
-                }
-            };
-            let stopped = quietly(|| catch_unwind(AssertUnwindSafe(stop)));
-            let dropped = quietly(|| catch_unwind(AssertUnwindSafe(move || drop(actor))));
-            if let Err(panic) = stopped.and(dropped) {
-                let fatal = Fatal::Panic(format!("{} (in stop)", text_of(&*panic)));
-                fault.get_or_insert_with(|| self.describe(&names[index], index, fatal));
+        let mut index = 0;
+        while let Some(stopped) = self.members.stop_next(&ctx) {
+            if let Err((name, fatal)) = stopped {
+                fault.get_or_insert_with(|| self.describe(name, index, fatal));
             }
+            index += 1;
         }
         let report = self.ledger.report(&self.spec);
         (report, fault)
     }
-}
-
-fn text_of(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no text was given".to_owned())
 }

@@ -4,15 +4,18 @@ use super::actor::{Actor, Phase, TickContext};
 use super::deadline::Ledger;
 use super::exchange::{ExchangeReader, exchange};
 use super::live::LiveReader;
+use super::panic_hook::{place as panicked_at, quietly, text_of};
 use super::rate_group::RateGroup;
 use super::record::Event;
 use super::recorder::Recorder;
 use super::release::GroupRun;
 use super::report::{GroupReport, RuntimeFault};
 use super::rewire::RecorderPort;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
+use std::any::Any;
 use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Makes the actors of a group anew, with fresh halves of their ports.
 pub(super) type Factory = Box<dyn FnMut() -> Result<Vec<Box<dyn Actor>>, Error> + Send>;
@@ -46,8 +49,8 @@ pub(super) struct Restarter {
     events: Option<Recorder>,
     /// What the group shows of itself, once it was made.
     shown: Option<LiveReader>,
-    /// Every fault that was answered by a restart.
-    pub(super) restarts: Vec<RuntimeFault>,
+    /// Restarts so far.
+    restarts: u32,
 }
 
 impl Restarter {
@@ -60,7 +63,7 @@ impl Restarter {
         records: Option<RecorderPort>,
         events: Option<Recorder>,
     ) -> Self {
-        Self { policy, factory, index, spec, until, records, events, shown: None, restarts: Vec::new() }
+        Self { policy, factory, index, spec, until, records, events, shown: None, restarts: 0 }
     }
 
     /// The group as it is when the run starts.
@@ -70,7 +73,7 @@ impl Restarter {
     }
 
     pub(super) fn may_restart(&self) -> bool {
-        self.restarts.len() < self.policy.at_most as usize
+        self.restarts < self.policy.at_most
     }
 
     /// Makes the group again after `fault`, with the books of the one before, and starts its actors at `now`.
@@ -79,16 +82,21 @@ impl Restarter {
     /// What the factory or a start says; the group then stays down.
     pub(super) fn again(
         &mut self,
-        fault: RuntimeFault,
+        fault: &RuntimeFault,
         mut ledger: Ledger,
         now: Nanos,
     ) -> Result<(GroupRun, ExchangeReader<Ledger>), Error> {
         ledger.resume();
         let (mut group, books) = self.make(ledger).map_err(|error| error.at(format!("restart after {fault}")))?;
         group.start_at(now).inspect_err(|_| group.undo_start())?;
-        self.restarts.push(fault);
-        self.event(now, Event::RESTARTED, self.restarts.len() as u64);
+        self.restarts += 1;
+        self.event(now, Event::RESTARTED, self.restarts.into());
         Ok((group, books))
+    }
+
+    /// How late a release may be without any suspicion: a device-paced group waits for its device.
+    pub(super) fn patience(&self) -> Nanos {
+        self.spec.watchdog().unwrap_or_default()
     }
 
     pub(super) fn group(&self) -> &str {
@@ -106,7 +114,13 @@ impl Restarter {
     }
 
     fn make(&mut self, ledger: Ledger) -> Result<(GroupRun, ExchangeReader<Ledger>), Error> {
-        let actors = (self.factory)()?;
+        // Unwind safe: a factory that panicked is not asked again in this restart, and says itself what it can do after.
+        let made = quietly(|| catch_unwind(AssertUnwindSafe(&mut self.factory)));
+        let place = || format!("rate group `{}`, factory", self.spec.name);
+        let panicked = |panic: Box<dyn Any + Send>| {
+            Error::new(ErrorKind::Fault, format!("panicked{}: {}", panicked_at(), text_of(&*panic))).at(place())
+        };
+        let actors = made.map_err(panicked)??;
         let recorder = self.records.as_ref().map(RecorderPort::recorder);
         let (writer, reader) = exchange(|| ledger);
         let mut group = GroupRun::new(self.index, self.spec.clone(), actors, recorder, ledger);

@@ -85,7 +85,7 @@ impl Runtime {
     pub fn start(self) -> Result<Running, Error> {
         let Self { execution, mut groups, restarters, reexecution, registry, grants } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
-        let names = groups.iter().map(|group| group.spec.name.clone()).collect();
+        let names: Vec<String> = groups.iter().map(|group| group.spec.name.clone()).collect();
         let live = groups.iter().map(GroupRun::live).collect();
         let executor = match execution {
             Execution::Threaded => {
@@ -100,7 +100,13 @@ impl Runtime {
             }
         };
         let executor = Arc::new(Mutex::new(executor));
-        watch(&executor)?;
+        if let Err(error) = watch(&executor) {
+            if let Executor::Threaded(threads) = &mut *lock(&executor) {
+                // Nobody else would: the groups have been released.
+                threads.join(&names, STOP_BOUND);
+            }
+            return Err(error);
+        }
         Ok(Running { executor, control, names, live, registry, grants })
     }
 }

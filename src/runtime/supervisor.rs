@@ -6,7 +6,9 @@
 
 use super::deadline::Ledger;
 use super::report::{GroupReport, RuntimeFault};
+use super::successor::Restarted;
 use super::sync::{AtomicBool, AtomicUsize, Ordering};
+use std::fmt;
 use std::sync::Arc;
 
 /// Flags that all threads of a run share.
@@ -77,27 +79,6 @@ impl Control {
     }
 }
 
-/// Something that is once true and stays so.
-#[derive(Debug)]
-pub(crate) struct Flag(AtomicBool);
-
-impl Default for Flag {
-    fn default() -> Self {
-        Self(AtomicBool::new(false))
-    }
-}
-
-impl Flag {
-    pub(crate) fn raise(&self) {
-        // Relaxed, here and where it is read: no data depends on it.
-        self.0.store(true, Ordering::Relaxed);
-    }
-
-    pub(crate) fn is_raised(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-}
-
 /// Asks a run to stop, from any thread, also from one that handles signals.
 #[derive(Clone, Debug)]
 pub struct StopHandle(pub(super) Arc<Control>);
@@ -129,10 +110,14 @@ pub(crate) enum Message {
     Ended(usize, Box<GroupReport>),
     /// The actors of a restartable group failed and are gone; nobody has been told to stop.
     Failed(Box<Failure>),
+    /// They could not be made or started again.
+    NotRestarted(Box<Failure>),
+    /// They were, and go on.
+    Restarted(Box<Restarted>),
 }
 
 /// A restartable group after a fault.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Failure {
     pub(crate) group: usize,
     /// Which of its threads says so, counting from 0: one that was left behind has nothing to say any more.
@@ -142,6 +127,14 @@ pub(crate) struct Failure {
     pub(crate) report: GroupReport,
     /// Its books, should it be.
     pub(crate) books: Ledger,
+}
+
+impl Failure {
+    /// The same when a restart failed too.
+    pub(crate) fn not_answered(self, why: &dyn fmt::Display) -> Self {
+        let what = format!("{}; it could not be started again: {why}", self.fault.what);
+        Self { fault: RuntimeFault { what, ..self.fault }, ..self }
+    }
 }
 
 /// Collects what the groups report.
@@ -163,10 +156,12 @@ impl Supervisor {
                 self.fault.get_or_insert(fault);
             }
             Message::Ended(group, report) => self.reports[group] = Some(*report),
-            Message::Failed(failure) => {
+            Message::Failed(failure) | Message::NotRestarted(failure) => {
                 self.fault.get_or_insert(failure.fault);
                 self.reports[failure.group] = Some(failure.report);
             }
+            // Nothing has ended.
+            Message::Restarted(_) => {}
         }
     }
 

@@ -8,6 +8,7 @@
 mod imp {
     pub(crate) use loom::cell::UnsafeCell;
     pub(crate) type AtomicBool = loom::sync::atomic::AtomicBool;
+    pub(crate) type AtomicU8 = loom::sync::atomic::AtomicU8;
     pub(crate) type AtomicU64 = loom::sync::atomic::AtomicU64;
     pub(crate) type AtomicUsize = loom::sync::atomic::AtomicUsize;
 }
@@ -15,6 +16,7 @@ mod imp {
 #[cfg(not(loom))]
 mod imp {
     pub(crate) type AtomicBool = std::sync::atomic::AtomicBool;
+    pub(crate) type AtomicU8 = std::sync::atomic::AtomicU8;
     pub(crate) type AtomicU64 = std::sync::atomic::AtomicU64;
     pub(crate) type AtomicUsize = std::sync::atomic::AtomicUsize;
 
@@ -38,7 +40,7 @@ mod imp {
     }
 }
 
-pub(crate) use imp::{AtomicBool, AtomicU64, AtomicUsize, UnsafeCell};
+pub(crate) use imp::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, UnsafeCell};
 pub(crate) use std::sync::atomic::Ordering;
 
 /// Keeps what two threads write on cache lines of their own; two lines, because adjacent lines are fetched in pairs.

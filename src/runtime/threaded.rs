@@ -1,55 +1,46 @@
-//! The threaded executor: one thread per rate group, absolute sleeps, integer release times.
-//!
-//! After warm-up the loop allocates nothing, takes no lock and makes no system call but its sleep.
+//! The threaded executor: one thread per rate group, absolute sleeps, integer release times, and a supervisor that starts
+//! again what failed.
 
 use super::deadline::Ledger;
 use super::exchange::ExchangeReader;
 use super::grant::{GrantHandle, SystemGrant, ThreadGrant, set_up_thread};
+use super::group_thread::{GroupThread, since};
 use super::mailbox::{MailReceiver, MailSender, mailbox};
 use super::os;
-use super::pace::Pace;
 use super::panic_hook;
 use super::rate_group::RateGroup;
 use super::release::GroupRun;
 use super::report::RuntimeFault;
 use super::restart::Restarter;
 use super::running::STOP_BOUND;
-use super::supervisor::{Control, Failure, Flag, Message, Supervisor};
-use super::wait::Waiter;
-use super::wake::Wake;
+use super::successor::{Restarted, Successor};
+use super::supervisor::{Control, Failure, Message, Supervisor};
+use super::tenure::Tenure;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
-use crossbeam_channel::{Receiver, Sender, bounded};
+use crossbeam_channel::{Sender, bounded};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Time for all threads to wake up and wait for release 0.
 const LEAD_NS: u64 = 2_000_000;
-/// A fault in a tick, one in a stop and the end, or as many failures as a poll can find.
-const MAIL_PER_GROUP: usize = 8;
+/// A fault in a tick, one in a stop and the end, or as many failures and restarts as a poll can find.
+const MAIL_PER_GROUP: usize = 16;
 /// How often a thread that waits for others looks again.
 const POLL: Duration = Duration::from_millis(2);
-
-/// What a thread waits for after its set-up.
-struct Go {
-    group: GroupRun,
-    base_ns: u64,
-    incarnation: usize,
-    /// A fault is for the supervisor to answer, who may start the group again.
-    restartable: bool,
-    left_behind: Arc<Flag>,
-}
+/// Between two polls no more than this counts as waiting: if the whole process or machine stood still, nobody hung.
+const LONGEST_STEP: Nanos = Nanos(50_000_000);
 
 /// A group's place among the threads.
 struct Seat {
     handle: Option<JoinHandle<()>>,
+    /// `None` if the group is not restartable, or while a successor is made.
     restart: Option<(Restarter, ExchangeReader<Ledger>)>,
     incarnation: usize,
-    /// When the present thread was started.
-    started: Nanos,
-    /// Tells the present thread that it is not waited for any more.
-    left_behind: Arc<Flag>,
+    tenure: Arc<Tenure>,
+    /// The release that is waited for, and for how long the supervisor has seen it overdue.
+    overdue: (u64, Nanos),
 }
 
 /// The threads of a run.
@@ -58,7 +49,11 @@ pub(crate) struct Threads {
     post: MailSender<Message>,
     mail: MailReceiver<Message>,
     control: Arc<Control>,
+    grants: GrantHandle,
     base_ns: u64,
+    polled: Nanos,
+    /// Faults that were answered by a restart.
+    restarts: Vec<RuntimeFault>,
     /// Set when somebody has waited long enough: nobody waits for the rest again.
     given_up: bool,
     /// Since when only observers are left.
@@ -86,7 +81,7 @@ impl Threads {
         let mut handles = Vec::new();
         let mut gates = Vec::new();
         for group in &groups {
-            let (thread, gate, granted) = spawn(&group.spec, &control, &post)?;
+            let (thread, gate, granted) = spawn(&group.spec)?;
             handles.push(thread);
             gates.push(gate);
             grant.timer_slack = worse(grant.timer_slack, granted.timer_slack);
@@ -98,14 +93,34 @@ impl Threads {
         let supervisor = Supervisor::new(groups.len());
         let mut seats = Vec::new();
         for (((group, gate), restart), handle) in groups.into_iter().zip(gates).zip(restarters).zip(handles) {
-            let left_behind = Arc::new(Flag::default());
-            let restartable = restart.as_ref().is_some_and(|(restarter, _)| restarter.may_restart());
-            let go = Go { group, base_ns, incarnation: 0, restartable, left_behind: Arc::clone(&left_behind) };
+            let tenure = Arc::new(Tenure::default());
             // A thread waits at its gate until it gets its group, so this cannot fail.
-            let _ = gate.send(go);
-            seats.push(Seat { handle: Some(handle), restart, incarnation: 0, started: Nanos::ZERO, left_behind });
+            let _ = gate.send(GroupThread {
+                group,
+                base_ns,
+                incarnation: 0,
+                restartable: restart.as_ref().is_some_and(|(restarter, _)| restarter.may_restart()),
+                watched: restart.is_some(),
+                tenure: Arc::clone(&tenure),
+                control: Arc::clone(&control),
+                post: post.clone(),
+            });
+            seats.push(Seat { handle: Some(handle), restart, incarnation: 0, tenure, overdue: (0, Nanos::ZERO) });
         }
-        Ok(Self { seats, post, mail, control, base_ns, given_up: false, closing: None, ended_at: None, supervisor })
+        Ok(Self {
+            seats,
+            post,
+            mail,
+            control,
+            grants: grants.clone(),
+            base_ns,
+            polled: Nanos::ZERO,
+            restarts: Vec::new(),
+            given_up: false,
+            closing: None,
+            ended_at: None,
+            supervisor,
+        })
     }
 
     /// True if there is something to do besides counting what ends.
@@ -113,20 +128,18 @@ impl Threads {
         self.seats.iter().any(|seat| seat.restart.is_some())
     }
 
-    /// Takes the mail and starts groups again; true when all groups have ended, or only observers are left that had
-    /// [`STOP_BOUND`] to close what they hold.
+    /// Takes the mail and lets failed groups start again; true when all groups have ended, or only observers are left that
+    /// had [`STOP_BOUND`] to close what they hold.
     pub(crate) fn poll(&mut self) -> bool {
         while let Some(message) = self.mail.poll() {
             match message {
                 Message::Failed(failure) => self.answer(failure),
+                Message::Restarted(begun) => self.install(*begun),
+                Message::NotRestarted(failure) => self.give_up(failure),
                 message => self.supervisor.note(message),
             }
         }
-        for index in 0..self.seats.len() {
-            if let Some(books) = self.hung(index) {
-                self.leave_behind(index, books);
-            }
-        }
+        self.watch();
         let only_observers = self.control.observers_may_end();
         if only_observers && self.ended_at.is_none() {
             self.ended_at = Some(since(self.base_ns));
@@ -139,7 +152,7 @@ impl Threads {
         self.given_up
     }
 
-    /// Starts a group again that has failed, or lets the run stop.
+    /// Lets a group start again that has failed, or the run stop.
     fn answer(&mut self, failure: Box<Failure>) {
         let seat = &mut self.seats[failure.group];
         if failure.incarnation != seat.incarnation {
@@ -149,13 +162,39 @@ impl Threads {
             // It has posted its last message and is about to end.
             let _ = handle.join();
         }
-        let allowed = seat.restart.as_ref().is_some_and(|(restarter, _)| restarter.may_restart());
-        if self.control.stop_requested() || !allowed {
-            self.give_up(failure);
-        } else if let Err(error) = self.restart(failure.group, failure.fault.clone(), failure.books) {
-            let what = format!("{}; it could not be started again: {error}", failure.fault.what);
-            self.give_up(Box::new(Failure { fault: RuntimeFault { what, ..failure.fault }, ..*failure }));
+        self.succeed(failure);
+    }
+
+    /// Starts the thread that takes the place of the one that failed.
+    fn succeed(&mut self, failure: Box<Failure>) {
+        let seat = &mut self.seats[failure.group];
+        let restarter = seat.restart.take().map(|(restarter, _)| restarter).filter(Restarter::may_restart);
+        let Some(restarter) = restarter.filter(|_| !self.control.stop_requested()) else {
+            return self.give_up(failure);
+        };
+        seat.incarnation += 1;
+        seat.tenure = Arc::new(Tenure::default());
+        seat.overdue = (0, Nanos::ZERO);
+        let successor = Successor {
+            restarter,
+            failure,
+            incarnation: seat.incarnation,
+            base_ns: self.base_ns,
+            tenure: Arc::clone(&seat.tenure),
+            control: Arc::clone(&self.control),
+            post: self.post.clone(),
+        };
+        match successor.spawn() {
+            Ok(handle) => seat.handle = Some(handle),
+            Err(failure) => self.give_up(failure),
         }
+    }
+
+    /// A successor has made the actors and goes on.
+    fn install(&mut self, begun: Restarted) {
+        self.seats[begun.group].restart = Some((begun.restarter, begun.books));
+        self.restarts.push(begun.failure.fault);
+        self.grants.replace(begun.group, begun.grant);
     }
 
     fn give_up(&mut self, failure: Box<Failure>) {
@@ -165,65 +204,61 @@ impl Threads {
         self.supervisor.note(Message::Failed(failure));
     }
 
-    fn restart(&mut self, index: usize, fault: RuntimeFault, books: Ledger) -> Result<(), Error> {
-        let seat = &mut self.seats[index];
-        let Some((restarter, reader)) = &mut seat.restart else { return Ok(()) };
-        let (group, fresh) = restarter.again(fault, books, since(self.base_ns))?;
-        *reader = fresh;
-        let (thread, gate, _) = spawn(&group.spec, &self.control, &self.post)?;
-        seat.incarnation += 1;
-        seat.started = since(self.base_ns);
-        seat.left_behind = Arc::new(Flag::default());
-        seat.handle = Some(thread);
-        let go = Go {
-            group,
-            base_ns: self.base_ns,
-            incarnation: seat.incarnation,
-            // Also after the last restart: a fault then comes here and stops the run.
-            restartable: true,
-            left_behind: Arc::clone(&seat.left_behind),
-        };
-        let _ = gate.send(go);
-        Ok(())
+    /// Looks for releases that do not return.
+    fn watch(&mut self) {
+        let now = since(self.base_ns);
+        let step = now.saturating_sub(self.polled).min(LONGEST_STEP);
+        self.polled = now;
+        for index in 0..self.seats.len() {
+            if self.hangs(index, now, step) {
+                self.leave_behind(index, now);
+            }
+        }
     }
 
-    /// The books of a restartable group whose release has not returned for too long.
-    fn hung(&mut self, index: usize) -> Option<Ledger> {
+    /// True if a restartable group's release has not returned for too long.
+    fn hangs(&mut self, index: usize, now: Nanos, step: Nanos) -> bool {
         let seat = &mut self.seats[index];
-        let (restarter, books) = seat.restart.as_mut()?;
+        let Some((restarter, books)) = &mut seat.restart else { return false };
         if self.control.stop_requested() || self.supervisor.has_ended(index) {
-            return None;
+            return false;
         }
         books.refresh();
-        let books = *books.get();
-        // What was due before its thread was there is not its fault.
-        let limit = books.next_due()?.max(seat.started) + restarter.policy.hung_after;
-        (since(self.base_ns) > limit).then_some(books)
+        let books = books.get();
+        let Some(due) = books.next_due() else { return false };
+        let release = books.elapsed_periods();
+        if seat.overdue.0 != release {
+            seat.overdue = (release, Nanos::ZERO);
+        } else if now > due + restarter.patience() {
+            seat.overdue.1 = seat.overdue.1 + step;
+        }
+        seat.overdue.1 > restarter.policy.hung_after
     }
 
-    fn leave_behind(&mut self, index: usize, books: Ledger) {
-        let now = since(self.base_ns);
+    fn leave_behind(&mut self, index: usize, now: Nanos) {
         let seat = &mut self.seats[index];
-        let Some((restarter, _)) = &mut seat.restart else { return };
-        seat.left_behind.raise();
-        // Its thread may never end: nobody joins it.
-        seat.handle = None;
+        let Some((restarter, books)) = &mut seat.restart else { return };
+        if !seat.tenure.dismiss() {
+            // It has just come back.
+            return;
+        }
+        // Nothing is booked any more: these are the last.
+        books.refresh();
+        let books = *books.get();
+        // Its thread may never end: nobody joins it, and it takes the core from nobody.
+        if let Some(handle) = seat.handle.take() {
+            os::give_up_realtime(&handle);
+        }
         let at = books.next_due().unwrap_or(now);
         restarter.abandoned(at);
-        let waited = restarter.policy.hung_after;
-        let allowed = restarter.may_restart();
-        let what = format!("did not return within {waited} and was left behind");
-        let fault = RuntimeFault { group: restarter.group().to_owned(), actor: String::new(), at, what };
-        let report = restarter.report(&books);
-        let failure = Failure { group: index, incarnation: seat.incarnation, fault, report, books };
-        seat.incarnation += 1;
-        if !allowed {
-            return self.give_up(Box::new(failure));
-        }
-        if let Err(error) = self.restart(index, failure.fault.clone(), books) {
-            let what = format!("{}; it could not be started again: {error}", failure.fault.what);
-            self.give_up(Box::new(Failure { fault: RuntimeFault { what, ..failure.fault }, ..failure }));
-        }
+        let fault = RuntimeFault {
+            group: restarter.group().to_owned(),
+            actor: String::new(),
+            at,
+            what: format!("did not return within {} and was left behind", restarter.policy.hung_after),
+        };
+        let (report, incarnation) = (restarter.report(&books), seat.incarnation);
+        self.succeed(Box::new(Failure { group: index, incarnation, fault, report, books }));
     }
 
     pub(crate) fn elapsed(&self) -> Nanos {
@@ -232,8 +267,7 @@ impl Threads {
 
     /// Faults that were answered by a restart.
     pub(crate) fn restarts(&self) -> Vec<RuntimeFault> {
-        let restarter = |seat: &'_ Seat| seat.restart.as_ref().map(|(restarter, _)| restarter.restarts.clone());
-        self.seats.iter().filter_map(restarter).flatten().collect()
+        self.restarts.clone()
     }
 
     /// Requests a stop and waits for all groups, `bound` for each step of the way: a group that does not end is given
@@ -261,10 +295,6 @@ impl Threads {
     }
 }
 
-fn since(base_ns: u64) -> Nanos {
-    Nanos(os::monotonic().saturating_sub(base_ns))
-}
-
 /// Keeps a refusal over a grant, so that one thread's refusal is not lost.
 fn worse(a: String, b: String) -> String {
     if a.starts_with("refused") { a } else { b }
@@ -281,20 +311,19 @@ pub(crate) fn start_actors(groups: &mut [GroupRun]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Starts the thread of a group and waits until it has set itself up.
-fn spawn(
-    spec: &RateGroup,
-    control: &Arc<Control>,
-    post: &MailSender<Message>,
-) -> Result<(JoinHandle<()>, Sender<Go>, ThreadGrant), Error> {
-    let (gate, go) = bounded(1);
+/// Starts a thread for a group and waits until it has set itself up; it then waits for its group.
+fn spawn(spec: &RateGroup) -> Result<(JoinHandle<()>, Sender<GroupThread>, ThreadGrant), Error> {
+    let (gate, go) = bounded::<GroupThread>(1);
     let (set_up, granted) = bounded(1);
-    let (control, post, own) = (Arc::clone(control), post.clone(), spec.clone());
+    let own = spec.clone();
     let body = move || {
         let grant = set_up_thread(&own);
         let waiter = grant.waiter;
-        if set_up.send(grant).is_ok() {
-            group_thread(&go, waiter, &control, &post);
+        // A closed gate means that the start failed elsewhere: nothing to run.
+        if set_up.send(grant).is_ok()
+            && let Ok(thread) = go.recv()
+        {
+            thread.run(waiter);
         }
     };
     let failed =
@@ -303,79 +332,4 @@ fn spawn(
     let thread = thread.map_err(|error| failed(error.to_string()))?;
     let granted = granted.recv().map_err(|_| failed("it ended during its set-up".to_owned()))?;
     Ok((thread, gate, granted))
-}
-
-fn group_thread(go: &Receiver<Go>, mut waiter: Waiter, control: &Control, post: &MailSender<Message>) {
-    // A closed gate means that the start failed elsewhere: nothing to run.
-    let Ok(Go { mut group, base_ns, incarnation, restartable, left_behind }) = go.recv() else { return };
-    group.close_when(Arc::clone(&left_behind));
-    let index = usize::from(group.index);
-    let observer = group.spec.observer;
-    let now = || since(base_ns);
-    let mut pace = Pace::new(&group);
-    let mut failed = None;
-    loop {
-        let Some(due) = group.ledger.next_due() else {
-            if group.spec.wind_down_at_end && group.begin_wind_down() {
-                continue;
-            }
-            break;
-        };
-        let winding_down = group.is_winding_down();
-        let leave = || match observer {
-            true => control.observers_may_end(),
-            false => !winding_down && control.stop_requested(),
-        };
-        let mut sleep = |until: Nanos| waiter.until(base_ns + until.0, leave).map(|woke_ns| Nanos(woke_ns - base_ns));
-        let wake = match &mut pace {
-            None => Ok(sleep(due).map(|woke| Wake::by_timer(due, woke))),
-            Some(pace) => pace.wait(&mut group, due, now, |until| sleep(until).is_some()),
-        };
-        let result = match wake {
-            Ok(Some(wake)) => group.release(wake, |_| now(), |_| now()),
-            Ok(None) if group.begin_wind_down() => continue,
-            Ok(None) => break,
-            Err(fault) => Err(fault),
-        };
-        if left_behind.is_raised() {
-            // Its place is taken: it says nothing any more, and its actors go with it.
-            return;
-        }
-        if let Err(fault) = result {
-            if restartable {
-                failed = Some(fault);
-                break;
-            }
-            post_fault(post, control, fault);
-            if !group.begin_wind_down() {
-                break;
-            }
-        }
-    }
-    if observer {
-        while !control.observers_may_end() {
-            std::thread::sleep(POLL);
-        }
-        if let Err(fault) = group.last_tick(now()) {
-            post_fault(post, control, fault);
-        }
-    }
-    let books = group.ledger;
-    let (report, fault) = group.finish(now());
-    if let Some(fault) = failed {
-        post.try_send(Message::Failed(Box::new(Failure { group: index, incarnation, fault, report, books })));
-        return;
-    }
-    if let Some(fault) = fault {
-        post_fault(post, control, fault);
-    }
-    if !observer {
-        control.group_ended();
-    }
-    post.try_send(Message::Ended(index, Box::new(report)));
-}
-
-fn post_fault(post: &MailSender<Message>, control: &Control, fault: RuntimeFault) {
-    post.try_send(Message::Fault(fault));
-    control.request_stop();
 }

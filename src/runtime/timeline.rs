@@ -73,6 +73,11 @@ impl Timeline {
         self.due(n).saturating_sub(Nanos(self.period.0 / 8 * 7))
     }
 
+    /// The same without an end.
+    pub(crate) fn unbounded(&self) -> Self {
+        Self { count: u64::MAX, until: Nanos(u64::MAX), ..*self }
+    }
+
     /// Lets release `count - 1` be the last, whenever it is due.
     pub(crate) fn end_before(&mut self, count: u64) {
         self.count = count;

@@ -8,10 +8,10 @@ use super::disturbance::VirtualPace;
 use super::panic_hook;
 use super::recording::RecordedRelease;
 use super::reexecution::{Reexecution, Step};
-use super::release::GroupRun;
+use super::release::{AfterFault, GroupRun};
 use super::report::RuntimeFault;
 use super::restart::Restarter;
-use super::supervisor::{Control, Message, Supervisor};
+use super::supervisor::{Control, Failure, Message, Supervisor};
 use crate::time::Nanos;
 use std::sync::Arc;
 
@@ -28,6 +28,7 @@ pub(crate) struct VirtualRun {
     /// `None` for groups that have ended.
     groups: Vec<Option<GroupRun>>,
     restarters: Vec<Option<Restarter>>,
+    restarts: Vec<RuntimeFault>,
     /// When each group wakes next.
     paces: Vec<VirtualPace>,
     now: Nanos,
@@ -49,8 +50,8 @@ impl VirtualRun {
         let supervisor = Supervisor::new(groups.len());
         let paces = groups.iter_mut().map(VirtualPace::new).collect();
         let groups = groups.into_iter().map(Some).collect();
-        let (now, stopping) = (Nanos::ZERO, false);
-        let mut run = Self { groups, restarters, paces, now, stopping, reexecution, control, supervisor };
+        let (now, stopping, restarts) = (Nanos::ZERO, false, Vec::new());
+        let mut run = Self { groups, restarters, restarts, paces, now, stopping, reexecution, control, supervisor };
         run.end_what_is_over();
         run
     }
@@ -118,7 +119,8 @@ impl VirtualRun {
         self.stopping = true;
         let repeats = self.reexecution.is_some();
         for index in self.indices(false) {
-            if repeats || !self.begin_wind_down(index) {
+            let winds_down = self.groups[index].as_ref().is_some_and(GroupRun::is_winding_down);
+            if repeats || !(winds_down || self.begin_wind_down(index)) {
                 self.end(index);
             }
         }
@@ -127,33 +129,54 @@ impl VirtualRun {
 
     fn begin_wind_down(&mut self, index: usize) -> bool {
         let Some(group) = self.groups[index].as_mut().filter(|group| !group.is_winding_down()) else { return false };
-        let begun = group.begin_wind_down();
+        let begun = group.begin_wind_down(self.now);
         if begun {
-            self.paces[index].plan(group);
+            self.paces[index].wind_down(group, self.now);
         }
         begun
     }
 
     /// Starts a group again that has failed, or stops the run.
     fn answer(&mut self, index: usize, fault: RuntimeFault) {
-        let now = self.now;
-        let restarter = self.restarters[index].as_mut().filter(|restarter| restarter.may_restart());
-        let Some(restarter) = restarter.filter(|_| !self.stopping && self.reexecution.is_none()) else {
+        let Some(group) = &mut self.groups[index] else { return };
+        if self.reexecution.is_some() {
+            // How the run went on is part of the recording.
             return self.note(Err(fault));
-        };
-        let Some(group) = self.groups[index].take() else { return };
+        }
+        let restartable = self.restarters[index].as_ref().is_some_and(Restarter::may_restart);
+        match group.after_fault(self.now, restartable, self.control.stop_requested()) {
+            AfterFault::Restart => self.restart(index, fault),
+            AfterFault::GoOn => {
+                self.paces[index].wind_down(group, self.now);
+                self.note(Err(fault));
+            }
+            AfterFault::End => {
+                let observer = group.spec.observer;
+                self.note(Err(fault));
+                // An observer ends after the others, however it fares.
+                if !observer {
+                    self.end(index);
+                }
+            }
+        }
+    }
+
+    fn restart(&mut self, index: usize, fault: RuntimeFault) {
+        let now = self.now;
+        let (Some(group), Some(restarter)) = (self.groups[index].take(), &mut self.restarters[index]) else { return };
         let books = group.ledger;
         // A fault in the stop of what has failed is its consequence.
         let (report, _) = group.finish(now);
-        match restarter.again(fault.clone(), books, now) {
+        match restarter.again(&fault, books, now) {
             Ok((group, _)) => {
                 self.paces[index].plan(&group);
                 self.groups[index] = Some(group);
+                self.restarts.push(fault);
             }
             Err(error) => {
-                let what = format!("{}; it could not be started again: {error}", fault.what);
-                self.note(Err(RuntimeFault { what, ..fault }));
-                self.supervisor.note(Message::Ended(index, Box::new(report)));
+                let failure = Failure { group: index, incarnation: 0, fault, report, books };
+                self.supervisor.note(Message::NotRestarted(Box::new(failure.not_answered(&error))));
+                self.control.request_stop();
                 self.control.group_ended();
             }
         }
@@ -161,7 +184,7 @@ impl VirtualRun {
 
     /// Faults that were answered by a restart.
     pub(crate) fn restarts(&self) -> Vec<RuntimeFault> {
-        self.restarters.iter().flatten().flat_map(|restarter| restarter.restarts.clone()).collect()
+        self.restarts.clone()
     }
 
     /// The next release; at equal times the group that was added first. `None` if there is none any more.

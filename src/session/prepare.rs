@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::budget;
 use super::graph::groups;
+use crate::actors::GAP_S;
 use crate::devices::{Device, Scripted, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::Vec3;
@@ -254,6 +255,10 @@ const RAMP_MARGIN_S: f64 = 0.005;
 
 /// The slew limit must not keep the force from being gone when the ramp is over.
 fn check_ramp(limits: &Limits) -> Result<(), Error> {
+    if !(limits.max_force_n.is_finite() && limits.max_force_n > 0.0) {
+        let message = format!("has a largest force of {} N, must be a finite number above 0", limits.max_force_n);
+        return Err(Error::scene("device", message));
+    }
     let needed_s = limits.max_force_n / limits.max_slew_n_per_s;
     if limits.ramp_s >= needed_s {
         return Ok(());
@@ -279,6 +284,8 @@ fn check_group(field: &str, group: &RateGroup) -> Result<(), Error> {
         "has a latency, which only the global group's results can have: leave it out"
     } else if field == "local" && own().overrun(OverrunPolicy::Rephase) == own() {
         "has the policy Rephase, but the tool's samples and the models belong to the nominal grid of ticks: use another"
+    } else if field == "local" && own().catches_up().as_secs_f64() > 0.5 * GAP_S {
+        "catches up after stops that the force must come back from slowly (0.1 s): catch up at most 0.05 s, or use Skip"
     } else if field == "global" && own().release(Release::Periodic) != own() {
         "is paced by a device, which only the local group has: leave it out"
     } else {
