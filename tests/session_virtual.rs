@@ -3,7 +3,7 @@
 mod session_support;
 
 use palpate::actors::{DeviceSample, ForceCommand, LocalActor, LocalPorts, ModelSource, SurfaceView, ToolView};
-use palpate::devices::DeviceState;
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
 use palpate::log::{ForceSample, LogRecord};
 use palpate::model::Vec3;
 use palpate::model::body::{Body, State};
@@ -238,6 +238,7 @@ fn a_group_that_would_break_the_convention_is_refused() {
         (session().global(RateGroup::hz(30).offset(late)), "global: has an offset"),
         (session().global(RateGroup::hz(30).observer()), "global: is an observer"),
         (session().local(haptic().overrun(OverrunPolicy::Rephase)), "local: has the policy Rephase"),
+        (session().local(haptic().overrun(OverrunPolicy::CatchUp { max: 51 })), "local: catches up after stops"),
         (session().global(RateGroup::hz(30).device_paced(Nanos(50_000_000))), "global: is paced by a device"),
     ] {
         let error = session.build().unwrap_err();
@@ -246,7 +247,38 @@ fn a_group_that_would_break_the_convention_is_refused() {
     }
     session().local(haptic().pin(0).realtime(50)).global(latency(5_000)).build().unwrap();
     session().local(haptic().device_paced(late)).build().unwrap();
+    session().local(haptic().overrun(OverrunPolicy::CatchUp { max: 50 })).build().unwrap();
     session().global(latency(0).overrun(OverrunPolicy::Rephase)).build().unwrap();
+}
+
+/// Says that it exerts this force at most.
+#[derive(Debug)]
+struct Claims(f64);
+
+impl Device for Claims {
+    fn name(&self) -> &str {
+        "claims"
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { max_force_n: self.0 }
+    }
+
+    fn read(&mut self, _: Nanos) -> Result<DeviceState, DeviceFault> {
+        Ok(DeviceState::default())
+    }
+
+    fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_device_whose_largest_force_is_no_positive_number_is_refused() {
+    for force_n in [-4.0, 0.0, f64::NAN, f64::INFINITY] {
+        let error = session().device(Claims(force_n)).build().unwrap_err().to_string();
+        assert_eq!(error, format!("device: has a largest force of {force_n} N, must be a finite number above 0"));
+    }
 }
 
 #[test]

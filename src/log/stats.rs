@@ -19,7 +19,7 @@ pub struct GroupStats {
     pub skipped: u64,
     /// Deadlines missed since the start.
     pub missed: u64,
-    /// Records of this group lost since the start, because a ring was full.
+    /// Records lost since the start, because a ring was full: those of all threads together, kept by the first group.
     pub lost_records: u64,
     /// Wake-up lateness since the start (ns).
     pub lateness: Percentiles<u64>,

@@ -154,15 +154,16 @@ impl RuntimeBuilder {
     }
 
     /// Adds a rate group whose actors are made by `factory`: once when the graph is built, and again whenever one of them
-    /// panicked, reported a fault or did not return, as often as `restart` allows. The other groups run on meanwhile.
+    /// panicked, reported a fault or did not return, as often as `restart` allows. The other groups run on meanwhile. What
+    /// stops the run by its overrun policy, or fails while it winds down, is not started again; an observer cannot be.
     ///
     /// The factory takes the halves of the actors' ports from ports that can be taken again
     /// ([`exchange_port`](Self::exchange_port) and the like), which cuts the failed actors off. Periods that passed meanwhile
-    /// are skipped with the cause [`Fault`](super::SlipCause::Fault).
+    /// are skipped with the cause [`Fault`](super::SlipCause::Fault), under every overrun policy.
     ///
     /// # Real-time
-    /// On threads the factory runs on none of the groups' own, and the new actors are started there too: both may allocate
-    /// and take their time, but a stop and the restart of another group wait for them.
+    /// On threads the factory runs, and the new actors are started, on the thread that then takes the group over, before it
+    /// is given its policy and core: both may allocate and take their time, and nobody waits for them but a stop.
     pub fn restartable(
         &mut self,
         group: RateGroup,

@@ -15,7 +15,8 @@
 //! - Admission: a graph that cannot work is refused when it is built, with the sum that failed; its
 //!   [plan](Runtime::plan) says what it asks for and what this system would refuse.
 //! - Introspection: [`Running::live`] shows counts, lateness and execution time of every group at any moment.
-//! - Faults: a panic or a reported fault stops the whole graph in order and is in the [report](RuntimeReport).
+//! - Faults: a panic or a reported fault stops the whole graph in order, after [winding down](RateGroup::wind_down), and
+//!   is in the [report](RuntimeReport); a [restartable](RuntimeBuilder::restartable) group is started again instead.
 //!
 //! Words with a fixed meaning in these docs: *wait-free* (done in a bounded number of steps whatever others do),
 //! *lock-free* (some thread always gets on), *bounded*, *allocates*, *may block*, *real-time safe* (no allocation, no

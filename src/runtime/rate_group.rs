@@ -218,6 +218,8 @@ impl RateGroup {
 
     /// When a stop is requested or an actor of the group has failed, the group is released for this long in
     /// [`Mode::Stopping`](super::Mode::Stopping), without the failed actor, so that it can bring what it drives to rest.
+    /// Periods that are overdue by then are skipped and do not count; a device is not waited for. A fault that a
+    /// [restart](super::RuntimeBuilder::restartable) answers begins none.
     #[must_use]
     pub fn wind_down(mut self, time: Nanos) -> Self {
         self.wind_down = time;

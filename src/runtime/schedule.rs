@@ -84,7 +84,8 @@ fn check_policy(group: &RateGroup) -> Result<(), Error> {
     }
     match group.overrun {
         OverrunPolicy::CatchUp { .. } | OverrunPolicy::Rephase => refuse(format!(
-            "the policy {:?} contradicts a device that paces the group: it has one frame per release and sets the phase;              use Skip, Degrade or Stop",
+            "the policy {:?} contradicts a device that paces the group: it has one frame per release and sets the phase; \
+             use Skip, Degrade or Stop",
             group.overrun
         )),
         _ => Ok(()),

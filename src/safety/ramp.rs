@@ -1,4 +1,4 @@
-//! Between clamp and slew limit: the force comes and goes within a declared time.
+//! Stage 3: the force comes and goes within a declared time.
 
 /// A gain between 0 (at rest) and 1 (the force passes as it is).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-//! Stage 3: the largest change from one command to the next.
+//! Stage 4: the largest change from one command to the next.
 
 use super::{Force, norm};
 
