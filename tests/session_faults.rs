@@ -80,7 +80,9 @@ fn a_stop_and_a_drop_ramp_the_force_out() {
 
 #[test]
 fn faults_of_the_global_model_leave_the_haptic_side_alone() {
-    for fault in Fault::ALL.into_iter().filter(|fault| fault.leaves_the_force()) {
+    // The log has a test of its own; that the whole process is stopped would disturb the other tests: `cli_faults`.
+    let is_elsewhere = |fault| matches!(fault, Fault::DiskFull | Fault::LoggerStuck | Fault::ProcessStopped);
+    for fault in Fault::ALL.into_iter().filter(|&fault| fault.leaves_the_force() && !is_elsewhere(fault)) {
         let trace = run(fault);
         let summary = trace.summary.as_ref().unwrap();
         assert_eq!(summary.runtime.fault, None, "{fault:?}");
@@ -96,6 +98,22 @@ fn faults_of_the_global_model_leave_the_haptic_side_alone() {
             _ => None,
         });
         assert!(newest.unwrap().model_age_s < 0.5, "{fault:?}: {newest:?}");
+    }
+}
+
+#[test]
+#[cfg(feature = "log")]
+fn faults_of_the_log_leave_the_force_alone() {
+    for fault in [Fault::DiskFull, Fault::LoggerStuck] {
+        let trace = run(fault);
+        let summary = trace.summary.as_ref().unwrap();
+        let until = summary.runtime.groups[0].elapsed_periods as f64 * 1e-3 - RAMP_S - 0.02;
+        let felt = trace.magnitudes().filter(|sample| (0.2..until).contains(&sample.0));
+        assert!(felt.map(|sample| sample.1).fold(f64::MAX, f64::min) > 0.05, "{fault:?}");
+        // Check that the report says what is missing: the log, or the logger that did not come back
+        let stuck = summary.runtime.fault.as_ref().is_some_and(|fault| fault.group == "logger");
+        assert_eq!(stuck, fault == Fault::LoggerStuck, "{fault:?}: {:?}", summary.runtime.fault);
+        assert!(stuck || summary.log_error.is_some(), "{fault:?}");
     }
 }
 

@@ -60,6 +60,9 @@ fn title(fault: Fault) -> &'static str {
         Fault::GlobalPanics => "the global model panics",
         Fault::GlobalStalls => "the global model stalls for 1 s",
         Fault::GlobalNeverReturns => "the global model never returns",
+        Fault::DiskFull => "the disk is full",
+        Fault::LoggerStuck => "the logger is stuck in a write",
+        Fault::ProcessStopped => "SIGSTOP, SIGCONT after 0.6 s",
         Fault::StopRequested => "a stop is requested (Ctrl-C)",
         Fault::Dropped => "the running session is dropped",
     }
@@ -71,11 +74,20 @@ fn row(fault: Fault, trace: &Trace) -> String {
         Some(rest) => format!("{:.0}", (rest - FAULT_S) * 1e3),
         None => "stays".to_owned(),
     };
-    let magnitudes: Vec<f64> = trace.magnitudes().filter(|sample| sample.0 > FAULT_S - 0.01).map(|s| s.1).collect();
-    let step = magnitudes.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    let after: Vec<_> = trace.magnitudes().filter(|sample| sample.0 > FAULT_S - 0.01).collect();
+    // Over a gap nothing is commanded.
+    let steps = after.windows(2).filter(|pair| pair[1].0 - pair[0].0 < 0.1).map(|pair| (pair[1].1 - pair[0].1).abs());
+    let step = steps.fold(0.0, f64::max);
     let summary = trace.summary.as_ref();
     let answer = match summary.map(|summary| &summary.runtime) {
         None => "ramps out, threads joined".to_owned(),
+        Some(_) if fault == Fault::ProcessStopped => "zero first, then ramps in".to_owned(),
+        Some(runtime)
+            if fault.leaves_the_force()
+                && (runtime.fault.is_some() || summary.is_some_and(|s| s.log_error.is_some())) =>
+        {
+            "the haptic side runs on, the report says what is missing".to_owned()
+        }
         Some(runtime) if runtime.fault.is_some() => "ramps out, run stops with the fault".to_owned(),
         Some(runtime) if !runtime.restarts.is_empty() => "the haptic side runs on, the group is restarted".to_owned(),
         Some(_) if fault == Fault::StopRequested => "ramps out, run ends".to_owned(),

@@ -6,6 +6,8 @@ use palpate::model::body::{Block, Body, State, TangentBlock};
 use palpate::model::mesh::{Face, Surface};
 use palpate::prelude::*;
 use palpate::scene::LocalModelKind;
+#[cfg(feature = "log")]
+use palpate::session::SessionBuilder;
 use palpate::session::Summary;
 use palpate::time::Nanos;
 use std::sync::{Arc, Mutex};
@@ -27,12 +29,15 @@ pub enum Fault {
     GlobalPanics,
     GlobalStalls,
     GlobalNeverReturns,
+    DiskFull,
+    LoggerStuck,
+    ProcessStopped,
     StopRequested,
     Dropped,
 }
 
 impl Fault {
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 13] = [
         Self::LocalPanics,
         Self::LocalNotFinite,
         Self::DeviceReadPanics,
@@ -41,13 +46,25 @@ impl Fault {
         Self::GlobalPanics,
         Self::GlobalStalls,
         Self::GlobalNeverReturns,
+        Self::DiskFull,
+        Self::LoggerStuck,
+        Self::ProcessStopped,
         Self::StopRequested,
         Self::Dropped,
     ];
 
     /// True where the haptic side runs on as if nothing had happened.
     pub fn leaves_the_force(self) -> bool {
-        matches!(self, Self::DeviceNotFinite | Self::GlobalPanics | Self::GlobalStalls | Self::GlobalNeverReturns)
+        matches!(
+            self,
+            Self::DeviceNotFinite
+                | Self::GlobalPanics
+                | Self::GlobalStalls
+                | Self::GlobalNeverReturns
+                | Self::DiskFull
+                | Self::LoggerStuck
+                | Self::ProcessStopped
+        )
     }
 
     fn of_body(self) -> bool {
@@ -72,6 +89,7 @@ impl Fault {
         match self {
             Self::GlobalNeverReturns => 4.0,
             Self::GlobalStalls => 2.5,
+            Self::ProcessStopped => 2.0,
             _ => 1.0,
         }
     }
@@ -223,13 +241,15 @@ pub fn run(fault: Fault) -> Result<Trace, Error> {
         let_go: Arc::clone(&let_go),
     };
     let device = Tool { fault, written: Arc::clone(&written), now: 0.0, read: false, done: false };
-    let session = Session::builder(body)
+    let builder = Session::builder(body)
         .device(device)
         .model(fault.model())
         .substeps_per_ms(2)
         .keep_records()
-        .duration_s(fault.duration_s())
-        .build()?;
+        .duration_s(fault.duration_s());
+    #[cfg(feature = "log")]
+    let (builder, _log) = logged(builder, fault)?;
+    let session = builder.build()?;
     let running = session.start()?;
     let summary = match fault {
         Fault::StopRequested | Fault::Dropped => {
@@ -237,6 +257,10 @@ pub fn run(fault: Fault) -> Result<Trace, Error> {
             (fault == Fault::StopRequested).then(|| running.stop())
         }
         _ => {
+            if fault == Fault::ProcessStopped {
+                running.wait_for(Duration::from_secs_f64(FAULT_S));
+                stop_this_process(Duration::from_millis(600));
+            }
             running.wait();
             Some(running.stop())
         }
@@ -244,4 +268,46 @@ pub fn run(fault: Fault) -> Result<Trace, Error> {
     *let_go.lock().expect("nobody panics under it") = true;
     let written = written.lock().expect("no writer panics").1.clone();
     Ok(Trace { written, summary })
+}
+
+/// Whoever reads the log, for as long as it is needed.
+#[cfg(feature = "log")]
+struct Log(Option<std::process::Child>);
+
+#[cfg(feature = "log")]
+impl Drop for Log {
+    fn drop(&mut self) {
+        if let Some(reader) = &mut self.0 {
+            // It may have ended.
+            let _ = reader.kill().and_then(|()| reader.wait());
+        }
+    }
+}
+
+/// The session with a log that fails, if that is the fault.
+#[cfg(feature = "log")]
+fn logged(builder: SessionBuilder, fault: Fault) -> Result<(SessionBuilder, Log), Error> {
+    match fault {
+        Fault::DiskFull => Ok((builder.log("/dev/full"), Log(None))),
+        Fault::LoggerStuck => {
+            // A pipe whose other end is open and never read.
+            let path = std::env::temp_dir().join(format!("palpate-{}.fifo", std::process::id()));
+            let shell = "rm -f \"$1\"; mkfifo \"$1\"; exec sleep 60 < \"$1\"";
+            let reader = std::process::Command::new("sh").args(["-c", shell, "sh"]).arg(&path).spawn();
+            let reader = reader.map_err(|error| Error::io(&path, error))?;
+            while !path.exists() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            Ok((builder.log(path), Log(Some(reader))))
+        }
+        _ => Ok((builder, Log(None))),
+    }
+}
+
+/// SIGSTOP, and SIGCONT after `pause`.
+fn stop_this_process(pause: Duration) {
+    let process = std::process::id();
+    let shell = format!("kill -STOP {process}; sleep {}; kill -CONT {process}", pause.as_secs_f64());
+    // Without a shell nothing is stopped, which the trace then shows.
+    let _ = std::process::Command::new("sh").args(["-c", &shell]).status();
 }
