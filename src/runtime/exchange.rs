@@ -26,6 +26,7 @@
 use super::sync::{AtomicUsize, CachePadded, Ordering, UnsafeCell};
 use crate::time::Nanos;
 use std::fmt;
+use std::marker::PhantomData;
 use std::sync::Arc;
 
 /// Set in [`Shared::in_flight`] when the slot holds a value that the reader has not taken.
@@ -80,7 +81,8 @@ pub fn exchange<T: Send>(mut init: impl FnMut() -> T) -> (ExchangeWriter<T>, Exc
 
 fn pair<T>(shared: Shared<T>) -> (ExchangeWriter<T>, ExchangeReader<T>) {
     let shared = Arc::new(shared);
-    (ExchangeWriter { shared: Arc::clone(&shared), slot: 0, version: 0 }, ExchangeReader { shared, slot: 2 })
+    let writer = ExchangeWriter { shared: Arc::clone(&shared), slot: 0, version: 0 };
+    (writer, ExchangeReader { shared, slot: 2, lends: PhantomData })
 }
 
 /// The publishing side of an [`exchange`].
@@ -133,9 +135,22 @@ impl<T> fmt::Debug for ExchangeWriter<T> {
 }
 
 /// The reading side of an [`exchange`]. It owns its buffer until the next successful refresh.
+///
+/// It lends out its value, so threads may share it only if they may share that: a `Cell` can go from thread to thread
+/// through an exchange, and cannot be looked at by two.
+///
+/// ```compile_fail,E0277
+/// fn share_between_threads<T: Sync>(_: &T) {}
+///
+/// let (_, reader) = palpate::runtime::exchange::exchange(|| std::cell::Cell::new(0));
+/// share_between_threads(&reader);
+/// ```
 pub struct ExchangeReader<T> {
     shared: Arc<Shared<T>>,
     slot: usize,
+    /// A reader is `Sync` where `T` is. What is shared would be so with `T: Send` alone, which is all that a hand-over
+    /// needs.
+    lends: PhantomData<T>,
 }
 
 impl<T> ExchangeReader<T> {
@@ -169,8 +184,15 @@ impl<T> ExchangeReader<T> {
     /// Wait-free, real-time safe.
     #[inline]
     pub fn get_mut(&mut self) -> &mut T {
-        // SAFETY: `slot` is ours until the next swap, and `&mut self` keeps the reference from outliving that.
-        self.shared.slots[self.slot].with_mut(|slot| unsafe { &mut (*slot).value })
+        &mut self.slot_mut().value
+    }
+
+    /// Takes over what the reader of another exchange holds, with its version and its stamp; that one gets ours.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe: it moves two values.
+    pub(super) fn adopt(&mut self, other: &mut Self) {
+        std::mem::swap(self.slot_mut(), other.slot_mut());
     }
 
     /// The version of the value, counting from 1; 0 before the first.
@@ -195,6 +217,12 @@ impl<T> ExchangeReader<T> {
     fn slot(&self) -> &Slot<T> {
         // SAFETY: `slot` is ours until the next swap, which needs `&mut self`.
         self.shared.slots[self.slot].with(|slot| unsafe { &*slot })
+    }
+
+    #[inline]
+    fn slot_mut(&mut self) -> &mut Slot<T> {
+        // SAFETY: `slot` is ours until the next swap, and `&mut self` keeps the reference from outliving that.
+        self.shared.slots[self.slot].with_mut(|slot| unsafe { &mut *slot })
     }
 }
 
@@ -223,6 +251,19 @@ mod tests {
         assert_eq!((*reader.get(), reader.version(), reader.published()), (30, 3, Nanos(30)));
         assert!(!reader.refresh());
         assert_eq!(*reader.get(), 30);
+    }
+
+    #[test]
+    fn what_may_be_sent_goes_through_and_what_may_be_shared_is_shared() {
+        fn send<T: Send>(_: &T) {}
+        fn sync<T: Sync>(_: &T) {}
+        // Check that a value need not be shareable to be handed over; that such a reader cannot be shared does not compile
+        let (writer, reader) = exchange(|| std::cell::Cell::new(0));
+        send(&writer);
+        send(&reader);
+        let (writer, reader) = exchange(|| 0);
+        sync(&writer);
+        sync(&reader);
     }
 
     #[test]

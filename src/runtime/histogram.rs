@@ -103,11 +103,6 @@ impl fmt::Debug for HistogramWriter {
 pub struct HistogramReader(Arc<CachePadded<Shared>>);
 
 impl HistogramReader {
-    /// A writer in the place of one that is gone.
-    pub(super) fn next_writer(&self) -> HistogramWriter {
-        HistogramWriter(Arc::clone(&self.0))
-    }
-
     /// All times counted so far.
     ///
     /// # Real-time
@@ -139,6 +134,13 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// What two histograms held together.
+    pub(super) fn merged(&self, other: &Self) -> Self {
+        let counts = self.counts.iter().zip(&other.counts).map(|(a, b)| a + b).collect();
+        let sum = Nanos(self.sum.0.wrapping_add(other.sum.0));
+        Self { counts, count: self.count + other.count, sum, max: self.max.max(other.max) }
+    }
+
     /// How many times were counted.
     pub fn count(&self) -> u64 {
         self.count
@@ -201,6 +203,16 @@ mod tests {
             let (exact, got) = (exact[rank - 1], shown.percentile(q).0);
             prop_assert!(got >= exact, "{got} < {exact}");
             prop_assert!(exact >= LIMIT || got - exact <= exact / FINE, "{got} for {exact}");
+        }
+
+        #[test]
+        fn histograms_merged_hold_what_one_of_both_would_hold(first in times(), second in times()) {
+            let of = |times: &[u64]| {
+                let (mut writer, reader) = histogram();
+                times.iter().for_each(|&time| writer.record(Nanos(time)));
+                reader.snapshot()
+            };
+            prop_assert!(of(&first).merged(&of(&second)) == of(&[first, second].concat()));
         }
 
         #[test]

@@ -6,7 +6,7 @@ use super::rate_group::RateGroup;
 use super::record::TickTiming;
 use super::sync::{AtomicU64, CachePadded, Ordering};
 use crate::time::{Nanos, Rate};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A rate group at one moment of its run.
 ///
@@ -38,6 +38,18 @@ struct Counts {
     missed: AtomicU64,
 }
 
+/// What one writer shows. Each has its own: one that was fenced counts on where nobody looks.
+#[derive(Debug)]
+struct Shown {
+    counts: Arc<CachePadded<Counts>>,
+    lateness: HistogramReader,
+    execution: HistogramReader,
+    /// Lateness and execution of all writers before.
+    before: Option<(Snapshot, Snapshot)>,
+    /// What the writer shows that has taken its place.
+    next: OnceLock<Arc<Shown>>,
+}
+
 /// The group's side.
 #[derive(Debug)]
 pub(crate) struct LiveWriter {
@@ -51,22 +63,31 @@ pub(crate) struct LiveWriter {
 pub(crate) struct LiveReader {
     name: String,
     rate: Rate,
-    counts: Arc<CachePadded<Counts>>,
-    lateness: HistogramReader,
-    execution: HistogramReader,
+    first: Arc<Shown>,
 }
 
 pub(crate) fn live(group: &RateGroup) -> (LiveWriter, LiveReader) {
-    let counts = Arc::new(CachePadded(Counts::default()));
-    let ((lateness, lateness_shown), (execution, execution_shown)) = (histogram(), histogram());
-    let reader = LiveReader {
-        name: group.name.clone(),
-        rate: group.rate,
-        counts: Arc::clone(&counts),
-        lateness: lateness_shown,
-        execution: execution_shown,
-    };
-    (LiveWriter { counts, lateness, execution }, reader)
+    let (writer, first) = Shown::new(Counts::default(), None);
+    (writer, LiveReader { name: group.name.clone(), rate: group.rate, first })
+}
+
+impl Shown {
+    fn new(counts: Counts, before: Option<(Snapshot, Snapshot)>) -> (LiveWriter, Arc<Self>) {
+        let counts = Arc::new(CachePadded(counts));
+        let ((lateness, lateness_shown), (execution, execution_shown)) = (histogram(), histogram());
+        let writer = LiveWriter { counts: Arc::clone(&counts), lateness, execution };
+        let next = OnceLock::new();
+        (writer, Arc::new(Self { counts, lateness: lateness_shown, execution: execution_shown, before, next }))
+    }
+
+    /// The times of this writer and of all before it.
+    fn times(&self) -> (Snapshot, Snapshot) {
+        let (lateness, execution) = (self.lateness.snapshot(), self.execution.snapshot());
+        match &self.before {
+            Some(before) => (before.0.merged(&lateness), before.1.merged(&execution)),
+            None => (lateness, execution),
+        }
+    }
 }
 
 impl LiveWriter {
@@ -90,23 +111,40 @@ impl LiveWriter {
 }
 
 impl LiveReader {
-    /// The group's side for actors that take the place of others.
+    /// The group's side for actors that take the place of others; what the one before still counts is seen by nobody.
     pub(crate) fn next_writer(&self) -> LiveWriter {
-        let (lateness, execution) = (self.lateness.next_writer(), self.execution.next_writer());
-        LiveWriter { counts: Arc::clone(&self.counts), lateness, execution }
+        let last = self.last();
+        let Counts { released, skipped, missed } = &**last.counts;
+        let copy = |count: &AtomicU64| AtomicU64::new(count.load(Ordering::Acquire));
+        let counts = Counts { released: copy(released), skipped: copy(skipped), missed: copy(missed) };
+        let (writer, shown) = Shown::new(counts, Some(last.times()));
+        // Set once: only the one who starts a group again comes here.
+        let _ = last.next.set(shown);
+        writer
+    }
+
+    /// What the writer in force shows: as many steps away as the group was started again.
+    fn last(&self) -> &Shown {
+        let mut last = &self.first;
+        while let Some(next) = last.next.get() {
+            last = next;
+        }
+        last
     }
 
     pub(crate) fn read(&self) -> GroupLive {
+        let shown = self.last();
         // Acquire: with the release in `count`; everything below is read afterwards.
-        let released = self.counts.released.load(Ordering::Acquire);
+        let released = shown.counts.released.load(Ordering::Acquire);
+        let (lateness, execution) = shown.times();
         GroupLive {
             name: self.name.clone(),
             rate: self.rate,
             released,
-            skipped: self.counts.skipped.load(Ordering::Relaxed),
-            missed: self.counts.missed.load(Ordering::Relaxed),
-            lateness: self.lateness.snapshot(),
-            execution: self.execution.snapshot(),
+            skipped: shown.counts.skipped.load(Ordering::Relaxed),
+            missed: shown.counts.missed.load(Ordering::Relaxed),
+            lateness,
+            execution,
         }
     }
 }
@@ -118,5 +156,32 @@ impl GroupLive {
     /// Wait-free, real-time safe.
     pub fn busy(&self, elapsed: Nanos) -> f64 {
         if elapsed == Nanos::ZERO { 0.0 } else { self.execution.sum().0 as f64 / elapsed.0 as f64 }
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_and_times_go_on_with_the_next_writer_and_a_fenced_one_has_no_part_in_them() {
+        let group = RateGroup::hz(1000).name("g");
+        let (mut fenced, reader) = live(&group);
+        let mut ledger = Ledger::new(0, &group, None);
+        let timing = |us: u64| TickTiming { end: Nanos(1000 * us), ..TickTiming::default() };
+        let early = reader.clone();
+        ledger.released = 1;
+        fenced.release(&timing(7), &ledger);
+        let mut next = reader.next_writer();
+        assert_eq!((reader.read().released, reader.read().execution.max()), (1, Nanos(7000)));
+        ledger.released = 100;
+        fenced.release(&timing(900), &ledger);
+        ledger.released = 2;
+        next.release(&timing(5), &ledger);
+        for reader in [&reader, &early] {
+            let shown = reader.read();
+            let times = (shown.execution.count(), shown.execution.sum(), shown.execution.max());
+            assert_eq!((shown.released, times), (2, (2, Nanos(12_000), Nanos(7000))));
+        }
     }
 }

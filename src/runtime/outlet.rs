@@ -3,24 +3,34 @@
 use super::actor::TickContext;
 use super::exchange::{ExchangeReader, ExchangeWriter, exchange};
 use super::link::{Linked, linked};
-use super::port::VersionCounter;
+use super::numbers::Numbers;
 use crate::time::Nanos;
 
 /// The actor's side of an outlet.
 #[derive(Debug)]
-pub struct OutletWriter<T>(Linked<ExchangeWriter<T>>, VersionCounter);
+pub struct OutletWriter<T>(Linked<ExchangeWriter<T>>, Numbers);
 
 /// The outside thread's side of an outlet. It owns its buffer until the next successful refresh.
+///
+/// It lends out its value: threads may share it only if they may share that.
+///
+/// ```compile_fail,E0277
+/// fn share_between_threads<T: Sync>(_: &T) {}
+///
+/// let mut graph = palpate::runtime::Runtime::builder(palpate::runtime::Execution::Virtual);
+/// let (_, reader) = graph.outlet(|| std::cell::Cell::new(0));
+/// share_between_threads(&reader);
+/// ```
 #[derive(Debug)]
 pub struct OutletReader<T>(Linked<ExchangeReader<T>>);
 
 pub(super) fn outlet<T: Send>(init: impl FnMut() -> T) -> (OutletWriter<T>, OutletReader<T>) {
     let (writer, reader) = exchange(init);
-    (OutletWriter::new(linked(writer).0, VersionCounter::default()), OutletReader::new(linked(reader).0))
+    (OutletWriter::new(linked(writer).0, Numbers::default()), OutletReader::new(linked(reader).0))
 }
 
 impl<T> OutletWriter<T> {
-    pub(super) fn new(half: Linked<ExchangeWriter<T>>, versions: VersionCounter) -> Self {
+    pub(super) fn new(half: Linked<ExchangeWriter<T>>, versions: Numbers) -> Self {
         Self(half, versions)
     }
 
@@ -32,14 +42,14 @@ impl<T> OutletWriter<T> {
         self.0.half_mut().buffer()
     }
 
-    /// Makes the buffer the newest value and returns its version, counting from 1.
+    /// Makes the buffer the newest value and returns its version, counting from 1; 0 if this writer's place was
+    /// [taken](super::OutletPort::writer): nothing is published then.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn publish(&mut self, ctx: &TickContext) -> u64 {
-        let version = self.0.half_mut().publish_as(self.1.next(), ctx.scheduled);
-        // Only now: a buffer half written must not be changed for another.
-        self.0.current();
+        let Some(version) = self.1.next() else { return 0 };
+        self.0.publish_as(version, ctx.scheduled);
         version
     }
 }
@@ -54,7 +64,7 @@ impl<T> OutletReader<T> {
     /// # Real-time
     /// Wait-free, real-time safe; never disturbs the writer.
     pub fn refresh(&mut self) -> bool {
-        self.0.current().refresh()
+        self.0.refresh()
     }
 
     /// The value of the last refresh, or the initial value.

@@ -12,16 +12,15 @@
 use super::actor::{Phase, TickContext};
 use super::exchange::{ExchangeReader, ExchangeWriter};
 use super::link::Linked;
+use super::numbers::Numbers;
 use super::port_memory::{Looks, PortPlan, UseRecorder, WriterGroup};
 use super::port_use::PortUseKind;
-use super::sync::{AtomicU64, Ordering};
 use super::virtual_port::{SharedFlight, VirtualReader, VirtualWriter};
 use crate::time::Nanos;
 use std::fmt;
-use std::sync::Arc;
 
 enum WriterKind<T> {
-    Threaded(Linked<ExchangeWriter<T>>, VersionCounter),
+    Threaded(Linked<ExchangeWriter<T>>),
     Virtual(VirtualWriter<T>),
 }
 
@@ -30,22 +29,10 @@ enum ReaderKind<T> {
     Virtual(VirtualReader<T>),
 }
 
-/// Counts the versions of a port, on through every writer that it had.
-#[derive(Clone, Debug, Default)]
-pub(super) struct VersionCounter(Arc<AtomicU64>);
-
-impl VersionCounter {
-    pub(super) fn next(&self) -> u64 {
-        // Relaxed, and no read-modify-write: there is one writer; one that was fenced may still count, to no effect.
-        let version = self.0.load(Ordering::Relaxed) + 1;
-        self.0.store(version, Ordering::Relaxed);
-        version
-    }
-}
-
 /// Publishes the newest value of a state.
 pub struct Writer<T> {
     kind: WriterKind<T>,
+    versions: Numbers,
     group: WriterGroup,
 }
 
@@ -58,12 +45,14 @@ pub struct Reader<T> {
 }
 
 impl<T> Writer<T> {
-    pub(super) fn threaded(plan: &PortPlan, half: Linked<ExchangeWriter<T>>, versions: VersionCounter) -> Self {
-        Self { kind: WriterKind::Threaded(half, versions), group: plan.group.clone() }
+    pub(super) fn threaded(plan: &PortPlan, half: Linked<ExchangeWriter<T>>, versions: Numbers) -> Self {
+        Self { kind: WriterKind::Threaded(half), versions, group: plan.group.clone() }
     }
 
-    pub(super) fn in_virtual_time(plan: &PortPlan, flight: &SharedFlight<T>) -> Self {
-        Self { kind: WriterKind::Virtual(VirtualWriter::new(flight)), group: plan.group.clone() }
+    /// Fences the writer that had these versions.
+    pub(super) fn in_virtual_time(plan: &PortPlan, flight: &SharedFlight<T>, versions: &mut Numbers) -> Self {
+        let kind = WriterKind::Virtual(VirtualWriter::new(flight));
+        Self { kind, versions: versions.succeed(), group: plan.group.clone() }
     }
 
     /// The buffer to write the next value into; it holds an old value, of no particular age.
@@ -72,26 +61,24 @@ impl<T> Writer<T> {
     /// Wait-free, real-time safe.
     pub fn buffer(&mut self) -> &mut T {
         match &mut self.kind {
-            WriterKind::Threaded(writer, _) => writer.half_mut().buffer(),
+            WriterKind::Threaded(writer) => writer.half_mut().buffer(),
             WriterKind::Virtual(writer) => writer.buffer(),
         }
     }
 
-    /// Makes the buffer the newest value and returns its version, counting from 1.
+    /// Makes the buffer the newest value and returns its version, counting from 1; 0 if this writer's place was
+    /// [taken](super::ExchangePort::writer): nothing is published then.
     ///
     /// # Real-time
     /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock and may allocate.
     pub fn publish(&mut self, ctx: &TickContext) -> u64 {
+        let Some(version) = self.versions.next() else { return 0 };
         self.group.set(ctx);
         match &mut self.kind {
-            WriterKind::Threaded(writer, versions) => {
-                let version = writer.half_mut().publish_as(versions.next(), ctx.scheduled);
-                // Only now: a buffer half written must not be changed for another.
-                writer.current();
-                version
-            }
-            WriterKind::Virtual(writer) => writer.publish(ctx),
+            WriterKind::Threaded(writer) => writer.publish_as(version, ctx.scheduled),
+            WriterKind::Virtual(writer) => writer.publish_as(version, ctx),
         }
+        version
     }
 }
 
@@ -120,7 +107,7 @@ impl<T> Reader<T> {
             return false;
         }
         let fresh = match &mut self.kind {
-            ReaderKind::Threaded(reader) => reader.current().refresh(),
+            ReaderKind::Threaded(reader) => reader.refresh(),
             ReaderKind::Virtual(reader) => reader.refresh(ctx, self.group.is(ctx)),
         };
         if fresh && ctx.phase == Phase::Release && !self.group.is(ctx) {

@@ -13,9 +13,10 @@ pub enum PortUseKind {
     /// A reader took a newer value; the count is its version.
     #[default]
     Took = 0,
-    /// More samples of a queue were visible than before; the count is how many had been sent in all.
+    /// More samples of a queue were visible than before; the count is the number of the newest: attempts to send are
+    /// numbered from 1, those that found the queue full too.
     Saw = 1,
-    /// A sample found its queue full; the count is the number of the attempt, counting from 1.
+    /// A sample found its queue full; the count is the number of the attempt.
     Dropped = 2,
 }
 
@@ -58,7 +59,7 @@ pub struct PortUse {
     pub kind: PortUseKind,
     /// The number of the release.
     pub tick: u64,
-    /// Version, samples or attempts: see [`PortUseKind`].
+    /// Version or number of an attempt: see [`PortUseKind`].
     pub count: u64,
     /// Numbers the uses of one kind of one port from 0, so that a missing one is noticed.
     pub sequence: u64,

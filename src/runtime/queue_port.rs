@@ -6,27 +6,30 @@
 
 use super::actor::{Phase, TickContext};
 use super::link::Linked;
+use super::linked_queue::{LinkedConsumer, Numbered};
+use super::numbers::Numbers;
 use super::port_memory::{Looks, PortPlan, UseRecorder, WriterGroup};
 use super::port_use::PortUseKind;
 use super::ring::{Consumer, Producer};
-use super::virtual_queue::VirtualQueue;
+use super::virtual_queue::{VirtualQueue, VirtualReceiver};
 use std::fmt;
 
 enum WriterKind<T> {
-    Threaded(Linked<Producer<T>>),
+    Threaded(Linked<Producer<Numbered<T>>>),
     Virtual(VirtualQueue<T>),
 }
 
 enum ReaderKind<T> {
-    Threaded(Linked<Consumer<T>>),
-    Virtual(VirtualQueue<T>),
+    Threaded(LinkedConsumer<T>),
+    Virtual(VirtualReceiver<T>),
 }
 
 /// Sends samples that all count, in order.
 pub struct QueueWriter<T> {
     kind: WriterKind<T>,
     group: WriterGroup,
-    attempts: u64,
+    attempts: Numbers,
+    drops: Numbers,
     dropped: UseRecorder,
 }
 
@@ -35,9 +38,7 @@ pub struct QueueReader<T> {
     kind: ReaderKind<T>,
     group: WriterGroup,
     looks: Looks,
-    /// Samples taken so far.
-    taken: u64,
-    /// Samples that had been sent when this release looked.
+    /// The number of the newest sample that was there when this release looked.
     visible: u64,
     /// The same at the last look that was recorded.
     recorded: u64,
@@ -45,62 +46,67 @@ pub struct QueueReader<T> {
 }
 
 impl<T: Copy> QueueWriter<T> {
-    pub(super) fn threaded(plan: &PortPlan, half: Linked<Producer<T>>) -> Self {
-        Self::of(plan, WriterKind::Threaded(half))
+    pub(super) fn threaded(
+        plan: &PortPlan,
+        half: Linked<Producer<Numbered<T>>>,
+        attempts: Numbers,
+        drops: Numbers,
+    ) -> Self {
+        Self::of(plan, WriterKind::Threaded(half), attempts, drops)
     }
 
-    pub(super) fn in_virtual_time(plan: &PortPlan, queue: &VirtualQueue<T>) -> Self {
-        Self::of(plan, WriterKind::Virtual(queue.clone()))
+    pub(super) fn in_virtual_time(plan: &PortPlan, queue: &VirtualQueue<T>, attempts: Numbers, drops: Numbers) -> Self {
+        Self::of(plan, WriterKind::Virtual(queue.clone()), attempts, drops)
     }
 
-    fn of(plan: &PortPlan, kind: WriterKind<T>) -> Self {
+    fn of(plan: &PortPlan, kind: WriterKind<T>, attempts: Numbers, drops: Numbers) -> Self {
         let dropped = plan.recorder(PortUseKind::Dropped);
-        Self { kind, group: plan.group.clone(), attempts: 0, dropped }
+        Self { kind, group: plan.group.clone(), attempts, drops, dropped }
     }
 
-    /// Sends a sample; false if the queue is full: the sample is then dropped and counted.
+    /// Sends a sample; false if the queue is full: the sample is then dropped and counted. Also false if this writer's
+    /// place was [taken](super::QueuePort::writer): nothing is sent or counted then.
     ///
     /// # Real-time
     /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock and may allocate.
     pub fn push(&mut self, ctx: &TickContext, sample: T) -> bool {
+        let Some(number) = self.attempts.next() else { return false };
         self.group.set(ctx);
-        self.attempts += 1;
+        let sample = Numbered { number, value: sample };
         let sent = match &mut self.kind {
-            WriterKind::Threaded(producer) => producer.current().push(sample),
-            WriterKind::Virtual(queue) => queue.push(ctx, sample, self.attempts),
+            WriterKind::Threaded(producer) => producer.push(sample),
+            WriterKind::Virtual(queue) => queue.push(ctx, sample),
         };
-        if !sent && matches!(ctx.phase, Phase::Start | Phase::Release) {
-            self.dropped.push(ctx, self.attempts);
+        if !sent {
+            self.drops.next();
+            if matches!(ctx.phase, Phase::Start | Phase::Release) {
+                self.dropped.push(ctx, number);
+            }
         }
         sent
     }
 
-    /// Samples dropped so far because the queue was full.
+    /// Samples dropped so far because the queue was full, by the writers before this one included.
     ///
     /// # Real-time
-    /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock.
+    /// Wait-free, real-time safe.
     pub fn dropped(&self) -> u64 {
-        match &self.kind {
-            WriterKind::Threaded(producer) => producer.half().lost(),
-            WriterKind::Virtual(queue) => queue.dropped(),
-        }
+        self.drops.last()
     }
 }
 
 impl<T: Copy> QueueReader<T> {
-    pub(super) fn threaded(plan: &PortPlan, half: Linked<Consumer<T>>) -> Self {
-        Self::of(plan, ReaderKind::Threaded(half), 0)
+    pub(super) fn threaded(plan: &PortPlan, half: Linked<Consumer<Numbered<T>>>) -> Self {
+        Self::of(plan, ReaderKind::Threaded(LinkedConsumer::new(half)))
     }
 
     pub(super) fn in_virtual_time(plan: &PortPlan, queue: &VirtualQueue<T>) -> Self {
-        Self::of(plan, ReaderKind::Virtual(queue.clone()), queue.skip_all())
+        Self::of(plan, ReaderKind::Virtual(queue.receiver()))
     }
 
-    /// `taken` samples have been sent before and are no concern of this reader.
-    fn of(plan: &PortPlan, kind: ReaderKind<T>, taken: u64) -> Self {
+    fn of(plan: &PortPlan, kind: ReaderKind<T>) -> Self {
         let saw = plan.recorder(PortUseKind::Saw);
-        let group = plan.group.clone();
-        Self { kind, group, looks: Looks::default(), taken, visible: taken, recorded: taken, saw }
+        Self { kind, group: plan.group.clone(), looks: Looks::default(), visible: 0, recorded: 0, saw }
     }
 
     /// The oldest sample that this release can see, left in the queue.
@@ -109,12 +115,9 @@ impl<T: Copy> QueueReader<T> {
     /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock.
     pub fn peek(&mut self, ctx: &TickContext) -> Option<T> {
         self.look(ctx);
-        if self.taken >= self.visible {
-            return None;
-        }
         match &mut self.kind {
-            ReaderKind::Threaded(consumer) => consumer.half_mut().peek(),
-            ReaderKind::Virtual(queue) => queue.peek(),
+            ReaderKind::Threaded(consumer) => consumer.peek(self.visible),
+            ReaderKind::Virtual(queue) => queue.peek(self.visible),
         }
     }
 
@@ -124,15 +127,10 @@ impl<T: Copy> QueueReader<T> {
     /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock.
     pub fn pop(&mut self, ctx: &TickContext) -> Option<T> {
         self.look(ctx);
-        if self.taken >= self.visible {
-            return None;
+        match &mut self.kind {
+            ReaderKind::Threaded(consumer) => consumer.pop(self.visible),
+            ReaderKind::Virtual(queue) => queue.pop(self.visible),
         }
-        let sample = match &mut self.kind {
-            ReaderKind::Threaded(consumer) => consumer.half_mut().pop(),
-            ReaderKind::Virtual(queue) => queue.pop(),
-        };
-        self.taken += u64::from(sample.is_some());
-        sample
     }
 
     /// Decides, at the first call of a release, which samples it gets.
@@ -140,10 +138,11 @@ impl<T: Copy> QueueReader<T> {
         if !self.looks.is_first(ctx) {
             return;
         }
-        self.visible = match &mut self.kind {
-            ReaderKind::Threaded(consumer) => self.taken + consumer.current().available() as u64,
-            ReaderKind::Virtual(queue) => queue.visible(ctx, self.group.is(ctx), self.taken),
+        let newest = match &mut self.kind {
+            ReaderKind::Threaded(consumer) => consumer.newest(),
+            ReaderKind::Virtual(queue) => queue.newest(ctx, self.group.is(ctx)),
         };
+        self.visible = newest.unwrap_or(self.visible);
         if self.visible != self.recorded && ctx.phase == Phase::Release && !self.group.is(ctx) {
             self.recorded = self.visible;
             self.saw.push(ctx, self.visible);
@@ -153,12 +152,12 @@ impl<T: Copy> QueueReader<T> {
 
 impl<T> fmt::Debug for QueueWriter<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("QueueWriter").field("attempts", &self.attempts).finish_non_exhaustive()
+        f.debug_struct("QueueWriter").field("attempts", &self.attempts.last()).finish_non_exhaustive()
     }
 }
 
 impl<T> fmt::Debug for QueueReader<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("QueueReader").field("taken", &self.taken).finish_non_exhaustive()
+        f.debug_struct("QueueReader").field("visible", &self.visible).finish_non_exhaustive()
     }
 }

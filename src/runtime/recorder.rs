@@ -1,7 +1,7 @@
 //! How records leave an actor: a ring per source, drained by a logger that merges them by time.
 
 use super::record::Record;
-use super::ring::{Consumer, Producer, ring};
+use super::ring::{Consumer, Producer, Sums, ring};
 use super::sync::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -21,30 +21,44 @@ struct Rings {
     lost: u64,
 }
 
+/// A ring in the place of another.
+#[derive(Debug)]
+pub(super) struct NewRing {
+    pub(super) recorder: Recorder,
+    /// Its number, to replace it.
+    pub(super) index: usize,
+    /// How many records were pushed into the one before, lost ones included, until it was replaced.
+    pub(super) before: u64,
+}
+
 impl Registry {
     pub(crate) fn new() -> Arc<Self> {
         Arc::new(Self { rings: Mutex::default(), wanted: AtomicBool::new(false) })
     }
 
     pub(crate) fn recorder(&self, capacity: usize) -> Recorder {
-        self.replace(None, capacity).0
+        self.replace(None, capacity).recorder
     }
 
-    /// A new ring in place of number `old`, whose records up to now are kept; and its own number.
-    pub(crate) fn replace(&self, old: Option<usize>, capacity: usize) -> (Recorder, usize) {
+    /// A new ring in place of number `old`, whose records up to now are kept: what its recorder still pushes is seen by
+    /// nobody.
+    pub(super) fn replace(&self, old: Option<usize>, capacity: usize) -> NewRing {
         let (producer, consumer) = ring(capacity);
         let mut rings = self.rings();
         let index = old.unwrap_or(rings.all.len());
+        let mut before = 0;
         if old.is_some() {
             let mut replaced = std::mem::replace(&mut rings.all[index], consumer);
-            let capacity = replaced.capacity();
+            // At one moment: the recorder may be at work on a thread that was left behind.
+            let Sums { pushed, lost, left } = replaced.sums();
             let wanted = self.wanted();
-            rings.kept.extend(std::iter::from_fn(|| replaced.pop()).take(if wanted { capacity } else { 0 }));
-            rings.lost += replaced.lost();
+            rings.kept.extend(std::iter::from_fn(|| replaced.pop()).take(if wanted { left } else { 0 }));
+            rings.lost += lost;
+            before = pushed + lost;
         } else {
             rings.all.push(consumer);
         }
-        (Recorder(producer), index)
+        NewRing { recorder: Recorder(producer), index, before }
     }
 
     pub(crate) fn drain(self: &Arc<Self>) -> RecordDrain {
@@ -145,5 +159,27 @@ mod tests {
         let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|e| e.code).collect();
         assert_eq!(codes, [10, 20, 11, 12, 21]);
         assert_eq!(drain.lost(), 1);
+    }
+
+    #[test]
+    fn a_replaced_ring_keeps_its_records_and_tells_how_many_there_were() {
+        let registry = Registry::new();
+        let mut drain = registry.drain();
+        let NewRing { recorder: mut old, index, .. } = registry.replace(None, 4);
+        old.push(event(1, 1));
+        let mut records = Vec::new();
+        drain.drain(&mut records);
+        for code in 2..=6 {
+            old.push(event(u64::from(code), code));
+        }
+        let NewRing { recorder: mut fresh, index: same, before } = registry.replace(Some(index), 4);
+        // Check that taken, left and lost ones count, and that the ring takes the place of the other
+        assert_eq!((same, before, drain.lost()), (index, 6, 1));
+        old.push(event(7, 7));
+        fresh.push(event(8, 8));
+        drain.drain(&mut records);
+        let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|e| e.code).collect();
+        assert_eq!(codes, [1, 2, 3, 4, 5, 8]);
+        assert_eq!(registry.rings().all.len(), 1);
     }
 }

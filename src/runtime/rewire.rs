@@ -1,12 +1,15 @@
 //! Ports whose halves can be taken again: what a restarted group is connected with.
 //!
 //! Taking a half again *fences* the one taken before: the other half is connected to the fresh one, and what the old one
-//! still publishes or sends is seen by nobody. So a thread that never returns can be left behind with its ports.
+//! still publishes, sends or records is seen by nobody and counted nowhere. So a thread that never returns can be left
+//! behind with its ports.
 
 use super::exchange::{ExchangeReader, ExchangeWriter, exchange};
 use super::link::{Linked, Relink, linked};
+use super::linked_queue::Numbered;
+use super::numbers::Numbers;
 use super::outlet::{OutletReader, OutletWriter};
-use super::port::{Reader, VersionCounter, Writer};
+use super::port::{Reader, Writer};
 use super::port_memory::PortPlan;
 use super::queue_port::{QueueReader, QueueWriter};
 use super::recorder::{Recorder, Registry};
@@ -19,38 +22,35 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// Two connected halves of which each can be made anew.
 pub(super) struct Pair<W, R> {
     make: Box<dyn FnMut() -> (W, R) + Send>,
+    /// Moves on to a writer what a reader of the writer before has not taken.
+    carry: fn(R, &mut W),
     writer: Option<Linked<W>>,
     reader: Option<Linked<R>>,
     to_writer: Relink<W>,
     to_reader: Relink<R>,
 }
 
-impl<W, R> Pair<W, R> {
-    fn new(mut make: impl FnMut() -> (W, R) + Send + 'static) -> Self {
+impl<W: Send, R: Send> Pair<W, R> {
+    fn new(mut make: impl FnMut() -> (W, R) + Send + 'static, carry: fn(R, &mut W)) -> Self {
         let (writer, reader) = make();
         let ((writer, to_writer), (reader, to_reader)) = (linked(writer), linked(reader));
-        Self { make: Box::new(make), writer: Some(writer), reader: Some(reader), to_writer, to_reader }
+        Self { make: Box::new(make), carry, writer: Some(writer), reader: Some(reader), to_writer, to_reader }
     }
 
-    pub(super) fn of_exchange<T: Send + 'static>(
-        mut init: impl FnMut() -> T + Send + 'static,
-    ) -> Pair<ExchangeWriter<T>, ExchangeReader<T>> {
-        Pair::new(move || exchange(&mut init))
-    }
-
-    pub(super) fn of_ring<T: Copy + Send + 'static>(capacity: usize) -> Pair<Producer<T>, Consumer<T>> {
-        Pair::new(move || ring(capacity))
-    }
-
-    pub(super) fn writer(&mut self) -> Linked<W> {
+    /// The writer, and its `numbers`: those of the one before are fenced.
+    pub(super) fn writer(&mut self, numbers: &mut Numbers) -> (Linked<W>, Numbers) {
         if let Some(first) = self.writer.take() {
-            return first;
+            return (first, numbers.succeed());
         }
-        let (writer, reader) = (self.make)();
-        self.to_reader.deliver(reader);
+        let (mut writer, reader) = (self.make)();
+        // Fenced first: whatever has a number then is found in the old half, or was never published.
+        let own = numbers.succeed();
+        if let Some(untaken) = self.to_reader.deliver(reader) {
+            (self.carry)(untaken, &mut writer);
+        }
         let (writer, to_writer) = linked(writer);
         self.to_writer = to_writer;
-        writer
+        (writer, own)
     }
 
     pub(super) fn reader(&mut self) -> Linked<R> {
@@ -58,33 +58,73 @@ impl<W, R> Pair<W, R> {
             return first;
         }
         let (writer, reader) = (self.make)();
-        self.to_writer.deliver(writer);
+        // One that nobody took has nothing in hand.
+        let _ = self.to_writer.deliver(writer);
         let (reader, to_reader) = linked(reader);
         self.to_reader = to_reader;
         reader
     }
 }
 
+type ExchangePair<T> = Pair<ExchangeWriter<T>, ExchangeReader<T>>;
+type RingPair<T> = Pair<Producer<Numbered<T>>, Consumer<Numbered<T>>>;
+
+fn exchange_pair<T: Send + 'static>(mut init: impl FnMut() -> T + Send + 'static) -> ExchangePair<T> {
+    Pair::new(
+        move || exchange(&mut init),
+        |mut untaken, writer| {
+            if untaken.refresh() {
+                std::mem::swap(untaken.get_mut(), writer.buffer());
+                writer.publish_as(untaken.version(), untaken.published());
+            }
+        },
+    )
+}
+
+fn ring_pair<T: Copy + Send + 'static>(capacity: usize) -> RingPair<T> {
+    Pair::new(
+        move || ring(capacity),
+        // They fit: both rings have the same capacity.
+        |mut untaken, producer| while untaken.pop().is_some_and(|sample| producer.push(sample)) {},
+    )
+}
+
 enum ExchangeParts<T> {
-    Threaded { pair: Box<Pair<ExchangeWriter<T>, ExchangeReader<T>>>, versions: VersionCounter },
+    Threaded(Box<ExchangePair<T>>),
     Virtual(SharedFlight<T>),
+}
+
+struct Exchange<T> {
+    plan: PortPlan,
+    parts: ExchangeParts<T>,
+    versions: Numbers,
 }
 
 /// An [exchange](super::RuntimeBuilder::exchange) whose halves can be taken again; clones are the same port.
 ///
+/// Taking a half again is the same in both executions:
+///
+/// - A new writer goes on with the versions. The reader that stays keeps its value, and still gets what was published
+///   before and not taken yet.
+/// - A new reader begins as at the start of the run, with the initial value and version 0, and gets everything that is
+///   published from then on. What was published before may be in use by the one that it replaces, and is not shown again.
+///
 /// # Real-time
-/// The half that stays takes the new one over in its next `publish` or `refresh`. That one call is not wait-free: it
-/// takes no lock and allocates nothing, but it may spin while the other half is just being taken once more.
-pub struct ExchangePort<T>(Arc<(PortPlan, Mutex<ExchangeParts<T>>)>);
+/// The half that stays takes the new one over in its next `publish` or `refresh`. That call is wait-free like any other, and
+/// moves one value from buffer to buffer.
+pub struct ExchangePort<T>(Arc<Mutex<Exchange<T>>>);
 
 impl<T: Send + 'static> ExchangePort<T> {
     pub(super) fn threaded(plan: PortPlan, init: impl FnMut() -> T + Send + 'static) -> Self {
-        let pair = Box::new(Pair::<ExchangeWriter<T>, ExchangeReader<T>>::of_exchange(init));
-        Self(Arc::new((plan, Mutex::new(ExchangeParts::Threaded { pair, versions: VersionCounter::default() }))))
+        Self::of(plan, ExchangeParts::Threaded(Box::new(exchange_pair(init))))
     }
 
     pub(super) fn in_virtual_time(plan: PortPlan, flight: SharedFlight<T>) -> Self {
-        Self(Arc::new((plan, Mutex::new(ExchangeParts::Virtual(flight)))))
+        Self::of(plan, ExchangeParts::Virtual(flight))
+    }
+
+    fn of(plan: PortPlan, parts: ExchangeParts<T>) -> Self {
+        Self(Arc::new(Mutex::new(Exchange { plan, parts, versions: Numbers::default() })))
     }
 
     /// The publishing half; fences the one taken before. Versions go on.
@@ -92,10 +132,13 @@ impl<T: Send + 'static> ExchangePort<T> {
     /// # Real-time
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn writer(&self) -> Writer<T> {
-        let (plan, parts) = &*self.0;
-        match &mut *lock(parts) {
-            ExchangeParts::Threaded { pair, versions } => Writer::threaded(plan, pair.writer(), versions.clone()),
-            ExchangeParts::Virtual(flight) => Writer::in_virtual_time(plan, flight),
+        let Exchange { plan, parts, versions } = &mut *lock(&self.0);
+        match parts {
+            ExchangeParts::Threaded(pair) => {
+                let (half, versions) = pair.writer(versions);
+                Writer::threaded(plan, half, versions)
+            }
+            ExchangeParts::Virtual(flight) => Writer::in_virtual_time(plan, flight, versions),
         }
     }
 
@@ -104,34 +147,49 @@ impl<T: Send + 'static> ExchangePort<T> {
     /// # Real-time
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn reader(&self) -> Reader<T> {
-        let (plan, parts) = &*self.0;
-        match &mut *lock(parts) {
-            ExchangeParts::Threaded { pair, .. } => Reader::threaded(plan, pair.reader()),
+        let Exchange { plan, parts, .. } = &mut *lock(&self.0);
+        match parts {
+            ExchangeParts::Threaded(pair) => Reader::threaded(plan, pair.reader()),
             ExchangeParts::Virtual(flight) => Reader::in_virtual_time(plan, flight),
         }
     }
 }
 
 enum QueueParts<T> {
-    Threaded(Box<Pair<Producer<T>, Consumer<T>>>),
+    Threaded(Box<RingPair<T>>),
     Virtual(VirtualQueue<T>),
+}
+
+struct Queue<T> {
+    plan: PortPlan,
+    parts: QueueParts<T>,
+    attempts: Numbers,
+    drops: Numbers,
 }
 
 /// A [queue](super::RuntimeBuilder::queue) whose halves can be taken again; clones are the same port.
 ///
+/// Taking a half again is the same in both executions:
+///
+/// - A new sender goes on with the counts. The receiver that stays gets all samples, those of the sender before first.
+/// - A new receiver gets the samples that are sent from then on.
+///
 /// # Real-time
-/// The half that stays takes the new one over in its next `push`, `peek` or `pop`. That one call is not wait-free: it
-/// takes no lock and allocates nothing, but it may spin while the other half is just being taken once more.
-pub struct QueuePort<T>(Arc<(PortPlan, Mutex<QueueParts<T>>)>);
+/// The half that stays takes the new one over in its next `push`, `peek` or `pop`, which is wait-free like any other.
+pub struct QueuePort<T>(Arc<Mutex<Queue<T>>>);
 
 impl<T: Copy + Send + 'static> QueuePort<T> {
     pub(super) fn threaded(plan: PortPlan, capacity: usize) -> Self {
-        let pair = Box::new(Pair::<Producer<T>, Consumer<T>>::of_ring(capacity));
-        Self(Arc::new((plan, Mutex::new(QueueParts::Threaded(pair)))))
+        Self::of(plan, QueueParts::Threaded(Box::new(ring_pair(capacity))))
     }
 
     pub(super) fn in_virtual_time(plan: PortPlan, queue: VirtualQueue<T>) -> Self {
-        Self(Arc::new((plan, Mutex::new(QueueParts::Virtual(queue)))))
+        Self::of(plan, QueueParts::Virtual(queue))
+    }
+
+    fn of(plan: PortPlan, parts: QueueParts<T>) -> Self {
+        let queue = Queue { plan, parts, attempts: Numbers::default(), drops: Numbers::default() };
+        Self(Arc::new(Mutex::new(queue)))
     }
 
     /// The sending half; fences the one taken before.
@@ -139,10 +197,15 @@ impl<T: Copy + Send + 'static> QueuePort<T> {
     /// # Real-time
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn writer(&self) -> QueueWriter<T> {
-        let (plan, parts) = &*self.0;
-        match &mut *lock(parts) {
-            QueueParts::Threaded(pair) => QueueWriter::threaded(plan, pair.writer()),
-            QueueParts::Virtual(queue) => QueueWriter::in_virtual_time(plan, queue),
+        let Queue { plan, parts, attempts, drops } = &mut *lock(&self.0);
+        match parts {
+            QueueParts::Threaded(pair) => {
+                let (half, attempts) = pair.writer(attempts);
+                QueueWriter::threaded(plan, half, attempts, drops.succeed())
+            }
+            QueueParts::Virtual(queue) => {
+                QueueWriter::in_virtual_time(plan, queue, attempts.succeed(), drops.succeed())
+            }
         }
     }
 
@@ -151,33 +214,40 @@ impl<T: Copy + Send + 'static> QueuePort<T> {
     /// # Real-time
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn reader(&self) -> QueueReader<T> {
-        let (plan, parts) = &*self.0;
-        match &mut *lock(parts) {
+        let Queue { plan, parts, .. } = &mut *lock(&self.0);
+        match parts {
             QueueParts::Threaded(pair) => QueueReader::threaded(plan, pair.reader()),
             QueueParts::Virtual(queue) => QueueReader::in_virtual_time(plan, queue),
         }
     }
 }
 
-/// An [outlet](super::RuntimeBuilder::outlet) whose writer can be taken again; clones are the same port.
+struct Outlet<T> {
+    pair: ExchangePair<T>,
+    versions: Numbers,
+}
+
+/// An [outlet](super::RuntimeBuilder::outlet) whose halves can be taken again, as those of an [`ExchangePort`]; clones are the
+/// same port.
 ///
 /// # Real-time
-/// The half that stays takes the new one over in its next `publish` or `refresh`. That one call is not wait-free: it
-/// takes no lock and allocates nothing, but it may spin while the other half is just being taken once more.
-pub struct OutletPort<T>(Arc<Mutex<Pair<ExchangeWriter<T>, ExchangeReader<T>>>>, VersionCounter);
+/// The half that stays takes the new one over in its next `publish` or `refresh`. That call is wait-free like any other, and
+/// moves one value from buffer to buffer.
+pub struct OutletPort<T>(Arc<Mutex<Outlet<T>>>);
 
 impl<T: Send + 'static> OutletPort<T> {
     pub(super) fn new(init: impl FnMut() -> T + Send + 'static) -> Self {
-        let pair = Pair::<ExchangeWriter<T>, ExchangeReader<T>>::of_exchange(init);
-        Self(Arc::new(Mutex::new(pair)), VersionCounter::default())
+        Self(Arc::new(Mutex::new(Outlet { pair: exchange_pair(init), versions: Numbers::default() })))
     }
 
-    /// The actor's half; fences the one taken before.
+    /// The actor's half; fences the one taken before. Versions go on.
     ///
     /// # Real-time
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn writer(&self) -> OutletWriter<T> {
-        OutletWriter::new(lock(&self.0).writer(), self.1.clone())
+        let Outlet { pair, versions } = &mut *lock(&self.0);
+        let (half, versions) = pair.writer(versions);
+        OutletWriter::new(half, versions)
     }
 
     /// The outside half; fences the one taken before.
@@ -185,7 +255,7 @@ impl<T: Send + 'static> OutletPort<T> {
     /// # Real-time
     /// Takes a lock and allocates.
     pub fn reader(&self) -> OutletReader<T> {
-        OutletReader::new(lock(&self.0).reader())
+        OutletReader::new(lock(&self.0).pair.reader())
     }
 }
 
@@ -208,9 +278,9 @@ impl RecorderPort {
     /// Takes a lock and allocates: for [factories](super::RuntimeBuilder::restartable).
     pub fn recorder(&self) -> Recorder {
         let mut ring = lock(&self.ring);
-        let (recorder, index) = self.registry.replace(*ring, self.capacity);
-        *ring = Some(index);
-        recorder
+        let new = self.registry.replace(*ring, self.capacity);
+        *ring = Some(new.index);
+        new.recorder
     }
 }
 
@@ -233,7 +303,7 @@ impl<T> Clone for QueuePort<T> {
 
 impl<T> Clone for OutletPort<T> {
     fn clone(&self) -> Self {
-        Self(Arc::clone(&self.0), self.1.clone())
+        Self(Arc::clone(&self.0))
     }
 }
 

@@ -101,8 +101,9 @@ impl<T: Copy> Producer<T> {
             // Acquire: with the consumer's release of `head`, so that its read of the slot is over before we overwrite.
             self.head = self.shared.head.load(Ordering::Acquire);
             if self.tail.wrapping_sub(self.head) == self.shared.slots.len() {
-                // Relaxed: a count of its own that orders nothing; no read-modify-write, this is its only writer.
-                self.shared.lost.store(self.shared.lost.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+                // No read-modify-write: this is its only writer. Release: with the acquire in `sums`, so that a loss is not
+                // seen before the pushes that came before it.
+                self.shared.lost.store(self.shared.lost.load(Ordering::Relaxed) + 1, Ordering::Release);
                 return false;
             }
         }
@@ -137,6 +138,17 @@ impl<T> fmt::Debug for Producer<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Producer").field("capacity", &self.shared.slots.len()).finish_non_exhaustive()
     }
+}
+
+/// What a producer has done up to one moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Sums {
+    /// Values pushed in all.
+    pub(super) pushed: u64,
+    /// Values lost because the ring was full.
+    pub(super) lost: u64,
+    /// Values pushed and not taken.
+    pub(super) left: usize,
 }
 
 /// The taking side of a [`ring`].
@@ -177,6 +189,34 @@ impl<T: Copy> Consumer<T> {
         // Release: with the producer's acquire of `head`, so that our read of the slot is over before it overwrites.
         self.shared.head.store(self.head, self.shared.release());
         Some(value)
+    }
+
+    /// The value pushed last, left in the ring; `None` if there is nothing to take.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    #[inline]
+    pub(super) fn newest(&mut self) -> Option<T> {
+        if self.available() == 0 {
+            return None;
+        }
+        // SAFETY: as in `peek`, for the last slot of head..tail.
+        Some(self.shared.slot(self.tail.wrapping_sub(1)).with(|slot| unsafe { (*slot).assume_init() }))
+    }
+
+    /// What the producer has done up to one moment.
+    ///
+    /// # Real-time
+    /// Lock-free: it looks again if a value is pushed meanwhile, which ends when the ring is full.
+    pub(super) fn sums(&mut self) -> Sums {
+        loop {
+            let left = self.available();
+            // Acquire: with the release in `push`; a loss behind a further push lets the next look find that push.
+            let lost = self.shared.lost.load(Ordering::Acquire);
+            if self.available() == left {
+                return Sums { pushed: self.tail as u64, lost, left };
+            }
+        }
     }
 
     /// How many values there are to take now.
@@ -224,17 +264,21 @@ mod tests {
         fn a_ring_behaves_like_a_bounded_queue(capacity in 1_usize..9, pushes in prop::collection::vec(any::<bool>(), 0..200)) {
             let (mut producer, mut consumer) = ring(capacity);
             let mut queue = VecDeque::new();
-            let mut lost = 0;
+            let (mut lost, mut attempts) = (0, 0);
             for (n, push) in pushes.into_iter().enumerate() {
                 if push {
                     let fits = queue.len() < producer.capacity();
+                    attempts += 1;
                     prop_assert_eq!(producer.push(n), fits);
                     if fits { queue.push_back(n) } else { lost += 1 }
                 } else {
                     prop_assert_eq!(consumer.peek(), queue.front().copied());
+                    prop_assert_eq!(consumer.newest(), queue.back().copied());
                     prop_assert_eq!(consumer.pop(), queue.pop_front());
                 }
                 prop_assert_eq!((producer.lost(), consumer.lost()), (lost, lost));
+                let expected = Sums { pushed: attempts - lost, lost, left: queue.len() };
+                prop_assert_eq!(consumer.sums(), expected);
             }
         }
     }

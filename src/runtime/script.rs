@@ -15,9 +15,9 @@ pub(super) struct PortScript {
     pub(super) reads: VecDeque<PortUse>,
     /// The attempts to send that failed, in order.
     pub(super) drops: VecDeque<u64>,
-    /// The newest version published, or the samples sent.
+    /// The newest version published, or the number of the newest sample sent.
     pub(super) produced: u64,
-    /// Samples that the reader has seen.
+    /// The number of the newest sample that the reader has seen.
     pub(super) seen: u64,
 }
 
@@ -77,7 +77,7 @@ impl ScriptedPort {
         act(&mut lock(&self.script.0)[self.index])
     }
 
-    /// The writer has published this version, or sent this many samples.
+    /// The writer has published this version, or sent the sample with this number.
     pub(super) fn produced(&self, count: u64) {
         self.with(|port| port.produced = count);
     }
@@ -93,7 +93,7 @@ impl ScriptedPort {
         self.with(|port| port.reads.pop_front_if(is_now)).map(|now| now.count)
     }
 
-    /// The samples that this release saw.
+    /// The number of the newest sample that this release saw.
     pub(super) fn saw(&self, ctx: &TickContext) -> u64 {
         let now = self.took(ctx);
         self.with(|port| {
