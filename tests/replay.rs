@@ -5,17 +5,19 @@
 mod session_support;
 
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
-use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter};
+use palpate::log::{ContactMode, Environment, Level, LogEntry, LogReader, LogRecord, McapWriter, TextEvent};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State, TangentBlock};
 use palpate::model::mesh::Surface;
 use palpate::runtime::{PortUseKind, RateGroup};
 use palpate::scene::{Feedback, LocalModelKind, Scene};
-use palpate::session::{ReplayReport, Session, SessionBuilder, Summary};
+use palpate::session::{Compared, ReplayReport, Session, SessionBuilder, Summary};
 use palpate::time::Nanos;
 use palpate::{Error, ErrorKind};
 use session_support::{block, pressing, top, wiggling};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Runs it with a log in `folder`.
@@ -33,8 +35,9 @@ fn folder() -> tempfile::TempDir {
 /// Check that every force of the log was computed again, and that there were as many as the run reported.
 fn assert_identical(report: &ReplayReport, summary: &Summary) {
     assert!(report.is_identical(), "{report}");
-    assert!(report.force.is_identical() && report.commanded.is_identical(), "{report}");
-    assert_eq!(report.logged_fault, None);
+    assert!(report.topics().all(Compared::is_identical), "{report}");
+    assert!(report.topics().all(|topic| topic.left_out == 0));
+    assert_eq!((&report.logged_fault, &report.unrepeated), (&None, &None));
     assert_eq!(
         (report.force.logged, report.commanded.logged),
         (summary.report.force.ticks, summary.report.limits.ticks)
@@ -208,8 +211,201 @@ fn a_run_that_a_panic_ended_is_compared_up_to_there() {
     let fault = summary.runtime.fault.unwrap();
     let report = own(block()).duration_s(1.0).replay(&log).unwrap().run().unwrap();
     assert!(report.is_identical() && report.force.is_identical(), "{report}");
-    assert_eq!(report.logged_fault.as_ref().map(|(time, _)| *time), Some(fault.at));
-    assert!(report.force.logged > 50 && report.to_string().contains("panicked"), "{report}");
+    let logged = report.logged_fault.as_ref().unwrap();
+    assert!(logged.time == fault.at && logged.what.contains("panicked") && !logged.restarted, "{report}");
+    assert!(report.force.logged > 50 && report.topics().all(Compared::is_identical), "{report}");
+    let says = format!("COMPARED ONLY up to t = {} s of {} s", fault.at.as_secs_f64(), report.end.as_secs_f64());
+    assert!(report.to_string().contains(&says) && report.to_string().contains("the run ended with it"), "{report}");
+}
+
+/// A block that fails once, which copies of it share.
+#[derive(Clone, Debug)]
+struct Failing {
+    block: Block,
+    calls: Arc<AtomicU64>,
+    /// For this long it does not return; without, it panics.
+    hangs: Option<Duration>,
+}
+
+impl Failing {
+    /// About half a second of a session of [`own`].
+    const AT: u64 = 1000;
+
+    fn new(hangs: Option<Duration>) -> Self {
+        Self { block: block(), calls: Arc::default(), hangs }
+    }
+}
+
+impl Body for Failing {
+    fn rest(&self) -> &[Vec3] {
+        self.block.rest()
+    }
+    fn inverse_masses(&self) -> &[f64] {
+        self.block.inverse_masses()
+    }
+    fn surface(&self) -> &Surface {
+        self.block.surface()
+    }
+    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
+        if self.calls.fetch_add(1, Ordering::Relaxed) == Self::AT {
+            std::thread::sleep(self.hangs.expect("the body gave way"));
+        }
+        self.block.forces(state, forces);
+    }
+    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
+        self.block.node_forces(state, nodes, forces);
+    }
+    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
+        self.block.tangent(state, nodes, clamp, emit);
+    }
+    fn duplicate(&self) -> Option<Box<dyn Body>> {
+        Some(Box::new(self.clone()))
+    }
+    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
+        self.block.patch(triangle, size, nodes);
+    }
+}
+
+// Check that a log goes on behind a restart, that this is no reason to refuse it, and that the report tells how much of
+// it was compared.
+#[test]
+fn a_run_whose_global_model_was_started_again_is_compared_up_to_the_fault() {
+    let hung = Duration::from_millis(2500);
+    for (hangs, is_virtual, seconds) in [(None, false, 1.2), (None, true, 1.2), (Some(hung), false, 3.2)] {
+        let folder = folder();
+        let session = own(Failing::new(hangs)).path(pressing()).duration_s(seconds);
+        let (summary, log) = record(if is_virtual { session.virtual_time() } else { session }, &folder);
+        assert_eq!((summary.runtime.restarts.len(), &summary.runtime.fault), (1, &None), "{summary}");
+        let fault = &summary.runtime.restarts[0];
+        let report = own(block()).duration_s(seconds).replay(&log).unwrap().run().unwrap();
+        assert!(report.is_identical() && report.topics().all(Compared::is_identical), "{report}");
+        let logged = report.logged_fault.as_ref().unwrap();
+        assert!(logged.time == fault.at && logged.restarted, "{report}");
+        assert_eq!(report.force.logged + report.force.left_out, summary.report.force.ticks);
+        assert!(report.force.logged > 50 && report.force.left_out > 50 && report.end > fault.at, "{report}");
+        assert!(report.to_string().contains("a new global model served after it"), "{report}");
+    }
+}
+
+#[test]
+fn a_fault_before_the_first_force_leaves_nothing_to_compare() {
+    let folder = folder();
+    let device = Moody { panics_at: 3, ..moody(pressing()) };
+    let (summary, log) = record(own(block()).device(device).duration_s(0.3), &folder);
+    assert_eq!(summary.runtime.fault.unwrap().at, Nanos(1_000_000));
+    let error = own(block()).duration_s(0.3).replay(&log).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Log);
+    assert!(error.to_string().contains("no force before the fault at t = 0.001 s"), "{error}");
+}
+
+/// A virtual run that a panic of the device ended at 298 ms.
+fn ended_by_a_fault(folder: &tempfile::TempDir) -> (Nanos, PathBuf) {
+    let device = Moody { panics_at: 300, ..moody(pressing()) };
+    let (summary, log) = record(own(block()).device(device).duration_s(1.0).virtual_time(), folder);
+    (summary.runtime.fault.unwrap().at, log)
+}
+
+fn replayed_own(log: &Path) -> Result<ReplayReport, Error> {
+    own(block()).duration_s(1.0).replay(log)?.run()
+}
+
+// Check that a fault in a log excuses nothing before it: what cannot be repeated and what is not there is told.
+#[test]
+fn what_is_missing_or_changed_before_a_fault_is_found() {
+    let folder = folder();
+    let (fault, log) = ended_by_a_fault(&folder);
+    let whole = entries(&log);
+    assert!(replayed_own(&rewritten(&log, whole.clone())).unwrap().is_identical());
+
+    // A version that was never published, in the last release before the fault that took one.
+    let took = |entry: &LogEntry| matches!(entry, LogEntry::Record(LogRecord::Port(r)) if r.kind == PortUseKind::Took && r.group == 0 && r.time < fault);
+    let mut changed = whole.clone();
+    let place = changed.iter().rposition(took).unwrap();
+    let LogEntry::Record(LogRecord::Port(used)) = &mut changed[place] else { unreachable!() };
+    used.count += 5;
+    let release = used.tick;
+    let report = replayed_own(&rewritten(&log, changed)).unwrap();
+    assert!(!report.is_identical() && report.unrepeated.is_none(), "{report}");
+    assert!(report.fault.as_ref().unwrap().what.contains(&format!("release {release} waits for number")), "{report}");
+    assert!(report.first_difference.as_ref().is_some_and(|found| found.what == "count"), "{report}");
+
+    // The last force before the fault, and all of the second half.
+    for gone in [fault - Nanos(1_000_000), Nanos(fault.0 / 2)] {
+        let is_kept = |entry: &&LogEntry| !matches!(entry, LogEntry::Record(LogRecord::Force(r)) if (gone..fault).contains(&r.time));
+        let report = replayed_own(&rewritten(&log, whole.iter().filter(is_kept).cloned().collect())).unwrap();
+        assert!(!report.is_identical() && report.force.computed > report.force.identical, "{report}");
+        assert_eq!(report.first_difference.as_ref().unwrap().topic, "/force");
+    }
+
+    // One more than was computed.
+    let mut changed = whole.clone();
+    let last = |entry: &LogEntry| matches!(entry, LogEntry::Record(LogRecord::Force(r)) if r.time < fault);
+    let place = changed.iter().rposition(last).unwrap();
+    changed.insert(place, changed[place].clone());
+    let report = replayed_own(&rewritten(&log, changed)).unwrap();
+    assert!(!report.is_identical() && report.first_difference.as_ref().unwrap().what == "count", "{report}");
+}
+
+// Check that an event that would cut the log short, or hide a fault, is not believed if no group told it.
+#[test]
+fn an_event_that_nobody_told_is_refused() {
+    let folder = folder();
+    let (fault, log) = ended_by_a_fault(&folder);
+    let whole = entries(&log);
+    let places: Vec<usize> = (0..whole.len()).filter(|i| matches!(whole[*i], LogEntry::Text(_))).collect();
+    assert!(places.len() > 10, "degraded releases and a fault");
+    let text = |entry: &mut LogEntry, change: &dyn Fn(&mut TextEvent)| {
+        let LogEntry::Text(event) = entry else { unreachable!() };
+        change(event);
+    };
+    let changes: [&dyn Fn(&mut TextEvent); 3] = [
+        &|event| event.level = if event.level == Level::Error { Level::Info } else { Level::Error },
+        &|event| event.time = Nanos(event.time.0 ^ 1 << 20),
+        &|event| event.message.push('!'),
+    ];
+    for change in changes {
+        for place in [places[3], places[places.len() - 2], places[places.len() - 1]] {
+            let mut changed = whole.clone();
+            text(&mut changed[place], change);
+            let error = replayed_own(&rewritten(&log, changed)).unwrap_err();
+            assert!(error.kind() == ErrorKind::Log && error.to_string().contains("an event in /log"), "{error}");
+        }
+    }
+    let mut more = whole.clone();
+    let message = "global: actor 0 panicked".to_owned();
+    more.insert(places[3], LogEntry::Text(TextEvent { time: Nanos(fault.0 / 2), level: Level::Error, message }));
+    let error = replayed_own(&rewritten(&log, more)).unwrap_err();
+    assert!(error.to_string().contains("events, but"), "{error}");
+}
+
+#[test]
+fn a_sample_used_again_after_a_failed_read_is_the_one_before() {
+    let folder = folder();
+    let (_, log) = ended_by_a_fault(&folder);
+    let mut changed = entries(&log);
+    let mut last_id = u32::MAX;
+    let again = changed.iter_mut().rev().find_map(|entry| match entry {
+        LogEntry::Record(LogRecord::Tool(r)) => (std::mem::replace(&mut last_id, r.id) == r.id).then_some(r),
+        _ => None,
+    });
+    again.unwrap().buttons ^= 1;
+    let error = replayed_own(&rewritten(&log, changed)).unwrap_err();
+    assert!(error.to_string().contains("no sample of the tool, or a wrong one"), "{error}");
+}
+
+#[test]
+fn one_wrong_bit_in_what_a_log_says_about_the_run_is_damage() {
+    let folder = folder();
+    let log = short(&folder);
+    let bytes = std::fs::read(&log).unwrap();
+    for word in ["first_tool", "instruction_set", "duration_s"] {
+        let mut wrong = bytes.clone();
+        let place = wrong.windows(word.len()).position(|window| window == word.as_bytes()).unwrap();
+        wrong[place + word.len() + 6] ^= 1;
+        std::fs::write(&log, wrong).unwrap();
+        let error = replayed(&log).unwrap_err();
+        assert!(error.kind() == ErrorKind::Log && error.to_string().contains("does not fit its checksum"), "{error}");
+    }
 }
 
 fn entries(log: &Path) -> Vec<LogEntry> {
@@ -269,32 +465,73 @@ fn a_log_written_once_more_is_as_good() {
     assert!(replayed(&again).unwrap().is_identical());
 }
 
+/// A computed field of a log: topic, name, and the flip of its last bit; false where the record is another one.
+type Field = (&'static str, &'static str, fn(&mut LogRecord) -> bool);
+
+macro_rules! field {
+    ($topic:literal, $name:literal, $variant:ident, |$r:ident| $change:expr) => {
+        ($topic, $name, |record| match record {
+            LogRecord::$variant($r) => {
+                $change;
+                true
+            }
+            _ => false,
+        })
+    };
+}
+
+const FIELDS: [Field; 25] = [
+    field!("/force", "force_n", Force, |r| flip(&mut r.force_n[1], 0)),
+    field!("/force", "model_version", Force, |r| r.model_version ^= 1),
+    field!("/force", "model_age_s", Force, |r| flip(&mut r.model_age_s, 0)),
+    field!("/force", "energy_j", Force, |r| flip(&mut r.energy_j, 0)),
+    field!("/force", "time", Force, |r| r.time.0 ^= 1),
+    field!("/force_commanded", "force_n", Command, |r| flip(&mut r.force_n[1], 0)),
+    field!("/force_commanded", "limits", Command, |r| r.limits ^= 1),
+    field!("/contact", "mode", Contact, |r| r.mode =
+        if r.mode == ContactMode::Free { ContactMode::Lost } else { ContactMode::Free }),
+    field!("/contact", "triangle", Contact, |r| r.triangle ^= 1),
+    field!("/contact", "weights", Contact, |r| flip(&mut r.weights[1], 0)),
+    field!("/contact", "normal", Contact, |r| flip(&mut r.normal[2], 63)),
+    field!("/contact", "normal_force_n", Contact, |r| r.normal_force_n =
+        f32::from_bits(r.normal_force_n.to_bits() ^ 1)),
+    field!("/contact", "tangential_force_n", Contact, |r| r.tangential_force_n =
+        f32::from_bits(r.tangential_force_n.to_bits() ^ 1)),
+    field!("/resync", "version", Resync, |r| r.version ^= 1),
+    field!("/resync", "age", Resync, |r| r.age.0 ^= 1),
+    field!("/resync", "jump_before_n", Resync, |r| flip(&mut r.jump_before_n, 0)),
+    field!("/resync", "jump_after_n", Resync, |r| flip(&mut r.jump_after_n, 0)),
+    field!("/resync", "energy_j", Resync, |r| flip(&mut r.energy_j, 0)),
+    field!("/global", "version", Global, |r| r.version ^= 1),
+    field!("/global", "first_tick", Global, |r| r.first_tick ^= 1),
+    field!("/global", "last_tick", Global, |r| r.last_tick ^= 1),
+    field!("/global", "time", Global, |r| r.time.0 ^= 1),
+    field!("/probe", "node", Probe, |r| r.node ^= 1),
+    field!("/probe", "local_m", Probe, |r| flip(&mut r.local_m[0], 0)),
+    field!("/probe", "global_m", Probe, |r| flip(&mut r.global_m[2], 0)),
+];
+
 #[test]
-fn one_bit_of_one_logged_force_is_found_at_its_time() {
+fn one_bit_of_any_field_of_one_logged_sample_is_found_at_its_time() {
     let folder = folder();
     let log = short(&folder);
-    let time = Nanos(123_000_000);
-    for topic in ["/force", "/force_commanded"] {
-        let mut changed = entries(&log);
-        for entry in &mut changed {
-            match entry {
-                LogEntry::Record(LogRecord::Force(r)) if topic == "/force" && r.time == time => {
-                    flip(&mut r.force_n[1], 0);
-                }
-                LogEntry::Record(LogRecord::Command(r)) if topic != "/force" && r.time == time => {
-                    flip(&mut r.force_n[1], 0);
-                }
-                _ => {}
-            }
-        }
+    let whole = entries(&log);
+    for (topic, name, change) in FIELDS {
+        let mut changed = whole.clone();
+        let mut records = changed.iter_mut().filter_map(|entry| match entry {
+            LogEntry::Record(record) if record.time() >= Nanos(400_000_000) => Some(record),
+            _ => None,
+        });
+        let time = records.find_map(|record| change(record).then(|| record.time())).unwrap();
         let report = replayed(&rewritten(&log, changed)).unwrap();
         let found = report.first_difference.as_ref().unwrap();
-        assert_eq!((found.time, found.topic, found.what), (time, topic, "force_n"));
+        assert_eq!((found.time, found.topic, found.what), (time, topic, name));
         assert!(!report.is_identical());
-        let (this, other) =
-            if topic == "/force" { (report.force, report.commanded) } else { (report.commanded, report.force) };
-        assert_eq!((this.logged, this.computed, this.identical), (500, 500, 499));
-        assert!(other.is_identical());
+        for compared in report.topics() {
+            let differing = u64::from(compared.topic == topic);
+            assert!(compared.logged > 5, "{report}");
+            assert_eq!((compared.computed, compared.identical + differing), (compared.logged, compared.logged));
+        }
     }
 }
 

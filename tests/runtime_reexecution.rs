@@ -295,6 +295,24 @@ fn a_recording_cut_at_a_time_is_repeated_up_to_there() {
     }
 }
 
+// Check that a cut is no excuse: a use before it that its release cannot have had ends the run, with its place.
+#[test]
+fn a_use_before_the_cut_of_what_was_never_written_ends_the_run_with_its_name() {
+    let (ran, plan) = small();
+    let is_one = |used: &PortUse| used.group == 0 && used.kind == PortUseKind::Took && used.time < Nanos(50 * MS);
+    let last = ran.uses().into_iter().filter(is_one).max_by_key(|used| used.time).unwrap();
+    let changed = |record: &Record| match PortUse::from_record(record) {
+        Some(used) if used == last => PortUse { count: used.count + 100, ..used }.into(),
+        _ => *record,
+    };
+    let records: Vec<Record> = ran.records.iter().map(changed).collect();
+    let again = rerun(Recording::from_records(&records).before(Nanos(50 * MS)), &plan);
+    let fault = again.report.fault.unwrap();
+    assert_eq!((&*fault.group, fault.at), ("group-0", last.time));
+    assert!(fault.what.contains(&format!("waits for number {} of port {}", last.count + 100, last.port)), "{fault}");
+    assert!(again.report.groups[0].released < 25);
+}
+
 #[test]
 fn an_actor_that_does_not_look_where_it_looked_has_left_the_recording() {
     let graph = |mut graph: RuntimeBuilder, looks: bool| {

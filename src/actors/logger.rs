@@ -155,6 +155,10 @@ impl LoggerActor {
                         Level::Warning => tracing::warn!(time = %text.time, "{}", text.message),
                         Level::Error => tracing::error!(time = %text.time, "{}", text.message),
                     }
+                    // The sum is one over all groups; an event of an unknown one counts for the first.
+                    let group = usize::from(event.group);
+                    let group = if group < self.stats.len() { group } else { 0 };
+                    self.stats.get_mut(group).into_iter().for_each(|counter| counter.push_event(&text));
                     self.analysis.push_text(&text);
                     self.keep(|sink| sink.text(&text));
                     continue;

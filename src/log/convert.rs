@@ -6,7 +6,7 @@ use super::records::{
     CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ToolSample,
 };
 use super::schema::{self, Vector3};
-use super::stats::GroupStats;
+use super::stats::{EventSum, GroupStats};
 use crate::runtime::Mode;
 use crate::runtime::record::{Event, SlipCause, TickTiming};
 use crate::runtime::{PortUse, PortUseKind};
@@ -265,6 +265,8 @@ impl From<&GroupStats> for schema::Stats {
             execution: s.execution.into(),
             execution_last_second: s.execution_last_second.into(),
             port_uses: s.port_uses,
+            events: s.events.count,
+            events_digest: s.events.digest,
         }
     }
 }
@@ -283,6 +285,7 @@ impl From<schema::Stats> for GroupStats {
             execution: m.execution.into(),
             execution_last_second: m.execution_last_second.into(),
             port_uses: m.port_uses,
+            events: EventSum { count: m.events, digest: m.events_digest },
         }
     }
 }

@@ -47,7 +47,15 @@ pub struct TextEvent {
     pub message: String,
 }
 
+/// In the words of a restart.
+const RESTARTED: &str = "restarted after a fault";
+
 impl TextEvent {
+    /// True if it tells that a rate group was started again.
+    pub fn tells_restart(&self) -> bool {
+        self.level == Level::Warning && self.message.contains(RESTARTED)
+    }
+
     /// An event record in words; `group` is the name of the rate group it happened in.
     pub fn describe(event: &Event, group: &str) -> Self {
         let (level, message) = match event.code {
@@ -58,7 +66,7 @@ impl TextEvent {
             }
             Event::DEGRADED if event.detail == Event::RECOVERED => (Level::Info, format!("{group}: back to normal")),
             Event::DEGRADED => (Level::Warning, format!("{group}: degraded, cause {}", event.detail)),
-            Event::RESTARTED => (Level::Warning, format!("{group}: restarted after a fault, restart {}", event.detail)),
+            Event::RESTARTED => (Level::Warning, format!("{group}: {RESTARTED}, restart {}", event.detail)),
             Event::ABANDONED => {
                 let waited = Nanos(event.detail);
                 (Level::Error, format!("{group}: a release did not return within {waited}, its thread was left behind"))
@@ -112,6 +120,14 @@ mod tests {
             text(Event::WATCHDOG, Event::RECOVERED),
             (Level::Info, "local: the device delivers again".to_owned())
         );
+    }
+
+    #[test]
+    fn a_restart_is_told_from_every_other_event() {
+        let describe = |code| TextEvent::describe(&Event { stamp: Nanos(5), group: 1, code, detail: 2 }, "global");
+        assert_eq!(describe(Event::RESTARTED).message, "global: restarted after a fault, restart 2");
+        let restarts: Vec<u32> = (0..20).filter(|code| describe(*code).tells_restart()).collect();
+        assert_eq!(restarts, [Event::RESTARTED]);
     }
 
     #[test]

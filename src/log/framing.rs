@@ -2,10 +2,13 @@
 //!
 //! A file may end at any byte or hold wrong bytes: whatever is read before the damage is good, memory stays bounded by
 //! [`MAX_RECORD_BYTES`], and [`RecordStream::damage`] says where and what. Chunks are checked against their checksum
-//! before anything of them is given out, except the last one of a cut file, which ends before its records do.
+//! before anything of them is given out, except the last one of a cut file, which ends before its records do. What is
+//! beside the chunks (metadata, attachments, the frame itself) has no checksum of its own that is checked before: the one
+//! of the whole data section follows it, the one of the index ends the file, and a wrong bit anywhere is damage.
 
 use std::io::{self, Read};
 
+use crc32fast::Hasher;
 use mcap::records::op;
 
 use super::chunk::ChunkRecords;
@@ -22,8 +25,21 @@ pub(super) struct RecordStream<R> {
     chunk: Option<(ChunkRecords, u64)>,
     /// A file either keeps its messages in chunks or does not: one beside them is a wrong opcode.
     has_chunks: bool,
+    /// Over all bytes of the section that is being read.
+    checksum: Hasher,
+    section: Section,
     damage: Option<String>,
     ended: bool,
+}
+
+/// The two parts of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Section {
+    Data,
+    /// The index; the data had a checksum that fits, or none.
+    Index {
+        data_has_checksum: bool,
+    },
 }
 
 impl<R: Read> RecordStream<R> {
@@ -41,7 +57,24 @@ impl<R: Read> RecordStream<R> {
             return Err(io::ErrorKind::InvalidData.into());
         }
         let offset = magic.len() as u64;
-        Ok(Self { source, offset, record: Vec::new(), chunk: None, has_chunks: false, damage: None, ended: false })
+        let mut checksum = Hasher::new();
+        checksum.update(&magic);
+        Ok(Self {
+            source,
+            offset,
+            record: Vec::new(),
+            chunk: None,
+            has_chunks: false,
+            checksum,
+            section: Section::Data,
+            damage: None,
+            ended: false,
+        })
+    }
+
+    /// True once the data section has been read and its checksum fits; a file of another writer may have none.
+    pub(super) fn is_checksummed(&self) -> bool {
+        self.section == Section::Index { data_has_checksum: true }
     }
 
     /// What is wrong with the file, as far as it has been read.
@@ -98,13 +131,20 @@ impl<R: Read> RecordStream<R> {
         let opcode = head[0];
         let length = u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]]);
         let cut = |offset: u64| format!("the log is cut off at byte {offset}, in the record at byte {start}");
+        if opcode == op::DATA_END && self.section == Section::Data {
+            return self.end_data(start, length).map(|()| None);
+        }
+        self.checksum.update(&head);
         match opcode {
+            op::CHUNK | op::MESSAGE | op::METADATA | op::ATTACHMENT if self.section != Section::Data => {
+                Err(format!("the log is damaged at byte {start}: a record of the data in the index"))
+            }
             op::CHUNK | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::STATISTICS | op::ATTACHMENT => {
                 if length > MAX_RECORD_BYTES {
                     return Err(format!("the record at byte {start} is damaged: it claims {length} bytes"));
                 }
-                self.record.clear();
                 self.read_body(length)?;
+                self.checksum.update(&self.record);
                 let complete = self.record.len() as u64 == length;
                 if opcode == op::MESSAGE && self.has_chunks {
                     return Err(format!("the log is damaged at byte {start}: a message outside of the chunks"));
@@ -118,16 +158,11 @@ impl<R: Read> RecordStream<R> {
                 }
                 if complete { Ok(Some(opcode)) } else { Err(cut(self.offset)) }
             }
-            op::FOOTER => {
-                self.ended = true;
-                self.record.clear();
-                self.read_body(length.saturating_add(mcap::MAGIC.len() as u64).min(MAX_RECORD_BYTES))?;
-                let intact = length == 20 && self.record.len() == 28 && self.record.ends_with(mcap::MAGIC);
-                if intact { Ok(None) } else { Err(format!("the index of the log is damaged at byte {start}")) }
-            }
+            op::FOOTER => self.end_index(start, length).map(|()| None),
             0 => Err(format!("the log is damaged at byte {start}: no record begins there")),
             _ => {
-                let skipped = io::copy(&mut (&mut self.source).take(length), &mut io::sink());
+                let mut sink = Hashed(&mut self.checksum);
+                let skipped = io::copy(&mut (&mut self.source).take(length), &mut sink);
                 let skipped = skipped.map_err(|e| unreadable(self.offset, &e))?;
                 self.offset += skipped;
                 if skipped == length { Ok(None) } else { Err(cut(self.offset)) }
@@ -135,8 +170,43 @@ impl<R: Read> RecordStream<R> {
         }
     }
 
-    /// Appends `length` bytes, or what is left, to the record.
+    /// Reads the rest of the record that ends the data, with the checksum of all bytes before it.
+    fn end_data(&mut self, start: u64, length: u64) -> Result<(), String> {
+        let computed = std::mem::take(&mut self.checksum).finalize();
+        self.read_body(length.min(MAX_RECORD_BYTES))?;
+        let Ok(stored) = <[u8; 4]>::try_from(self.record.as_slice()) else {
+            return Err(format!("the end of the data is damaged at byte {start}"));
+        };
+        let stored = u32::from_le_bytes(stored);
+        // By the format, 0 says that the writer made none.
+        if stored != 0 && stored != computed {
+            return Err(format!("the data before byte {start} does not fit its checksum: something in it is damaged"));
+        }
+        self.section = Section::Index { data_has_checksum: stored != 0 };
+        Ok(())
+    }
+
+    /// Reads the rest of the footer: the index with its checksum is whole and the file ends as it should.
+    fn end_index(&mut self, start: u64, length: u64) -> Result<(), String> {
+        self.ended = true;
+        self.read_body(length.saturating_add(mcap::MAGIC.len() as u64).min(MAX_RECORD_BYTES))?;
+        let whole = length == 20 && self.record.len() == 28 && self.record.ends_with(mcap::MAGIC);
+        let mut fits = || {
+            let (offsets, rest) = self.record.split_at(16);
+            self.checksum.update(offsets);
+            let stored = u32::from_le_bytes([rest[0], rest[1], rest[2], rest[3]]);
+            stored == 0 || stored == std::mem::take(&mut self.checksum).finalize()
+        };
+        if self.section != Section::Data && whole && fits() {
+            Ok(())
+        } else {
+            Err(format!("the index of the log is damaged at byte {start}"))
+        }
+    }
+
+    /// Reads `length` bytes, or what is left, as the record.
     fn read_body(&mut self, length: u64) -> Result<(), String> {
+        self.record.clear();
         let read = (&mut self.source).take(length).read_to_end(&mut self.record);
         self.offset += read.map_err(|e| unreadable(self.offset, &e))? as u64;
         Ok(())
@@ -155,6 +225,20 @@ impl<R: Read> RecordStream<R> {
         }
         self.offset += filled as u64;
         Ok(filled)
+    }
+}
+
+/// Skips bytes that count for the checksum.
+struct Hashed<'a>(&'a mut Hasher);
+
+impl io::Write for Hashed<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 

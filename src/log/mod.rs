@@ -43,7 +43,7 @@ pub use percentiles::{Distribution, Magnitudes, Percentiles};
 pub use records::{
     CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ToolSample,
 };
-pub use stats::{GroupStats, StatsCounter};
+pub use stats::{EventSum, GroupStats, StatsCounter};
 
 #[cfg(feature = "log")]
 pub use reader::LogReader;

@@ -77,6 +77,12 @@ impl<R: Read> LogReader<R> {
         self.records.damage()
     }
 
+    /// True if the log has a checksum over all of its data and it fits; known only once the iterator has ended. palpate
+    /// always writes one, other programs may not.
+    pub fn is_checksummed(&self) -> bool {
+        self.records.is_checksummed()
+    }
+
     /// The name that errors use.
     pub fn place(&self) -> &str {
         &self.place

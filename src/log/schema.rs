@@ -225,6 +225,8 @@ proto_schema! {
         execution: message of Percentiles = 9,
         execution_last_second: message of Percentiles = 10,
         port_uses: uint64 = 11,
+        events: uint64 = 12,
+        events_digest: uint64 = 13,
     }
 
     /// `/log`: something that happened once. `coded` ones came from a rate group as numbers.

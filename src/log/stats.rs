@@ -1,5 +1,6 @@
 //! How a rate group keeps time, condensed once a second for the log and for a live display.
 
+use super::event::TextEvent;
 use super::percentiles::{Distribution, Percentiles};
 use crate::runtime::record::TickTiming;
 use crate::time::Nanos;
@@ -31,6 +32,38 @@ pub struct GroupStats {
     pub execution_last_second: Percentiles<u64>,
     /// Uses of ports recorded since the start: what `/ports` holds of this group.
     pub port_uses: u64,
+    /// Events of this group since the start, in number and as digests: what `/log` holds of it.
+    pub events: EventSum,
+}
+
+/// How many events there were, and the sum of their digests: the order does not matter, any change does.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and bounded by the length of the message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EventSum {
+    /// Events.
+    pub count: u64,
+    /// The wrapping sum of a 64-bit digest (FNV-1a) of time, level and message of each.
+    pub digest: u64,
+}
+
+impl EventSum {
+    /// Counts one event.
+    pub fn push(&mut self, event: &TextEvent) {
+        let (time, level) = (event.time.0.to_le_bytes(), (event.level as u16).to_le_bytes());
+        let bytes = time.iter().chain(&level).chain(event.message.as_bytes());
+        let digest = bytes.fold(0xcbf2_9ce4_8422_2325, |digest: u64, byte| {
+            (digest ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
+        });
+        self.add(Self { count: 1, digest });
+    }
+
+    /// Adds the events of another group.
+    pub fn add(&mut self, other: Self) {
+        self.count = self.count.wrapping_add(other.count);
+        self.digest = self.digest.wrapping_add(other.digest);
+    }
 }
 
 /// Counts the releases of one group and gives a [`GroupStats`] for each second.
@@ -72,6 +105,11 @@ impl StatsCounter {
         self.now.port_uses += 1;
     }
 
+    /// Counts one event.
+    pub fn push_event(&mut self, event: &TextEvent) {
+        self.now.events.push(event);
+    }
+
     /// Sets the number of records of this group lost since the start.
     pub fn set_lost(&mut self, total: u64) {
         self.now.lost_records = total;
@@ -100,6 +138,28 @@ impl StatsCounter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::Level;
+
+    // Check that a changed time, level or message, a missing and a doubled event give another sum, and another order the
+    // same.
+    #[test]
+    fn the_sum_of_events_knows_every_one_of_them() {
+        let event = |time, level, message: &str| TextEvent { time: Nanos(time), level, message: message.to_owned() };
+        let sum = |events: &[TextEvent]| {
+            let mut sum = EventSum::default();
+            events.iter().for_each(|event| sum.push(event));
+            sum
+        };
+        let (one, two) = (event(1, Level::Info, "here"), event(2, Level::Error, "there"));
+        let both = sum(&[one.clone(), two.clone()]);
+        assert_eq!(sum(&[two.clone(), one.clone()]), both);
+        let others =
+            [event(3, Level::Error, "there"), event(2, Level::Warning, "there"), event(2, Level::Error, "their")];
+        for other in others {
+            assert_ne!(sum(&[one.clone(), other]), both);
+        }
+        assert!(sum(&[one.clone()]) != both && sum(&[one, two.clone(), two]) != both);
+    }
 
     #[test]
     fn each_second_is_reported_once_beside_the_whole_run() {

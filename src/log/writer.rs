@@ -76,6 +76,9 @@ impl<W: Write> McapWriter<W> {
             .profile("palpate")
             .library(concat!("palpate/", env!("CARGO_PKG_VERSION")))
             .chunk_size(None)
+            // Metadata and the frame have no other checksum.
+            .calculate_data_section_crc(true)
+            .calculate_summary_section_crc(true)
             .disable_seeking(true);
         let output = options.create(NoSeek::new(output)).map_err(|e| write_error(place, e))?;
         Ok(Self {

@@ -89,7 +89,6 @@ impl From<&TickTiming> for RecordedRelease {
 pub struct Recording {
     releases: BTreeMap<u16, Vec<RecordedRelease>>,
     uses: BTreeMap<(u32, PortUseKind), Vec<PortUse>>,
-    cut: bool,
 }
 
 impl Recording {
@@ -114,7 +113,8 @@ impl Recording {
         self.uses.entry((used.port, used.kind)).or_default().push(*used);
     }
 
-    /// Leaves out everything that was due at `time` or later. What the rest needs of it ends the re-execution in order.
+    /// Leaves out everything that was due at `time` or later. A release of the rest that needs something of it cannot be
+    /// repeated and ends the re-execution with a fault that names it.
     #[must_use]
     pub fn before(mut self, time: Nanos) -> Self {
         for releases in self.releases.values_mut() {
@@ -123,7 +123,6 @@ impl Recording {
         for uses in self.uses.values_mut() {
             uses.retain(|used| used.time < time);
         }
-        self.cut = true;
         self
     }
 
@@ -178,11 +177,6 @@ impl Recording {
     /// The number of the last group with a release, plus one.
     pub(super) fn groups(&self) -> usize {
         self.releases.keys().map(|group| usize::from(*group) + 1).max().unwrap_or(0)
-    }
-
-    /// True if it ends before the run did.
-    pub(super) fn is_cut(&self) -> bool {
-        self.cut
     }
 
     /// What ports must show.
@@ -266,6 +260,6 @@ mod tests {
     #[test]
     fn what_comes_before_a_time_is_kept() {
         let cut = recording(&[timing(0, 0), timing(1, 0)], &[took(0, 1, 0), took(1, 2, 1)]).before(Nanos(10));
-        assert_eq!((cut.released(1), cut.port_uses(1), cut.is_cut()), (1, 1, true));
+        assert_eq!((cut.released(1), cut.port_uses(1), cut.end()), (1, 1, Nanos(0)));
     }
 }

@@ -16,7 +16,6 @@ pub(crate) struct Reexecution {
     /// What is left to run, by group.
     releases: Vec<VecDeque<RecordedRelease>>,
     script: Script,
-    cut: bool,
 }
 
 /// What can be done next.
@@ -47,11 +46,10 @@ impl Reexecution {
             );
             return Err(Error::new(ErrorKind::Runtime, message));
         }
-        let cut = recording.is_cut();
         let mut releases = recording.into_releases(groups.len());
         // Observers follow their own schedule.
         groups.iter().zip(&mut releases).filter(|(group, _)| group.spec.observer).for_each(|(_, left)| left.clear());
-        Ok(Self { releases, script, cut })
+        Ok(Self { releases, script })
     }
 
     /// True if group `index` has no release left.
@@ -81,8 +79,8 @@ impl Reexecution {
         }
         match (ready, stuck) {
             (Some((index, release)), _) => Step::Run(index, release),
-            (None, Some(fault)) if !self.cut => Step::Stuck(fault),
-            (None, _) => Step::Over,
+            (None, Some(fault)) => Step::Stuck(fault),
+            (None, None) => Step::Over,
         }
     }
 

@@ -24,7 +24,7 @@ mod sink;
 
 pub use builder::SessionBuilder;
 #[cfg(all(feature = "log", feature = "scene"))]
-pub use replay::{Compared, Difference, Replay, ReplayReport};
+pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};
 pub use running::{Running, Summary, Viewer};
 
 use crate::error::Error;

@@ -2,136 +2,137 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::report::{Compared, Difference, ReplayReport};
-use crate::log::{CommandSample, ForceSample, LogRecord};
-use crate::runtime::{Actor, Outcome, Record, RecordDrain, RuntimeFault, TickContext};
+use super::fields::{first_difference, in_words};
+use super::report::{Compared, Difference};
+use crate::log::LogRecord;
+use crate::runtime::{Actor, Outcome, Record, RecordDrain, TickContext};
 use crate::time::Nanos;
 
-/// What is compared of a sample.
+/// The topics whose samples are computed, and whether the local group makes them.
+const TOPICS: [(&str, bool); 6] = [
+    ("/force", true),
+    ("/force_commanded", true),
+    ("/contact", true),
+    ("/resync", true),
+    ("/global", false),
+    ("/probe", true),
+];
+
+/// The place of a sample in [`TOPICS`]; `None` for inputs and measurements.
+fn place(record: &LogRecord) -> Option<usize> {
+    match record {
+        LogRecord::Force(_) => Some(0),
+        LogRecord::Command(_) => Some(1),
+        LogRecord::Contact(_) => Some(2),
+        LogRecord::Resync(_) => Some(3),
+        LogRecord::Global(_) => Some(4),
+        LogRecord::Probe(_) => Some(5),
+        LogRecord::Tick(_) | LogRecord::Event(_) | LogRecord::Port(_) | LogRecord::Tool(_) => None,
+    }
+}
+
+/// From when on samples of the log have no counterpart, for each side: the log goes on behind its first fault.
 #[derive(Clone, Copy, Debug)]
-struct Sample {
-    time: Nanos,
-    force_n: [f64; 3],
-    model_version: u32,
-}
-
-impl Sample {
-    /// The first thing that differs, by its bits: -0.0 is not 0.0, and a NaN is itself.
-    fn difference(&self, other: &Self) -> Option<&'static str> {
-        if self.time != other.time {
-            Some("time")
-        } else if self.force_n.map(f64::to_bits) != other.force_n.map(f64::to_bits) {
-            Some("force_n")
-        } else if self.model_version != other.model_version {
-            Some("model_version")
-        } else {
-            None
-        }
-    }
-
-    fn in_words(&self) -> String {
-        format!("{:?} N (t = {} s, model {})", self.force_n, self.time.as_secs_f64(), self.model_version)
-    }
-}
-
-impl From<&ForceSample> for Sample {
-    fn from(r: &ForceSample) -> Self {
-        Self { time: r.time, force_n: r.force_n, model_version: r.model_version }
-    }
-}
-
-impl From<&CommandSample> for Sample {
-    fn from(r: &CommandSample) -> Self {
-        Self { time: r.time, force_n: r.force_n, model_version: 0 }
-    }
+pub(super) struct End {
+    pub(super) local: Nanos,
+    pub(super) global: Nanos,
+    /// The last release of the local group that was repeated. The local model may lag behind it.
+    pub(super) last_local: Nanos,
 }
 
 /// One topic: what was logged, and how far the computation has followed.
 #[derive(Debug)]
 struct Topic {
     name: &'static str,
-    logged: Vec<Sample>,
+    logged: Vec<LogRecord>,
     computed: u64,
     identical: u64,
+    last: Option<Nanos>,
     first: Option<Difference>,
 }
 
 impl Topic {
     fn new(name: &'static str) -> Self {
-        Self { name, logged: Vec::new(), computed: 0, identical: 0, first: None }
+        Self { name, logged: Vec::new(), computed: 0, identical: 0, last: None, first: None }
     }
 
-    fn compare(&mut self, computed: Sample) {
+    fn compare(&mut self, computed: LogRecord) {
         let logged = self.logged.get(self.computed as usize).copied();
         self.computed += 1;
-        match logged.map_or(Some("count"), |logged| logged.difference(&computed)) {
+        self.last = Some(computed.time());
+        match logged.map_or(Some("count"), |logged| first_difference(&logged, &computed)) {
             None => self.identical += 1,
             Some(what) => self.note(what, logged, Some(computed)),
         }
     }
 
-    fn note(&mut self, what: &'static str, logged: Option<Sample>, computed: Option<Sample>) {
-        let Some(time) = logged.or(computed).map(|sample| sample.time) else { return };
-        let words = |sample: Option<Sample>| sample.map(|sample| sample.in_words());
+    fn note(&mut self, what: &'static str, logged: Option<LogRecord>, computed: Option<LogRecord>) {
+        let Some(time) = logged.or(computed).map(|sample| sample.time()) else { return };
+        let words = |sample: Option<LogRecord>| sample.map(|sample| in_words(&sample));
         let (logged, computed) = (words(logged), words(computed));
         self.first.get_or_insert(Difference { time, topic: self.name, what, logged, computed });
     }
 
-    /// Sums up. Of a log that was cut at a fault the samples past the last computed one do not count.
-    fn finish(&mut self, is_cut: bool) -> Compared {
-        if is_cut {
-            self.logged.truncate(self.computed as usize);
+    /// Sums up. Logged samples that nothing was computed for are a difference, but from `end` on.
+    fn finish(&mut self, end: Option<Nanos>) -> Compared {
+        let left = self.logged.get(self.computed as usize..).unwrap_or_default();
+        let is_owed = |sample: &&LogRecord| end.is_none_or(|end| sample.time() < end);
+        let owed = left.iter().filter(is_owed).count();
+        let (first_owed, left_out) = (left.iter().find(is_owed).copied(), left.len() - owed);
+        if first_owed.is_some() {
+            self.note("count", first_owed, None);
         }
-        let left = self.logged.get(self.computed as usize).copied();
-        if left.is_some() {
-            self.note("count", left, None);
+        Compared {
+            topic: self.name,
+            logged: (self.logged.len() - left_out) as u64,
+            computed: self.computed,
+            identical: self.identical,
+            left_out: left_out as u64,
         }
-        Compared { logged: self.logged.len() as u64, computed: self.computed, identical: self.identical }
     }
 }
 
-#[derive(Debug)]
-struct Topics {
-    force: Topic,
-    commanded: Topic,
-}
-
-/// The logged forces, shared by the actor that compares and the replay that reports.
+/// The logged samples, shared by the actor that compares and the replay that reports.
 #[derive(Clone, Debug)]
-pub(crate) struct Comparison(Arc<Mutex<Topics>>);
+pub(crate) struct Comparison(Arc<Mutex<[Topic; TOPICS.len()]>>);
 
 impl Comparison {
     pub(super) fn new() -> Self {
-        let (force, commanded) = (Topic::new("/force"), Topic::new("/force_commanded"));
-        Self(Arc::new(Mutex::new(Topics { force, commanded })))
+        Self(Arc::new(Mutex::new(TOPICS.map(|(name, _)| Topic::new(name)))))
     }
 
-    pub(super) fn log_force(&self, sample: &ForceSample) {
-        self.topics().force.logged.push(sample.into());
-    }
-
-    pub(super) fn log_command(&self, sample: &CommandSample) {
-        self.topics().commanded.logged.push(sample.into());
-    }
-
-    fn compare(&self, record: &LogRecord) {
-        match record {
-            LogRecord::Force(sample) => self.topics().force.compare(sample.into()),
-            LogRecord::Command(sample) => self.topics().commanded.compare(sample.into()),
-            _ => {}
+    /// Adds a sample of the log, if it is one that a replay computes.
+    pub(super) fn log(&self, record: &LogRecord) {
+        if let Some(place) = place(record) {
+            self.topics()[place].logged.push(*record);
         }
     }
 
-    pub(super) fn report(&self, logged_fault: Option<(Nanos, String)>, fault: Option<RuntimeFault>) -> ReplayReport {
-        let mut topics = self.topics();
-        let force = topics.force.finish(logged_fault.is_some());
-        let commanded = topics.commanded.finish(logged_fault.is_some());
-        let differences = [topics.force.first.take(), topics.commanded.first.take()];
-        let first_difference = differences.into_iter().flatten().min_by_key(|difference| difference.time);
-        ReplayReport { force, commanded, first_difference, logged_fault, fault }
+    /// Forces in the log before `time`.
+    pub(super) fn forces_before(&self, time: Nanos) -> usize {
+        self.topics()[0].logged.iter().filter(|sample| sample.time() < time).count()
     }
 
-    fn topics(&self) -> MutexGuard<'_, Topics> {
+    /// How each topic compares, and the earliest difference.
+    pub(super) fn finish(&self, end: Option<End>) -> ([Compared; TOPICS.len()], Option<Difference>) {
+        let mut topics = self.topics();
+        let last_force = topics[0].last.unwrap_or_default();
+        let end_of = |end: End, is_local: bool| match is_local {
+            // A sample carries the model's time. The releases behind the end go on from where the model stood.
+            true if last_force < end.last_local => end.local.min(last_force + Nanos(1)),
+            true => end.local,
+            false => end.global,
+        };
+        let mut compared = [Compared::default(); TOPICS.len()];
+        for ((topic, compared), (_, is_local)) in topics.iter_mut().zip(&mut compared).zip(TOPICS) {
+            *compared = topic.finish(end.map(|end| end_of(end, is_local)));
+        }
+        let differences = topics.iter_mut().filter_map(|topic| topic.first.take());
+        let first = differences.min_by_key(|difference| difference.time);
+        (compared, first)
+    }
+
+    fn topics(&self) -> MutexGuard<'_, [Topic; TOPICS.len()]> {
         // Nothing that can panic half-way runs under the lock.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -158,8 +159,12 @@ impl Actor for Comparer {
 
     fn tick(&mut self, _: &TickContext) -> Outcome {
         self.drain.drain(&mut self.records);
-        let records = self.records.drain(..).filter_map(|record| LogRecord::from_record(&record));
-        records.for_each(|record| self.comparison.compare(&record));
+        let mut topics = self.comparison.topics();
+        for computed in self.records.drain(..).filter_map(|record| LogRecord::from_record(&record)) {
+            if let Some(place) = place(&computed) {
+                topics[place].compare(computed);
+            }
+        }
         Outcome::Continue
     }
 }

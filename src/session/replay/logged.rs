@@ -4,13 +4,20 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::compare::Comparison;
+use super::cut::Cut;
+use super::report::LoggedFault;
 use crate::devices::{DeviceState, ReplayedSample};
 use crate::error::{Error, ErrorKind};
-use crate::log::{Environment, GroupStats, Level, LogEntry, LogReader, LogRecord, TextEvent, ToolSample};
+use crate::log::{
+    Environment, EventSum, Execution, GroupStats, Level, LogEntry, LogReader, LogRecord, TextEvent, ToolSample,
+};
 use crate::model::body::Block;
-use crate::runtime::Recording;
+use crate::runtime::{Recording, TickTiming};
 use crate::scene::Scene;
 use crate::time::Nanos;
+
+/// The rate group that is no part of what is repeated.
+const LOGGER: &str = "logger";
 
 /// Everything that a replay needs of a log.
 #[derive(Debug)]
@@ -20,8 +27,10 @@ pub(super) struct Logged {
     pub(super) first: DeviceState,
     pub(super) samples: Vec<ReplayedSample>,
     pub(super) comparison: Comparison,
-    /// The first fault, and the time of its release: nothing from there on is part of the rest.
-    pub(super) fault: Option<(Nanos, String)>,
+    /// When the last release was due.
+    pub(super) end: Nanos,
+    /// At the first fault: nothing from there on is part of the rest.
+    pub(super) cut: Option<Cut>,
 }
 
 /// What one pass over the file gathers.
@@ -32,7 +41,11 @@ struct Gathered {
     samples: Vec<ReplayedSample>,
     comparison: Comparison,
     stats: BTreeMap<u16, GroupStats>,
-    fault: Option<(Nanos, String)>,
+    timings: BTreeMap<u16, Vec<TickTiming>>,
+    events: EventSum,
+    fault: Option<LoggedFault>,
+    /// The last time that a group was started again.
+    restarted: Option<Nanos>,
 }
 
 impl Logged {
@@ -50,7 +63,10 @@ impl Logged {
             samples: Vec::new(),
             comparison: Comparison::new(),
             stats: BTreeMap::new(),
+            timings: BTreeMap::new(),
+            events: EventSum::default(),
             fault: None,
+            restarted: None,
         };
         for entry in reader.by_ref() {
             gathered.push(entry);
@@ -61,6 +77,11 @@ impl Logged {
         }
         if !reader.topics().contains_key("/ports") {
             let message = "it has no topic /ports: what the ticks saw of each other was not recorded, record it again";
+            return Err(refusal(message).at(place));
+        }
+        if !reader.is_checksummed() {
+            let message = "it has no checksum over its data, so nobody knows whether it is as it was written: replay the \
+                           file that palpate wrote";
             return Err(refusal(message).at(place));
         }
         gathered.check().map_err(|error| error.at(place))
@@ -78,30 +99,35 @@ impl Gathered {
             LogEntry::Stats(stats) => {
                 self.stats.insert(stats.group, stats);
             }
-            LogEntry::Text(event) => self.note_fault(event),
+            LogEntry::Text(event) => self.push_event(event),
             LogEntry::Record(record) => self.push_record(&record),
         }
     }
 
     fn push_record(&mut self, record: &LogRecord) {
         match record {
-            LogRecord::Tick(timing) => self.recording.push_timing(timing),
+            LogRecord::Tick(timing) => {
+                self.recording.push_timing(timing);
+                self.timings.entry(timing.group).or_default().push(*timing);
+            }
             LogRecord::Port(used) => self.recording.push_use(used),
             LogRecord::Tool(sample) => {
                 self.samples.push(ReplayedSample { time: sample.time, id: sample.id, state: state(sample) });
             }
-            LogRecord::Force(sample) => self.comparison.log_force(sample),
-            LogRecord::Command(sample) => self.comparison.log_command(sample),
-            LogRecord::Event(event) => self.note_fault(TextEvent::describe(event, &format!("group {}", event.group))),
-            LogRecord::Contact(_) | LogRecord::Resync(_) | LogRecord::Global(_) | LogRecord::Probe(_) => {}
+            LogRecord::Event(event) => self.push_event(TextEvent::describe(event, &format!("group {}", event.group))),
+            computed => self.comparison.log(computed),
         }
     }
 
     /// What the runtime tells as an error ended a release half-way: it cannot be compared.
-    fn note_fault(&mut self, event: TextEvent) {
-        let is_earlier = self.fault.as_ref().is_none_or(|(time, _)| event.time < *time);
+    fn push_event(&mut self, event: TextEvent) {
+        self.events.push(&event);
+        if event.tells_restart() {
+            self.restarted = self.restarted.max(Some(event.time));
+        }
+        let is_earlier = self.fault.as_ref().is_none_or(|fault| event.time < fault.time);
         if event.level == Level::Error && is_earlier {
-            self.fault = Some((event.time, event.message));
+            self.fault = Some(LoggedFault { time: event.time, what: event.message, restarted: false });
         }
     }
 
@@ -115,14 +141,36 @@ impl Gathered {
             .map_err(|error| refusal(format!("what was run cannot be read: {error}")))?;
         let first = environment.first_tool.ok_or_else(|| refusal("it lacks the device's first state"))?;
         self.check_sums(&environment)?;
+        let end = self.recording.end();
+        // Ports are counted anew after a restart and releases half done: what is behind a fault is not repeated.
+        let cut = self.cut(&environment)?;
         self.recording.check(|group| environment.group_name(group))?;
-        if let Some((time, _)) = self.fault {
-            self.recording = self.recording.before(time);
-            self.samples.retain(|sample| sample.time < time);
+        self.check_samples(&environment, &first)?;
+        let Self { recording, samples, comparison, .. } = self;
+        Ok(Logged { scene, recording, first: state(&first), samples, comparison, end, cut })
+    }
+
+    /// Leaves out what is behind the first fault.
+    fn cut(&mut self, environment: &Environment) -> Result<Option<Cut>, Error> {
+        let Some(fault) = self.fault.take() else {
+            let some = self.comparison.forces_before(Nanos(u64::MAX)) > 0;
+            return if some { Ok(None) } else { Err(refusal("it holds no force: there is nothing to compare")) };
+        };
+        let time = fault.time;
+        if self.comparison.forces_before(time) == 0 {
+            let (t, what) = (time.as_secs_f64(), &fault.what);
+            let message =
+                format!("it holds no force before the fault at t = {t} s ({what}): there is nothing to compare");
+            return Err(refusal(message));
         }
-        self.check_samples(&environment)?;
-        let Self { recording, samples, comparison, fault, .. } = self;
-        Ok(Logged { scene, recording, first: state(&first), samples, comparison, fault })
+        self.recording = std::mem::take(&mut self.recording).before(time);
+        self.samples.retain(|sample| sample.time < time);
+        let fault = LoggedFault { restarted: self.restarted.is_some_and(|restarted| restarted >= time), ..fault };
+        let is_virtual = environment.execution == Execution::Virtual;
+        // Observers are not repeated.
+        let repeated = self.timings.iter().filter(|(group, _)| environment.group_name(**group) != LOGGER);
+        let groups = repeated.map(|(group, timings)| (environment.group_name(*group), timings.as_slice()));
+        Ok(Some(Cut::new(fault, is_virtual, groups)))
     }
 
     /// The statistics at the end of a log say how many records it must hold.
@@ -146,18 +194,32 @@ impl Gathered {
                 }
             }
         }
+        self.check_events()
+    }
+
+    /// An event decides how much is compared: none may be missing or changed.
+    fn check_events(&self) -> Result<(), Error> {
+        let mut told = EventSum::default();
+        self.stats.values().for_each(|stats| told.add(stats.events));
+        if told.count != self.events.count {
+            let message = format!("its rate groups told {} events, but {} are in /log", told.count, self.events.count);
+            return Err(refusal(message));
+        }
+        if told != self.events {
+            return Err(refusal("time, level or words of an event in /log are not those that a rate group told"));
+        }
         Ok(())
     }
 
     /// Every release of the local group read the device.
-    fn check_samples(&self, environment: &Environment) -> Result<(), Error> {
+    fn check_samples(&self, environment: &Environment, first: &ToolSample) -> Result<(), Error> {
         let local = environment.groups.iter().position(|group| group.name == "local");
         let local = local.ok_or_else(|| refusal("it has no rate group `local`, so it is no log of a session"))?;
         let mut samples = self.samples.iter();
-        let mut last_id = 0;
+        let mut last = ReplayedSample { time: Nanos::ZERO, id: 0, state: state(first) };
         for (tick, time) in self.recording.releases(local as u16) {
             match samples.next() {
-                Some(sample) if sample.time == time && sample.id.wrapping_sub(last_id) <= 1 => last_id = sample.id,
+                Some(sample) if sample.time == time && follows(sample, &last) => last = *sample,
                 _ => {
                     let message =
                         format!("release {tick} of rate group `local` has no sample of the tool, or a wrong one");
@@ -183,6 +245,21 @@ fn check_instruction_set(logged: &str) -> Result<(), Error> {
     let message =
         format!("it was made with the instruction set {logged}, this machine uses {here}: bit-identity holds for one");
     Err(refusal(message))
+}
+
+/// A read counts on, or has failed and the state before is used again.
+fn follows(sample: &ReplayedSample, last: &ReplayedSample) -> bool {
+    match sample.id.wrapping_sub(last.id) {
+        0 => bits(&sample.state) == bits(&last.state),
+        1 => true,
+        _ => false,
+    }
+}
+
+fn bits(state: &DeviceState) -> ([u64; 6], u16) {
+    let [a, b, c]: [f64; 3] = state.position.into();
+    let [d, e, f]: [f64; 3] = state.velocity.into();
+    ([a, b, c, d, e, f].map(f64::to_bits), state.buttons)
 }
 
 fn state(sample: &ToolSample) -> DeviceState {

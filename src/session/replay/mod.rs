@@ -1,11 +1,13 @@
-//! A logged run, executed again from what it was given, and its forces compared with the logged ones bit for bit.
+//! A logged run, executed again from what it was given, and what it computes compared with the log bit for bit.
 
 mod compare;
+mod cut;
+mod fields;
 mod logged;
 mod report;
 
 pub(super) use compare::{Comparer, Comparison};
-pub use report::{Compared, Difference, ReplayReport};
+pub use report::{Compared, Difference, LoggedFault, ReplayReport, Unrepeated, UnrepeatedRelease};
 
 use std::path::Path;
 use std::time::Duration;
@@ -14,8 +16,10 @@ use super::Session;
 use super::prepare::{Parts, as_run, prepare};
 use crate::devices::Replayed;
 use crate::error::{Error, ErrorKind};
-use crate::runtime::{Execution, Recording};
+use crate::runtime::{Execution, Recording, RuntimeReport};
 use crate::time::Nanos;
+use compare::End;
+use cut::Cut;
 use logged::Logged;
 
 /// Simulated time between two reports of progress.
@@ -34,8 +38,9 @@ pub(super) struct Reexecuted {
 pub struct Replay {
     session: Session,
     comparison: Comparison,
-    end: Nanos,
-    fault: Option<(Nanos, String)>,
+    /// Of what is repeated, and of the log.
+    ends: [Nanos; 2],
+    cut: Option<Cut>,
 }
 
 impl Replay {
@@ -71,17 +76,17 @@ impl Replay {
             return Err(Error::new(ErrorKind::Log, message).at(place));
         }
         let comparison = logged.comparison;
-        let end = logged.recording.end();
+        let ends = [logged.recording.end(), logged.end];
         prepared.reexecuted = Some(Reexecuted { recording: logged.recording, comparison: comparison.clone() });
-        Ok(Self { session: Session { prepared }, comparison, end, fault: logged.fault })
+        Ok(Self { session: Session { prepared }, comparison, ends, cut: logged.cut })
     }
 
-    /// The scheduled time of the last release.
+    /// The scheduled time of the last release that is repeated.
     pub fn end(&self) -> Nanos {
-        self.end
+        self.ends[0]
     }
 
-    /// Executes the log in simulated time and compares every force.
+    /// Executes the log in simulated time and compares every sample that it computes.
     ///
     /// # Errors
     /// If the session cannot be started again. A difference, or a re-execution that does not get to the end, is part of
@@ -98,11 +103,28 @@ impl Replay {
         let running = self.session.start()?;
         while !running.finished() {
             running.wait_for(STEP);
-            progress(running.elapsed().min(self.end));
+            progress(running.elapsed().min(self.ends[0]));
         }
-        let summary = running.stop();
-        Ok(self.comparison.report(self.fault, summary.runtime.fault))
+        Ok(report(&self.comparison, self.ends[1], self.cut, running.stop().runtime))
     }
+}
+
+fn report(comparison: &Comparison, end: Nanos, cut: Option<Cut>, mut runtime: RuntimeReport) -> ReplayReport {
+    let (unrepeated, fault) = match (runtime.fault.take(), &cut) {
+        (Some(fault), Some(cut)) => match cut.excuse(&runtime, fault) {
+            Ok(unrepeated) => (Some(unrepeated), None),
+            Err(fault) => (None, Some(fault)),
+        },
+        (fault, _) => (None, fault),
+    };
+    let ends = cut.as_ref().map(|cut| {
+        let (last_local, local) = cut.end_of("local", unrepeated.as_ref());
+        End { local, last_local, global: cut.end_of("global", unrepeated.as_ref()).1 }
+    });
+    let ([force, commanded, others @ ..], first_difference) = comparison.finish(ends);
+    let logged_fault = cut.map(|cut| cut.fault);
+    let others = others.to_vec();
+    ReplayReport { force, commanded, others, first_difference, end, logged_fault, unrepeated, fault }
 }
 
 /// The first line in which two texts differ.

@@ -8,12 +8,16 @@ use crate::time::Nanos;
 /// How the samples of one topic compare.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compared {
-    /// Samples in the log.
+    /// The topic.
+    pub topic: &'static str,
+    /// Samples in the log that are to be compared.
     pub logged: u64,
     /// Samples that the replay computed.
     pub computed: u64,
-    /// Pairs that are the same in every bit: time, force and model version.
+    /// Pairs that are the same in every bit of every field.
     pub identical: u64,
+    /// Samples in the log behind a fault, which are not compared.
+    pub left_out: u64,
 }
 
 impl Compared {
@@ -30,7 +34,7 @@ pub struct Difference {
     pub time: Nanos,
     /// Its topic.
     pub topic: &'static str,
-    /// What differs: `force_n`, `model_version`, `time`, or `count` if only one side has the sample.
+    /// What differs: the name of the field, or `count` if only one side has the sample.
     pub what: &'static str,
     /// The sample in the log.
     pub logged: Option<String>,
@@ -52,6 +56,37 @@ impl fmt::Display for Difference {
     }
 }
 
+/// The first fault of the logged run. What came after it cannot be repeated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LoggedFault {
+    /// When the release that failed was due: what was due before is compared, nothing else.
+    pub time: Nanos,
+    /// What happened.
+    pub what: String,
+    /// True if a new global model served after it; else the run ended.
+    pub restarted: bool,
+}
+
+/// A release that was due before a fault and still ran when the failed one began.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnrepeatedRelease {
+    /// Its rate group.
+    pub group: String,
+    /// Its number.
+    pub tick: u64,
+    /// When it was due.
+    pub time: Nanos,
+}
+
+/// Releases before a fault that need what only came after it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unrepeated {
+    /// All of them.
+    pub releases: Vec<UnrepeatedRelease>,
+    /// What the first of them waits for.
+    pub why: String,
+}
+
 /// What a replay found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReplayReport {
@@ -59,27 +94,58 @@ pub struct ReplayReport {
     pub force: Compared,
     /// `/force_commanded`: after it.
     pub commanded: Compared,
+    /// The other computed topics: `/contact`, `/resync`, `/global` and `/probe`.
+    pub others: Vec<Compared>,
     /// The earliest sample that differs.
     pub first_difference: Option<Difference>,
-    /// A fault of the logged run and the time of its release: everything before it was compared, nothing after.
-    pub logged_fault: Option<(Nanos, String)>,
+    /// When the last release of the log was due.
+    pub end: Nanos,
+    /// The first fault of the logged run: everything before it was compared, nothing after.
+    pub logged_fault: Option<LoggedFault>,
+    /// Releases before that fault that cannot be repeated.
+    pub unrepeated: Option<Unrepeated>,
     /// Why the re-execution did not get to the end, if it did not.
     pub fault: Option<RuntimeFault>,
 }
 
 impl ReplayReport {
-    /// True if every sample was computed and is the same in every bit.
+    /// True if every sample before a logged fault, or to the end, was computed and is the same in every bit. Nothing
+    /// compared is not identical.
     pub fn is_identical(&self) -> bool {
-        self.fault.is_none() && self.first_difference.is_none()
+        self.fault.is_none() && self.first_difference.is_none() && self.force.identical > 0
+    }
+
+    /// Every topic.
+    pub fn topics(&self) -> impl Iterator<Item = &Compared> {
+        [&self.force, &self.commanded].into_iter().chain(&self.others)
+    }
+
+    /// Up to when samples were compared.
+    pub fn compared_up_to(&self) -> Nanos {
+        self.logged_fault.as_ref().map_or(self.end, |fault| fault.time)
     }
 }
 
 impl fmt::Display for ReplayReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let of = |compared: Compared| format!("{} of {}", compared.identical, compared.logged);
-        writeln!(f, "{} force samples bit-identical, {} commanded", of(self.force), of(self.commanded))?;
-        if let Some((time, what)) = &self.logged_fault {
-            writeln!(f, "compared up to t = {} s, where the logged run ended: {what}", time.as_secs_f64())?;
+        let of = |compared: &Compared| format!("{} of {}", compared.identical, compared.logged);
+        writeln!(f, "{} force samples bit-identical, {} commanded", of(&self.force), of(&self.commanded))?;
+        let other = |compared: &Compared| format!("{} {}", of(compared), compared.topic.trim_start_matches('/'));
+        let others: Vec<String> = self.others.iter().map(other).collect();
+        writeln!(f, "and {}", others.join(", "))?;
+        if let Some(fault) = &self.logged_fault {
+            let (up_to, end) = (fault.time.as_secs_f64(), self.end.as_secs_f64());
+            let after = if fault.restarted { "a new global model served after it" } else { "the run ended with it" };
+            let left_out = self.force.left_out;
+            writeln!(f, "COMPARED ONLY up to t = {up_to} s of {end} s, to the fault `{}`", fault.what)?;
+            writeln!(f, "{after}, {left_out} force samples from there on were not compared")?;
+        }
+        if let Some(Unrepeated { releases, why }) = &self.unrepeated {
+            let name = |left: &UnrepeatedRelease| {
+                format!("release {} of `{}` (t = {} s)", left.tick, left.group, left.time.as_secs_f64())
+            };
+            let names: Vec<String> = releases.iter().map(name).collect();
+            writeln!(f, "not repeated, because they saw what came after the fault: {}; {why}", names.join(", "))?;
         }
         if let Some(fault) = &self.fault {
             writeln!(f, "the re-execution ended before the log: {fault}")?;

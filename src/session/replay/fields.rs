@@ -1,0 +1,123 @@
+//! The fields of a logged sample, each by its bits: -0.0 is not 0.0, and a NaN is itself.
+
+use crate::log::LogRecord;
+use crate::runtime::Record;
+
+/// The first field in which two samples of one topic differ.
+pub(super) fn first_difference(one: &LogRecord, other: &LogRecord) -> Option<&'static str> {
+    // Nearly always: all bits at once.
+    if Record::from(*one) == Record::from(*other) {
+        return None;
+    }
+    let pairs = fields(one).into_iter().zip(fields(other));
+    Some(pairs.into_iter().find(|(one, other)| one != other).map_or("kind", |((name, _), _)| name))
+}
+
+/// Name and bits of every field of a computed sample, in the order of its definition.
+fn fields(record: &LogRecord) -> Vec<(&'static str, u64)> {
+    let mut all = vec![("time", record.time().0)];
+    let mut add = |name: &'static str, bits: &[u64]| all.extend(bits.iter().map(|bits| (name, *bits)));
+    match record {
+        LogRecord::Force(r) => {
+            add("force_n", &r.force_n.map(f64::to_bits));
+            add("model_version", &[r.model_version.into()]);
+            add("model_age_s", &[r.model_age_s.to_bits()]);
+            add("energy_j", &[r.energy_j.to_bits()]);
+        }
+        LogRecord::Command(r) => {
+            add("force_n", &r.force_n.map(f64::to_bits));
+            add("limits", &[r.limits.into()]);
+        }
+        LogRecord::Contact(r) => {
+            add("mode", &[r.mode as u64]);
+            add("triangle", &[r.triangle.into()]);
+            add("weights", &r.weights.map(f64::to_bits));
+            add("normal", &r.normal.map(f64::to_bits));
+            add("normal_force_n", &[r.normal_force_n.to_bits().into()]);
+            add("tangential_force_n", &[r.tangential_force_n.to_bits().into()]);
+        }
+        LogRecord::Resync(r) => {
+            add("version", &[r.version.into()]);
+            add("age", &[r.age.0]);
+            add("jump_before_n", &[r.jump_before_n.to_bits()]);
+            add("jump_after_n", &[r.jump_after_n.to_bits()]);
+            add("energy_j", &[r.energy_j.to_bits()]);
+        }
+        LogRecord::Global(r) => {
+            add("version", &[r.version.into()]);
+            add("first_tick", &[r.first_tick]);
+            add("last_tick", &[r.last_tick]);
+        }
+        LogRecord::Probe(r) => {
+            add("node", &[r.node.into()]);
+            add("local_m", &r.local_m.map(f64::to_bits));
+            add("global_m", &r.global_m.map(f64::to_bits));
+        }
+        // Inputs and measurements: nothing is computed that they could be compared with.
+        LogRecord::Tick(_) | LogRecord::Event(_) | LogRecord::Port(_) | LogRecord::Tool(_) => {}
+    }
+    all
+}
+
+/// A sample in one line.
+pub(super) fn in_words(record: &LogRecord) -> String {
+    let t = record.time().as_secs_f64();
+    match record {
+        LogRecord::Force(r) => format!(
+            "{:?} N (t = {t} s, model {}, age {:?} s, energy {:?} J)",
+            r.force_n, r.model_version, r.model_age_s, r.energy_j
+        ),
+        LogRecord::Command(r) => format!("{:?} N (t = {t} s, limits {})", r.force_n, r.limits),
+        other => format!("{other:?}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{CommandSample, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync};
+
+    // Check that every bit of a record that a sample uses belongs to a named field.
+    #[test]
+    fn every_flipped_bit_of_a_computed_sample_is_a_difference_with_a_name() {
+        let samples: [LogRecord; 6] = [
+            LogRecord::Force(ForceSample::default()),
+            LogRecord::Command(CommandSample::default()),
+            LogRecord::Contact(ContactSample::default()),
+            LogRecord::Resync(Resync::default()),
+            LogRecord::Global(GlobalTick::default()),
+            LogRecord::Probe(ProbeSample::default()),
+        ];
+        for sample in samples {
+            let clean = Record::from(sample);
+            let mut names = Vec::new();
+            for word in 0..6 {
+                for bit in 0..64 {
+                    let mut flipped = clean;
+                    flipped.words[word] ^= 1 << bit;
+                    names.extend(changed(&sample, &flipped));
+                }
+            }
+            for bit in 0..32 {
+                let index = Record { index: clean.index ^ 1 << bit, ..clean };
+                let stamp = Record { stamp: crate::time::Nanos(clean.stamp.0 ^ 1 << bit), ..clean };
+                let code = Record { code: clean.code ^ 1 << (bit % 16), ..clean };
+                names.extend([index, stamp, code].iter().filter_map(|flipped| changed(&sample, flipped)));
+            }
+            names.sort_unstable();
+            names.dedup();
+            let mut named: Vec<_> = fields(&sample).into_iter().map(|(name, _)| name).collect();
+            named.sort_unstable();
+            named.dedup();
+            assert_eq!(names, named, "{sample:?}");
+        }
+    }
+
+    /// The field that a changed record changes; `None` for bits that the sample does not use.
+    fn changed(sample: &LogRecord, flipped: &Record) -> Option<&'static str> {
+        let other = LogRecord::from_record(flipped).unwrap();
+        let is_used = Record::from(other) != Record::from(*sample);
+        assert_eq!(first_difference(sample, &other).is_some(), is_used, "{other:?}");
+        first_difference(sample, &other)
+    }
+}
