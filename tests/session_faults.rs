@@ -40,11 +40,15 @@ fn assert_ramps_out(trace: &Trace, fault: Fault) {
     // The fault is noticed in one release and answered in the next; a skipped period is made up for by a larger step.
     let begun = trace.magnitudes().filter(|sample| sample.0 <= FAULT_S + 0.05).last().unwrap().0;
     assert!(rest <= begun + RAMP_S + 0.005, "{fault:?}: still a force at {rest} s");
-    let fading: Vec<f64> =
-        trace.magnitudes().filter(|sample| sample.0 > FAULT_S + 0.06).map(|sample| sample.1).collect();
-    assert!(fading.windows(2).all(|pair| pair[1] <= pair[0]), "{fault:?}: {fading:?}");
-    let steps = fading.iter().filter(|magnitude| **magnitude > 0.0).count();
-    assert!(steps > 5, "{fault:?}: it must fade, not drop");
+    let fading: Vec<_> = trace.magnitudes().filter(|sample| sample.0 > begun).collect();
+    assert!(!fading.is_empty());
+    for pair in fading.windows(2) {
+        let (dt, drop) = (pair[1].0 - pair[0].0, pair[0].1 - pair[1].1);
+        // Check that it fades and does not drop, however many periods the host took. A device that nobody reads cannot
+        // tell how many that were.
+        let slow = drop <= before * dt / RAMP_S * 1.01 + 1e-9 || fault == Fault::DeviceReadPanics;
+        assert!(drop >= 0.0 && (slow || dt >= 0.1), "{fault:?}: {pair:?} of {before} N");
+    }
 }
 
 fn words(summary: &Summary) -> String {
