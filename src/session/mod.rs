@@ -61,11 +61,12 @@ impl Session {
 
     /// Reads the log of a scene's run, in real or in simulated time, to execute it again in simulated time from what was
     /// logged: the states that the device gave and what each tick saw of the other rate group. Logged forces are only
-    /// compared with.
+    /// compared with. A run with a fault is repeated up to it.
     ///
     /// # Errors
     /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read; [`ErrorKind::Log`](crate::ErrorKind::Log) if it is
-    /// damaged, if a record is missing, if it was made with another instruction set, or if the body was a program's own.
+    /// damaged, if a record is missing, if it holds no force before its first fault, if it was made with another
+    /// instruction set, or if the body was a program's own.
     #[cfg(all(feature = "log", feature = "scene"))]
     pub fn replay(log: &std::path::Path) -> Result<Replay, Error> {
         Replay::of_scene(log)

@@ -119,6 +119,8 @@ fn report(comparison: &Comparison, end: Nanos, cut: Option<Cut>, mut runtime: Ru
     };
     let ends = cut.as_ref().map(|cut| {
         let (last_local, local) = cut.end_of("local", unrepeated.as_ref());
+        // After a fault of the re-execution the model lags because of that.
+        let last_local = if fault.is_none() { last_local } else { Nanos::ZERO };
         End { local, last_local, global: cut.end_of("global", unrepeated.as_ref()).1 }
     });
     let ([force, commanded, others @ ..], first_difference) = comparison.finish(ends);
