@@ -6,7 +6,7 @@
 //! | field | content |
 //! | --- | --- |
 //! | `schema_version` | 1 |
-//! | `verdict`, `reason` | `OK`, `INCOMPLETE`, `LATE` or `FAILED`, and why in one line |
+//! | `verdict`, `reason` | `OK`, `INCOMPLETE`, `LATE`, `RESTARTED` or `FAILED`, and why in one line |
 //! | `duration_s` | time of the last record |
 //! | `virtual_time` | true if lateness is zero by construction |
 //! | `damage` | what is wrong with the log and where, or `null` |

@@ -1,7 +1,7 @@
 //! The one line that a report begins with.
 
 use super::units::plural;
-use crate::log::{Level, RunReport};
+use crate::log::{Level, RunReport, TextEvent};
 
 /// How a run went, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -12,6 +12,8 @@ pub enum Verdict {
     Incomplete,
     /// Periods were skipped or deadlines missed.
     Late,
+    /// A rate group failed and was started again; the run went on.
+    Restarted,
     /// An actor failed.
     Failed,
 }
@@ -23,6 +25,7 @@ impl Verdict {
             Self::Ok => "OK",
             Self::Incomplete => "INCOMPLETE",
             Self::Late => "LATE",
+            Self::Restarted => "RESTARTED",
             Self::Failed => "FAILED",
         }
     }
@@ -38,7 +41,15 @@ pub fn verdict(report: &RunReport) -> (Verdict, String) {
     let ran = format!("{:.3} s of {time}", report.duration.as_secs_f64());
     let (skipped, missed, lost) = (report.skipped(), report.missed(), report.lost_records());
     if report.worst_event == Some(Level::Error) {
-        let first = report.events.iter().find(|event| event.level == Level::Error);
+        let errors = || report.events.iter().filter(|event| event.level == Level::Error);
+        let first = errors().find(|event| restart_after(report, event).is_none());
+        if first.is_none()
+            && let Some(restart) = errors().last().and_then(|event| restart_after(report, event))
+        {
+            let (skipped, missed) = (plural(skipped, "period", "periods"), plural(missed, "deadline", "deadlines"));
+            let restart = &restart.message;
+            return (Verdict::Restarted, format!("{restart}; {skipped} skipped and {missed} missed in {ran}"));
+        }
         let reason = first.map_or("an actor failed".to_owned(), |event| event.message.clone());
         return (Verdict::Failed, format!("{reason}, in {ran}"));
     }
@@ -57,6 +68,15 @@ pub fn verdict(report: &RunReport) -> (Verdict, String) {
         return (Verdict::Incomplete, "the log holds no ticks".to_owned());
     }
     (Verdict::Ok, format!("{ran}, every period kept, every deadline met"))
+}
+
+/// The restart that answered a fault: the first of the same group at its time or later.
+fn restart_after<'a>(report: &'a RunReport, fault: &TextEvent) -> Option<&'a TextEvent> {
+    let group = fault.message.split_once(": ")?.0;
+    report.events.iter().find(|event| {
+        let rest = event.message.strip_prefix(group);
+        event.time >= fault.time && rest.is_some_and(|rest| rest.starts_with(": restarted after a fault"))
+    })
 }
 
 #[cfg(test)]
@@ -90,5 +110,20 @@ mod tests {
         assert_eq!(verdict(&cut).0, Verdict::Incomplete);
         let both = RunReport { worst_event: Some(Level::Error), ..report(3) };
         assert_eq!(verdict(&both).0, Verdict::Failed);
+    }
+
+    #[test]
+    fn a_fault_that_a_restart_answered_is_told_from_one_that_ended_the_run() {
+        let event = |s: u64, level, message: &str| TextEvent { time: Nanos(s), level, message: message.to_owned() };
+        let restarted = event(6, Level::Warning, "global: restarted after a fault, restart 1");
+        let with = |events: Vec<TextEvent>| RunReport { worst_event: Some(Level::Error), events, ..report(3) };
+        let panicked = |s, group: &str| event(s, Level::Error, &format!("{group}: actor 0 panicked"));
+        let (found, why) = verdict(&with(vec![panicked(5, "global"), restarted.clone()]));
+        assert_eq!(found, Verdict::Restarted);
+        assert!(why.starts_with("global: restarted after a fault, restart 1; 3 periods skipped"), "{why}");
+        // Check that neither another group's restart nor an earlier one answers a fault
+        for fault in [panicked(5, "local"), panicked(7, "global")] {
+            assert_eq!(verdict(&with(vec![fault, restarted.clone()])).0, Verdict::Failed);
+        }
     }
 }
