@@ -236,7 +236,7 @@ mod loom_tests {
     use super::*;
 
     #[test]
-    fn loom_a_publication_after_a_delivery_was_seen_reaches_the_new_reader_and_nothing_is_seen_twice() {
+    fn loom_the_publication_after_two_deliveries_reaches_the_newest_reader() {
         let mut builder = loom::model::Builder::new();
         builder.preemption_bound = Some(3);
         builder.check(|| {

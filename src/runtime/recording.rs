@@ -75,7 +75,7 @@ impl From<&TickTiming> for RecordedRelease {
 ///     let running = graph.build().unwrap().start().unwrap();
 ///     running.wait_for(Duration::MAX);
 ///     assert_eq!(running.stop().fault, None);
-///     (counts.lock().unwrap().clone(), Recording::from_records(&records.lock().unwrap()))
+///     (counts.lock().unwrap().clone(), Recording::from_records(records.lock().unwrap().iter()))
 /// }
 ///
 /// let (counts, recording) = graph(Runtime::builder(Execution::Threaded));
