@@ -16,8 +16,7 @@ use palpate::time::Nanos;
 use palpate::{Error, ErrorKind};
 use session_support::{block, pressing, top, wiggling};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Runs it with a log in `folder`.
@@ -99,7 +98,7 @@ impl Device for Moody {
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
         self.reads += 1;
         assert!(self.reads < self.panics_at, "the device gave way");
-        if self.reads % 97 == 0 {
+        if self.reads.is_multiple_of(97) {
             std::thread::sleep(Duration::from_micros(700 * (self.reads / 97 % 20)));
         }
         // The state before the start is not the one of release 0.
@@ -114,7 +113,7 @@ impl Device for Moody {
     }
 
     fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
-        if self.reads % 11 == 0 { Err(DeviceFault::NotReady) } else { Ok(()) }
+        if self.reads.is_multiple_of(11) { Err(DeviceFault::NotReady) } else { Ok(()) }
     }
 }
 
@@ -222,7 +221,7 @@ fn a_run_that_a_panic_ended_is_compared_up_to_there() {
 #[derive(Clone, Debug)]
 struct Failing {
     block: Block,
-    calls: Arc<AtomicU64>,
+    calls: Arc<Mutex<u64>>,
     /// For this long it does not return; without, it panics.
     hangs: Option<Duration>,
 }
@@ -232,8 +231,8 @@ impl Failing {
     const AT: u64 = 1000;
 
     /// Fails once `calls` has counted that far: a session looks at its body before it starts.
-    fn new(calls: &Arc<AtomicU64>, hangs: Option<Duration>) -> Self {
-        calls.store(u64::MAX / 2, Ordering::Relaxed);
+    fn new(calls: &Arc<Mutex<u64>>, hangs: Option<Duration>) -> Self {
+        *calls.lock().unwrap() = u64::MAX / 2;
         Self { block: block(), calls: Arc::clone(calls), hangs }
     }
 }
@@ -249,7 +248,12 @@ impl Body for Failing {
         self.block.surface()
     }
     fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
-        if self.calls.fetch_add(1, Ordering::Relaxed) == Self::AT {
+        let call = {
+            let mut calls = self.calls.lock().unwrap();
+            *calls += 1;
+            *calls
+        };
+        if call == Self::AT {
             std::thread::sleep(self.hangs.expect("the body gave way"));
         }
         self.block.forces(state, forces);
@@ -278,7 +282,7 @@ fn a_run_whose_global_model_was_started_again_is_compared_up_to_the_fault() {
         let (calls, log) = (Arc::default(), folder.path().join("run.mcap"));
         let session = own(Failing::new(&calls, hangs)).path(pressing()).duration_s(seconds).log(&log);
         let session = if is_virtual { session.virtual_time() } else { session }.build().unwrap();
-        calls.store(0, Ordering::Relaxed);
+        *calls.lock().unwrap() = 0;
         let summary = session.run().unwrap();
         assert_eq!((summary.runtime.restarts.len(), &summary.runtime.fault), (1, &None), "{summary}");
         let fault = &summary.runtime.restarts[0];
@@ -648,13 +652,16 @@ fn a_log_that_lacks_anything_is_refused_with_what_it_lacks() {
     }
 }
 
+/// What the refusal must say, and the entry to take away.
+type Gap = (&'static str, fn(&LogEntry) -> bool);
+
 // Check that gaps are found by the records' own numbers too, where the sums were made to fit.
 #[test]
 fn a_gap_is_refused_even_if_the_sums_fit() {
     let folder = folder();
     let log = short(&folder);
     let whole = entries(&log);
-    let gaps: [(&str, fn(&LogEntry) -> bool); 2] =
+    let gaps: [Gap; 2] =
         [("release 78 of rate group `local`", |e| is_timing(e, 0, 77)), ("`took`", |e| is_use(e, PortUseKind::Took))];
     for (says, is_it) in gaps {
         let mut changed = whole.clone();
