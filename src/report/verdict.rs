@@ -44,7 +44,7 @@ pub fn verdict(report: &RunReport) -> (Verdict, String) {
         let errors = || report.events.iter().filter(|event| event.level == Level::Error);
         let first = errors().find(|event| restart_after(report, event).is_none());
         if first.is_none()
-            && let Some(restart) = errors().last().and_then(|event| restart_after(report, event))
+            && let Some(restart) = errors().next_back().and_then(|event| restart_after(report, event))
         {
             let (skipped, missed) = (plural(skipped, "period", "periods"), plural(missed, "deadline", "deadlines"));
             let restart = &restart.message;
