@@ -11,6 +11,7 @@ pub(super) fn granted(grant: &SystemGrant) -> BTreeMap<String, String> {
     if !grant.virtual_time {
         map.insert("memory".to_owned(), format!("mlockall {}", grant.mlock));
         map.insert("timer slack".to_owned(), grant.timer_slack.clone());
+        map.insert("idle states".to_owned(), grant.idle_states.clone());
         map.extend(grant.groups.iter().map(|group| (group.name.clone(), in_words(group))));
     }
     map

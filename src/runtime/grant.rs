@@ -14,6 +14,9 @@ pub struct SystemGrant {
     pub mlock: String,
     /// Timer slack of the group threads: `1 ns`, `not asked`, or why it was refused.
     pub timer_slack: String,
+    /// Whether processors are kept out of idle states that take long to leave: `held off`, `not asked`, or why it was
+    /// refused.
+    pub idle_states: String,
     /// What the kernel reads the time from.
     pub clock_source: String,
     /// The kernel's release and build.
@@ -136,6 +139,11 @@ pub(super) fn refusals(groups: &[RateGroup]) -> Vec<String> {
     {
         refused.push(format!("memory: {reason}"));
     }
+    if groups.iter().any(|spec| spec.priority.is_some())
+        && let Err(reason) = os::stay_awake()
+    {
+        refused.push(format!("idle states: {reason}"));
+    }
     refused
 }
 
@@ -146,6 +154,7 @@ impl SystemGrant {
             virtual_time: false,
             mlock: "not asked".to_owned(),
             timer_slack: "not asked".to_owned(),
+            idle_states: "not asked".to_owned(),
             clock_source: os::clock_source(),
             kernel: os::kernel(),
             cores: os::cores(),

@@ -58,7 +58,7 @@ pub enum Release {
 #[non_exhaustive]
 pub enum Wait {
     /// Sleep until shortly before the release, then spin, where a real-time policy was granted; otherwise `Sleep`. How
-    /// long before is learnt from how late the sleeps end: at most 120 us and 15 % of the period.
+    /// long before is learnt from how late the sleeps end: at most 135 us and 15 % of the period.
     #[default]
     Auto,
     /// One absolute sleep.

@@ -19,6 +19,7 @@ use super::tenure::Tenure;
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
 use crossbeam_channel::{Sender, bounded};
+use std::fs::File;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -60,6 +61,8 @@ pub(crate) struct Threads {
     closing: Option<Instant>,
     /// When the last group that is no observer was seen to end.
     ended_at: Option<Nanos>,
+    /// Open for as long as the run lasts.
+    _awake: Option<File>,
     pub(crate) supervisor: Supervisor,
 }
 
@@ -86,6 +89,12 @@ impl Threads {
             gates.push(gate);
             grant.timer_slack = worse(grant.timer_slack, granted.timer_slack);
             grant.groups.push(granted.group);
+        }
+        // Who may not have a real-time policy gains little by it.
+        let real_time = grant.groups.iter().any(|group| group.priority > 0);
+        let awake = real_time.then(os::stay_awake);
+        if let Some(awake) = &awake {
+            grant.idle_states = awake.as_ref().map_or_else(String::clone, |_| "held off".to_owned());
         }
         grants.set(grant);
         start_actors(&mut groups)?;
@@ -119,6 +128,7 @@ impl Threads {
             given_up: false,
             closing: None,
             ended_at: None,
+            _awake: awake.and_then(Result::ok),
             supervisor,
         })
     }
