@@ -2,14 +2,17 @@
 # The demo's scene in real time beside a load that fills every core: is every record there, every period accounted for, and
 # is there a cause for every slip and every missed deadline?
 #
-#     benches/stress.sh [SECONDS]     600 if left out; needs stress-ng and python3
+#     benches/stress.sh [SECONDS]     600 if left out; needs stress-ng and python3; PALPATE=PROGRAM runs that one
 #
 # Lateness under such a load is the machine's; what is checked here is that the books tell it exactly.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 seconds=${1:-600}
 target=${CARGO_TARGET_DIR:-$PWD/target}
-cargo build --locked --release --bin palpate
+if [ -z "${PALPATE:-}" ]; then
+    cargo build --locked --release --bin palpate
+    PALPATE=$target/release/palpate
+fi
 folder=$(mktemp -d)
 stress=
 cleanup() {
@@ -39,11 +42,11 @@ cores=$(nproc)
 stress-ng --cpu "$cores" --vm "$cores" --vm-bytes 128M --hdd 1 --hdd-bytes 64M --temp-path "$folder" \
     --timeout "$((seconds + 30))s" --quiet &
 stress=$!
-"$target/release/palpate" run "$folder/scene.toml" --duration "$seconds" --out "$folder/run.mcap" | tee "$folder/report.txt"
+"$PALPATE" run "$folder/scene.toml" --duration "$seconds" --out "$folder/run.mcap" | tee "$folder/report.txt"
 kill "$stress" 2>/dev/null || true
 wait "$stress" 2>/dev/null || true
 stress=
-"$target/release/palpate" timing "$folder/run.mcap" --json >"$folder/timing.json"
+"$PALPATE" timing "$folder/run.mcap" --json >"$folder/timing.json"
 
 python3 - "$folder/timing.json" <<'PYTHON'
 import json, sys

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Logs open with readers that palpate did not write, and their message counts are those that the run reports.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
-cargo build --locked --release --bin palpate
-palpate="$CARGO_TARGET_DIR/release/palpate"
+cargo build --locked --profile test --bin palpate
+palpate="$CARGO_TARGET_DIR/debug/palpate"
 
 venv="$CARGO_TARGET_DIR/ci-venv"
 if [ ! -x "$venv/bin/python" ] || ! "$venv/bin/python" -c 'import mcap, mcap_protobuf' 2>/dev/null; then
