@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # Every example runs to its end within a minute, in an empty folder, without a terminal, a display or hardware.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
-# The profile of the tests, which come later: what both need is compiled once.
-cargo build --locked --profile test --examples
+build_programs
 
 shopt -s nullglob
 names=()

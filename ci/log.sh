@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Logs open with readers that palpate did not write, and their message counts are those that the run reports.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
-cargo build --locked --profile test --bin palpate
+build_programs
 palpate="$CARGO_TARGET_DIR/debug/palpate"
 
 venv="$CARGO_TARGET_DIR/ci-venv"

@@ -3,5 +3,5 @@
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 command -v stress-ng >/dev/null || install_packages "stress-ng" stress-ng
 command -v python3 >/dev/null || install_packages "Python" python3
-cargo build --locked --profile test --bin palpate
+build_programs
 PALPATE="$CARGO_TARGET_DIR/debug/palpate" benches/stress.sh 10
