@@ -277,7 +277,7 @@ fn every_topic_of_a_log_can_be_exported() {
         ("/contact", "t_s,mode", 200),
         ("/resync", "t_s,version", 5),
         ("/global", "t_s,version", 6),
-        ("/ports", "t_s,group,port", 12),
+        ("/ports", "t_s,group,port", 19),
         ("/probe", "t_s,node", 200),
         ("/log", "t_s,level,message", 0),
         ("/timing/local", "tick,scheduled_ns", 201),
