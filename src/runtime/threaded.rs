@@ -239,8 +239,10 @@ impl Threads {
         let release = books.elapsed_periods();
         if seat.overdue.0 != release {
             seat.overdue = (release, Nanos::ZERO);
-        } else if now > due + restarter.patience() {
-            seat.overdue.1 = seat.overdue.1 + step;
+        } else {
+            // Of the time since the last look, what it was overdue for.
+            let late = now.saturating_sub(due + restarter.patience());
+            seat.overdue.1 = seat.overdue.1 + step.min(late);
         }
         seat.overdue.1 > restarter.policy.hung_after
     }
