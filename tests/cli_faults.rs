@@ -85,7 +85,9 @@ fn after_a_stopped_process_goes_on_the_first_command_is_zero_and_then_ramps_in()
     let timing = folder.succeed(&["timing", "run.mcap", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&timing).unwrap();
     let local = &report["groups"][0];
-    assert!(local["skipped_by_cause"]["late_wake"].as_u64().unwrap() >= 2500, "{local}");
+    // It was stopped asleep or, now and then, within a tick, which then is a long one.
+    let skipped = |cause: &str| local["skipped_by_cause"][cause].as_u64().unwrap();
+    assert!(skipped("late_wake") + skipped("long_tick") >= 2500, "{local}");
     assert_eq!(report["groups"][1]["skipped_by_cause"]["fault"], 0, "{report}");
     let count = |name: &str| local[name].as_u64().unwrap();
     assert_eq!(count("released") + count("skipped"), count("elapsed_periods"));
