@@ -7,14 +7,13 @@ mod session_support;
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
 use palpate::log::{ContactMode, Environment, Level, LogEntry, LogReader, LogRecord, McapWriter, TextEvent};
 use palpate::model::Vec3;
-use palpate::model::body::{Block, Body, State, TangentBlock};
-use palpate::model::mesh::Surface;
+use palpate::model::body::{Block, Body, State};
 use palpate::runtime::{PortUseKind, RateGroup};
 use palpate::scene::{Feedback, LocalModelKind, Scene};
 use palpate::session::{Compared, ReplayReport, Session, SessionBuilder, Summary};
 use palpate::time::Nanos;
 use palpate::{Error, ErrorKind};
-use session_support::{block, pressing, top, wiggling};
+use session_support::{AlteredBlock, block, pressing, top, wiggling};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -121,43 +120,18 @@ fn moody(path: ToolPath) -> Moody {
     Moody { path, reads: 0, panics_at: u64::MAX }
 }
 
-/// A block whose forces take their time now and then, so that local models come late.
-#[derive(Debug)]
-struct Slow {
-    block: Block,
-    calls: u64,
-    /// How long call number 2000 takes.
-    longest: Duration,
-}
-
-impl Body for Slow {
-    fn rest(&self) -> &[Vec3] {
-        self.block.rest()
-    }
-    fn inverse_masses(&self) -> &[f64] {
-        self.block.inverse_masses()
-    }
-    fn surface(&self) -> &Surface {
-        self.block.surface()
-    }
-    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
-        self.calls += 1;
-        match self.calls {
-            2000 => std::thread::sleep(self.longest),
+/// A block whose forces take their time now and then, so that local models come late; call number 2000 takes `longest`.
+fn slow(longest: Duration) -> impl Body {
+    let mut calls = 0_u64;
+    AlteredBlock::new(block(), move |block: &mut Block, state: &State, forces: &mut [Vec3]| {
+        calls += 1;
+        match calls {
+            2000 => std::thread::sleep(longest),
             calls if calls % 331 == 0 => std::thread::sleep(Duration::from_millis(calls % 60)),
             _ => {}
         }
-        self.block.forces(state, forces);
-    }
-    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
-        self.block.node_forces(state, nodes, forces);
-    }
-    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
-        self.block.tangent(state, nodes, clamp, emit);
-    }
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.block.patch(triangle, size, nodes);
-    }
+        block.forces(state, forces);
+    })
 }
 
 /// A session around a program's own body; the program fills it in the same way for the run and for the replay.
@@ -168,7 +142,7 @@ fn own(body: impl Body + 'static) -> SessionBuilder {
 #[test]
 fn stalls_late_models_and_failed_reads_are_replayed_bit_for_bit() {
     let folder = folder();
-    let slow = Slow { block: block(), calls: 0, longest: Duration::from_millis(300) };
+    let slow = slow(Duration::from_millis(300));
     let (summary, log) = record(own(slow).device(moody(pressing())).duration_s(2.0), &folder);
     // Check that it was such a run: releases skipped on both sides, models that came late, reads that failed
     assert!(summary.runtime.groups.iter().take(2).all(|group| group.skipped > 0), "{summary}");
@@ -180,7 +154,7 @@ fn stalls_late_models_and_failed_reads_are_replayed_bit_for_bit() {
 #[test]
 fn a_queue_that_overflowed_is_replayed_bit_for_bit() {
     let folder = folder();
-    let slow = Slow { block: block(), calls: 0, longest: Duration::from_millis(4600) };
+    let slow = slow(Duration::from_millis(4600));
     let (summary, log) = record(own(slow).path(pressing()).duration_s(6.0), &folder);
     let dropped = |entry: &LogEntry| matches!(entry, LogEntry::Record(LogRecord::Port(used)) if used.kind == PortUseKind::Dropped);
     assert!(entries(&log).iter().any(dropped), "the queue of four seconds never overflowed");
@@ -217,59 +191,25 @@ fn a_run_that_a_panic_ended_is_compared_up_to_there() {
     assert!(report.to_string().contains(&says) && report.to_string().contains("the run ended with it"), "{report}");
 }
 
-/// A block that fails once, which copies of it share.
-#[derive(Clone, Debug)]
-struct Failing {
-    block: Block,
-    calls: Arc<Mutex<u64>>,
-    /// For this long it does not return; without, it panics.
-    hangs: Option<Duration>,
-}
-
-impl Failing {
-    /// About half a second of a session of [`own`].
+/// A block that fails once, which copies of it share, when `calls` has counted to about half a second of a session of
+/// [`own`]: for `hangs` it does not return; without, it panics. A session looks at its body before it starts, so the count
+/// begins far beyond.
+fn failing(calls: &Arc<Mutex<u64>>, hangs: Option<Duration>) -> impl Body + use<> {
     const AT: u64 = 1000;
-
-    /// Fails once `calls` has counted that far: a session looks at its body before it starts.
-    fn new(calls: &Arc<Mutex<u64>>, hangs: Option<Duration>) -> Self {
-        *calls.lock().unwrap() = u64::MAX / 2;
-        Self { block: block(), calls: Arc::clone(calls), hangs }
-    }
-}
-
-impl Body for Failing {
-    fn rest(&self) -> &[Vec3] {
-        self.block.rest()
-    }
-    fn inverse_masses(&self) -> &[f64] {
-        self.block.inverse_masses()
-    }
-    fn surface(&self) -> &Surface {
-        self.block.surface()
-    }
-    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
+    *calls.lock().unwrap() = u64::MAX / 2;
+    let calls = Arc::clone(calls);
+    let body = AlteredBlock::new(block(), move |block: &mut Block, state: &State, forces: &mut [Vec3]| {
         let call = {
-            let mut calls = self.calls.lock().unwrap();
+            let mut calls = calls.lock().unwrap();
             *calls += 1;
             *calls - 1
         };
-        if call == Self::AT {
-            std::thread::sleep(self.hangs.expect("the body gave way"));
+        if call == AT {
+            std::thread::sleep(hangs.expect("the body gave way"));
         }
-        self.block.forces(state, forces);
-    }
-    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
-        self.block.node_forces(state, nodes, forces);
-    }
-    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
-        self.block.tangent(state, nodes, clamp, emit);
-    }
-    fn duplicate(&self) -> Option<Box<dyn Body>> {
-        Some(Box::new(self.clone()))
-    }
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.block.patch(triangle, size, nodes);
-    }
+        block.forces(state, forces);
+    });
+    body.with_copies()
 }
 
 // Check that a log goes on behind a restart, that this is no reason to refuse it, and that the report tells how much of
@@ -280,7 +220,7 @@ fn a_run_whose_global_model_was_started_again_is_compared_up_to_the_fault() {
     for (hangs, is_virtual, seconds) in [(None, false, 1.2), (None, true, 1.2), (Some(hung), false, 3.2)] {
         let folder = folder();
         let (calls, log) = (Arc::default(), folder.path().join("run.mcap"));
-        let session = own(Failing::new(&calls, hangs)).path(pressing()).duration_s(seconds).log(&log);
+        let session = own(failing(&calls, hangs)).path(pressing()).duration_s(seconds).log(&log);
         let session = if is_virtual { session.virtual_time() } else { session }.build().unwrap();
         *calls.lock().unwrap() = 0;
         let summary = session.run().unwrap();

@@ -1,6 +1,8 @@
 //! One suite, run against both executors: the same actors see the same order, ports, starts, stops and faults.
 
 mod device_clock;
+#[macro_use]
+mod runtime_support;
 
 use device_clock::DeviceClock;
 use palpate::runtime::{
@@ -13,14 +15,6 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 const MS: u64 = 1_000_000;
-
-/// Runs a test body in both executions.
-macro_rules! in_both_executions {
-    ($($name:ident)*) => {
-        mod in_virtual_time { $(#[test] fn $name() { super::$name(palpate::runtime::Execution::Virtual) })* }
-        mod on_threads { $(#[test] fn $name() { super::$name(palpate::runtime::Execution::Threaded) })* }
-    };
-}
 
 in_both_executions! {
     commits_follow_all_ticks_in_reverse_order

@@ -1,5 +1,8 @@
 //! What happens when actors fail: wind-down, restart, threads left behind; in both executions where both can show it.
 
+#[macro_use]
+mod runtime_support;
+
 use palpate::runtime::{
     Actor, Event, Execution, Mode, Outcome, RateGroup, Record, Restart, Runtime, RuntimeBuilder, RuntimeReport,
     SlipCause, TickContext, actor_fn,
@@ -10,13 +13,6 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 const MS: u64 = 1_000_000;
-
-macro_rules! in_both_executions {
-    ($($name:ident)*) => {
-        mod in_virtual_time { $(#[test] fn $name() { super::$name(palpate::runtime::Execution::Virtual) })* }
-        mod on_threads { $(#[test] fn $name() { super::$name(palpate::runtime::Execution::Threaded) })* }
-    };
-}
 
 in_both_executions! {
     a_group_winds_down_without_the_actor_that_failed

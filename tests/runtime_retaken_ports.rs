@@ -1,5 +1,8 @@
 //! What ports show when a half is taken again by a group that was started again: the same in both executions.
 
+#[macro_use]
+mod runtime_support;
+
 use palpate::runtime::{
     Actor, Execution, Outcome, PortUse, PortUseKind, RateGroup, Reader, Record, Recording, Restart, Runtime,
     RuntimeBuilder, RuntimeReport, TickContext, Writer, actor_fn,
@@ -11,13 +14,6 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 const MS: u64 = 1_000_000;
-
-macro_rules! in_both_executions {
-    ($($name:ident)*) => {
-        mod in_virtual_time { $(#[test] fn $name() { super::$name(palpate::runtime::Execution::Virtual) })* }
-        mod on_threads { $(#[test] fn $name() { super::$name(palpate::runtime::Execution::Threaded) })* }
-    };
-}
 
 in_both_executions! {
     the_first_publication_after_a_restart_reaches_the_new_reader

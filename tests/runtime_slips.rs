@@ -1,13 +1,16 @@
 //! Slips: virtual time injects what threads only suffer, and the books must tell exactly that, in number and in cause.
 
+mod runtime_support;
+
 use palpate::runtime::{
     Disturbance, Execution, Outcome, OverrunPolicy, RateGroup, Runtime, RuntimeReport, SlipCause, TickContext,
     TickTiming, actor_fn,
 };
 use palpate::time::{Nanos, Rate};
 use proptest::prelude::*;
+use runtime_support::busy;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 const MS: u64 = 1_000_000;
 
@@ -332,14 +335,6 @@ fn a_disturbance_that_cannot_be_is_refused_with_the_group() {
     let mut graph = Runtime::builder(Execution::Virtual);
     let error = graph.group(RateGroup::hz(100).device_paced(Nanos(10 * MS)), vec![]).build().unwrap_err();
     assert!(error.to_string().contains("`group-0`") && error.to_string().contains("no actor"), "{error}");
-}
-
-/// Keeps the thread busy.
-fn busy(span: Duration) {
-    let start = Instant::now();
-    while start.elapsed() < span {
-        std::hint::spin_loop();
-    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Wind-down, restarts, overrun policies and device-paced groups together: what one of them does, the others must bear.
 
 mod device_clock;
+#[macro_use]
+mod runtime_support;
 
 use device_clock::DeviceClock;
 use palpate::runtime::{
@@ -14,13 +16,6 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 const MS: u64 = 1_000_000;
-
-macro_rules! in_both_executions {
-    ($($name:ident)*) => {
-        mod in_virtual_time { $(#[test] fn $name() { super::$name(palpate::runtime::Execution::Virtual) })* }
-        mod on_threads { $(#[test] fn $name() { super::$name(palpate::runtime::Execution::Threaded) })* }
-    };
-}
 
 in_both_executions! {
     a_fault_during_the_wind_down_takes_nothing_from_the_other_actors

@@ -1,21 +1,16 @@
 //! Threads in real time. These tests assert counts and identities, never an absolute time: the machine may be busy.
 
+mod runtime_support;
+
 use palpate::runtime::{
     Event, Execution, Outcome, OverrunPolicy, RateGroup, Runtime, SlipCause, TickTiming, Wait, actor_fn,
 };
 use palpate::time::Nanos;
+use runtime_support::busy;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 const MS: u64 = 1_000_000;
-
-/// Keeps the thread busy.
-fn work(span: Duration) {
-    let start = Instant::now();
-    while start.elapsed() < span {
-        std::hint::spin_loop();
-    }
-}
 
 #[test]
 fn a_soak_with_stalls_accounts_for_every_period_and_record() {
@@ -23,7 +18,7 @@ fn a_soak_with_stalls_accounts_for_every_period_and_record() {
     let mut drain = graph.drain();
     let spiky = actor_fn("spiky", |ctx| {
         if ctx.tick % 100 == 50 {
-            work(Duration::from_millis(5));
+            busy(Duration::from_millis(5));
         }
         Outcome::Continue
     });
@@ -79,7 +74,7 @@ fn the_actor_is_told_how_many_periods_were_skipped() {
         expected = ctx.tick + 1;
         if ctx.tick >= 5 && !overran {
             overran = true;
-            work(Duration::from_millis(10));
+            busy(Duration::from_millis(10));
         }
         Outcome::Continue
     });
@@ -95,7 +90,7 @@ fn the_stop_policy_ends_the_run_at_the_first_overrun() {
     let mut graph = Runtime::builder(Execution::Threaded);
     let mut drain = graph.drain();
     let actor = actor_fn("a", |_| {
-        work(Duration::from_millis(30));
+        busy(Duration::from_millis(30));
         Outcome::Continue
     });
     let running = graph

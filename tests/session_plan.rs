@@ -4,8 +4,7 @@ mod session_support;
 
 use palpate::ErrorKind;
 use palpate::model::Vec3;
-use palpate::model::body::{Block, Body, State, TangentBlock};
-use palpate::model::mesh::Surface;
+use palpate::model::body::{Block, Body, State};
 use palpate::runtime::{Execution, RateGroup};
 use palpate::scene::LocalModelKind;
 use palpate::session::{Session, SessionBuilder};
@@ -16,48 +15,19 @@ use std::time::{Duration, Instant};
 
 const MS: u64 = 1_000_000;
 
-/// A block that counts the evaluations of its forces and takes its time for each.
-#[derive(Debug)]
-struct Slow {
-    block: Block,
-    takes: Duration,
-    evaluations: Arc<Mutex<u64>>,
-}
-
-impl Slow {
-    fn new(takes: Duration) -> (Self, Arc<Mutex<u64>>) {
-        let evaluations = Arc::default();
-        (Self { block: block(), takes, evaluations: Arc::clone(&evaluations) }, evaluations)
-    }
-}
-
-impl Body for Slow {
-    fn rest(&self) -> &[Vec3] {
-        self.block.rest()
-    }
-    fn inverse_masses(&self) -> &[f64] {
-        self.block.inverse_masses()
-    }
-    fn surface(&self) -> &Surface {
-        self.block.surface()
-    }
-    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
+/// A block that takes its time for each evaluation of its forces, and the count of these.
+fn slow(takes: Duration) -> (impl Body, Arc<Mutex<u64>>) {
+    let evaluations: Arc<Mutex<u64>> = Arc::default();
+    let count = Arc::clone(&evaluations);
+    let body = AlteredBlock::new(block(), move |block: &mut Block, state: &State, forces: &mut [Vec3]| {
         let start = Instant::now();
-        self.block.forces(state, forces);
-        *self.evaluations.lock().unwrap() += 1;
-        while start.elapsed() < self.takes {
+        block.forces(state, forces);
+        *count.lock().unwrap() += 1;
+        while start.elapsed() < takes {
             std::hint::spin_loop();
         }
-    }
-    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
-        self.block.node_forces(state, nodes, forces);
-    }
-    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
-        self.block.tangent(state, nodes, clamp, emit);
-    }
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.block.patch(triangle, size, nodes);
-    }
+    });
+    (body, evaluations)
 }
 
 fn session(body: impl Body + 'static) -> SessionBuilder {
@@ -72,7 +42,7 @@ fn budgets(session: &Session) -> Vec<(String, Option<Nanos>)> {
 fn the_measured_cost_of_the_body_is_the_budget_of_the_group_that_runs_it() {
     // A step takes 50 us at least: 66.7 steps of a global period 3.3 ms, two steps of a haptic tick 0.1 ms.
     let takes = Duration::from_micros(50);
-    let planned = |model| budgets(&session(Slow::new(takes).0).model(model).build().unwrap());
+    let planned = |model| budgets(&session(slow(takes).0).model(model).build().unwrap());
     let patch = planned(LocalModelKind::Patch);
     assert_eq!(patch.iter().map(|(name, _)| &**name).collect::<Vec<_>>(), ["local", "global", "logger"]);
     let (local, global) = (patch[0].1, patch[1].1);
@@ -85,7 +55,7 @@ fn the_measured_cost_of_the_body_is_the_budget_of_the_group_that_runs_it() {
 #[test]
 fn a_body_that_cannot_keep_its_rate_is_refused_when_the_session_is_built() {
     let takes = Duration::from_micros(600);
-    let refused = |model| session(Slow::new(takes).0).model(model).build().unwrap_err();
+    let refused = |model| session(slow(takes).0).model(model).build().unwrap_err();
     for (model, words) in [
         (LocalModelKind::Patch, ["body: ", "66.7 force evaluations", "33.333ms", "of 216 fit"]),
         (LocalModelKind::Full, ["local.model: ", "2.0 force evaluations", "1.000ms", "another local model"]),
@@ -95,14 +65,14 @@ fn a_body_that_cannot_keep_its_rate_is_refused_when_the_session_is_built() {
         let error = error.to_string();
         assert!(words.iter().all(|word| error.contains(word)), "{words:?} in {error}");
         // Check that virtual time takes it
-        assert!(session(Slow::new(takes).0).model(model).virtual_time().build().is_ok());
+        assert!(session(slow(takes).0).model(model).virtual_time().build().is_ok());
     }
 }
 
 #[test]
 fn nothing_is_measured_in_virtual_time_or_where_the_program_gave_a_budget() {
     let evaluations = |change: &dyn Fn(SessionBuilder) -> SessionBuilder| {
-        let (body, evaluations) = Slow::new(Duration::ZERO);
+        let (body, evaluations) = slow(Duration::ZERO);
         change(session(body)).build().unwrap();
         *evaluations.lock().unwrap()
     };
@@ -110,7 +80,7 @@ fn nothing_is_measured_in_virtual_time_or_where_the_program_gave_a_budget() {
     assert!(evaluations(&|session| session) > virtual_time);
     let given = RateGroup::hz(30).budget(Nanos(7 * MS));
     assert_eq!(evaluations(&|session| session.global(given.clone())), virtual_time);
-    let planned = budgets(&session(Slow::new(Duration::from_millis(1)).0).global(given).build().unwrap());
+    let planned = budgets(&session(slow(Duration::from_millis(1)).0).global(given).build().unwrap());
     assert_eq!(planned[1].1, Some(Nanos(7 * MS)));
 }
 

@@ -7,8 +7,7 @@ mod session_support;
 use device_clock::DeviceClock;
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
 use palpate::model::Vec3;
-use palpate::model::body::{Block, Body, State, TangentBlock};
-use palpate::model::mesh::Surface;
+use palpate::model::body::{Block, Body, State};
 use palpate::runtime::{OverrunPolicy, RateGroup, SlipCause};
 use palpate::scene::LocalModelKind;
 use palpate::session::{Session, SessionBuilder, Summary};
@@ -307,50 +306,25 @@ fn a_device_without_a_first_state_is_refused_at_the_start_and_leaves_no_log() {
 }
 
 /// A block that fails after so many evaluations of its forces, once it is armed.
-#[derive(Debug)]
-struct Failing {
-    block: Block,
-    left: Arc<Mutex<Option<u64>>>,
-    panics: bool,
-}
-
-impl Body for Failing {
-    fn rest(&self) -> &[Vec3] {
-        self.block.rest()
-    }
-    fn inverse_masses(&self) -> &[f64] {
-        self.block.inverse_masses()
-    }
-    fn surface(&self) -> &Surface {
-        self.block.surface()
-    }
-    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
-        self.block.forces(state, forces);
-        let mut left = self.left.lock().unwrap();
+fn failing(left: Arc<Mutex<Option<u64>>>, panics: bool) -> impl Body {
+    AlteredBlock::new(block(), move |block: &mut Block, state: &State, forces: &mut [Vec3]| {
+        block.forces(state, forces);
+        let mut left = left.lock().unwrap();
         *left = left.map(|left| left.saturating_sub(1));
         if *left == Some(0) {
             // A poisoned lock would be a second failure.
             drop(left);
-            assert!(!self.panics, "the body gave way");
+            assert!(!panics, "the body gave way");
             forces.fill(Vec3::repeat(f64::NAN));
         }
-    }
-    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
-        self.block.node_forces(state, nodes, forces);
-    }
-    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
-        self.block.tangent(state, nodes, clamp, emit);
-    }
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.block.patch(triangle, size, nodes);
-    }
+    })
 }
 
 /// Runs a body that fails 350 ticks of two steps after the start.
 fn run_failing(panics: bool, model: LocalModelKind, seconds: f64) -> (Summary, Written) {
     let (device, written) = Probing::new(pressing(), |_, state| Ok(state));
     let left = Arc::new(Mutex::new(None));
-    let body = Failing { block: block(), left: Arc::clone(&left), panics };
+    let body = failing(Arc::clone(&left), panics);
     let session = Session::builder(body).device(device).substeps_per_ms(2).model(model).keep_records();
     let session = session.duration_s(seconds).build().unwrap();
     *left.lock().unwrap() = Some(700);
@@ -387,7 +361,7 @@ fn a_body_that_turns_nan_under_the_tool_ends_the_run_with_zero_force() {
 fn a_body_with_forces_that_are_not_finite_is_refused_when_the_session_is_built() {
     for substeps in [None, Some(2)] {
         let (device, _) = Probing::new(pressing(), |_, state| Ok(state));
-        let body = Failing { block: block(), left: Arc::new(Mutex::new(Some(0))), panics: false };
+        let body = failing(Arc::new(Mutex::new(Some(0))), false);
         let session = Session::builder(body).device(device);
         let session = substeps.into_iter().fold(session, SessionBuilder::substeps_per_ms);
         let error = session.build().unwrap_err();

@@ -1,9 +1,13 @@
 //! One run per fault: what is injected, and the force that reached the device all the while.
 
+#[path = "../common/altered_block.rs"]
+mod altered_block;
+
+use altered_block::AlteredBlock;
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
 use palpate::model::Vec3;
-use palpate::model::body::{Block, Body, State, TangentBlock};
-use palpate::model::mesh::{Face, Surface};
+use palpate::model::body::{Block, Body, State};
+use palpate::model::mesh::Face;
 use palpate::prelude::*;
 use palpate::scene::LocalModelKind;
 #[cfg(feature = "log")]
@@ -169,17 +173,16 @@ impl Device for Tool {
     }
 }
 
-/// A block with one fault, which copies of it share.
-#[derive(Clone, Debug)]
-struct Faulty {
-    block: Block,
+/// What fails in the body, shared by its copies.
+#[derive(Clone)]
+struct BodyFault {
     /// What happens at the next evaluation of the forces, once the run is that far.
     fault: Arc<Mutex<Option<Fault>>>,
     written: Written,
     let_go: Arc<Mutex<bool>>,
 }
 
-impl Faulty {
+impl BodyFault {
     fn due(&self) -> Option<Fault> {
         let mut fault = self.fault.lock().expect("nobody panics under it");
         if self.written.lock().expect("no writer panics").0 < FAULT_S {
@@ -188,20 +191,8 @@ impl Faulty {
         // NaN stays, everything else happens once.
         if *fault == Some(Fault::LocalNotFinite) { *fault } else { fault.take() }
     }
-}
 
-impl Body for Faulty {
-    fn rest(&self) -> &[Vec3] {
-        self.block.rest()
-    }
-    fn inverse_masses(&self) -> &[f64] {
-        self.block.inverse_masses()
-    }
-    fn surface(&self) -> &Surface {
-        self.block.surface()
-    }
-    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
-        self.block.forces(state, forces);
+    fn strike(&self, forces: &mut [Vec3]) {
         match self.due() {
             Some(Fault::LocalPanics | Fault::GlobalPanics) => panic!("the body gave way"),
             Some(Fault::LocalNotFinite) => forces.fill(Vec3::repeat(f64::NAN)),
@@ -214,18 +205,6 @@ impl Body for Faulty {
             _ => {}
         }
     }
-    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
-        self.block.node_forces(state, nodes, forces);
-    }
-    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
-        self.block.tangent(state, nodes, clamp, emit);
-    }
-    fn duplicate(&self) -> Option<Box<dyn Body>> {
-        Some(Box::new(self.clone()))
-    }
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.block.patch(triangle, size, nodes);
-    }
 }
 
 /// Runs a session on real threads, with `fault` after half a second.
@@ -234,12 +213,16 @@ pub fn run(fault: Fault) -> Result<Trace, Error> {
     // Room for the run: the haptic thread must not wait for memory.
     let written: Written = Arc::new(Mutex::new((0.0, Vec::with_capacity(10_000))));
     let let_go = Arc::new(Mutex::new(false));
-    let body = Faulty {
-        block,
+    let fault_in_body = BodyFault {
         fault: Arc::new(Mutex::new(Some(fault).filter(|fault| fault.of_body()))),
         written: Arc::clone(&written),
         let_go: Arc::clone(&let_go),
     };
+    let body = AlteredBlock::new(block, move |block: &mut Block, state: &State, forces: &mut [Vec3]| {
+        block.forces(state, forces);
+        fault_in_body.strike(forces);
+    });
+    let body = body.with_copies();
     let device = Tool { fault, written: Arc::clone(&written), now: 0.0, read: false, done: false };
     let builder = Session::builder(body)
         .device(device)

@@ -1,6 +1,11 @@
 //! Small bodies, paths and records for tests of whole sessions.
 #![allow(dead_code)]
 
+#[path = "../../examples/common/altered_block.rs"]
+mod altered_block;
+
+#[allow(unused_imports)]
+pub use altered_block::AlteredBlock;
 use palpate::devices::ToolPath;
 use palpate::log::{CommandSample, ForceSample, GlobalTick, LogRecord, Resync};
 use palpate::model::Vec3;
