@@ -27,7 +27,7 @@ const ALLOWED: [(&str, &[&str]); 14] = [
 const QUARANTINE: [(&str, &[&str]); 5] = [
     ("unsafe", &["model/body/kernel.rs", "runtime/exchange.rs", "runtime/os.rs", "runtime/ring.rs"]),
     ("parry3d_f64", &["model/geometry.rs"]),
-    ("faer", &["model/sparse.rs"]),
+    ("faer", &["model/dense.rs", "model/sparse.rs"]),
     // However the path to them is cut up into braces.
     ("atomic", &["runtime/sync.rs"]),
     ("loom::", &["runtime/sync.rs"]),

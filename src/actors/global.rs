@@ -5,9 +5,11 @@ use super::messages::{Checkpoint, SurfaceView, ToolTick};
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::contact::ToolMotion;
+use crate::model::forecast::ToolHistory;
 use crate::model::geometry::NearestTriangle;
 use crate::model::local::{LocalModel, PatchGeometry, ResyncView};
 use crate::model::simulation::Simulation;
+use crate::model::surroundings::Bases;
 use crate::runtime::{Actor, Outcome, OutletWriter, QueueReader, Reader, Recorder, TickContext, Writer};
 use crate::time::{Nanos, Rate};
 
@@ -41,7 +43,19 @@ pub struct GlobalActor {
     haptic: Rate,
     /// The tool at the last tick taken: the state's own time.
     tool: ToolTick,
+    history: ToolHistory,
+    /// Triangles that the next model's window has to hold.
+    triangles: Vec<u32>,
+    horizon: u32,
+    bases: Bases,
+    springs: Option<std::sync::Arc<crate::model::surroundings::SpringGraph>>,
+    size: [usize; 3],
 }
+
+/// The window holds what the tool is expected over for this long: two periods of 30 Hz and the time to catch up (s).
+const WINDOW_LEAD_S: f64 = 75e-3;
+/// Places on that way that are looked at.
+const LOOKS: u32 = 3;
 
 impl GlobalActor {
     /// A global model that starts with `simulation` and the tool at `tool`, also in the midst of a run; haptic ticks come
@@ -49,9 +63,10 @@ impl GlobalActor {
     ///
     /// # Errors
     /// If the body's surface has no triangles.
-    pub fn new(simulation: Simulation, tool: ToolTick, haptic: Rate, ports: GlobalPorts) -> Result<Self, Error> {
+    pub fn new(simulation: Simulation, tool: ToolTick, haptic: Rate, horizon: u32, springs: Option<std::sync::Arc<crate::model::surroundings::SpringGraph>>, size: [usize; 3], ports: GlobalPorts) -> Result<Self, Error> {
         let nearest = NearestTriangle::new(simulation.body().surface(), &simulation.state().positions)?;
-        Ok(Self { simulation, nearest, ports, haptic, tool })
+        let history = ToolHistory::new(tool.position, haptic.period_s());
+        Ok(Self { simulation, nearest, ports, haptic, tool, history, triangles: Vec::new(), horizon, bases: Bases::default(), springs, size })
     }
 
     /// Advances along every tool sample up to `until`; returns whether all of them were there.
@@ -64,7 +79,9 @@ impl GlobalActor {
             let path = ToolMotion { from: self.tool.position, to: next.position };
             for i in 0..gap {
                 let share = |i: u64| i as f64 / gap as f64;
-                self.simulation.tick(path.part(share(i), share(i + 1)));
+                let part = path.part(share(i), share(i + 1));
+                self.simulation.tick(part);
+                self.history.push(part.to);
             }
             self.tool = next;
         }
@@ -82,12 +99,34 @@ impl GlobalActor {
         }
     }
 
-    /// Builds the next local model around the contact, or around the surface nearest to the tool.
+    /// Builds the next local model around the contact, or around the surface nearest to the tool, and where it is going.
     fn publish_model(&mut self, ctx: &TickContext) -> u64 {
-        let triangle = self.simulation.contact().triangle;
-        let triangle =
-            triangle.unwrap_or_else(|| self.nearest.find(&self.simulation.state().positions, &self.tool.position));
-        let resync = ResyncView { global: &self.simulation, tick: self.tool.tick, triangle };
+        let tool = self.history.forecast();
+        self.nearest.refit(&self.simulation.state().positions);
+        let present = self.simulation.contact().triangle.unwrap_or_else(|| self.nearest.find(&tool.position));
+        self.triangles.clear();
+        self.triangles.push(present);
+        for part in 1..=LOOKS {
+            let ahead = WINDOW_LEAD_S * f64::from(part) / f64::from(LOOKS);
+            self.triangles.push(self.nearest.find(&tool.unbraked(ahead)));
+        }
+        if let Some(springs) = &self.springs {
+            let mut patch = Vec::new();
+            self.simulation.body().patch(&self.triangles, self.size, &mut patch);
+            if self.bases.get(&patch).is_none()
+                && let Ok(basis) = crate::model::surroundings::Basis::compute(springs, &patch, 50)
+            {
+                self.bases.insert(std::sync::Arc::new(basis));
+            }
+        }
+        let resync = ResyncView {
+            global: &mut self.simulation,
+            tick: self.tool.tick,
+            triangles: &self.triangles,
+            tool,
+            horizon: self.horizon,
+            bases: &self.bases,
+        };
         self.ports.models.buffer().rebuild(resync);
         self.ports.models.publish(ctx)
     }

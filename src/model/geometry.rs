@@ -42,15 +42,22 @@ impl NearestTriangle {
         Ok(Self { mesh, nodes, vertices })
     }
 
-    /// The triangle nearest to `point` with nodes at `positions`; 0 if no number is finite.
+    /// Moves the nodes to `positions`.
     ///
     /// # Real-time
     /// For the global actor: refits the tree in place, allocates nothing.
-    pub fn find(&mut self, positions: &[Vec3], point: &Vec3) -> u32 {
+    pub fn refit(&mut self, positions: &[Vec3]) {
         for (vertex, &node) in self.vertices.iter_mut().zip(&self.nodes) {
             *vertex = Vector::from(positions[node as usize]);
         }
         self.mesh.set_vertices(&self.vertices);
+    }
+
+    /// The triangle nearest to `point`; 0 if no number is finite.
+    ///
+    /// # Real-time
+    /// For the global actor: bounded, allocates nothing.
+    pub fn find(&self, point: &Vec3) -> u32 {
         // A hollow mesh: a tool inside the body also has a nearest triangle.
         let (_, (triangle, _)) = self.mesh.project_local_point_and_get_location(Vector::from(*point), false);
         triangle
@@ -68,10 +75,11 @@ mod tests {
         let mut nearest = NearestTriangle::new(block.surface(), block.rest()).unwrap();
         let above = Vec3::new(0.06, 0.03, 0.13);
         let on_top = |t: u32, x: &[Vec3]| block.surface().triangles[t as usize].iter().all(|&n| x[n as usize].z > 0.09);
-        assert!(on_top(nearest.find(block.rest(), &above), block.rest()));
+        assert!(on_top(nearest.find(&above), block.rest()));
         // With the block moved up by its height, the same point is nearest to the lower half.
         let moved: Vec<Vec3> = block.rest().iter().map(|x| x + Vec3::z() * 0.1).collect();
-        let triangle = nearest.find(&moved, &Vec3::new(0.06, 0.03, 0.09));
+        nearest.refit(&moved);
+        let triangle = nearest.find(&Vec3::new(0.06, 0.03, 0.09));
         assert!(block.surface().triangles[triangle as usize].iter().all(|&n| moved[n as usize].z < 0.101));
     }
 }

@@ -6,13 +6,16 @@
 pub mod blend;
 pub mod body;
 pub mod contact;
+mod dense;
 pub mod equilibrium;
+pub mod forecast;
 pub mod geometry;
 pub mod integrator;
 pub mod local;
 pub mod mesh;
 pub mod simulation;
 mod sparse;
+pub mod surroundings;
 pub mod tangent;
 
 /// A point, direction or force in space.

@@ -122,8 +122,13 @@ impl Simulation {
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
     pub fn tick(&mut self, tool: ToolMotion) -> Vec3 {
+        self.advance(tool, &mut |_| ())
+    }
+
+    fn advance(&mut self, tool: ToolMotion, watch: &mut impl FnMut(&State)) -> Vec3 {
         let Self { body, state, forces, contact, law, candidates, inverse_masses, stepping, .. } = self;
         self.force = stepping.tick(tool, |tool, d| {
+            watch(state);
             body.forces(state, forces);
             let mut deformable = Deformable {
                 positions: &mut state.positions,
@@ -135,6 +140,28 @@ impl Simulation {
             step(&mut deformable, forces, contact, law, tool, d)
         });
         self.force
+    }
+
+    /// Runs on for `ticks` haptic ticks along `motion` (of each, from 0), shows `watch` the state at the start of every
+    /// substep and at the end, and goes back to the present.
+    ///
+    /// # Real-time
+    /// For the global actor: costs as much as the ticks; `present` keeps the state meanwhile and may grow.
+    pub fn look_ahead(
+        &mut self,
+        ticks: u32,
+        motion: impl Fn(u32) -> ToolMotion,
+        present: &mut State,
+        mut watch: impl FnMut(&State),
+    ) {
+        present.clone_from(&self.state);
+        let (contact, force) = (self.contact, self.force);
+        for tick in 0..ticks {
+            self.advance(motion(tick), &mut watch);
+        }
+        watch(&self.state);
+        std::mem::swap(&mut self.state, present);
+        (self.contact, self.force) = (contact, force);
     }
 
     /// The body.

@@ -1,9 +1,9 @@
-//! The bridge to faer: sparse symmetric positive definite systems. Only this file names it.
+//! The bridge to faer: sparse symmetric positive definite systems. With `dense.rs` the only file that names it.
 
 use faer::prelude::Solve;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, Triplet};
-use faer::{Mat, Side};
+use faer::{Mat, MatMut, Side};
 
 /// A Cholesky solver for matrices of one sparsity pattern.
 #[derive(Debug, Default)]
@@ -32,6 +32,30 @@ impl SparseCholesky {
             *x = solution[(row, 0)];
         }
         x.iter().all(|x| x.is_finite()).then_some(())
+    }
+}
+
+/// A factorised symmetric positive definite matrix, for many right-hand sides.
+pub(super) struct SparseFactor {
+    factor: Llt<usize, f64>,
+    n: usize,
+}
+
+impl SparseFactor {
+    /// Factorises the n x n matrix given by the sum of `entries` (row, column, value) of its lower triangle. `None` if it
+    /// is not positive definite.
+    pub(super) fn new(n: usize, entries: &[(usize, usize, f64)]) -> Option<Self> {
+        let lower: Vec<_> = entries.iter().map(|&(row, column, value)| Triplet::new(row, column, value)).collect();
+        let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &lower).ok()?;
+        let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).ok()?;
+        let factor = Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), Side::Lower).ok()?;
+        Some(Self { factor, n })
+    }
+
+    /// Replaces each column of `columns` (n numbers, one column after the other) by its solution.
+    pub(super) fn solve(&self, columns: &mut [f64]) {
+        let count = columns.len() / self.n;
+        self.factor.solve_in_place(MatMut::from_column_major_slice_mut(columns, self.n, count));
     }
 }
 

@@ -114,7 +114,7 @@ mod tests {
             *v = Vec3::new((5.0 * n).sin(), (7.0 * n).cos(), (11.0 * n).sin()) * 0.1;
         }
         let mut nodes = Vec::new();
-        block.patch(block.surface().triangles.len() as u32 - 5, [4, 4, 2], &mut nodes);
+        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
         let place = |node: u32| nodes.iter().position(|&other| other == node);
         let mut tangent = PatchTangent::default();
         tangent.rebuild(&block, &state, &nodes, &place);

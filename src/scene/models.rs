@@ -57,11 +57,13 @@ pub enum LocalModelKind {
     /// The paper's: a linear patch in fixed surroundings.
     #[default]
     Patch,
+    /// A non-linear patch in surroundings that move as predicted, corrected by a reduced model of them.
+    Predictive,
 }
 
 impl LocalModelKind {
     /// Every model, in order of cost.
-    pub const ALL: [Self; 3] = [Self::Hold, Self::Patch, Self::Full];
+    pub const ALL: [Self; 4] = [Self::Hold, Self::Patch, Self::Predictive, Self::Full];
 
     /// Its name in scene files and tables.
     pub fn name(self) -> &'static str {
@@ -69,6 +71,7 @@ impl LocalModelKind {
             Self::Full => "full",
             Self::Hold => "hold",
             Self::Patch => "patch",
+            Self::Predictive => "predictive",
         }
     }
 }

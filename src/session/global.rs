@@ -2,7 +2,7 @@
 
 use crate::actors::{Checkpoint, GlobalActor, GlobalPorts, SurfaceView, ToolTick};
 use crate::error::{Error, ErrorKind};
-use crate::model::local::{LocalModel, PatchGeometry};
+use crate::model::local::{LocalModel, PatchGeometry, Template};
 use crate::model::simulation::Simulation;
 use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RecorderPort};
 use crate::time::Rate;
@@ -40,15 +40,17 @@ pub(super) struct GlobalMaker {
     last: Checkpoint,
     saved: OutletReader<Checkpoint>,
     haptic: Rate,
+    horizon: u32,
+    template: Template,
     side: GlobalSide,
 }
 
 impl GlobalMaker {
-    pub(super) fn new(simulation: Simulation, tool: ToolTick, haptic: Rate, side: GlobalSide) -> Self {
+    pub(super) fn new(simulation: Simulation, tool: ToolTick, haptic: Rate, horizon: u32, template: Template, side: GlobalSide) -> Self {
         let spare = simulation.duplicate();
         let last = Checkpoint { tool, state: simulation.state().clone(), contact: *simulation.contact() };
         let saved = side.checkpoint.reader();
-        Self { first: Some(simulation), spare, last, saved, haptic, side }
+        Self { first: Some(simulation), spare, last, saved, haptic, horizon, template, side }
     }
 
     pub(super) fn can_restart(&self) -> bool {
@@ -69,7 +71,7 @@ impl GlobalMaker {
             Some(first) => first,
             None => self.restored()?,
         };
-        Ok(vec![Box::new(GlobalActor::new(simulation, self.last.tool, self.haptic, ports)?)])
+        Ok(vec![Box::new(GlobalActor::new(simulation, self.last.tool, self.haptic, self.horizon, self.template.springs.clone(), self.template.patch, ports)?)])
     }
 
     fn restored(&self) -> Result<Simulation, Error> {

@@ -32,7 +32,7 @@ const MIN_TICKS_BUFFERED: usize = 64;
 
 /// The rate groups of a session, in graph order.
 pub(super) fn groups(prepared: &Prepared) -> Vec<RateGroup> {
-    let global = (prepared.kind != Kind::Full).then(|| prepared.global.clone());
+    let global = (prepared.template.kind != Kind::Full).then(|| prepared.global.clone());
     [prepared.local.clone()].into_iter().chain(global).chain([logger_group()]).collect()
 }
 
@@ -73,14 +73,14 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
         model
     };
     let spare = || Box::new(Hold::default()) as Box<dyn LocalModel>;
-    let (source, models, global) = match prepared.kind.empty() {
+    let (source, models, global) = match prepared.template.empty() {
         None => {
             let full = watching(Box::new(Full::new(prepared.simulation)), &probes);
             (ModelSource::Alone(surface_port.writer()), [full, spare(), spare()], None)
         }
         Some(_) => {
-            let (kind, watched) = (prepared.kind, probes.clone());
-            let model = move || watching(kind.empty().unwrap_or_else(spare), &watched);
+            let (template, watched) = (prepared.template.clone(), probes.clone());
+            let model = move || watching(template.empty().unwrap_or_else(spare), &watched);
             let rotating = [model(), model(), model()];
             let ports = GlobalSide {
                 ticks: graph.queue_port(ticks_buffered),
@@ -98,7 +98,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
                 geometry: ports.geometry.as_ref().map(ExchangePort::writer),
             };
             let tool = ToolTick { tick: 0, position: first.position };
-            (source, rotating, Some(GlobalMaker::new(prepared.simulation, tool, prepared.haptic, ports)))
+            (source, rotating, Some(GlobalMaker::new(prepared.simulation, tool, prepared.haptic, (3.2 * prepared.haptic.as_hz() / prepared.global_rate.as_hz()) as u32, prepared.template.clone(), ports)))
         }
     };
     let device = DeviceActor::new(
@@ -149,7 +149,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
 
 fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, Error> {
     let group = |name: &str, rate: Rate| GroupInfo { name: name.to_owned(), rate_hz: rate.as_hz() };
-    let is_multi_rate = prepared.kind != Kind::Full;
+    let is_multi_rate = prepared.template.kind != Kind::Full;
     let mut groups = vec![group("local", prepared.haptic)];
     if is_multi_rate {
         groups.push(group("global", prepared.global_rate));
@@ -166,7 +166,7 @@ fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, 
             Execution::Virtual => LogExecution::Virtual,
             Execution::Threaded => LogExecution::Threaded { start_unix_ns: unix_now_ns() },
         },
-        model: prepared.kind.name().to_owned(),
+        model: prepared.template.kind.name().to_owned(),
         haptic_hz: prepared.haptic.as_hz(),
         global_hz: if is_multi_rate { prepared.global_rate.as_hz() } else { 0.0 },
         groups,

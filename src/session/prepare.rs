@@ -13,7 +13,7 @@ use crate::model::body::{Block, Body, State};
 use crate::model::contact::{Contact, Law};
 use crate::model::equilibrium::static_equilibrium;
 use crate::model::integrator::Spectrum;
-use crate::model::local::Kind;
+use crate::model::local::{Kind, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, OverrunPolicy, RateGroup, Release, admit_here};
@@ -64,7 +64,7 @@ impl Parts {
 #[derive(Debug)]
 pub(super) struct Prepared {
     pub simulation: Simulation,
-    pub kind: Kind,
+    pub template: Template,
     pub geometry_feedback: bool,
     pub blend_ticks: u32,
     pub device: Box<dyn Device>,
@@ -156,7 +156,8 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let kind = match scene.local.model {
         LocalModelKind::Full => Kind::Full,
         LocalModelKind::Hold => Kind::Hold,
-        LocalModelKind::Patch => Kind::Patch(scene.local.patch),
+        LocalModelKind::Patch => Kind::Patch,
+        LocalModelKind::Predictive => Kind::Predictive,
     };
     // The paper feeds the patch's geometry back; hold has none.
     let feedback = scene.local.feedback.unwrap_or(Feedback::Geometry);
@@ -190,9 +191,9 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         Execution::Threaded => budget::declare(&mut *body, &state, Timing { haptic, substeps }, kind, [local, global])?,
     };
     let prepared = Prepared {
+        template: Template::new(kind, scene.local.patch, &*body)?,
         simulation: Simulation::new(body, state, contact, law, Stepping { tick, substeps })?,
-        kind,
-        geometry_feedback: feedback == Feedback::Geometry && matches!(kind, Kind::Patch(_)),
+        geometry_feedback: feedback == Feedback::Geometry && kind == Kind::Patch,
         blend_ticks,
         device,
         limits,

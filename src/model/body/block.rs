@@ -4,7 +4,7 @@ use super::super::Vec3;
 use super::super::mesh::{Face, Lattice, Surface};
 use super::kernel::{self, Scratch};
 use super::lattice_springs::LatticeSprings;
-use super::{Body, State, TangentBlock};
+use super::{Body, Link, State, TangentBlock};
 use crate::error::Error;
 
 /// A block of nodes and springs; made by [`Block::builder`].
@@ -170,8 +170,19 @@ impl Body for Block {
         Some(Box::new(self.clone()))
     }
 
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.lattice.window(self.surface.triangles[triangle as usize], size, nodes);
+    fn springs(&self) -> Option<Vec<Link>> {
+        let mut links = Vec::with_capacity(self.springs.len());
+        for node in 0..self.rest.len() as u32 {
+            let ahead = self.springs.neighbours(&self.lattice, node).filter(|&(other, _)| other > node);
+            links.extend(ahead.map(|(other, spring)| Link { nodes: [node, other], spring }));
+        }
+        Some(links)
+    }
+
+    fn patch(&self, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
+        nodes.clear();
+        let corners = triangles.iter().map(|&triangle| self.surface.triangles[triangle as usize]);
+        self.lattice.window(corners, size, nodes);
         nodes.retain(|&node| self.inverse_masses[node as usize] > 0.0);
     }
 }

@@ -67,6 +67,15 @@ impl TangentBlock {
     }
 }
 
+/// A spring between two nodes of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link {
+    /// The nodes that it joins.
+    pub nodes: [u32; 2],
+    /// The spring.
+    pub spring: Spring,
+}
+
 /// A deformable body: nodes, masses, internal forces, tangent and surface.
 ///
 /// The block of springs is one implementation; a program brings its own by implementing this trait. Forces may be
@@ -120,31 +129,43 @@ pub trait Body: Send + std::fmt::Debug {
         None
     }
 
-    /// Appends the nodes of a patch around surface triangle `triangle` to `nodes`, in increasing order and without
-    /// held ones; `size` = nodes along the surface, along it, into depth.
+    /// Every spring once, if the body is made of nothing else; `None`, the default, if it is not. Models that keep the
+    /// springs around the tool as they are need them.
+    ///
+    /// # Real-time
+    /// Not called in a tick: may allocate.
+    fn springs(&self) -> Option<Vec<Link>> {
+        None
+    }
+
+    /// Puts the nodes of a patch around surface triangles `triangles` in place of `nodes`, each once, in increasing order
+    /// and without held ones; `size` = nodes along the surface, along it, into depth, around a single triangle.
     ///
     /// The default grows rings of triangles along the surface until there are enough nodes; it has no depth.
     ///
     /// # Real-time
     /// For the global actor, at each resync: bounded; `nodes` may grow.
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
+    fn patch(&self, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
         let surface = self.surface();
-        let wanted = size[0] * size[1];
-        let first = nodes.len();
-        nodes.extend(surface.triangles[triangle as usize]);
-        let mut next = first;
-        while next < nodes.len() && nodes.len() - first < wanted {
-            for &t in surface.at_node(nodes[next]) {
-                for node in surface.triangles[t as usize] {
-                    if !nodes[first..].contains(&node) {
-                        nodes.push(node);
+        nodes.clear();
+        for &triangle in triangles {
+            let mut around: Vec<u32> = surface.triangles[triangle as usize].to_vec();
+            let mut next = 0;
+            while next < around.len() && around.len() < size[0] * size[1] {
+                for &t in surface.at_node(around[next]) {
+                    for node in surface.triangles[t as usize] {
+                        if !around.contains(&node) {
+                            around.push(node);
+                        }
                     }
                 }
+                next += 1;
             }
-            next += 1;
+            nodes.append(&mut around);
         }
         let inverse_masses = self.inverse_masses();
         nodes.retain(|&node| inverse_masses[node as usize] > 0.0);
         nodes.sort_unstable();
+        nodes.dedup();
     }
 }

@@ -2,18 +2,27 @@
 
 mod full;
 mod hold;
+mod near;
 mod patch;
+mod predictive;
+mod ring_path;
 mod succession;
 mod window;
 
+use std::sync::Arc;
+
 use super::Vec3;
-use super::body::State;
+use super::body::{Body, State};
 use super::contact::{Contact, ToolMotion};
+use super::forecast::ToolForecast;
 use super::simulation::Simulation;
+use super::surroundings::{Bases, SpringGraph};
+use crate::error::Error;
 
 pub use full::Full;
 pub use hold::Hold;
 pub use patch::Patch;
+pub use predictive::Predictive;
 pub use succession::{Resynced, Served, Succession};
 
 /// The local models by name.
@@ -23,8 +32,10 @@ pub enum Kind {
     Full,
     /// [`Hold`].
     Hold,
-    /// [`Patch`] of this many nodes along the surface, along it, into depth.
-    Patch([usize; 3]),
+    /// [`Patch`].
+    Patch,
+    /// [`Predictive`].
+    Predictive,
 }
 
 impl Kind {
@@ -36,32 +47,75 @@ impl Kind {
         match self {
             Self::Full => "full",
             Self::Hold => "hold",
-            Self::Patch(_) => "patch",
-        }
-    }
-
-    /// An empty model of this kind, to be rebuilt in place; `None` for [`Full`], which is the simulation itself.
-    ///
-    /// # Real-time
-    /// Not real-time safe: allocates.
-    pub fn empty(self) -> Option<Box<dyn LocalModel>> {
-        match self {
-            Self::Full => None,
-            Self::Hold => Some(Box::new(Hold::default())),
-            Self::Patch(size) => Some(Box::new(Patch::new(size))),
+            Self::Patch => "patch",
+            Self::Predictive => "predictive",
         }
     }
 }
 
-/// The global model at a resync: what a local model is built from.
-#[derive(Clone, Copy, Debug)]
+/// What the local models of a session are made from.
+#[derive(Clone, Debug)]
+pub struct Template {
+    /// Which model.
+    pub kind: Kind,
+    /// Patch nodes along the surface, along it, into depth.
+    pub patch: [usize; 3],
+    /// The body's springs, for the models that need them.
+    pub springs: Option<Arc<SpringGraph>>,
+}
+
+impl Template {
+    /// For models of `body`; a patch has `patch` nodes along the surface, along it, into depth.
+    ///
+    /// # Errors
+    /// If the model needs springs and the body has none.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn new(kind: Kind, patch: [usize; 3], body: &dyn Body) -> Result<Self, Error> {
+        let springs = match kind {
+            Kind::Predictive => {
+                let springs = SpringGraph::new(body).ok_or_else(|| {
+                    let message = format!("{:?} needs a body of springs, use another model", kind.name());
+                    Error::scene("local.model", message)
+                })?;
+                Some(Arc::new(springs))
+            }
+            _ => None,
+        };
+        Ok(Self { kind, patch, springs })
+    }
+
+    /// An empty model, to be rebuilt in place; `None` for [`Full`], which is the simulation itself.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn empty(&self) -> Option<Box<dyn LocalModel>> {
+        match (self.kind, &self.springs) {
+            (Kind::Full, _) => None,
+            (Kind::Patch, _) => Some(Box::new(Patch::new(self.patch))),
+            (Kind::Predictive, Some(springs)) => Some(Box::new(Predictive::new(self.patch, Arc::clone(springs)))),
+            (Kind::Hold | Kind::Predictive, _) => Some(Box::new(Hold::default())),
+        }
+    }
+}
+
+/// The global model at a resync, and what is expected: what a local model is built from.
+#[derive(Debug)]
 pub struct ResyncView<'a> {
     /// The whole body after the last tool sample it has received.
-    pub global: &'a Simulation,
+    pub global: &'a mut Simulation,
     /// The haptic tick that this state belongs to.
     pub tick: u64,
-    /// The surface triangle to build around: the contact's, or the one nearest to the tool.
-    pub triangle: u32,
+    /// The surface triangle to build around (the contact's, or the one nearest to the tool), then those that the tool is
+    /// expected over before the next model serves.
+    pub triangles: &'a [u32],
+    /// Where the tool is, and where it is expected.
+    pub tool: ToolForecast,
+    /// Haptic ticks that the model may have to reach ahead, catching up included.
+    pub horizon: u32,
+    /// Reduced surroundings that are there.
+    pub bases: &'a Bases,
 }
 
 /// What a patch found, for a global model that takes the local one's geometry.

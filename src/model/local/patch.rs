@@ -61,7 +61,7 @@ impl LocalModel for Patch {
     fn rebuild(&mut self, resync: ResyncView<'_>) {
         let global = resync.global;
         let (body, state) = (global.body(), global.state());
-        self.window.rebuild(body, resync.triangle, self.size);
+        self.window.rebuild(body, &resync.triangles[..1], self.size, None);
         let (window, movable) = (&self.window, self.window.movable);
         window.gather(&state.positions, &mut self.state.positions);
         window.gather(&state.velocities, &mut self.state.velocities);

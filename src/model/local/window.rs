@@ -1,16 +1,20 @@
-//! The part of a body that a patch holds: its nodes, and the surface around them, in compact numbering.
+//! The part of a body that a local model holds: its nodes, and the surface around them, in compact numbering.
 
 use super::super::Vec3;
 use super::super::body::Body;
 use super::super::mesh::{NONE, Surface};
+use super::super::surroundings::SpringGraph;
 
-/// Patch nodes first, then the rim: surface nodes that contact needs for normals and walking but that do not move.
+/// Patch nodes first; then, if the model asks for them, the nodes that a spring joins to the patch: the ring, which can
+/// move, and held ones; then the rim: surface nodes that contact needs for normals and walking.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Window {
     /// Global id of each local node.
     pub nodes: Vec<u32>,
     /// How many of them the patch moves; they come first, in increasing order.
     pub movable: usize,
+    /// How many ring nodes follow, in increasing order; 0 if they were not asked for.
+    pub ring: usize,
     /// The surface over local nodes: every triangle that shares a node with one that the tool can press.
     pub surface: Surface,
     /// Global id of each local triangle.
@@ -20,29 +24,59 @@ pub(super) struct Window {
     /// Local place of each global node and triangle, or [`NONE`]; as long as the body, only touched entries change.
     local_node: Vec<u32>,
     local_triangle: Vec<u32>,
+    /// Of the patch: the ring, and held nodes.
+    neighbours: [Vec<u32>; 2],
 }
 
 impl Window {
-    /// Makes the window anew around surface triangle `triangle`; costs as much as the patch, whatever the body.
-    pub(super) fn rebuild(&mut self, body: &dyn Body, triangle: u32, size: [usize; 3]) {
+    /// Makes the window anew around surface triangles `triangles`, with the ring if `springs` are given; costs as much as
+    /// the patch, whatever the body.
+    pub(super) fn rebuild(
+        &mut self,
+        body: &dyn Body,
+        triangles: &[u32],
+        size: [usize; 3],
+        springs: Option<&SpringGraph>,
+    ) {
         let whole = body.surface();
         self.forget();
         self.local_node.resize(body.rest().len(), NONE);
         self.local_triangle.resize(whole.triangles.len(), NONE);
-        body.patch(triangle, size, &mut self.nodes);
+        body.patch(triangles, size, &mut self.nodes);
         self.movable = self.nodes.len();
         for (place, &node) in self.nodes.iter().enumerate() {
             self.local_node[node as usize] = place as u32;
         }
-        // On a held face nothing moves, but the tool is to be found there too.
-        for node in whole.triangles[triangle as usize] {
-            self.add_node(node);
+        self.neighbours.iter_mut().for_each(Vec::clear);
+        if let Some(springs) = springs {
+            let [ring, held] = &mut self.neighbours;
+            springs.neighbours(&self.nodes, ring, held);
         }
-        let centre = self.nodes.len();
-        // First the triangles of movable nodes (the candidates), then those around their corners (for normals).
-        self.grow(whole, 0..centre);
+        self.ring = self.neighbours[0].len();
+        for list in 0..self.neighbours.len() {
+            for place in 0..self.neighbours[list].len() {
+                self.add_node(self.neighbours[list][place]);
+            }
+        }
+        // On a held face nothing moves, but the tool is to be found there too.
+        for &triangle in triangles {
+            for node in whole.triangles[triangle as usize] {
+                self.add_node(node);
+            }
+        }
+        // First the triangles of movable nodes and those asked for (the candidates), then those around their corners (for
+        // normals).
+        self.grow(whole, 0..self.movable);
+        for &triangle in triangles {
+            self.add_triangle(triangle);
+        }
         let candidates = self.triangles.len();
-        self.grow(whole, self.movable..self.nodes.len());
+        let corners: Vec<u32> =
+            self.triangles.iter().flat_map(|&t| whole.triangles[t as usize]).collect();
+        for node in corners {
+            self.add_triangles(whole, node);
+        }
+        self.add_corners(whole, candidates);
         self.candidates.clear();
         self.candidates.extend(0..candidates as u32);
 
@@ -67,13 +101,25 @@ impl Window {
     fn grow(&mut self, whole: &Surface, places: std::ops::Range<usize>) {
         let start = self.triangles.len();
         for place in places {
-            for &t in whole.at_node(self.nodes[place]) {
-                if self.local_triangle[t as usize] == NONE {
-                    self.local_triangle[t as usize] = self.triangles.len() as u32;
-                    self.triangles.push(t);
-                }
-            }
+            self.add_triangles(whole, self.nodes[place]);
         }
+        self.add_corners(whole, start);
+    }
+
+    fn add_triangles(&mut self, whole: &Surface, node: u32) {
+        for &t in whole.at_node(node) {
+            self.add_triangle(t);
+        }
+    }
+
+    fn add_triangle(&mut self, triangle: u32) {
+        if self.local_triangle[triangle as usize] == NONE {
+            self.local_triangle[triangle as usize] = self.triangles.len() as u32;
+            self.triangles.push(triangle);
+        }
+    }
+
+    fn add_corners(&mut self, whole: &Surface, start: usize) {
         for place in start..self.triangles.len() {
             for node in whole.triangles[self.triangles[place] as usize] {
                 self.add_node(node);

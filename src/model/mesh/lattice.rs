@@ -145,29 +145,49 @@ impl Lattice {
         triangles
     }
 
-    /// A window of `size` = (along, along, depth) nodes around the cell that surface triangle `nodes` belongs to,
-    /// clamped at the edges; appends the ids in increasing order to `out`.
-    pub fn window(&self, nodes: [u32; 3], size: [usize; 3], out: &mut Vec<u32>) {
-        let corners = nodes.map(|node| self.coordinates(node));
-        let low: [usize; 3] = std::array::from_fn(|axis| corners.iter().map(|c| c[axis]).min().unwrap_or(0));
-        let high: [usize; 3] = std::array::from_fn(|axis| corners.iter().map(|c| c[axis]).max().unwrap_or(0));
-        let depth_axis = (0..3).find(|&axis| low[axis] == high[axis]).unwrap_or(2);
-        let mut along = size[..2].iter();
-        let range: [(usize, usize); 3] = std::array::from_fn(|axis| {
-            let n = self.nodes[axis];
-            if axis == depth_axis {
-                let depth = size[2].min(n);
-                return if low[axis] > 0 { (n - depth, n) } else { (0, depth) };
-            }
-            let width = along.next().map_or(2, |&w| w).min(n);
-            let first = low[axis].saturating_sub((width.max(2) - 2) / 2).min(n - width);
-            (first, first + width)
-        });
-        for k in range[2].0..range[2].1 {
-            for j in range[1].0..range[1].1 {
-                out.extend((range[0].0..range[0].1).map(|i| self.id([i, j, k])));
+    /// The nodes around the cells that surface triangles with `corners` belong to, in increasing order, appended to `out`.
+    ///
+    /// On each face the cells' bounding box grows to `size` = (along, along, depth) nodes for a single cell, and by as much
+    /// for several; it is clamped at the edges.
+    pub fn window(&self, corners: impl Iterator<Item = [u32; 3]>, size: [usize; 3], out: &mut Vec<u32>) {
+        let mut faces = [None::<[(usize, usize); 3]>; 6];
+        for triangle in corners {
+            let nodes = triangle.map(|node| self.coordinates(node));
+            let cell: [(usize, usize); 3] = std::array::from_fn(|axis| {
+                let along = nodes.map(|node| node[axis]);
+                (along[0].min(along[1]).min(along[2]), along[0].max(along[1]).max(along[2]))
+            });
+            let across = (0..3).find(|&axis| cell[axis].0 == cell[axis].1).unwrap_or(2);
+            let face = &mut faces[2 * across + usize::from(cell[across].0 > 0)];
+            *face = Some(match face {
+                None => cell,
+                Some(box_) => std::array::from_fn(|axis| (box_[axis].0.min(cell[axis].0), box_[axis].1.max(cell[axis].1))),
+            });
+        }
+        let first = out.len();
+        for (face, cells) in faces.iter().enumerate() {
+            let Some(cells) = cells else { continue };
+            let mut along = size[..2].iter();
+            let range: [(usize, usize); 3] = std::array::from_fn(|axis| {
+                let n = self.nodes[axis];
+                if axis == face / 2 {
+                    let depth = size[2].min(n);
+                    return if cells[axis].0 > 0 { (n - depth, n) } else { (0, depth) };
+                }
+                let margin = along.next().map_or(2, |&width| width.max(2)) - 2;
+                let (low, high) = cells[axis];
+                let width = (high - low + 1 + margin).min(n);
+                let start = low.saturating_sub(margin / 2).min(n - width);
+                (start, start + width)
+            });
+            for k in range[2].0..range[2].1 {
+                for j in range[1].0..range[1].1 {
+                    out.extend((range[0].0..range[0].1).map(|i| self.id([i, j, k])));
+                }
             }
         }
+        out[first..].sort_unstable();
+        out.dedup();
     }
 }
 
@@ -194,12 +214,27 @@ mod tests {
         let lattice = Lattice { nodes: [12, 12, 12] };
         let cell = |i, j| [lattice.id([i, j, 11]), lattice.id([i + 1, j, 11]), lattice.id([i + 1, j + 1, 11])];
         let mut window = Vec::new();
-        lattice.window(cell(5, 5), [4, 4, 2], &mut window);
+        lattice.window([cell(5, 5)].into_iter(), [4, 4, 2], &mut window);
         assert_eq!(window.len(), 32);
         assert_eq!(lattice.coordinates(window[0]), [4, 4, 10]);
         assert_eq!(lattice.coordinates(window[31]), [7, 7, 11]);
         window.clear();
-        lattice.window(cell(0, 10), [4, 4, 2], &mut window);
+        lattice.window([cell(0, 10)].into_iter(), [4, 4, 2], &mut window);
         assert_eq!(lattice.coordinates(window[0]), [0, 8, 10]);
+    }
+    #[test]
+    fn a_window_over_several_cells_covers_them_all_and_reaches_round_an_edge() {
+        let lattice = Lattice { nodes: [12, 12, 12] };
+        let top = |i, j| [lattice.id([i, j, 11]), lattice.id([i + 1, j, 11]), lattice.id([i + 1, j + 1, 11])];
+        let side = |j, k| [lattice.id([11, j, k]), lattice.id([11, j + 1, k]), lattice.id([11, j + 1, k + 1])];
+        let mut window = Vec::new();
+        lattice.window([top(3, 5), top(6, 5)].into_iter(), [4, 4, 2], &mut window);
+        assert_eq!(window.len(), 7 * 4 * 2);
+        window.clear();
+        lattice.window([top(10, 5), side(5, 9)].into_iter(), [4, 4, 2], &mut window);
+        assert!(window.windows(2).all(|pair| pair[0] < pair[1]), "each node once");
+        for node in top(10, 5).into_iter().chain(side(5, 9)) {
+            assert!(window.contains(&node));
+        }
     }
 }

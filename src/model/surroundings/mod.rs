@@ -1,0 +1,8 @@
+//! What lies around a patch: the springs that reach out of it, the ring of nodes that they reach, and a reduced model of
+//! everything beyond.
+
+mod basis;
+mod graph;
+
+pub use basis::{Bases, Basis};
+pub use graph::SpringGraph;
