@@ -114,7 +114,7 @@ impl GlobalActor {
             let mut patch = Vec::new();
             self.simulation.body().patch(&self.triangles, self.size, &mut patch);
             if self.bases.get(&patch).is_none()
-                && let Ok(basis) = crate::model::surroundings::Basis::compute(springs, &patch, 50)
+                && let Ok(Some(basis)) = crate::model::surroundings::Basis::compute(springs, &patch, 50)
             {
                 self.bases.insert(std::sync::Arc::new(basis));
             }

@@ -1,61 +1,105 @@
 //! Dense linear algebra for reduced models. With `sparse.rs` the only file that names faer.
+//!
+//! A matrix is a slice, column after column.
 
 use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{Llt, SelfAdjointEigen};
-use faer::prelude::Solve;
+use faer::linalg::solvers::SelfAdjointEigen;
 use faer::{Accum, Mat, MatRef, Par, Side};
 
 /// Singular values below this share of the largest are rounding: the Gram matrix squares them.
 const NUMERICAL_RANK: f64 = 1e-7;
 
-/// The left singular vectors of the largest singular values of `matrix` (column after column, `rows` numbers each), at
-/// most `count` of them, column after column.
+/// The left singular vectors of the largest singular values of `matrix` (columns of `rows` numbers), at most `count`.
 pub(super) fn leading_left_singular_vectors(matrix: &[f64], rows: usize, count: usize) -> Vec<f64> {
     let columns = matrix.len() / rows.max(1);
-    let s = MatRef::from_column_major_slice(matrix, rows, columns);
-    let mut gram = Mat::<f64>::zeros(columns, columns);
-    matmul(gram.as_mut(), Accum::Replace, s.transpose(), s, 1.0, Par::Seq);
-    let Ok(eigen) = SelfAdjointEigen::new(gram.as_ref(), Side::Lower) else { return Vec::new() };
-    // In increasing order.
-    let (values, vectors) = (eigen.S().column_vector(), eigen.U());
-    let largest = values[columns - 1].max(0.0).sqrt();
+    let Some((values, vectors)) = eigen(&product(matrix, matrix, rows)) else { return Vec::new() };
     let sigma = |n: usize| values[columns - 1 - n].max(0.0).sqrt();
-    let count = (0..count.min(columns)).take_while(|&n| sigma(n) > NUMERICAL_RANK * largest).count();
-    let scaled = Mat::from_fn(columns, count, |row, n| vectors[(row, columns - 1 - n)] / sigma(n));
-    let mut left = Mat::<f64>::zeros(rows, count);
-    matmul(left.as_mut(), Accum::Replace, s, scaled.as_ref(), 1.0, Par::Seq);
-    let mut shapes = Vec::with_capacity(rows * count);
+    let count = (0..count.min(columns)).take_while(|&n| sigma(n) > NUMERICAL_RANK * sigma(0)).count();
+    let mut scaled = Vec::with_capacity(columns * count);
     for n in 0..count {
-        shapes.extend(left.col(n).iter());
+        scaled.extend(vectors[(columns - 1 - n) * columns..][..columns].iter().map(|x| x / sigma(n)));
     }
-    shapes
+    combinations(matrix, &scaled, rows, columns)
 }
 
-/// A matrix of `n` rows of `n` zeros.
-pub(super) fn zeros(n: usize) -> Vec<f64> {
-    vec![0.0; n * n]
-}
-
-/// matrix += scale v v^T.
-pub(super) fn add_outer(matrix: &mut [f64], v: &[f64], scale: f64) {
-    for (row, &x) in matrix.chunks_exact_mut(v.len().max(1)).zip(v) {
-        let x = scale * x;
-        if x != 0.0 {
-            row.iter_mut().zip(v).for_each(|(entry, y)| *entry += x * y);
+/// The modes of the symmetric pencil (`stiffness`, `mass`) in the directions that `mass` can tell apart: T with
+/// T^T M T = I and T^T K T diagonal, as the columns of T and the diagonal. Empty if a number is not finite.
+pub(super) fn modes(mass: &[f64], stiffness: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let n = mass.len().isqrt();
+    let Some((values, vectors)) = eigen(mass) else { return Default::default() };
+    let largest = values.last().copied().unwrap_or(0.0);
+    let mut white = Vec::with_capacity(n * n);
+    for (value, vector) in values.iter().zip(vectors.chunks_exact(n.max(1))) {
+        if *value > DEPENDENT * largest {
+            white.extend(vector.iter().map(|x| x / value.sqrt()));
         }
     }
+    let projected = product(&white, &combinations(stiffness, &white, n, n), n);
+    let Some((values, vectors)) = eigen(&projected) else { return Default::default() };
+    (combinations(&white, &vectors, n, values.len()), values)
 }
 
-/// For the symmetric positive definite `matrix` A (n rows of n) and `right` R (any number of rows of n): R A^-1 in rows of
-/// n, which for a symmetric R is the transpose of A^-1 R.
-pub(super) fn solve_rows(matrix: &[f64], right: &[f64], n: usize) -> Vec<f64> {
-    let a = MatRef::from_column_major_slice(matrix, n, n);
-    let Ok(factor) = Llt::new(a, Side::Lower) else { return vec![f64::NAN; right.len()] };
-    let mut columns = MatRef::from_column_major_slice(right, n, right.len() / n.max(1)).to_owned();
-    factor.solve_in_place(columns.as_mut());
-    let mut rows = Vec::with_capacity(right.len());
-    for n in 0..columns.ncols() {
-        rows.extend(columns.col(n).iter());
+/// Directions with less than this share of the largest mass are combinations of others.
+const DEPENDENT: f64 = 1e-9;
+
+/// A^T B for matrices with columns of `rows` numbers.
+pub(super) fn product(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
+    let [a, b] = [a, b].map(|matrix| MatRef::from_column_major_slice(matrix, rows, matrix.len() / rows.max(1)));
+    let mut out = Mat::<f64>::zeros(a.ncols(), b.ncols());
+    matmul(out.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
+    slice_of(&out)
+}
+
+/// A B for A with columns of `rows` numbers and B with columns of `inner` numbers.
+pub(super) fn combinations(a: &[f64], b: &[f64], rows: usize, inner: usize) -> Vec<f64> {
+    let a = MatRef::from_column_major_slice(a, rows, inner);
+    let b = MatRef::from_column_major_slice(b, inner, b.len() / inner.max(1));
+    let mut out = Mat::<f64>::zeros(rows, b.ncols());
+    matmul(out.as_mut(), Accum::Replace, a, b, 1.0, Par::Seq);
+    slice_of(&out)
+}
+
+/// Eigenvalues in increasing order and eigenvectors of a symmetric matrix; `None` if a number is not finite.
+fn eigen(matrix: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+    let n = matrix.len().isqrt();
+    if n == 0 || !matrix.iter().all(|x| x.is_finite()) {
+        return None;
     }
-    rows
+    let eigen = SelfAdjointEigen::new(MatRef::from_column_major_slice(matrix, n, n), Side::Lower).ok()?;
+    Some((eigen.S().column_vector().iter().copied().collect(), slice_of(&eigen.U().to_owned())))
+}
+
+fn slice_of(matrix: &Mat<f64>) -> Vec<f64> {
+    (0..matrix.ncols()).flat_map(|n| matrix.col(n).iter().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn singular_vectors_come_in_order_and_stop_at_the_numerical_rank() {
+        // Columns 3 e_0, 2 e_1 and their sum: rank two.
+        let matrix = [3.0, 0.0, 0.0, 0.0, 2.0, 0.0, 3.0, 2.0, 0.0];
+        let shapes = leading_left_singular_vectors(&matrix, 3, 5);
+        assert_eq!(shapes.len(), 6);
+        let gram = product(&shapes, &shapes, 3);
+        assert!((gram[0] - 1.0).abs() < 1e-12 && gram[1].abs() < 1e-12 && (gram[3] - 1.0).abs() < 1e-12);
+        assert!(shapes[0].abs() > shapes[1].abs(), "the first leans to the largest column");
+    }
+
+    #[test]
+    fn modes_diagonalise_both_matrices_and_drop_dependent_directions() {
+        let (mass, stiffness) = ([2.0, 0.5, 0.5, 1.0], [-5.0, 1.0, 1.0, -3.0]);
+        let (t, values) = modes(&mass, &stiffness);
+        let m = product(&t, &combinations(&mass, &t, 2, 2), 2);
+        let k = product(&t, &combinations(&stiffness, &t, 2, 2), 2);
+        for (at, (m, k)) in m.iter().zip(&k).enumerate() {
+            let (row, column) = (at % 2, at / 2);
+            let on_diagonal = if row == column { [1.0, values[row]] } else { [0.0, 0.0] };
+            assert!((m - on_diagonal[0]).abs() < 1e-12 && (k - on_diagonal[1]).abs() < 1e-12);
+        }
+        assert_eq!(modes(&[1.0, 1.0, 1.0, 1.0], &stiffness).1.len(), 1);
+        assert!(modes(&[f64::NAN], &[1.0]).1.is_empty());
+    }
 }

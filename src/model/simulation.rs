@@ -164,6 +164,15 @@ impl Simulation {
         (self.contact, self.force) = (contact, force);
     }
 
+    /// The state, and the internal force on every node in it (N).
+    ///
+    /// # Real-time
+    /// Bounded and real-time safe if the body's forces are.
+    pub fn internal_forces(&mut self) -> (&State, &[Vec3]) {
+        self.body.forces(&self.state, &mut self.forces);
+        (&self.state, &self.forces)
+    }
+
     /// The body.
     ///
     /// # Real-time

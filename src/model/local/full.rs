@@ -3,7 +3,7 @@
 use super::super::Vec3;
 use super::super::contact::{Contact, ToolMotion};
 use super::super::simulation::Simulation;
-use super::{LocalModel, PatchGeometry, ResyncView};
+use super::{Kind, LocalModel, PatchGeometry, ResyncView};
 
 /// The global model itself, run at the haptic rate. There is nothing to resync with.
 ///
@@ -44,6 +44,10 @@ impl LocalModel for Full {
 
     fn built_at(&self) -> u64 {
         0
+    }
+
+    fn serves_as(&self) -> Kind {
+        Kind::Full
     }
 
     fn catches_up(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use super::super::Vec3;
 use super::super::contact::{Contact, ToolMotion};
-use super::{LocalModel, PatchGeometry, ResyncView, Watched};
+use super::{Kind, LocalModel, PatchGeometry, ResyncView, Watched};
 
 /// The force of the global model's last tick, held until the next.
 #[derive(Clone, Debug, Default)]
@@ -27,6 +27,10 @@ impl LocalModel for Hold {
 
     fn built_at(&self) -> u64 {
         self.built_at
+    }
+
+    fn serves_as(&self) -> Kind {
+        Kind::Hold
     }
 
     fn catches_up(&self) -> bool {

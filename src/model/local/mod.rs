@@ -34,8 +34,20 @@ pub enum Kind {
     Hold,
     /// [`Patch`].
     Patch,
+    /// [`Predictive`] while it has no basis: the ring moves as predicted, whatever happens.
+    Predicted,
     /// [`Predictive`].
     Predictive,
+}
+
+/// How `predictive` finds where its ring will go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Prediction {
+    /// By a reduced model of the surroundings, where that holds the present motion; else as [`Full`](Self::Full).
+    #[default]
+    Reduced,
+    /// By running the whole body ahead.
+    Full,
 }
 
 impl Kind {
@@ -48,6 +60,7 @@ impl Kind {
             Self::Full => "full",
             Self::Hold => "hold",
             Self::Patch => "patch",
+            Self::Predicted => "predicted",
             Self::Predictive => "predictive",
         }
     }
@@ -60,6 +73,8 @@ pub struct Template {
     pub kind: Kind,
     /// Patch nodes along the surface, along it, into depth.
     pub patch: [usize; 3],
+    /// How `predictive` looks ahead.
+    pub prediction: Prediction,
     /// The body's springs, for the models that need them.
     pub springs: Option<Arc<SpringGraph>>,
 }
@@ -74,7 +89,7 @@ impl Template {
     /// Not real-time safe: allocates.
     pub fn new(kind: Kind, patch: [usize; 3], body: &dyn Body) -> Result<Self, Error> {
         let springs = match kind {
-            Kind::Predictive => {
+            Kind::Predictive | Kind::Predicted => {
                 let springs = SpringGraph::new(body).ok_or_else(|| {
                     let message = format!("{:?} needs a body of springs, use another model", kind.name());
                     Error::scene("local.model", message)
@@ -83,7 +98,7 @@ impl Template {
             }
             _ => None,
         };
-        Ok(Self { kind, patch, springs })
+        Ok(Self { kind, patch, prediction: Prediction::default(), springs })
     }
 
     /// An empty model, to be rebuilt in place; `None` for [`Full`], which is the simulation itself.
@@ -94,8 +109,10 @@ impl Template {
         match (self.kind, &self.springs) {
             (Kind::Full, _) => None,
             (Kind::Patch, _) => Some(Box::new(Patch::new(self.patch))),
-            (Kind::Predictive, Some(springs)) => Some(Box::new(Predictive::new(self.patch, Arc::clone(springs)))),
-            (Kind::Hold | Kind::Predictive, _) => Some(Box::new(Hold::default())),
+            (Kind::Predictive | Kind::Predicted, Some(springs)) => {
+                Some(Box::new(Predictive::new(self.patch, self.prediction, Arc::clone(springs))))
+            }
+            (Kind::Hold | Kind::Predictive | Kind::Predicted, _) => Some(Box::new(Hold::default())),
         }
     }
 }
@@ -189,6 +206,12 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// # Real-time
     /// Wait-free, real-time safe.
     fn built_at(&self) -> u64;
+
+    /// What its force in the last tick was: its own kind, or what it falls back to.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    fn serves_as(&self) -> Kind;
 
     /// True if its state has to be advanced to the present before it can serve.
     ///

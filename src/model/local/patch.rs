@@ -6,7 +6,7 @@ use super::super::contact::{Contact, Deformable, Law, ToolMotion, step};
 use super::super::simulation::Stepping;
 use super::super::tangent::PatchTangent;
 use super::window::Window;
-use super::{LocalModel, PatchGeometry, ResyncView, Watched};
+use super::{Kind, LocalModel, PatchGeometry, ResyncView, Watched};
 
 /// The nodes around the contact, with their tangent at the resync; every other node stands still (paper, section 2.3).
 #[derive(Clone, Debug)]
@@ -101,6 +101,10 @@ impl LocalModel for Patch {
 
     fn built_at(&self) -> u64 {
         self.built_at
+    }
+
+    fn serves_as(&self) -> Kind {
+        Kind::Patch
     }
 
     fn catches_up(&self) -> bool {

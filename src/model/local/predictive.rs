@@ -1,4 +1,4 @@
-//! `predictive`: a non-linear patch in a ring that moves as the global model predicts, corrected by reduced surroundings.
+//! `predictive`: a non-linear patch in a ring that moves as predicted, corrected by reduced surroundings.
 
 use std::sync::Arc;
 
@@ -6,24 +6,29 @@ use super::super::Vec3;
 use super::super::body::State;
 use super::super::contact::{Contact, Deformable, Law, ToolMotion, step};
 use super::super::simulation::Stepping;
-use super::super::surroundings::{Basis, SpringGraph};
+use super::super::surroundings::{Basis, ReducedMotion, SpringGraph};
 use super::near::NearSprings;
 use super::ring_path::{RingPath, RingSample};
 use super::window::Window;
-use super::{LocalModel, PatchGeometry, ResyncView, Watched};
+use super::{Kind, LocalModel, PatchGeometry, Prediction, ResyncView, Watched};
 
-/// The patch and every spring that touches it stay non-linear. The ring, the patch's neighbours outside, moves as the
-/// global model has predicted for the expected path of the tool, and answers by the reduced surroundings to what the
-/// springs do differently from the prediction:
+/// The patch and every spring that touches it stay non-linear. The ring, the patch's neighbours outside, moves as
+/// predicted for the expected path of the tool, and answers by the reduced surroundings to what the springs do
+/// differently from the prediction:
 ///
-/// x_ring = x_predicted + Phi eta, eta'' = K eta + C eta' + B^T (f_near - f_near,predicted).
+/// x_ring = x_predicted + Phi eta, eta'' = K eta + C eta' + Phi^T (f_near - f_near,predicted).
 ///
-/// It is built at the time of the global model's state; a model that comes late replays the tool's own path.
+/// It is built at the time of the global model's state; a model that comes late replays the tool's own path. While there
+/// is no basis the ring moves as predicted whatever happens. A contact that leaves the patch would press against nodes
+/// that do not give way: from then on the last force is held.
 #[derive(Debug)]
 pub struct Predictive {
     size: [usize; 3],
+    prediction: Prediction,
     springs: Arc<SpringGraph>,
     window: Window,
+    /// True for window nodes that move in the body but not by contact forces in this model.
+    beyond: Vec<bool>,
     near: NearSprings,
     /// Of all window nodes: the patch, the ring, then what stands still.
     state: State,
@@ -34,14 +39,15 @@ pub struct Predictive {
     /// Substeps since it was built.
     substep: usize,
     basis: Option<Arc<Basis>>,
-    eta: Vec<f64>,
-    eta_rate: Vec<f64>,
-    acceleration: Vec<f64>,
+    surroundings: ReducedMotion,
     /// Its triangle is local.
     contact: Contact,
     law: Law,
     stepping: Stepping,
     built_at: u64,
+    /// Of the last tick whose contact was inside the patch (N).
+    force: Vec3,
+    has_left: bool,
     watched: Watched,
     /// The global model's present while it looks ahead.
     present: State,
@@ -52,11 +58,13 @@ impl Predictive {
     ///
     /// # Real-time
     /// Not called in a tick. Memory comes with the first [`rebuild`](LocalModel::rebuild).
-    pub fn new(size: [usize; 3], springs: Arc<SpringGraph>) -> Self {
+    pub fn new(size: [usize; 3], prediction: Prediction, springs: Arc<SpringGraph>) -> Self {
         Self {
             size,
+            prediction,
             springs,
             window: Window::default(),
+            beyond: Vec::new(),
             near: NearSprings::default(),
             state: State::default(),
             inverse_masses: Vec::new(),
@@ -64,85 +72,97 @@ impl Predictive {
             path: RingPath::default(),
             substep: 0,
             basis: None,
-            eta: Vec::new(),
-            eta_rate: Vec::new(),
-            acceleration: Vec::new(),
+            surroundings: ReducedMotion::default(),
             contact: Contact::default(),
             law: Law::default(),
             stepping: Stepping { tick: 1e-3, substeps: 1 },
             built_at: 0,
+            force: Vec3::zeros(),
+            has_left: false,
             watched: Watched::default(),
             present: State::default(),
         }
     }
 
-    /// Runs the global model ahead and records what the ring does.
+    fn ring(&self) -> std::ops::Range<usize> {
+        self.window.movable..self.window.movable + self.window.ring
+    }
+
+    /// Everything but the path as it is in the global model.
+    fn take_present(&mut self, resync: &ResyncView<'_>) {
+        let (global, window) = (&*resync.global, &self.window);
+        window.gather(&global.state().positions, &mut self.state.positions);
+        window.gather(&global.state().velocities, &mut self.state.velocities);
+        // What is beyond the ring stands still.
+        self.state.velocities[window.movable + window.ring..].fill(Vec3::zeros());
+        self.contact = *global.contact();
+        // A contact outside the window cannot be followed here: detection starts anew.
+        self.contact.triangle = self.contact.triangle.and_then(|t| window.triangle(t));
+        if self.contact.triangle.is_none() {
+            self.contact = Contact { glued: self.contact.glued, ..Contact::default() };
+        }
+        (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
+        (self.substep, self.has_left, self.force) = (0, false, global.force());
+    }
+
+    /// Finds the ring's path: by the forecast of the surroundings where it holds the present motion, or else by running
+    /// the whole body ahead.
     fn predict(&mut self, resync: &mut ResyncView<'_>) {
-        let Self { window, near, state, forces, path, present, .. } = self;
-        let tick = resync.global.stepping().tick;
-        path.clear(window.ring, resync.global.stepping().step());
-        let ring = window.movable..window.movable + window.ring;
-        resync.global.look_ahead(resync.horizon, |n| resync.tool.motion(n, tick), present, |global| {
+        let basis = self.basis.clone().filter(|_| self.prediction == Prediction::Reduced);
+        if !basis.is_some_and(|basis| self.predict_by_forecast(&basis, resync)) {
+            self.predict_by_global(resync);
+        }
+    }
+
+    fn predict_by_global(&mut self, resync: &mut ResyncView<'_>) {
+        let ring = self.ring();
+        let Self { window, near, state, forces, path, present, stepping, .. } = self;
+        path.clear(window.ring, stepping.step());
+        let motion = |n| resync.tool.motion(n, stepping.tick);
+        resync.global.look_ahead(resync.horizon, motion, present, |global| {
             window.gather(&global.positions, &mut state.positions);
             window.gather(&global.velocities, &mut state.velocities);
             near.forces(&state.positions, &state.velocities, forces);
-            path.push(ring.clone().map(|node| RingSample {
-                position: state.positions[node],
-                velocity: state.velocities[node],
-                force: forces[node],
-            }));
+            path.push(ring.clone().map(|node| RingSample::at(node, state, forces)));
         });
+        self.take_present(resync);
     }
 
-    /// eta' and eta one substep on; `forces` are those of the near springs at its start.
-    fn advance_surroundings(&mut self, d: f64) {
-        let Some(basis) = &self.basis else { return };
-        let r = basis.states;
-        let ring = self.window.movable..self.window.movable + self.window.ring;
-        self.acceleration.fill(0.0);
-        for ((force, predicted), inputs) in
-            self.forces[ring].iter().zip(self.path.at(self.substep)).zip(basis.inputs.chunks_exact(3 * r))
-        {
-            let deviation = force - predicted.force;
-            for (axis, input) in inputs.chunks_exact(r).enumerate() {
-                self.acceleration.iter_mut().zip(input).for_each(|(a, input)| *a += input * deviation[axis]);
+    /// As [`tick`](LocalModel::tick), with the forecast in place of the path.
+    fn predict_by_forecast(&mut self, basis: &Basis, resync: &mut ResyncView<'_>) -> bool {
+        let (ring, forecast) = (self.ring(), basis.forecast());
+        let span = f64::from(resync.horizon) * self.stepping.tick;
+        let (state, forces) = resync.global.internal_forces();
+        if !forecast.launch(&mut self.surroundings, state, forces, span) {
+            return false;
+        }
+        self.path.clear(self.window.ring, self.stepping.step());
+        let origin = self.state.positions[ring.clone()].to_vec();
+        self.near.forces(&self.state.positions, &self.state.velocities, &mut self.forces);
+        let resting = self.forces[ring.clone()].to_vec();
+        let stepping = self.stepping;
+        for n in 0..resync.horizon {
+            if self.contact_is_beyond() {
+                // What the patch would do from here on is wrong: the ring coasts.
+                break;
             }
-        }
-        for (state, acceleration) in self.acceleration.iter_mut().enumerate() {
-            let row = |matrix: &[f64], x: &[f64]| -> f64 {
-                matrix[state * r..(state + 1) * r].iter().zip(x).map(|(a, x)| a * x).sum()
-            };
-            *acceleration += row(&basis.stiffness, &self.eta) + row(&basis.damping, &self.eta_rate);
-        }
-        for ((eta, rate), acceleration) in self.eta.iter_mut().zip(&mut self.eta_rate).zip(&self.acceleration) {
-            *rate += d * acceleration;
-            *eta += d * *rate;
-        }
-    }
-
-    /// Puts the ring where it is at the start of the present substep.
-    fn place_ring(&mut self) {
-        let ring = self.window.movable..self.window.movable + self.window.ring;
-        let nodes = self.state.positions[ring.clone()].iter_mut().zip(&mut self.state.velocities[ring]);
-        for ((x, v), sample) in nodes.zip(self.path.at(self.substep)) {
-            (*x, *v) = (sample.position, sample.velocity);
-        }
-        let Some(basis) = &self.basis else { return };
-        let (first, r) = (self.window.movable, basis.states);
-        for (place, shapes) in basis.shapes.chunks_exact(3 * r).enumerate() {
-            for (axis, shape) in shapes.chunks_exact(r).enumerate() {
-                let (mut x, mut v) = (0.0, 0.0);
-                for ((phi, eta), rate) in shape.iter().zip(&self.eta).zip(&self.eta_rate) {
-                    x += phi * eta;
-                    v += phi * rate;
+            stepping.tick(resync.tool.motion(n, stepping.tick), |tool, d| {
+                let force = self.contact_step(tool, d);
+                self.path.push(ring.clone().map(|node| RingSample::at(node, &self.state, &self.forces)));
+                let deviations = self.forces[ring.clone()].iter().zip(&resting).map(|(f, f_0)| f - f_0);
+                forecast.model().step(&mut self.surroundings, deviations, d);
+                for ((node, origin), (x, v)) in ring.clone().zip(&origin).zip(forecast.model().ring(&self.surroundings)) {
+                    (self.state.positions[node], self.state.velocities[node]) = (origin + x, v);
                 }
-                self.state.positions[first + place][axis] += x;
-                self.state.velocities[first + place][axis] += v;
-            }
+                force
+            });
         }
+        self.take_present(resync);
+        true
     }
 
-    fn substep(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
+    /// Near forces, and the patch one substep on.
+    fn contact_step(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
         self.near.forces(&self.state.positions, &self.state.velocities, &mut self.forces);
         let mut deformable = Deformable {
             positions: &mut self.state.positions,
@@ -151,11 +171,34 @@ impl Predictive {
             surface: &self.window.surface,
             candidates: &self.window.candidates,
         };
-        let force = step(&mut deformable, &self.forces, &mut self.contact, &self.law, tool, d);
-        self.advance_surroundings(d);
+        step(&mut deformable, &self.forces, &mut self.contact, &self.law, tool, d)
+    }
+
+    fn substep(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
+        let force = self.contact_step(tool, d);
+        let ring = self.ring();
+        if let Some(basis) = &self.basis {
+            let predicted = self.path.at(self.substep);
+            let deviations = self.forces[ring.clone()].iter().zip(predicted).map(|(f, predicted)| f - predicted.force);
+            basis.answers().step(&mut self.surroundings, deviations, d);
+        }
         self.substep += 1;
-        self.place_ring();
+        for (node, sample) in ring.clone().zip(self.path.at(self.substep)) {
+            (self.state.positions[node], self.state.velocities[node]) = (sample.position, sample.velocity);
+        }
+        if let Some(basis) = &self.basis {
+            for (node, (x, v)) in ring.zip(basis.answers().ring(&self.surroundings)) {
+                self.state.positions[node] += x;
+                self.state.velocities[node] += v;
+            }
+        }
         force
+    }
+
+    /// True if the contact is on a node that gives way in the body but not here.
+    fn contact_is_beyond(&self) -> bool {
+        let touched = self.contact.triangle.filter(|_| self.contact.is_touching());
+        touched.is_some_and(|t| self.window.surface.triangles[t as usize].iter().any(|&node| self.beyond[node as usize]))
     }
 }
 
@@ -163,44 +206,49 @@ impl LocalModel for Predictive {
     fn rebuild(&mut self, mut resync: ResyncView<'_>) {
         self.window.rebuild(resync.global.body(), resync.triangles, self.size, Some(&self.springs));
         self.near.rebuild(&self.springs, &self.window);
-        let nodes = self.window.nodes.len();
-        self.forces.resize(nodes, Vec3::zeros());
-        self.predict(&mut resync);
-        let global = &*resync.global;
         let (window, movable) = (&self.window, self.window.movable);
-        window.gather(&global.state().positions, &mut self.state.positions);
-        window.gather(&global.state().velocities, &mut self.state.velocities);
-        // What is beyond the ring stands still.
-        self.state.velocities[movable + window.ring..].fill(Vec3::zeros());
+        let body_masses = resync.global.body().inverse_masses();
         self.inverse_masses.clear();
-        let masses = global.body().inverse_masses();
-        self.inverse_masses.extend(window.nodes[..movable].iter().map(|&node| masses[node as usize]));
-        self.inverse_masses.resize(nodes, 0.0);
-        self.basis = resync.bases.get(&window.nodes[..movable]).filter(|basis| basis.states > 0).cloned();
-        let states = self.basis.as_ref().map_or(0, |basis| basis.states);
-        for states_of in [&mut self.eta, &mut self.eta_rate, &mut self.acceleration] {
-            states_of.clear();
-            states_of.resize(states, 0.0);
-        }
-        self.substep = 0;
-        self.contact = *global.contact();
-        self.contact.triangle = self.contact.triangle.and_then(|t| window.triangle(t));
-        if self.contact.triangle.is_none() {
-            self.contact = Contact { glued: self.contact.glued, ..Contact::default() };
-        }
-        (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
-        self.watched.take(global.state());
+        self.inverse_masses.extend(window.nodes[..movable].iter().map(|&node| body_masses[node as usize]));
+        self.inverse_masses.resize(window.nodes.len(), 0.0);
+        self.beyond.clear();
+        self.beyond.resize(movable, false);
+        self.beyond.extend(window.nodes[movable..].iter().map(|&node| body_masses[node as usize] > 0.0));
+        self.forces.resize(window.nodes.len(), Vec3::zeros());
+        self.basis = resync.bases.get(&window.nodes[..movable]).cloned();
+        self.take_present(&resync);
+        self.predict(&mut resync);
+        self.surroundings.rest(self.basis.as_ref().map_or(0, |basis| basis.answers().states()));
+        self.watched.take(resync.global.state());
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Vec3 {
+        if self.has_left {
+            return self.force;
+        }
         let stepping = self.stepping;
         let force = stepping.tick(tool, |tool, d| self.substep(tool, d));
         // A state that is not finite touches nothing: its zero force would look like a free tool.
-        if self.state.is_finite() { force } else { Vec3::repeat(f64::NAN) }
+        if !self.state.is_finite() {
+            return Vec3::repeat(f64::NAN);
+        }
+        self.has_left = self.contact_is_beyond();
+        if !self.has_left {
+            self.force = force;
+        }
+        self.force
     }
 
     fn built_at(&self) -> u64 {
         self.built_at
+    }
+
+    fn serves_as(&self) -> Kind {
+        match &self.basis {
+            _ if self.has_left => Kind::Hold,
+            None => Kind::Predicted,
+            Some(_) => Kind::Predictive,
+        }
     }
 
     fn catches_up(&self) -> bool {

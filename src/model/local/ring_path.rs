@@ -1,6 +1,7 @@
 //! What the global model predicts for the ring around a patch, substep by substep.
 
 use super::super::Vec3;
+use super::super::body::State;
 
 /// Past its end the prediction coasts with its last velocity for this long (s), then stands still.
 const COASTING: f64 = 15e-3;
@@ -11,6 +12,12 @@ pub(super) struct RingSample {
     pub position: Vec3,
     pub velocity: Vec3,
     pub force: Vec3,
+}
+
+impl RingSample {
+    pub(super) fn at(node: usize, state: &State, forces: &[Vec3]) -> Self {
+        Self { position: state.positions[node], velocity: state.velocities[node], force: forces[node] }
+    }
 }
 
 /// The predicted motion of the ring.

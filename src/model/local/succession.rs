@@ -182,7 +182,7 @@ impl Succession {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{PatchGeometry, ResyncView};
+    use super::super::{Kind, PatchGeometry, ResyncView};
     use super::*;
     use crate::model::contact::Contact;
 
@@ -205,6 +205,9 @@ mod tests {
         }
         fn built_at(&self) -> u64 {
             self.built_at
+        }
+        fn serves_as(&self) -> Kind {
+            Kind::Patch
         }
         fn catches_up(&self) -> bool {
             self.catches_up

@@ -2,7 +2,10 @@
 //! everything beyond.
 
 mod basis;
+mod far;
 mod graph;
+mod reduced;
 
 pub use basis::{Bases, Basis};
 pub use graph::SpringGraph;
+pub(crate) use reduced::ReducedMotion;

@@ -1,0 +1,136 @@
+//! A linear model in few states, in modal form, that answers to forces on a ring of nodes.
+
+use super::super::{Vec3, dense};
+use super::far::Far;
+
+/// What the velocities do to the states' accelerations.
+#[derive(Clone, Debug, PartialEq)]
+enum Damping {
+    /// Proportional to the stiffness: one number per state (1/s).
+    Diagonal(Vec<f64>),
+    /// r rows of r (1/s).
+    Full(Vec<f64>),
+}
+
+/// eta'' = K eta + C eta' + Phi^T f with Phi^T M Phi = 1 and a diagonal K; the ring moves by Phi eta.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Reduced {
+    states: usize,
+    /// Phi on the ring (1/sqrt(kg)): three rows of r for each node.
+    shapes: Vec<f64>,
+    /// One number per state (1/s^2), negative.
+    stiffness: Vec<f64>,
+    damping: Damping,
+}
+
+impl Reduced {
+    /// The surroundings `far` in the span of the columns of `shapes`, with its modes there on all of `far` as columns.
+    /// `None` if there is no motion in that span or a number is not finite.
+    pub(super) fn new(far: &Far, ring: &[u32], shapes: &[f64]) -> Option<(Self, Vec<f64>)> {
+        let columns = shapes.len() / far.unknowns().max(1);
+        let (stiffness, damping) = far.stiffness_and_damping(shapes);
+        let (modes, values) = dense::modes(&far.mass(shapes), &stiffness);
+        let states = values.len();
+        if states == 0 {
+            return None;
+        }
+        let shapes = dense::combinations(shapes, &modes, far.unknowns(), columns);
+        let damping = match far.proportional_damping() {
+            Some(share) => Damping::Diagonal(values.iter().map(|value| share * value).collect()),
+            None => Damping::Full(dense::product(&modes, &dense::combinations(&damping, &modes, columns, columns), columns)),
+        };
+        let unknowns = ring.iter().flat_map(|&node| (0..3).map(move |axis| far.unknown(node, axis)));
+        let row = |unknown: usize| (0..states).map(move |state| (state, unknown));
+        let on_ring = unknowns.flat_map(row).map(|(state, unknown)| shapes[state * far.unknowns() + unknown]).collect();
+        Some((Self { states, shapes: on_ring, stiffness: values, damping }, shapes))
+    }
+
+    pub(crate) fn states(&self) -> usize {
+        self.states
+    }
+
+    /// One step of `d` seconds under `forces` on the ring (N, of each node in order).
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
+    pub(crate) fn step(&self, motion: &mut ReducedMotion, forces: impl Iterator<Item = Vec3>, d: f64) {
+        let ReducedMotion { eta, rate, acceleration, load, rate_origin } = motion;
+        let r = self.states;
+        acceleration.copy_from_slice(load);
+        for (force, rows) in forces.zip(self.shapes.chunks_exact(3 * r)) {
+            let ((x, y), z) = (rows[..2 * r].split_at(r), &rows[2 * r..]);
+            for (((a, x), y), z) in acceleration.iter_mut().zip(x).zip(y).zip(z) {
+                *a += force.x * x + force.y * y + force.z * z;
+            }
+        }
+        match &self.damping {
+            Damping::Diagonal(damping) => {
+                for (((a, c), rate), origin) in acceleration.iter_mut().zip(damping).zip(&*rate).zip(&*rate_origin) {
+                    *a += c * (rate - origin);
+                }
+            }
+            Damping::Full(damping) => {
+                for (a, row) in acceleration.iter_mut().zip(damping.chunks_exact(r)) {
+                    *a += row.iter().zip(&*rate).zip(&*rate_origin).map(|((c, rate), o)| c * (rate - o)).sum::<f64>();
+                }
+            }
+        }
+        for (((eta, rate), a), k) in eta.iter_mut().zip(rate).zip(acceleration).zip(&self.stiffness) {
+            *rate += d * (*a + k * *eta);
+            *eta += d * *rate;
+        }
+    }
+
+    /// Displacement (m) and velocity (m/s) of each ring node in order.
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
+    pub(crate) fn ring<'a>(&'a self, motion: &'a ReducedMotion) -> impl Iterator<Item = (Vec3, Vec3)> + 'a {
+        self.shapes.chunks_exact(3 * self.states).map(|rows| {
+            let (mut x, mut v) = (Vec3::zeros(), Vec3::zeros());
+            for (axis, row) in rows.chunks_exact(self.states).enumerate() {
+                for ((phi, eta), rate) in row.iter().zip(&motion.eta).zip(&motion.rate) {
+                    x[axis] += phi * eta;
+                    v[axis] += phi * rate;
+                }
+            }
+            (x, v)
+        })
+    }
+}
+
+/// The state of a [`Reduced`] model.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ReducedMotion {
+    eta: Vec<f64>,
+    rate: Vec<f64>,
+    acceleration: Vec<f64>,
+    /// Constant part of the acceleration.
+    load: Vec<f64>,
+    /// The velocities that `load` belongs to.
+    rate_origin: Vec<f64>,
+}
+
+impl ReducedMotion {
+    /// At rest, without a load.
+    ///
+    /// # Real-time
+    /// Not called in a tick: may allocate.
+    pub(crate) fn rest(&mut self, states: usize) {
+        for vector in [&mut self.eta, &mut self.rate, &mut self.acceleration, &mut self.load, &mut self.rate_origin] {
+            vector.clear();
+            vector.resize(states, 0.0);
+        }
+    }
+
+    /// Starts with velocities `rate`, at which the acceleration is `load`.
+    ///
+    /// # Real-time
+    /// Not called in a tick: may allocate.
+    pub(crate) fn launch(&mut self, rate: &[f64], load: &[f64]) {
+        self.rest(rate.len());
+        self.rate.copy_from_slice(rate);
+        self.rate_origin.copy_from_slice(rate);
+        self.load.copy_from_slice(load);
+    }
+}
