@@ -18,6 +18,8 @@ pub enum Cause {
     GlobalNotFinite,
     /// Samples of the tool were lost between local and global model; the path was interpolated.
     SamplesLost,
+    /// The surroundings of a patch could not be reduced: its model serves without them.
+    NoBasis,
 }
 
 impl Cause {
@@ -31,6 +33,7 @@ impl Cause {
             Self::LocalNotFinite => 301,
             Self::GlobalNotFinite => 302,
             Self::SamplesLost => 303,
+            Self::NoBasis => 304,
         }
     }
 
@@ -43,6 +46,7 @@ impl Cause {
             300 => "the device reported numbers that are not finite",
             301 => "the local model's force is not finite, zero is commanded",
             302 => "the global model's state is not finite, it publishes nothing any more",
+            304 => "the surroundings of a patch could not be reduced",
             303 => "tool samples were lost between local and global model",
             _ => return None,
         })
@@ -56,7 +60,13 @@ mod tests {
     #[test]
     fn every_cause_has_words() {
         let faults = [DeviceFault::Stale, DeviceFault::NotReady, DeviceFault::Disconnected];
-        let others = [Cause::DeviceNotFinite, Cause::LocalNotFinite, Cause::GlobalNotFinite, Cause::SamplesLost];
+        let others = [
+            Cause::DeviceNotFinite,
+            Cause::LocalNotFinite,
+            Cause::GlobalNotFinite,
+            Cause::SamplesLost,
+            Cause::NoBasis,
+        ];
         for cause in faults.map(Cause::Device).into_iter().chain(others) {
             assert!(Cause::describe(cause.code()).is_some(), "{cause:?}");
         }

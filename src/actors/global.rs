@@ -1,13 +1,13 @@
 //! The global actor: advances the whole body along the tool's path and publishes the next local model.
 
+use super::basis::Wishes;
 use super::cause::Cause;
 use super::messages::{Checkpoint, SurfaceView, ToolTick};
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::contact::ToolMotion;
-use crate::model::forecast::ToolHistory;
-use crate::model::geometry::NearestTriangle;
-use crate::model::local::{LocalModel, PatchGeometry, ResyncView};
+use crate::model::forecast::{ToolForecast, ToolHistory};
+use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{Actor, Outcome, OutletWriter, QueueReader, Reader, Recorder, TickContext, Writer};
@@ -22,12 +22,43 @@ pub struct GlobalPorts {
     pub geometry: Option<Reader<PatchGeometry>>,
     /// The next local model.
     pub models: Writer<Box<dyn LocalModel>>,
+    /// To and from the basis actor, if the models use what it makes.
+    pub surroundings: Option<SurroundingsPorts>,
     /// The newest surface for a program that draws.
     pub surface: OutletWriter<SurfaceView>,
     /// The newest good state, for a restart.
     pub checkpoint: OutletWriter<Checkpoint>,
     /// Records.
     pub recorder: Recorder,
+}
+
+/// The global half of the ports of a [`BasisActor`](super::BasisActor).
+#[derive(Debug)]
+pub struct SurroundingsPorts {
+    /// What is wanted.
+    pub wishes: Writer<Wishes>,
+    /// What is there.
+    pub bases: Reader<Bases>,
+}
+
+/// Where the tool may be by the time that a basis is ready (s).
+const PREFETCH_S: [f64; 3] = [0.15, 0.3, 0.6];
+
+/// What a [`GlobalActor`] has to know of the session.
+#[derive(Clone, Debug)]
+pub struct GlobalPlan {
+    /// Rate of the haptic ticks.
+    pub haptic: Rate,
+    /// Rate of its own releases.
+    pub global: Rate,
+    /// Haptic ticks that a local model may have to reach ahead.
+    pub horizon: u32,
+    /// Patch nodes along the surface, along it, into depth.
+    pub patch: [usize; 3],
+    /// Bases that are there from the start.
+    pub bases: Bases,
+    /// Bases are wanted for all places that the tool could go to, and not only for where it is going.
+    pub prefetches: bool,
 }
 
 /// Runs the slow, detailed simulation.
@@ -38,41 +69,31 @@ pub struct GlobalPorts {
 #[derive(Debug)]
 pub struct GlobalActor {
     simulation: Simulation,
-    nearest: NearestTriangle,
+    aim: Aim,
     ports: GlobalPorts,
-    haptic: Rate,
+    plan: GlobalPlan,
     /// The tool at the last tick taken: the state's own time.
     tool: ToolTick,
     history: ToolHistory,
-    /// Triangles that the next model's window has to hold.
+    /// Working memory: triangles that a window has to hold.
     triangles: Vec<u32>,
-    horizon: u32,
-    bases: Bases,
-    springs: Option<std::sync::Arc<crate::model::surroundings::SpringGraph>>,
-    size: [usize; 3],
 }
 
-/// The window holds what the tool is expected over for this long: two periods of 30 Hz and the time to catch up (s).
-const WINDOW_LEAD_S: f64 = 75e-3;
-/// Places on that way that are looked at.
-const LOOKS: u32 = 3;
-
 impl GlobalActor {
-    /// A global model that starts with `simulation` and the tool at `tool`, also in the midst of a run; haptic ticks come
-    /// at rate `haptic`.
+    /// A global model that starts with `simulation` and the tool at `tool`, also in the midst of a run.
     ///
     /// # Errors
     /// If the body's surface has no triangles.
-    pub fn new(simulation: Simulation, tool: ToolTick, haptic: Rate, horizon: u32, springs: Option<std::sync::Arc<crate::model::surroundings::SpringGraph>>, size: [usize; 3], ports: GlobalPorts) -> Result<Self, Error> {
-        let nearest = NearestTriangle::new(simulation.body().surface(), &simulation.state().positions)?;
-        let history = ToolHistory::new(tool.position, haptic.period_s());
-        Ok(Self { simulation, nearest, ports, haptic, tool, history, triangles: Vec::new(), horizon, bases: Bases::default(), springs, size })
+    pub fn new(simulation: Simulation, tool: ToolTick, plan: GlobalPlan, ports: GlobalPorts) -> Result<Self, Error> {
+        let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
+        let history = ToolHistory::new(tool.position, plan.haptic.period_s());
+        Ok(Self { simulation, aim, ports, plan, tool, history, triangles: Vec::new() })
     }
 
     /// Advances along every tool sample up to `until`; returns whether all of them were there.
     fn follow_tool(&mut self, ctx: &TickContext, until: Nanos) -> bool {
         let mut complete = true;
-        while let Some(next) = self.ports.ticks.peek(ctx).filter(|next| self.haptic.release(next.tick) <= until) {
+        while let Some(next) = self.ports.ticks.peek(ctx).filter(|next| self.plan.haptic.release(next.tick) <= until) {
             self.ports.ticks.pop(ctx);
             let gap = next.tick.saturating_sub(self.tool.tick);
             complete &= gap <= 1;
@@ -102,33 +123,58 @@ impl GlobalActor {
     /// Builds the next local model around the contact, or around the surface nearest to the tool, and where it is going.
     fn publish_model(&mut self, ctx: &TickContext) -> u64 {
         let tool = self.history.forecast();
-        self.nearest.refit(&self.simulation.state().positions);
-        let present = self.simulation.contact().triangle.unwrap_or_else(|| self.nearest.find(&tool.position));
-        self.triangles.clear();
-        self.triangles.push(present);
-        for part in 1..=LOOKS {
-            let ahead = WINDOW_LEAD_S * f64::from(part) / f64::from(LOOKS);
-            self.triangles.push(self.nearest.find(&tool.unbraked(ahead)));
-        }
-        if let Some(springs) = &self.springs {
-            let mut patch = Vec::new();
-            self.simulation.body().patch(&self.triangles, self.size, &mut patch);
-            if self.bases.get(&patch).is_none()
-                && let Ok(Some(basis)) = crate::model::surroundings::Basis::compute(springs, &patch, 50)
-            {
-                self.bases.insert(std::sync::Arc::new(basis));
-            }
-        }
+        self.aim.refit(&self.simulation.state().positions);
+        self.aim.triangles(self.simulation.contact().triangle, &tool, 0.0, &mut self.triangles);
         let resync = ResyncView {
             global: &mut self.simulation,
             tick: self.tool.tick,
             triangles: &self.triangles,
             tool,
-            horizon: self.horizon,
-            bases: &self.bases,
+            horizon: self.plan.horizon,
+            bases: &self.plan.bases,
         };
         self.ports.models.buffer().rebuild(resync);
-        self.ports.models.publish(ctx)
+        let version = self.ports.models.publish(ctx);
+        self.publish_wishes(ctx, &tool);
+        version
+    }
+
+    /// Takes the bases that are there by now.
+    fn take_bases(&mut self, ctx: &TickContext) {
+        if let Some(ports) = &mut self.ports.surroundings
+            && ports.bases.refresh(ctx)
+        {
+            self.plan.bases.clone_from(ports.bases.get());
+        }
+    }
+
+    /// Asks for the bases that are missing: of the present window, of the next release's, and of those around.
+    fn publish_wishes(&mut self, ctx: &TickContext, tool: &ToolForecast) {
+        let Some(ports) = &mut self.ports.surroundings else { return };
+        let (aim, body, triangles) = (&self.aim, self.simulation.body(), &mut self.triangles);
+        let wishes = ports.wishes.buffer();
+        wishes.patches.clear();
+        let mut wish = |triangles: &[u32]| {
+            let mut patch = Vec::new();
+            body.patch(triangles, self.plan.patch, &mut patch);
+            if self.plan.bases.get(&patch).is_none() && !wishes.patches.contains(&patch) {
+                wishes.patches.push(patch);
+            }
+        };
+        wish(triangles);
+        aim.triangles(None, tool, self.plan.global.period_s(), triangles);
+        wish(triangles);
+        if self.plan.prefetches {
+            for ahead in PREFETCH_S {
+                aim.triangles(None, tool, ahead, triangles);
+                wish(triangles);
+            }
+            aim.around(body.surface(), &tool.position, triangles);
+            triangles.iter().for_each(|&triangle| wish(&[triangle]));
+        }
+        if !wishes.patches.is_empty() {
+            ports.wishes.publish(ctx);
+        }
     }
 
     fn publish_checkpoint(&mut self, ctx: &TickContext) {
@@ -141,7 +187,7 @@ impl GlobalActor {
 
     fn publish_surface(&mut self, ctx: &TickContext) {
         let view = self.ports.surface.buffer();
-        view.time = self.haptic.release(self.tool.tick);
+        view.time = self.plan.haptic.release(self.tool.tick);
         view.positions.clone_from(&self.simulation.state().positions);
         self.ports.surface.publish(ctx);
     }
@@ -160,6 +206,7 @@ impl Actor for GlobalActor {
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         let before = self.tool.tick;
+        self.take_bases(ctx);
         let complete = self.follow_tool(ctx, ctx.scheduled);
         if self.tool.tick == before {
             // Release 0, or a local model that stands still: there is nothing new to say.

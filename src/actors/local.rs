@@ -2,10 +2,10 @@
 
 use super::cause::Cause;
 use super::messages::{DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
-use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync};
+use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync, ServedBy};
 use crate::model::Vec3;
 use crate::model::contact::{Contact, Mode};
-use crate::model::local::{LocalModel, PatchGeometry, Resynced, Served, Succession};
+use crate::model::local::{Kind, LocalModel, PatchGeometry, Resynced, Served, Succession};
 use crate::runtime::{
     Actor, Mode as RunMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
 };
@@ -154,6 +154,7 @@ impl LocalActor {
             time,
             force_n: force.into(),
             model_version: self.models.version(),
+            served_by: served_by(model.serves_as()),
             model_age_s,
             energy_j: self.energy,
         });
@@ -213,6 +214,16 @@ impl Actor for LocalActor {
             (false, ModelSource::Global { .. }) => Outcome::Degraded(Cause::LocalNotFinite.code()),
             (false, ModelSource::Alone(_)) => Outcome::Fault(Cause::LocalNotFinite.code()),
         }
+    }
+}
+
+fn served_by(kind: Kind) -> ServedBy {
+    match kind {
+        Kind::Full => ServedBy::Full,
+        Kind::Hold => ServedBy::Hold,
+        Kind::Patch => ServedBy::Patch,
+        Kind::Predicted => ServedBy::Predicted,
+        Kind::Predictive => ServedBy::Predictive,
     }
 }
 

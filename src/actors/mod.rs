@@ -1,11 +1,13 @@
-//! The four actors of a haptic session: thin glue between models, devices, logs and the runtime.
+//! The actors of a haptic session: thin glue between models, devices, logs and the runtime.
 //!
 //! ```text
 //! device --DeviceSample--> local --ToolTick, PatchGeometry--> global
-//!        <--ForceCommand--       <--local model--
+//!        <--ForceCommand--       <--local model--              --Wishes--> basis
+//!                                                              <--Bases--
 //! every actor --records--> logger
 //! ```
 
+mod basis;
 mod cause;
 mod device;
 mod global;
@@ -14,10 +16,11 @@ mod local;
 mod logger;
 mod messages;
 
+pub use basis::{BasisActor, BasisPorts, Wishes};
 pub use cause::Cause;
 pub(crate) use device::GAP_S;
 pub use device::{DeviceActor, first_state};
-pub use global::{GlobalActor, GlobalPorts};
+pub use global::{GlobalActor, GlobalPlan, GlobalPorts, SurroundingsPorts};
 pub use local::{LocalActor, LocalPorts, ModelSource};
 pub use logger::{LOG_FAILURE, LogSink, LoggerActor, LoggerOutcome};
 pub use messages::{Checkpoint, DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};

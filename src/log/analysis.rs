@@ -54,14 +54,24 @@ impl RunReport {
         self.groups.iter().map(|group| group.lost_records).sum()
     }
 
-    /// Periods skipped, all groups together.
+    /// Periods skipped, all groups together but those in the background.
     pub fn skipped(&self) -> u64 {
-        self.groups.iter().map(|group| group.skipped.total()).sum()
+        self.foreground().map(|group| group.skipped.total()).sum()
     }
 
-    /// Deadlines missed, all groups together.
+    /// Deadlines missed, all groups together but those in the background.
     pub fn missed(&self) -> u64 {
-        self.groups.iter().map(|group| group.missed.total()).sum()
+        self.foreground().map(|group| group.missed.total()).sum()
+    }
+
+    /// True if nobody waits for the releases of the group `name`.
+    pub fn is_background(&self, name: &str) -> bool {
+        let groups = self.environment.iter().flat_map(|environment| &environment.groups);
+        groups.into_iter().any(|group| group.background && group.name == name)
+    }
+
+    fn foreground(&self) -> impl Iterator<Item = &GroupReport> {
+        self.groups.iter().filter(|group| !self.is_background(&group.name))
     }
 }
 
@@ -235,7 +245,7 @@ mod tests {
         let mut analysis = Analysis::default();
         analysis.set_environment(&Environment {
             limit_stages: vec!["finite".into(), "clamp".into()],
-            groups: vec![GroupInfo { name: "haptic".into(), rate_hz: 1000.0 }],
+            groups: vec![GroupInfo { name: "haptic".into(), rate_hz: 1000.0, background: false }],
             ..Environment::default()
         });
         for n in 1..=100_u64 {

@@ -3,7 +3,7 @@
 use super::event::{Level, TextEvent};
 use super::percentiles::Percentiles;
 use super::records::{
-    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ToolSample,
+    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy, ToolSample,
 };
 use super::schema::{self, Vector3};
 use super::stats::{EventSum, GroupStats};
@@ -76,6 +76,7 @@ impl From<&ForceSample> for schema::Force {
             force_n: r.force_n.into(),
             model_version: r.model_version,
             model_age_s: r.model_age_s,
+            served_by: r.served_by as i32,
             energy_j: r.energy_j,
         }
     }
@@ -88,6 +89,7 @@ impl From<schema::Force> for ForceSample {
             force_n: m.force_n.into(),
             model_version: m.model_version,
             model_age_s: m.model_age_s,
+            served_by: ServedBy::from_code(code(m.served_by)),
             energy_j: m.energy_j,
         }
     }

@@ -24,6 +24,8 @@ pub struct GroupInfo {
     pub name: String,
     /// Releases per second.
     pub rate_hz: f64,
+    /// Its releases take as long as they take: no run is late for its sake.
+    pub background: bool,
 }
 
 /// Everything about a run that is not a record.
@@ -108,6 +110,7 @@ impl Environment {
         for (i, group) in self.groups.iter().enumerate() {
             map.insert(format!("group.{i}.name"), group.name.clone());
             map.insert(format!("group.{i}.rate_hz"), group.rate_hz.to_string());
+            map.insert(format!("group.{i}.background"), group.background.to_string());
         }
         for (i, stage) in self.limit_stages.iter().enumerate() {
             map.insert(format!("limit_stage.{i}"), stage.clone());
@@ -132,7 +135,11 @@ impl Environment {
         };
         let groups = (0..)
             .map_while(|i| map.get(&format!("group.{i}.name")).map(|name| (i, name)))
-            .map(|(i, name)| GroupInfo { name: name.clone(), rate_hz: number(&format!("group.{i}.rate_hz")) })
+            .map(|(i, name)| GroupInfo {
+                name: name.clone(),
+                rate_hz: number(&format!("group.{i}.rate_hz")),
+                background: text(&format!("group.{i}.background")) == "true",
+            })
             .collect();
         let granted = map
             .iter()
@@ -191,8 +198,8 @@ mod tests {
             haptic_hz: 1000.0,
             global_hz: 29.97,
             groups: vec![
-                GroupInfo { name: "haptic".into(), rate_hz: 1000.0 },
-                GroupInfo { name: "global".into(), rate_hz: 29.97 },
+                GroupInfo { name: "haptic".into(), rate_hz: 1000.0, background: false },
+                GroupInfo { name: "global".into(), rate_hz: 29.97, background: true },
             ],
             limit_stages: vec!["clamp".into(), "slew".into()],
             granted: [("policy".to_owned(), "other".to_owned())].into(),

@@ -1,7 +1,7 @@
 //! What a run did to the force: resyncs, contact, limits.
 
 use super::percentiles::{Distribution, Magnitudes, Percentiles};
-use super::records::{CommandSample, ContactMode, ContactSample, ForceSample, Resync};
+use super::records::{CommandSample, ContactMode, ContactSample, ForceSample, Resync, ServedBy};
 
 /// The bits of [`CommandSample::limits`].
 const LIMIT_BITS: usize = 16;
@@ -28,8 +28,18 @@ pub struct ForceReport {
     pub peak_commanded_n: f64,
     /// Forces before the safety pipeline that were not finite.
     pub not_finite: u64,
+    /// Ticks that each local model served, by [`ServedBy`]'s number.
+    pub served: [u64; ServedBy::ALL.len()],
     /// Age of the local model's last resync at each tick (s).
     pub model_age_s: Percentiles<f64>,
+}
+
+impl ForceReport {
+    /// The models that served, with the share of ticks that each did, 0 to 1.
+    pub fn shares(&self) -> impl Iterator<Item = (ServedBy, f64)> {
+        let served = ServedBy::ALL.into_iter().zip(self.served).filter(|&(_, ticks)| ticks > 0);
+        served.map(|(model, ticks)| (model, ticks as f64 / self.ticks as f64))
+    }
 }
 
 /// Haptic ticks in each contact mode.
@@ -77,6 +87,7 @@ pub(super) struct HapticsCounter {
 impl HapticsCounter {
     pub(super) fn push_force(&mut self, sample: &ForceSample) {
         self.force.ticks += 1;
+        self.force.served[usize::from(sample.served_by as u16)] += 1;
         self.model_age.push(sample.model_age_s);
         let magnitude = norm(sample.force_n);
         if magnitude.is_finite() {

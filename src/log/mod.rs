@@ -41,7 +41,7 @@ pub use group::{CauseCounts, GroupReport};
 pub use haptics::{ContactReport, ForceReport, LimitReport, ResyncReport};
 pub use percentiles::{Distribution, Magnitudes, Percentiles};
 pub use records::{
-    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ToolSample,
+    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ServedBy, ToolSample,
 };
 pub use stats::{EventSum, GroupStats, StatsCounter};
 

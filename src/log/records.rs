@@ -4,6 +4,62 @@ use crate::runtime::PortUse;
 use crate::runtime::record::{Channel, Event, Record, TickTiming};
 use crate::time::Nanos;
 
+/// What served a haptic tick: a local model, or what it fell back to.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u16)]
+#[allow(missing_docs)]
+pub enum ServedBy {
+    #[default]
+    Unknown = 0,
+    Full = 1,
+    Hold = 2,
+    Patch = 3,
+    LinearBoundary = 4,
+    ScaledBoundary = 5,
+    Condensed = 6,
+    /// `predictive` without its basis: the ring moves as predicted, whatever happens.
+    Predicted = 7,
+    Predictive = 8,
+}
+
+impl ServedBy {
+    /// All, by number.
+    pub const ALL: [Self; 9] = [
+        Self::Unknown,
+        Self::Full,
+        Self::Hold,
+        Self::Patch,
+        Self::LinearBoundary,
+        Self::ScaledBoundary,
+        Self::Condensed,
+        Self::Predicted,
+        Self::Predictive,
+    ];
+
+    /// The one with this number; unknown numbers read as unknown.
+    pub fn from_code(code: u16) -> Self {
+        Self::ALL.get(usize::from(code)).copied().unwrap_or_default()
+    }
+
+    /// Its name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Unknown => "unknown",
+            Self::Full => "full",
+            Self::Hold => "hold",
+            Self::Patch => "patch",
+            Self::LinearBoundary => "linear_boundary",
+            Self::ScaledBoundary => "scaled_boundary",
+            Self::Condensed => "condensed",
+            Self::Predicted => "predicted",
+            Self::Predictive => "predictive",
+        }
+    }
+}
+
 /// The force of one haptic tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ForceSample {
@@ -13,6 +69,8 @@ pub struct ForceSample {
     pub force_n: [f64; 3],
     /// Version of the local model that served the tick.
     pub model_version: u32,
+    /// What that model was in this tick.
+    pub served_by: ServedBy,
     /// Age of that model's last resync (s).
     pub model_age_s: f64,
     /// Energy that the tool has given to the simulation since the start, negative if it got some (J).
@@ -193,6 +251,7 @@ impl LogRecord {
                 time,
                 force_n: [a, b, c],
                 model_version: record.index,
+                served_by: ServedBy::from_code(record.code),
                 model_age_s: d,
                 energy_j: e,
             }),
@@ -240,7 +299,7 @@ fn join(a: [f64; 3], b: [f64; 3]) -> [f64; 6] {
 impl From<ForceSample> for Record {
     fn from(r: ForceSample) -> Self {
         let [x, y, z] = r.force_n;
-        Self::with_floats(r.time, FORCE, 0, r.model_version, [x, y, z, r.model_age_s, r.energy_j, 0.0])
+        Self::with_floats(r.time, FORCE, r.served_by as u16, r.model_version, [x, y, z, r.model_age_s, r.energy_j, 0.0])
     }
 }
 
@@ -326,6 +385,7 @@ mod tests {
                 time,
                 force_n: [0.1, -0.2, 1e-300],
                 model_version: 7,
+                served_by: ServedBy::Predictive,
                 model_age_s: 0.033,
                 energy_j: 1e-9,
             }),

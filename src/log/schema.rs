@@ -13,7 +13,7 @@ use prost_types::{
 };
 
 use super::event::Level;
-use super::records::ContactMode;
+use super::records::{ContactMode, ServedBy};
 use crate::runtime::record::SlipCause;
 use crate::runtime::{Mode, PortUseKind};
 
@@ -103,6 +103,9 @@ proto_schema! {
     enum PortUseKind { Took, Saw, Dropped }
     enum Mode { Normal, Degraded, Stopping }
     enum ContactMode { Free, Stick, Slip, Lost }
+    enum ServedBy {
+        Unknown, Full, Hold, Patch, LinearBoundary, ScaledBoundary, Condensed, Predicted, Predictive
+    }
     enum Level { Info, Warning, Error }
 
     /// A vector in world coordinates.
@@ -144,6 +147,7 @@ proto_schema! {
         model_version: uint32 = 3,
         model_age_s: double = 4,
         energy_j: double = 5,
+        served_by: int32 as ServedBy = 6,
     }
 
     /// `/force_commanded`: the force after the safety pipeline.

@@ -14,7 +14,7 @@
 //! | `environment` | versions, rates, and in `granted` what the system granted; `null` if unknown |
 //! | `groups[]` | `name`, `rate_hz`, `released`, `skipped`, `missed`, `elapsed_periods`, `in_degraded_mode`, `lost_records`, `skipped_by_cause`, `missed_by_cause`, `lateness_ns`, `execution_ns`, `period_error_ns` |
 //! | `resyncs` | `count`, `jump_before_n`, `jump_after_n`, `age_ns` |
-//! | `force` | `ticks`, `peak_n`, `peak_commanded_n`, `not_finite`, `model_age_s` |
+//! | `force` | `ticks`, `peak_n`, `peak_commanded_n`, `not_finite`, `model_age_s`, `served` (share of ticks by local model) |
 //! | `contact` | haptic ticks `free`, `stick`, `slip`, `lost` |
 //! | `limits` | `ticks`, `limited`, `share` (0 to 1), `stages` by name |
 //! | `lost_records` | of all groups |
@@ -58,6 +58,7 @@ pub fn to_json(report: &RunReport) -> String {
             "peak_commanded_n": force.peak_commanded_n,
             "not_finite": force.not_finite,
             "model_age_s": percentiles(force.model_age_s),
+            "served": force.shares().map(|(model, share)| (model.name().to_owned(), json!(share))).collect::<Map<_, _>>(),
         },
         "contact": {
             "free": contact.free,

@@ -147,6 +147,11 @@ fn haptics(page: &mut Page, report: &RunReport) {
         page.named("  age", format!("on arrival       {}", of(resyncs.age_ns.map(|ns| ns as f64 / 1e9), seconds)));
         page.named("", format!("at each tick     {}", of(report.force.model_age_s, seconds)));
     }
+    let shares: Vec<String> =
+        report.force.shares().map(|(model, share)| format!("{} {:.2} %", model.name(), 100.0 * share)).collect();
+    if !shares.is_empty() {
+        page.named("served by", shares.join(", "));
+    }
     let contact = report.contact;
     page.named(
         "contact",
@@ -207,7 +212,7 @@ mod tests {
         analysis.set_environment(&Environment {
             execution: Execution::Threaded { start_unix_ns: 1 },
             model: "patch".into(),
-            groups: names.map(|name| GroupInfo { name: name.into(), rate_hz: 29.97 }).into(),
+            groups: names.map(|name| GroupInfo { name: name.into(), rate_hz: 29.97, background: false }).into(),
             granted: (0..30).map(|i| (format!("grant_{i}"), "refused by the system".into())).collect(),
             ..Environment::default()
         });
@@ -247,8 +252,8 @@ mod tests {
         let mut analysis = Analysis::default();
         analysis.set_environment(&Environment {
             groups: vec![
-                GroupInfo { name: "haptic".into(), rate_hz: 1000.0 },
-                GroupInfo { name: "global".into(), rate_hz: 30.0 },
+                GroupInfo { name: "haptic".into(), rate_hz: 1000.0, background: false },
+                GroupInfo { name: "global".into(), rate_hz: 30.0, background: false },
             ],
             granted: (0..30).map(|i| (format!("grant_{i}"), "refused".into())).collect(),
             ..Environment::default()

@@ -34,7 +34,7 @@ pub use crate::devices::ToolPath;
 pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
 pub use device::{DeviceKind, DeviceSpec, SafetySpec};
-pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec};
+pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction};
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,5 +1,7 @@
 //! The global and the local model's part of a scene: rates, sizes, feedback, blending.
 
+pub use crate::model::local::Prediction;
+
 /// The slow, detailed simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
@@ -10,11 +12,13 @@ pub struct GlobalSpec {
     pub substeps_per_ms: Option<u32>,
     /// Virtual time: how long after its release a result becomes visible (ms).
     pub compute_latency_ms: f64,
+    /// Virtual time: the same for the reduced surroundings of a patch (ms).
+    pub basis_latency_ms: f64,
 }
 
 impl Default for GlobalSpec {
     fn default() -> Self {
-        Self { rate_hz: 30.0, substeps_per_ms: None, compute_latency_ms: 0.0 }
+        Self { rate_hz: 30.0, substeps_per_ms: None, compute_latency_ms: 0.0, basis_latency_ms: 0.0 }
     }
 }
 
@@ -28,6 +32,10 @@ pub struct LocalSpec {
     pub model: LocalModelKind,
     /// Patch window: nodes along the surface, along it, into depth.
     pub patch: [usize; 3],
+    /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted.
+    pub basis: usize,
+    /// How `predictive` looks ahead.
+    pub prediction: Prediction,
     /// What the global model learns from the local one.
     pub feedback: Option<Feedback>,
     /// How a resync's discontinuity is spread.
@@ -40,6 +48,8 @@ impl Default for LocalSpec {
             rate_hz: 1000.0,
             model: LocalModelKind::default(),
             patch: [4, 4, 2],
+            basis: 50,
+            prediction: Prediction::default(),
             feedback: None,
             blend: BlendSpec::default(),
         }

@@ -18,6 +18,8 @@ const MIN_TRIANGLE_M2: f64 = 1e-14;
 const MAX_SUBSTEPS_PER_MS: u32 = 10_000;
 /// A dense tangent of 38 MB, far above what a haptic tick can multiply with.
 const MAX_PATCH_NODES: usize = 512;
+/// Far above what the ring of a patch can answer with.
+const MAX_BASIS: usize = 500;
 /// Longer than any global model is worth waiting for (ms).
 const MAX_LATENCY_MS: f64 = 60_000.0;
 /// Eleven days.
@@ -149,10 +151,13 @@ fn global(global: &GlobalSpec) -> Result<(), Error> {
         );
         return Err(Error::scene("global.substeps_per_ms", message));
     }
-    not_negative("global.compute_latency_ms", global.compute_latency_ms)?;
-    if global.compute_latency_ms > MAX_LATENCY_MS {
-        let message = format!("is {}, must be at most {MAX_LATENCY_MS} ms", global.compute_latency_ms);
-        return Err(Error::scene("global.compute_latency_ms", message));
+    let latencies =
+        [("global.compute_latency_ms", global.compute_latency_ms), ("global.basis_latency_ms", global.basis_latency_ms)];
+    for (field, latency_ms) in latencies {
+        not_negative(field, latency_ms)?;
+        if latency_ms > MAX_LATENCY_MS {
+            return Err(Error::scene(field, format!("is {latency_ms}, must be at most {MAX_LATENCY_MS} ms")));
+        }
     }
     Ok(())
 }
@@ -169,6 +174,10 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
         let message =
             format!("\"geometry\" needs model = \"patch\" and the model is {:?}, leave it out", local.model.name());
         return Err(Error::scene("local.feedback", message));
+    }
+    if local.basis > MAX_BASIS {
+        let message = format!("is {}, must be at most {MAX_BASIS}: more cost time and add nothing", local.basis);
+        return Err(Error::scene("local.basis", message));
     }
     not_negative("local.blend.ms", local.blend.ms)?;
     if local.blend.kind == BlendKind::Crossfade && local.blend.ms == 0.0 {

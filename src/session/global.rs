@@ -1,17 +1,20 @@
 //! Makes the global actor: once at the start, and again after a fault, from its last good state.
 
-use crate::actors::{Checkpoint, GlobalActor, GlobalPorts, SurfaceView, ToolTick};
+use crate::actors::{
+    Checkpoint, GlobalActor, GlobalPlan, GlobalPorts, SurfaceView, SurroundingsPorts, ToolTick, Wishes,
+};
 use crate::error::{Error, ErrorKind};
-use crate::model::local::{LocalModel, PatchGeometry, Template};
+use crate::model::local::{LocalModel, PatchGeometry};
 use crate::model::simulation::Simulation;
+use crate::model::surroundings::Bases;
 use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RecorderPort};
-use crate::time::Rate;
 
 /// The ports whose global halves a new actor takes again.
 pub(super) struct GlobalSide {
     pub(super) ticks: QueuePort<ToolTick>,
     pub(super) geometry: Option<ExchangePort<PatchGeometry>>,
     pub(super) models: ExchangePort<Box<dyn LocalModel>>,
+    pub(super) surroundings: Option<(ExchangePort<Wishes>, ExchangePort<Bases>)>,
     pub(super) surface: OutletPort<SurfaceView>,
     pub(super) checkpoint: OutletPort<Checkpoint>,
     pub(super) recorder: RecorderPort,
@@ -23,6 +26,10 @@ impl GlobalSide {
             ticks: self.ticks.reader(),
             geometry: self.geometry.as_ref().map(ExchangePort::reader),
             models: self.models.writer(),
+            surroundings: self.surroundings.as_ref().map(|(wishes, bases)| SurroundingsPorts {
+                wishes: wishes.writer(),
+                bases: bases.reader(),
+            }),
             surface: self.surface.writer(),
             checkpoint: self.checkpoint.writer(),
             recorder: self.recorder.recorder(),
@@ -39,18 +46,16 @@ pub(super) struct GlobalMaker {
     /// The last state that was good; the start if there was none.
     last: Checkpoint,
     saved: OutletReader<Checkpoint>,
-    haptic: Rate,
-    horizon: u32,
-    template: Template,
+    plan: GlobalPlan,
     side: GlobalSide,
 }
 
 impl GlobalMaker {
-    pub(super) fn new(simulation: Simulation, tool: ToolTick, haptic: Rate, horizon: u32, template: Template, side: GlobalSide) -> Self {
+    pub(super) fn new(simulation: Simulation, tool: ToolTick, plan: GlobalPlan, side: GlobalSide) -> Self {
         let spare = simulation.duplicate();
         let last = Checkpoint { tool, state: simulation.state().clone(), contact: *simulation.contact() };
         let saved = side.checkpoint.reader();
-        Self { first: Some(simulation), spare, last, saved, haptic, horizon, template, side }
+        Self { first: Some(simulation), spare, last, saved, plan, side }
     }
 
     pub(super) fn can_restart(&self) -> bool {
@@ -71,7 +76,7 @@ impl GlobalMaker {
             Some(first) => first,
             None => self.restored()?,
         };
-        Ok(vec![Box::new(GlobalActor::new(simulation, self.last.tool, self.haptic, self.horizon, self.template.springs.clone(), self.template.patch, ports)?)])
+        Ok(vec![Box::new(GlobalActor::new(simulation, self.last.tool, self.plan.clone(), ports)?)])
     }
 
     fn restored(&self) -> Result<Simulation, Error> {

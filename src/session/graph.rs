@@ -1,5 +1,6 @@
 //! Wires actors and ports into a runtime and starts it.
 
+use super::basis::{self, BasisSide};
 use super::global::{GlobalMaker, GlobalSide};
 use super::prepare::Prepared;
 #[cfg(all(feature = "log", feature = "scene"))]
@@ -7,7 +8,7 @@ use super::replay::{Comparer, Reexecuted};
 use super::running::{Running, Viewer};
 use super::sink::{Memory, Sinks};
 use crate::actors::{
-    Checkpoint, DeviceActor, DeviceSample, ForceCommand, LocalActor, LocalPorts, LoggerActor, LoggerOutcome,
+    Checkpoint, DeviceActor, DeviceSample, ForceCommand, GlobalPlan, LocalActor, LocalPorts, LoggerActor, LoggerOutcome,
     ModelSource, SurfaceView, ToolTick, ToolView, first_state,
 };
 use crate::devices::DeviceState;
@@ -33,7 +34,8 @@ const MIN_TICKS_BUFFERED: usize = 64;
 /// The rate groups of a session, in graph order.
 pub(super) fn groups(prepared: &Prepared) -> Vec<RateGroup> {
     let global = (prepared.template.kind != Kind::Full).then(|| prepared.global.clone());
-    [prepared.local.clone()].into_iter().chain(global).chain([logger_group()]).collect()
+    let basis = prepared.reduces().then(|| basis::group(prepared));
+    [prepared.local.clone()].into_iter().chain(basis).chain(global).chain([logger_group()]).collect()
 }
 
 fn logger_group() -> RateGroup {
@@ -67,6 +69,9 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let (sample_writer, samples) = graph.exchange(DeviceSample::default);
     let (command_writer, commands) = graph.exchange(ForceCommand::default);
 
+    let bases = BasisSide::new(&mut graph, &prepared, first.position)?;
+    let reducing = bases.as_ref().map(|bases| (basis::group(&prepared), bases.actor()));
+
     let probes = prepared.probes;
     let watching = |mut model: Box<dyn LocalModel>, probes: &[u32]| {
         model.watch(probes);
@@ -79,6 +84,10 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
             (ModelSource::Alone(surface_port.writer()), [full, spare(), spare()], None)
         }
         Some(_) => {
+            let (surroundings, known) = match bases {
+                Some(BasisSide { wishes, bases, known, .. }) => (Some((wishes, bases)), known),
+                None => Default::default(),
+            };
             let (template, watched) = (prepared.template.clone(), probes.clone());
             let model = move || watching(template.empty().unwrap_or_else(spare), &watched);
             let rotating = [model(), model(), model()];
@@ -88,6 +97,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
                     .geometry_feedback
                     .then(|| graph.exchange_port(move || PatchGeometry::with_room(nodes))),
                 models: graph.exchange_port(model),
+                surroundings,
                 surface: surface_port,
                 checkpoint: graph.outlet_port(Checkpoint::default),
                 recorder: graph.recorder_port(ticks_buffered),
@@ -98,7 +108,15 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
                 geometry: ports.geometry.as_ref().map(ExchangePort::writer),
             };
             let tool = ToolTick { tick: 0, position: first.position };
-            (source, rotating, Some(GlobalMaker::new(prepared.simulation, tool, prepared.haptic, (3.2 * prepared.haptic.as_hz() / prepared.global_rate.as_hz()) as u32, prepared.template.clone(), ports)))
+            let plan = GlobalPlan {
+                haptic: prepared.haptic,
+                global: prepared.global_rate,
+                horizon: prepared.horizon,
+                patch: prepared.template.patch,
+                bases: known,
+                prefetches: prepared.execution == Execution::Threaded,
+            };
+            (source, rotating, Some(GlobalMaker::new(prepared.simulation, tool, plan, ports)))
         }
     };
     let device = DeviceActor::new(
@@ -131,6 +149,9 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     #[cfg(not(all(feature = "log", feature = "scene")))]
     let logger = logger(drain);
     graph.group(prepared.local, vec![Box::new(device), Box::new(local)]);
+    if let Some((group, actor)) = reducing {
+        graph.group(group, vec![actor]);
+    }
     if let Some(mut maker) = global {
         if maker.can_restart() {
             graph.restartable(prepared.global, Restart::default(), move || maker.make());
@@ -148,9 +169,16 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
 }
 
 fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, Error> {
-    let group = |name: &str, rate: Rate| GroupInfo { name: name.to_owned(), rate_hz: rate.as_hz() };
+    let group = |name: &str, rate: Rate| GroupInfo {
+        name: name.to_owned(),
+        rate_hz: rate.as_hz(),
+        background: name == basis::GROUP,
+    };
     let is_multi_rate = prepared.template.kind != Kind::Full;
     let mut groups = vec![group("local", prepared.haptic)];
+    if prepared.reduces() {
+        groups.push(group(basis::GROUP, prepared.global_rate));
+    }
     if is_multi_rate {
         groups.push(group("global", prepared.global_rate));
     }

@@ -12,6 +12,7 @@
 //! # }
 //! ```
 
+mod basis;
 mod budget;
 mod builder;
 mod global;

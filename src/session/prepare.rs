@@ -65,6 +65,12 @@ impl Parts {
 pub(super) struct Prepared {
     pub simulation: Simulation,
     pub template: Template,
+    /// States of reduced surroundings.
+    pub basis_states: usize,
+    /// Virtual time: how long after its release a basis becomes visible.
+    pub basis_latency: Nanos,
+    /// Haptic ticks that a local model may have to reach ahead.
+    pub horizon: u32,
     pub geometry_feedback: bool,
     pub blend_ticks: u32,
     pub device: Box<dyn Device>,
@@ -87,6 +93,13 @@ pub(super) struct Prepared {
     /// The recording that is executed again in place of a run of its own.
     #[cfg(all(feature = "log", feature = "scene"))]
     pub reexecuted: Option<super::replay::Reexecuted>,
+}
+
+impl Prepared {
+    /// True if the local models use reduced surroundings.
+    pub(super) fn reduces(&self) -> bool {
+        self.template.kind == Kind::Predictive && self.basis_states > 0
+    }
 }
 
 /// How often the whole body's forces are evaluated: `substeps` times per haptic tick.
@@ -191,7 +204,10 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         Execution::Threaded => budget::declare(&mut *body, &state, Timing { haptic, substeps }, kind, [local, global])?,
     };
     let prepared = Prepared {
-        template: Template::new(kind, scene.local.patch, &*body)?,
+        template: Template::new(kind, scene.local.patch, scene.local.prediction, &*body)?,
+        basis_states: scene.local.basis,
+        basis_latency: Nanos::from_secs_f64(scene.global.basis_latency_ms * 1e-3),
+        horizon: horizon(haptic, global_rate, scene.global.compute_latency_ms, blend_ticks),
         simulation: Simulation::new(body, state, contact, law, Stepping { tick, substeps })?,
         geometry_feedback: feedback == Feedback::Geometry && kind == Kind::Patch,
         blend_ticks,
@@ -231,6 +247,16 @@ pub(super) fn as_run(scene: &Scene, named: Option<(Option<u32>, &[u32])>) -> Sce
     }
     scene
 }
+
+/// Haptic ticks from the state that a local model is built from to the end of its service: its own lateness, one period
+/// until the next, another if that one is lost, and the time to catch up and to blend.
+fn horizon(haptic: Rate, global: Rate, latency_ms: f64, blend_ticks: u32) -> u32 {
+    let periods = PERIODS_AHEAD + (1e-3 * latency_ms / global.period_s()).ceil();
+    (periods * haptic.as_hz() / global.as_hz()).ceil() as u32 + blend_ticks
+}
+
+/// One period of service, and what catching up takes.
+const PERIODS_AHEAD: f64 = 1.25;
 
 fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
     Rate::from_hz(hz).ok_or_else(|| Error::scene(field, format!("is {hz}, which is no rate")))

@@ -1,7 +1,7 @@
 //! A small run for the log tests: every kind of record, at the rates of a real one.
 
 use palpate::log::{
-    CommandSample, ContactMode, ContactSample, Environment, Execution, ForceSample, GlobalTick, GroupInfo, GroupStats,
+    CommandSample, ContactMode, ContactSample, Environment, Execution, ForceSample, GlobalTick, GroupInfo, GroupStats, ServedBy,
     Level, LogEntry, LogRecord, McapWriter, Percentiles, ProbeSample, Resync, TextEvent, ToolSample,
 };
 use palpate::runtime::record::{Event, SlipCause, TickTiming};
@@ -18,8 +18,8 @@ pub fn environment() -> Environment {
         haptic_hz: 1000.0,
         global_hz: 30.0,
         groups: vec![
-            GroupInfo { name: "haptic".into(), rate_hz: 1000.0 },
-            GroupInfo { name: "global".into(), rate_hz: 30.0 },
+            GroupInfo { name: "haptic".into(), rate_hz: 1000.0, background: false },
+            GroupInfo { name: "global".into(), rate_hz: 30.0, background: false },
         ],
         limit_stages: vec!["finite".into(), "clamp".into(), "slew".into()],
         granted: [("policy", "SCHED_OTHER"), ("mlock", "refused")]
@@ -62,6 +62,7 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
                     time,
                     force_n,
                     model_version: n as u32 / 33,
+                    served_by: ServedBy::Patch,
                     model_age_s: (n % 33) as f64 * 1e-3,
                     energy_j: -phase,
                 }),

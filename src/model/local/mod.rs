@@ -1,5 +1,6 @@
 //! Local models: what runs at the haptic rate between two results of the global model. One file per model.
 
+mod aim;
 mod full;
 mod hold;
 mod near;
@@ -19,6 +20,7 @@ use super::simulation::Simulation;
 use super::surroundings::{Bases, SpringGraph};
 use crate::error::Error;
 
+pub use aim::Aim;
 pub use full::Full;
 pub use hold::Hold;
 pub use patch::Patch;
@@ -42,6 +44,7 @@ pub enum Kind {
 
 /// How `predictive` finds where its ring will go.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Prediction {
     /// By a reduced model of the surroundings, where that holds the present motion; else as [`Full`](Self::Full).
     #[default]
@@ -87,7 +90,7 @@ impl Template {
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(kind: Kind, patch: [usize; 3], body: &dyn Body) -> Result<Self, Error> {
+    pub fn new(kind: Kind, patch: [usize; 3], prediction: Prediction, body: &dyn Body) -> Result<Self, Error> {
         let springs = match kind {
             Kind::Predictive | Kind::Predicted => {
                 let springs = SpringGraph::new(body).ok_or_else(|| {
@@ -98,7 +101,7 @@ impl Template {
             }
             _ => None,
         };
-        Ok(Self { kind, patch, prediction: Prediction::default(), springs })
+        Ok(Self { kind, patch, prediction, springs })
     }
 
     /// An empty model, to be rebuilt in place; `None` for [`Full`], which is the simulation itself.
@@ -133,6 +136,24 @@ pub struct ResyncView<'a> {
     pub horizon: u32,
     /// Reduced surroundings that are there.
     pub bases: &'a Bases,
+}
+
+impl<'a> ResyncView<'a> {
+    /// Of a tool that rests at `tool` (m), over `triangles`, for a model that looks `horizon` ticks ahead.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn at_rest(
+        global: &'a mut Simulation,
+        tick: u64,
+        tool: Vec3,
+        triangles: &'a [u32],
+        horizon: u32,
+        bases: &'a Bases,
+    ) -> Self {
+        let tool = ToolForecast { position: tool, velocity: Vec3::zeros() };
+        Self { global, tick, triangles, tool, horizon, bases }
+    }
 }
 
 /// What a patch found, for a global model that takes the local one's geometry.

@@ -21,6 +21,7 @@ fn fields(record: &LogRecord) -> Vec<(&'static str, u64)> {
         LogRecord::Force(r) => {
             add("force_n", &r.force_n.map(f64::to_bits));
             add("model_version", &[r.model_version.into()]);
+            add("served_by", &[r.served_by as u64]);
             add("model_age_s", &[r.model_age_s.to_bits()]);
             add("energy_j", &[r.energy_j.to_bits()]);
         }

@@ -1,0 +1,70 @@
+//! Which part of the surface the next local models have to hold.
+
+use super::super::Vec3;
+use super::super::forecast::ToolForecast;
+use super::super::geometry::NearestTriangle;
+use super::super::mesh::Surface;
+use crate::error::Error;
+
+/// A window holds what the tool is expected over for this long: two periods of 30 Hz and the time to catch up (s).
+const LEAD: f64 = 75e-3;
+/// Places on that way that are looked at, besides the present one.
+const LOOKS: u32 = 3;
+
+/// Finds the surface triangles under the tool, now and where it is going.
+#[derive(Clone, Debug)]
+pub struct Aim {
+    nearest: NearestTriangle,
+}
+
+impl Aim {
+    /// Over `surface` with nodes at `positions`.
+    ///
+    /// # Errors
+    /// If the surface has no triangles.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn new(surface: &Surface, positions: &[Vec3]) -> Result<Self, Error> {
+        Ok(Self { nearest: NearestTriangle::new(surface, positions)? })
+    }
+
+    /// Moves the surface to `positions`.
+    ///
+    /// # Real-time
+    /// For the global actor: bounded, allocates nothing.
+    pub fn refit(&mut self, positions: &[Vec3]) {
+        self.nearest.refit(positions);
+    }
+
+    /// Puts the triangles for a window that is made `after` seconds from now in place of `triangles`: the one under the
+    /// tool then, and those that it comes over. `contact` is the triangle that it touches at the time.
+    ///
+    /// # Real-time
+    /// For the global actor: bounded; `triangles` may grow.
+    pub fn triangles(&self, contact: Option<u32>, tool: &ToolForecast, after: f64, triangles: &mut Vec<u32>) {
+        triangles.clear();
+        triangles.push(contact.unwrap_or_else(|| self.nearest.find(&tool.unbraked(after))));
+        for look in 1..=LOOKS {
+            let ahead = after + LEAD * f64::from(look) / f64::from(LOOKS);
+            triangles.push(self.nearest.find(&tool.unbraked(ahead)));
+        }
+    }
+
+    /// Puts the triangles around the one nearest to `point` in place of `triangles`: it first, then those that share a
+    /// node with it.
+    ///
+    /// # Real-time
+    /// For the global actor: bounded; `triangles` may grow.
+    pub fn around(&self, surface: &Surface, point: &Vec3, triangles: &mut Vec<u32>) {
+        triangles.clear();
+        triangles.push(self.nearest.find(point));
+        for node in surface.triangles[triangles[0] as usize] {
+            for &triangle in surface.at_node(node) {
+                if !triangles.contains(&triangle) {
+                    triangles.push(triangle);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! The background group that reduces surroundings, and what has to be there before a run begins.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::prepare::Prepared;
+use crate::actors::{BasisActor, BasisPorts, Wishes};
+use crate::error::Error;
+use crate::model::Vec3;
+use crate::model::forecast::ToolForecast;
+use crate::model::local::Aim;
+use crate::model::surroundings::{Bases, Basis, SpringGraph};
+use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, RuntimeBuilder};
+
+/// The name of the group.
+pub(super) const GROUP: &str = "basis";
+/// Before a run on threads, surroundings are reduced for this long, from the tool's place outwards.
+const READY: Duration = Duration::from_secs(5);
+
+/// The basis actor's side of a session.
+pub(super) struct BasisSide {
+    pub(super) wishes: ExchangePort<Wishes>,
+    pub(super) bases: ExchangePort<Bases>,
+    /// Those that are there before the start.
+    pub(super) known: Bases,
+    springs: Arc<SpringGraph>,
+    states: usize,
+    most: usize,
+}
+
+impl BasisSide {
+    /// Its ports, and the bases around `tool` (m).
+    ///
+    /// # Errors
+    /// If the surface cannot be searched.
+    pub(super) fn new(graph: &mut RuntimeBuilder, prepared: &Prepared, tool: Vec3) -> Result<Option<Self>, Error> {
+        let Some(springs) = prepared.template.springs.clone().filter(|_| prepared.reduces()) else {
+            return Ok(None);
+        };
+        let (prefetches, most) = match prepared.execution {
+            Execution::Virtual => (Duration::ZERO, usize::MAX),
+            Execution::Threaded => (READY, 1),
+        };
+        Ok(Some(Self {
+            wishes: graph.exchange_port(Wishes::default),
+            bases: graph.exchange_port(Bases::default),
+            known: first_bases(prepared, &springs, tool, prefetches)?,
+            states: prepared.basis_states,
+            springs,
+            most,
+        }))
+    }
+
+    pub(super) fn actor(&self) -> Box<dyn Actor> {
+        let ports = BasisPorts { wishes: self.wishes.reader(), bases: self.bases.writer() };
+        Box::new(BasisActor::new(Arc::clone(&self.springs), self.states, self.known.clone(), self.most, ports))
+    }
+}
+
+/// The rate group: it looks for wishes as often as the global model makes them.
+pub(super) fn group(prepared: &Prepared) -> RateGroup {
+    RateGroup::new(prepared.global_rate).name(GROUP).latency(prepared.basis_latency)
+}
+
+/// The basis where the tool is, and those around for as long as `span` allows.
+fn first_bases(prepared: &Prepared, springs: &SpringGraph, tool: Vec3, span: Duration) -> Result<Bases, Error> {
+    let start = Instant::now();
+    let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
+    let aim = Aim::new(body.surface(), &state.positions)?;
+    let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
+    let at_rest = ToolForecast { position: tool, velocity: Vec3::zeros() };
+    aim.triangles(prepared.simulation.contact().triangle, &at_rest, 0.0, &mut triangles);
+    let here = triangles.clone();
+    aim.around(body.surface(), &tool, &mut triangles);
+    for window in std::iter::once(here.as_slice()).chain(triangles.iter().map(std::slice::from_ref)) {
+        body.patch(window, prepared.template.patch, &mut patch);
+        // What cannot be reduced is told by the actor, when it is wanted.
+        if bases.get(&patch).is_none()
+            && let Ok(Some(basis)) = Basis::compute(springs, &patch, prepared.basis_states)
+        {
+            bases.insert(Arc::new(basis));
+        }
+        if start.elapsed() >= span {
+            break;
+        }
+    }
+    Ok(bases)
+}
