@@ -82,6 +82,19 @@ fn network(block: &Block) -> SpringNetwork {
     builder.springs(edges(block)).build().expect("a valid network")
 }
 
+/// The same network, and a state of it, with its nodes in no order.
+fn shuffled(block: &Block, state: &State) -> (SpringNetwork, State) {
+    let mut order: Vec<usize> = (0..block.rest().len()).collect();
+    order.sort_by_key(|&n| (n as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut place = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(new, &old)| place[old] = new as u32);
+    let pick = |vectors: &[Vec3]| order.iter().map(|&old| vectors[old]).collect::<Vec<_>>();
+    let springs = edges(block).into_iter().map(|(i, j, spring)| (place[i as usize], place[j as usize], spring));
+    let builder = SpringNetwork::builder(pick(block.rest())).masses(vec![0.5e-3; order.len()]).springs(springs);
+    let state = State { positions: pick(&state.positions), velocities: pick(&state.velocities) };
+    (builder.build().expect("a valid network"), state)
+}
+
 fn per_spring(nodes: usize) {
     let (whole, state) = (block(nodes), deformed(block(nodes).rest()));
     let (springs, net) = (whole.spring_count(), network(&whole));
@@ -94,6 +107,8 @@ fn per_spring(nodes: usize) {
         let net = net.clone().with_instruction_set(set).expect("it is available");
         contestants.push((format!("network, {}", set.name()), forces(net, &state)));
     }
+    let (mixed, mixed_state) = shuffled(&whole, &state);
+    contestants.push(("network, shuffled nodes".into(), forces(mixed, &mixed_state)));
     let times = least(&mut contestants, 40, 10);
     for ((name, _), time) in contestants.iter().zip(&times) {
         let share = times[0] / time;
@@ -111,7 +126,7 @@ fn two_cores(nodes: usize) {
         ("network".into(), forces(net.clone(), &state)),
         ("network".into(), forces(net.on_cores(2).expect("threads"), &state)),
     ];
-    let times = least(&mut contestants, 60, 10);
+    let times = least(&mut contestants, 400, 1);
     for pair in 0..2 {
         let (name, one, two) = (&contestants[2 * pair].0, times[2 * pair], times[2 * pair + 1]);
         println!("| {nodes}^3 | {name} | {:.1} | {:.1} | {:.2} |", one * 1e6, two * 1e6, one / two);
@@ -134,7 +149,9 @@ fn full_tick() -> f64 {
         black_box(sim.tick(ToolMotion { from: path(k), to: path(k + 1) }));
         start.elapsed().as_secs_f64()
     };
-    (0..200).for_each(|k| drop(tick(k, &mut sim)));
+    (0..200).for_each(|k| {
+        tick(k, &mut sim);
+    });
     let mut times: Vec<f64> = (200..5200).map(|k| tick(k, &mut sim)).collect();
     assert!(sim.contact().is_touching(), "the ticks measured have a contact in them");
     times.sort_by(f64::total_cmp);

@@ -3,6 +3,10 @@
 #[cfg(feature = "parallel")]
 use crate::error::Error;
 
+/// Looks at whether the helpers are done before the calling thread sleeps: some 100 us.
+#[cfg(feature = "parallel")]
+const SPINS: u32 = 4096;
+
 /// The threads that help; without any, one part follows the other.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cores {
@@ -36,10 +40,21 @@ impl Cores {
             let first = parts.next();
             let work = &work;
             helpers.in_place_scope(|scope| {
+                let busy = std::sync::Arc::new(());
                 for part in parts {
-                    scope.spawn(move |_| work(part));
+                    let busy = busy.clone();
+                    scope.spawn(move |_| {
+                        work(part);
+                        drop(busy);
+                    });
                 }
                 first.into_iter().for_each(work);
+                // Parts take about as long, so the others end soon. To sleep until then would cost the wake-up.
+                let mut left = SPINS;
+                while left > 0 && std::sync::Arc::strong_count(&busy) > 1 {
+                    std::hint::spin_loop();
+                    left -= 1;
+                }
             });
             return;
         }

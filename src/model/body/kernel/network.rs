@@ -24,6 +24,8 @@ const WINDOW: usize = 512;
 pub(in super::super) struct NetworkKernel {
     /// The caller's numbers of the nodes, in the order of the kernel.
     order: Vec<u32>,
+    /// The kernel's numbers of the nodes, in the caller's order.
+    place: Vec<u32>,
     parts: Vec<NetworkPart>,
     set: InstructionSet,
     cores: Cores,
@@ -32,7 +34,12 @@ pub(in super::super) struct NetworkKernel {
 impl NetworkKernel {
     pub(in super::super) fn new(nodes: usize, springs: &[(u32, u32, Spring)]) -> Self {
         let order = near_first(nodes, springs);
-        let mut new = Self { order, parts: Vec::new(), set: InstructionSet::detect(), cores: Cores::default() };
+        let mut place = vec![0; nodes];
+        for (new, &old) in order.iter().enumerate() {
+            place[old as usize] = new as u32;
+        }
+        let (parts, set, cores) = (Vec::new(), InstructionSet::detect(), Cores::default());
+        let mut new = Self { order, place, parts, set, cores };
         new.divide(springs, 1);
         new
     }
@@ -50,10 +57,7 @@ impl NetworkKernel {
 
     /// Contiguous ranges of nodes with about as many springs each; a spring belongs to its lower node.
     fn divide(&mut self, springs: &[(u32, u32, Spring)], parts: usize) {
-        let mut place = vec![0; self.order.len()];
-        for (new, &old) in self.order.iter().enumerate() {
-            place[old as usize] = new as u32;
-        }
+        let place = &self.place;
         let mut sorted: Vec<(u32, u32, Spring)> = springs
             .iter()
             .map(|&(i, j, spring)| {
@@ -79,21 +83,17 @@ impl NetworkKernel {
 
     /// Writes the spring force on every node to `out`.
     pub(in super::super) fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], out: &mut [Vec3]) {
-        let Self { order, parts, set, cores } = self;
+        let Self { order, place, parts, set, cores } = self;
         let order = &order[..];
         cores.each(parts.iter_mut(), |part| part.evaluate(*set, order, positions, velocities));
-        // Own forces first, then those of other parts on the same nodes, part by part.
-        for part in &*parts {
-            for (&old, force) in order[part.own.clone()].iter().zip(&part.forces) {
-                out[old as usize] = Vec3::new(force.0[0], force.0[1], force.0[2]);
+        // Several parts may have a force on a node; it is summed in their order.
+        let (parts, length) = (&parts[..], out.len().div_ceil(parts.len()).max(1));
+        cores.each(out.chunks_mut(length).zip(place.chunks(length)), |(out, place)| {
+            for (force, &new) in out.iter_mut().zip(place) {
+                let touching = parts.iter().take_while(|part| part.own.start <= new as usize);
+                *force = touching.fold(Vec3::zeros(), |sum, part| sum + part.force(new as usize));
             }
-        }
-        for part in parts {
-            let own = part.own.len();
-            for (&old, force) in order[part.own.end..part.end].iter().zip(&part.forces[own..]) {
-                out[old as usize] += Vec3::new(force.0[0], force.0[1], force.0[2]);
-            }
-        }
+        });
     }
 }
 
@@ -140,6 +140,16 @@ impl NetworkPart {
         }
         self.forces.fill(Push::default());
         set.run(Evaluation { batches: &self.batches, nodes: &self.nodes, forces: &mut self.forces });
+    }
+
+    /// What its springs do to node `new`, which may be beyond the nodes that they touch.
+    #[inline]
+    fn force(&self, new: usize) -> Vec3 {
+        if new >= self.end {
+            return Vec3::zeros();
+        }
+        let [x, y, z, _] = self.forces[new - self.own.start].0;
+        Vec3::new(x, y, z)
     }
 }
 
