@@ -154,10 +154,10 @@ proptest! {
 }
 
 #[test]
-fn what_is_not_a_number_stays_none() {
+fn what_is_not_a_number_stays_none_and_leaves_nothing_behind() {
     let block = Block::builder([3, 4, 5], [0.1; 3]).build().unwrap();
     let mut state = State::at_rest(block.rest());
-    state.positions[17].y = f64::NAN;
+    state.positions.iter_mut().skip(17).for_each(|x| x.y = f64::NAN);
     for set in sets() {
         let mut bodies: [Box<dyn Body>; 2] = [
             Box::new(block.clone().with_instruction_set(set).unwrap()),

@@ -137,8 +137,8 @@ impl Block {
     }
 
     /// Computes its forces on `cores` cores: the calling thread and threads of its own, which copies share. Worth it
-    /// from some 5,000 nodes on. Forces are bit-identical from run to run for one number of cores, and its evaluations
-    /// are then no longer real-time safe: they allocate and may block.
+    /// from some 1,000 nodes on if the other cores are free. Forces are bit-identical from run to run for one number of
+    /// cores. With more than one, evaluations are no longer real-time safe: they allocate and may block.
     ///
     /// # Errors
     /// If `cores` is 0 or the system refuses a thread.

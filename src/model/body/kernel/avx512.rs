@@ -214,12 +214,12 @@ impl Simd for Avx512 {
                     _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b10_00_10_00>(high, high)),
                     _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b11_01_11_01>(high, high)),
                 ];
-                for n in 0..4 {
+                for (n, &quad) in quads.iter().enumerate() {
                     let lane = 2 * n + odd;
                     let own = &mut forces[from[lane] as usize].0;
-                    _mm256_storeu_pd(own.as_mut_ptr(), _mm256_add_pd(_mm256_loadu_pd(own.as_ptr()), quads[n]));
+                    _mm256_storeu_pd(own.as_mut_ptr(), _mm256_add_pd(_mm256_loadu_pd(own.as_ptr()), quad));
                     let other = &mut forces[to[lane] as usize].0;
-                    _mm256_storeu_pd(other.as_mut_ptr(), _mm256_sub_pd(_mm256_loadu_pd(other.as_ptr()), quads[n]));
+                    _mm256_storeu_pd(other.as_mut_ptr(), _mm256_sub_pd(_mm256_loadu_pd(other.as_ptr()), quad));
                 }
             }
         }

@@ -17,10 +17,18 @@ const LINE: usize = 8;
 const PAGE: usize = 512;
 
 /// Nine coordinate arrays of the same length in one piece of memory: positions, velocities, forces.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Arrays {
     memory: Vec<f64>,
     stride: usize,
+}
+
+impl Clone for Arrays {
+    /// The same room with zeros in it: at another address the arrays begin elsewhere, and what was a NaN in a node would
+    /// stand beyond the last one, where nobody overwrites it.
+    fn clone(&self) -> Self {
+        Self { memory: vec![0.0; self.memory.len()], stride: self.stride }
+    }
 }
 
 impl Arrays {

@@ -83,9 +83,9 @@ impl Simd for Portable {
     #[inline(always)]
     fn exchange(self, pull: [Lane; 3], forces: &mut [Push], from: &Numbers, to: &Numbers) {
         for lane in 0..LANES {
-            for axis in 0..3 {
-                forces[from[lane] as usize].0[axis] += pull[axis][lane];
-                forces[to[lane] as usize].0[axis] -= pull[axis][lane];
+            for (axis, pull) in pull.iter().enumerate() {
+                forces[from[lane] as usize].0[axis] += pull[lane];
+                forces[to[lane] as usize].0[axis] -= pull[lane];
             }
         }
     }
