@@ -20,7 +20,7 @@ const SPEAK_FOR_ALL: &str = "
     Nanos Rate TickContext Record TickTiming Event PortUse PortUseKind SlipCause SlipCounts Snapshot
     LogRecord ContactMode Cause DeviceFault Actions Contact ToolMotion Crossfade Spring Stepping TangentBlock Face Lattice
     DeviceActor LocalActor GlobalActor LoggerActor LogSink Scripted Replayed
-    Block BlockBuilder RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";
+    Block BlockBuilder SpringNetwork SpringNetworkBuilder InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";
 
 /// The name of a public type, trait or function, or `Owner::name` of a public method; and whether its docs have the section,
 /// with a text.

@@ -1,4 +1,5 @@
-//! Physics and numerics: bodies, contact, local models. No threads, clocks, channels or logging.
+//! Physics and numerics: bodies, contact, local models. No threads (but those of a body's forces, with the feature
+//! `parallel`), clocks, channels or logging.
 //!
 //! The equations are those of the paper (Jacobs, Moore, Cavusoglu, IJRR 2010) with the corrections that DESIGN.md
 //! lists. One step of any model, whole body or patch, is [`contact::step`].

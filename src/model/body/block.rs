@@ -2,7 +2,7 @@
 
 use super::super::Vec3;
 use super::super::mesh::{Face, Lattice, Surface};
-use super::kernel::{self, Scratch};
+use super::kernel::{InstructionSet, LatticeKernel};
 use super::lattice_springs::LatticeSprings;
 use super::{Body, Link, State, TangentBlock};
 use crate::error::Error;
@@ -18,7 +18,7 @@ pub struct Block {
     inverse_masses: Vec<f64>,
     surface: Surface,
     springs: LatticeSprings,
-    scratch: Scratch,
+    kernel: LatticeKernel,
 }
 
 /// Collects what a [`Block`] is made of. Defaults: k 30 N/m, zeta 0.3, node mass 0.5 g, nothing held.
@@ -100,7 +100,7 @@ impl BlockBuilder {
                 .collect(),
             inverse_masses: (0..lattice.len()).map(|id| if held(id) { 0.0 } else { 1.0 / self.node_mass }).collect(),
             surface: Surface::new(lattice.len(), lattice.surface_triangles())?,
-            scratch: Scratch::new(springs.padded()),
+            kernel: LatticeKernel::new(&springs),
             springs,
         })
     }
@@ -124,7 +124,28 @@ impl Block {
 
     /// The instruction set that its forces are computed with on this machine.
     pub fn instruction_set() -> &'static str {
-        kernel::instruction_set()
+        InstructionSet::detect().name()
+    }
+
+    /// Computes its forces with `set`, to compare sets; the fastest one is chosen otherwise.
+    ///
+    /// # Errors
+    /// If this machine does not have it.
+    pub fn with_instruction_set(mut self, set: InstructionSet) -> Result<Self, Error> {
+        self.kernel.set_instruction_set(set.available()?);
+        Ok(self)
+    }
+
+    /// Computes its forces on `cores` cores: the calling thread and threads of its own, which copies share. Worth it
+    /// from some 1,000 nodes on if the other cores are free. Forces are bit-identical from run to run for one number of
+    /// cores. With more than one, evaluations are no longer real-time safe: they allocate and may block.
+    ///
+    /// # Errors
+    /// If `cores` is 0 or the system refuses a thread.
+    #[cfg(feature = "parallel")]
+    pub fn on_cores(mut self, cores: usize) -> Result<Self, Error> {
+        self.kernel.set_cores(&self.springs, cores)?;
+        Ok(self)
     }
 }
 
@@ -142,7 +163,7 @@ impl Body for Block {
     }
 
     fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
-        kernel::forces(&self.springs, &mut self.scratch, &state.positions, &state.velocities, forces);
+        self.kernel.forces(&self.springs, &state.positions, &state.velocities, forces);
     }
 
     fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {

@@ -1,11 +1,14 @@
-//! Deformable bodies: what a simulation needs to know of one, and the block of springs.
+//! Deformable bodies: what a simulation needs to know of one, the block of springs, and networks of any springs.
 
 mod block;
 mod kernel;
 mod lattice_springs;
+mod network;
 mod spring;
 
 pub use block::{Block, BlockBuilder};
+pub use kernel::InstructionSet;
+pub use network::{SpringNetwork, SpringNetworkBuilder};
 pub use spring::{Spring, SpringTangent};
 
 use super::mesh::Surface;

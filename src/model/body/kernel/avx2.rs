@@ -1,0 +1,181 @@
+//! AVX2 with fused multiply-add: eight doubles in two registers, exact root and division.
+//!
+//! A value of [`Avx2`] is made by [`Avx2::detect`] alone, so whoever has one may call the instructions: that is the reason
+//! why every block here is sound. Loads and stores go through references to whole arrays.
+
+use std::arch::x86_64::*;
+
+use super::nodes::{Motion, Push};
+use super::simd::{Lane, Numbers, Simd, Work};
+
+/// Proof that this machine has AVX2 and FMA.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Avx2(());
+
+/// Lanes 0 to 3, lanes 4 to 7.
+type Pair = [__m256d; 2];
+
+impl Avx2 {
+    #[inline]
+    pub(super) fn detect() -> Option<Self> {
+        let is_there = std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
+        is_there.then_some(Self(()))
+    }
+
+    #[inline]
+    pub(super) fn run(self, work: impl Work) {
+        // SAFETY: a value of this type exists only where the features were detected.
+        unsafe { compiled(self, work) }
+    }
+
+    /// Rows of four doubles to columns.
+    #[inline(always)]
+    fn transpose(self, [a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
+        // SAFETY: the features were detected.
+        unsafe {
+            let (ab, cd) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+            let (ba, dc) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+            [
+                _mm256_permute2f128_pd::<0x20>(ab, cd),
+                _mm256_permute2f128_pd::<0x20>(ba, dc),
+                _mm256_permute2f128_pd::<0x31>(ab, cd),
+                _mm256_permute2f128_pd::<0x31>(ba, dc),
+            ]
+        }
+    }
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn compiled(set: Avx2, work: impl Work) {
+    work.run(set);
+}
+
+impl Simd for Avx2 {
+    type V = Pair;
+    type M = Pair;
+
+    #[inline(always)]
+    fn splat(self, value: f64) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe { [_mm256_set1_pd(value); 2] }
+    }
+
+    #[inline(always)]
+    fn load(self, from: &Lane) -> Pair {
+        // SAFETY: the features were detected; the reference covers all that is read.
+        unsafe { [_mm256_loadu_pd(from.as_ptr()), _mm256_loadu_pd(from.as_ptr().add(4))] }
+    }
+
+    #[inline(always)]
+    fn store(self, value: Pair, to: &mut Lane) {
+        // SAFETY: the features were detected; the reference covers all that is written.
+        unsafe {
+            _mm256_storeu_pd(to.as_mut_ptr(), value[0]);
+            _mm256_storeu_pd(to.as_mut_ptr().add(4), value[1]);
+        }
+    }
+
+    #[inline(always)]
+    fn add(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe { [_mm256_add_pd(a[0], b[0]), _mm256_add_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn sub(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe { [_mm256_sub_pd(a[0], b[0]), _mm256_sub_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn mul(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: Pair, b: Pair, c: Pair) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe { [_mm256_fmadd_pd(a[0], b[0], c[0]), _mm256_fmadd_pd(a[1], b[1], c[1])] }
+    }
+
+    #[inline(always)]
+    fn mul_sub_from(self, a: Pair, b: Pair, c: Pair) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe { [_mm256_fnmadd_pd(a[0], b[0], c[0]), _mm256_fnmadd_pd(a[1], b[1], c[1])] }
+    }
+
+    #[inline(always)]
+    fn inverse_root(self, x: Pair) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe {
+            let one = _mm256_set1_pd(1.0);
+            [_mm256_div_pd(one, _mm256_sqrt_pd(x[0])), _mm256_div_pd(one, _mm256_sqrt_pd(x[1]))]
+        }
+    }
+
+    #[inline(always)]
+    fn keep(self, bits: Pair, x: Pair, limit: Pair, value: Pair) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe {
+            let is_long = [
+                _mm256_and_pd(bits[0], _mm256_cmp_pd::<_CMP_NLT_UQ>(x[0], limit[0])),
+                _mm256_and_pd(bits[1], _mm256_cmp_pd::<_CMP_NLT_UQ>(x[1], limit[1])),
+            ];
+            [_mm256_and_pd(is_long[0], value[0]), _mm256_and_pd(is_long[1], value[1])]
+        }
+    }
+
+    #[inline(always)]
+    fn mask(self, bits: u8) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe {
+            let all = _mm256_set1_epi64x(i64::from(bits));
+            let (low, high) = (_mm256_setr_epi64x(1, 2, 4, 8), _mm256_setr_epi64x(16, 32, 64, 128));
+            [
+                _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(all, low), low)),
+                _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(all, high), high)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Pair; 3]; 2] {
+        // SAFETY: the features were detected; a motion is eight doubles.
+        unsafe {
+            let mut differences = [[[_mm256_setzero_pd(); 2]; 3]; 2];
+            for half in 0..2 {
+                let mut rows = [[_mm256_setzero_pd(); 4]; 2];
+                for lane in 0..4 {
+                    let there = self.load(&nodes[to[4 * half + lane] as usize].0);
+                    let here = self.load(&nodes[from[4 * half + lane] as usize].0);
+                    rows[0][lane] = _mm256_sub_pd(there[0], here[0]);
+                    rows[1][lane] = _mm256_sub_pd(there[1], here[1]);
+                }
+                for kind in 0..2 {
+                    let [x, y, z, _] = self.transpose(rows[kind]);
+                    differences[kind][0][half] = x;
+                    differences[kind][1][half] = y;
+                    differences[kind][2][half] = z;
+                }
+            }
+            differences
+        }
+    }
+
+    #[inline(always)]
+    fn exchange(self, [x, y, z]: [Pair; 3], forces: &mut [Push], from: &Numbers, to: &Numbers) {
+        // SAFETY: the features were detected; a push is four doubles.
+        unsafe {
+            for half in 0..2 {
+                let rows = self.transpose([x[half], y[half], z[half], _mm256_setzero_pd()]);
+                for lane in 0..4 {
+                    let own = &mut forces[from[4 * half + lane] as usize].0;
+                    _mm256_storeu_pd(own.as_mut_ptr(), _mm256_add_pd(_mm256_loadu_pd(own.as_ptr()), rows[lane]));
+                    let other = &mut forces[to[4 * half + lane] as usize].0;
+                    _mm256_storeu_pd(other.as_mut_ptr(), _mm256_sub_pd(_mm256_loadu_pd(other.as_ptr()), rows[lane]));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! The spring kernels: eight springs at once, by explicit vector instructions that are chosen at run time.
+//!
+//! [`simd`] says what the kernels ask of an instruction set; `avx512`, `avx2` and `portable` answer it. [`lattice`] is the
+//! kernel of a block, [`network`] that of an arbitrary list of springs. Both divide their springs into parts, one for
+//! each core; a part has memory of its own, and what it adds to nodes of another is added at the end, in a fixed order:
+//! results are bit-identical from run to run, for one instruction set and number of cores.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod cores;
+mod lattice;
+mod network;
+mod nodes;
+mod numbering;
+mod portable;
+mod pull;
+mod simd;
+
+pub(super) use lattice::LatticeKernel;
+pub(super) use network::NetworkKernel;
+pub use simd::InstructionSet;
+pub(super) use simd::LANES;

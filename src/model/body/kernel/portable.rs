@@ -1,0 +1,92 @@
+//! The portable instruction set: plain arithmetic on arrays, which the compiler vectorises as far as it can.
+
+use super::nodes::{Motion, Push};
+use super::simd::{LANES, Lane, Numbers, Simd};
+
+/// Plain arithmetic: no fused multiply-add, which a processor may lack, and exact root and division.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Portable;
+
+impl Simd for Portable {
+    type V = Lane;
+    type M = [bool; LANES];
+
+    #[inline(always)]
+    fn splat(self, value: f64) -> Lane {
+        [value; LANES]
+    }
+
+    #[inline(always)]
+    fn load(self, from: &Lane) -> Lane {
+        *from
+    }
+
+    #[inline(always)]
+    fn store(self, value: Lane, to: &mut Lane) {
+        *to = value;
+    }
+
+    #[inline(always)]
+    fn add(self, a: Lane, b: Lane) -> Lane {
+        std::array::from_fn(|lane| a[lane] + b[lane])
+    }
+
+    #[inline(always)]
+    fn sub(self, a: Lane, b: Lane) -> Lane {
+        std::array::from_fn(|lane| a[lane] - b[lane])
+    }
+
+    #[inline(always)]
+    fn mul(self, a: Lane, b: Lane) -> Lane {
+        std::array::from_fn(|lane| a[lane] * b[lane])
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: Lane, b: Lane, c: Lane) -> Lane {
+        std::array::from_fn(|lane| a[lane] * b[lane] + c[lane])
+    }
+
+    #[inline(always)]
+    fn mul_sub_from(self, a: Lane, b: Lane, c: Lane) -> Lane {
+        std::array::from_fn(|lane| c[lane] - a[lane] * b[lane])
+    }
+
+    #[inline(always)]
+    fn inverse_root(self, x: Lane) -> Lane {
+        std::array::from_fn(|lane| 1.0 / x[lane].sqrt())
+    }
+
+    #[inline(always)]
+    fn keep(self, bits: [bool; LANES], x: Lane, limit: Lane, value: Lane) -> Lane {
+        // A NaN is kept: it must come out as one and not as a force of zero.
+        std::array::from_fn(|lane| if !bits[lane] | (x[lane] < limit[lane]) { 0.0 } else { value[lane] })
+    }
+
+    #[inline(always)]
+    fn mask(self, bits: u8) -> [bool; LANES] {
+        std::array::from_fn(|lane| bits >> lane & 1 == 1)
+    }
+
+    #[inline(always)]
+    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Lane; 3]; 2] {
+        let mut differences = [[[0.0; LANES]; 3]; 2];
+        for lane in 0..LANES {
+            let (here, there) = (&nodes[from[lane] as usize].0, &nodes[to[lane] as usize].0);
+            for axis in 0..3 {
+                differences[0][axis][lane] = there[axis] - here[axis];
+                differences[1][axis][lane] = there[4 + axis] - here[4 + axis];
+            }
+        }
+        differences
+    }
+
+    #[inline(always)]
+    fn exchange(self, pull: [Lane; 3], forces: &mut [Push], from: &Numbers, to: &Numbers) {
+        for lane in 0..LANES {
+            for (axis, pull) in pull.iter().enumerate() {
+                forces[from[lane] as usize].0[axis] += pull[lane];
+                forces[to[lane] as usize].0[axis] -= pull[lane];
+            }
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! A body of any nodes and springs.
+
+use super::super::Vec3;
+use super::super::mesh::Surface;
+use super::kernel::{InstructionSet, NetworkKernel};
+use super::{Body, Spring, State, TangentBlock};
+use crate::error::Error;
+
+/// Point masses joined by an arbitrary list of springs; made by [`SpringNetwork::builder`].
+///
+/// Nodes keep the numbers that the builder got. For its forces they are renumbered inside and the springs put in batches
+/// of eight without a common node; forces are bit-identical from run to run, and change in the last digits
+/// with the order of nodes and springs.
+///
+/// # Real-time
+/// Its forces are bounded and real-time safe; to make it or a copy of it allocates.
+#[derive(Clone, Debug)]
+pub struct SpringNetwork {
+    rest: Vec<Vec3>,
+    inverse_masses: Vec<f64>,
+    surface: Surface,
+    springs: Vec<(u32, u32, Spring)>,
+    /// Where each node's list begins in `at_node`; one entry more than nodes.
+    node_start: Vec<u32>,
+    /// The springs at each node and the nodes at their other ends, one list after the other.
+    at_node: Vec<(u32, u32)>,
+    kernel: NetworkKernel,
+}
+
+/// Collects what a [`SpringNetwork`] is made of.
+///
+/// # Real-time
+/// Not real-time safe: allocates. Before the run.
+#[derive(Clone, Debug)]
+pub struct SpringNetworkBuilder {
+    rest: Vec<Vec3>,
+    masses: Vec<f64>,
+    held: Vec<u32>,
+    springs: Vec<(u32, u32, Spring)>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl SpringNetworkBuilder {
+    /// Mass of each node (kg), one per node.
+    #[must_use]
+    pub fn masses(mut self, kg: Vec<f64>) -> Self {
+        self.masses = kg;
+        self
+    }
+
+    /// Holds `node` stationary.
+    #[must_use]
+    pub fn fix(mut self, node: u32) -> Self {
+        self.held.push(node);
+        self
+    }
+
+    /// Joins nodes `i` and `j`. Two nodes may have several springs.
+    #[must_use]
+    pub fn spring(mut self, i: u32, j: u32, spring: Spring) -> Self {
+        self.springs.push((i, j, spring));
+        self
+    }
+
+    /// Joins many pairs of nodes.
+    #[must_use]
+    pub fn springs(mut self, springs: impl IntoIterator<Item = (u32, u32, Spring)>) -> Self {
+        self.springs.extend(springs);
+        self
+    }
+
+    /// The triangles that tools touch: node numbers, counter-clockwise seen from outside.
+    #[must_use]
+    pub fn surface(mut self, triangles: Vec<[u32; 3]>) -> Self {
+        self.triangles = triangles;
+        self
+    }
+
+    /// Makes the network.
+    ///
+    /// # Errors
+    /// If there are no nodes, a number is not finite, a mass or rest length is not positive, a stiffness or damping is
+    /// negative, a spring joins a node to itself, something names a node that is not there, or the surface is not a
+    /// manifold.
+    pub fn build(self) -> Result<SpringNetwork, Error> {
+        let nodes = self.rest.len();
+        if nodes == 0 || nodes >= u32::MAX as usize {
+            return Err(Error::scene("nodes", format!("{nodes}: at least 1 and less than 2^32 - 1 are needed")));
+        }
+        if let Some((n, x)) = self.rest.iter().enumerate().find(|(_, x)| !x.iter().all(|c| c.is_finite())) {
+            let message = format!("node {n} is at {:?}: finite positions are needed", x.as_slice());
+            return Err(Error::scene("nodes", message));
+        }
+        if self.masses.len() != nodes {
+            return Err(Error::scene("masses", format!("{} for {nodes} nodes: one each is needed", self.masses.len())));
+        }
+        if let Some((n, m)) = self.masses.iter().enumerate().find(|(_, m)| !(m.is_finite() && **m > 0.0)) {
+            let message = format!("node {n} has {m} kg: a finite value above 0 is needed");
+            return Err(Error::scene("masses", message));
+        }
+        if let Some(node) = self.held.iter().find(|&&node| node as usize >= nodes) {
+            return Err(Error::scene("fix", format!("node {node}: there are only {nodes}")));
+        }
+        for (n, spring) in self.springs.iter().enumerate() {
+            check(spring, nodes).map_err(|what| Error::scene("springs", format!("spring {n}: {what}")))?;
+        }
+        let mut inverse_masses: Vec<f64> = self.masses.iter().map(|m| 1.0 / m).collect();
+        for node in self.held {
+            inverse_masses[node as usize] = 0.0;
+        }
+        let (node_start, at_node) = by_node(nodes, &self.springs);
+        Ok(SpringNetwork {
+            surface: Surface::new(nodes, self.triangles)?,
+            kernel: NetworkKernel::new(nodes, &self.springs),
+            rest: self.rest,
+            inverse_masses,
+            springs: self.springs,
+            node_start,
+            at_node,
+        })
+    }
+}
+
+/// What is wrong with a spring.
+fn check(&(i, j, spring): &(u32, u32, Spring), nodes: usize) -> Result<(), String> {
+    if i.max(j) as usize >= nodes {
+        return Err(format!("nodes {i} and {j}: there are only {nodes}"));
+    }
+    if i == j {
+        return Err(format!("it joins node {i} to itself"));
+    }
+    let not_negative = |value: f64| value.is_finite() && value >= 0.0;
+    if !(not_negative(spring.stiffness) && not_negative(spring.damping)) {
+        let Spring { stiffness, damping, .. } = spring;
+        return Err(format!("stiffness {stiffness} and damping {damping}: finite values, 0 or more, are needed"));
+    }
+    if !(spring.rest_length.is_finite() && spring.rest_length > 0.0) {
+        return Err(format!("rest length {}: a finite value above 0 is needed", spring.rest_length));
+    }
+    Ok(())
+}
+
+/// Each node's springs and neighbours, one list after the other, and where the lists begin.
+fn by_node(nodes: usize, springs: &[(u32, u32, Spring)]) -> (Vec<u32>, Vec<(u32, u32)>) {
+    let mut ends: Vec<(u32, u32, u32)> = Vec::with_capacity(2 * springs.len());
+    for (n, &(i, j, _)) in springs.iter().enumerate() {
+        ends.extend([(i, n as u32, j), (j, n as u32, i)]);
+    }
+    ends.sort_unstable();
+    let start = |node| ends.partition_point(|&(at, ..)| at < node) as u32;
+    let starts = (0..=nodes as u32).map(start).collect();
+    (starts, ends.into_iter().map(|(_, spring, other)| (spring, other)).collect())
+}
+
+impl SpringNetwork {
+    /// Starts a network of nodes at `rest` (m), without springs and surface; masses must be given.
+    pub fn builder(rest: Vec<Vec3>) -> SpringNetworkBuilder {
+        let (masses, held, springs, triangles) = Default::default();
+        SpringNetworkBuilder { rest, masses, held, springs, triangles }
+    }
+
+    /// Its springs and the nodes that they join, as the builder got them.
+    pub fn springs(&self) -> &[(u32, u32, Spring)] {
+        &self.springs
+    }
+
+    /// Computes its forces with `set`, to compare sets; the fastest one is chosen otherwise.
+    ///
+    /// # Errors
+    /// If this machine does not have it.
+    pub fn with_instruction_set(mut self, set: InstructionSet) -> Result<Self, Error> {
+        self.kernel.set_instruction_set(set.available()?);
+        Ok(self)
+    }
+
+    /// Computes its forces on `cores` cores: the calling thread and threads of its own, which copies share. Worth it
+    /// from some 1,000 nodes on if the other cores are free. Forces are bit-identical from run to run for one number of
+    /// cores. With more than one, evaluations are no longer real-time safe: they allocate and may block.
+    ///
+    /// # Errors
+    /// If `cores` is 0 or the system refuses a thread.
+    #[cfg(feature = "parallel")]
+    pub fn on_cores(mut self, cores: usize) -> Result<Self, Error> {
+        self.kernel.set_cores(&self.springs, cores)?;
+        Ok(self)
+    }
+
+    /// The springs at `node` and their other ends, with the differences of position and velocity to there.
+    fn around<'a>(&'a self, state: &'a State, node: u32) -> impl Iterator<Item = (u32, Spring, Vec3, Vec3)> + 'a {
+        let node = node as usize;
+        let list = &self.at_node[self.node_start[node] as usize..self.node_start[node + 1] as usize];
+        list.iter().map(move |&(spring, other)| {
+            let to = other as usize;
+            let along = state.positions[to] - state.positions[node];
+            (other, self.springs[spring as usize].2, along, state.velocities[to] - state.velocities[node])
+        })
+    }
+}
+
+impl Body for SpringNetwork {
+    fn rest(&self) -> &[Vec3] {
+        &self.rest
+    }
+
+    fn inverse_masses(&self) -> &[f64] {
+        &self.inverse_masses
+    }
+
+    fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
+        self.kernel.forces(&state.positions, &state.velocities, forces);
+    }
+
+    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
+        for (&node, force) in nodes.iter().zip(forces) {
+            let sum = |sum, (_, spring, along, closing): (u32, Spring, Vec3, Vec3)| sum + spring.force(along, closing);
+            *force = self.around(state, node).fold(Vec3::zeros(), sum);
+        }
+    }
+
+    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
+        for &row in nodes {
+            for (column, spring, along, closing) in self.around(state, row) {
+                let tangent = spring.tangent(along, closing, clamp);
+                TangentBlock::pair(row, column, &tangent).into_iter().for_each(&mut *emit);
+            }
+        }
+    }
+
+    fn duplicate(&self) -> Option<Box<dyn Body>> {
+        Some(Box::new(self.clone()))
+    }
+}
