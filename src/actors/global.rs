@@ -8,7 +8,7 @@ use crate::model::contact::ToolMotion;
 use crate::model::geometry::NearestTriangle;
 use crate::model::local::{LocalModel, PatchGeometry, ResyncView};
 use crate::model::simulation::Simulation;
-use crate::runtime::{Actor, Outcome, OutletWriter, QueueReader, Reader, Recorder, TickContext, Writer};
+use crate::runtime::{Actor, Outcome, OutletWriter, QueueReader, Reader, Recorder, Stopwatch, TickContext, Writer};
 use crate::time::{Nanos, Rate};
 
 /// The ports of a [`GlobalActor`].
@@ -26,6 +26,8 @@ pub struct GlobalPorts {
     pub checkpoint: OutletWriter<Checkpoint>,
     /// Records.
     pub recorder: Recorder,
+    /// What building the next local model costs, if that is measured.
+    pub build_cost: Option<Stopwatch>,
 }
 
 /// Runs the slow, detailed simulation.
@@ -88,7 +90,8 @@ impl GlobalActor {
         let triangle =
             triangle.unwrap_or_else(|| self.nearest.find(&self.simulation.state().positions, &self.tool.position));
         let resync = ResyncView { global: &self.simulation, tick: self.tool.tick, triangle };
-        self.ports.models.buffer().rebuild(resync);
+        let model = self.ports.models.buffer();
+        Stopwatch::around(self.ports.build_cost.as_mut(), || model.rebuild(resync));
         self.ports.models.publish(ctx)
     }
 

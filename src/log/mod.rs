@@ -9,6 +9,7 @@
 //! allocates: it is for the logger, and for the time after a run.
 
 mod analysis;
+mod comparison;
 mod entry;
 mod environment;
 mod event;
@@ -34,6 +35,7 @@ pub(crate) mod topic;
 mod writer;
 
 pub use analysis::{Analysis, RunReport};
+pub use comparison::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, ModelError, RunOutcome};
 pub use entry::LogEntry;
 pub use environment::{Environment, Execution, GroupInfo};
 pub use event::{Level, TextEvent};

@@ -136,6 +136,14 @@ impl SessionBuilder {
         self
     }
 
+    /// Virtual time: measures the CPU time of every release and of every build of a local model, for
+    /// [`RuntimeReport::costs`](crate::runtime::RuntimeReport::costs) and [`Summary::builds`](super::Summary::builds).
+    #[must_use]
+    pub fn measure_cost(mut self) -> Self {
+        self.parts.measures_cost = true;
+        self
+    }
+
     /// Reads the log of an earlier run of this session, to execute it again in simulated time, as
     /// [`Session::replay`] does for a scene. The builder must be filled as it was for that run, without the device: a body
     /// of the program's own is not in the log.

@@ -4,7 +4,7 @@ use crate::actors::{Checkpoint, GlobalActor, GlobalPorts, SurfaceView, ToolTick}
 use crate::error::{Error, ErrorKind};
 use crate::model::local::{LocalModel, PatchGeometry};
 use crate::model::simulation::Simulation;
-use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RecorderPort};
+use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RecorderPort, Stopwatch};
 use crate::time::Rate;
 
 /// The ports whose global halves a new actor takes again.
@@ -26,6 +26,7 @@ impl GlobalSide {
             surface: self.surface.writer(),
             checkpoint: self.checkpoint.writer(),
             recorder: self.recorder.recorder(),
+            build_cost: None,
         }
     }
 }
@@ -41,6 +42,8 @@ pub(super) struct GlobalMaker {
     saved: OutletReader<Checkpoint>,
     haptic: Rate,
     side: GlobalSide,
+    /// For the first actor; one that is started again is not measured.
+    build_cost: Option<Stopwatch>,
 }
 
 impl GlobalMaker {
@@ -48,7 +51,13 @@ impl GlobalMaker {
         let spare = simulation.duplicate();
         let last = Checkpoint { tool, state: simulation.state().clone(), contact: *simulation.contact() };
         let saved = side.checkpoint.reader();
-        Self { first: Some(simulation), spare, last, saved, haptic, side }
+        Self { first: Some(simulation), spare, last, saved, haptic, side, build_cost: None }
+    }
+
+    /// Measures what building a local model costs.
+    pub(super) fn measured_by(mut self, build_cost: Option<Stopwatch>) -> Self {
+        self.build_cost = build_cost;
+        self
     }
 
     pub(super) fn can_restart(&self) -> bool {
@@ -64,7 +73,7 @@ impl GlobalMaker {
         if self.saved.refresh() {
             self.last.clone_from(self.saved.get());
         }
-        let ports = self.side.take();
+        let ports = GlobalPorts { build_cost: self.build_cost.take(), ..self.side.take() };
         let simulation = match self.first.take() {
             Some(first) => first,
             None => self.restored()?,

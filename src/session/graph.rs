@@ -16,7 +16,7 @@ use crate::log::{Environment, Execution as LogExecution, GroupInfo, ToolSample};
 use crate::model::Vec3;
 use crate::model::body::Block;
 use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
-use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, Restart, Runtime};
+use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, Restart, Runtime, Stopwatch};
 use crate::safety::{Actions, Pipeline};
 use crate::time::Rate;
 
@@ -51,6 +51,11 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     };
     #[cfg(not(all(feature = "log", feature = "scene")))]
     let mut graph = Runtime::builder(prepared.execution);
+    if prepared.measures_cost {
+        graph.measure_cost();
+    }
+    let build_cost = prepared.measures_cost.then(Stopwatch::new);
+    let builds = build_cost.as_ref().map(Stopwatch::reader);
     // Before the ports, so that they record what a replay needs. The order of the ports below numbers them in the log.
     let drain = graph.drain();
     let ticks_buffered = ((SECONDS_BUFFERED * prepared.haptic.as_hz()) as usize).max(MIN_TICKS_BUFFERED);
@@ -98,7 +103,8 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
                 geometry: ports.geometry.as_ref().map(ExchangePort::writer),
             };
             let tool = ToolTick { tick: 0, position: first.position };
-            (source, rotating, Some(GlobalMaker::new(prepared.simulation, tool, prepared.haptic, ports)))
+            let maker = GlobalMaker::new(prepared.simulation, tool, prepared.haptic, ports);
+            (source, rotating, Some(maker.measured_by(build_cost)))
         }
     };
     let device = DeviceActor::new(
@@ -144,7 +150,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
         graph.until(until);
     }
     let running = graph.build()?.start()?;
-    Ok(Running::new(running, outcome, memory, Viewer::new(triangles, surface, view), prepared.until))
+    Ok(Running::new(running, outcome, memory, Viewer::new(triangles, surface, view), prepared.until).measuring(builds))
 }
 
 fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, Error> {

@@ -14,6 +14,7 @@
 
 mod budget;
 mod builder;
+mod compare;
 mod global;
 mod graph;
 mod prepare;
@@ -23,6 +24,7 @@ mod running;
 mod sink;
 
 pub use builder::SessionBuilder;
+pub use compare::{CompareOptions, CompareProgress, compare, one_period};
 #[cfg(all(feature = "log", feature = "scene"))]
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};
 pub use running::{Running, Summary, Viewer};

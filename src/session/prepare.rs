@@ -38,6 +38,7 @@ pub(super) struct Parts {
     #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
+    pub measures_cost: bool,
     pub endless: bool,
 }
 
@@ -56,6 +57,7 @@ impl Parts {
             #[cfg(feature = "log")]
             log: None,
             keep_records: false,
+            measures_cost: false,
         }
     }
 }
@@ -79,6 +81,7 @@ pub(super) struct Prepared {
     #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
+    pub measures_cost: bool,
     /// The scene file's text, for the log.
     pub source: Option<String>,
     /// The scene as it is run, with everything that a program or the command line changed.
@@ -105,6 +108,7 @@ const MAX_SUBSTEPS_PER_MS: f64 = 1e4;
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let scene = parts.scene;
     scene.validate()?;
+    check_measurement(parts.execution, parts.measures_cost)?;
     for (field, group) in [("local", &parts.local), ("global", &parts.global)] {
         group.as_ref().map_or(Ok(()), |group| check_group(field, group))?;
     }
@@ -206,6 +210,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         #[cfg(feature = "log")]
         log: parts.log,
         keep_records: parts.keep_records,
+        measures_cost: parts.measures_cost,
         source: scene.source,
         #[cfg(feature = "scene")]
         as_run,
@@ -229,6 +234,16 @@ pub(super) fn as_run(scene: &Scene, named: Option<(Option<u32>, &[u32])>) -> Sce
         scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.place(node) }).collect();
     }
     scene
+}
+
+/// Refused before anything is made, as the runtime would.
+fn check_measurement(execution: Execution, measures_cost: bool) -> Result<(), Error> {
+    match execution {
+        Execution::Threaded if measures_cost => {
+            Err(Error::new(ErrorKind::Runtime, "cost is measured in virtual time only: use virtual_time()"))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
