@@ -3,7 +3,7 @@
 use super::Session;
 use super::prepare::{Parts, prepare};
 use crate::devices::{Device, ToolPath};
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::model::body::Body;
 use crate::runtime::{Execution, RateGroup};
 use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, LocalModelKind, Scene};
@@ -160,6 +160,9 @@ impl SessionBuilder {
     /// # Errors
     /// Whatever cannot work, naming the field and what would be right.
     pub fn build(self) -> Result<Session, Error> {
+        if self.parts.measures_cost && self.parts.execution == Execution::Threaded {
+            return Err(Error::new(ErrorKind::Runtime, "cost is measured in virtual time only: use virtual_time()"));
+        }
         Ok(Session { prepared: prepare(self.parts)? })
     }
 }

@@ -108,7 +108,6 @@ const MAX_SUBSTEPS_PER_MS: f64 = 1e4;
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let scene = parts.scene;
     scene.validate()?;
-    check_measurement(parts.execution, parts.measures_cost)?;
     for (field, group) in [("local", &parts.local), ("global", &parts.global)] {
         group.as_ref().map_or(Ok(()), |group| check_group(field, group))?;
     }
@@ -234,16 +233,6 @@ pub(super) fn as_run(scene: &Scene, named: Option<(Option<u32>, &[u32])>) -> Sce
         scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.place(node) }).collect();
     }
     scene
-}
-
-/// Refused before anything is made, as the runtime would.
-fn check_measurement(execution: Execution, measures_cost: bool) -> Result<(), Error> {
-    match execution {
-        Execution::Threaded if measures_cost => {
-            Err(Error::new(ErrorKind::Runtime, "cost is measured in virtual time only: use virtual_time()"))
-        }
-        _ => Ok(()),
-    }
 }
 
 fn rate(field: &str, hz: f64) -> Result<Rate, Error> {

@@ -6,6 +6,9 @@ use crate::log::{ComparedRun, Comparison, Measured};
 use crate::report::units::duration;
 use crate::time::Nanos;
 
+/// Costs that differ by less are called the same: they are measured, and differ from run to run.
+const MARGIN: f64 = 0.1;
+
 /// Errors (% rms) that a model is asked to stay within.
 pub const NEAR: [f64; 2] = [1.0, 5.0];
 
@@ -53,20 +56,17 @@ pub(super) fn full_fits(comparison: &Comparison) -> bool {
 /// Who is cheaper than `full` in which way, and who in none.
 fn against_full(comparison: &Comparison) -> [String; 3] {
     let full = &comparison.full;
-    let in_total = |run: &Measured| run.cost.total_load() < full.cost.total_load();
-    let per_tick = |run: &Measured| run.cost.tick_p50 < full.cost.tick_p50;
-    let those =
-        |wins: &dyn Fn(&Measured) -> bool| list(comparison.runs.iter().filter(|run| run.measured().is_some_and(wins)));
-    let load = figure(1e3 * full.cost.total_load());
+    let in_total = |run: &Measured| run.cost.total_load() < (1.0 - MARGIN) * full.cost.total_load();
+    let per_tick = |run: &Measured| (run.cost.tick_p50.0 as f64) < (1.0 - MARGIN) * full.cost.tick_p50.0 as f64;
+    let is_worse = |run: &Measured| run.error.rms > 0.0 && !in_total(run);
+    let those = |wins: &dyn Fn(&Measured) -> bool| list(comparison, wins);
+    let (load, margin) = (figure(1e3 * full.cost.total_load()), 100.0 * MARGIN);
     [
-        format!("cheaper than `full` in total ({load} ms/s): {}", those(&in_total)),
+        format!("cheaper than `full` in total ({load} ms/s) by more than {margin} %: {}", those(&in_total)),
+        format!("worse than `full` in error and not cheaper in total: {}", those(&is_worse)),
         format!(
-            "worse than `full` both in error and in total cost: {}",
-            those(&|run| run.error.rms > 0.0 && !in_total(run))
-        ),
-        format!(
-            "never better, not even in the cost of a haptic tick: {}",
-            those(&|run| run.error.rms > 0.0 && !in_total(run) && !per_tick(run))
+            "worse in error and cheaper in nothing, not even a haptic tick: {}",
+            those(&|run| is_worse(run) && !per_tick(run))
         ),
     ]
 }
@@ -84,26 +84,31 @@ fn nearest(comparison: &Comparison, limit: f64) -> String {
         let found = cheapest.and_then(|run| Some((&run.model, run.measured()?))).map(|(model, run)| {
             format!("{model} ({} %, {} per tick)", figure(run.error.rms), duration(run.cost.tick_p50.0))
         });
-        let late =
-            if latency == Nanos::ZERO { "in time".to_owned() } else { format!("{} ms late", milliseconds(latency)) };
-        format!("{late} {}", found.unwrap_or_else(|| "none".to_owned()))
+        format!("{} {}", in_words(latency), found.unwrap_or_else(|| "none".to_owned()))
     };
     let found: Vec<String> = latencies.into_iter().map(at).collect();
     format!("cheapest tick within {limit} % rms of `full`: {}", found.join("; "))
 }
 
-/// Models by name; a model at all its latencies is named once.
-fn list<'a>(runs: impl Iterator<Item = &'a ComparedRun>) -> String {
-    let mut models: Vec<(&str, Vec<String>)> = Vec::new();
-    for run in runs {
-        match models.last_mut().filter(|(model, _)| *model == run.model) {
-            Some((_, latencies)) => latencies.push(milliseconds(run.latency)),
-            None => models.push((&run.model, vec![milliseconds(run.latency)])),
-        }
-    }
-    let names: Vec<String> =
-        models.into_iter().map(|(model, latencies)| format!("{model} ({} ms)", latencies.join(", "))).collect();
+/// The models of which runs are `asked` for; with the latency where that is not so for all latencies of the model.
+fn list(comparison: &Comparison, asked: &dyn Fn(&Measured) -> bool) -> String {
+    let runs = || comparison.runs.iter().filter_map(|run| Some((run, run.measured()?)));
+    let all = |model: &str| runs().filter(|(run, _)| run.model == model).all(|(_, measured)| asked(measured));
+    let names = runs().filter(|(_, measured)| asked(measured)).map(|(run, _)| match all(&run.model) {
+        true => run.model.clone(),
+        false => format!("{} ({})", run.model, in_words(run.latency)),
+    });
+    let mut names: Vec<String> = names.collect();
+    names.dedup();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+/// A latency in a sentence.
+fn in_words(latency: Nanos) -> String {
+    match latency {
+        Nanos::ZERO => "in time".to_owned(),
+        late => format!("{} ms late", milliseconds(late)),
+    }
 }
 
 /// A count with two digits that mean something.
@@ -160,12 +165,17 @@ mod tests {
             ],
         ));
         let ends = [
-            "in total (100 ms/s): hold (33 ms), patch (0 ms)",
-            "in total cost: hold (0 ms), patch (33 ms)",
-            "of a haptic tick: patch (33 ms)",
+            "in total (100 ms/s) by more than 10 %: hold (33 ms late), patch (in time)",
+            "not cheaper in total: hold (in time), patch (33 ms late)",
+            "not even a haptic tick: patch (33 ms late)",
             "within 1 % rms of `full`: in time hold (0.500 %, 2.00 us per tick); 33 ms late none",
             "within 5 % rms of `full`: in time hold (0.500 %, 2.00 us per tick); 33 ms late none",
         ];
+        let same = conclusions(&comparison(
+            100,
+            &[("hold", 0, measured(0.5, 99, 0.099)), ("hold", 33, measured(0.5, 99, 0.101))],
+        ));
+        assert!(same[2].ends_with("total: hold") && same[3].ends_with("tick: hold"), "{same:?}");
         assert_eq!(lines.len(), 1 + ends.len());
         for (line, end) in lines[1..].iter().zip(ends) {
             assert!(line.ends_with(end), "{line:?} does not end with {end:?}");

@@ -105,3 +105,22 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
     }
     style
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{ComparedRun, RunOutcome};
+    use crate::time::Nanos;
+
+    #[test]
+    fn a_scene_without_any_force_and_a_refused_model_still_make_a_page() {
+        let outcome = RunOutcome::Refused("too <large>".into());
+        let runs = vec![
+            ComparedRun { model: "patch".into(), latency: Nanos(33_340_000), outcome },
+            ComparedRun { model: "hold".into(), latency: Nanos::ZERO, outcome: RunOutcome::Measured(Box::default()) },
+        ];
+        let page = to_html(&Comparison { scene: "a&b".into(), runs, ..Comparison::default() });
+        assert!(page.contains("<td class=\"why\" colspan=\"11\">too &lt;large&gt;</td>"), "{page}");
+        assert!(page.contains("nothing to compare") && page.contains("a&amp;b") && !page.contains("NaN"), "{page}");
+    }
+}

@@ -75,3 +75,27 @@ fn model(name: &str, latency_ns: u64, run: Option<&Measured>, why_not: Option<&s
         "degraded": run.map(|run| run.degraded),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{ComparedRun, RunOutcome};
+    use crate::time::Nanos;
+
+    #[test]
+    fn a_failed_run_has_its_reason_and_no_figures() {
+        let outcome = RunOutcome::Failed("it diverged".into());
+        let runs = vec![ComparedRun { model: "patch".into(), latency: Nanos(33_340_000), outcome }];
+        let mut comparison = Comparison { runs, ..Comparison::default() };
+        comparison.full.error.rms = f64::NAN;
+        let document: Value = serde_json::from_str(&to_json(&comparison)).unwrap();
+        let row = &document["models"][1];
+        assert_eq!(
+            (&row["ok"], &row["why_not"], &row["latency_ms"]),
+            (&false.into(), &"it diverged".into(), &33.34.into())
+        );
+        assert!(row["error_percent"].is_null() && row["cost"].is_null() && row["degraded"].is_null(), "{row}");
+        // Without a force there is no percentage, and JSON has no NaN.
+        assert_eq!(document["models"][0]["error_percent"]["rms"], Value::Null);
+    }
+}

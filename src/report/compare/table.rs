@@ -41,14 +41,14 @@ pub(super) const COLUMNS: [Column; 11] = [
         value: |run| Some(run.error.jump),
     },
     Column {
-        head: ["resync", "before", "%"],
-        width: 7,
-        meaning: "jump at resyncs before blending, p99, in % of the largest force of full",
+        head: ["resync", "before", "p99 %"],
+        width: 8,
+        meaning: "jump of the force at a resync before blending, p99, in % of the largest force of full",
         value: |run| is_resynced(run).then_some(run.error.resync_before_p99),
     },
     Column {
-        head: ["jump p99", "after", "%"],
-        width: 9,
+        head: ["resync", "after", "p99 %"],
+        width: 8,
         meaning: "largest one-tick change that blending leaves of a resync's jump, p99, in % of the largest force of full",
         value: |run| is_resynced(run).then_some(run.error.resync_after_p99),
     },
@@ -214,7 +214,7 @@ mod tests {
         let text = to_text(&comparison);
         assert!(text.contains("\npatch           33.34  local.patch: is too large\n"), "{text}");
         assert!(text.lines().all(|line| line.len() <= WIDTH), "{text}");
-        assert!(text.contains("\n    is too large is too large"), "{text}");
+        assert!(text.contains("\n    large is too large is too large"), "{text}");
         assert_eq!(wrapped(&"x".repeat(120)), "x".repeat(120) + "\n");
     }
 }
