@@ -22,7 +22,7 @@ impl Axis {
     /// From zero to a round value at or above `top`.
     pub(in crate::report) fn from_zero(label: &str, top: f64) -> Self {
         let top = if top.is_finite() && top > 0.0 { top } else { 1.0 };
-        let step = round_step(top / 4.0);
+        let step = round_step(top / 8.0);
         Self::linear(label, [0.0, (top / step).ceil() * step])
     }
 
