@@ -60,27 +60,29 @@ impl Stopwatch {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use std::time::{Duration, Instant};
 
     #[test]
-    fn work_counts_and_sleep_does_not() {
+    fn work_is_counted_and_only_where_there_is_a_stopwatch() {
         let mut stopwatch = Stopwatch::new();
         let reader = stopwatch.reader();
-        let slept = Duration::from_millis(200);
-        Stopwatch::around(Some(&mut stopwatch), || std::thread::sleep(slept));
-        assert!(reader.snapshot().sum() < Nanos::from_duration(slept));
-        let begun = thread_cpu();
-        let worked = Stopwatch::around(Some(&mut stopwatch), || {
-            let start = Instant::now();
+        Stopwatch::around(Some(&mut stopwatch), || {
+            let begun = thread_cpu();
             while thread_cpu() - begun < 2_000_000 {
                 std::hint::spin_loop();
             }
-            start.elapsed()
         });
-        let shown = reader.snapshot();
-        assert_eq!(shown.count(), 2);
-        assert!(shown.max() >= Nanos(1_900_000) && worked >= Duration::from_micros(1900), "{shown:?}, {worked:?}");
+        assert!(reader.snapshot().max() >= Nanos(2_000_000), "{reader:?}");
         assert_eq!(Stopwatch::around(None, || 7), 7);
-        assert_eq!(reader.snapshot().count(), 2);
+        assert_eq!(reader.snapshot().count(), 1);
+    }
+
+    // Elsewhere the clock is the wall's.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn sleep_is_no_work() {
+        let mut stopwatch = Stopwatch::new();
+        let slept = std::time::Duration::from_millis(100);
+        Stopwatch::around(Some(&mut stopwatch), || std::thread::sleep(slept));
+        assert!(stopwatch.reader().snapshot().sum() < Nanos::from_duration(slept));
     }
 }
