@@ -7,9 +7,9 @@ use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, Mode, ToolMotion};
 use palpate::model::local::{Kind, Prediction, ResyncView, Template};
-use palpate::model::surroundings::Bases;
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
+use palpate::model::surroundings::Bases;
 use proptest::prelude::*;
 
 const SPACING: f64 = 0.1 / 11.0;

@@ -60,13 +60,8 @@ mod tests {
     #[test]
     fn every_cause_has_words() {
         let faults = [DeviceFault::Stale, DeviceFault::NotReady, DeviceFault::Disconnected];
-        let others = [
-            Cause::DeviceNotFinite,
-            Cause::LocalNotFinite,
-            Cause::GlobalNotFinite,
-            Cause::SamplesLost,
-            Cause::NoBasis,
-        ];
+        let others =
+            [Cause::DeviceNotFinite, Cause::LocalNotFinite, Cause::GlobalNotFinite, Cause::SamplesLost, Cause::NoBasis];
         for cause in faults.map(Cause::Device).into_iter().chain(others) {
             assert!(Cause::describe(cause.code()).is_some(), "{cause:?}");
         }

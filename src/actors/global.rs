@@ -10,7 +10,7 @@ use crate::model::forecast::{ToolForecast, ToolHistory};
 use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
-use crate::runtime::{Actor, Outcome, OutletWriter, QueueReader, Reader, Recorder, TickContext, Writer};
+use crate::runtime::{Actor, Outcome, OutletWriter, QueueReader, Reader, Recorder, Stopwatch, TickContext, Writer};
 use crate::time::{Nanos, Rate};
 
 /// The ports of a [`GlobalActor`].
@@ -30,6 +30,8 @@ pub struct GlobalPorts {
     pub checkpoint: OutletWriter<Checkpoint>,
     /// Records.
     pub recorder: Recorder,
+    /// What building the next local model costs, if that is measured.
+    pub build_cost: Option<Stopwatch>,
 }
 
 /// The global half of the ports of a [`BasisActor`](super::BasisActor).
@@ -133,7 +135,8 @@ impl GlobalActor {
             horizon: self.plan.horizon,
             bases: &self.plan.bases,
         };
-        self.ports.models.buffer().rebuild(resync);
+        let model = self.ports.models.buffer();
+        Stopwatch::around(self.ports.build_cost.as_mut(), || model.rebuild(resync));
         let version = self.ports.models.publish(ctx);
         self.publish_wishes(ctx, &tool);
         version

@@ -3,6 +3,7 @@
 //! Exit code 0 on success, 2 on a usage or input error (one line on standard error), 1 on a failed run, 130 on a run that
 //! the user interrupted.
 
+pub mod compare;
 pub mod export;
 pub mod replay;
 pub mod run;
@@ -37,6 +38,8 @@ enum Command {
     Run(run::RunArgs),
     /// Say how well a recorded run kept its time, and what that did to the force
     Timing(timing::TimingArgs),
+    /// Run every local model on a scene in virtual time: how far each is from `full`, and what it costs
+    Compare(compare::CompareArgs),
     /// Execute a log again in simulated time and compare every force with the logged one, bit for bit
     Replay(replay::ReplayArgs),
     /// Write one topic of a log as a table
@@ -60,6 +63,7 @@ pub fn main() -> ExitCode {
         Ok(Cli { command }) => match command {
             None => run::demo(),
             Some(Command::Run(args)) => run::run(&args),
+            Some(Command::Compare(args)) => compare::run(&args),
             Some(Command::Timing(args)) => timing::run(&args),
             Some(Command::Export(args)) => export::run(&args),
             Some(Command::Replay(args)) => replay::run(&args),

@@ -100,7 +100,8 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
     }
 }
 
-fn model(name: &str) -> Result<LocalModelKind, String> {
+/// A local model by its name, or which there are.
+pub(super) fn model(name: &str) -> Result<LocalModelKind, String> {
     LocalModelKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
         let names: Vec<_> = LocalModelKind::ALL.iter().map(|kind| kind.name()).collect();
         format!("the local models are {}", names.join(", "))

@@ -9,6 +9,7 @@
 //! allocates: it is for the logger, and for the time after a run.
 
 mod analysis;
+mod comparison;
 mod entry;
 mod environment;
 mod event;
@@ -34,6 +35,7 @@ pub(crate) mod topic;
 mod writer;
 
 pub use analysis::{Analysis, RunReport};
+pub use comparison::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, ModelError, RunOutcome};
 pub use entry::LogEntry;
 pub use environment::{Environment, Execution, GroupInfo};
 pub use event::{Level, TextEvent};
@@ -41,7 +43,8 @@ pub use group::{CauseCounts, GroupReport};
 pub use haptics::{ContactReport, ForceReport, LimitReport, ResyncReport};
 pub use percentiles::{Distribution, Magnitudes, Percentiles};
 pub use records::{
-    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ServedBy, ToolSample,
+    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ServedBy,
+    ToolSample,
 };
 pub use stats::{EventSum, GroupStats, StatsCounter};
 

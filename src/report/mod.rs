@@ -1,5 +1,8 @@
 //! Reports about a run: for a terminal, for programs, and its records as tables.
 
+pub mod compare;
+mod html;
+mod svg;
 mod units;
 mod verdict;
 

@@ -53,6 +53,7 @@ pub struct RuntimeBuilder {
     grants: GrantHandle,
     /// Exchanges and queues made so far.
     ports: u32,
+    measures_cost: bool,
     /// What to repeat, and what its ports must show.
     recording: Option<(Recording, Script)>,
 }
@@ -67,6 +68,7 @@ impl RuntimeBuilder {
             registry: Registry::new(),
             grants: GrantHandle::default(),
             ports: 0,
+            measures_cost: false,
             recording: recording.map(|recording| {
                 let script = recording.script();
                 (recording, script)
@@ -190,6 +192,13 @@ impl RuntimeBuilder {
         self
     }
 
+    /// Virtual time: measures the CPU time of every release, for [`RuntimeReport::costs`](super::RuntimeReport::costs).
+    /// Nothing that an actor computes depends on it.
+    pub fn measure_cost(&mut self) -> &mut Self {
+        self.measures_cost = true;
+        self
+    }
+
     /// Ends the run by itself: the last release of each group is the last one due at or before `time`.
     pub fn until(&mut self, time: Nanos) -> &mut Self {
         self.until = Some(time);
@@ -204,7 +213,7 @@ impl RuntimeBuilder {
     /// threads a latency beyond the period, equal real-time priorities pinned to one core, a priority outside 1 to 99, a
     /// name used twice, no group that is not an observer; an overrun policy that says nothing or contradicts the release
     /// mode, a watchdog below a period, a device-paced group without an actor; a disturbance of threads, of no group, or a
-    /// second one of the same. Or what a [factory](Self::restartable) says. For a re-execution also if the recording is one
+    /// second one of the same; a [measurement](Self::measure_cost) of threads. Or what a [factory](Self::restartable) says. For a re-execution also if the recording is one
     /// of another graph, and [`ErrorKind::Log`](crate::ErrorKind::Log) if it has gaps.
     pub fn build(&mut self) -> Result<Runtime, Error> {
         for (index, (group, _)) in self.groups.iter_mut().enumerate() {
@@ -215,6 +224,7 @@ impl RuntimeBuilder {
         admit_here(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>(), self.execution)?;
         self.check_restartable()?;
         self.check_disturbances()?;
+        self.check_measurement()?;
         let mut built = std::mem::replace(self, Self::new(self.execution, None));
         let registry = built.registry;
         let mut groups = Vec::with_capacity(built.groups.len());
@@ -246,7 +256,8 @@ impl RuntimeBuilder {
             Some((recording, script)) => Some(Reexecution::new(recording, script, &groups, built.ports)?),
             None => None,
         };
-        Ok(Runtime::new(built.execution, groups, restarters, reexecution, registry, built.grants))
+        let runtime = Runtime::new(built.execution, groups, restarters, reexecution, registry, built.grants);
+        Ok(if built.measures_cost { runtime.measuring_cost() } else { runtime })
     }
 }
 
@@ -261,6 +272,15 @@ impl RuntimeBuilder {
             Err(Error::new(ErrorKind::Runtime, "an observer cannot be restartable; add it with `group`")
                 .at(format!("rate group `{}`", group.name)))
         })
+    }
+
+    fn check_measurement(&self) -> Result<(), Error> {
+        if self.measures_cost && self.execution == Execution::Threaded {
+            let wrong =
+                "the cost of threads is not measured: it takes system calls; their execution times are in every report";
+            return Err(Error::new(ErrorKind::Runtime, wrong));
+        }
+        Ok(())
     }
 
     fn check_disturbances(&self) -> Result<(), Error> {

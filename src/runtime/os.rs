@@ -4,7 +4,7 @@
 
 pub(crate) use imp::{
     block_signals, give_up_realtime, lock_memory, may_lock_everything, monotonic, set_realtime, set_timer_slack,
-    sleep_until, stay_awake,
+    sleep_until, stay_awake, thread_cpu,
 };
 
 use std::fs::read_to_string;
@@ -64,6 +64,17 @@ mod imp {
         let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
         // SAFETY: the pointer is to a timespec of our own; CLOCK_MONOTONIC always exists.
         unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
+        time.tv_sec as u64 * NANOS_PER_S + time.tv_nsec as u64
+    }
+
+    /// CPU time that the calling thread has used, in nanoseconds.
+    ///
+    /// # Real-time
+    /// A system call: not for a tick on a real-time thread.
+    pub(crate) fn thread_cpu() -> u64 {
+        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+        // SAFETY: the pointer is to a timespec of our own; every thread has this clock.
+        unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut time) };
         time.tv_sec as u64 * NANOS_PER_S + time.tv_nsec as u64
     }
 
@@ -179,6 +190,11 @@ mod imp {
     pub(crate) fn monotonic() -> u64 {
         static START: OnceLock<Instant> = OnceLock::new();
         START.get_or_init(Instant::now).elapsed().as_nanos() as u64
+    }
+
+    /// The nearest that there is: it counts preemption too.
+    pub(crate) fn thread_cpu() -> u64 {
+        monotonic()
     }
 
     pub(crate) fn sleep_until(time: u64) {

@@ -2,6 +2,7 @@
 
 use super::deadline::SlipCounts;
 use super::grant::SystemGrant;
+use super::histogram::Snapshot;
 use crate::time::{Nanos, Rate};
 use std::fmt;
 
@@ -53,6 +54,15 @@ impl fmt::Display for RuntimeFault {
     }
 }
 
+/// What the releases of one rate group cost, see [`RuntimeBuilder::measure_cost`](super::RuntimeBuilder::measure_cost).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GroupCost {
+    /// The group's name.
+    pub name: String,
+    /// CPU time of each release: its actors and the runtime's own books.
+    pub cpu: Snapshot,
+}
+
 /// The report of a run.
 ///
 /// A group that did not end when it was told to has no sums and is the fault, unless there was one before.
@@ -68,6 +78,8 @@ pub struct RuntimeReport {
     pub restarts: Vec<RuntimeFault>,
     /// Records that a full ring dropped; 0 if the graph has no drain.
     pub lost_records: u64,
+    /// What the releases cost, in graph order; empty unless it was asked for.
+    pub costs: Vec<GroupCost>,
 }
 
 impl fmt::Display for RuntimeReport {

@@ -10,7 +10,7 @@ use super::recorder::Registry;
 use super::recording::Recording;
 use super::reexecution::Reexecution;
 use super::release::GroupRun;
-use super::report::{RuntimeFault, RuntimeReport};
+use super::report::{GroupCost, RuntimeFault, RuntimeReport};
 use super::restart::Restarter;
 use super::supervisor::{Control, StopHandle};
 use super::threaded::{Threads, start_actors};
@@ -38,6 +38,7 @@ pub struct Runtime {
     reexecution: Option<Reexecution>,
     registry: Arc<Registry>,
     grants: GrantHandle,
+    measures_cost: bool,
 }
 
 impl Runtime {
@@ -63,7 +64,13 @@ impl Runtime {
         registry: Arc<Registry>,
         grants: GrantHandle,
     ) -> Self {
-        Self { execution, groups, restarters, reexecution, registry, grants }
+        Self { execution, groups, restarters, reexecution, registry, grants, measures_cost: false }
+    }
+
+    /// In virtual time it measures what each release costs.
+    pub(super) fn measuring_cost(mut self) -> Self {
+        self.measures_cost = true;
+        self
     }
 
     /// The schedule: what each group asks for, what the cores bear, which releases coincide, and what this system would
@@ -83,7 +90,7 @@ impl Runtime {
     /// The error of the first actor whose start failed, after those already started were stopped; or
     /// [`ErrorKind::Runtime`] if the system gives no thread.
     pub fn start(self) -> Result<Running, Error> {
-        let Self { execution, mut groups, restarters, reexecution, registry, grants } = self;
+        let Self { execution, mut groups, restarters, reexecution, registry, grants, measures_cost } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names: Vec<String> = groups.iter().map(|group| group.spec.name.clone()).collect();
         let live = groups.iter().map(GroupRun::live).collect();
@@ -96,7 +103,8 @@ impl Runtime {
                 start_actors(&mut groups)?;
                 let restarters =
                     restarters.into_iter().map(|restart| restart.map(|(restarter, _)| restarter)).collect();
-                Executor::Virtual(VirtualRun::new(groups, restarters, reexecution, Arc::clone(&control)))
+                let run = VirtualRun::new(groups, restarters, reexecution, Arc::clone(&control));
+                Executor::Virtual(if measures_cost { run.measuring_cost() } else { run })
             }
         };
         let executor = Arc::new(Mutex::new(executor));
@@ -235,6 +243,12 @@ impl Running {
             Executor::Threaded(threads) => threads.supervisor.results(),
             Executor::Virtual(run) => run.supervisor.results(),
         };
+        let costs = match &*executor {
+            Executor::Threaded(_) => Vec::new(),
+            Executor::Virtual(run) => {
+                self.names.iter().cloned().zip(run.costs()).map(|(name, cpu)| GroupCost { name, cpu }).collect()
+            }
+        };
         let (restarts, at) = match &*executor {
             Executor::Threaded(threads) => (threads.restarts(), threads.elapsed()),
             Executor::Virtual(run) => (run.restarts(), run.now()),
@@ -247,7 +261,7 @@ impl Running {
         };
         let fault = fault.or_else(|| (!given_up.is_empty()).then(stuck));
         let grant = self.grants.get().unwrap_or_default();
-        RuntimeReport { groups, grant, fault, restarts, lost_records: self.registry.lost() }
+        RuntimeReport { groups, grant, fault, restarts, lost_records: self.registry.lost(), costs }
     }
 
     /// Ends the run if it has not ended; returns the groups that had to be given up.

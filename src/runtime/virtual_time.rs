@@ -5,12 +5,14 @@
 //! [re-execution](super::Recording) runs the recorded releases instead, and observers along with them.
 
 use super::disturbance::VirtualPace;
+use super::histogram::Snapshot;
 use super::panic_hook;
 use super::recording::RecordedRelease;
 use super::reexecution::{Reexecution, Step};
 use super::release::{AfterFault, GroupRun};
 use super::report::RuntimeFault;
 use super::restart::Restarter;
+use super::stopwatch::Stopwatch;
 use super::supervisor::{Control, Failure, Message, Supervisor};
 use crate::time::Nanos;
 use std::sync::Arc;
@@ -31,6 +33,8 @@ pub(crate) struct VirtualRun {
     restarts: Vec<RuntimeFault>,
     /// When each group wakes next.
     paces: Vec<VirtualPace>,
+    /// What the releases of each group cost; empty if nobody asked.
+    stopwatches: Vec<Stopwatch>,
     now: Nanos,
     /// Set once every group was told to stop.
     stopping: bool,
@@ -51,9 +55,22 @@ impl VirtualRun {
         let paces = groups.iter_mut().map(VirtualPace::new).collect();
         let groups = groups.into_iter().map(Some).collect();
         let (now, stopping, restarts) = (Nanos::ZERO, false, Vec::new());
-        let mut run = Self { groups, restarters, restarts, paces, now, stopping, reexecution, control, supervisor };
+        let stopwatches = Vec::new();
+        let mut run =
+            Self { groups, restarters, restarts, paces, stopwatches, now, stopping, reexecution, control, supervisor };
         run.end_what_is_over();
         run
+    }
+
+    /// Measures what each release costs.
+    pub(crate) fn measuring_cost(mut self) -> Self {
+        self.stopwatches = self.paces.iter().map(|_| Stopwatch::new()).collect();
+        self
+    }
+
+    /// What the releases of each group cost; empty if that is not measured.
+    pub(crate) fn costs(&self) -> impl Iterator<Item = Snapshot> {
+        self.stopwatches.iter().map(|stopwatch| stopwatch.reader().snapshot())
     }
 
     pub(crate) fn now(&self) -> Nanos {
@@ -102,7 +119,8 @@ impl VirtualRun {
         planned.took_over.into_iter().for_each(|took_over| group.note_watchdog(took_over));
         let (latency, wake) = (group.spec.latency, planned.wake);
         let end = |scheduled: Nanos| (scheduled + latency).max(wake.free.unwrap_or(wake.woke));
-        let result = group.release(wake, |_| wake.woke, end);
+        let stopwatch = self.stopwatches.get_mut(index);
+        let result = Stopwatch::around(stopwatch, || group.release(wake, |_| wake.woke, end));
         self.paces[index].plan(group);
         result
     }
@@ -110,7 +128,7 @@ impl VirtualRun {
     /// The next recorded release of a group.
     fn rerun(&mut self, index: usize, release: &RecordedRelease) -> Result<(), RuntimeFault> {
         let (Some(group), Some(script)) = (&mut self.groups[index], &mut self.reexecution) else { return Ok(()) };
-        group.rerun(release)?;
+        Stopwatch::around(self.stopwatches.get_mut(index), || group.rerun(release))?;
         script.done(index, group)
     }
 

@@ -151,8 +151,10 @@ fn global(global: &GlobalSpec) -> Result<(), Error> {
         );
         return Err(Error::scene("global.substeps_per_ms", message));
     }
-    let latencies =
-        [("global.compute_latency_ms", global.compute_latency_ms), ("global.basis_latency_ms", global.basis_latency_ms)];
+    let latencies = [
+        ("global.compute_latency_ms", global.compute_latency_ms),
+        ("global.basis_latency_ms", global.basis_latency_ms),
+    ];
     for (field, latency_ms) in latencies {
         not_negative(field, latency_ms)?;
         if latency_ms > MAX_LATENCY_MS {

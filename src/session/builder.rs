@@ -3,7 +3,7 @@
 use super::Session;
 use super::prepare::{Parts, prepare};
 use crate::devices::{Device, ToolPath};
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::model::body::Body;
 use crate::runtime::{Execution, RateGroup};
 use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, LocalModelKind, Scene};
@@ -136,6 +136,14 @@ impl SessionBuilder {
         self
     }
 
+    /// Virtual time: measures the CPU time of every release and of every build of a local model, for
+    /// [`RuntimeReport::costs`](crate::runtime::RuntimeReport::costs) and [`Summary::builds`](super::Summary::builds).
+    #[must_use]
+    pub fn measure_cost(mut self) -> Self {
+        self.parts.measures_cost = true;
+        self
+    }
+
     /// Reads the log of an earlier run of this session, to execute it again in simulated time, as
     /// [`Session::replay`] does for a scene. The builder must be filled as it was for that run, without the device: a body
     /// of the program's own is not in the log.
@@ -152,6 +160,9 @@ impl SessionBuilder {
     /// # Errors
     /// Whatever cannot work, naming the field and what would be right.
     pub fn build(self) -> Result<Session, Error> {
+        if self.parts.measures_cost && self.parts.execution == Execution::Threaded {
+            return Err(Error::new(ErrorKind::Runtime, "cost is measured in virtual time only: use virtual_time()"));
+        }
         Ok(Session { prepared: prepare(self.parts)? })
     }
 }

@@ -7,7 +7,7 @@ use crate::error::{Error, ErrorKind};
 use crate::model::local::{LocalModel, PatchGeometry};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
-use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RecorderPort};
+use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RecorderPort, Stopwatch};
 
 /// The ports whose global halves a new actor takes again.
 pub(super) struct GlobalSide {
@@ -26,13 +26,14 @@ impl GlobalSide {
             ticks: self.ticks.reader(),
             geometry: self.geometry.as_ref().map(ExchangePort::reader),
             models: self.models.writer(),
-            surroundings: self.surroundings.as_ref().map(|(wishes, bases)| SurroundingsPorts {
-                wishes: wishes.writer(),
-                bases: bases.reader(),
-            }),
+            surroundings: self
+                .surroundings
+                .as_ref()
+                .map(|(wishes, bases)| SurroundingsPorts { wishes: wishes.writer(), bases: bases.reader() }),
             surface: self.surface.writer(),
             checkpoint: self.checkpoint.writer(),
             recorder: self.recorder.recorder(),
+            build_cost: None,
         }
     }
 }
@@ -48,6 +49,8 @@ pub(super) struct GlobalMaker {
     saved: OutletReader<Checkpoint>,
     plan: GlobalPlan,
     side: GlobalSide,
+    /// For the first actor; one that is started again is not measured.
+    build_cost: Option<Stopwatch>,
 }
 
 impl GlobalMaker {
@@ -55,7 +58,13 @@ impl GlobalMaker {
         let spare = simulation.duplicate();
         let last = Checkpoint { tool, state: simulation.state().clone(), contact: *simulation.contact() };
         let saved = side.checkpoint.reader();
-        Self { first: Some(simulation), spare, last, saved, plan, side }
+        Self { first: Some(simulation), spare, last, saved, plan, side, build_cost: None }
+    }
+
+    /// Measures what building a local model costs.
+    pub(super) fn measured_by(mut self, build_cost: Option<Stopwatch>) -> Self {
+        self.build_cost = build_cost;
+        self
     }
 
     pub(super) fn can_restart(&self) -> bool {
@@ -71,7 +80,7 @@ impl GlobalMaker {
         if self.saved.refresh() {
             self.last.clone_from(self.saved.get());
         }
-        let ports = self.side.take();
+        let ports = GlobalPorts { build_cost: self.build_cost.take(), ..self.side.take() };
         let simulation = match self.first.take() {
             Some(first) => first,
             None => self.restored()?,

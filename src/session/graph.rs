@@ -8,8 +8,8 @@ use super::replay::{Comparer, Reexecuted};
 use super::running::{Running, Viewer};
 use super::sink::{Memory, Sinks};
 use crate::actors::{
-    Checkpoint, DeviceActor, DeviceSample, ForceCommand, GlobalPlan, LocalActor, LocalPorts, LoggerActor, LoggerOutcome,
-    ModelSource, SurfaceView, ToolTick, ToolView, first_state,
+    Checkpoint, DeviceActor, DeviceSample, ForceCommand, GlobalPlan, LocalActor, LocalPorts, LoggerActor,
+    LoggerOutcome, ModelSource, SurfaceView, ToolTick, ToolView, first_state,
 };
 use crate::devices::DeviceState;
 use crate::error::Error;
@@ -17,7 +17,7 @@ use crate::log::{Environment, Execution as LogExecution, GroupInfo, ToolSample};
 use crate::model::Vec3;
 use crate::model::body::Block;
 use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
-use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, Restart, Runtime};
+use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, Restart, Runtime, Stopwatch};
 use crate::safety::{Actions, Pipeline};
 use crate::time::Rate;
 
@@ -53,6 +53,11 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     };
     #[cfg(not(all(feature = "log", feature = "scene")))]
     let mut graph = Runtime::builder(prepared.execution);
+    if prepared.measures_cost {
+        graph.measure_cost();
+    }
+    let build_cost = prepared.measures_cost.then(Stopwatch::new);
+    let builds = build_cost.as_ref().map(Stopwatch::reader);
     // Before the ports, so that they record what a replay needs. The order of the ports below numbers them in the log.
     let drain = graph.drain();
     let ticks_buffered = ((SECONDS_BUFFERED * prepared.haptic.as_hz()) as usize).max(MIN_TICKS_BUFFERED);
@@ -116,7 +121,8 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
                 bases: known,
                 prefetches: prepared.execution == Execution::Threaded,
             };
-            (source, rotating, Some(GlobalMaker::new(prepared.simulation, tool, plan, ports)))
+            let maker = GlobalMaker::new(prepared.simulation, tool, plan, ports);
+            (source, rotating, Some(maker.measured_by(build_cost)))
         }
     };
     let device = DeviceActor::new(
@@ -165,7 +171,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
         graph.until(until);
     }
     let running = graph.build()?.start()?;
-    Ok(Running::new(running, outcome, memory, Viewer::new(triangles, surface, view), prepared.until))
+    Ok(Running::new(running, outcome, memory, Viewer::new(triangles, surface, view), prepared.until).measuring(builds))
 }
 
 fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, Error> {

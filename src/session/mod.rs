@@ -15,6 +15,7 @@
 mod basis;
 mod budget;
 mod builder;
+mod compare;
 mod global;
 mod graph;
 mod prepare;
@@ -24,6 +25,7 @@ mod running;
 mod sink;
 
 pub use builder::SessionBuilder;
+pub use compare::{CompareOptions, CompareProgress, compare, one_period};
 #[cfg(all(feature = "log", feature = "scene"))]
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};
 pub use running::{Running, Summary, Viewer};

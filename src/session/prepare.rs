@@ -38,6 +38,7 @@ pub(super) struct Parts {
     #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
+    pub measures_cost: bool,
     pub endless: bool,
 }
 
@@ -56,6 +57,7 @@ impl Parts {
             #[cfg(feature = "log")]
             log: None,
             keep_records: false,
+            measures_cost: false,
         }
     }
 }
@@ -85,6 +87,7 @@ pub(super) struct Prepared {
     #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
+    pub measures_cost: bool,
     /// The scene file's text, for the log.
     pub source: Option<String>,
     /// The scene as it is run, with everything that a program or the command line changed.
@@ -223,6 +226,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         #[cfg(feature = "log")]
         log: parts.log,
         keep_records: parts.keep_records,
+        measures_cost: parts.measures_cost,
         source: scene.source,
         #[cfg(feature = "scene")]
         as_run,

@@ -8,6 +8,7 @@ use super::sink::Memory;
 use crate::actors::{LoggerOutcome, SurfaceView, ToolView};
 use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
+use crate::runtime::histogram::{HistogramReader, Snapshot};
 use crate::runtime::{GroupLive, OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
 use crate::time::Nanos;
 
@@ -24,6 +25,7 @@ pub struct Running {
     memory: Option<Memory>,
     viewer: Option<Viewer>,
     until: Option<Nanos>,
+    builds: Option<HistogramReader>,
 }
 
 impl Running {
@@ -34,7 +36,13 @@ impl Running {
         viewer: Viewer,
         until: Option<Nanos>,
     ) -> Self {
-        Self { runtime, outcome, memory, viewer: Some(viewer), until }
+        Self { runtime, outcome, memory, viewer: Some(viewer), until, builds: None }
+    }
+
+    /// Reports what `builds` has counted.
+    pub(super) fn measuring(mut self, builds: Option<HistogramReader>) -> Self {
+        self.builds = builds;
+        self
     }
 
     /// Waits for `span`, or until the run has ended; in virtual time, runs that much of it.
@@ -88,7 +96,8 @@ impl Running {
         let runtime = self.runtime.stop();
         let (report, log_error) = self.outcome.take();
         let records = self.memory.map(|memory| memory.take()).unwrap_or_default();
-        Summary { report, runtime, log_error, records }
+        let builds = self.builds.map(|builds| builds.snapshot());
+        Summary { report, runtime, log_error, records, builds }
     }
 }
 
@@ -144,6 +153,9 @@ pub struct Summary {
     pub log_error: Option<Error>,
     /// Every record, if they were kept.
     pub records: Vec<LogRecord>,
+    /// CPU time of building each local model, if [cost was measured](super::SessionBuilder::measure_cost); none for
+    /// `full`, which is never built anew.
+    pub builds: Option<Snapshot>,
 }
 
 impl fmt::Display for Summary {

@@ -1,8 +1,8 @@
 //! A small run for the log tests: every kind of record, at the rates of a real one.
 
 use palpate::log::{
-    CommandSample, ContactMode, ContactSample, Environment, Execution, ForceSample, GlobalTick, GroupInfo, GroupStats, ServedBy,
-    Level, LogEntry, LogRecord, McapWriter, Percentiles, ProbeSample, Resync, TextEvent, ToolSample,
+    CommandSample, ContactMode, ContactSample, Environment, Execution, ForceSample, GlobalTick, GroupInfo, GroupStats,
+    Level, LogEntry, LogRecord, McapWriter, Percentiles, ProbeSample, Resync, ServedBy, TextEvent, ToolSample,
 };
 use palpate::runtime::record::{Event, SlipCause, TickTiming};
 use palpate::runtime::{Mode, PortUse};

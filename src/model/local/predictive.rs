@@ -151,7 +151,8 @@ impl Predictive {
                 self.path.push(ring.clone().map(|node| RingSample::at(node, &self.state, &self.forces)));
                 let deviations = self.forces[ring.clone()].iter().zip(&resting).map(|(f, f_0)| f - f_0);
                 forecast.model().step(&mut self.surroundings, deviations, d);
-                for ((node, origin), (x, v)) in ring.clone().zip(&origin).zip(forecast.model().ring(&self.surroundings)) {
+                for ((node, origin), (x, v)) in ring.clone().zip(&origin).zip(forecast.model().ring(&self.surroundings))
+                {
                     (self.state.positions[node], self.state.velocities[node]) = (origin + x, v);
                 }
                 force
@@ -198,7 +199,8 @@ impl Predictive {
     /// True if the contact is on a node that gives way in the body but not here.
     fn contact_is_beyond(&self) -> bool {
         let touched = self.contact.triangle.filter(|_| self.contact.is_touching());
-        touched.is_some_and(|t| self.window.surface.triangles[t as usize].iter().any(|&node| self.beyond[node as usize]))
+        touched
+            .is_some_and(|t| self.window.surface.triangles[t as usize].iter().any(|&node| self.beyond[node as usize]))
     }
 }
 

@@ -71,8 +71,7 @@ impl Window {
             self.add_triangle(triangle);
         }
         let candidates = self.triangles.len();
-        let corners: Vec<u32> =
-            self.triangles.iter().flat_map(|&t| whole.triangles[t as usize]).collect();
+        let corners: Vec<u32> = self.triangles.iter().flat_map(|&t| whole.triangles[t as usize]).collect();
         for node in corners {
             self.add_triangles(whole, node);
         }

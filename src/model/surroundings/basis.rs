@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use super::super::Vec3;
 use super::super::body::State;
 use super::super::dense;
 use super::super::sparse::SparseFactor;
-use super::super::Vec3;
+use super::SpringGraph;
 use super::far::Far;
 use super::reduced::{Reduced, ReducedMotion};
-use super::SpringGraph;
 use crate::error::{Error, ErrorKind};
 
 /// The real frequency that the answers are expanded at (rad/s): between rest and the fastest that a hand does.
@@ -131,7 +131,8 @@ impl Forecast {
     /// # Real-time
     /// For the global actor: reads all modes once; may allocate.
     pub(crate) fn launch(&self, motion: &mut ReducedMotion, state: &State, forces: &[Vec3], span: f64) -> bool {
-        let (mut momentum, mut force) = (Vec::with_capacity(3 * self.nodes.len()), Vec::with_capacity(3 * self.nodes.len()));
+        let (mut momentum, mut force) =
+            (Vec::with_capacity(3 * self.nodes.len()), Vec::with_capacity(3 * self.nodes.len()));
         // In the norm of the mass, in which the modes are orthonormal.
         let (mut speed, mut acceleration) = (0.0, 0.0);
         for (&node, mass) in self.nodes.iter().zip(&self.masses) {

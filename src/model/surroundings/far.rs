@@ -139,7 +139,8 @@ impl Far {
     pub(super) fn proportional_damping(&self) -> Option<f64> {
         let first = self.springs.first().filter(|spring| spring.stiffness > 0.0)?;
         let share = first.damping / first.stiffness;
-        let same = |spring: &FarSpring| (spring.damping - share * spring.stiffness).abs() <= PROPORTIONAL * spring.damping;
+        let same =
+            |spring: &FarSpring| (spring.damping - share * spring.stiffness).abs() <= PROPORTIONAL * spring.damping;
         self.springs.iter().all(same).then_some(share)
     }
 

@@ -37,7 +37,9 @@ impl Reduced {
         let shapes = dense::combinations(shapes, &modes, far.unknowns(), columns);
         let damping = match far.proportional_damping() {
             Some(share) => Damping::Diagonal(values.iter().map(|value| share * value).collect()),
-            None => Damping::Full(dense::product(&modes, &dense::combinations(&damping, &modes, columns, columns), columns)),
+            None => {
+                Damping::Full(dense::product(&modes, &dense::combinations(&damping, &modes, columns, columns), columns))
+            }
         };
         let unknowns = ring.iter().flat_map(|&node| (0..3).map(move |axis| far.unknown(node, axis)));
         let row = |unknown: usize| (0..states).map(move |state| (state, unknown));

@@ -132,7 +132,14 @@ mod tests {
             watchdog_takeovers: 0,
         };
         let groups = ["local", "global"].into_iter().zip(released).map(group).collect();
-        RuntimeReport { groups, grant: Default::default(), fault: None, restarts: Vec::new(), lost_records: 0 }
+        RuntimeReport {
+            groups,
+            grant: Default::default(),
+            fault: None,
+            restarts: Vec::new(),
+            lost_records: 0,
+            costs: Vec::new(),
+        }
     }
 
     // Check that what is excused is named, and that nothing else is: an earlier release, a fault inside of one.

@@ -1,0 +1,247 @@
+//! One chart: frame, grid, lines, labelled points.
+
+use std::fmt::Write;
+
+use super::super::html::escaped;
+use super::axis::Axis;
+use super::thin::thinned;
+
+/// Drawn size; the page scales it.
+const HEAD: f64 = 26.0;
+const LEFT: f64 = 54.0;
+const RIGHT: f64 = 12.0;
+const FOOT: f64 = 38.0;
+/// What a letter of a label takes.
+const LETTER: f64 = 6.4;
+const LINE: f64 = 13.0;
+
+/// A curve.
+#[derive(Clone, Debug)]
+pub(in crate::report) struct Line<'a> {
+    /// Classes of the page that colour and hide it.
+    pub(in crate::report) class: String,
+    /// What it shows, read out where it is pointed at.
+    pub(in crate::report) name: &'a str,
+    /// x and y, rising in x.
+    pub(in crate::report) points: Vec<(f64, f64)>,
+}
+
+/// A point with a label.
+#[derive(Clone, Debug)]
+pub(in crate::report) struct Point {
+    pub(in crate::report) class: String,
+    pub(in crate::report) label: String,
+    pub(in crate::report) at: (f64, f64),
+    pub(in crate::report) is_hollow: bool,
+}
+
+/// A vertical line.
+#[derive(Clone, Debug)]
+pub(in crate::report) struct Mark {
+    pub(in crate::report) x: f64,
+    pub(in crate::report) label: String,
+}
+
+/// A chart.
+#[derive(Clone, Debug)]
+pub(in crate::report) struct Chart<'a> {
+    pub(in crate::report) title: String,
+    pub(in crate::report) width: f64,
+    pub(in crate::report) height: f64,
+    pub(in crate::report) x: Axis,
+    pub(in crate::report) y: Axis,
+    /// From x to x: shaded.
+    pub(in crate::report) band: Option<[f64; 2]>,
+    pub(in crate::report) marks: Vec<Mark>,
+    pub(in crate::report) lines: Vec<Line<'a>>,
+    pub(in crate::report) points: Vec<Point>,
+}
+
+impl Chart<'_> {
+    /// The chart as an SVG element of a page.
+    pub(in crate::report) fn to_svg(&self) -> String {
+        let (width, height) = (self.width, self.height);
+        let mut svg = format!(
+            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n\
+             <text class=\"title\" x=\"{LEFT}\" y=\"16\">{0}</text>\n",
+            escaped(&self.title)
+        );
+        self.draw(&mut svg);
+        svg.push_str("</svg>\n");
+        svg
+    }
+
+    fn across(&self) -> f64 {
+        self.width - LEFT - RIGHT
+    }
+
+    fn down(&self) -> f64 {
+        self.height - HEAD - FOOT
+    }
+
+    /// From the left edge of the plot.
+    fn px(&self, x: f64) -> f64 {
+        self.x.place(x) * self.across()
+    }
+
+    /// From the top edge of the plot.
+    fn py(&self, y: f64) -> f64 {
+        (1.0 - self.y.place(y)) * self.down()
+    }
+
+    // Writing to a string cannot fail.
+    fn draw(&self, svg: &mut String) {
+        let (across, down) = (self.across(), self.down());
+        let (bottom, middle) = (HEAD + down, HEAD + 0.5 * down);
+        if let Some([from, to]) = self.band {
+            let (from, to) = (self.px(from), self.px(to));
+            let (x, wide) = (LEFT + from, to - from);
+            let _ =
+                writeln!(svg, "<rect class=\"band\" x=\"{x:.1}\" y=\"{HEAD}\" width=\"{wide:.1}\" height=\"{down}\"/>");
+        }
+        for (value, label) in self.x.ticks() {
+            let x = LEFT + self.px(value);
+            let _ = writeln!(svg, "<path class=\"grid\" d=\"M{x:.1} {HEAD}v{down}\"/>");
+            if let Some(label) = label {
+                let y = bottom + 14.0;
+                let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\">{label}</text>");
+            }
+        }
+        for (value, label) in self.y.ticks() {
+            let y = HEAD + self.py(value);
+            let _ = writeln!(svg, "<path class=\"grid\" d=\"M{LEFT} {y:.1}h{across}\"/>");
+            if let Some(label) = label {
+                let (x, y) = (LEFT - 6.0, y + 4.0);
+                let _ = writeln!(svg, "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\">{label}</text>");
+            }
+        }
+        for mark in &self.marks {
+            let x = LEFT + self.px(mark.x);
+            let _ = writeln!(svg, "<path class=\"mark\" d=\"M{x:.1} {HEAD}v{down}\"/>");
+            if !mark.label.is_empty() {
+                let (x, y, label) = (x - 4.0, HEAD + LINE, escaped(&mark.label));
+                let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"end\">{label}</text>");
+            }
+        }
+        // An inner svg cuts off what leaves the plot.
+        let _ = writeln!(svg, "<svg x=\"{LEFT}\" y=\"{HEAD}\" width=\"{across}\" height=\"{down}\">");
+        self.lines.iter().for_each(|line| self.draw_line(svg, line));
+        svg.push_str("</svg>\n");
+        let _ = writeln!(svg, "<rect class=\"frame\" x=\"{LEFT}\" y=\"{HEAD}\" width=\"{across}\" height=\"{down}\"/>");
+        self.draw_points(svg);
+        let (x, y) = (LEFT + 0.5 * across, self.height - 6.0);
+        let _ = writeln!(svg, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\">{}</text>", escaped(&self.x.label));
+        let y_label = escaped(&self.y.label);
+        let _ = writeln!(
+            svg,
+            "<text transform=\"translate(12 {middle}) rotate(-90)\" text-anchor=\"middle\">{y_label}</text>"
+        );
+    }
+
+    fn draw_line(&self, svg: &mut String, line: &Line<'_>) {
+        let points = thinned(line.points.iter().copied(), self.x.range, self.across() as usize);
+        if points.is_empty() {
+            return;
+        }
+        let _ = write!(svg, "<path class=\"line {}\" d=\"", line.class);
+        for (index, (x, y)) in points.into_iter().enumerate() {
+            let step = if index == 0 { 'M' } else { 'L' };
+            // Far outside is outside: a huge number would only take room.
+            let y = self.py(y).clamp(-9.0, self.down() + 9.0);
+            let _ = write!(svg, "{step}{:.1} {y:.1}", self.px(x));
+        }
+        let _ = writeln!(svg, "\"><title>{}</title></path>", escaped(line.name));
+    }
+
+    /// Points, each with its label where no other one is.
+    fn draw_points(&self, svg: &mut String) {
+        let place = |point: &Point| (LEFT + self.px(point.at.0), HEAD + self.py(point.at.1));
+        let mut taken: Vec<Area> = self.points.iter().map(|point| Area::around(place(point), 6.0, 6.0)).collect();
+        for point in &self.points {
+            let (x, y) = place(point);
+            let long = LETTER * point.label.chars().count() as f64;
+            let right = [-0.1, 1.0, -1.0, 2.0, -2.0].map(|lines| (x + 9.0, y + 4.0 + lines * LINE));
+            let left = [-0.1, 1.0, -1.0, 2.0, -2.0].map(|lines| (x - 9.0 - long, y + 4.0 + lines * LINE));
+            let area = |(x, y): (f64, f64)| Area { left: x, right: x + long, top: y - LINE + 3.0, bottom: y + 3.0 };
+            let plot = Area { left: LEFT, right: self.width, top: HEAD, bottom: HEAD + self.down() };
+            let is_free =
+                |at: &&(f64, f64)| plot.holds(&area(**at)) && !taken.iter().any(|taken| taken.meets(&area(**at)));
+            let at = *right.iter().chain(&left).find(is_free).unwrap_or(&right[0]);
+            taken.push(area(at));
+            let (class, hollow) = (&point.class, if point.is_hollow { " hollow" } else { "" });
+            let label = escaped(&point.label);
+            let _ = writeln!(
+                svg,
+                "<g class=\"{class}\"><circle class=\"point{hollow}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/>\
+                 <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\">{label}</text></g>",
+                at.0, at.1
+            );
+        }
+    }
+}
+
+/// A rectangle of the picture.
+struct Area {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+}
+
+impl Area {
+    fn around((x, y): (f64, f64), dx: f64, dy: f64) -> Self {
+        Self { left: x - dx, right: x + dx, top: y - dy, bottom: y + dy }
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
+    }
+
+    fn holds(&self, other: &Self) -> bool {
+        self.left <= other.left && other.right <= self.right && self.top <= other.top && other.bottom <= self.bottom
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart() -> Chart<'static> {
+        Chart {
+            title: "a < b".to_owned(),
+            width: 600.0,
+            height: 200.0,
+            x: Axis::linear("t (s)", [0.0, 1.0]),
+            y: Axis::log("error (%)", [0.1, 10.0]),
+            band: Some([0.2, 0.4]),
+            marks: vec![Mark { x: 0.5, label: "the period".to_owned() }],
+            lines: vec![Line { class: "c1".to_owned(), name: "patch", points: vec![(0.0, 0.0), (1.0, 1e300)] }],
+            points: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_chart_is_drawn_with_its_labels_and_without_numbers_that_no_browser_reads() {
+        let svg = chart().to_svg();
+        for words in
+            ["a &lt; b", "t (s)", "error (%)", "the period", "class=\"band\"", "<title>patch</title>", ">10</text>"]
+        {
+            assert!(svg.contains(words), "{words:?} is not in {svg}");
+        }
+        // The plot is 534 by 136: zero is at the bottom, what is too large is cut off above.
+        assert!(svg.contains("d=\"M0.0 136.0L534.0 -9.0\""), "{svg}");
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    }
+
+    #[test]
+    fn labels_of_points_at_one_place_do_not_lie_on_each_other() {
+        let mut chart = chart();
+        let point = |label: &str| Point { class: "c1".into(), label: label.into(), at: (0.5, 1.0), is_hollow: false };
+        chart.points = ["one", "two", "six"].map(point).into();
+        let svg = chart.to_svg();
+        let places: Vec<&str> = svg.lines().filter_map(|line| line.split("class=\"label\"").nth(1)).collect();
+        let place = |text: &str| text.split('>').next().unwrap_or_default().to_owned();
+        assert_eq!(places.len(), 3);
+        assert!(place(places[0]) != place(places[1]) && place(places[1]) != place(places[2]), "{places:?}");
+    }
+}
