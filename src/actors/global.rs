@@ -1,5 +1,7 @@
 //! The global actor: advances the whole body along the tool's path and publishes the next local model.
 
+use std::ops::Range;
+
 use super::basis::Wishes;
 use super::cause::Cause;
 use super::messages::{Checkpoint, SurfaceView, ToolTick};
@@ -79,6 +81,8 @@ pub struct GlobalActor {
     history: ToolHistory,
     /// Working memory: triangles that a window has to hold.
     triangles: Vec<u32>,
+    /// Working memory: the same for other windows.
+    others: Vec<u32>,
 }
 
 impl GlobalActor {
@@ -89,7 +93,7 @@ impl GlobalActor {
     pub fn new(simulation: Simulation, tool: ToolTick, plan: GlobalPlan, ports: GlobalPorts) -> Result<Self, Error> {
         let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
         let history = ToolHistory::new(tool.position, plan.haptic.period_s());
-        Ok(Self { simulation, aim, ports, plan, tool, history, triangles: Vec::new() })
+        Ok(Self { simulation, aim, ports, plan, tool, history, triangles: Vec::new(), others: Vec::new() })
     }
 
     /// Advances along every tool sample up to `until`; returns whether all of them were there.
@@ -127,19 +131,34 @@ impl GlobalActor {
         let tool = self.history.forecast();
         self.aim.refit(&self.simulation.state().positions);
         self.aim.triangles(self.simulation.contact().triangle, &tool, 0.0, &mut self.triangles);
+        self.publish_wishes(ctx, &tool);
+        let window = self.window();
         let resync = ResyncView {
             global: &mut self.simulation,
             tick: self.tool.tick,
-            triangles: &self.triangles,
+            triangles: &self.triangles[window],
             tool,
             horizon: self.plan.horizon,
             bases: &self.plan.bases,
         };
         let model = self.ports.models.buffer();
         Stopwatch::around(self.ports.build_cost.as_mut(), || model.rebuild(resync));
-        let version = self.ports.models.publish(ctx);
-        self.publish_wishes(ctx, &tool);
-        version
+        self.ports.models.publish(ctx)
+    }
+
+    /// Which of the triangles the window is made for: all of them, or, while there is no basis for that, where the tool
+    /// will be or where it is.
+    fn window(&self) -> Range<usize> {
+        let all = 0..self.triangles.len();
+        if self.ports.surroundings.is_none() {
+            return all;
+        }
+        let mut patch = Vec::new();
+        let mut is_there = |window: &Range<usize>| {
+            self.simulation.body().patch(&self.triangles[window.clone()], self.plan.patch, &mut patch);
+            self.plan.bases.get(&patch).is_some()
+        };
+        [all.clone(), all.end - 1..all.end, 0..1].into_iter().find(|window| is_there(window)).unwrap_or(all)
     }
 
     /// Takes the bases that are there by now.
@@ -154,7 +173,7 @@ impl GlobalActor {
     /// Asks for the bases that are missing: of the present window, of the next release's, and of those around.
     fn publish_wishes(&mut self, ctx: &TickContext, tool: &ToolForecast) {
         let Some(ports) = &mut self.ports.surroundings else { return };
-        let (aim, body, triangles) = (&self.aim, self.simulation.body(), &mut self.triangles);
+        let (aim, body, triangles) = (&self.aim, self.simulation.body(), &mut self.others);
         let wishes = ports.wishes.buffer();
         wishes.patches.clear();
         let mut wish = |triangles: &[u32]| {
@@ -164,7 +183,7 @@ impl GlobalActor {
                 wishes.patches.push(patch);
             }
         };
-        wish(triangles);
+        wish(&self.triangles);
         aim.triangles(None, tool, self.plan.global.period_s(), triangles);
         wish(triangles);
         if self.plan.prefetches {

@@ -8,7 +8,7 @@ use super::super::contact::{Contact, Deformable, Law, ToolMotion, step};
 use super::super::simulation::Stepping;
 use super::super::surroundings::{Basis, ReducedMotion, SpringGraph};
 use super::near::NearSprings;
-use super::ring_path::{RingPath, RingSample};
+use super::ring_path::RingPath;
 use super::window::Window;
 use super::{Kind, LocalModel, PatchGeometry, Prediction, ResyncView, Watched};
 
@@ -40,6 +40,10 @@ pub struct Predictive {
     substep: usize,
     basis: Option<Arc<Basis>>,
     surroundings: ReducedMotion,
+    /// Working memory: of the ring, three numbers for each node.
+    ring_positions: Vec<f64>,
+    ring_velocities: Vec<f64>,
+    ring_forces: Vec<f64>,
     /// Its triangle is local.
     contact: Contact,
     law: Law,
@@ -73,6 +77,9 @@ impl Predictive {
             substep: 0,
             basis: None,
             surroundings: ReducedMotion::default(),
+            ring_positions: Vec::new(),
+            ring_velocities: Vec::new(),
+            ring_forces: Vec::new(),
             contact: Contact::default(),
             law: Law::default(),
             stepping: Stepping { tick: 1e-3, substeps: 1 },
@@ -117,44 +124,46 @@ impl Predictive {
     fn predict_by_global(&mut self, resync: &mut ResyncView<'_>) {
         let ring = self.ring();
         let Self { window, near, state, forces, path, present, stepping, .. } = self;
-        path.clear(window.ring, stepping.step());
+        path.clear(window.ring, stepping.step(), (resync.horizon * stepping.substeps + 1) as usize);
         let motion = |n| resync.tool.motion(n, stepping.tick);
         resync.global.look_ahead(resync.horizon, motion, present, |global| {
             window.gather(&global.positions, &mut state.positions);
             window.gather(&global.velocities, &mut state.velocities);
             near.forces(&state.positions, &state.velocities, forces);
-            path.push(ring.clone().map(|node| RingSample::at(node, state, forces)));
+            path.push(&state.positions[ring.clone()], &state.velocities[ring.clone()], &forces[ring.clone()]);
         });
         self.take_present(resync);
     }
 
-    /// As [`tick`](LocalModel::tick), with the forecast in place of the path.
+    /// As [`tick`](LocalModel::tick), with the forecast in place of the path. False if it does not hold the present motion.
     fn predict_by_forecast(&mut self, basis: &Basis, resync: &mut ResyncView<'_>) -> bool {
-        let (ring, forecast) = (self.ring(), basis.forecast());
-        let span = f64::from(resync.horizon) * self.stepping.tick;
+        let (ring, forecast, stepping) = (self.ring(), basis.forecast(), self.stepping);
+        let span = f64::from(resync.horizon) * stepping.tick;
         let (state, forces) = resync.global.internal_forces();
         if !forecast.launch(&mut self.surroundings, state, forces, span) {
             return false;
         }
-        self.path.clear(self.window.ring, self.stepping.step());
-        let origin = self.state.positions[ring.clone()].to_vec();
-        self.near.forces(&self.state.positions, &self.state.velocities, &mut self.forces);
-        let resting = self.forces[ring.clone()].to_vec();
-        let stepping = self.stepping;
+        self.path.clear(self.window.ring, stepping.step(), (resync.horizon * stepping.substeps) as usize);
+        let origin = flat(&self.state.positions[ring.clone()]);
+        self.take_near_forces();
+        let resting = flat(&self.forces[ring.clone()]);
         for n in 0..resync.horizon {
             if self.contact_is_beyond() {
                 // What the patch would do from here on is wrong: the ring coasts.
                 break;
             }
             stepping.tick(resync.tool.motion(n, stepping.tick), |tool, d| {
+                self.take_near_forces();
+                let Self { path, state, ring_forces, surroundings, ring_positions: x, ring_velocities: v, .. } = self;
+                let forces = &self.forces[ring.clone()];
+                path.push(&state.positions[ring.clone()], &state.velocities[ring.clone()], forces);
+                deviations(ring_forces, forces, &resting);
+                forecast.model().step(surroundings, ring_forces, d);
+                x.copy_from_slice(&origin);
+                v.fill(0.0);
+                forecast.model().add_ring(surroundings, x, v);
                 let force = self.contact_step(tool, d);
-                self.path.push(ring.clone().map(|node| RingSample::at(node, &self.state, &self.forces)));
-                let deviations = self.forces[ring.clone()].iter().zip(&resting).map(|(f, f_0)| f - f_0);
-                forecast.model().step(&mut self.surroundings, deviations, d);
-                for ((node, origin), (x, v)) in ring.clone().zip(&origin).zip(forecast.model().ring(&self.surroundings))
-                {
-                    (self.state.positions[node], self.state.velocities[node]) = (origin + x, v);
-                }
+                self.place_ring();
                 force
             });
         }
@@ -162,9 +171,21 @@ impl Predictive {
         true
     }
 
-    /// Near forces, and the patch one substep on.
-    fn contact_step(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
+    /// The ring's nodes to where `ring_positions` and `ring_velocities` say.
+    fn place_ring(&mut self) {
+        let ring = self.ring();
+        let places = self.ring_positions.as_chunks::<3>().0.iter().zip(self.ring_velocities.as_chunks::<3>().0);
+        for (node, (x, v)) in ring.zip(places) {
+            (self.state.positions[node], self.state.velocities[node]) = (Vec3::from(*x), Vec3::from(*v));
+        }
+    }
+
+    fn take_near_forces(&mut self) {
         self.near.forces(&self.state.positions, &self.state.velocities, &mut self.forces);
+    }
+
+    /// The patch one substep on, under the near forces and the tool's.
+    fn contact_step(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
         let mut deformable = Deformable {
             positions: &mut self.state.positions,
             velocities: &mut self.state.velocities,
@@ -176,23 +197,21 @@ impl Predictive {
     }
 
     fn substep(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
+        self.take_near_forces();
         let force = self.contact_step(tool, d);
-        let ring = self.ring();
-        if let Some(basis) = &self.basis {
-            let predicted = self.path.at(self.substep);
-            let deviations = self.forces[ring.clone()].iter().zip(predicted).map(|(f, predicted)| f - predicted.force);
-            basis.answers().step(&mut self.surroundings, deviations, d);
+        let basis = self.basis.take();
+        if let Some(basis) = &basis {
+            let expected = self.path.at(self.substep).forces;
+            deviations(&mut self.ring_forces, &self.forces[self.window.movable..], expected);
+            basis.answers().step(&mut self.surroundings, &self.ring_forces, d);
         }
         self.substep += 1;
-        for (node, sample) in ring.clone().zip(self.path.at(self.substep)) {
-            (self.state.positions[node], self.state.velocities[node]) = (sample.position, sample.velocity);
+        self.path.at(self.substep).write(&mut self.ring_positions, &mut self.ring_velocities);
+        if let Some(basis) = &basis {
+            basis.answers().add_ring(&self.surroundings, &mut self.ring_positions, &mut self.ring_velocities);
         }
-        if let Some(basis) = &self.basis {
-            for (node, (x, v)) in ring.zip(basis.answers().ring(&self.surroundings)) {
-                self.state.positions[node] += x;
-                self.state.velocities[node] += v;
-            }
-        }
+        self.basis = basis;
+        self.place_ring();
         force
     }
 
@@ -201,6 +220,19 @@ impl Predictive {
         let touched = self.contact.triangle.filter(|_| self.contact.is_touching());
         touched
             .is_some_and(|t| self.window.surface.triangles[t as usize].iter().any(|&node| self.beyond[node as usize]))
+    }
+}
+
+/// The numbers of `vectors`, one after the other.
+fn flat(vectors: &[Vec3]) -> Vec<f64> {
+    vectors.iter().flat_map(|vector| vector.iter()).copied().collect()
+}
+
+/// out = forces - expected, as far as `expected` reaches.
+fn deviations(out: &mut [f64], forces: &[Vec3], expected: &[f64]) {
+    let forces = forces.iter().flat_map(|force| force.iter());
+    for ((out, force), expected) in out.iter_mut().zip(forces).zip(expected) {
+        *out = force - expected;
     }
 }
 
@@ -218,6 +250,9 @@ impl LocalModel for Predictive {
         self.beyond.extend(window.nodes[movable..].iter().map(|&node| body_masses[node as usize] > 0.0));
         self.forces.resize(window.nodes.len(), Vec3::zeros());
         self.basis = resync.bases.get(&window.nodes[..movable]).cloned();
+        for numbers in [&mut self.ring_positions, &mut self.ring_velocities, &mut self.ring_forces] {
+            numbers.resize(3 * self.window.ring, 0.0);
+        }
         self.take_present(&resync);
         self.predict(&mut resync);
         self.surroundings.rest(self.basis.as_ref().map_or(0, |basis| basis.answers().states()));

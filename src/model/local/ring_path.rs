@@ -1,60 +1,76 @@
-//! What the global model predicts for the ring around a patch, substep by substep.
+//! What is predicted for the ring around a patch, substep by substep.
 
 use super::super::Vec3;
-use super::super::body::State;
 
 /// Past its end the prediction coasts with its last velocity for this long (s), then stands still.
 const COASTING: f64 = 15e-3;
 
-/// Position (m), velocity (m/s) and the near springs' force (N) of one ring node at the start of a substep.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct RingSample {
-    pub position: Vec3,
-    pub velocity: Vec3,
-    pub force: Vec3,
-}
-
-impl RingSample {
-    pub(super) fn at(node: usize, state: &State, forces: &[Vec3]) -> Self {
-        Self { position: state.positions[node], velocity: state.velocities[node], force: forces[node] }
-    }
-}
-
-/// The predicted motion of the ring.
+/// The predicted motion of the ring: positions (m), velocities (m/s) and near springs' forces (N), three numbers for each
+/// ring node.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RingPath {
-    ring: usize,
+    /// Numbers of one quantity: three times the ring nodes.
+    numbers: usize,
     /// Substep (s).
     step: f64,
-    /// One after the other the samples of each substep, and of the end.
-    samples: Vec<RingSample>,
+    /// Positions, velocities and forces at the start of each substep, one after the other.
+    samples: Vec<f64>,
+}
+
+/// The ring at one time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RingSample<'a> {
+    pub(super) positions: &'a [f64],
+    pub(super) velocities: &'a [f64],
+    pub(super) forces: &'a [f64],
+    /// How long the ring has gone on with its velocity since (s).
+    pub(super) coasted: f64,
+    /// False once it stands still.
+    pub(super) moves: bool,
 }
 
 impl RingPath {
-    /// Forgets all samples; the next are of `ring` nodes, `step` seconds apart.
-    pub(super) fn clear(&mut self, ring: usize, step: f64) {
-        (self.ring, self.step) = (ring, step);
+    /// Forgets all samples; the next are of `ring` nodes, `step` seconds apart, and there is room for `count`.
+    pub(super) fn clear(&mut self, ring: usize, step: f64, count: usize) {
+        (self.numbers, self.step) = (3 * ring, step);
         self.samples.clear();
+        self.samples.reserve(3 * self.numbers * count);
     }
 
-    pub(super) fn push(&mut self, samples: impl Iterator<Item = RingSample>) {
-        self.samples.extend(samples);
-        debug_assert!(self.ring == 0 || self.samples.len().is_multiple_of(self.ring));
+    pub(super) fn push(&mut self, positions: &[Vec3], velocities: &[Vec3], forces: &[Vec3]) {
+        for vectors in [positions, velocities, forces] {
+            debug_assert_eq!(3 * vectors.len(), self.numbers);
+            self.samples.extend(vectors.iter().flat_map(|vector| vector.iter()));
+        }
     }
 
     /// The ring at the start of substep `n`, which may lie past the end.
-    pub(super) fn at(&self, n: usize) -> impl Iterator<Item = RingSample> {
-        let last = (self.samples.len() / self.ring.max(1)).saturating_sub(1);
+    pub(super) fn at(&self, n: usize) -> RingSample<'_> {
+        let last = (self.samples.len() / (3 * self.numbers).max(1)).saturating_sub(1);
+        let sample = &self.samples[n.min(last) * 3 * self.numbers..];
         let beyond = n.saturating_sub(last) as f64 * self.step;
-        let first = n.min(last) * self.ring;
-        let samples = &self.samples[first..(first + self.ring).min(self.samples.len())];
-        samples.iter().map(move |sample| {
-            if beyond == 0.0 {
-                return *sample;
-            }
-            let velocity = if beyond < COASTING { sample.velocity } else { Vec3::zeros() };
-            RingSample { position: sample.position + sample.velocity * beyond.min(COASTING), velocity, ..*sample }
-        })
+        RingSample {
+            positions: &sample[..self.numbers],
+            velocities: &sample[self.numbers..2 * self.numbers],
+            forces: &sample[2 * self.numbers..3 * self.numbers],
+            coasted: beyond.min(COASTING),
+            moves: beyond < COASTING,
+        }
+    }
+}
+
+impl RingSample<'_> {
+    /// Writes where the ring is (m) and its velocity (m/s).
+    pub(super) fn write(&self, positions: &mut [f64], velocities: &mut [f64]) {
+        positions.copy_from_slice(self.positions);
+        if self.moves {
+            velocities.copy_from_slice(self.velocities);
+        } else {
+            velocities.fill(0.0);
+        }
+        if self.coasted > 0.0 {
+            positions.iter_mut().zip(self.velocities).for_each(|(x, v)| *x += v * self.coasted);
+        }
     }
 }
 
@@ -65,15 +81,17 @@ mod tests {
     #[test]
     fn past_its_end_the_ring_coasts_and_then_stands_still() {
         let mut path = RingPath::default();
-        path.clear(1, 1e-3);
+        path.clear(1, 1e-3, 3);
         for n in 0..3 {
-            let position = Vec3::x() * f64::from(n);
-            path.push(std::iter::once(RingSample { position, velocity: Vec3::x(), force: Vec3::zeros() }));
+            path.push(&[Vec3::x() * f64::from(n)], &[Vec3::x()], &[Vec3::y() * f64::from(n)]);
         }
-        let at = |n| path.at(n).next().unwrap();
-        assert_eq!((at(1).position.x, at(2).position.x), (1.0, 2.0));
-        assert!((at(12).position.x - 2.010).abs() < 1e-12 && at(12).velocity.x == 1.0);
-        assert!((at(100).position.x - 2.015).abs() < 1e-12 && at(100).velocity.x == 0.0);
-        assert_eq!(RingPath::default().at(5).count(), 0);
+        let at = |n| {
+            let (mut x, mut v) = ([0.0; 3], [0.0; 3]);
+            path.at(n).write(&mut x, &mut v);
+            (x[0], v[0], path.at(n).forces[1])
+        };
+        assert_eq!((at(1), at(2)), ((1.0, 1.0, 1.0), (2.0, 1.0, 2.0)));
+        assert!((at(12).0 - 2.010).abs() < 1e-12 && at(12).1 == 1.0);
+        assert!((at(100).0 - 2.015).abs() < 1e-12 && at(100).1 == 0.0 && at(100).2 == 2.0);
     }
 }

@@ -9,6 +9,7 @@ use super::super::dense;
 use super::super::sparse::SparseFactor;
 use super::SpringGraph;
 use super::far::Far;
+use super::products::Columns;
 use super::reduced::{Reduced, ReducedMotion};
 use crate::error::{Error, ErrorKind};
 
@@ -63,6 +64,7 @@ impl Basis {
         factor.solve(&mut smooth);
         let shapes = [normalised(&wide, far.unknowns()), normalised(&smooth, far.unknowns())].concat();
         let (model, modes) = Reduced::new(&far, &ring, &shapes).ok_or_else(indefinite)?;
+        let modes = Columns::new(&modes, far.unknowns());
         let forecast = Forecast { nodes: far.nodes, masses: far.masses, modes, model };
         Ok(Some(Self { patch: patch.to_vec(), answers, forecast }))
     }
@@ -116,7 +118,7 @@ pub(crate) struct Forecast {
     nodes: Vec<u32>,
     masses: Vec<f64>,
     /// Modes on those nodes as columns, three numbers a node (1/sqrt(kg)).
-    modes: Vec<f64>,
+    modes: Columns,
     model: Reduced,
 }
 
@@ -142,10 +144,9 @@ impl Forecast {
             momentum.extend((v * *mass).iter());
             force.extend(f.iter());
         }
-        let rows = 3 * self.nodes.len();
-        let project = |vector: &[f64], mode: &[f64]| vector.iter().zip(mode).map(|(x, y)| x * y).sum::<f64>();
-        let (rate, load): (Vec<f64>, Vec<f64>) =
-            self.modes.chunks_exact(rows).map(|mode| (project(&momentum, mode), project(&force, mode))).unzip();
+        let (mut rate, mut load) = (vec![0.0; self.model.states()], vec![0.0; self.model.states()]);
+        self.modes.project(&momentum, &mut rate);
+        self.modes.project(&force, &mut load);
         let missing = |all: f64, held: &[f64]| (all - held.iter().map(|x| x * x).sum::<f64>()).max(0.0).sqrt();
         let travel = |v: f64, a: f64| v * span + 0.5 * a * span * span;
         let (all, lost) =

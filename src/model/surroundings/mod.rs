@@ -4,6 +4,7 @@
 mod basis;
 mod far;
 mod graph;
+mod products;
 mod reduced;
 
 pub use basis::{Bases, Basis};

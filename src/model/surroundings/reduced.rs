@@ -1,7 +1,8 @@
 //! A linear model in few states, in modal form, that answers to forces on a ring of nodes.
 
-use super::super::{Vec3, dense};
+use super::super::dense;
 use super::far::Far;
+use super::products::Columns;
 
 /// What the velocities do to the states' accelerations.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,8 +17,8 @@ enum Damping {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Reduced {
     states: usize,
-    /// Phi on the ring (1/sqrt(kg)): three rows of r for each node.
-    shapes: Vec<f64>,
+    /// Phi on the ring (1/sqrt(kg)): three numbers for each node.
+    shapes: Columns,
     /// One number per state (1/s^2), negative.
     stiffness: Vec<f64>,
     damping: Damping,
@@ -41,9 +42,12 @@ impl Reduced {
                 Damping::Full(dense::product(&modes, &dense::combinations(&damping, &modes, columns, columns), columns))
             }
         };
-        let unknowns = ring.iter().flat_map(|&node| (0..3).map(move |axis| far.unknown(node, axis)));
-        let row = |unknown: usize| (0..states).map(move |state| (state, unknown));
-        let on_ring = unknowns.flat_map(row).map(|(state, unknown)| shapes[state * far.unknowns() + unknown]).collect();
+        let mut on_ring = Vec::with_capacity(3 * ring.len() * states);
+        for shape in shapes.chunks_exact(far.unknowns()) {
+            let of_node = |&node: &u32| &shape[far.unknown(node, 0)..][..3];
+            on_ring.extend(ring.iter().flat_map(of_node));
+        }
+        let on_ring = Columns::new(&on_ring, 3 * ring.len());
         Some((Self { states, shapes: on_ring, stiffness: values, damping }, shapes))
     }
 
@@ -51,20 +55,14 @@ impl Reduced {
         self.states
     }
 
-    /// One step of `d` seconds under `forces` on the ring (N, of each node in order).
+    /// One step of `d` seconds under `forces` on the ring (N, three numbers for each node).
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub(crate) fn step(&self, motion: &mut ReducedMotion, forces: impl Iterator<Item = Vec3>, d: f64) {
+    pub(crate) fn step(&self, motion: &mut ReducedMotion, forces: &[f64], d: f64) {
         let ReducedMotion { eta, rate, acceleration, load, rate_origin } = motion;
-        let r = self.states;
         acceleration.copy_from_slice(load);
-        for (force, rows) in forces.zip(self.shapes.chunks_exact(3 * r)) {
-            let ((x, y), z) = (rows[..2 * r].split_at(r), &rows[2 * r..]);
-            for (((a, x), y), z) in acceleration.iter_mut().zip(x).zip(y).zip(z) {
-                *a += force.x * x + force.y * y + force.z * z;
-            }
-        }
+        self.shapes.project(forces, acceleration);
         match &self.damping {
             Damping::Diagonal(damping) => {
                 for (((a, c), rate), origin) in acceleration.iter_mut().zip(damping).zip(&*rate).zip(&*rate_origin) {
@@ -72,7 +70,7 @@ impl Reduced {
                 }
             }
             Damping::Full(damping) => {
-                for (a, row) in acceleration.iter_mut().zip(damping.chunks_exact(r)) {
+                for (a, row) in acceleration.iter_mut().zip(damping.chunks_exact(self.states)) {
                     *a += row.iter().zip(&*rate).zip(&*rate_origin).map(|((c, rate), o)| c * (rate - o)).sum::<f64>();
                 }
             }
@@ -83,21 +81,12 @@ impl Reduced {
         }
     }
 
-    /// Displacement (m) and velocity (m/s) of each ring node in order.
+    /// Adds the displacements (m) and velocities (m/s) of the ring, three numbers for each node.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub(crate) fn ring<'a>(&'a self, motion: &'a ReducedMotion) -> impl Iterator<Item = (Vec3, Vec3)> + 'a {
-        self.shapes.chunks_exact(3 * self.states).map(|rows| {
-            let (mut x, mut v) = (Vec3::zeros(), Vec3::zeros());
-            for (axis, row) in rows.chunks_exact(self.states).enumerate() {
-                for ((phi, eta), rate) in row.iter().zip(&motion.eta).zip(&motion.rate) {
-                    x[axis] += phi * eta;
-                    v[axis] += phi * rate;
-                }
-            }
-            (x, v)
-        })
+    pub(crate) fn add_ring(&self, motion: &ReducedMotion, positions: &mut [f64], velocities: &mut [f64]) {
+        self.shapes.combine([&motion.eta, &motion.rate], [positions, velocities]);
     }
 }
 

@@ -19,6 +19,6 @@ mod pull;
 mod simd;
 
 pub(super) use lattice::LatticeKernel;
-pub(super) use network::NetworkKernel;
+pub(in crate::model) use network::NetworkKernel;
 pub use simd::InstructionSet;
-pub(super) use simd::LANES;
+pub(in crate::model) use simd::{LANES, Lane, Simd, Work};

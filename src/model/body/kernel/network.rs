@@ -21,7 +21,7 @@ const WINDOW: usize = 512;
 
 /// Evaluates a list of springs.
 #[derive(Clone, Debug)]
-pub(in super::super) struct NetworkKernel {
+pub(in crate::model) struct NetworkKernel {
     /// The caller's numbers of the nodes, in the order of the kernel.
     order: Vec<u32>,
     /// The kernel's numbers of the nodes, in the caller's order.
@@ -32,7 +32,7 @@ pub(in super::super) struct NetworkKernel {
 }
 
 impl NetworkKernel {
-    pub(in super::super) fn new(nodes: usize, springs: &[(u32, u32, Spring)]) -> Self {
+    pub(in crate::model) fn new(nodes: usize, springs: &[(u32, u32, Spring)]) -> Self {
         let order = near_first(nodes, springs);
         let mut place = vec![0; nodes];
         for (new, &old) in order.iter().enumerate() {
@@ -82,7 +82,7 @@ impl NetworkKernel {
     }
 
     /// Writes the spring force on every node to `out`.
-    pub(in super::super) fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], out: &mut [Vec3]) {
+    pub(in crate::model) fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], out: &mut [Vec3]) {
         let Self { order, place, parts, set, cores } = self;
         let order = &order[..];
         cores.each(parts.iter_mut(), |part| part.evaluate(*set, order, positions, velocities));

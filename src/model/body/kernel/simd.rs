@@ -8,10 +8,10 @@ use super::{avx2::Avx2, avx512::Avx512};
 use crate::error::Error;
 
 /// Springs, or nodes, that a kernel takes at once.
-pub(in super::super) const LANES: usize = 8;
+pub(in crate::model) const LANES: usize = 8;
 
 /// Eight doubles in memory.
-pub(super) type Lane = [f64; LANES];
+pub(in crate::model) type Lane = [f64; LANES];
 
 /// Eight node numbers.
 pub(super) type Numbers = [u32; LANES];
@@ -20,7 +20,7 @@ pub(super) type Numbers = [u32; LANES];
 /// instruction set, so the methods are safe to call.
 ///
 /// All of them are to be inlined into one function that is compiled for the set: no closures on the way.
-pub(super) trait Simd: Copy {
+pub(in crate::model) trait Simd: Copy {
     /// Eight doubles in registers.
     type V: Copy;
     /// A yes or no for each of them.
@@ -72,7 +72,7 @@ pub(super) trait Simd: Copy {
 }
 
 /// Work that is compiled for each instruction set.
-pub(super) trait Work {
+pub(in crate::model) trait Work {
     fn run<S: Simd>(self, simd: S);
 }
 
@@ -130,7 +130,7 @@ impl InstructionSet {
 
     /// Does `work` with this set; with the portable one where the machine lacks it.
     #[inline]
-    pub(super) fn run(self, work: impl Work) {
+    pub(in crate::model) fn run(self, work: impl Work) {
         #[cfg(target_arch = "x86_64")]
         match self {
             Self::Avx512 => {
