@@ -65,6 +65,13 @@ pub struct GlobalPlan {
     pub prefetches: bool,
 }
 
+impl GlobalPlan {
+    /// How long a local model serves from its state on (s).
+    fn lead_s(&self) -> f64 {
+        f64::from(self.horizon) * self.haptic.period_s()
+    }
+}
+
 /// Runs the slow, detailed simulation.
 ///
 /// # Real-time
@@ -130,7 +137,8 @@ impl GlobalActor {
     fn publish_model(&mut self, ctx: &TickContext) -> u64 {
         let tool = self.history.forecast();
         self.aim.refit(&self.simulation.state().positions);
-        self.aim.triangles(self.simulation.contact().triangle, &tool, 0.0, &mut self.triangles);
+        let now = [0.0, self.plan.lead_s()];
+        self.aim.triangles(self.simulation.contact().triangle, &tool, now, &mut self.triangles);
         self.publish_wishes(ctx, &tool);
         let window = self.window();
         let resync = ResyncView {
@@ -176,6 +184,7 @@ impl GlobalActor {
         let (aim, body, triangles) = (&self.aim, self.simulation.body(), &mut self.others);
         let wishes = ports.wishes.buffer();
         wishes.patches.clear();
+        let lead = self.plan.lead_s();
         let mut wish = |triangles: &[u32]| {
             let mut patch = Vec::new();
             body.patch(triangles, self.plan.patch, &mut patch);
@@ -184,11 +193,14 @@ impl GlobalActor {
             }
         };
         wish(&self.triangles);
-        aim.triangles(None, tool, self.plan.global.period_s(), triangles);
+        aim.triangles(None, tool, [self.plan.global.period_s(), lead], triangles);
         wish(triangles);
+        // It may come to one of the two sooner or later than expected.
+        wish(&[triangles[0], *triangles.last().unwrap_or(&triangles[0])]);
+        triangles.iter().for_each(|&triangle| wish(&[triangle]));
         if self.plan.prefetches {
             for ahead in PREFETCH_S {
-                aim.triangles(None, tool, ahead, triangles);
+                aim.triangles(None, tool, [ahead, lead], triangles);
                 wish(triangles);
             }
             aim.around(body.surface(), &tool.position, triangles);

@@ -6,8 +6,6 @@ use super::super::geometry::NearestTriangle;
 use super::super::mesh::Surface;
 use crate::error::Error;
 
-/// A window holds what the tool is expected over for this long: two periods of 30 Hz and the time to catch up (s).
-const LEAD: f64 = 75e-3;
 /// Places on that way that are looked at, besides the present one.
 const LOOKS: u32 = 3;
 
@@ -38,15 +36,16 @@ impl Aim {
     }
 
     /// Puts the triangles for a window that is made `after` seconds from now in place of `triangles`: the one under the
-    /// tool then, and those that it comes over. `contact` is the triangle that it touches at the time.
+    /// tool then, and those that it comes over in the `lead` seconds that follow. `contact` is the triangle that it touches
+    /// at the time.
     ///
     /// # Real-time
     /// For the global actor: bounded; `triangles` may grow.
-    pub fn triangles(&self, contact: Option<u32>, tool: &ToolForecast, after: f64, triangles: &mut Vec<u32>) {
+    pub fn triangles(&self, contact: Option<u32>, tool: &ToolForecast, [after, lead]: [f64; 2], triangles: &mut Vec<u32>) {
         triangles.clear();
         triangles.push(contact.unwrap_or_else(|| self.nearest.find(&tool.unbraked(after))));
         for look in 1..=LOOKS {
-            let ahead = after + LEAD * f64::from(look) / f64::from(LOOKS);
+            let ahead = after + lead * f64::from(look) / f64::from(LOOKS);
             triangles.push(self.nearest.find(&tool.unbraked(ahead)));
         }
     }
