@@ -1,7 +1,5 @@
 //! The global actor: advances the whole body along the tool's path and publishes the next local model.
 
-use std::ops::Range;
-
 use super::basis::Wishes;
 use super::cause::Cause;
 use super::messages::{Checkpoint, SurfaceView, ToolTick};
@@ -90,6 +88,8 @@ pub struct GlobalActor {
     triangles: Vec<u32>,
     /// Working memory: the same for other windows.
     others: Vec<u32>,
+    /// The patch of the next model.
+    patch: Vec<u32>,
 }
 
 impl GlobalActor {
@@ -100,7 +100,17 @@ impl GlobalActor {
     pub fn new(simulation: Simulation, tool: ToolTick, plan: GlobalPlan, ports: GlobalPorts) -> Result<Self, Error> {
         let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
         let history = ToolHistory::new(tool.position, plan.haptic.period_s());
-        Ok(Self { simulation, aim, ports, plan, tool, history, triangles: Vec::new(), others: Vec::new() })
+        Ok(Self {
+            simulation,
+            aim,
+            ports,
+            plan,
+            tool,
+            history,
+            triangles: Vec::new(),
+            others: Vec::new(),
+            patch: Vec::new(),
+        })
     }
 
     /// Advances along every tool sample up to `until`; returns whether all of them were there.
@@ -140,11 +150,12 @@ impl GlobalActor {
         let now = [0.0, self.plan.lead_s()];
         self.aim.triangles(self.simulation.contact().triangle, &tool, now, &mut self.triangles);
         self.publish_wishes(ctx, &tool);
-        let window = self.window();
+        self.choose_patch();
         let resync = ResyncView {
             global: &mut self.simulation,
             tick: self.tool.tick,
-            triangles: &self.triangles[window],
+            triangles: &self.triangles,
+            patch: self.ports.surroundings.is_some().then_some(&self.patch),
             tool,
             horizon: self.plan.horizon,
             bases: &self.plan.bases,
@@ -154,19 +165,15 @@ impl GlobalActor {
         self.ports.models.publish(ctx)
     }
 
-    /// Which of the triangles the window is made for: all of them, or, while there is no basis for that, where the tool
-    /// will be or where it is.
-    fn window(&self) -> Range<usize> {
-        let all = 0..self.triangles.len();
-        if self.ports.surroundings.is_none() {
-            return all;
+    /// The patch that the next model is made for: the one around the triangles, or a larger one if there is a basis for that
+    /// and not for this.
+    fn choose_patch(&mut self) {
+        self.simulation.body().patch(&self.triangles, self.plan.patch, &mut self.patch);
+        if self.plan.bases.get(&self.patch).is_none()
+            && let Some(larger) = self.plan.bases.around(&self.patch)
+        {
+            self.patch = larger.to_vec();
         }
-        let mut patch = Vec::new();
-        let mut is_there = |window: &Range<usize>| {
-            self.simulation.body().patch(&self.triangles[window.clone()], self.plan.patch, &mut patch);
-            self.plan.bases.get(&patch).is_some()
-        };
-        [all.clone(), all.end - 1..all.end, 0..1].into_iter().find(|window| is_there(window)).unwrap_or(all)
     }
 
     /// Takes the bases that are there by now.
@@ -195,9 +202,12 @@ impl GlobalActor {
         wish(&self.triangles);
         aim.triangles(None, tool, [self.plan.global.period_s(), lead], triangles);
         wish(triangles);
-        // It may come to one of the two sooner or later than expected.
-        wish(&[triangles[0], *triangles.last().unwrap_or(&triangles[0])]);
-        triangles.iter().for_each(|&triangle| wish(&[triangle]));
+        // It may leave for the next cells sooner or later than expected.
+        aim.heading(body, tool, self.triangles[0], triangles);
+        for last in 1..=triangles.len() {
+            wish(&triangles[..last]);
+            wish(&triangles[last - 1..]);
+        }
         if self.plan.prefetches {
             for ahead in PREFETCH_S {
                 aim.triangles(None, tool, [ahead, lead], triangles);

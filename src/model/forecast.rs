@@ -3,12 +3,17 @@
 use super::Vec3;
 use super::contact::ToolMotion;
 
-/// The motion dies away in about this time (s): a hand does not go on as it went for longer.
-const DECAY: f64 = 15e-3;
+/// The velocity dies away in about this time (s): a hand does not go on as it went for longer.
+const DECAY: f64 = 60e-3;
+/// What changes the velocity dies away in about this time (s).
+const CHANGE_DECAY: f64 = 30e-3;
 /// The velocity is the mean over this time (s).
 const SPAN: f64 = 3e-3;
+/// The acceleration is the mean over this time (s); shorter, the steps of an encoder would be all of it.
+const CHANGE_SPAN: f64 = 16e-3;
 
-/// A tool that runs on with its present velocity and comes to rest: q + v tau (1 - exp(-t / tau)).
+/// A tool that runs on with its present velocity and acceleration and comes to rest:
+/// q + v tau (1 - exp(-t / tau)) + a tau_a^2 (1 - (1 + t / tau_a) exp(-t / tau_a)).
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
@@ -18,12 +23,20 @@ pub struct ToolForecast {
     pub position: Vec3,
     /// Present velocity (m/s).
     pub velocity: Vec3,
+    /// Present acceleration (m/s^2).
+    pub acceleration: Vec3,
 }
 
 impl ToolForecast {
+    /// Of a tool that rests at `position` (m).
+    pub fn at_rest(position: Vec3) -> Self {
+        Self { position, ..Self::default() }
+    }
+
     /// The position expected `t` seconds from now.
     pub fn at(&self, t: f64) -> Vec3 {
-        self.position + self.velocity * (DECAY * -(-t / DECAY).exp_m1())
+        let change = CHANGE_DECAY * CHANGE_DECAY * (1.0 - (1.0 + t / CHANGE_DECAY) * (-t / CHANGE_DECAY).exp());
+        self.position + self.velocity * (DECAY * -(-t / DECAY).exp_m1()) + self.acceleration * change
     }
 
     /// The position `t` seconds from now if it kept its velocity: what a window has to be ready for.
@@ -38,7 +51,7 @@ impl ToolForecast {
     }
 }
 
-/// The last positions of the tool, for its mean velocity.
+/// The last positions of the tool, for its mean velocity and acceleration.
 #[derive(Clone, Debug)]
 pub struct ToolHistory {
     /// Newest first.
@@ -54,8 +67,7 @@ impl ToolHistory {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn new(position: Vec3, tick: f64) -> Self {
-        let ticks = (SPAN / tick).round().max(1.0) as usize;
-        Self { positions: vec![position; ticks + 1], known: 0, tick }
+        Self { positions: vec![position; ticks(CHANGE_SPAN, tick) + 1], known: 0, tick }
     }
 
     /// The tool's position one tick later (m).
@@ -73,13 +85,30 @@ impl ToolHistory {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn forecast(&self) -> ToolForecast {
-        let position = self.positions[0];
-        let velocity = match self.known {
+        let forecast = ToolForecast::at_rest(self.positions[0]);
+        let recent = self.known.min(ticks(SPAN, self.tick));
+        if recent == 0 {
+            return forecast;
+        }
+        // From the first and the last quarter of what is known.
+        let quarter = (self.known / 4).max(1);
+        let between = self.known - quarter;
+        let acceleration = match between {
             0 => Vec3::zeros(),
-            ticks => (position - self.positions[ticks]) / (ticks as f64 * self.tick),
+            _ => (self.mean_velocity(0, quarter) - self.mean_velocity(between, quarter)) / (between as f64 * self.tick),
         };
-        ToolForecast { position, velocity }
+        ToolForecast { velocity: self.mean_velocity(0, recent), acceleration, ..forecast }
     }
+
+    /// Over `ticks` ticks that end `ago` ticks ago.
+    fn mean_velocity(&self, ago: usize, ticks: usize) -> Vec3 {
+        (self.positions[ago] - self.positions[ago + ticks]) / (ticks as f64 * self.tick)
+    }
+}
+
+/// Whole ticks in `span` seconds, at least one.
+fn ticks(span: f64, tick: f64) -> usize {
+    (span / tick).round().max(1.0) as usize
 }
 
 #[cfg(test)]
@@ -87,17 +116,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_velocity_is_the_mean_of_what_is_known_and_the_motion_dies_away() {
+    fn velocity_and_acceleration_are_means_of_what_is_known_and_the_motion_dies_away() {
         let mut history = ToolHistory::new(Vec3::zeros(), 1e-3);
-        assert_eq!(history.forecast().velocity, Vec3::zeros());
+        assert_eq!(history.forecast(), ToolForecast::at_rest(Vec3::zeros()));
         history.push(Vec3::x() * 1e-3);
         assert!((history.forecast().velocity.x - 1.0).abs() < 1e-12, "one tick is known");
-        (2..10).for_each(|n| history.push(Vec3::x() * 2e-3 * f64::from(n)));
+        // x = t^2 with t in ms: 2000 m/s^2.
+        let at = |n: i32| Vec3::x() * f64::from(n * n) * 1e-3;
+        (2..40).for_each(|n| history.push(at(n)));
         let forecast = history.forecast();
-        assert!((forecast.velocity.x - 2.0).abs() < 1e-12);
+        assert!((forecast.velocity.x - (2.0 * 39.0 - 3.0)).abs() < 1e-9);
+        assert!((forecast.acceleration.x - 2000.0).abs() < 1e-6);
         assert_eq!(forecast.at(0.0), forecast.position);
-        let (first, far) = (forecast.motion(0, 1e-3), forecast.at(1.0));
-        assert!((first.to.x - first.from.x - 2e-3).abs() < 1e-4);
-        assert!((far.x - forecast.position.x - 2.0 * DECAY).abs() < 1e-12);
+        let first = forecast.motion(0, 1e-3);
+        assert!((first.to.x - first.from.x - 76e-3).abs() < 2e-3, "{first:?}");
+        let rest = forecast.velocity.x * DECAY + forecast.acceleration.x * CHANGE_DECAY * CHANGE_DECAY;
+        assert!((forecast.at(3.0).x - forecast.position.x - rest).abs() < 1e-9);
     }
 }

@@ -68,7 +68,7 @@ fn first_bases(prepared: &Prepared, springs: &SpringGraph, tool: Vec3, span: Dur
     let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
     let aim = Aim::new(body.surface(), &state.positions)?;
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
-    let at_rest = ToolForecast { position: tool, velocity: Vec3::zeros() };
+    let at_rest = ToolForecast::at_rest(tool);
     aim.triangles(prepared.simulation.contact().triangle, &at_rest, [0.0; 2], &mut triangles);
     let here = triangles.clone();
     aim.around(body.surface(), &tool, &mut triangles);

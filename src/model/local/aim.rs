@@ -1,11 +1,14 @@
 //! Which part of the surface the next local models have to hold.
 
 use super::super::Vec3;
+use super::super::body::Body;
 use super::super::forecast::ToolForecast;
 use super::super::geometry::NearestTriangle;
 use super::super::mesh::Surface;
 use crate::error::Error;
 
+/// Slower tools have no direction (m/s).
+const AT_REST: f64 = 1e-3;
 /// Places on that way that are looked at, besides the present one.
 const LOOKS: u32 = 3;
 
@@ -41,12 +44,40 @@ impl Aim {
     ///
     /// # Real-time
     /// For the global actor: bounded; `triangles` may grow.
-    pub fn triangles(&self, contact: Option<u32>, tool: &ToolForecast, [after, lead]: [f64; 2], triangles: &mut Vec<u32>) {
+    pub fn triangles(
+        &self,
+        contact: Option<u32>,
+        tool: &ToolForecast,
+        [after, lead]: [f64; 2],
+        triangles: &mut Vec<u32>,
+    ) {
         triangles.clear();
         triangles.push(contact.unwrap_or_else(|| self.nearest.find(&tool.unbraked(after))));
         for look in 1..=LOOKS {
             let ahead = after + lead * f64::from(look) / f64::from(LOOKS);
             triangles.push(self.nearest.find(&tool.unbraked(ahead)));
+        }
+    }
+
+    /// Puts `present` and the triangles that a tool comes over next if it keeps its direction in place of `triangles`, in
+    /// this order, for two edges of `present`.
+    ///
+    /// # Real-time
+    /// For the global actor: bounded; `triangles` may grow.
+    pub fn heading(&self, body: &dyn Body, tool: &ToolForecast, present: u32, triangles: &mut Vec<u32>) {
+        triangles.clear();
+        triangles.push(present);
+        let speed = tool.velocity.norm();
+        if speed < AT_REST {
+            return;
+        }
+        let [a, b, c] = body.surface().triangles[present as usize].map(|node| body.rest()[node as usize]);
+        let edge = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+        for part in 1..=4 {
+            let next = self.nearest.find(&(tool.position + tool.velocity * (0.5 * f64::from(part) * edge / speed)));
+            if !triangles.contains(&next) {
+                triangles.push(next);
+            }
         }
     }
 

@@ -130,6 +130,8 @@ pub struct ResyncView<'a> {
     /// The surface triangle to build around (the contact's, or the one nearest to the tool), then those that the tool is
     /// expected over before the next model serves.
     pub triangles: &'a [u32],
+    /// The patch to use, if it is not to be the one around the triangles: node ids in increasing order.
+    pub patch: Option<&'a [u32]>,
     /// Where the tool is, and where it is expected.
     pub tool: ToolForecast,
     /// Haptic ticks that the model may have to reach ahead, catching up included.
@@ -151,8 +153,7 @@ impl<'a> ResyncView<'a> {
         horizon: u32,
         bases: &'a Bases,
     ) -> Self {
-        let tool = ToolForecast { position: tool, velocity: Vec3::zeros() };
-        Self { global, tick, triangles, tool, horizon, bases }
+        Self { global, tick, triangles, patch: None, tool: ToolForecast::at_rest(tool), horizon, bases }
     }
 }
 

@@ -167,6 +167,10 @@ impl Predictive {
                 force
             });
         }
+        // The end of the path, and all of it for a contact that is outside the patch already.
+        self.take_near_forces();
+        let (state, forces) = (&self.state, &self.forces[ring.clone()]);
+        self.path.push(&state.positions[ring.clone()], &state.velocities[ring.clone()], forces);
         self.take_present(resync);
         true
     }
@@ -238,7 +242,11 @@ fn deviations(out: &mut [f64], forces: &[Vec3], expected: &[f64]) {
 
 impl LocalModel for Predictive {
     fn rebuild(&mut self, mut resync: ResyncView<'_>) {
-        self.window.rebuild(resync.global.body(), resync.triangles, self.size, Some(&self.springs));
+        let (body, triangles, size) = (resync.global.body(), resync.triangles, self.size);
+        self.window.rebuild_with(body, triangles, Some(&self.springs), |nodes| match resync.patch {
+            Some(patch) => nodes.extend_from_slice(patch),
+            None => body.patch(triangles, size, nodes),
+        });
         self.near.rebuild(&self.springs, &self.window);
         let (window, movable) = (&self.window, self.window.movable);
         let body_masses = resync.global.body().inverse_masses();

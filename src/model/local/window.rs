@@ -38,11 +38,22 @@ impl Window {
         size: [usize; 3],
         springs: Option<&SpringGraph>,
     ) {
+        self.rebuild_with(body, triangles, springs, |nodes| body.patch(triangles, size, nodes));
+    }
+
+    /// The same for the patch nodes that `patch` gives, in increasing order.
+    pub(super) fn rebuild_with(
+        &mut self,
+        body: &dyn Body,
+        triangles: &[u32],
+        springs: Option<&SpringGraph>,
+        patch: impl FnOnce(&mut Vec<u32>),
+    ) {
         let whole = body.surface();
         self.forget();
         self.local_node.resize(body.rest().len(), NONE);
         self.local_triangle.resize(whole.triangles.len(), NONE);
-        body.patch(triangles, size, &mut self.nodes);
+        patch(&mut self.nodes);
         self.movable = self.nodes.len();
         for (place, &node) in self.nodes.iter().enumerate() {
             self.local_node[node as usize] = place as u32;

@@ -171,6 +171,19 @@ impl Bases {
         self.of.get(patch)
     }
 
+    /// The patch of the smallest basis that holds all nodes of `patch`.
+    ///
+    /// # Real-time
+    /// For the global actor: looks at all bases.
+    pub fn around(&self, patch: &[u32]) -> Option<&[u32]> {
+        let holds = |basis: &&Arc<Basis>| patch.iter().all(|node| basis.patch.binary_search(node).is_ok());
+        self.of
+            .values()
+            .filter(holds)
+            .map(|basis| &basis.patch[..])
+            .min_by_key(|patch| (patch.len(), patch.first().copied()))
+    }
+
     /// Adds one.
     ///
     /// # Real-time
