@@ -148,7 +148,7 @@ impl GlobalActor {
         let tool = self.history.forecast();
         self.aim.refit(&self.simulation.state().positions);
         let now = [0.0, self.plan.lead_s()];
-        self.aim.triangles(self.simulation.contact().triangle, &tool, now, &mut self.triangles);
+        self.aim.triangles(Some(self.simulation.contact()), &tool, now, &mut self.triangles);
         self.publish_wishes(ctx, &tool);
         self.choose_patch();
         let resync = ResyncView {
@@ -200,6 +200,13 @@ impl GlobalActor {
             }
         };
         wish(&self.triangles);
+        if self.simulation.contact().glued {
+            // The tool stays where it is.
+            if !wishes.patches.is_empty() {
+                ports.wishes.publish(ctx);
+            }
+            return;
+        }
         aim.triangles(None, tool, [self.plan.global.period_s(), lead], triangles);
         wish(triangles);
         // It may leave for the next cells sooner or later than expected.

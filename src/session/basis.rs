@@ -69,7 +69,7 @@ fn first_bases(prepared: &Prepared, springs: &SpringGraph, tool: Vec3, span: Dur
     let aim = Aim::new(body.surface(), &state.positions)?;
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
     let at_rest = ToolForecast::at_rest(tool);
-    aim.triangles(prepared.simulation.contact().triangle, &at_rest, [0.0; 2], &mut triangles);
+    aim.triangles(Some(prepared.simulation.contact()), &at_rest, [0.0; 2], &mut triangles);
     let here = triangles.clone();
     aim.around(body.surface(), &tool, &mut triangles);
     for window in std::iter::once(here.as_slice()).chain(triangles.iter().map(std::slice::from_ref)) {

@@ -2,6 +2,7 @@
 
 use super::super::Vec3;
 use super::super::body::Body;
+use super::super::contact::Contact;
 use super::super::forecast::ToolForecast;
 use super::super::geometry::NearestTriangle;
 use super::super::mesh::Surface;
@@ -39,20 +40,24 @@ impl Aim {
     }
 
     /// Puts the triangles for a window that is made `after` seconds from now in place of `triangles`: the one under the
-    /// tool then, and those that it comes over in the `lead` seconds that follow. `contact` is the triangle that it touches
-    /// at the time.
+    /// tool then, and those that it comes over in the `lead` seconds that follow. `contact` is the contact at the time, if
+    /// that is known; a tool that is glued to it goes nowhere else.
     ///
     /// # Real-time
     /// For the global actor: bounded; `triangles` may grow.
     pub fn triangles(
         &self,
-        contact: Option<u32>,
+        contact: Option<&Contact>,
         tool: &ToolForecast,
         [after, lead]: [f64; 2],
         triangles: &mut Vec<u32>,
     ) {
         triangles.clear();
-        triangles.push(contact.unwrap_or_else(|| self.nearest.find(&tool.unbraked(after))));
+        let touched = contact.and_then(|contact| contact.triangle);
+        triangles.push(touched.unwrap_or_else(|| self.nearest.find(&tool.unbraked(after))));
+        if contact.is_some_and(|contact| contact.glued) {
+            return;
+        }
         for look in 1..=LOOKS {
             let ahead = after + lead * f64::from(look) / f64::from(LOOKS);
             triangles.push(self.nearest.find(&tool.unbraked(ahead)));

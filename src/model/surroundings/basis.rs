@@ -107,8 +107,11 @@ fn moments(far: &Far, factor: &SparseFactor, ring: &[u32]) -> Vec<f64> {
 
 /// Every column divided by its norm: directions count, not lengths.
 fn normalised(columns: &[f64], rows: usize) -> Vec<f64> {
-    let norm = |column: &[f64]| column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-    columns.chunks_exact(rows).flat_map(|column| column.iter().map(move |x| x / norm(column))).collect()
+    let scaled = columns.chunks_exact(rows).flat_map(|column| {
+        let norm = column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+        column.iter().map(move |x| x / norm)
+    });
+    scaled.collect()
 }
 
 /// The surroundings as they go on from a given state of the whole body.
