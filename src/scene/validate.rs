@@ -2,8 +2,8 @@
 
 use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 use super::{
-    BlendKind, BlockSpec, BodySpec, DeviceSpec, Face, Friction, GlobalSpec, InitialSpec, LocalModelKind, LocalSpec,
-    SafetySpec, Scene,
+    BlendKind, BlockSpec, BodySpec, DeviceSpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec,
+    LocalModelKind, LocalSpec, SafetySpec, Scene, StepKind,
 };
 use crate::error::Error;
 use crate::time::Rate;
@@ -35,6 +35,10 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
     }
     global(&scene.global)?;
     local(&scene.local, &scene.global)?;
+    if scene.local.step == StepKind::Implicit && scene.contact.equations == Equations::Paper {
+        let message = "\"implicit\" has the corrected contact equations only, leave it out or use equations = \"corrected\"";
+        return Err(Error::scene("local.step", message));
+    }
     device(&scene.device)?;
     safety(&scene.safety)?;
     if let Some(spec) = &scene.initial {
@@ -50,7 +54,7 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
 /// What names nodes of the block, or has to fit into it.
 fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
     // A body too small for the default patch is fine for the models that have none; a patch that was asked for is not.
-    if scene.local.model == LocalModelKind::Patch || scene.local.patch != LocalSpec::default().patch {
+    if scene.local.model.has_patch() || scene.local.patch != LocalSpec::default().patch {
         patch(scene.local.patch, block)?;
     }
     if let Some(node) = scene.device.attach_node {
@@ -166,15 +170,32 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
     if let Some(feedback) = local.feedback
         && !feedback.fits(local.model)
     {
-        let message =
-            format!("\"geometry\" needs model = \"patch\" and the model is {:?}, leave it out", local.model.name());
-        return Err(Error::scene("local.feedback", message));
+        return Err(Error::scene("local.feedback", misfit(feedback, local.model)));
+    }
+    if local.step == StepKind::Implicit && !local.model.is_linear() {
+        let message = format!("\"implicit\" needs a linear patch and the model is {:?}, leave it out", local.model.name());
+        return Err(Error::scene("local.step", message));
     }
     not_negative("local.blend.ms", local.blend.ms)?;
-    if local.blend.kind == BlendKind::Crossfade && local.blend.ms == 0.0 {
-        return Err(Error::scene("local.blend.ms", "is 0 or missing, a crossfade needs a time above 0 such as 10"));
+    let name = match local.blend.kind {
+        BlendKind::None => return Ok(()),
+        BlendKind::Crossfade => "a crossfade",
+        BlendKind::Offset => "an offset",
+    };
+    if local.blend.ms == 0.0 {
+        return Err(Error::scene("local.blend.ms", format!("is 0 or missing, {name} needs a time above 0 such as 10")));
     }
     Ok(())
+}
+
+fn misfit(feedback: Feedback, model: LocalModelKind) -> String {
+    let (feedback, name) = (feedback.name(), model.name());
+    if model == LocalModelKind::Condensed {
+        return format!("{feedback:?} with model = {name:?} would count the surroundings' compliance twice, leave it out");
+    }
+    let fitting = LocalModelKind::ALL.into_iter().filter(|&model| Feedback::Geometry.fits(model));
+    let fitting = fitting.map(|model| format!("{:?}", model.name())).collect::<Vec<_>>().join(" or ");
+    format!("{feedback:?} needs model = {fitting} and the model is {name:?}, leave it out")
 }
 
 /// The window is clamped at thin faces, so it has to fit one of the faces that can be touched: those that are not fixed.

@@ -2,7 +2,9 @@
 //! everything beyond.
 
 mod basis;
+mod condense;
 mod graph;
 
 pub use basis::{Bases, Basis};
+pub use condense::Condensation;
 pub use graph::SpringGraph;
