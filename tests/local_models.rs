@@ -83,23 +83,57 @@ impl Way {
     }
 }
 
-#[test]
-fn survey() {
-    for name in ["hand", "wave", "drag_friction"] {
-        let full = forces(scene(name).with_model(LocalModelKind::Full));
-        for model in [Hold, Patch, LinearBoundary, ScaledBoundary, Condensed] {
-            for feedback in [Trajectory, ContactNodes, Geometry].into_iter().filter(|f| f.fits(model)) {
-                for blend in [BlendKind::None, BlendKind::Crossfade, BlendKind::Offset] {
-                    for is_late in [false, true] {
-                        let way = Way { blend, is_late, ..way(model, feedback) };
-                        let start = std::time::Instant::now();
-                        let e = error(&forces(way.scene(name)), &full);
-                        println!("{name} {} {} {blend:?} {is_late}: {:.2} / {:.1} / {:.1} ({:.1} s)", model.name(), feedback.name(), e.rms, e.max, e.jump, start.elapsed().as_secs_f64());
-                    }
-                }
-            }
+/// Every way that the README's table shows, by the name that it has there.
+fn ways() -> [(&'static str, Way); 14] {
+    let crossfade = BlendKind::Crossfade;
+    [
+        ("hold", way(Hold, Trajectory)),
+        ("patch", way(Patch, Geometry)),
+        ("patch, 10 ms crossfade", way(Patch, Geometry).blended(crossfade)),
+        ("patch, 10 ms offset", way(Patch, Geometry).blended(BlendKind::Offset)),
+        ("patch, trajectory", way(Patch, Trajectory)),
+        ("patch, late", way(Patch, Geometry).late()),
+        ("linear_boundary", way(LinearBoundary, Trajectory)),
+        ("linear_boundary, geometry", way(LinearBoundary, Geometry)),
+        ("linear_boundary, contact_nodes, 10 ms crossfade", way(LinearBoundary, ContactNodes).blended(crossfade)),
+        ("linear_boundary, late", way(LinearBoundary, Trajectory).late()),
+        ("scaled_boundary", way(ScaledBoundary, Trajectory)),
+        ("scaled_boundary, late", way(ScaledBoundary, Trajectory).late()),
+        ("condensed", way(Condensed, Trajectory)),
+        ("condensed, late", way(Condensed, Trajectory).late()),
+    ]
+}
+
+/// Check that each way has the error that was measured for it (rms, largest, largest change in one tick; % of the peak), to
+/// a tenth or to 0.3.
+fn assert_errors(name: &str, measured: [[f64; 3]; 14]) {
+    let full = forces(scene(name).with_model(LocalModelKind::Full));
+    let mut wrong = Vec::new();
+    for ((label, way), expected) in ways().into_iter().zip(measured) {
+        let found = error(&forces(way.scene(name)), &full);
+        println!("{name}: {label}: rms {:.1} / max {:.1} / jump {:.1} %", found.rms, found.max, found.jump);
+        let is_near = |found: f64, expected: f64| (found - expected).abs() < (0.1 * expected).max(0.3);
+        if ![found.rms, found.max, found.jump].into_iter().zip(expected).all(|(found, expected)| is_near(found, expected)) {
+            wrong.push(format!("{label}: {found:?}, was {expected:?}"));
         }
     }
+    println!("{name}: full itself: jump {:.1} %", error(&full, &full).jump);
+    assert!(wrong.is_empty(), "{name}: {wrong:#?}");
+}
+
+#[test]
+fn a_hand_held_node_has_the_known_errors() {
+    assert_errors("hand", [[0.0; 3]; 14]);
+}
+
+#[test]
+fn a_wave_has_the_known_errors() {
+    assert_errors("wave", [[0.0; 3]; 14]);
+}
+
+#[test]
+fn a_drag_with_friction_has_the_known_errors() {
+    assert_errors("drag_friction", [[0.0; 3]; 14]);
 }
 
 /// `hold` renders what the 30 Hz global model computed in blocks of 33 or 34 ticks; at every resync that must be the

@@ -189,13 +189,13 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
 }
 
 fn misfit(feedback: Feedback, model: LocalModelKind) -> String {
-    let (feedback, name) = (feedback.name(), model.name());
-    if model == LocalModelKind::Condensed {
-        return format!("{feedback:?} with model = {name:?} would count the surroundings' compliance twice, leave it out");
+    let (fed, name) = (feedback.name(), model.name());
+    if matches!(model, LocalModelKind::Condensed | LocalModelKind::ScaledBoundary) {
+        return format!("{fed:?} with model = {name:?} would count the surroundings' compliance twice, leave it out");
     }
-    let fitting = LocalModelKind::ALL.into_iter().filter(|&model| Feedback::Geometry.fits(model));
+    let fitting = LocalModelKind::ALL.into_iter().filter(|&model| feedback.fits(model));
     let fitting = fitting.map(|model| format!("{:?}", model.name())).collect::<Vec<_>>().join(" or ");
-    format!("{feedback:?} needs model = {fitting} and the model is {name:?}, leave it out")
+    format!("{fed:?} needs model = {fitting} and the model is {name:?}, leave it out")
 }
 
 /// The window is clamped at thin faces, so it has to fit one of the faces that can be touched: those that are not fixed.

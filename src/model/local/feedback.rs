@@ -31,25 +31,27 @@ impl Feedback {
         }
     }
 
-    /// True if `model` can give it: a linear patch in held or moving surroundings. `condensed` has their compliance in its own
-    /// geometry, and the global model would add it again.
+    /// True if `model` can give it: a linear patch. One that gives way more than the body does between held surroundings
+    /// must not: `condensed` has their compliance in its own state, and the global model would add it again;
+    /// `scaled_boundary` sinks in, and pulls the body after it if its whole geometry is taken over.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn fits(self, model: Kind) -> bool {
-        self == Self::Trajectory || matches!(model, Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary)
+        match self {
+            Self::Trajectory => true,
+            Self::ContactNodes => matches!(model, Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary),
+            Self::Geometry => matches!(model, Kind::Patch | Kind::LinearBoundary),
+        }
     }
 
-    /// What `model` does without being asked for another.
+    /// What `model` does without being asked for another: the paper's for its patch, for the others what is nearest to the
+    /// whole body at the haptic rate (DESIGN.md).
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn of(model: Kind) -> Self {
-        match model {
-            Kind::Patch | Kind::ScaledBoundary => Self::Geometry,
-            Kind::LinearBoundary => Self::ContactNodes,
-            _ => Self::Trajectory,
-        }
+        if model == Kind::Patch { Self::Geometry } else { Self::Trajectory }
     }
 }
 
