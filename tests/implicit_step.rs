@@ -27,8 +27,7 @@ fn patch(factor: f64, zeta: f64, friction: f64, is_implicit: bool, ticks: u32) -
     let template = if is_implicit { template.with_implicit_steps() } else { template };
     let state = State::at_rest(palpate::model::body::Body::rest(&body));
     let law = Law { friction, ..Law::default() };
-    let mut sim =
-        Simulation::new(Box::new(body), state, Contact::default(), law, Stepping { tick, substeps }).unwrap();
+    let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, Stepping { tick, substeps }).unwrap();
     let top = |&t: &u32| {
         let corners = sim.body().surface().triangles[t as usize].map(|n| sim.body().rest()[n as usize]);
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;

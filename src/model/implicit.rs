@@ -143,7 +143,8 @@ mod tests {
             let Self { tangent, state, forces, inverse_masses } = self;
             let still = vec![Vec3::zeros(); rest.len()];
             tangent.forces(&state.positions, &still, 0.0, Drift::default(), forces);
-            let nodes = state.positions.iter().zip(rest).zip(&*forces).zip(state.velocities.iter().zip(&*inverse_masses));
+            let nodes =
+                state.positions.iter().zip(rest).zip(&*forces).zip(state.velocities.iter().zip(&*inverse_masses));
             nodes.map(|(((x, x0), f), (v, w))| 0.5 * (v.norm_squared() / w - f.dot(&(x - x0)))).sum()
         }
     }
@@ -160,7 +161,11 @@ mod tests {
             for step in 0..500 {
                 patch.step(&mut system);
                 let after = patch.energy(&rest);
-                assert!(after <= before * (1.0 + 1e-12), "k {stiffness}, zeta {zeta}, step {step}: {before} to {after}");
+                // Below that is rounding of positions.
+                assert!(
+                    after <= before * (1.0 + 1e-12) + 1e-20 * first,
+                    "k {stiffness}, zeta {zeta}, step {step}: {before} to {after}"
+                );
                 before = after;
             }
             assert!(before < 0.5 * first, "{before} of {first}");

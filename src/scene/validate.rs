@@ -36,7 +36,8 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
     global(&scene.global)?;
     local(&scene.local, &scene.global)?;
     if scene.local.step == StepKind::Implicit && scene.contact.equations == Equations::Paper {
-        let message = "\"implicit\" has the corrected contact equations only, leave it out or use equations = \"corrected\"";
+        let message =
+            "\"implicit\" has the corrected contact equations only, leave it out or use equations = \"corrected\"";
         return Err(Error::scene("local.step", message));
     }
     device(&scene.device)?;
@@ -173,7 +174,8 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
         return Err(Error::scene("local.feedback", misfit(feedback, local.model)));
     }
     if local.step == StepKind::Implicit && !local.model.is_linear() {
-        let message = format!("\"implicit\" needs a linear patch and the model is {:?}, leave it out", local.model.name());
+        let message =
+            format!("\"implicit\" needs a linear patch and the model is {:?}, leave it out", local.model.name());
         return Err(Error::scene("local.step", message));
     }
     not_negative("local.blend.ms", local.blend.ms)?;

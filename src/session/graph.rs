@@ -99,7 +99,18 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
                 geometry: ports.geometry.as_ref().map(ExchangePort::writer),
             };
             let tool = ToolTick { tick: 0, position: first.position };
-            (source, rotating, Some(GlobalMaker::new(prepared.simulation, tool, prepared.haptic, (3.2 * prepared.haptic.as_hz() / prepared.global_rate.as_hz()) as u32, prepared.template.clone(), ports)))
+            (
+                source,
+                rotating,
+                Some(GlobalMaker::new(
+                    prepared.simulation,
+                    tool,
+                    prepared.haptic,
+                    (3.2 * prepared.haptic.as_hz() / prepared.global_rate.as_hz()) as u32,
+                    prepared.template.clone(),
+                    ports,
+                )),
+            )
         }
     };
     let device = DeviceActor::new(

@@ -231,8 +231,7 @@ mod tests {
 
     fn succession(blend_ticks: u32) -> Succession {
         let blend = Blend::new(BlendKind::Crossfade, blend_ticks);
-        let mut models =
-            Succession::new([1.0, -1.0, -1.0].map(|base| model(base, 0, true)), blend, Vec3::zeros());
+        let mut models = Succession::new([1.0, -1.0, -1.0].map(|base| model(base, 0, true)), blend, Vec3::zeros());
         models.begin(Vec3::zeros(), None);
         models
     }

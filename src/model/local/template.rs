@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::super::body::Body;
 use super::super::surroundings::{Condensation, SpringGraph};
 use super::{
-    Condensed, Feedback, Hold, Kind, Layered, LinearBoundary, LinearSpec, LocalModel, Patch, Predictive, ScaledBoundary,
-    Yielding,
+    Condensed, Feedback, Hold, Kind, Layered, LinearBoundary, LinearSpec, LocalModel, Patch, Predictive,
+    ScaledBoundary, Yielding,
 };
 use crate::error::Error;
 

@@ -61,7 +61,9 @@ impl Condensation {
                 }
             }
         }
-        let factor = Some(&places).filter(|places| places.contains(&None)).and_then(|_| SparseFactor::new(3 * movable, &entries));
+        let factor = Some(&places)
+            .filter(|places| places.contains(&None))
+            .and_then(|_| SparseFactor::new(3 * movable, &entries));
         match factor {
             Some(factor) => Ok(Self { factor, places, movable, springs }),
             None => {
