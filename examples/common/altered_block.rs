@@ -53,7 +53,7 @@ impl<F: FnMut(&mut Block, &State, &mut [Vec3]) + Clone + Send + 'static> Body fo
     fn duplicate(&self) -> Option<Box<dyn Body>> {
         self.copies.then(|| Box::new(self.clone()) as Box<dyn Body>)
     }
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.block.patch(triangle, size, nodes);
+    fn patch(&self, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
+        self.block.patch(triangles, size, nodes);
     }
 }

@@ -163,7 +163,8 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         StepKind::Implicit => true,
         StepKind::Auto => scene.contact.equations != Equations::Paper && stable_substeps > MOST_EXPLICIT_STEPS,
     };
-    let period_ticks = (haptic.as_hz() / global_rate.as_hz()).round().min(f64::from(u32::MAX)) as u32;
+    // The longer one where periods alternate, 33 and 34 ticks at 30 Hz.
+    let period_ticks = (haptic.as_hz() / global_rate.as_hz() - 1e-6).ceil().min(f64::from(u32::MAX)) as u32;
     let template = Template::new(kind, scene.local.patch, &*body)?
         .with_feedback(scene.local.feedback.unwrap_or(Feedback::of(kind)))
         .with_period(period_ticks);
