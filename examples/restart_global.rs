@@ -59,8 +59,8 @@ impl Body for Fragile {
     fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
         self.block.tangent(state, nodes, clamp, emit);
     }
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.block.patch(triangle, size, nodes);
+    fn patch(&self, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
+        self.block.patch(triangles, size, nodes);
     }
     fn duplicate(&self) -> Option<Box<dyn Body>> {
         Some(Box::new(self.clone()))

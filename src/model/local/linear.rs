@@ -239,3 +239,84 @@ impl<B> LinearPatch<B> {
         geometry.push(self.window.nodes[place], self.state.positions[place], self.state.velocities[place]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::body::Block;
+    use super::super::super::forecast::ToolForecast;
+    use super::super::super::mesh::Face;
+    use super::super::super::simulation::Simulation;
+    use super::super::super::surroundings::Bases;
+    use super::super::{LinearBoundary, Patch};
+    use super::*;
+
+    /// A block whose nodes all move sideways, touched in the middle of its top.
+    fn touched() -> (Simulation, u32) {
+        let block = Block::builder([6; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
+        let top = block.surface().triangles.len() as u32 - 5;
+        let mut state = State::at_rest(block.rest());
+        state.velocities.iter_mut().zip(block.inverse_masses()).for_each(|(v, w)| *v = Vec3::x() * w.min(0.1));
+        let contact = Contact::glued(top, [0.2, 0.3, 0.5]);
+        let stepping = Stepping { tick: 1e-3, substeps: 2 };
+        (Simulation::new(Box::new(block), state, contact, Law::default(), stepping).unwrap(), top)
+    }
+
+    fn rebuilt<B: Boundary>(mut model: LinearPatch<B>, (global, top): (&mut Simulation, u32)) -> LinearPatch<B> {
+        let (tool, bases) = (ToolForecast::default(), Bases::default());
+        model.rebuild(ResyncView { global, tick: 0, triangles: &[top], tool, horizon: 0, bases: &bases });
+        model
+    }
+
+    fn spec(feedback: Feedback) -> LinearSpec {
+        LinearSpec { size: [4, 4, 2], feedback, is_implicit: false }
+    }
+
+    #[test]
+    fn surroundings_move_for_their_ticks_and_then_stand_still() {
+        let (mut global, top) = touched();
+        let mut model = rebuilt(LinearBoundary::new(spec(Feedback::Trajectory), 3), (&mut global, top));
+        let rim = model.window.movable;
+        let start = model.state.positions[rim];
+        let tool = Vec3::new(0.02, 0.02, 0.05);
+        let mut seen = Vec::new();
+        for _ in 0..5 {
+            seen.push((model.drift(0.5e-3), model.state.positions[rim].x - start.x));
+            model.tick(ToolMotion { from: tool, to: tool });
+        }
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-15;
+        for (tick, (drift, moved)) in seen.into_iter().enumerate() {
+            let (ticks, is_moving) = (tick.min(3) as f64, tick < 3);
+            assert!(near(drift.time, ticks * 1e-3 + if is_moving { 0.5e-3 } else { 0.0 }), "{tick}: {drift:?}");
+            assert_eq!(drift.is_moving, is_moving);
+            assert!(near(moved, ticks * 1e-3 * 0.1), "tick {tick}: the rim moved {moved}");
+        }
+        let mut still = rebuilt(Patch::new(spec(Feedback::Trajectory)), (&mut global, top));
+        still.tick(ToolMotion { from: tool, to: tool });
+        assert_eq!((still.drift(0.0), still.state.positions[rim]), (Drift::default(), start));
+    }
+
+    #[test]
+    fn each_kind_of_feedback_names_its_nodes() {
+        let (mut global, top) = touched();
+        let corners = global.body().surface().triangles[top as usize];
+        let mut told = |feedback| {
+            let model = rebuilt(Patch::new(spec(feedback)), (&mut global, top));
+            let mut geometry = PatchGeometry::default();
+            model.geometry(&mut geometry).then_some(geometry)
+        };
+        assert!(told(Feedback::Trajectory).is_none());
+        let whole = told(Feedback::Geometry).unwrap();
+        let touched = told(Feedback::ContactNodes).unwrap();
+        assert_eq!((whole.nodes.len(), &touched.nodes[..]), (32, &corners[..]));
+        assert_eq!((touched.contact.triangle, touched.is_usable()), (Some(top), true));
+        let x: Vec<Vec3> = corners.iter().map(|&node| global.state().positions[node as usize]).collect();
+        assert_eq!(touched.state.positions, x);
+        // What is told replaces that and nothing else.
+        let before = global.state().clone();
+        let mut moved = touched;
+        moved.state.positions[0] += Vec3::z();
+        moved.write_to(&mut global);
+        let changed = |n: &usize| global.state().positions[*n] != before.positions[*n];
+        assert_eq!((0..before.positions.len()).filter(changed).collect::<Vec<_>>(), [corners[0] as usize]);
+    }
+}
