@@ -9,9 +9,11 @@ use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_ma
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
-use palpate::model::local::{Kind, LocalModel, ResyncView};
+use palpate::model::forecast::ToolForecast;
+use palpate::model::local::{Kind, LocalModel, ResyncView, Template};
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
+use palpate::model::surroundings::{Bases, Condensation, SpringGraph};
 
 /// The reference material, two substeps per tick, a tool pressed 5 mm into the top.
 fn pressed(nodes: usize) -> (Simulation, Vec3) {
@@ -29,42 +31,80 @@ fn pressed(nodes: usize) -> (Simulation, Vec3) {
     (sim, at(100))
 }
 
-fn patch(sim: &Simulation) -> Box<dyn LocalModel> {
-    let mut patch = Kind::Patch([4, 4, 2]).empty().expect("a patch is built from a global model");
-    rebuild(&mut *patch, sim);
-    patch
+fn template(kind: Kind, sim: &Simulation) -> Template {
+    Template::new(kind, [4, 4, 2], sim.body()).expect("a held body of springs")
 }
 
-fn rebuild(patch: &mut dyn LocalModel, sim: &Simulation) {
+fn model(template: &Template, sim: &mut Simulation) -> Box<dyn LocalModel> {
+    let mut model = template.empty().expect("a patch is built from a global model");
+    rebuild(&mut *model, sim);
+    model
+}
+
+fn rebuild(patch: &mut dyn LocalModel, sim: &mut Simulation) {
     let triangle = sim.contact().triangle.expect("the tool touches");
-    patch.rebuild(ResyncView { global: sim, tick: 100, triangle });
+    patch.rebuild(ResyncView {
+        global: sim,
+        tick: 100,
+        triangles: &[triangle],
+        patch: None,
+        tool: ToolForecast::default(),
+        horizon: 0,
+        bases: &Bases::default(),
+    });
 }
 
 fn patch_tick(c: &mut Criterion) {
-    let (sim, tool) = pressed(12);
+    let (mut sim, tool) = pressed(12);
     let circle = |k: usize| {
         let angle = k as f64 * 0.01;
         tool + Vec3::new(angle.cos() - 1.0, angle.sin(), 0.0) * 1e-3
     };
-    let (mut patch, mut k) = (patch(&sim), 0);
-    c.bench_function("patch 4x4x2: one 1 kHz tick with contact, 2 substeps", |b| {
-        b.iter(|| {
-            k += 1;
-            black_box(patch.tick(ToolMotion { from: circle(k - 1), to: circle(k) }))
+    let explicit = template(Kind::Patch, &sim);
+    for (name, template) in [("2 substeps", explicit.clone()), ("implicit", explicit.with_implicit_steps())] {
+        let (mut patch, mut k) = (model(&template, &mut sim), 0);
+        c.bench_function(&format!("patch 4x4x2: one 1 kHz tick with contact, {name}"), |b| {
+            b.iter(|| {
+                k += 1;
+                black_box(patch.tick(ToolMotion { from: circle(k - 1), to: circle(k) }))
+            });
         });
-    });
-    assert!(patch.contact().is_touching(), "the tick measured has a contact in it");
+        assert!(patch.contact().is_touching(), "the tick measured has a contact in it");
+    }
 }
 
 fn patch_build(c: &mut Criterion) {
     let mut group = c.benchmark_group("patch 4x4x2: build at a resync");
     for nodes in [8, 12, 20] {
-        let (sim, _) = pressed(nodes);
-        let mut patch = patch(&sim);
+        let (mut sim, _) = pressed(nodes);
+        let mut patch = model(&template(Kind::Patch, &sim), &mut sim);
         group.bench_function(BenchmarkId::from_parameter(format!("{nodes}^3 body")), |b| {
-            b.iter(|| rebuild(&mut *patch, &sim));
+            b.iter(|| rebuild(&mut *patch, &mut sim));
         });
     }
+    let (mut sim, _) = pressed(12);
+    for kind in [Kind::LinearBoundary, Kind::ScaledBoundary, Kind::Condensed] {
+        let mut patch = model(&template(kind, &sim), &mut sim);
+        group.bench_function(BenchmarkId::from_parameter(kind.name()), |b| b.iter(|| rebuild(&mut *patch, &mut sim)));
+    }
+    let mut patch = model(&template(Kind::Patch, &sim).with_implicit_steps(), &mut sim);
+    group.bench_function(BenchmarkId::from_parameter("implicit"), |b| b.iter(|| rebuild(&mut *patch, &mut sim)));
+    group.finish();
+}
+
+/// What `condensed` costs besides: once for the body, and once for each window that the tool comes to.
+fn condense(c: &mut Criterion) {
+    let mut group = c.benchmark_group("condensed 4x4x2, 12^3 body");
+    let (sim, _) = pressed(12);
+    let springs = SpringGraph::new(sim.body()).expect("a body of springs");
+    group.sample_size(10);
+    group.bench_function("factorise the body", |b| {
+        b.iter_batched(|| springs.clone(), |springs| Condensation::new(springs).expect("held"), BatchSize::LargeInput);
+    });
+    let body = Condensation::new(springs).expect("held");
+    let mut nodes = Vec::new();
+    sim.body().patch(&[sim.contact().triangle.expect("the tool touches")], [4, 4, 2], &mut nodes);
+    group.bench_function("a new window", |b| b.iter(|| black_box(body.compliance(&nodes))));
     group.finish();
 }
 
@@ -94,6 +134,6 @@ fn whole_body(c: &mut Criterion) {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(60);
-    targets = patch_tick, patch_build, whole_body
+    targets = patch_tick, patch_build, condense, whole_body
 }
 criterion_main!(benches);

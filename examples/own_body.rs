@@ -152,10 +152,11 @@ impl Body for Ball {
         }
     }
 
-    /// The skin around the triangle, ring by ring, and the flesh below it: a patch of skin alone would be too soft to
+    /// The skin around the triangles, ring by ring, and the flesh below it: a patch of skin alone would be too soft to
     /// press against and too stiff to rub.
-    fn patch(&self, triangle: u32, size: [usize; 3], nodes: &mut Vec<u32>) {
-        let mut rings: BTreeSet<u32> = self.surface.triangles[triangle as usize].into();
+    fn patch(&self, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
+        let corners = triangles.iter().flat_map(|&triangle| self.surface.triangles[triangle as usize]);
+        let mut rings: BTreeSet<u32> = corners.collect();
         while rings.len() < size[0] * size[1] {
             let grown: BTreeSet<u32> = rings
                 .iter()
@@ -167,6 +168,7 @@ impl Body for Ball {
             }
             rings = grown;
         }
+        nodes.clear();
         nodes.extend(&rings);
         if size[2] > 1 {
             nodes.extend(rings.iter().map(|node| node + self.skin()));

@@ -5,6 +5,7 @@ mod cli_support;
 
 use cli_support::{Called, Folder, PATH, rows};
 use palpate::log::{LogEntry, LogReader, LogRecord};
+use palpate::scene::LocalModelKind;
 
 /// Check that it is a refusal: exit code 2, one line on standard error that has `words` in it, and nothing else.
 #[track_caller]
@@ -371,7 +372,7 @@ fn a_reader_that_goes_away_early_is_no_error() {
 #[test]
 fn a_scene_of_every_model_runs_and_names_it() {
     let folder = Folder::new();
-    for model in ["full", "hold", "patch"] {
+    for model in LocalModelKind::ALL.map(LocalModelKind::name) {
         let report = folder.succeed(&["run", "scene.toml", "--virtual", "--model", model]);
         assert!(report.contains(&format!("model {model},")), "{report}");
     }

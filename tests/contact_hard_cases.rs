@@ -6,7 +6,8 @@ use common::*;
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, Mode, ToolMotion};
-use palpate::model::local::{Kind, Prediction, ResyncView, Template};
+use palpate::model::forecast::ToolForecast;
+use palpate::model::local::{Kind, ResyncView, Template};
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
 use palpate::model::surroundings::Bases;
@@ -80,7 +81,7 @@ fn a_tool_on_a_fixed_face_is_lost_without_force() {
 
 #[test]
 fn a_patch_on_a_held_face_reports_the_lost_contact_too() {
-    let sim = simulation(block(STD), Contact::default(), 1.0);
+    let mut sim = simulation(block(STD), Contact::default(), 1.0);
     // In the middle of the bottom, away from the side faces.
     let in_the_middle = |node: u32| {
         let x = sim.body().rest()[node as usize];
@@ -89,8 +90,16 @@ fn a_patch_on_a_held_face_reports_the_lost_contact_too() {
     let bottom = (0..sim.body().surface().triangles.len() as u32)
         .find(|&t| sim.body().surface().triangles[t as usize].iter().all(|&n| in_the_middle(n)))
         .unwrap();
-    let mut patch = Kind::Patch([4, 4, 2]).empty().unwrap();
-    patch.rebuild(ResyncView { global: &sim, tick: 0, triangle: bottom });
+    let mut patch = Template::new(Kind::Patch, [4, 4, 2], sim.body()).unwrap().empty().unwrap();
+    patch.rebuild(ResyncView {
+        global: &mut sim,
+        tick: 0,
+        triangles: &[bottom],
+        patch: None,
+        tool: ToolForecast::default(),
+        horizon: 0,
+        bases: &Bases::default(),
+    });
     let corners = sim.body().surface().triangles[bottom as usize].map(|n| sim.body().rest()[n as usize]);
     let below = (corners[0] + corners[1] + corners[2]) / 3.0 - Vec3::z() * 0.001;
     let force = patch.tick(ToolMotion { from: below, to: below + Vec3::z() * 0.002 });

@@ -58,6 +58,21 @@ fn a_tick_with_a_patch_makes_no_system_call_and_never_allocates() {
 }
 
 #[test]
+fn a_tick_with_moving_surroundings_makes_no_system_call_and_never_allocates() {
+    assert_silent(Case::new(LocalModelKind::LinearBoundary, Guard::SystemCalls));
+}
+
+#[test]
+fn an_implicit_tick_makes_no_system_call_and_never_allocates() {
+    assert_silent(Case::new(LocalModelKind::ScaledBoundary, Guard::SystemCalls));
+}
+
+#[test]
+fn a_tick_with_condensed_surroundings_makes_no_system_call_and_never_allocates() {
+    assert_silent(Case::new(LocalModelKind::Condensed, Guard::SystemCalls));
+}
+
+#[test]
 fn a_tick_with_hold_makes_no_system_call_and_never_allocates() {
     assert_silent(Case::new(LocalModelKind::Hold, Guard::SystemCalls));
 }
@@ -75,6 +90,11 @@ fn a_tick_without_privileges_makes_no_system_call_and_never_allocates() {
 #[test]
 fn a_tick_with_a_patch_faults_no_page_and_waits_for_nothing_but_its_release() {
     assert_still(Case::new(LocalModelKind::Patch, Guard::Counters));
+}
+
+#[test]
+fn an_implicit_tick_faults_no_page_and_waits_for_nothing_but_its_release() {
+    assert_still(Case::new(LocalModelKind::ScaledBoundary, Guard::Counters));
 }
 
 #[test]

@@ -68,7 +68,7 @@ const CASES: &[Case] = &[
     case("node_mass_kg", "mass_g", "scene.toml:8: body.material.mass_g: ", &["did you mean node_mass_kg?"]),
     case("[body]", "gravity = 9.81\n[body]", "scene.toml:1: gravity: ", &["unknown key", "body, contact, global"]),
     case("[safety]", "[safty]", "scene.toml:27: safty: ", &["did you mean safety?"]),
-    case("patch = [4, 4, 2]", "basis = 50", "scene.toml:21: local.basis: ", &["rate_hz, model, patch, feedback, blend"]),
+    case("patch = [4, 4, 2]", "basis = 50", "scene.toml:21: local.basis: ", &["rate_hz, model, patch, feedback, step, blend"]),
     case("ms = 10", "s = 10", "scene.toml:23: local.blend.s: ", &["unknown key", "did you mean ms?"]),
     case("node = [7, 5, 11]", "nodes = [7, 5, 11]", "scene.toml:36: probe[1].nodes: ", &["did you mean node?"]),
     case("duration_s", "\"a\\nb\"", "scene.toml:38: run.\"a\\nb\": ", &["unknown key", "duration_s"]),
@@ -95,11 +95,12 @@ const CASES: &[Case] = &[
     case("kind = \"crossfade\", ", "", "scene.toml:23: local.blend.kind: ", &["missing"]),
     case("pull = { node = [5, 5, 11], offset_m = [0.0, 0.0, 0.02] }\n", "", "scene.toml:30: initial.pull: ", &["missing"]),
     // Words that do not exist.
-    case("model = \"patch\"", "model = \"predictive\"", "scene.toml:20: local.model: ", &["is \"predictive\"", "\"full\", \"hold\" or \"patch\""]),
+    case("model = \"patch\"", "model = \"boundary\"", "scene.toml:20: local.model: ", &["is \"boundary\"", "\"full\", \"hold\"", "\"linear_boundary\", \"scaled_boundary\", \"condensed\" or \"predictive\""]),
     case("fixed = [\"z_min\"]", "fixed = [\"z_min\", \"bottom\"]", "scene.toml:6: body.block.fixed[1]: ", &["is \"bottom\"", "\"x_min\"", "\"z_max\""]),
     case("normals = \"interpolated\"", "normals = \"smooth\"", "scene.toml:13: contact.normals: ", &["\"interpolated\" or \"face\""]),
-    case("feedback = \"geometry\"", "feedback = \"contact_nodes\"", "scene.toml:22: local.feedback: ", &["\"trajectory\" or \"geometry\""]),
-    case("kind = \"crossfade\"", "kind = \"offset\"", "scene.toml:23: local.blend.kind: ", &["\"none\" or \"crossfade\""]),
+    case("feedback = \"geometry\"", "feedback = \"patch\"", "scene.toml:22: local.feedback: ", &["\"trajectory\", \"contact_nodes\" or \"geometry\""]),
+    case("kind = \"crossfade\"", "kind = \"fade\"", "scene.toml:23: local.blend.kind: ", &["\"none\", \"crossfade\" or \"offset\""]),
+    case("patch = [4, 4, 2]", "step = \"euler\"", "scene.toml:21: local.step: ", &["\"auto\", \"explicit\" or \"implicit\""]),
     case("kind = \"scripted\"", "kind = \"phantom\"", "scene.toml:25: device.kind: ", &["\"scripted\""]),
     case("kind = \"mass_spring\"", "kind = 7", "scene.toml:2: body.kind: ", &["is 7", "\"mass_spring\""]),
     // TOML itself.
@@ -136,6 +137,11 @@ const CASES: &[Case] = &[
     case("patch = [4, 4, 2]", "patch = [10, 10, 10]", "scene.toml:21: local.patch: ", &["1000 nodes", "512"]),
     case("compute_latency_ms = 0", "compute_latency_ms = 1e300", "scene.toml:17: global.compute_latency_ms: ", &["60000"]),
     case("model = \"patch\"", "model = \"hold\"", "scene.toml:22: local.feedback: ", &["\"geometry\"", "\"patch\"", "\"hold\""]),
+    case("model = \"patch\"", "model = \"condensed\"", "scene.toml:22: local.feedback: ", &["\"geometry\"", "\"condensed\"", "compliance twice"]),
+    case("model = \"patch\"", "model = \"scaled_boundary\"", "scene.toml:22: local.feedback: ", &["\"geometry\"", "compliance twice"]),
+    case("model = \"patch\"\npatch = [4, 4, 2]\nfeedback = \"geometry\"", "model = \"full\"\nfeedback = \"contact_nodes\"", "scene.toml:21: local.feedback: ", &["\"contact_nodes\" needs", "\"patch\" or \"linear_boundary\" or \"scaled_boundary\"", "is \"full\""]),
+    case("model = \"patch\"\npatch = [4, 4, 2]\nfeedback = \"geometry\"", "model = \"hold\"\nstep = \"implicit\"", "scene.toml:21: local.step: ", &["linear patch", "\"hold\""]),
+    case("kind = \"crossfade\", ms = 10", "kind = \"offset\"", "scene.toml:23: local.blend.ms: ", &["missing", "an offset"]),
     case("ms = 10", "ms = 0", "scene.toml:23: local.blend.ms: ", &["above 0"]),
     case(", ms = 10", "", "scene.toml:23: local.blend.ms: ", &["missing", "above 0"]),
     case("ms = 10", "ms = -5.0", "scene.toml:23: local.blend.ms: ", &["is -5"]),
@@ -343,4 +349,13 @@ proptest! {
             prop_assert!(is_one_line(&error.to_string()), "{error}");
         }
     }
+}
+
+#[test]
+fn an_implicit_step_has_no_paper_equations() {
+    let text = GOOD.replace("patch = [4, 4, 2]", "patch = [4, 4, 2]\nstep = \"implicit\"");
+    Scene::from_toml(&text, "scene.toml", None).unwrap();
+    let paper = text.replace("normals = \"interpolated\"", "normals = \"interpolated\"\nequations = \"paper\"");
+    let message = refusal(&paper).to_string();
+    assert!(message.starts_with("scene.toml:23: local.step: ") && message.contains("corrected"), "{message}");
 }

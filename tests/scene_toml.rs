@@ -5,7 +5,7 @@ use std::path::Path;
 
 use palpate::scene::{
     BlendKind, BlendSpec, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, InitialSpec, LocalModelKind,
-    MaterialSpec, Normals, ProbeSpec, PullSpec, Scene,
+    MaterialSpec, Normals, ProbeSpec, PullSpec, Scene, StepKind,
 };
 use proptest::prelude::*;
 
@@ -60,8 +60,12 @@ fn scenes() -> impl Strategy<Value = Scene> {
     let contact = (friction, any::<bool>(), any::<bool>());
     let node = [1_usize..5, 1_usize..5, 1_usize..5];
     let initial = prop::option::of((node.clone(), number(1e-4, 0.1), any::<bool>()));
-    let local =
-        (prop::sample::select(LocalModelKind::ALL.to_vec()), any::<bool>(), prop::option::of(number(1.0, 30.0)));
+    let local = (
+        prop::sample::select(LocalModelKind::ALL.to_vec()),
+        prop::option::of(prop::sample::select(vec![Feedback::Trajectory, Feedback::ContactNodes, Feedback::Geometry])),
+        prop::sample::select(vec![StepKind::Auto, StepKind::Explicit, StepKind::Implicit]),
+        prop::option::of((prop::sample::select(vec![BlendKind::Crossfade, BlendKind::Offset]), number(1.0, 30.0))),
+    );
     let rest = (
         prop::option::of(1_u32..100),
         prop_oneof![Just(0.0), number(0.1, 100.0)],
@@ -72,7 +76,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
     );
     (prop::option::of(body()), contact, initial, local, rest).prop_map(|(body, contact, initial, local, rest)| {
         let (substeps_per_ms, latency_ms, max_force_n, slew, probes, duration_s) = rest;
-        let (model, feeds_back, blend_ms) = local;
+        let (model, feedback, step, blend) = local;
         let mut scene = Scene::of_program();
         scene.contact.friction = contact.0;
         scene.contact.normals = if contact.1 { Normals::Face } else { Normals::Interpolated };
@@ -90,9 +94,13 @@ fn scenes() -> impl Strategy<Value = Scene> {
             scene.device.attach_node = scene.initial.is_none().then_some([2, 2, 5]);
         }
         scene.body = body;
+        // What does not fit the model is left out.
+        (scene.local.feedback, scene.local.step) = (feedback, step);
         scene = scene.with_model(model);
-        scene.local.feedback = feeds_back.then_some(Feedback::Trajectory);
-        scene.local.blend = blend_ms.map_or(BlendSpec::default(), |ms| BlendSpec { kind: BlendKind::Crossfade, ms });
+        if scene.contact.equations == Equations::Paper && step == StepKind::Implicit {
+            scene.local.step = StepKind::Auto;
+        }
+        scene.local.blend = blend.map_or(BlendSpec::default(), |(kind, ms)| BlendSpec { kind, ms });
         (scene.global.substeps_per_ms, scene.global.compute_latency_ms) = (substeps_per_ms, latency_ms);
         (scene.safety.max_force_n, scene.safety.max_slew_n_per_ms) = (max_force_n, slew);
         scene.run.duration_s = duration_s;

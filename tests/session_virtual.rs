@@ -6,6 +6,7 @@ use palpate::actors::{DeviceSample, ForceCommand, LocalActor, LocalPorts, ModelS
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
 use palpate::log::{ForceSample, LogRecord};
 use palpate::model::Vec3;
+use palpate::model::blend::Blend;
 use palpate::model::body::{Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
 use palpate::model::integrator::Spectrum;
@@ -363,7 +364,7 @@ impl ByHand {
         };
         let spare = || Box::new(Hold::default()) as Box<dyn LocalModel>;
         let full = Box::new(Full::new(glued_simulation()));
-        let models = Succession::new([full, spare(), spare()], 0, Vec3::zeros());
+        let models = Succession::new([full, spare(), spare()], Blend::default(), Vec3::zeros());
         let actor = LocalActor::new(models, HAPTIC, Rate::hz(30), Vec::new(), ports);
         Self { actor, samples, view, drain, simulation: glued_simulation() }
     }

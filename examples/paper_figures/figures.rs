@@ -142,6 +142,7 @@ fn legend(runs: &ForceRuns, run: &ForceRun) -> String {
         LocalModelKind::Full => "full: the whole body at 1 kHz".to_owned(),
         LocalModelKind::Hold => format!("hold: the last 30 Hz force (rms {rms:.1} %)"),
         LocalModelKind::Patch => format!("patch: the paper's local model (rms {rms:.1} %)"),
+        other => format!("{}: rms {rms:.1} %", other.name()),
     }
 }
 
@@ -149,7 +150,7 @@ fn color(model: LocalModelKind) -> RGBColor {
     match model {
         LocalModelKind::Full => INK,
         LocalModelKind::Hold => ORANGE,
-        LocalModelKind::Patch => BLUE,
+        _ => BLUE,
     }
 }
 

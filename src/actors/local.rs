@@ -222,6 +222,9 @@ fn served_by(kind: Kind) -> ServedBy {
         Kind::Full => ServedBy::Full,
         Kind::Hold => ServedBy::Hold,
         Kind::Patch => ServedBy::Patch,
+        Kind::LinearBoundary => ServedBy::LinearBoundary,
+        Kind::ScaledBoundary => ServedBy::ScaledBoundary,
+        Kind::Condensed => ServedBy::Condensed,
         Kind::Predicted => ServedBy::Predicted,
         Kind::Predictive => ServedBy::Predictive,
     }

@@ -7,8 +7,9 @@ use super::body::{Body, State};
 /// denormals, which are a hundred times slower. Far below anything that a force can show.
 const REST: f64 = 1e-30;
 
+/// Without what is too small to matter.
 #[inline(always)]
-fn snap(vector: Vec3) -> Vec3 {
+pub(super) fn snap(vector: Vec3) -> Vec3 {
     vector.map(|c| if c.abs() < REST { 0.0 } else { c })
 }
 

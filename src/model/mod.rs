@@ -11,6 +11,7 @@ mod dense;
 pub mod equilibrium;
 pub mod forecast;
 pub mod geometry;
+pub mod implicit;
 pub mod integrator;
 pub mod local;
 pub mod mesh;

@@ -1,17 +1,23 @@
-//! The dense linear model of a patch: force at the resync and its answer to displacements and velocities.
+//! The dense linear model of a patch: force at the resync and its answer to displacements and velocities, of the patch and
+//! of what surrounds it.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Vec3;
 use super::body::{Body, State};
+use super::{Mat3, Vec3};
 
-/// Force on the n nodes of a patch as a linear function of their motion, surroundings fixed.
+/// Force on the n nodes of a patch as a linear function of their motion and of the time that their surroundings move on.
 ///
-/// f = f_0 + K (x - x_0) + C (v - v_0), with f_0 the force at (x_0, v_0) while every node outside stands still.
+/// f = f_0 + K (x - x_0) + C (v - v_0) + C_B v_B + t K_B v_B, with f_0 the force at (x_0, v_0) while every node outside
+/// stands still, and v_B the velocities of these nodes at the resync.
 #[derive(Clone, Debug, Default)]
 pub struct PatchTangent {
     /// f_0 (N), 3n.
     force: DVector<f64>,
+    /// C_B v_B (N), 3n.
+    dragged: DVector<f64>,
+    /// K_B v_B (N/s), 3n.
+    drift: DVector<f64>,
     /// [K | C], 3n x 6n: one product per step reads one matrix.
     matrix: DMatrix<f64>,
     /// [x - x_0; v - v_0], 6n.
@@ -23,42 +29,80 @@ pub struct PatchTangent {
     product: DVector<f64>,
 }
 
+/// What the nodes outside have done since the resync.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Drift {
+    /// For how long they have moved on with their velocity at the resync (s).
+    pub time: f64,
+    /// True while they still do.
+    pub is_moving: bool,
+}
+
+/// How much of the coupling of a patch node (first) to a node outside (second) answers to the patch's motion, both by
+/// global id; 1 is all of it.
+pub type Share<'a> = &'a dyn Fn(u32, u32) -> f64;
+
 impl PatchTangent {
     /// Linearises `body` at `state` for the rows of `nodes`; `place` finds a node's place in `nodes`. The negative
-    /// geometric stiffness of compressed springs is left out.
+    /// geometric stiffness of compressed springs is left out. `share` weakens couplings to the outside; the force at the
+    /// resync is not changed by it.
     ///
     /// # Real-time
     /// For the global actor: allocates when the number of nodes is not that of the call before.
-    pub fn rebuild(&mut self, body: &dyn Body, state: &State, nodes: &[u32], place: &dyn Fn(u32) -> Option<usize>) {
+    pub fn rebuild(
+        &mut self,
+        body: &dyn Body,
+        state: &State,
+        nodes: &[u32],
+        place: &dyn Fn(u32) -> Option<usize>,
+        share: Share<'_>,
+    ) {
         let n = nodes.len();
         if self.force.len() != 3 * n {
-            self.force = DVector::zeros(3 * n);
+            for vector in [&mut self.force, &mut self.dragged, &mut self.drift, &mut self.product] {
+                *vector = DVector::zeros(3 * n);
+            }
             self.matrix = DMatrix::zeros(3 * n, 6 * n);
             self.deviation = DVector::zeros(6 * n);
-            self.product = DVector::zeros(3 * n);
         }
         self.matrix.fill(0.0);
+        self.dragged.fill(0.0);
+        self.drift.fill(0.0);
         self.node_forces.resize(n, Vec3::zeros());
         body.node_forces(state, nodes, &mut self.node_forces);
         for (force, node) in self.force.as_mut_slice().as_chunks_mut::<3>().0.iter_mut().zip(&self.node_forces) {
             *force = (*node).into();
         }
-        let (force, matrix) = (&mut self.force, &mut self.matrix);
+        let Self { force, dragged, drift, matrix, .. } = self;
+        let mut add = |row: usize, column: usize, position: Mat3, velocity: Mat3| {
+            let mut place = matrix.fixed_view_mut::<3, 3>(row, column);
+            place += position;
+            let mut place = matrix.fixed_view_mut::<3, 3>(row, 3 * n + column);
+            place += velocity;
+        };
         body.tangent(state, nodes, true, &mut |block| {
             let Some(row) = place(block.row).map(|row| 3 * row) else { return };
             match place(block.column) {
                 None => {
+                    let outside = state.velocities[block.column as usize];
                     // Forces are linear in the velocities: outside nodes that stand still take their share back.
+                    let taken = block.velocity * outside;
                     let mut rows = force.fixed_rows_mut::<3>(row);
-                    rows -= block.velocity * state.velocities[block.column as usize];
+                    rows -= taken;
+                    let mut rows = dragged.fixed_rows_mut::<3>(row);
+                    rows += taken;
+                    let share = share(block.row, block.column);
+                    let mut rows = drift.fixed_rows_mut::<3>(row);
+                    rows += block.position * outside * share;
+                    if share != 1.0 {
+                        // Moving both nodes alike changes no force: the diagonal holds the opposite of this coupling.
+                        add(row, row, block.position * (1.0 - share), block.velocity * (1.0 - share));
+                    }
                 }
-                Some(column) => {
-                    let column = 3 * column;
-                    let mut position = matrix.fixed_view_mut::<3, 3>(row, column);
-                    position += block.position;
-                    let mut velocity = matrix.fixed_view_mut::<3, 3>(row, 3 * n + column);
-                    velocity += block.velocity;
-                }
+                Some(column) => add(row, 3 * column, block.position, block.velocity),
             }
         });
         self.origin.positions.clear();
@@ -67,20 +111,53 @@ impl PatchTangent {
         self.origin.velocities.extend(nodes.iter().map(|&node| state.velocities[node as usize]));
     }
 
-    /// Writes the force on each patch node (N) for the given positions and velocities (the first n of each are read).
+    /// Adds `stiffness` (N/m, 3n x 3n, a derivative of the force as K is) to K.
+    ///
+    /// # Real-time
+    /// For the global actor: bounded.
+    pub fn add_stiffness(&mut self, stiffness: &DMatrix<f64>) {
+        let n = self.force.len();
+        if stiffness.shape() == (n, n) {
+            let mut position = self.matrix.columns_mut(0, n);
+            position += stiffness;
+        }
+    }
+
+    /// Writes the force on each patch node (N) for the given positions and velocities (the first n of each are read), with
+    /// positions that move on with their velocity for `ahead` seconds, and surroundings that have done `drift` by then.
     ///
     /// # Real-time
     /// Bounded, real-time safe: 18 n^2 multiply-adds.
-    pub fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], forces: &mut [Vec3]) {
+    pub fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], ahead: f64, drift: Drift, forces: &mut [Vec3]) {
         let n = self.origin.positions.len();
         let (by_position, by_velocity) = self.deviation.as_mut_slice().split_at_mut(3 * n);
-        write_deviation(by_position, positions, &self.origin.positions);
-        write_deviation(by_velocity, velocities, &self.origin.velocities);
+        let nodes = positions.iter().zip(velocities).zip(&self.origin.positions);
+        for (deviation, ((x, v), x0)) in by_position.as_chunks_mut::<3>().0.iter_mut().zip(nodes) {
+            *deviation = (x + v * ahead - x0).into();
+        }
+        let nodes = velocities.iter().zip(&self.origin.velocities);
+        for (deviation, (v, v0)) in by_velocity.as_chunks_mut::<3>().0.iter_mut().zip(nodes) {
+            *deviation = (v - v0).into();
+        }
         self.product.copy_from(&self.force);
+        if drift.is_moving {
+            self.product += &self.dragged;
+        }
+        if drift.time > 0.0 {
+            self.product.axpy(drift.time, &self.drift, 1.0);
+        }
         self.product.gemv(1.0, &self.matrix, &self.deviation, 1.0);
         for (force, product) in forces.iter_mut().zip(self.product.as_slice().as_chunks::<3>().0) {
             *force = Vec3::from(*product);
         }
+    }
+
+    /// K and C side by side (N/m, N s/m), 3n x 6n.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn matrix(&self) -> &DMatrix<f64> {
+        &self.matrix
     }
 
     /// Number of patch nodes n.
@@ -89,12 +166,6 @@ impl PatchTangent {
     /// Wait-free, real-time safe.
     pub fn nodes(&self) -> usize {
         self.origin.positions.len()
-    }
-}
-
-fn write_deviation(deviation: &mut [f64], now: &[Vec3], origin: &[Vec3]) {
-    for ((deviation, now), origin) in deviation.as_chunks_mut::<3>().0.iter_mut().zip(now).zip(origin) {
-        *deviation = (now - origin).into();
     }
 }
 
@@ -117,7 +188,7 @@ mod tests {
         block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
         let place = |node: u32| nodes.iter().position(|&other| other == node);
         let mut tangent = PatchTangent::default();
-        tangent.rebuild(&block, &state, &nodes, &place);
+        tangent.rebuild(&block, &state, &nodes, &place, &|_, _| 1.0);
 
         // The body with everything outside the patch standing still is what the linear model stands for.
         let mut frozen = state.clone();
@@ -130,7 +201,8 @@ mod tests {
         let mut exact = vec![Vec3::zeros(); state.positions.len()];
         let mut linear = vec![Vec3::zeros(); nodes.len()];
         block.forces(&frozen, &mut exact);
-        tangent.forces(&patch(&frozen.positions), &patch(&frozen.velocities), &mut linear);
+        let still = Drift::default();
+        tangent.forces(&patch(&frozen.positions), &patch(&frozen.velocities), 0.0, still, &mut linear);
         assert!(nodes.iter().zip(&linear).all(|(&node, f)| (exact[node as usize] - f).norm() < 1e-13));
 
         let error = |scale: f64, linear: &mut [Vec3], tangent: &mut PatchTangent, block: &mut Block| {
@@ -138,12 +210,46 @@ mod tests {
             for &node in &nodes {
                 moved.velocities[node as usize] += Vec3::new(0.3, -0.2, 0.1) * scale;
             }
-            tangent.forces(&patch(&moved.positions), &patch(&moved.velocities), linear);
+            tangent.forces(&patch(&moved.positions), &patch(&moved.velocities), 0.0, still, linear);
             let mut exact = vec![Vec3::zeros(); state.positions.len()];
             block.forces(&moved, &mut exact);
             nodes.iter().zip(&*linear).map(|(&node, f)| (exact[node as usize] - f).norm()).fold(0.0, f64::max)
         };
         // Forces are linear in the velocities: the model is exact for any of them.
         assert!(error(1.0, &mut linear, &mut tangent, &mut block) < 1e-12);
+    }
+
+    #[test]
+    fn surroundings_that_move_on_give_the_force_that_they_give_in_the_body() {
+        let mut block = Block::builder([6; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
+        let mut state = State::at_rest(block.rest());
+        for (n, v) in state.velocities.iter_mut().enumerate() {
+            let n = n as f64;
+            *v = Vec3::new((5.0 * n).sin(), (7.0 * n).cos(), (11.0 * n).sin()) * 1e-3;
+        }
+        let mut nodes = Vec::new();
+        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
+        let place = |node: u32| nodes.iter().position(|&other| other == node);
+        let mut tangent = PatchTangent::default();
+        tangent.rebuild(&block, &state, &nodes, &place, &|_, _| 1.0);
+        let time = 1e-3;
+        let mut later = state.clone();
+        for (node, (x, v)) in later.positions.iter_mut().zip(&later.velocities).enumerate() {
+            if place(node as u32).is_none() && block.inverse_masses()[node] > 0.0 {
+                *x += v * time;
+            }
+        }
+        let patch = |all: &[Vec3]| nodes.iter().map(|&node| all[node as usize]).collect::<Vec<_>>();
+        let (mut exact, mut linear) = (vec![Vec3::zeros(); state.positions.len()], vec![Vec3::zeros(); nodes.len()]);
+        block.forces(&later, &mut exact);
+        let drift = Drift { time, is_moving: true };
+        tangent.forces(&patch(&state.positions), &patch(&state.velocities), 0.0, drift, &mut linear);
+        let largest = patch(&exact).iter().map(Vec3::norm).fold(0.0, f64::max);
+        let error = patch(&exact).iter().zip(&linear).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(error < 1e-3 * largest && largest > 1e-6, "{error} of {largest}");
+        // Without their motion it is another force.
+        tangent.forces(&patch(&state.positions), &patch(&state.velocities), 0.0, Drift::default(), &mut linear);
+        let error = patch(&exact).iter().zip(&linear).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(error > 0.05 * largest, "{error} of {largest}");
     }
 }

@@ -34,7 +34,7 @@ pub use crate::devices::ToolPath;
 pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
 pub use device::{DeviceKind, DeviceSpec, SafetySpec};
-pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction};
+pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,11 +139,14 @@ impl Scene {
         validate::validate(self)
     }
 
-    /// The same scene with another local model, without a feedback that only the former model can give.
+    /// The same scene with another local model, without a feedback and a step that only the former model can have.
     #[must_use]
     pub fn with_model(mut self, model: LocalModelKind) -> Self {
         if !self.local.feedback.is_none_or(|feedback| feedback.fits(model)) {
             self.local.feedback = None;
+        }
+        if self.local.step == StepKind::Implicit && !model.is_linear() {
+            self.local.step = StepKind::Auto;
         }
         self.local.model = model;
         self

@@ -1,4 +1,7 @@
-//! The global and the local model's part of a scene: rates, sizes, feedback, blending.
+//! The global and the local model's part of a scene: rates, sizes, feedback, steps, blending.
+
+pub use crate::model::blend::BlendKind;
+pub use crate::model::local::{Feedback, Kind as LocalModelKind};
 
 pub use crate::model::local::Prediction;
 
@@ -36,8 +39,10 @@ pub struct LocalSpec {
     pub basis: usize,
     /// How `predictive` looks ahead.
     pub prediction: Prediction,
-    /// What the global model learns from the local one.
+    /// What the global model learns from the local one; what the model is best with if absent.
     pub feedback: Option<Feedback>,
+    /// How a linear patch is stepped.
+    pub step: StepKind,
     /// How a resync's discontinuity is spread.
     pub blend: BlendSpec,
 }
@@ -51,56 +56,23 @@ impl Default for LocalSpec {
             basis: 50,
             prediction: Prediction::default(),
             feedback: None,
+            step: StepKind::default(),
             blend: BlendSpec::default(),
         }
     }
 }
 
-/// The local models.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+/// How a linear patch is stepped through a haptic tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
-pub enum LocalModelKind {
-    /// The whole body at the haptic rate: the reference that the others are measured against.
-    Full,
-    /// The last force of the global model.
-    Hold,
-    /// The paper's: a linear patch in fixed surroundings.
+pub enum StepKind {
+    /// Explicit while the stability limit asks for few steps per tick, implicit beyond.
     #[default]
-    Patch,
-    /// A non-linear patch in surroundings that move as predicted, corrected by a reduced model of them.
-    Predictive,
-}
-
-impl LocalModelKind {
-    /// Every model, in order of cost.
-    pub const ALL: [Self; 4] = [Self::Hold, Self::Patch, Self::Predictive, Self::Full];
-
-    /// Its name in scene files and tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Full => "full",
-            Self::Hold => "hold",
-            Self::Patch => "patch",
-            Self::Predictive => "predictive",
-        }
-    }
-}
-
-/// What the global model learns from the local one, besides the tool's trajectory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
-pub enum Feedback {
-    /// Nothing: it resolves the contact along the tool's trajectory itself.
-    Trajectory,
-    /// The patch's positions, velocities and contact replace its own: the paper's.
-    Geometry,
-}
-
-impl Feedback {
-    /// True if `model` can give it: only a patch has a geometry of its own.
-    pub fn fits(self, model: LocalModelKind) -> bool {
-        self == Self::Trajectory || model == LocalModelKind::Patch
-    }
+    Auto,
+    /// The global model's explicit steps.
+    Explicit,
+    /// One implicit step per tick.
+    Implicit,
 }
 
 /// How a resync's discontinuity is spread over time.
@@ -112,15 +84,4 @@ pub struct BlendSpec {
     /// How long (ms); not used by `none`.
     #[cfg_attr(feature = "scene", serde(default))]
     pub ms: f64,
-}
-
-/// The ways of blending.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
-pub enum BlendKind {
-    /// The new model's force at once.
-    #[default]
-    None,
-    /// Old and new model both run; the force moves linearly from one to the other.
-    Crossfade,
 }

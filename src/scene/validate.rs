@@ -2,8 +2,8 @@
 
 use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 use super::{
-    BlendKind, BlockSpec, BodySpec, DeviceSpec, Face, Friction, GlobalSpec, InitialSpec, LocalModelKind, LocalSpec,
-    SafetySpec, Scene,
+    BlendKind, BlockSpec, BodySpec, DeviceSpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec,
+    LocalModelKind, LocalSpec, SafetySpec, Scene, StepKind,
 };
 use crate::error::Error;
 use crate::time::Rate;
@@ -37,6 +37,11 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
     }
     global(&scene.global)?;
     local(&scene.local, &scene.global)?;
+    if scene.local.step == StepKind::Implicit && scene.contact.equations == Equations::Paper {
+        let message =
+            "\"implicit\" has the corrected contact equations only, leave it out or use equations = \"corrected\"";
+        return Err(Error::scene("local.step", message));
+    }
     device(&scene.device)?;
     safety(&scene.safety)?;
     if let Some(spec) = &scene.initial {
@@ -52,7 +57,7 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
 /// What names nodes of the block, or has to fit into it.
 fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
     // A body too small for the default patch is fine for the models that have none; a patch that was asked for is not.
-    if scene.local.model == LocalModelKind::Patch || scene.local.patch != LocalSpec::default().patch {
+    if scene.local.model.has_patch() || scene.local.patch != LocalSpec::default().patch {
         patch(scene.local.patch, block)?;
     }
     if let Some(node) = scene.device.attach_node {
@@ -173,19 +178,37 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
     if let Some(feedback) = local.feedback
         && !feedback.fits(local.model)
     {
+        return Err(Error::scene("local.feedback", misfit(feedback, local.model)));
+    }
+    if local.step == StepKind::Implicit && !local.model.is_linear() {
         let message =
-            format!("\"geometry\" needs model = \"patch\" and the model is {:?}, leave it out", local.model.name());
-        return Err(Error::scene("local.feedback", message));
+            format!("\"implicit\" needs a linear patch and the model is {:?}, leave it out", local.model.name());
+        return Err(Error::scene("local.step", message));
     }
     if local.basis > MAX_BASIS {
         let message = format!("is {}, must be at most {MAX_BASIS}: more cost time and add nothing", local.basis);
         return Err(Error::scene("local.basis", message));
     }
     not_negative("local.blend.ms", local.blend.ms)?;
-    if local.blend.kind == BlendKind::Crossfade && local.blend.ms == 0.0 {
-        return Err(Error::scene("local.blend.ms", "is 0 or missing, a crossfade needs a time above 0 such as 10"));
+    let name = match local.blend.kind {
+        BlendKind::None => return Ok(()),
+        BlendKind::Crossfade => "a crossfade",
+        BlendKind::Offset => "an offset",
+    };
+    if local.blend.ms == 0.0 {
+        return Err(Error::scene("local.blend.ms", format!("is 0 or missing, {name} needs a time above 0 such as 10")));
     }
     Ok(())
+}
+
+fn misfit(feedback: Feedback, model: LocalModelKind) -> String {
+    let (fed, name) = (feedback.name(), model.name());
+    if matches!(model, LocalModelKind::Condensed | LocalModelKind::ScaledBoundary) {
+        return format!("{fed:?} with model = {name:?} would count the surroundings' compliance twice, leave it out");
+    }
+    let fitting = LocalModelKind::ALL.into_iter().filter(|&model| feedback.fits(model));
+    let fitting = fitting.map(|model| format!("{:?}", model.name())).collect::<Vec<_>>().join(" or ");
+    format!("{fed:?} needs model = {fitting} and the model is {name:?}, leave it out")
 }
 
 /// The window is clamped at thin faces, so it has to fit one of the faces that can be touched: those that are not fixed.

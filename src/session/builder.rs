@@ -6,7 +6,7 @@ use crate::devices::{Device, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::body::Body;
 use crate::runtime::{Execution, RateGroup};
-use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, LocalModelKind, Scene};
+use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, LocalModelKind, Scene, StepKind};
 
 /// Collects what a session is made of; fills the same [`Scene`] as a scene file and passes the same validation.
 #[derive(Debug)]
@@ -84,10 +84,24 @@ impl SessionBuilder {
         self
     }
 
-    /// Blends resyncs over `ms` milliseconds.
+    /// Blends resyncs over `ms` milliseconds, old and new model both running.
     #[must_use]
     pub fn crossfade_ms(mut self, ms: f64) -> Self {
         self.parts.scene.local.blend = BlendSpec { kind: BlendKind::Crossfade, ms };
+        self
+    }
+
+    /// Lets the step of a resync decay over `ms` milliseconds while the new model alone runs.
+    #[must_use]
+    pub fn offset_ms(mut self, ms: f64) -> Self {
+        self.parts.scene.local.blend = BlendSpec { kind: BlendKind::Offset, ms };
+        self
+    }
+
+    /// How a linear patch is stepped; without, chosen from the stability limit.
+    #[must_use]
+    pub fn local_step(mut self, step: StepKind) -> Self {
+        self.parts.scene.local.step = step;
         self
     }
 

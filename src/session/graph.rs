@@ -99,7 +99,8 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
             let ports = GlobalSide {
                 ticks: graph.queue_port(ticks_buffered),
                 geometry: prepared
-                    .geometry_feedback
+                    .template
+                    .feeds_back()
                     .then(|| graph.exchange_port(move || PatchGeometry::with_room(nodes))),
                 models: graph.exchange_port(model),
                 surroundings,
@@ -140,7 +141,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
         view: view_writer,
         recorder: graph.recorder(ticks_buffered * per_tick),
     };
-    let succession = Succession::new(models, prepared.blend_ticks, Vec3::zeros());
+    let succession = Succession::new(models, prepared.blend, Vec3::zeros());
     let local = LocalActor::new(succession, prepared.haptic, prepared.global_rate, probes, ports);
 
     let outcome = LoggerOutcome::default();

@@ -9,18 +9,19 @@ use crate::actors::GAP_S;
 use crate::devices::{Device, Scripted, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::Vec3;
+use crate::model::blend::Blend;
 use crate::model::body::{Block, Body, State};
 use crate::model::contact::{Contact, Law};
 use crate::model::equilibrium::static_equilibrium;
 use crate::model::integrator::Spectrum;
-use crate::model::local::{Kind, Template};
+use crate::model::local::Template;
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, OverrunPolicy, RateGroup, Release, admit_here};
 use crate::safety::Limits;
 #[cfg(feature = "scene")]
 use crate::scene::ProbeSpec;
-use crate::scene::{BlendKind, BodySpec, Feedback, InitialSpec, LocalModelKind, Scene};
+use crate::scene::{BodySpec, Equations, Feedback, InitialSpec, Scene, StepKind};
 use crate::time::{Nanos, Rate};
 
 /// What a builder has collected.
@@ -73,8 +74,7 @@ pub(super) struct Prepared {
     pub basis_latency: Nanos,
     /// Haptic ticks that a local model may have to reach ahead.
     pub horizon: u32,
-    pub geometry_feedback: bool,
-    pub blend_ticks: u32,
+    pub blend: Blend,
     pub device: Box<dyn Device>,
     pub limits: Limits,
     pub probes: Vec<u32>,
@@ -101,7 +101,7 @@ pub(super) struct Prepared {
 impl Prepared {
     /// True if the local models use reduced surroundings.
     pub(super) fn reduces(&self) -> bool {
-        self.template.kind == Kind::Predictive && self.basis_states > 0
+        self.template.kind == crate::model::local::Kind::Predictive && self.basis_states > 0
     }
 }
 
@@ -114,6 +114,10 @@ pub(super) struct Timing {
 
 /// The priority of the haptic thread: above everything but the kernel's own.
 const HAPTIC_PRIORITY: u8 = 80;
+
+/// A linear patch whose stability asks for more takes one implicit step per tick: that costs as much as two explicit ones,
+/// and damps what four still show.
+const MOST_EXPLICIT_STEPS: u32 = 4;
 
 /// Steps of 0.1 us, the limit of `global.substeps_per_ms` too: a body that needs more would seem to hang.
 const MAX_SUBSTEPS_PER_MS: f64 = 1e4;
@@ -140,7 +144,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     check_nodes(&*body, attach, &probes)?;
 
     let tick = haptic.period_s();
-    let substeps = substeps(&mut *body, scene.global.substeps_per_ms, tick)?;
+    let (substeps, stable_substeps) = substeps(&mut *body, scene.global.substeps_per_ms, tick)?;
     let state = match &scene.initial {
         Some(initial) => pulled(&mut *body, initial, id)?,
         None => State::at_rest(body.rest()),
@@ -169,18 +173,20 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         // The device's own limit too; one without a limit has none to note.
         as_run.safety.max_force_n = limits.max_force_n.is_finite().then_some(limits.max_force_n);
     }
-    let kind = match scene.local.model {
-        LocalModelKind::Full => Kind::Full,
-        LocalModelKind::Hold => Kind::Hold,
-        LocalModelKind::Patch => Kind::Patch,
-        LocalModelKind::Predictive => Kind::Predictive,
+    let kind = scene.local.model;
+    let is_implicit = match scene.local.step {
+        StepKind::Explicit => false,
+        StepKind::Implicit => true,
+        StepKind::Auto => scene.contact.equations != Equations::Paper && stable_substeps > MOST_EXPLICIT_STEPS,
     };
-    // The paper feeds the patch's geometry back; hold has none.
-    let feedback = scene.local.feedback.unwrap_or(Feedback::Geometry);
-    let blend_ticks = match scene.local.blend.kind {
-        BlendKind::None => 0,
-        BlendKind::Crossfade => (scene.local.blend.ms * 1e-3 / tick).round().max(1.0) as u32,
-    };
+    // The longer one where periods alternate, 33 and 34 ticks at 30 Hz.
+    let period_ticks = (haptic.as_hz() / global_rate.as_hz() - 1e-6).ceil().min(f64::from(u32::MAX)) as u32;
+    let template = Template::new(kind, scene.local.patch, &*body)?
+        .with_feedback(scene.local.feedback.unwrap_or(Feedback::of(kind)))
+        .with_prediction(scene.local.prediction)
+        .with_period(period_ticks);
+    let template = if is_implicit { template.with_implicit_steps() } else { template };
+    let blend_ticks = (scene.local.blend.ms * 1e-3 / tick).round().max(1.0) as u32;
     let global = parts.global.unwrap_or_else(|| RateGroup::new(global_rate)).name("global");
     let global = match scene.global.compute_latency_ms {
         // Not given: the latency of a group that the program brings stays.
@@ -207,13 +213,12 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         Execution::Threaded => budget::declare(&mut *body, &state, Timing { haptic, substeps }, kind, [local, global])?,
     };
     let prepared = Prepared {
-        template: Template::new(kind, scene.local.patch, scene.local.prediction, &*body)?,
+        template,
         basis_states: scene.local.basis,
         basis_latency: Nanos::from_secs_f64(scene.global.basis_latency_ms * 1e-3),
         horizon: horizon(haptic, global_rate, scene.global.compute_latency_ms, blend_ticks),
         simulation: Simulation::new(body, state, contact, law, Stepping { tick, substeps })?,
-        geometry_feedback: feedback == Feedback::Geometry && kind == Kind::Patch,
-        blend_ticks,
+        blend: Blend::new(scene.local.blend.kind, blend_ticks),
         device,
         limits,
         probes,
@@ -368,8 +373,8 @@ fn check_nodes(body: &dyn Body, attach: Option<u32>, probes: &[u32]) -> Result<(
     }
 }
 
-/// Substeps per haptic tick: as asked, unless that is unstable, or from the stability limit.
-fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<u32, Error> {
+/// Substeps per haptic tick: as asked, unless that is unstable, or from the stability limit; and what that asks for.
+fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<(u32, u32), Error> {
     let spectrum = Spectrum::estimate(body);
     let stable = spectrum.stable_step();
     if stable.is_nan() || stable <= 0.0 {
@@ -384,7 +389,7 @@ fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<u32, 
             );
             return Err(Error::scene("body", message));
         }
-        return Ok(substeps);
+        return Ok((substeps, substeps));
     };
     let substeps = (f64::from(per_ms) * tick * 1e3 - 1e-9).ceil().max(1.0);
     if tick / substeps >= stable {
@@ -394,7 +399,7 @@ fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<u32, 
         );
         return Err(Error::scene("global.substeps_per_ms", message));
     }
-    Ok(substeps as u32)
+    Ok((substeps as u32, spectrum.substeps(tick)))
 }
 
 fn pulled(body: &mut dyn Body, initial: &InitialSpec, id: impl Fn([usize; 3]) -> u32) -> Result<State, Error> {

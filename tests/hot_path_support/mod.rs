@@ -16,7 +16,7 @@ use palpate::model::body::Block;
 use palpate::model::mesh::Face;
 use palpate::runtime::RateGroup;
 use palpate::runtime::exchange::exchange;
-use palpate::scene::LocalModelKind;
+use palpate::scene::{LocalModelKind, StepKind};
 use palpate::session::Session;
 use palpate::time::Nanos;
 
@@ -60,7 +60,7 @@ const VARIABLE: &str = "PALPATE_HOT_PATH_CHILD";
 const LOG: &str = "PALPATE_HOT_PATH_LOG";
 const NOT_POSSIBLE: i32 = 77;
 
-const MODELS: [LocalModelKind; 3] = LocalModelKind::ALL;
+const MODELS: [LocalModelKind; 7] = LocalModelKind::ALL;
 const GUARDS: [Guard; 2] = [Guard::SystemCalls, Guard::Counters];
 const OFFENCES: [Offence; 7] =
     [Offence::None, Offence::Allocate, Offence::Free, Offence::Call, Offence::Lock, Offence::Fault, Offence::Wait];
@@ -201,6 +201,8 @@ pub fn child() {
         .device(device)
         .friction(0.5)
         .model(case.model)
+        // One of the linear patches shows the implicit step.
+        .local_step(if case.model == LocalModelKind::ScaledBoundary { StepKind::Implicit } else { StepKind::Auto })
         .crossfade_ms(10.0)
         .log(std::env::var_os(LOG).expect("set by the parent"));
     if !case.privileged {

@@ -10,7 +10,10 @@
 //! x += d_c v;  slip or release: walk to the triangle under the tool
 //! force on the tool: J / d
 //! ```
+//!
+//! [`step_implicit`] differs in v*, which comes from a linear system, and in the impulse, which moves every node.
 
+mod coupled;
 mod deformable;
 mod normal;
 mod paper;
@@ -23,7 +26,7 @@ mod walk;
 use super::Vec3;
 
 pub use deformable::Deformable;
-pub use step::step;
+pub use step::{step, step_implicit};
 
 /// The state of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -9,9 +9,9 @@ use super::{Law, Mode, ToolMotion};
 /// Penetration is recovered at this speed (m/s); an open gap is closed in full.
 const RECOVERY: f64 = 0.1;
 /// Below this compliance S (1/kg) all nodes are held and no force can be computed.
-const IMMOVABLE: f64 = 1e-9;
+pub(super) const IMMOVABLE: f64 = 1e-9;
 /// A remaining step shorter than this cannot carry an impulse (s).
-const NO_TIME: f64 = 1e-12;
+pub(super) const NO_TIME: f64 = 1e-12;
 
 /// What a contact did in one step.
 #[derive(Clone, Copy, Debug)]
@@ -30,15 +30,33 @@ impl Resolution {
     }
 }
 
+/// Where a contact is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place<'a> {
+    pub triangle: u32,
+    pub weights: &'a [f64; 3],
+    pub is_glued: bool,
+}
+
+/// The velocity that the contact point is to take over the last `d_c` of a step of `d` (s): v_t = (q1 - q_start + r) / d_c, r
+/// the drift between the tool and `point`.
+pub(super) fn target_velocity(point: Vec3, normal: &Vec3, tool: ToolMotion, d_c: f64, d: f64) -> Vec3 {
+    let mut drift = tool.from - point;
+    let (length, cap) = (drift.norm(), RECOVERY * d);
+    if length > cap && drift.dot(normal) < 0.0 {
+        drift *= cap / length;
+    }
+    (tool.to - tool.from + drift) / d_c
+}
+
 /// Solves the contact over the last `d_c` of a step of `d` (s) and changes the three nodes' velocities.
 ///
-/// The contact point G x is to move with the tool: v_t = (q1 - q_start + r) / d_c, r the drift between the two. The
-/// impulse J = (G v* - v_t) / S with S = sum w_i^2 / m_i, and v_i = v*_i - (w_i / m_i) J. Source: physics of the
+/// The contact point G x is to move with the tool. The impulse J = (G v* - v_t) / S with S = sum w_i^2 / m_i, and v_i = v*_i - (w_i / m_i) J. Source: physics of the
 /// paper's sections 4.2 to 4.4 in the mass-weighted form; J is the Lagrange multiplier for any masses.
 pub(super) fn resolve(
     body: &mut Deformable<'_>,
     law: &Law,
-    (triangle, weights, glued): (u32, &[f64; 3], bool),
+    Place { triangle, weights, is_glued }: Place<'_>,
     tool: ToolMotion,
     d_c: f64,
     d: f64,
@@ -55,15 +73,10 @@ pub(super) fn resolve(
     }
     let point = interpolate(weights, &nodes.map(|node| body.positions[node]));
     let velocity = interpolate(weights, &nodes.map(|node| body.velocities[node]));
-    let mut drift = tool.from - point;
-    let (length, cap) = (drift.norm(), RECOVERY * d);
-    if length > cap && drift.dot(&normal) < 0.0 {
-        drift *= cap / length;
-    }
-    let target = (tool.to - tool.from + drift) / d_c;
+    let target = target_velocity(point, &normal, tool, d_c, d);
     let mut impulse = (velocity - target) / compliance;
     let mut mode = Mode::Stick;
-    if !glued {
+    if !is_glued {
         let along = impulse.dot(&normal);
         // Written so that an impulse that is not a number releases.
         if along.is_nan() || along <= 0.0 {

@@ -1,14 +1,16 @@
-//! One explicit step with contact, for a whole body and for a patch alike.
+//! One step with contact, for a whole body and for a patch, explicit and implicit alike.
 
+use super::super::implicit::ImplicitStep;
 use super::super::{Vec3, integrator};
+use super::coupled::resolve_coupled;
 use super::deformable::Deformable;
-use super::resolve::{Resolution, resolve};
+use super::resolve::{Place, Resolution, resolve};
 use super::{Contact, Equations, Law, Mode, ToolMotion, paper};
 
-/// One step of `d` seconds: velocities take `forces`, the tool's contact is found and resolved, positions move.
+/// One explicit step of `d` seconds: velocities take `forces`, the tool's contact is found and resolved, positions move.
 /// Returns the force on the tool (N), the impulse over the full step.
 ///
-/// Velocities of nodes with zero inverse mass must be zero.
+/// Velocities of nodes with zero inverse mass are theirs to keep.
 ///
 /// # Real-time
 /// Bounded, real-time safe.
@@ -24,6 +26,38 @@ pub fn step(
         return paper::step(body, forces, contact, law, tool, d);
     }
     integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
+    move_with_tool(body, contact, law, tool, d, |body, place, tool, d_c| resolve(body, law, place, tool, d_c, d))
+}
+
+/// The same for the implicit step `system` of a linear patch: `forces` are those at its end for unchanged velocities, and
+/// every node answers to the tool's impulse. The equations are the corrected ones.
+///
+/// # Real-time
+/// Bounded, real-time safe: 9 n^2 multiply-adds for n nodes, and what detection costs.
+pub fn step_implicit(
+    body: &mut Deformable<'_>,
+    system: &mut ImplicitStep,
+    forces: &[Vec3],
+    contact: &mut Contact,
+    law: &Law,
+    tool: ToolMotion,
+) -> Vec3 {
+    let d = system.step();
+    system.accelerate(body.velocities, forces);
+    move_with_tool(body, contact, law, tool, d, |body, place, tool, d_c| {
+        resolve_coupled(body, system, law, place, tool, d_c)
+    })
+}
+
+/// From the velocities without contact on: detection, `resolution`, motion, tracking.
+fn move_with_tool(
+    body: &mut Deformable<'_>,
+    contact: &mut Contact,
+    law: &Law,
+    tool: ToolMotion,
+    d: f64,
+    resolution: impl FnOnce(&mut Deformable<'_>, Place<'_>, ToolMotion, f64) -> Resolution,
+) -> Vec3 {
     let Some((triangle, share)) = body.detect(contact, tool, d) else {
         body.drift(d);
         return Vec3::zeros();
@@ -32,8 +66,8 @@ pub fn step(
         body.drift(share * d);
     }
     let d_c = (1.0 - share) * d;
-    let place = (triangle, &contact.weights, contact.glued);
-    let Resolution { mode, impulse, normal } = resolve(body, law, place, tool.part(share, 1.0), d_c, d);
+    let place = Place { triangle, weights: &contact.weights, is_glued: contact.glued };
+    let Resolution { mode, impulse, normal } = resolution(body, place, tool.part(share, 1.0), d_c);
     (contact.mode, contact.normal) = (mode, normal);
     body.drift(d_c);
     if mode != Mode::Stick {

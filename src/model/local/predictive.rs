@@ -10,7 +10,18 @@ use super::super::surroundings::{Basis, ReducedMotion, SpringGraph};
 use super::near::NearSprings;
 use super::ring_path::RingPath;
 use super::window::Window;
-use super::{Kind, LocalModel, PatchGeometry, Prediction, ResyncView, Watched};
+use super::{Kind, LocalModel, PatchGeometry, ResyncView, Watched};
+
+/// How `predictive` finds where its ring will go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum Prediction {
+    /// By a reduced model of the surroundings, where that holds the present motion; else as [`Full`](Self::Full).
+    #[default]
+    Reduced,
+    /// By running the whole body ahead.
+    Full,
+}
 
 /// The patch and every spring that touches it stay non-linear. The ring, the patch's neighbours outside, moves as
 /// predicted for the expected path of the tool, and answers by the reduced surroundings to what the springs do

@@ -1,7 +1,7 @@
 //! From one local model to the next: swap in, catch up, blend.
 
 use super::super::Vec3;
-use super::super::blend::{Crossfade, Jump};
+use super::super::blend::{Blend, Jump};
 use super::super::contact::ToolMotion;
 use super::LocalModel;
 
@@ -40,7 +40,7 @@ pub struct Succession {
     arriving: Box<dyn LocalModel>,
     /// Version and tick that `arriving` has reached; `None` if it is a spare.
     arrival: Option<(u32, u64)>,
-    blend: Crossfade,
+    blend: Blend,
     version: u32,
     resync: Resynced,
     /// Tool position at the end of tick t at place t % HISTORY (m).
@@ -50,19 +50,19 @@ pub struct Succession {
 }
 
 impl Succession {
-    /// Starts with `models` to rotate through and a blend over `blend_ticks`; the tool is at `tool` (m) at tick 0.
+    /// Starts with `models` to rotate through and resyncs blended by `blend`; the tool is at `tool` (m) at tick 0.
     /// The first serves until another is offered.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(models: [Box<dyn LocalModel>; 3], blend_ticks: u32, tool: Vec3) -> Self {
+    pub fn new(models: [Box<dyn LocalModel>; 3], blend: Blend, tool: Vec3) -> Self {
         let [serving, fading, arriving] = models;
         Self {
             serving,
             fading,
             arriving,
             arrival: None,
-            blend: Crossfade::new(blend_ticks),
+            blend,
             version: 0,
             resync: Resynced::default(),
             history: vec![tool; HISTORY],
@@ -107,10 +107,10 @@ impl Succession {
         let place = self.now as usize % HISTORY;
         self.history[place] = tool;
         let new = self.serving.tick(motion);
-        if !self.blend.needs_old() {
+        if !self.blend.is_under_way() {
             return Served { force: new, resync: None };
         }
-        let old = self.fading.tick(motion);
+        let old = if self.blend.needs_old() { self.fading.tick(motion) } else { new };
         // A diverged old model must not spoil a good new one.
         let old = if old.iter().all(|c| c.is_finite()) { old } else { new };
         let (force, jump) = self.blend.mix(new, old);
@@ -131,7 +131,7 @@ impl Succession {
                 return;
             }
         }
-        if self.blend.needs_old() {
+        if self.blend.is_under_way() {
             return;
         }
         self.arrival = None;
@@ -184,6 +184,7 @@ impl Succession {
 mod tests {
     use super::super::{Kind, PatchGeometry, ResyncView};
     use super::*;
+    use crate::model::blend::BlendKind;
     use crate::model::contact::Contact;
 
     /// Adds up the motion that it was given; its force is its base plus that.
@@ -232,8 +233,8 @@ mod tests {
     }
 
     fn succession(blend_ticks: u32) -> Succession {
-        let mut models =
-            Succession::new([1.0, -1.0, -1.0].map(|base| model(base, 0, true)), blend_ticks, Vec3::zeros());
+        let blend = Blend::new(BlendKind::Crossfade, blend_ticks);
+        let mut models = Succession::new([1.0, -1.0, -1.0].map(|base| model(base, 0, true)), blend, Vec3::zeros());
         models.begin(Vec3::zeros(), None);
         models
     }

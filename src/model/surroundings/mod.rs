@@ -2,11 +2,13 @@
 //! everything beyond.
 
 mod basis;
+mod condense;
 mod far;
 mod graph;
 mod products;
 mod reduced;
 
 pub use basis::{Bases, Basis};
+pub use condense::Condensation;
 pub use graph::SpringGraph;
 pub(crate) use reduced::ReducedMotion;

@@ -1,0 +1,73 @@
+//! The local models by name.
+
+/// The local models.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum Kind {
+    /// [`Full`](super::Full): the whole body at the haptic rate, the reference that the others are measured against.
+    Full,
+    /// [`Hold`](super::Hold): the last force of the global model.
+    Hold,
+    /// [`Patch`](super::Patch): the paper's, a linear patch in fixed surroundings.
+    #[default]
+    Patch,
+    /// [`LinearBoundary`](super::LinearBoundary): a linear patch in surroundings that move on.
+    LinearBoundary,
+    /// [`ScaledBoundary`](super::ScaledBoundary): a linear patch on springs scaled by depth.
+    ScaledBoundary,
+    /// [`Condensed`](super::Condensed): a linear patch in surroundings that give way as at rest.
+    Condensed,
+    /// [`Predictive`](super::Predictive) without a basis: a non-linear patch in surroundings that move as predicted, whatever
+    /// happens.
+    Predicted,
+    /// [`Predictive`](super::Predictive): a non-linear patch in surroundings that move as predicted, corrected by a reduced
+    /// model of them.
+    Predictive,
+}
+
+impl Kind {
+    /// Every model, in order of cost.
+    pub const ALL: [Self; 8] = [
+        Self::Hold,
+        Self::Patch,
+        Self::LinearBoundary,
+        Self::ScaledBoundary,
+        Self::Condensed,
+        Self::Predicted,
+        Self::Predictive,
+        Self::Full,
+    ];
+
+    /// Its name in scene files, tables and logs.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Hold => "hold",
+            Self::Patch => "patch",
+            Self::LinearBoundary => "linear_boundary",
+            Self::ScaledBoundary => "scaled_boundary",
+            Self::Condensed => "condensed",
+            Self::Predicted => "predicted",
+            Self::Predictive => "predictive",
+        }
+    }
+
+    /// True if it holds a patch around the tool.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn has_patch(self) -> bool {
+        !matches!(self, Self::Full | Self::Hold)
+    }
+
+    /// True if its patch is linear: one that can take an implicit step.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn is_linear(self) -> bool {
+        matches!(self, Self::Patch | Self::LinearBoundary | Self::ScaledBoundary | Self::Condensed)
+    }
+}

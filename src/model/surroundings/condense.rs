@@ -1,0 +1,157 @@
+//! Static condensation: what the surroundings of a patch yield when it is pushed.
+
+use nalgebra::DMatrix;
+
+use super::super::sparse::SparseFactor;
+use super::graph::SpringGraph;
+use crate::error::Error;
+
+/// The stiffness of a whole body at rest, factorised once for every patch.
+///
+/// With A = -K over all nodes that can move, the Schur complement of a patch L is S = ((A^-1)_LL)^-1: a solution for each of
+/// its coordinates, in place of a factorisation of its surroundings.
+pub struct Condensation {
+    factor: SparseFactor,
+    /// Place of each node among those that can move.
+    places: Vec<Option<usize>>,
+    movable: usize,
+    springs: SpringGraph,
+}
+
+impl std::fmt::Debug for Condensation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Condensation").field("movable", &self.movable).finish_non_exhaustive()
+    }
+}
+
+impl Condensation {
+    /// Factorises the body of `springs`.
+    ///
+    /// # Errors
+    /// If nothing holds the body: pushed, it would drift away.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates, and factorises a sparse matrix of three rows per node.
+    pub fn new(springs: SpringGraph) -> Result<Self, Error> {
+        let mut movable = 0;
+        let places: Vec<Option<usize>> = springs
+            .inverse_masses()
+            .iter()
+            .map(|&w| {
+                (w > 0.0).then(|| {
+                    movable += 1;
+                    movable - 1
+                })
+            })
+            .collect();
+        let mut entries = Vec::with_capacity(24 * springs.links().len());
+        for link in springs.links() {
+            let [a, b] = link.nodes.map(|node| places[node as usize]);
+            let along = springs.rest()[link.nodes[1] as usize] - springs.rest()[link.nodes[0] as usize];
+            let u = along / along.norm();
+            let stiffness = u * u.transpose() * link.spring.stiffness;
+            for (row, column, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
+                let (Some(row), Some(column)) = (row, column) else { continue };
+                for r in 0..3 {
+                    for c in 0..3 {
+                        if 3 * row + r >= 3 * column + c {
+                            entries.push((3 * row + r, 3 * column + c, sign * stiffness[(r, c)]));
+                        }
+                    }
+                }
+            }
+        }
+        let factor = Some(&places)
+            .filter(|places| places.contains(&None))
+            .and_then(|_| SparseFactor::new(3 * movable, &entries));
+        match factor {
+            Some(factor) => Ok(Self { factor, places, movable, springs }),
+            None => {
+                let message = "\"condensed\" needs a body that is held, set body.block.fixed or use another model";
+                Err(Error::scene("local.model", message))
+            }
+        }
+    }
+
+    /// K_LB (-K_BB)^-1 K_BL (N/m, 3n x 3n) of the patch L of `nodes`, all of them movable, B all others: what is to be added
+    /// to the stiffness K_LL of a patch between held surroundings. `None` if the numbers do not allow it.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates, and solves a sparse system for each coordinate of the patch.
+    pub fn compliance(&self, nodes: &[u32]) -> Option<DMatrix<f64>> {
+        let (n, rows) = (3 * nodes.len(), 3 * self.movable);
+        let places = nodes.iter().map(|&node| self.places[node as usize]).collect::<Option<Vec<_>>>()?;
+        let row = |coordinate: usize| 3 * places[coordinate / 3] + coordinate % 3;
+        let mut columns = vec![0.0; rows * n];
+        (0..n).for_each(|column| columns[column * rows + row(column)] = 1.0);
+        self.factor.solve(&mut columns);
+        let inverse = DMatrix::from_fn(n, n, |r, c| columns[c * rows + row(r)]);
+        // Symmetric but for rounding, which the patch is not to have.
+        let schur = inverse.try_inverse().map(|schur| (&schur + schur.transpose()) * 0.5)?;
+        let added = self.held(nodes) - schur;
+        added.iter().all(|entry| entry.is_finite()).then_some(added)
+    }
+
+    /// A_LL: the stiffness of the patch while all others are held.
+    fn held(&self, nodes: &[u32]) -> DMatrix<f64> {
+        let mut held = DMatrix::zeros(3 * nodes.len(), 3 * nodes.len());
+        for (place, &node) in nodes.iter().enumerate() {
+            for &link in self.springs.at_node(node) {
+                let link = self.springs.links()[link as usize];
+                let other = if link.nodes[0] == node { link.nodes[1] } else { link.nodes[0] };
+                let along = self.springs.rest()[other as usize] - self.springs.rest()[node as usize];
+                let u = along / along.norm();
+                let stiffness = u * u.transpose() * link.spring.stiffness;
+                let mut diagonal = held.fixed_view_mut::<3, 3>(3 * place, 3 * place);
+                diagonal += stiffness;
+                if let Ok(column) = nodes.binary_search(&other) {
+                    let mut coupling = held.fixed_view_mut::<3, 3>(3 * place, 3 * column);
+                    coupling -= stiffness;
+                }
+            }
+        }
+        held
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::Vec3;
+    use super::super::super::body::{Block, Body};
+    use super::super::super::equilibrium::static_equilibrium;
+    use super::super::super::mesh::Face;
+    use super::*;
+
+    #[test]
+    fn a_patch_with_its_condensed_surroundings_yields_as_the_whole_body_does() {
+        let mut block = Block::builder([6; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
+        let mut nodes = Vec::new();
+        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
+        let condensation = Condensation::new(SpringGraph::new(&block).unwrap()).unwrap();
+        let schur = condensation.held(&nodes) - condensation.compliance(&nodes).unwrap();
+
+        // A small pull: the force on the pulled node of the whole body, and of the patch whose other nodes are free.
+        let pulled = nodes[nodes.len() - 6];
+        let way = Vec3::new(1e-6, -2e-6, 3e-6);
+        let target = block.rest()[pulled as usize] + way;
+        let state = static_equilibrium(&mut block, &[(pulled, target)]).unwrap();
+        let mut forces = vec![Vec3::zeros(); block.rest().len()];
+        block.forces(&state, &mut forces);
+        let moved = nodes.iter().map(|&node| state.positions[node as usize] - block.rest()[node as usize]);
+        let moved = nalgebra::DVector::from_iterator(3 * nodes.len(), moved.flat_map(|x| [x.x, x.y, x.z]));
+        let answer = schur * moved;
+        let largest = forces[pulled as usize].norm();
+        for (place, &node) in nodes.iter().enumerate() {
+            let force = Vec3::new(answer[3 * place], answer[3 * place + 1], answer[3 * place + 2]);
+            let expected = if node == pulled { -forces[pulled as usize] } else { Vec3::zeros() };
+            assert!((force - expected).norm() < 1e-3 * largest, "node {node}: {force} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_body_that_floats_is_refused() {
+        let block = Block::builder([3; 3], [0.05; 3]).build().unwrap();
+        let error = Condensation::new(SpringGraph::new(&block).unwrap()).unwrap_err().to_string();
+        assert!(error.contains("held"), "{error}");
+    }
+}
