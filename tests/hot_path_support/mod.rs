@@ -60,7 +60,7 @@ const VARIABLE: &str = "PALPATE_HOT_PATH_CHILD";
 const LOG: &str = "PALPATE_HOT_PATH_LOG";
 const NOT_POSSIBLE: i32 = 77;
 
-const MODELS: [LocalModelKind; 7] = LocalModelKind::ALL;
+const MODELS: [LocalModelKind; 8] = LocalModelKind::ALL;
 const GUARDS: [Guard; 2] = [Guard::SystemCalls, Guard::Counters];
 const OFFENCES: [Offence; 7] =
     [Offence::None, Offence::Allocate, Offence::Free, Offence::Call, Offence::Lock, Offence::Fault, Offence::Wait];
