@@ -154,27 +154,34 @@ impl Predictive {
         if !forecast.launch(&mut self.surroundings, state, forces, span) {
             return false;
         }
-        self.path.clear(self.window.ring, stepping.step(), (resync.horizon * stepping.substeps) as usize);
+        self.path.clear(self.window.ring, stepping.step(), (resync.horizon * stepping.substeps) as usize + 1);
+        // The surroundings take one step per tick if that is stable; within it the ring keeps its velocity.
+        let steps = if stepping.tick < forecast.model().stable_step() { 1 } else { stepping.substeps };
+        let (d, each) = (stepping.tick / f64::from(steps), stepping.substeps / steps);
         let origin = flat(&self.state.positions[ring.clone()]);
         self.take_near_forces();
         let resting = flat(&self.forces[ring.clone()]);
+        let mut substep = 0;
         for n in 0..resync.horizon {
             if self.contact_is_beyond() {
                 // What the patch would do from here on is wrong: the ring coasts.
                 break;
             }
-            stepping.tick(resync.tool.motion(n, stepping.tick), |tool, d| {
+            stepping.tick(resync.tool.motion(n, stepping.tick), |tool, _| {
                 self.take_near_forces();
                 let Self { path, state, ring_forces, surroundings, ring_positions: x, ring_velocities: v, .. } = self;
                 let forces = &self.forces[ring.clone()];
                 path.push(&state.positions[ring.clone()], &state.velocities[ring.clone()], forces);
-                deviations(ring_forces, forces, &resting);
-                forecast.model().step(surroundings, ring_forces, d);
-                x.copy_from_slice(&origin);
-                v.fill(0.0);
-                forecast.model().add_ring(surroundings, x, v);
-                let force = self.contact_step(tool, d);
-                self.place_ring();
+                if substep % each == 0 {
+                    deviations(ring_forces, forces, &resting);
+                    forecast.model().step(surroundings, ring_forces, d);
+                    x.copy_from_slice(&origin);
+                    v.fill(0.0);
+                    forecast.model().add_ring(surroundings, x, v);
+                }
+                substep += 1;
+                let force = self.contact_step(tool, stepping.step());
+                self.place_ring_before(f64::from((each - substep % each) % each) * stepping.step());
                 force
             });
         }
@@ -186,12 +193,13 @@ impl Predictive {
         true
     }
 
-    /// The ring's nodes to where `ring_positions` and `ring_velocities` say.
-    fn place_ring(&mut self) {
+    /// The ring's nodes to where they are `before` seconds before `ring_positions` with `ring_velocities`.
+    fn place_ring_before(&mut self, before: f64) {
         let ring = self.ring();
         let places = self.ring_positions.as_chunks::<3>().0.iter().zip(self.ring_velocities.as_chunks::<3>().0);
         for (node, (x, v)) in ring.zip(places) {
-            (self.state.positions[node], self.state.velocities[node]) = (Vec3::from(*x), Vec3::from(*v));
+            let (x, v) = (Vec3::from(*x), Vec3::from(*v));
+            (self.state.positions[node], self.state.velocities[node]) = (x - v * before, v);
         }
     }
 
@@ -226,7 +234,7 @@ impl Predictive {
             basis.answers().add_ring(&self.surroundings, &mut self.ring_positions, &mut self.ring_velocities);
         }
         self.basis = basis;
-        self.place_ring();
+        self.place_ring_before(0.0);
         force
     }
 

@@ -40,7 +40,7 @@ impl RingPath {
     pub(super) fn push(&mut self, positions: &[Vec3], velocities: &[Vec3], forces: &[Vec3]) {
         for vectors in [positions, velocities, forces] {
             debug_assert_eq!(3 * vectors.len(), self.numbers);
-            self.samples.extend(vectors.iter().flat_map(|vector| vector.iter()));
+            vectors.iter().for_each(|vector| self.samples.extend_from_slice(vector.as_slice()));
         }
     }
 

@@ -18,7 +18,7 @@ const EXPANSION: f64 = 2.0 * std::f64::consts::PI * 30.0;
 /// Moments: Z_0, Z_1 and Z_2.
 const MOMENTS: usize = 3;
 /// The forecast has this many answers of the ring, at most.
-const FORECAST_STATES: usize = 100;
+const FORECAST_STATES: usize = 64;
 /// And smooth fields of this degree: the waves of the whole body.
 const SMOOTH_DEGREE: i32 = 2;
 /// A forecast is used where it holds the present motion to this share.
@@ -148,8 +148,7 @@ impl Forecast {
             force.extend(f.iter());
         }
         let (mut rate, mut load) = (vec![0.0; self.model.states()], vec![0.0; self.model.states()]);
-        self.modes.project(&momentum, &mut rate);
-        self.modes.project(&force, &mut load);
+        self.modes.project_all([&momentum, &force], [&mut rate, &mut load]);
         let missing = |all: f64, held: &[f64]| (all - held.iter().map(|x| x * x).sum::<f64>()).max(0.0).sqrt();
         let travel = |v: f64, a: f64| v * span + 0.5 * a * span * span;
         let (all, lost) =
