@@ -5,6 +5,7 @@ use super::cause::Cause;
 use super::messages::{Checkpoint, SurfaceView, ToolTick};
 use crate::error::Error;
 use crate::log::GlobalTick;
+use crate::model::body::Body;
 use crate::model::contact::ToolMotion;
 use crate::model::forecast::{ToolForecast, ToolHistory};
 use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView};
@@ -185,43 +186,40 @@ impl GlobalActor {
         }
     }
 
-    /// Asks for the bases that are missing: of the present window, of the next release's, and of those around.
+    /// Asks for the bases that are missing.
     fn publish_wishes(&mut self, ctx: &TickContext, tool: &ToolForecast) {
         let Some(ports) = &mut self.ports.surroundings else { return };
-        let (aim, body, triangles) = (&self.aim, self.simulation.body(), &mut self.others);
         let wishes = ports.wishes.buffer();
         wishes.patches.clear();
-        let lead = self.plan.lead_s();
-        let mut wish = |triangles: &[u32]| {
-            let mut patch = Vec::new();
-            body.patch(triangles, self.plan.patch, &mut patch);
-            if self.plan.bases.get(&patch).is_none() && !wishes.patches.contains(&patch) {
-                wishes.patches.push(patch);
-            }
-        };
-        wish(&self.triangles);
+        let mut list = WishList { body: self.simulation.body(), bases: &self.plan.bases, wishes };
+        let (aim, size, lead, ahead) = (&self.aim, self.plan.patch, self.plan.lead_s(), &mut self.others);
         if self.simulation.contact().glued {
             // The tool stays where it is.
-            if !wishes.patches.is_empty() {
-                ports.wishes.publish(ctx);
+            list.wish(&self.triangles, size);
+        } else if self.plan.prefetches {
+            // In the time that one takes the tool can be in the next cells: a window that is a cell wider serves there too.
+            let wide = [size[0] + 2, size[1] + 2, size[2]];
+            if !list.is_covered(&self.triangles, size) {
+                list.wish(&self.triangles, size);
             }
-            return;
-        }
-        aim.triangles(None, tool, [self.plan.global.period_s(), lead], triangles);
-        wish(triangles);
-        // It may leave for the next cells sooner or later than expected.
-        aim.heading(body, tool, self.triangles[0], triangles);
-        for last in 1..=triangles.len() {
-            wish(&triangles[..last]);
-            wish(&triangles[last - 1..]);
-        }
-        if self.plan.prefetches {
-            for ahead in PREFETCH_S {
-                aim.triangles(None, tool, [ahead, lead], triangles);
-                wish(triangles);
+            list.wish(&self.triangles[..1], wide);
+            aim.heading(list.body, tool, self.triangles[0], ahead);
+            list.wish(&ahead[ahead.len() - 1..], wide);
+            for seconds in PREFETCH_S {
+                aim.triangles(None, tool, [seconds, 0.0], ahead);
+                list.wish(&ahead[..1], wide);
             }
-            aim.around(body.surface(), &tool.position, triangles);
-            triangles.iter().for_each(|&triangle| wish(&[triangle]));
+            list.wish(&self.triangles, size);
+        } else {
+            list.wish(&self.triangles, size);
+            aim.triangles(None, tool, [self.plan.global.period_s(), lead], ahead);
+            list.wish(ahead, size);
+            // It may leave for the next cells sooner or later than expected.
+            aim.heading(list.body, tool, self.triangles[0], ahead);
+            for last in 1..=ahead.len() {
+                list.wish(&ahead[..last], size);
+                list.wish(&ahead[last - 1..], size);
+            }
         }
         if !wishes.patches.is_empty() {
             ports.wishes.publish(ctx);
@@ -241,6 +239,33 @@ impl GlobalActor {
         view.time = self.plan.haptic.release(self.tool.tick);
         view.positions.clone_from(&self.simulation.state().positions);
         self.ports.surface.publish(ctx);
+    }
+}
+
+/// Collects the patches whose bases are missing.
+struct WishList<'a> {
+    body: &'a dyn Body,
+    bases: &'a Bases,
+    wishes: &'a mut Wishes,
+}
+
+impl WishList<'_> {
+    fn patch(&self, triangles: &[u32], size: [usize; 3]) -> Vec<u32> {
+        let mut patch = Vec::new();
+        self.body.patch(triangles, size, &mut patch);
+        patch
+    }
+
+    /// True if there is a basis for the patch around `triangles`, or for one that holds it.
+    fn is_covered(&self, triangles: &[u32], size: [usize; 3]) -> bool {
+        self.bases.around(&self.patch(triangles, size)).is_some()
+    }
+
+    fn wish(&mut self, triangles: &[u32], size: [usize; 3]) {
+        let patch = self.patch(triangles, size);
+        if self.bases.get(&patch).is_none() && !self.wishes.patches.contains(&patch) {
+            self.wishes.patches.push(patch);
+        }
     }
 }
 

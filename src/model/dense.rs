@@ -22,6 +22,14 @@ pub(super) fn leading_left_singular_vectors(matrix: &[f64], rows: usize, count: 
     combinations(matrix, &scaled, rows, columns)
 }
 
+/// The combinations of the columns of `matrix` (of `rows` numbers) along its leading right singular vectors, at most
+/// `count`: what is left out is the smallest part that `count` columns can leave out.
+pub(super) fn leading_combinations(matrix: &[f64], rows: usize, count: usize) -> Vec<f64> {
+    let columns = matrix.len() / rows.max(1);
+    let Some((_, vectors)) = eigen(&product(matrix, matrix, rows)) else { return matrix.to_vec() };
+    combinations(matrix, &vectors[columns.saturating_sub(count) * columns..], rows, columns)
+}
+
 /// The modes of the symmetric pencil (`stiffness`, `mass`) in the directions that `mass` can tell apart: T with
 /// T^T M T = I and T^T K T diagonal, as the columns of T and the diagonal. Empty if a number is not finite.
 pub(super) fn modes(mass: &[f64], stiffness: &[f64]) -> (Vec<f64>, Vec<f64>) {

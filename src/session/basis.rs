@@ -1,7 +1,6 @@
 //! The background group that reduces surroundings, and what has to be there before a run begins.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use super::prepare::Prepared;
 use crate::actors::{BasisActor, BasisPorts, Wishes};
@@ -14,8 +13,6 @@ use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, RuntimeBuilder};
 
 /// The name of the group.
 pub(super) const GROUP: &str = "basis";
-/// Before a run on threads, surroundings are reduced for this long, from the tool's place outwards.
-const READY: Duration = Duration::from_secs(5);
 
 /// The basis actor's side of a session.
 pub(super) struct BasisSide {
@@ -37,14 +34,14 @@ impl BasisSide {
         let Some(springs) = prepared.template.springs.clone().filter(|_| prepared.reduces()) else {
             return Ok(None);
         };
-        let (prefetches, most) = match prepared.execution {
-            Execution::Virtual => (Duration::ZERO, usize::MAX),
-            Execution::Threaded => (READY, 1),
+        let most = match prepared.execution {
+            Execution::Virtual => usize::MAX,
+            Execution::Threaded => 1,
         };
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
-            known: first_bases(prepared, &springs, tool, prefetches)?,
+            known: first_bases(prepared, &springs, tool)?,
             states: prepared.basis_states,
             springs,
             most,
@@ -62,26 +59,20 @@ pub(super) fn group(prepared: &Prepared) -> RateGroup {
     RateGroup::new(prepared.global_rate).name(GROUP).latency(prepared.basis_latency)
 }
 
-/// The basis where the tool is, and those around for as long as `span` allows.
-fn first_bases(prepared: &Prepared, springs: &SpringGraph, tool: Vec3, span: Duration) -> Result<Bases, Error> {
-    let start = Instant::now();
+/// The basis where the tool is, and before a run on threads one that holds a cell more around it.
+fn first_bases(prepared: &Prepared, springs: &SpringGraph, tool: Vec3) -> Result<Bases, Error> {
     let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
     let aim = Aim::new(body.surface(), &state.positions)?;
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
-    let at_rest = ToolForecast::at_rest(tool);
-    aim.triangles(Some(prepared.simulation.contact()), &at_rest, [0.0; 2], &mut triangles);
-    let here = triangles.clone();
-    aim.around(body.surface(), &tool, &mut triangles);
-    for window in std::iter::once(here.as_slice()).chain(triangles.iter().map(std::slice::from_ref)) {
-        body.patch(window, prepared.template.patch, &mut patch);
+    aim.triangles(Some(prepared.simulation.contact()), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
+    let size = prepared.template.patch;
+    let wide = [size[0] + 2, size[1] + 2, size[2]];
+    let sizes: &[[usize; 3]] = if prepared.execution == Execution::Threaded { &[size, wide] } else { &[size] };
+    for &size in sizes {
+        body.patch(&triangles[..1], size, &mut patch);
         // What cannot be reduced is told by the actor, when it is wanted.
-        if bases.get(&patch).is_none()
-            && let Ok(Some(basis)) = Basis::compute(springs, &patch, prepared.basis_states)
-        {
+        if let Ok(Some(basis)) = Basis::compute(springs, &patch, prepared.basis_states) {
             bases.insert(Arc::new(basis));
-        }
-        if start.elapsed() >= span {
-            break;
         }
     }
     Ok(bases)

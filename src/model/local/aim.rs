@@ -85,21 +85,4 @@ impl Aim {
             }
         }
     }
-
-    /// Puts the triangles around the one nearest to `point` in place of `triangles`: it first, then those that share a
-    /// node with it.
-    ///
-    /// # Real-time
-    /// For the global actor: bounded; `triangles` may grow.
-    pub fn around(&self, surface: &Surface, point: &Vec3, triangles: &mut Vec<u32>) {
-        triangles.clear();
-        triangles.push(self.nearest.find(point));
-        for node in surface.triangles[triangles[0] as usize] {
-            for &triangle in surface.at_node(node) {
-                if !triangles.contains(&triangle) {
-                    triangles.push(triangle);
-                }
-            }
-        }
-    }
 }

@@ -17,6 +17,8 @@ use crate::error::{Error, ErrorKind};
 const EXPANSION: f64 = 2.0 * std::f64::consts::PI * 30.0;
 /// Moments: Z_0, Z_1 and Z_2.
 const MOMENTS: usize = 3;
+/// Combinations of unit forces that are followed to higher moments.
+const LEADING: usize = 110;
 /// The forecast has this many answers of the ring, at most.
 const FORECAST_STATES: usize = 64;
 /// And smooth fields of this degree: the waves of the whole body.
@@ -86,7 +88,8 @@ impl Basis {
     }
 }
 
-/// `[Z_0/|Z_0|, Z_1/|Z_1|, ...]`.
+/// `[Z_0/|Z_0|, Z_1/|Z_1|, ...]`, each in the combinations of its columns that are largest in Z_0: what is small there is
+/// even smaller in the rest.
 fn moments(far: &Far, factor: &SparseFactor, ring: &[u32]) -> Vec<f64> {
     let (rows, columns) = (far.unknowns(), 3 * ring.len());
     let mut moment = vec![0.0; rows * columns];
@@ -95,10 +98,13 @@ fn moments(far: &Far, factor: &SparseFactor, ring: &[u32]) -> Vec<f64> {
             moment[(3 * place + axis) * rows + far.unknown(node, axis)] = 1.0;
         }
     }
-    let mut all = Vec::with_capacity(MOMENTS * moment.len());
-    for _ in 0..MOMENTS {
+    let mut all = Vec::with_capacity(MOMENTS * rows * LEADING.min(columns));
+    for n in 0..MOMENTS {
         factor.solve(&mut moment);
         let scale = 1.0 / moment.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if n == 0 {
+            moment = dense::leading_combinations(&moment, rows, LEADING);
+        }
         all.extend(moment.iter().map(|x| x * scale));
         far.times_mass(&mut moment);
     }
