@@ -1,0 +1,99 @@
+//! How far the force of `predictive` on threads is from the force that the whole body gives for the same tool samples.
+//!
+//! Each scene runs in real time; then `full` follows the positions that the device reported, in virtual time. Ticks within
+//! 100 ms after a skipped period of the haptic group are counted apart: what the host takes away is no error of the model.
+//!
+//! ```text
+//! cargo run --release --example real_time_error                          drag_friction
+//! cargo run --release --example real_time_error -- hand wave drag_slip   scenes by name
+//! ```
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use palpate::devices::ToolPath;
+use palpate::log::LogRecord;
+use palpate::model::Vec3;
+use palpate::prelude::*;
+use palpate::scene::{LocalModelKind, Scene};
+use palpate::session::Summary;
+
+/// Ticks this long after a skipped period are counted apart (s).
+const AFTER_A_SLIP_S: f64 = 0.1;
+
+fn main() -> Result<(), Error> {
+    let names: Vec<String> = std::env::args().skip(1).collect();
+    let names = if names.is_empty() { vec!["drag_friction".to_owned()] } else { names };
+    for name in names {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(format!("{name}.toml"));
+        compare(&name, Scene::load(&path)?)?;
+    }
+    Ok(())
+}
+
+fn compare(name: &str, scene: Scene) -> Result<(), Error> {
+    let real =
+        Session::from_scene(scene.clone().with_model(LocalModelKind::Predictive)).keep_records().build()?.run()?;
+    let mut reference = scene.with_model(LocalModelKind::Full);
+    reference.device.path = Some(reported(&real)?);
+    let full = Session::from_scene(reference).virtual_time().keep_records().build()?.run()?;
+
+    let (forces, expected) = (forces(&real), forces(&full));
+    let peak = expected.values().map(|force| force.norm()).fold(0.0, f64::max);
+    let slips = slips(&real);
+    let is_clear = |time: f64| !slips.iter().any(|slip| (0.0..AFTER_A_SLIP_S).contains(&(time - slip)));
+    let (mut all, mut clear) = (Vec::new(), Vec::new());
+    for (&time, force) in &forces {
+        let Some(expected) = expected.get(&time) else { continue };
+        let error = 100.0 * (force - expected).norm() / peak;
+        all.push(error);
+        if is_clear(time as f64 * 1e-9) {
+            clear.push(error);
+        }
+    }
+    let left_out = 100.0 * (1.0 - clear.len() as f64 / all.len() as f64);
+    let shares: Vec<String> =
+        real.report.force.shares().map(|(model, share)| format!("{} {:.2} %", model.name(), 100.0 * share)).collect();
+    println!(
+        "{name}: rms {:.3} %, max {:.2} % of the peak; over all ticks rms {:.3} % ({left_out:.1} % left out, {} slips); \
+         served by {}",
+        rms(&clear),
+        clear.iter().copied().fold(0.0, f64::max),
+        rms(&all),
+        slips.len(),
+        shares.join(", ")
+    );
+    Ok(())
+}
+
+fn rms(errors: &[f64]) -> f64 {
+    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+}
+
+/// The tool as the device reported it.
+fn reported(summary: &Summary) -> Result<ToolPath, Error> {
+    let samples = summary.records.iter().filter_map(|record| match record {
+        LogRecord::Tool(sample) => Some((sample.time.as_secs_f64(), sample.position_m)),
+        _ => None,
+    });
+    let (times, positions) = samples.unzip();
+    ToolPath::new(times, positions)
+}
+
+/// By the end of their tick (ns).
+fn forces(summary: &Summary) -> BTreeMap<u64, Vec3> {
+    let force = |record: &LogRecord| match record {
+        LogRecord::Force(sample) => Some((sample.time.0, Vec3::from(sample.force_n))),
+        _ => None,
+    };
+    summary.records.iter().filter_map(force).collect()
+}
+
+/// When the haptic group, the first, came back from skipped periods (s).
+fn slips(summary: &Summary) -> Vec<f64> {
+    let slip = |record: &LogRecord| match record {
+        LogRecord::Tick(timing) if timing.group == 0 && timing.slips > 0 => Some(timing.scheduled.as_secs_f64()),
+        _ => None,
+    };
+    summary.records.iter().filter_map(slip).collect()
+}
