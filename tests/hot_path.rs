@@ -73,6 +73,11 @@ fn a_tick_with_condensed_surroundings_makes_no_system_call_and_never_allocates()
 }
 
 #[test]
+fn a_predictive_tick_makes_no_system_call_and_never_allocates() {
+    assert_silent(Case::new(LocalModelKind::Predictive, Guard::SystemCalls));
+}
+
+#[test]
 fn a_tick_with_hold_makes_no_system_call_and_never_allocates() {
     assert_silent(Case::new(LocalModelKind::Hold, Guard::SystemCalls));
 }
@@ -90,6 +95,11 @@ fn a_tick_without_privileges_makes_no_system_call_and_never_allocates() {
 #[test]
 fn a_tick_with_a_patch_faults_no_page_and_waits_for_nothing_but_its_release() {
     assert_still(Case::new(LocalModelKind::Patch, Guard::Counters));
+}
+
+#[test]
+fn a_predictive_tick_faults_no_page_and_waits_for_nothing_but_its_release() {
+    assert_still(Case::new(LocalModelKind::Predictive, Guard::Counters));
 }
 
 #[test]

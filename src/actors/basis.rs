@@ -41,6 +41,9 @@ pub struct BasisActor {
 impl BasisActor {
     /// Of a body with `springs`; the bases have `states` states, `bases` are there already, and one release computes
     /// `most` at most.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn new(springs: Arc<SpringGraph>, states: usize, bases: Bases, most: usize, ports: BasisPorts) -> Self {
         Self { springs, states, most, bases, hopeless: Vec::new(), ports }
     }

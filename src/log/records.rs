@@ -40,11 +40,17 @@ impl ServedBy {
     ];
 
     /// The one with this number; unknown numbers read as unknown.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn from_code(code: u16) -> Self {
         Self::ALL.get(usize::from(code)).copied().unwrap_or_default()
     }
 
     /// Its name in reports.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn name(self) -> &'static str {
         match self {
             Self::Unknown => "unknown",
