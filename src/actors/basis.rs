@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::basis_store::BasisStore;
 use super::cause::Cause;
-use crate::model::surroundings::{Bases, Basis, SpringGraph};
+use crate::model::surroundings::{Bases, SpringGraph};
 use crate::runtime::{Actor, Outcome, Reader, TickContext, Writer};
 
 /// Patches whose surroundings are wanted.
@@ -29,7 +30,7 @@ pub struct BasisPorts {
 #[derive(Debug)]
 pub struct BasisActor {
     springs: Arc<SpringGraph>,
-    states: usize,
+    store: BasisStore,
     /// Bases that one release computes at most.
     most: usize,
     bases: Bases,
@@ -39,13 +40,13 @@ pub struct BasisActor {
 }
 
 impl BasisActor {
-    /// Of a body with `springs`; the bases have `states` states, `bases` are there already, and one release computes
+    /// Of a body with `springs`; bases come from `store`, `bases` are there already, and one release computes
     /// `most` at most.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(springs: Arc<SpringGraph>, states: usize, bases: Bases, most: usize, ports: BasisPorts) -> Self {
-        Self { springs, states, most, bases, hopeless: Vec::new(), ports }
+    pub fn new(springs: Arc<SpringGraph>, store: BasisStore, bases: Bases, most: usize, ports: BasisPorts) -> Self {
+        Self { springs, store, most, bases, hopeless: Vec::new(), ports }
     }
 }
 
@@ -71,7 +72,7 @@ impl Actor for BasisActor {
             if self.hopeless.contains(patch) {
                 continue;
             }
-            match Basis::compute(&self.springs, patch, self.states) {
+            match self.store.get(&self.springs, patch) {
                 Ok(Some(basis)) => {
                     self.bases.insert(Arc::new(basis));
                     computed += 1;

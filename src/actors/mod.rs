@@ -8,6 +8,7 @@
 //! ```
 
 mod basis;
+mod basis_store;
 mod cause;
 mod device;
 mod global;
@@ -17,6 +18,7 @@ mod logger;
 mod messages;
 
 pub use basis::{BasisActor, BasisPorts, Wishes};
+pub use basis_store::BasisStore;
 pub use cause::Cause;
 pub(crate) use device::GAP_S;
 pub use device::{DeviceActor, first_state};

@@ -1,5 +1,7 @@
 //! The global and the local model's part of a scene: rates, sizes, feedback, steps, blending.
 
+use std::path::PathBuf;
+
 pub use crate::model::blend::BlendKind;
 pub use crate::model::local::{Feedback, Kind as LocalModelKind};
 
@@ -26,7 +28,7 @@ impl Default for GlobalSpec {
 }
 
 /// The fast, small simulation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
 pub struct LocalSpec {
     /// Releases per second.
@@ -37,6 +39,8 @@ pub struct LocalSpec {
     pub patch: [usize; 3],
     /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted.
     pub basis: usize,
+    /// Bases are kept in this folder from run to run; relative to the current one.
+    pub basis_folder: Option<PathBuf>,
     /// How `predictive` looks ahead.
     pub prediction: Prediction,
     /// What the global model learns from the local one; what the model is best with if absent.
@@ -54,6 +58,7 @@ impl Default for LocalSpec {
             model: LocalModelKind::default(),
             patch: [4, 4, 2],
             basis: 50,
+            basis_folder: None,
             prediction: Prediction::default(),
             feedback: None,
             step: StepKind::default(),

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use super::prepare::Prepared;
-use crate::actors::{BasisActor, BasisPorts, Wishes};
+use crate::actors::{BasisActor, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::forecast::ToolForecast;
 use crate::model::local::Aim;
-use crate::model::surroundings::{Bases, Basis, SpringGraph};
+use crate::model::surroundings::{Bases, SpringGraph};
 use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, RuntimeBuilder};
 
 /// The name of the group.
@@ -21,7 +21,7 @@ pub(super) struct BasisSide {
     /// Those that are there before the start.
     pub(super) known: Bases,
     springs: Arc<SpringGraph>,
-    states: usize,
+    store: BasisStore,
     most: usize,
 }
 
@@ -34,6 +34,7 @@ impl BasisSide {
         let Some(springs) = prepared.template.springs.clone().filter(|_| prepared.reduces()) else {
             return Ok(None);
         };
+        let store = BasisStore { states: prepared.basis_states, folder: prepared.basis_folder.clone() };
         let most = match prepared.execution {
             Execution::Virtual => usize::MAX,
             Execution::Threaded => 1,
@@ -41,8 +42,8 @@ impl BasisSide {
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
-            known: first_bases(prepared, &springs, tool)?,
-            states: prepared.basis_states,
+            known: first_bases(prepared, &springs, &store, tool)?,
+            store,
             springs,
             most,
         }))
@@ -50,7 +51,7 @@ impl BasisSide {
 
     pub(super) fn actor(&self) -> Box<dyn Actor> {
         let ports = BasisPorts { wishes: self.wishes.reader(), bases: self.bases.writer() };
-        Box::new(BasisActor::new(Arc::clone(&self.springs), self.states, self.known.clone(), self.most, ports))
+        Box::new(BasisActor::new(Arc::clone(&self.springs), self.store.clone(), self.known.clone(), self.most, ports))
     }
 }
 
@@ -60,7 +61,7 @@ pub(super) fn group(prepared: &Prepared) -> RateGroup {
 }
 
 /// The basis where the tool is, and before a run on threads one that holds a cell more around it.
-fn first_bases(prepared: &Prepared, springs: &SpringGraph, tool: Vec3) -> Result<Bases, Error> {
+fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, tool: Vec3) -> Result<Bases, Error> {
     let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
     let aim = Aim::new(body.surface(), &state.positions)?;
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
@@ -71,7 +72,7 @@ fn first_bases(prepared: &Prepared, springs: &SpringGraph, tool: Vec3) -> Result
     for &size in sizes {
         body.patch(&triangles[..1], size, &mut patch);
         // What cannot be reduced is told by the actor, when it is wanted.
-        if let Ok(Some(basis)) = Basis::compute(springs, &patch, prepared.basis_states) {
+        if let Ok(Some(basis)) = store.get(springs, &patch) {
             bases.insert(Arc::new(basis));
         }
     }

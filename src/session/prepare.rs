@@ -1,6 +1,5 @@
 //! Turns a validated description into bodies, states and models that can start.
 
-#[cfg(feature = "log")]
 use std::path::PathBuf;
 
 use super::budget;
@@ -70,6 +69,8 @@ pub(super) struct Prepared {
     pub template: Template,
     /// States of reduced surroundings.
     pub basis_states: usize,
+    /// Where bases are kept from run to run.
+    pub basis_folder: Option<PathBuf>,
     /// Virtual time: how long after its release a basis becomes visible.
     pub basis_latency: Nanos,
     /// Haptic ticks that a local model may have to reach ahead.
@@ -215,6 +216,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let prepared = Prepared {
         template,
         basis_states: scene.local.basis,
+        basis_folder: scene.local.basis_folder.clone(),
         basis_latency: Nanos::from_secs_f64(scene.global.basis_latency_ms * 1e-3),
         horizon: horizon(haptic, global_rate, scene.global.compute_latency_ms, blend_ticks),
         simulation: Simulation::new(body, state, contact, law, Stepping { tick, substeps })?,

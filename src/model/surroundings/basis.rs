@@ -34,9 +34,9 @@ const HELD: f64 = 0.05;
 /// depends on patch, material and topology, not on time. The forecast adds smooth fields, for what is under way already.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Basis {
-    patch: Vec<u32>,
-    answers: Reduced,
-    forecast: Forecast,
+    pub(super) patch: Vec<u32>,
+    pub(super) answers: Reduced,
+    pub(super) forecast: Forecast,
 }
 
 impl Basis {
@@ -124,11 +124,11 @@ fn normalised(columns: &[f64], rows: usize) -> Vec<f64> {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Forecast {
     /// Ids of all movable nodes outside the patch.
-    nodes: Vec<u32>,
-    masses: Vec<f64>,
+    pub(super) nodes: Vec<u32>,
+    pub(super) masses: Vec<f64>,
     /// Modes on those nodes as columns, three numbers a node (1/sqrt(kg)).
-    modes: Columns,
-    model: Reduced,
+    pub(super) modes: Columns,
+    pub(super) model: Reduced,
 }
 
 impl Forecast {

@@ -2,6 +2,7 @@
 
 use super::super::Vec3;
 use super::super::body::{Body, Link};
+use super::stored::digest;
 
 /// The springs of a body at rest, to be found by the nodes that they join.
 #[derive(Clone, Debug)]
@@ -12,6 +13,7 @@ pub struct SpringGraph {
     /// The links at node n are `at_nodes[first[n]..first[n + 1]]`.
     first: Vec<u32>,
     at_nodes: Vec<u32>,
+    digest: u64,
 }
 
 impl SpringGraph {
@@ -35,7 +37,17 @@ impl SpringGraph {
                 next[node as usize] += 1;
             }
         }
-        Some(Self { inverse_masses: body.inverse_masses().to_vec(), rest, links, first, at_nodes })
+        let inverse_masses = body.inverse_masses().to_vec();
+        let digest = digest_of(&rest, &inverse_masses, &links);
+        Some(Self { inverse_masses, rest, links, first, at_nodes, digest })
+    }
+
+    /// A number that differs for bodies of other nodes, masses or springs.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn digest(&self) -> u64 {
+        self.digest
     }
 
     /// Rest positions (m).
@@ -93,4 +105,14 @@ impl SpringGraph {
             list.dedup();
         }
     }
+}
+
+fn digest_of(rest: &[Vec3], inverse_masses: &[f64], links: &[Link]) -> u64 {
+    let coordinates = rest.iter().flat_map(|x| x.iter()).chain(inverse_masses).map(|x| x.to_bits());
+    let springs = links.iter().flat_map(|Link { nodes: [a, b], spring }| {
+        let numbers = [spring.stiffness, spring.damping, spring.rest_length].map(f64::to_bits);
+        [u64::from(*a) << 32 | u64::from(*b), numbers[0], numbers[1], numbers[2]]
+    });
+    let bytes: Vec<u8> = coordinates.chain(springs).flat_map(u64::to_le_bytes).collect();
+    digest(&bytes)
 }

@@ -7,6 +7,7 @@ mod far;
 mod graph;
 mod products;
 mod reduced;
+mod stored;
 
 pub use basis::{Bases, Basis};
 pub use condense::Condensation;

@@ -32,6 +32,16 @@ impl Columns {
         Self { lines, height, rows, set: InstructionSet::detect() }
     }
 
+    pub(super) fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Column after column, without the padding.
+    pub(super) fn to_matrix(&self) -> Vec<f64> {
+        let columns = self.lines.chunks_exact(self.height.max(1));
+        columns.flat_map(|column| column.iter().flat_map(|line| line.0).take(self.rows)).collect()
+    }
+
     /// out += A^T y for each column of A; `y` has a number per row.
     pub(super) fn project(&self, y: &[f64], out: &mut [f64]) {
         self.project_all([y], [out]);

@@ -6,7 +6,7 @@ use super::products::Columns;
 
 /// What the velocities do to the states' accelerations.
 #[derive(Clone, Debug, PartialEq)]
-enum Damping {
+pub(super) enum Damping {
     /// Proportional to the stiffness: one number per state (1/s).
     Diagonal(Vec<f64>),
     /// r rows of r (1/s).
@@ -16,12 +16,12 @@ enum Damping {
 /// eta'' = K eta + C eta' + Phi^T f with Phi^T M Phi = 1 and a diagonal K; the ring moves by Phi eta.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Reduced {
-    states: usize,
+    pub(super) states: usize,
     /// Phi on the ring (1/sqrt(kg)): three numbers for each node.
-    shapes: Columns,
+    pub(super) shapes: Columns,
     /// One number per state (1/s^2), negative.
-    stiffness: Vec<f64>,
-    damping: Damping,
+    pub(super) stiffness: Vec<f64>,
+    pub(super) damping: Damping,
 }
 
 impl Reduced {

@@ -1,0 +1,82 @@
+//! Where bases come from: a folder that keeps them from run to run, or the computation.
+
+use std::path::PathBuf;
+
+use crate::error::Error;
+use crate::model::surroundings::{Basis, SpringGraph};
+
+/// Makes the bases of one body, or reads those that it has made before.
+#[derive(Clone, Debug)]
+pub struct BasisStore {
+    /// States of a basis.
+    pub states: usize,
+    /// Bases are kept in this folder, if there is one.
+    pub folder: Option<PathBuf>,
+}
+
+impl BasisStore {
+    /// The basis of `patch` (node ids in increasing order); `None` if nothing around the patch can move. A file that is
+    /// damaged or cannot be written is as good as none: the basis is computed.
+    ///
+    /// # Errors
+    /// If nothing holds the surroundings together.
+    ///
+    /// # Real-time
+    /// Not real-time safe: reads and writes files, and computes for seconds.
+    pub fn get(&self, springs: &SpringGraph, patch: &[u32]) -> Result<Option<Basis>, Error> {
+        let compute = || Basis::compute(springs, patch, self.states);
+        let Some(folder) = &self.folder else { return compute() };
+        let key = self.key(springs, patch);
+        let file = folder.join(format!("{key:016x}.basis"));
+        let stored = std::fs::read(&file).ok().and_then(|bytes| Basis::from_bytes(&bytes, key));
+        if let Some(basis) = stored.filter(|basis| basis.patch() == patch) {
+            return Ok(Some(basis));
+        }
+        let basis = compute()?;
+        if let Some(basis) = &basis {
+            // Another run may read it meanwhile: it appears whole or not at all.
+            let part = folder.join(format!("{key:016x}.{}", std::process::id()));
+            let written = std::fs::create_dir_all(folder)
+                .and_then(|()| std::fs::write(&part, basis.to_bytes(key)))
+                .and_then(|()| std::fs::rename(&part, &file));
+            if let Err(error) = written {
+                tracing::warn!("the basis could not be kept in {}: {error}", folder.display());
+            }
+        }
+        Ok(basis)
+    }
+
+    /// Of body, patch and states.
+    fn key(&self, springs: &SpringGraph, patch: &[u32]) -> u64 {
+        let mix = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31);
+        patch.iter().fold(mix(springs.digest(), self.states as u64), |hash, &node| mix(hash, node.into()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::body::{Block, Body};
+    use crate::model::mesh::Face;
+
+    #[test]
+    fn what_was_computed_is_read_again_and_damage_is_computed_again() {
+        let block = Block::builder([5; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
+        let springs = SpringGraph::new(&block).unwrap();
+        let mut patch = Vec::new();
+        block.patch(&[block.surface().triangles.len() as u32 - 5], [2, 2, 1], &mut patch);
+        let folder = tempfile::tempdir().unwrap();
+        let store = BasisStore { states: 10, folder: Some(folder.path().join("bases")) };
+        let first = store.get(&springs, &patch).unwrap();
+        let files = || std::fs::read_dir(folder.path().join("bases")).unwrap().map(|file| file.unwrap().path());
+        assert_eq!(files().count(), 1);
+        assert_eq!(store.get(&springs, &patch).unwrap(), first);
+        for file in files() {
+            std::fs::write(file, b"no basis").unwrap();
+        }
+        assert_eq!(store.get(&springs, &patch).unwrap(), first);
+        let other = BasisStore { states: 11, ..store.clone() };
+        assert_ne!(other.get(&springs, &patch).unwrap(), first);
+        assert_eq!(files().count(), 2, "other states, another file");
+    }
+}

@@ -1,0 +1,166 @@
+//! A basis as bytes, to be kept from run to run.
+
+use super::basis::{Basis, Forecast};
+use super::products::Columns;
+use super::reduced::{Damping, Reduced};
+
+/// What the bytes begin with; its number changes with what follows.
+const MAGIC: &[u8; 16] = b"palpate-basis-1\n";
+const WORD: usize = size_of::<u64>();
+
+impl Basis {
+    /// All of it as bytes, with a checksum at the end. `key` comes first: what the basis was made of.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn to_bytes(&self, key: u64) -> Vec<u8> {
+        let mut out = Writer(MAGIC.to_vec());
+        out.word(key);
+        out.ids(&self.patch);
+        out.reduced(&self.answers);
+        out.ids(&self.forecast.nodes);
+        out.numbers(&self.forecast.masses);
+        out.columns(&self.forecast.modes);
+        out.reduced(&self.forecast.model);
+        let sum = digest(&out.0);
+        out.word(sum);
+        out.0
+    }
+
+    /// Reads [`to_bytes`](Self::to_bytes) back; `None` if the bytes are damaged, of another version or of another `key`.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn from_bytes(bytes: &[u8], key: u64) -> Option<Self> {
+        let (body, sum) = bytes.split_at_checked(bytes.len().checked_sub(WORD)?)?;
+        if u64::from_le_bytes(sum.try_into().ok()?) != digest(body) {
+            return None;
+        }
+        let mut from = Reader(body.strip_prefix(MAGIC)?);
+        if from.word()? != key {
+            return None;
+        }
+        let (patch, answers) = (from.ids()?, from.reduced()?);
+        let (nodes, masses, modes) = (from.ids()?, from.numbers()?, from.columns()?);
+        Some(Self { patch, answers, forecast: Forecast { nodes, masses, modes, model: from.reduced()? } })
+    }
+}
+
+/// FNV-1a over whole words: fast enough for megabytes, and any changed bit changes it.
+pub(super) fn digest(bytes: &[u8]) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut words = bytes.chunks_exact(WORD);
+    let mut add = |word: u64| hash = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29);
+    for word in &mut words {
+        add(u64::from_le_bytes(word.try_into().unwrap_or_default()));
+    }
+    words.remainder().iter().for_each(|&byte| add(u64::from(byte)));
+    add(bytes.len() as u64);
+    hash
+}
+
+struct Writer(Vec<u8>);
+
+impl Writer {
+    fn word(&mut self, word: u64) {
+        self.0.extend_from_slice(&word.to_le_bytes());
+    }
+
+    fn ids(&mut self, ids: &[u32]) {
+        self.word(ids.len() as u64);
+        ids.iter().for_each(|&id| self.word(id.into()));
+    }
+
+    fn numbers(&mut self, numbers: &[f64]) {
+        self.word(numbers.len() as u64);
+        numbers.iter().for_each(|x| self.word(x.to_bits()));
+    }
+
+    fn columns(&mut self, columns: &Columns) {
+        self.word(columns.rows() as u64);
+        self.numbers(&columns.to_matrix());
+    }
+
+    fn reduced(&mut self, model: &Reduced) {
+        self.columns(&model.shapes);
+        self.numbers(&model.stiffness);
+        match &model.damping {
+            Damping::Diagonal(damping) => {
+                self.word(0);
+                self.numbers(damping);
+            }
+            Damping::Full(damping) => {
+                self.word(1);
+                self.numbers(damping);
+            }
+        }
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn word(&mut self) -> Option<u64> {
+        let (word, rest) = self.0.split_at_checked(WORD)?;
+        self.0 = rest;
+        Some(u64::from_le_bytes(word.try_into().ok()?))
+    }
+
+    fn words(&mut self) -> Option<impl Iterator<Item = u64> + use<>> {
+        let count = usize::try_from(self.word()?).ok()?;
+        let (words, rest) = self.0.split_at_checked(count.checked_mul(WORD)?)?;
+        self.0 = rest;
+        let word = |bytes: &[u8]| u64::from_le_bytes(bytes.try_into().unwrap_or_default());
+        Some(words.chunks_exact(WORD).map(word).collect::<Vec<_>>().into_iter())
+    }
+
+    fn ids(&mut self) -> Option<Vec<u32>> {
+        self.words()?.map(|word| u32::try_from(word).ok()).collect()
+    }
+
+    fn numbers(&mut self) -> Option<Vec<f64>> {
+        Some(self.words()?.map(f64::from_bits).collect())
+    }
+
+    fn columns(&mut self) -> Option<Columns> {
+        let rows = usize::try_from(self.word()?).ok()?;
+        let matrix = self.numbers()?;
+        (rows > 0 && matrix.len().is_multiple_of(rows)).then(|| Columns::new(&matrix, rows))
+    }
+
+    fn reduced(&mut self) -> Option<Reduced> {
+        let (shapes, stiffness) = (self.columns()?, self.numbers()?);
+        let damping = match self.word()? {
+            0 => Damping::Diagonal(self.numbers()?),
+            1 => Damping::Full(self.numbers()?),
+            _ => return None,
+        };
+        Some(Reduced { states: stiffness.len(), shapes, stiffness, damping })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::body::{Block, Body};
+    use super::super::super::mesh::Face;
+    use super::super::SpringGraph;
+    use super::*;
+
+    #[test]
+    fn a_basis_comes_back_whole_and_a_damaged_one_not_at_all() {
+        let block = Block::builder([5; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
+        let graph = SpringGraph::new(&block).unwrap();
+        let mut patch = Vec::new();
+        block.patch(&[block.surface().triangles.len() as u32 - 5], [2, 2, 1], &mut patch);
+        let basis = Basis::compute(&graph, &patch, 12).unwrap().unwrap();
+        let bytes = basis.to_bytes(7);
+        assert_eq!(Basis::from_bytes(&bytes, 7).as_ref(), Some(&basis));
+        assert_eq!(Basis::from_bytes(&bytes, 8), None, "another key");
+        for at in (0..bytes.len()).step_by(997) {
+            let mut wrong = bytes.clone();
+            wrong[at] ^= 0x10;
+            assert_eq!(Basis::from_bytes(&wrong, 7), None, "byte {at}");
+            assert_eq!(Basis::from_bytes(&bytes[..at], 7), None, "cut at {at}");
+        }
+    }
+}
