@@ -95,7 +95,7 @@ const CASES: &[Case] = &[
     case("kind = \"crossfade\", ", "", "scene.toml:23: local.blend.kind: ", &["missing"]),
     case("pull = { node = [5, 5, 11], offset_m = [0.0, 0.0, 0.02] }\n", "", "scene.toml:30: initial.pull: ", &["missing"]),
     // Words that do not exist.
-    case("model = \"patch\"", "model = \"boundary\"", "scene.toml:20: local.model: ", &["is \"boundary\"", "\"full\", \"hold\"", "\"linear_boundary\", \"scaled_boundary\", \"condensed\" or \"predictive\""]),
+    case("model = \"patch\"", "model = \"boundary\"", "scene.toml:20: local.model: ", &["is \"boundary\"", "\"hold\", \"patch\"", "\"predictive\", \"full\" or \"auto\""]),
     case("fixed = [\"z_min\"]", "fixed = [\"z_min\", \"bottom\"]", "scene.toml:6: body.block.fixed[1]: ", &["is \"bottom\"", "\"x_min\"", "\"z_max\""]),
     case("normals = \"interpolated\"", "normals = \"smooth\"", "scene.toml:13: contact.normals: ", &["\"interpolated\" or \"face\""]),
     case("feedback = \"geometry\"", "feedback = \"patch\"", "scene.toml:22: local.feedback: ", &["\"trajectory\", \"contact_nodes\" or \"geometry\""]),
@@ -141,6 +141,9 @@ const CASES: &[Case] = &[
     case("model = \"patch\"", "model = \"scaled_boundary\"", "scene.toml:22: local.feedback: ", &["\"geometry\"", "compliance twice"]),
     case("model = \"patch\"\npatch = [4, 4, 2]\nfeedback = \"geometry\"", "model = \"full\"\nfeedback = \"contact_nodes\"", "scene.toml:21: local.feedback: ", &["\"contact_nodes\" needs", "\"patch\" or \"linear_boundary\" or \"scaled_boundary\"", "is \"full\""]),
     case("model = \"patch\"\npatch = [4, 4, 2]\nfeedback = \"geometry\"", "model = \"hold\"\nstep = \"implicit\"", "scene.toml:21: local.step: ", &["linear patch", "\"hold\""]),
+    case("model = \"patch\"", "model = \"auto\"", "scene.toml:22: local.feedback: ", &["\"geometry\" needs", "\"patch\" or \"linear_boundary\"", "is \"auto\""]),
+    case("model = \"patch\"\npatch = [4, 4, 2]\nfeedback = \"geometry\"", "step = \"implicit\"", "scene.toml:20: local.step: ", &["linear patch", "\"auto\""]),
+    case("model = \"patch\"", "error_pct = 0\nmodel = \"patch\"", "scene.toml:20: local.error_pct: ", &["is 0", "above 0"]),
     case("kind = \"crossfade\", ms = 10", "kind = \"offset\"", "scene.toml:23: local.blend.ms: ", &["missing", "an offset"]),
     case("ms = 10", "ms = 0", "scene.toml:23: local.blend.ms: ", &["above 0"]),
     case(", ms = 10", "", "scene.toml:23: local.blend.ms: ", &["missing", "above 0"]),
