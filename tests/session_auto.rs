@@ -65,7 +65,7 @@ fn in_virtual_time_the_choice_is_nominal_and_the_machine_has_no_say() {
             .duration_s(0.1)
     };
     let strict = choice(large());
-    assert!(strict.model != LocalModelKind::Full && strict.reason.why.contains("188 us of 250 us"), "{strict}");
+    assert!(strict.model != LocalModelKind::Full && strict.reason.why.contains("of 250 us (nominal)"), "{strict}");
     assert_eq!(choice(large()), strict);
     assert_eq!(choice(large().error_pct(60.0)).model, LocalModelKind::Hold);
 }
@@ -77,8 +77,8 @@ fn a_body_that_is_too_small_for_a_patch_runs_without_one() {
     assert_eq!(choice.model, LocalModelKind::Full, "{choice}");
 }
 
-/// At 2 x 300 us of 1 ms `full` is beyond what a tick may take, on any machine.
-const TOO_SLOW: Duration = Duration::from_micros(300);
+/// At 2 x 340 us of 1 ms `full` is beyond what a tick may take, on any machine, and a global period holds the work.
+const TOO_SLOW: Duration = Duration::from_micros(340);
 
 #[test]
 fn on_threads_the_cost_is_measured_and_what_is_missed_is_a_warning_in_the_report() {

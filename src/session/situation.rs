@@ -7,13 +7,20 @@ use crate::runtime::Execution;
 use crate::scene::{LocalModelKind as Kind, Scene};
 use crate::time::Nanos;
 
-/// Contact, integration, device and records of a tick of the whole body, as a factor on its force evaluations: 70 us for two
-/// evaluations of 28 to 35 us (`cargo bench --bench spring_kernel`).
+/// Contact, integration, device and records of a tick of the whole body, as a factor on its force evaluations.
 const OVERHEAD: f64 = 1.25;
-/// The part of a haptic period that a tick may take on average: the rest is for caches, interrupts and lateness.
-const HAPTIC_SHARE: f64 = 0.6;
-/// The part of a global period that its work may take.
-const GLOBAL_SHARE: f64 = 0.8;
+/// The part of a haptic period that the typical tick may take: the slowest of a hundred takes twice as long (`palpate compare`
+/// on the reference scenes: 74 and 168 us for `full`).
+const HAPTIC_SHARE: f64 = 0.5;
+/// The part that a tick of `full` may take where everything else misses the error: some ticks are late then.
+const TIGHT_SHARE: f64 = 0.8;
+/// The part of a global period that its work may take: late results are what the expected errors are of.
+const GLOBAL_SHARE: f64 = 1.0;
+/// The same for both rates on a single core.
+const SINGLE_CORE_SHARE: f64 = 0.8;
+/// What `predictive` pays for looking ahead and for building its patch, in parts of as much simulation of the whole body;
+/// `predicted` runs the whole body (`palpate compare`: global load, against that of `hold`).
+const REDUCED_AHEAD: f64 = 0.6;
 /// In virtual time: one for the haptic thread and one for the others.
 const NOMINAL_CORES: usize = 2;
 
@@ -41,9 +48,10 @@ pub(super) struct Situation {
 fn local_substep_s(kind: Kind) -> f64 {
     match kind {
         Kind::Full => 0.0,
-        Kind::Hold => 0.5e-6,
-        Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary | Kind::Condensed => 4e-6,
-        Kind::Predicted | Kind::Predictive => 12e-6,
+        Kind::Hold => 0.3e-6,
+        Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary | Kind::Condensed => 4.5e-6,
+        Kind::Predicted => 5e-6,
+        Kind::Predictive => 7.5e-6,
     }
 }
 
@@ -107,7 +115,8 @@ impl Situation {
     fn global_work_s(&self, kind: Kind) -> f64 {
         let periods = match kind {
             Kind::Full => 0.0,
-            Kind::Predicted | Kind::Predictive => 1.0 + self.ahead_periods,
+            Kind::Predicted => 1.0 + self.ahead_periods,
+            Kind::Predictive => 1.0 + REDUCED_AHEAD * self.ahead_periods,
             _ => 1.0,
         };
         periods * self.global_period_s / self.haptic_period_s * self.full_tick_s()
@@ -118,12 +127,16 @@ impl Situation {
         let haptic = self.tick_s(kind) / self.haptic_period_s;
         let global = self.global_work_s(kind) / self.global_period_s;
         // The haptic thread takes a single core away from the global one.
-        let shared = if self.cores > 1 { global } else { haptic + global };
-        let shared = if kind == Kind::Full { 0.0 } else { shared };
-        (haptic / HAPTIC_SHARE).max(shared / GLOBAL_SHARE)
+        let shared = if self.cores > 1 { global / GLOBAL_SHARE } else { (haptic + global) / SINGLE_CORE_SHARE };
+        (haptic / HAPTIC_SHARE).max(if kind == Kind::Full { 0.0 } else { shared })
     }
 
-    /// What a tick of `full` takes of what it may, in words.
+    /// What part of its period a tick of `full` takes, if it can do that with some of them late.
+    pub(super) fn tight_share(&self) -> Option<f64> {
+        Some(self.full_tick_s() / self.haptic_period_s).filter(|share| *share <= TIGHT_SHARE)
+    }
+
+    /// What a tick of `full` takes of its period, in words.
     pub(super) fn full_in_words(&self, verb: &str) -> String {
         let (tick, period) = (short(self.full_tick_s()), short(self.haptic_period_s));
         format!("a full tick {verb} {tick} of {period} ({})", self.origin)
