@@ -249,7 +249,7 @@ fn main() -> Result<(), Error> {
         1e3 / heaviest
     );
 
-    println!("Real time, model patch:\n{}", session(&ball)?.build()?.run()?);
+    println!("Real time, model patch:\n{}", session(&ball)?.model(LocalModelKind::Patch).build()?.run()?);
 
     let run = |model: LocalModelKind| -> Result<Vec<Vec3>, Error> {
         let summary = session(&ball)?.model(model).virtual_time().keep_records().build()?.run()?;

@@ -9,6 +9,7 @@ use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State, TangentBlock};
 use palpate::model::mesh::{Face, Surface};
 use palpate::prelude::*;
+use palpate::scene::LocalModelKind;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -72,7 +73,9 @@ fn main() -> Result<(), Error> {
     let body = Fragile { block, faults: Arc::default(), begun: Instant::now() };
     let path =
         ToolPath::new(vec![0.0, 0.1, 10.0], vec![[0.05, 0.05, 0.101], [0.05, 0.05, 0.092], [0.06, 0.05, 0.092]])?;
-    let mut running = Session::builder(body).path(path).friction(0.5).duration_s(5.5).build()?.start()?;
+    // Named, because a body of this size would be chosen to run whole at 1 kHz, without a global model to lose.
+    let session = Session::builder(body).path(path).model(LocalModelKind::Patch).friction(0.5).duration_s(5.5);
+    let mut running = session.build()?.start()?;
     if let Some(mut viewer) = running.take_viewer() {
         println!("  t (s)   force (N)   age of the global model's last result (ms)");
         while !running.finished() {

@@ -65,3 +65,25 @@ fn a_body_that_takes_longer_than_its_period_is_refused_in_real_time_with_what_wa
     let words = ["scene.toml: local.model: ", "a haptic tick of `full`", "1.000ms", "another local model"];
     assert_refused_in_real_time(&folder, &["--model", "full"], &words);
 }
+
+#[test]
+fn auto_says_in_plan_report_timing_and_json_which_model_it_took_and_why() {
+    let folder = Folder::new();
+    let auto = ["run", "scene.toml", "--virtual", "--model", "auto"];
+    let why = "a full tick takes 9.7 us of 1 ms (nominal), and nothing beats full where it fits";
+    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>().join(" ");
+    let plan = folder.succeed(&[&auto[..], &["--plan"]].concat());
+    let line = format!("model full: {why}");
+    assert!(words(&plan).contains(&line), "{plan}");
+    for report in [folder.succeed(&auto), folder.succeed(&["timing", "palpate-run.mcap"])] {
+        assert!(words(&report).contains(&line), "{report}");
+    }
+    let json = folder.succeed(&["timing", "palpate-run.mcap", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["environment"]["model_reason"], why);
+    assert!(json["environment"]["model_warning"].is_null(), "{json}");
+    // A model that is named has no reason to give.
+    let named = folder.succeed(&["run", "scene.toml", "--virtual", "--plan"]);
+    assert!(!named.contains("model"), "{named}");
+    folder.succeed(&["replay", "palpate-run.mcap"]);
+}

@@ -136,7 +136,7 @@ fn slow(longest: Duration) -> impl Body {
 
 /// A session around a program's own body; the program fills it in the same way for the run and for the replay.
 fn own(body: impl Body + 'static) -> SessionBuilder {
-    Session::builder(body).substeps_per_ms(2).friction(0.5).crossfade_ms(10.0).probe(top())
+    Session::builder(body).model(LocalModelKind::Patch).substeps_per_ms(2).friction(0.5).crossfade_ms(10.0).probe(top())
 }
 
 #[test]

@@ -38,7 +38,7 @@ fn every_scene_loads_and_says_what_it_shows() {
         let source = scene.source.as_deref().unwrap();
         assert!(source.starts_with("# ") && source.contains("Look for:"), "{}", file.display());
         assert_eq!(scene.validate().map_err(|error| error.to_string()), Ok(()), "{}", file.display());
-        assert_eq!(scene.local.model, LocalModelKind::Patch, "{}", file.display());
+        assert_eq!(scene.local.model, LocalModelKind::Patch.into(), "{}", file.display());
     }
 }
 
@@ -163,7 +163,7 @@ fn a_glued_tool_starts_where_its_node_rests() {
 #[test]
 fn another_model_drops_only_a_feedback_that_it_cannot_give() {
     let full = Scene::demo().with_model(LocalModelKind::Full);
-    assert_eq!((full.local.model, full.local.feedback), (LocalModelKind::Full, None));
+    assert_eq!((full.local.model, full.local.feedback), (LocalModelKind::Full.into(), None));
     assert!(full.validate().is_ok());
     let mut scene = Scene::demo();
     scene.local.feedback = Some(Feedback::Trajectory);

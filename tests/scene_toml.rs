@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use palpate::scene::{
-    BlendKind, BlendSpec, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, InitialSpec, LocalModelKind,
-    MaterialSpec, Normals, ProbeSpec, PullSpec, Scene, StepKind,
+    BlendKind, BlendSpec, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, InitialSpec, MaterialSpec,
+    ModelChoice, Normals, ProbeSpec, PullSpec, Scene, StepKind,
 };
 use proptest::prelude::*;
 
@@ -61,7 +61,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
     let node = [1_usize..5, 1_usize..5, 1_usize..5];
     let initial = prop::option::of((node.clone(), number(1e-4, 0.1), any::<bool>()));
     let local = (
-        prop::sample::select(LocalModelKind::ALL.to_vec()),
+        prop::sample::select(ModelChoice::NAMES.to_vec()),
         prop::option::of(prop::sample::select(vec![Feedback::Trajectory, Feedback::ContactNodes, Feedback::Geometry])),
         prop::sample::select(vec![StepKind::Auto, StepKind::Explicit, StepKind::Implicit]),
         prop::option::of((prop::sample::select(vec![BlendKind::Crossfade, BlendKind::Offset]), number(1.0, 30.0))),
@@ -96,7 +96,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
         scene.body = body;
         // What does not fit the model is left out.
         (scene.local.feedback, scene.local.step) = (feedback, step);
-        scene = scene.with_model(model);
+        scene = scene.with_model(ModelChoice::from_name(model).unwrap());
         if scene.contact.equations == Equations::Paper && step == StepKind::Implicit {
             scene.local.step = StepKind::Auto;
         }

@@ -31,7 +31,7 @@ fn slow(takes: Duration) -> (impl Body, Arc<Mutex<u64>>) {
 }
 
 fn session(body: impl Body + 'static) -> SessionBuilder {
-    Session::builder(body).path(pressing()).substeps_per_ms(2)
+    Session::builder(body).path(pressing()).model(LocalModelKind::Patch).substeps_per_ms(2)
 }
 
 fn budgets(session: &Session) -> Vec<(String, Option<Nanos>)> {

@@ -76,7 +76,7 @@ impl Device for Probing {
 const WIND_DOWN: u64 = 105;
 
 fn session(device: impl Device + 'static) -> SessionBuilder {
-    Session::builder(block()).device(device).friction(0.5).keep_records()
+    Session::builder(block()).device(device).model(LocalModelKind::Patch).friction(0.5).keep_records()
 }
 
 fn run(builder: SessionBuilder, seconds: f64) -> Summary {

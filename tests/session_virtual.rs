@@ -21,7 +21,7 @@ use session_support::*;
 const HAPTIC: Rate = Rate::hz(1000);
 
 fn session() -> SessionBuilder {
-    Session::builder(block()).path(pressing()).friction(0.5).virtual_time().keep_records()
+    Session::builder(block()).path(pressing()).model(LocalModelKind::Patch).friction(0.5).virtual_time().keep_records()
 }
 
 fn run(builder: SessionBuilder, seconds: f64) -> Summary {

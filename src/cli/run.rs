@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::scene::{LocalModelKind, ModelChoice, Scene};
 use palpate::session::{Session, SessionBuilder};
 use palpate::{Error, ErrorKind};
 
@@ -23,8 +23,8 @@ pub struct RunArgs {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// Use this local model instead of the scene's own
-    #[arg(long, value_name = "NAME", value_parser = model)]
-    pub model: Option<LocalModelKind>,
+    #[arg(long, value_name = "NAME", value_parser = choice)]
+    pub model: Option<ModelChoice>,
     /// Print the schedule and what this system would refuse, and run nothing
     #[arg(long)]
     pub plan: bool,
@@ -67,8 +67,10 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
 }
 
 fn plan(builder: SessionBuilder, name: &str) -> Result<(), Error> {
-    let plan = builder.build().and_then(|session| session.plan()).map_err(|error| error.at(name))?;
-    output::print(&format!("{name}: {plan}"))
+    let planned = builder.build().and_then(|session| Ok((session.plan()?, session.choice().cloned())));
+    let (plan, choice) = planned.map_err(|error| error.at(name))?;
+    let choice = choice.map_or(String::new(), |choice| format!("model      {choice}\n"));
+    output::print(&format!("{name}: {plan}{choice}"))
 }
 
 fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error> {
@@ -98,6 +100,11 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
         }
         _ => Ok(()),
     }
+}
+
+/// A local model or `auto` by name, or which there are.
+fn choice(name: &str) -> Result<ModelChoice, String> {
+    ModelChoice::from_name(name).ok_or_else(|| format!("the local models are {}", ModelChoice::NAMES.join(", ")))
 }
 
 /// A local model by its name, or which there are.

@@ -28,6 +28,15 @@ pub struct GroupInfo {
     pub background: bool,
 }
 
+/// Why a run has the local model that it has, if nobody named one.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ModelReason {
+    /// The costs and the error that decided, in one line.
+    pub why: String,
+    /// What falls short, if something does.
+    pub warning: Option<String>,
+}
+
 /// Everything about a run that is not a record.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Environment {
@@ -39,6 +48,8 @@ pub struct Environment {
     pub execution: Execution,
     /// The local model.
     pub model: String,
+    /// Why it is that one, if it was chosen; `None` if it was named.
+    pub model_reason: Option<ModelReason>,
     /// The haptic rate (Hz).
     pub haptic_hz: f64,
     /// The rate of the global model (Hz).
@@ -107,6 +118,10 @@ impl Environment {
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .into();
+        if let Some(reason) = &self.model_reason {
+            map.insert(MODEL_REASON.to_owned(), reason.why.clone());
+            map.extend(reason.warning.iter().map(|warning| (MODEL_WARNING.to_owned(), warning.clone())));
+        }
         for (i, group) in self.groups.iter().enumerate() {
             map.insert(format!("group.{i}.name"), group.name.clone());
             map.insert(format!("group.{i}.rate_hz"), group.rate_hz.to_string());
@@ -150,6 +165,9 @@ impl Environment {
             instruction_set: text("instruction_set"),
             execution,
             model: text("model"),
+            model_reason: map
+                .get(MODEL_REASON)
+                .map(|why| ModelReason { why: why.clone(), warning: map.get(MODEL_WARNING).cloned() }),
             haptic_hz: number("haptic_hz"),
             global_hz: number("global_hz"),
             groups,
@@ -161,6 +179,10 @@ impl Environment {
         }
     }
 }
+
+/// The keys of a choice.
+const MODEL_REASON: &str = "model_reason";
+const MODEL_WARNING: &str = "model_warning";
 
 /// Where the keys of the device's first state begin.
 const FIRST_TOOL: &str = "first_tool";
@@ -195,6 +217,7 @@ mod tests {
             instruction_set: "avx2".into(),
             execution: Execution::Threaded { start_unix_ns: 1_700_000_000_123_456_789 },
             model: "patch".into(),
+            model_reason: Some(ModelReason { why: "it is cheap".into(), warning: Some("it is wrong".into()) }),
             haptic_hz: 1000.0,
             global_hz: 29.97,
             groups: vec![
@@ -213,6 +236,8 @@ mod tests {
             session: None,
         };
         assert_eq!(Environment::from_map(&environment.to_map(1)), environment);
+        let named = Environment { model_reason: None, ..environment.clone() };
+        assert_eq!(Environment::from_map(&named.to_map(1)), named);
         assert_eq!(environment.group_name(1), "global");
         assert_eq!(environment.group_name(7), "group-7");
     }

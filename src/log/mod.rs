@@ -37,7 +37,7 @@ mod writer;
 pub use analysis::{Analysis, RunReport};
 pub use comparison::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, ModelError, RunOutcome};
 pub use entry::LogEntry;
-pub use environment::{Environment, Execution, GroupInfo};
+pub use environment::{Environment, Execution, GroupInfo, ModelReason};
 pub use event::{Level, TextEvent};
 pub use group::{CauseCounts, GroupReport};
 pub use haptics::{ContactReport, ForceReport, LimitReport, ResyncReport};

@@ -87,6 +87,10 @@ fn about(page: &mut Page, environment: &Environment) {
             environment.model, environment.palpate_version, environment.instruction_set
         ),
     );
+    if let Some(reason) = &environment.model_reason {
+        page.wrapped("model", &format!("{}: {}", environment.model, reason.why));
+        reason.warning.iter().for_each(|warning| page.wrapped("warning", warning));
+    }
     for (i, (what, granted)) in environment.granted.iter().take(GRANT_LINES).enumerate() {
         page.wrapped(if i == 0 { "granted" } else { "" }, &format!("{what}: {granted}"));
     }

@@ -7,6 +7,7 @@ use crate::error::Error;
 
 mod body;
 mod check;
+mod choice;
 mod contact;
 mod device;
 mod models;
@@ -28,6 +29,7 @@ mod reader;
 mod suggest;
 
 pub use body::{BlockSpec, BodyKind, BodySpec, MaterialSpec};
+pub use choice::ModelChoice;
 pub use contact::{ContactSpec, Friction};
 
 pub use crate::devices::ToolPath;
@@ -115,7 +117,7 @@ impl Default for RunSpec {
 }
 
 impl Scene {
-    /// The defaults around a program's own body: default rates, frictionless, `patch`, nothing moves the tool yet.
+    /// The defaults around a program's own body: default rates, frictionless, `auto`, nothing moves the tool yet.
     pub fn of_program() -> Self {
         Self {
             body: None,
@@ -139,13 +141,15 @@ impl Scene {
         validate::validate(self)
     }
 
-    /// The same scene with another local model, without a feedback and a step that only the former model can have.
+    /// The same scene with another local model, without a feedback and a step that the model, or one that `auto` may choose,
+    /// cannot have.
     #[must_use]
-    pub fn with_model(mut self, model: LocalModelKind) -> Self {
-        if !self.local.feedback.is_none_or(|feedback| feedback.fits(model)) {
+    pub fn with_model(mut self, model: impl Into<ModelChoice>) -> Self {
+        let model = model.into();
+        if !self.local.feedback.is_none_or(|feedback| model.all(|kind| feedback.fits(kind))) {
             self.local.feedback = None;
         }
-        if self.local.step == StepKind::Implicit && !model.is_linear() {
+        if self.local.step == StepKind::Implicit && !model.all(LocalModelKind::is_linear) {
             self.local.step = StepKind::Auto;
         }
         self.local.model = model;

@@ -7,6 +7,8 @@ pub use crate::model::local::{Feedback, Kind as LocalModelKind};
 
 pub use crate::model::local::Prediction;
 
+use super::ModelChoice;
+
 /// The slow, detailed simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
@@ -34,7 +36,9 @@ pub struct LocalSpec {
     /// Releases per second.
     pub rate_hz: f64,
     /// Which local model.
-    pub model: LocalModelKind,
+    pub model: ModelChoice,
+    /// The largest expected error of a model that `auto` may choose (rms, % of the peak force, see DESIGN.md).
+    pub error_pct: f64,
     /// Patch window: nodes along the surface, along it, into depth.
     pub patch: [usize; 3],
     /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted.
@@ -55,7 +59,8 @@ impl Default for LocalSpec {
     fn default() -> Self {
         Self {
             rate_hz: 1000.0,
-            model: LocalModelKind::default(),
+            model: ModelChoice::default(),
+            error_pct: 1.0,
             patch: [4, 4, 2],
             basis: 50,
             basis_folder: None,

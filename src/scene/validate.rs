@@ -3,7 +3,7 @@
 use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 use super::{
     BlendKind, BlockSpec, BodySpec, DeviceSpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec,
-    LocalModelKind, LocalSpec, SafetySpec, Scene, StepKind,
+    LocalModelKind, LocalSpec, ModelChoice, SafetySpec, Scene, StepKind,
 };
 use crate::error::Error;
 use crate::time::Rate;
@@ -56,8 +56,11 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
 
 /// What names nodes of the block, or has to fit into it.
 fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
-    // A body too small for the default patch is fine for the models that have none; a patch that was asked for is not.
-    if scene.local.model.has_patch() || scene.local.patch != LocalSpec::default().patch {
+    // A body too small for the default patch is fine for the models that have none, and for the choice among them; a patch
+    // that was asked for is not.
+    if scene.local.model.named().is_some_and(LocalModelKind::has_patch)
+        || scene.local.patch != LocalSpec::default().patch
+    {
         patch(scene.local.patch, block)?;
     }
     if let Some(node) = scene.device.attach_node {
@@ -176,15 +179,16 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
         return Err(Error::scene("local.rate_hz", message));
     }
     if let Some(feedback) = local.feedback
-        && !feedback.fits(local.model)
+        && !local.model.all(|kind| feedback.fits(kind))
     {
         return Err(Error::scene("local.feedback", misfit(feedback, local.model)));
     }
-    if local.step == StepKind::Implicit && !local.model.is_linear() {
+    if local.step == StepKind::Implicit && !local.model.all(LocalModelKind::is_linear) {
         let message =
             format!("\"implicit\" needs a linear patch and the model is {:?}, leave it out", local.model.name());
         return Err(Error::scene("local.step", message));
     }
+    positive("local.error_pct", local.error_pct)?;
     if local.basis > MAX_BASIS {
         let message = format!("is {}, must be at most {MAX_BASIS}: more cost time and add nothing", local.basis);
         return Err(Error::scene("local.basis", message));
@@ -201,9 +205,9 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
     Ok(())
 }
 
-fn misfit(feedback: Feedback, model: LocalModelKind) -> String {
+fn misfit(feedback: Feedback, model: ModelChoice) -> String {
     let (fed, name) = (feedback.name(), model.name());
-    if matches!(model, LocalModelKind::Condensed | LocalModelKind::ScaledBoundary) {
+    if matches!(model.named(), Some(LocalModelKind::Condensed | LocalModelKind::ScaledBoundary)) {
         return format!("{fed:?} with model = {name:?} would count the surroundings' compliance twice, leave it out");
     }
     let fitting = LocalModelKind::ALL.into_iter().filter(|&model| feedback.fits(model));

@@ -9,7 +9,7 @@ use crate::model::Vec3;
 use crate::model::forecast::ToolForecast;
 use crate::model::local::Aim;
 use crate::model::surroundings::{Bases, SpringGraph};
-use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, RuntimeBuilder};
+use crate::runtime::{Actor, ExchangePort, RateGroup, RuntimeBuilder};
 
 /// The name of the group.
 pub(super) const GROUP: &str = "basis";
@@ -35,10 +35,7 @@ impl BasisSide {
             return Ok(None);
         };
         let store = BasisStore { states: prepared.basis_states, folder: prepared.basis_folder.clone() };
-        let most = match prepared.execution {
-            Execution::Virtual => usize::MAX,
-            Execution::Threaded => 1,
-        };
+        let most = if prepared.prefetches { 1 } else { usize::MAX };
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
@@ -68,7 +65,7 @@ fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, t
     aim.triangles(Some(prepared.simulation.contact()), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
     let size = prepared.template.patch;
     let wide = [size[0] + 2, size[1] + 2, size[2]];
-    let sizes: &[[usize; 3]] = if prepared.execution == Execution::Threaded { &[size, wide] } else { &[size] };
+    let sizes: &[[usize; 3]] = if prepared.prefetches { &[size, wide] } else { &[size] };
     for &size in sizes {
         body.patch(&triangles[..1], size, &mut patch);
         // What cannot be reduced is told by the actor, when it is wanted.

@@ -15,13 +15,14 @@ use crate::time::Nanos;
 const EVALUATIONS: u32 = 16;
 const ENOUGH: Duration = Duration::from_millis(20);
 
-/// Declares the budget of the group that evaluates the whole body's forces, if the program gave none.
+/// Declares the budget of the group that evaluates the whole body's forces, if the program gave none; `evaluation` is one
+/// of them.
 ///
 /// # Errors
 /// If the least that was measured is above the group's period.
 pub(super) fn declare(
-    body: &mut dyn Body,
-    state: &State,
+    evaluation: impl FnOnce() -> Nanos,
+    nodes: usize,
     timing: Timing,
     kind: Kind,
     [local, global]: [RateGroup; 2],
@@ -30,7 +31,7 @@ pub(super) fn declare(
     if at_work.has_budget() {
         return Ok([local, global]);
     }
-    let cost = Cost { evaluation: force_evaluation(body, state), timing, nodes: body.rest().len(), kind };
+    let cost = Cost { evaluation: evaluation(), timing, nodes, kind };
     let budget = cost.budget(at_work)?;
     Ok(match kind {
         Kind::Full => [local.budget(budget), global],
@@ -39,7 +40,7 @@ pub(super) fn declare(
 }
 
 /// The least time that one evaluation of all forces takes.
-fn force_evaluation(body: &mut dyn Body, state: &State) -> Nanos {
+pub(super) fn force_evaluation(body: &mut dyn Body, state: &State) -> Nanos {
     let mut forces = vec![Vec3::zeros(); state.positions.len()];
     let (start, mut least) = (Instant::now(), Duration::MAX);
     for _ in 0..EVALUATIONS {
@@ -53,6 +54,19 @@ fn force_evaluation(body: &mut dyn Body, state: &State) -> Nanos {
     Nanos::from_duration(least)
 }
 
+/// The same on no machine in particular, for runs that must be the same on all of them.
+pub(super) fn nominal_evaluation(body: &dyn Body) -> Nanos {
+    match body.spring_count() {
+        Some(springs) => Nanos(springs as u64 * NOMINAL_SPRING_NS),
+        None => Nanos(body.rest().len() as u64 * NOMINAL_NODE_NS),
+    }
+}
+
+/// What the vector kernels take for a spring on an AVX-512 machine (`cargo bench --bench spring_kernel`).
+const NOMINAL_SPRING_NS: u64 = 2;
+/// A body of something else: some ten springs at each node, and without vector instructions.
+const NOMINAL_NODE_NS: u64 = 300;
+
 struct Cost {
     /// One evaluation of all forces.
     evaluation: Nanos,
@@ -64,7 +78,7 @@ struct Cost {
 impl Cost {
     /// What a release of `group` takes at least, if that is within its period.
     fn budget(&self, group: &RateGroup) -> Result<Nanos, Error> {
-        let Timing { haptic, substeps } = self.timing;
+        let Timing { haptic, substeps, .. } = self.timing;
         let ticks = haptic.as_hz() / group.rate().as_hz();
         let evaluations = f64::from(substeps) * ticks;
         // A budget of zero would be refused, and a clock can be that coarse.
@@ -96,7 +110,7 @@ mod tests {
     use crate::time::Rate;
 
     fn cost(evaluation_us: u64, kind: Kind) -> Cost {
-        let timing = Timing { haptic: Rate::hz(1000), substeps: 2 };
+        let timing = Timing { haptic: Rate::hz(1000), global: Rate::hz(40), substeps: 2, horizon: 32 };
         Cost { evaluation: Nanos(evaluation_us * 1000), timing, nodes: 1000, kind }
     }
 

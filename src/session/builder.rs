@@ -6,7 +6,7 @@ use crate::devices::{Device, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::body::Body;
 use crate::runtime::{Execution, RateGroup};
-use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, LocalModelKind, Scene, StepKind};
+use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, ModelChoice, Scene, StepKind};
 
 /// Collects what a session is made of; fills the same [`Scene`] as a scene file and passes the same validation.
 #[derive(Debug)]
@@ -63,10 +63,17 @@ impl SessionBuilder {
         self
     }
 
-    /// Which local model.
+    /// Which local model; without, the choice of one.
     #[must_use]
-    pub fn model(mut self, model: LocalModelKind) -> Self {
+    pub fn model(mut self, model: impl Into<ModelChoice>) -> Self {
         self.parts.scene = self.parts.scene.with_model(model);
+        self
+    }
+
+    /// The largest expected error of a model that may be chosen (rms, % of the peak force); 1 without.
+    #[must_use]
+    pub fn error_pct(mut self, error_pct: f64) -> Self {
+        self.parts.scene.local.error_pct = error_pct;
         self
     }
 

@@ -15,8 +15,6 @@ use crate::time::{Nanos, Rate};
 const STEP: Duration = Duration::from_millis(50);
 /// A latency of one period is rounded up to a multiple of this, so that it can be written in a scene file.
 const LATENCY_GRAIN: u64 = 10_000;
-/// Chooses among the models by itself: there is nothing of its own to compare.
-const CHOOSER: &str = "auto";
 
 /// What is compared; by default every model, with results of the global model that are there at once and one period late.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -73,7 +71,7 @@ pub fn compare(
     };
     let is_compared = |kind: &LocalModelKind| {
         let asked = options.models.is_empty() || options.models.contains(kind);
-        asked && *kind != LocalModelKind::Full && kind.name() != CHOOSER
+        asked && *kind != LocalModelKind::Full
     };
     let pairs: Vec<(LocalModelKind, Nanos)> = LocalModelKind::ALL
         .into_iter()

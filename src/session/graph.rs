@@ -120,7 +120,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
                 horizon: prepared.horizon,
                 patch: prepared.template.patch,
                 bases: known,
-                prefetches: prepared.execution == Execution::Threaded,
+                prefetches: prepared.prefetches,
             };
             let maker = GlobalMaker::new(prepared.simulation, tool, plan, ports);
             (source, rotating, Some(maker.measured_by(build_cost)))
@@ -202,6 +202,7 @@ fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, 
             Execution::Threaded => LogExecution::Threaded { start_unix_ns: unix_now_ns() },
         },
         model: prepared.template.kind.name().to_owned(),
+        model_reason: prepared.choice.as_ref().map(|choice| choice.reason.clone()),
         haptic_hz: prepared.haptic.as_hz(),
         global_hz: if is_multi_rate { prepared.global_rate.as_hz() } else { 0.0 },
         groups,

@@ -15,16 +15,21 @@
 mod basis;
 mod budget;
 mod builder;
+mod choice;
 mod compare;
 mod global;
 mod graph;
 mod prepare;
+mod rate_groups;
 #[cfg(all(feature = "log", feature = "scene"))]
 mod replay;
 mod running;
 mod sink;
+mod situation;
+mod substeps;
 
 pub use builder::SessionBuilder;
+pub use choice::Choice;
 pub use compare::{CompareOptions, CompareProgress, compare, one_period};
 #[cfg(all(feature = "log", feature = "scene"))]
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};
@@ -51,6 +56,11 @@ impl Session {
     /// A session as a scene describes it; the builder can still change it.
     pub fn from_scene(scene: Scene) -> SessionBuilder {
         SessionBuilder::new(None, scene)
+    }
+
+    /// The local model that was chosen and why; `None` if the scene or the program named one.
+    pub fn choice(&self) -> Option<&Choice> {
+        self.prepared.choice.as_ref()
     }
 
     /// The schedule: what each rate group asks for, what the cores bear, which releases coincide, and what this system

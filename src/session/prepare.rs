@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 
 use super::budget;
+use super::choice::{Choice, choose};
 use super::graph::groups;
-use crate::actors::GAP_S;
+use super::rate_groups::{check_group, global_group, local_group};
+use super::situation::Situation;
+use super::substeps::substeps;
 use crate::devices::{Device, Scripted, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::Vec3;
@@ -12,15 +15,14 @@ use crate::model::blend::Blend;
 use crate::model::body::{Block, Body, State};
 use crate::model::contact::{Contact, Law};
 use crate::model::equilibrium::static_equilibrium;
-use crate::model::integrator::Spectrum;
 use crate::model::local::Template;
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
-use crate::runtime::{Execution, OverrunPolicy, RateGroup, Release, admit_here};
+use crate::runtime::{Execution, RateGroup, admit_here};
 use crate::safety::Limits;
 #[cfg(feature = "scene")]
 use crate::scene::ProbeSpec;
-use crate::scene::{BodySpec, Equations, Feedback, InitialSpec, Scene, StepKind};
+use crate::scene::{BodySpec, Equations, Feedback, InitialSpec, ModelChoice, Scene, StepKind};
 use crate::time::{Nanos, Rate};
 
 /// What a builder has collected.
@@ -67,6 +69,8 @@ impl Parts {
 pub(super) struct Prepared {
     pub simulation: Simulation,
     pub template: Template,
+    /// Why its model, if none was named.
+    pub choice: Option<Choice>,
     /// States of reduced surroundings.
     pub basis_states: usize,
     /// Where bases are kept from run to run.
@@ -84,6 +88,8 @@ pub(super) struct Prepared {
     pub local: RateGroup,
     pub global: RateGroup,
     pub execution: Execution,
+    /// A basis takes its time here: bases are asked for ahead of the tool.
+    pub prefetches: bool,
     pub until: Option<Nanos>,
     #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
@@ -106,25 +112,22 @@ impl Prepared {
     }
 }
 
-/// How often the whole body's forces are evaluated: `substeps` times per haptic tick.
+/// How often the whole body's forces are evaluated: `substeps` times per haptic tick; and for how many ticks ahead.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timing {
     pub haptic: Rate,
+    pub global: Rate,
     pub substeps: u32,
+    /// Haptic ticks that a local model may have to reach ahead.
+    pub horizon: u32,
 }
-
-/// The priority of the haptic thread: above everything but the kernel's own.
-const HAPTIC_PRIORITY: u8 = 80;
 
 /// A linear patch whose stability asks for more takes one implicit step per tick: that costs as much as two explicit ones,
 /// and damps what four still show.
 const MOST_EXPLICIT_STEPS: u32 = 4;
 
-/// Steps of 0.1 us, the limit of `global.substeps_per_ms` too: a body that needs more would seem to hang.
-const MAX_SUBSTEPS_PER_MS: f64 = 1e4;
-
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
-    let scene = parts.scene;
+    let mut scene = parts.scene;
     scene.validate()?;
     for (field, group) in [("local", &parts.local), ("global", &parts.global)] {
         group.as_ref().map_or(Ok(()), |group| check_group(field, group))?;
@@ -150,6 +153,18 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         Some(initial) => pulled(&mut *body, initial, id)?,
         None => State::at_rest(body.rest()),
     };
+    let blend_ticks = (scene.local.blend.ms * 1e-3 / tick).round().max(1.0) as u32;
+    let horizon = horizon(haptic, global_rate, scene.global.compute_latency_ms, blend_ticks);
+    let timing = Timing { haptic, global: global_rate, substeps, horizon };
+    let (kind, choice, measured) = match scene.local.model {
+        ModelChoice::Named(kind) => (kind, None, None),
+        ModelChoice::Auto => {
+            let situation = Situation::of(&scene, &mut *body, &state, timing, parts.execution);
+            let choice = choose(&situation);
+            (choice.model, Some(choice), Some(situation.evaluation))
+        }
+    };
+    scene.local.model = kind.into();
     let contact = attach.map_or_else(Contact::default, |node| glued(&*body, node));
     #[cfg(feature = "scene")]
     let mut as_run = as_run(&scene, Some((attach, &probes)));
@@ -174,7 +189,6 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         // The device's own limit too; one without a limit has none to note.
         as_run.safety.max_force_n = limits.max_force_n.is_finite().then_some(limits.max_force_n);
     }
-    let kind = scene.local.model;
     let is_implicit = match scene.local.step {
         StepKind::Explicit => false,
         StepKind::Implicit => true,
@@ -187,38 +201,23 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         .with_prediction(scene.local.prediction)
         .with_period(period_ticks);
     let template = if is_implicit { template.with_implicit_steps() } else { template };
-    let blend_ticks = (scene.local.blend.ms * 1e-3 / tick).round().max(1.0) as u32;
-    let global = parts.global.unwrap_or_else(|| RateGroup::new(global_rate)).name("global");
-    let global = match scene.global.compute_latency_ms {
-        // Not given: the latency of a group that the program brings stays.
-        0.0 => global,
-        latency_ms if parts.execution == Execution::Threaded && latency_ms > 1e3 * global_rate.period_s() => {
-            let message = format!(
-                "is {latency_ms}, which is above the period of {:.3} ms: in real time a result must be there before the next \
-                 release; lower it, or run in virtual time (--virtual)",
-                1e3 * global_rate.period_s()
-            );
-            return Err(Error::scene("global.compute_latency_ms", message));
-        }
-        latency_ms => global.latency(Nanos::from_secs_f64(latency_ms * 1e-3)),
-    };
-    let last_core = std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1);
-    let local = parts.local.unwrap_or_else(|| {
-        let group = RateGroup::new(haptic).realtime(HAPTIC_PRIORITY);
-        // On a single core the haptic thread preempts the others; pinning would gain nothing.
-        if last_core > 0 { group.pin(last_core) } else { group }
-    });
-    let local = winding_down(local.name("local"), limits.ramp_s, exerts_force);
+    let global = global_group(parts.global, &scene.global, global_rate, parts.execution)?;
+    let local = local_group(parts.local, haptic, limits.ramp_s, exerts_force);
     let [local, global] = match parts.execution {
         Execution::Virtual => [local, global],
-        Execution::Threaded => budget::declare(&mut *body, &state, Timing { haptic, substeps }, kind, [local, global])?,
+        Execution::Threaded => {
+            let nodes = body.rest().len();
+            let evaluation = || measured.unwrap_or_else(|| budget::force_evaluation(&mut *body, &state));
+            budget::declare(evaluation, nodes, timing, kind, [local, global])?
+        }
     };
     let prepared = Prepared {
         template,
+        choice,
         basis_states: scene.local.basis,
         basis_folder: scene.local.basis_folder.clone(),
         basis_latency: Nanos::from_secs_f64(scene.global.basis_latency_ms * 1e-3),
-        horizon: horizon(haptic, global_rate, scene.global.compute_latency_ms, blend_ticks),
+        horizon,
         simulation: Simulation::new(body, state, contact, law, Stepping { tick, substeps })?,
         blend: Blend::new(scene.local.blend.kind, blend_ticks),
         device,
@@ -229,6 +228,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         local,
         global,
         execution: parts.execution,
+        prefetches: parts.execution == Execution::Threaded,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
         #[cfg(feature = "log")]
         log: parts.log,
@@ -281,16 +281,6 @@ fn block(spec: &BodySpec) -> Result<Block, Error> {
     spec.block.fixed.iter().fold(builder, |builder, &face| builder.fix(face)).build().map_err(|error| error.at("body"))
 }
 
-/// The haptic group as it ends: with time for the force to go to zero. A device that exerts none needs it only to show
-/// in the log what would have been done.
-fn winding_down(local: RateGroup, ramp_s: f64, exerts_force: bool) -> RateGroup {
-    let group = local.wind_down(Nanos::from_secs_f64(ramp_s + RAMP_MARGIN_S));
-    if exerts_force { group.wind_down_at_end() } else { group }
-}
-
-/// Releases of the wind-down that may be skipped without shortening the ramp (s).
-const RAMP_MARGIN_S: f64 = 0.005;
-
 /// The slew limit must not keep the force from being gone when the ramp is over.
 fn check_ramp(limits: &Limits) -> Result<(), Error> {
     if !(limits.max_force_n.is_finite() && limits.max_force_n > 0.0) {
@@ -309,27 +299,6 @@ fn check_ramp(limits: &Limits) -> Result<(), Error> {
         (needed_s * 1e3).ceil()
     );
     Err(Error::scene("safety.ramp_ms", message))
-}
-
-/// What a rate group can ask for and a session cannot give.
-fn check_group(field: &str, group: &RateGroup) -> Result<(), Error> {
-    let own = || group.clone();
-    let wrong = if own().offset(Nanos::ZERO) != own() {
-        "has an offset, but device and models count from release 0: leave it out"
-    } else if own().observer() == own() {
-        "is an observer, which a session's groups cannot be: leave it out"
-    } else if field == "local" && own().latency(Nanos::ZERO) != own() {
-        "has a latency, which only the global group's results can have: leave it out"
-    } else if field == "local" && own().overrun(OverrunPolicy::Rephase) == own() {
-        "has the policy Rephase, but the tool's samples and the models belong to the nominal grid of ticks: use another"
-    } else if field == "local" && own().catches_up().as_secs_f64() > 0.5 * GAP_S {
-        "catches up after stops that the force must come back from slowly (0.1 s): catch up at most 0.05 s, or use Skip"
-    } else if field == "global" && own().release(Release::Periodic) != own() {
-        "is paced by a device, which only the local group has: leave it out"
-    } else {
-        return Ok(());
-    };
-    Err(Error::new(ErrorKind::Runtime, wrong).at(field))
 }
 
 /// What a program's own body can get wrong.
@@ -373,35 +342,6 @@ fn check_nodes(body: &dyn Body, attach: Option<u32>, probes: &[u32]) -> Result<(
         }
         _ => Ok(()),
     }
-}
-
-/// Substeps per haptic tick: as asked, unless that is unstable, or from the stability limit; and what that asks for.
-fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<(u32, u32), Error> {
-    let spectrum = Spectrum::estimate(body);
-    let stable = spectrum.stable_step();
-    if stable.is_nan() || stable <= 0.0 {
-        return Err(Error::scene("body", "gives forces near its rest positions that are not finite"));
-    }
-    let Some(per_ms) = per_ms else {
-        let substeps = spectrum.substeps(tick);
-        if f64::from(substeps) > MAX_SUBSTEPS_PER_MS * (tick * 1e3).max(1.0) {
-            let message = format!(
-                "needs {substeps} explicit steps per haptic tick to be stable, which no machine can do: less stiffness or \
-                 damping, or more mass"
-            );
-            return Err(Error::scene("body", message));
-        }
-        return Ok((substeps, substeps));
-    };
-    let substeps = (f64::from(per_ms) * tick * 1e3 - 1e-9).ceil().max(1.0);
-    if tick / substeps >= stable {
-        let needed = (1.3e-3 / stable).ceil();
-        let message = format!(
-            "is {per_ms}, which is unstable for this stiffness, damping and mass: use {needed} or more, or leave it out"
-        );
-        return Err(Error::scene("global.substeps_per_ms", message));
-    }
-    Ok((substeps as u32, spectrum.substeps(tick)))
 }
 
 fn pulled(body: &mut dyn Body, initial: &InitialSpec, id: impl Fn([usize; 3]) -> u32) -> Result<State, Error> {

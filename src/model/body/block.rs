@@ -191,6 +191,10 @@ impl Body for Block {
         Some(Box::new(self.clone()))
     }
 
+    fn spring_count(&self) -> Option<usize> {
+        Some(self.springs.len())
+    }
+
     fn springs(&self) -> Option<Vec<Link>> {
         let mut links = Vec::with_capacity(self.springs.len());
         for node in 0..self.rest.len() as u32 {

@@ -141,6 +141,14 @@ pub trait Body: Send + std::fmt::Debug {
         None
     }
 
+    /// How many springs [`springs`](Self::springs) has; `None` if it has none to give.
+    ///
+    /// # Real-time
+    /// Not called in a tick: may allocate.
+    fn spring_count(&self) -> Option<usize> {
+        self.springs().map(|springs| springs.len())
+    }
+
     /// Puts the nodes of a patch around surface triangles `triangles` in place of `nodes`, each once, in increasing order
     /// and without held ones; `size` = nodes along the surface, along it, into depth, around a single triangle.
     ///

@@ -1,7 +1,7 @@
 //! The local models by name.
 
 /// The local models.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Kind {
     /// [`Full`](super::Full): the whole body at the haptic rate, the reference that the others are measured against.
@@ -9,7 +9,6 @@ pub enum Kind {
     /// [`Hold`](super::Hold): the last force of the global model.
     Hold,
     /// [`Patch`](super::Patch): the paper's, a linear patch in fixed surroundings.
-    #[default]
     Patch,
     /// [`LinearBoundary`](super::LinearBoundary): a linear patch in surroundings that move on.
     LinearBoundary,
@@ -42,7 +41,7 @@ impl Kind {
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Full => "full",
             Self::Hold => "hold",

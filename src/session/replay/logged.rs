@@ -24,6 +24,8 @@ const LOGGER: &str = "logger";
 pub(super) struct Logged {
     pub(super) scene: Scene,
     pub(super) recording: Recording,
+    /// True if it was written on threads.
+    pub(super) in_real_time: bool,
     pub(super) first: DeviceState,
     pub(super) samples: Vec<ReplayedSample>,
     pub(super) comparison: Comparison,
@@ -147,7 +149,8 @@ impl Gathered {
         self.recording.check(|group| environment.group_name(group))?;
         self.check_samples(&environment, &first)?;
         let Self { recording, samples, comparison, .. } = self;
-        Ok(Logged { scene, recording, first: state(&first), samples, comparison, end, cut })
+        let in_real_time = environment.execution != Execution::Virtual;
+        Ok(Logged { scene, recording, in_real_time, first: state(&first), samples, comparison, end, cut })
     }
 
     /// Leaves out what is behind the first fault.

@@ -17,6 +17,7 @@ use super::prepare::{Parts, as_run, prepare};
 use crate::devices::Replayed;
 use crate::error::{Error, ErrorKind};
 use crate::runtime::{Execution, Recording, RuntimeReport};
+use crate::scene::ModelChoice;
 use crate::time::Nanos;
 use compare::End;
 use cut::Cut;
@@ -64,6 +65,10 @@ impl Replay {
         let place = log.display().to_string();
         let max_force_n = logged.scene.safety.max_force_n;
         parts.scene.safety.max_force_n = max_force_n;
+        // What the machine of the log chose, and not what this one would.
+        if parts.scene.local.model == ModelChoice::Auto {
+            parts.scene.local.model = logged.scene.local.model;
+        }
         parts.device =
             Some(Box::new(Replayed::new(logged.first, logged.samples, max_force_n.unwrap_or(f64::INFINITY))));
         parts.execution = Execution::Virtual;
@@ -75,6 +80,8 @@ impl Replay {
             let message = format!("it is the log of another session: `{there}` was run, this one has `{here}`");
             return Err(Error::new(ErrorKind::Log, message).at(place));
         }
+        // The bases that were wished for are part of the recording.
+        prepared.prefetches = logged.in_real_time;
         let comparison = logged.comparison;
         let ends = [logged.recording.end(), logged.end];
         prepared.reexecuted = Some(Reexecuted { recording: logged.recording, comparison: comparison.clone() });

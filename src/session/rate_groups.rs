@@ -1,0 +1,78 @@
+//! The rate groups that a session's scene and program ask for.
+
+use crate::actors::GAP_S;
+use crate::error::{Error, ErrorKind};
+use crate::runtime::{Execution, OverrunPolicy, RateGroup, Release};
+use crate::scene::GlobalSpec;
+use crate::time::{Nanos, Rate};
+
+/// The priority of the haptic thread: above everything but the kernel's own.
+const HAPTIC_PRIORITY: u8 = 80;
+
+/// The global group: the program's, or one of the scene's rate, with the scene's latency.
+///
+/// # Errors
+/// On threads, if the latency is above the period.
+pub(super) fn global_group(
+    given: Option<RateGroup>,
+    spec: &GlobalSpec,
+    rate: Rate,
+    execution: Execution,
+) -> Result<RateGroup, Error> {
+    let group = given.unwrap_or_else(|| RateGroup::new(rate)).name("global");
+    match spec.compute_latency_ms {
+        // Not given: the latency of a group that the program brings stays.
+        0.0 => Ok(group),
+        latency_ms if execution == Execution::Threaded && latency_ms > 1e3 * rate.period_s() => {
+            let message = format!(
+                "is {latency_ms}, which is above the period of {:.3} ms: in real time a result must be there before the next \
+                 release; lower it, or run in virtual time (--virtual)",
+                1e3 * rate.period_s()
+            );
+            Err(Error::scene("global.compute_latency_ms", message))
+        }
+        latency_ms => Ok(group.latency(Nanos::from_secs_f64(latency_ms * 1e-3))),
+    }
+}
+
+/// The haptic group: the program's, or one with a core of its own, and time to bring the force to rest within `ramp_s`.
+pub(super) fn local_group(given: Option<RateGroup>, rate: Rate, ramp_s: f64, exerts_force: bool) -> RateGroup {
+    let last_core = std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1);
+    let group = given.unwrap_or_else(|| {
+        let group = RateGroup::new(rate).realtime(HAPTIC_PRIORITY);
+        // On a single core the haptic thread preempts the others; pinning would gain nothing.
+        if last_core > 0 { group.pin(last_core) } else { group }
+    });
+    winding_down(group.name("local"), ramp_s, exerts_force)
+}
+
+/// The haptic group as it ends: with time for the force to go to zero. A device that exerts none needs it only to show
+/// in the log what would have been done.
+fn winding_down(local: RateGroup, ramp_s: f64, exerts_force: bool) -> RateGroup {
+    let group = local.wind_down(Nanos::from_secs_f64(ramp_s + RAMP_MARGIN_S));
+    if exerts_force { group.wind_down_at_end() } else { group }
+}
+
+/// Releases of the wind-down that may be skipped without shortening the ramp (s).
+const RAMP_MARGIN_S: f64 = 0.005;
+
+/// What a rate group can ask for and a session cannot give.
+pub(super) fn check_group(field: &str, group: &RateGroup) -> Result<(), Error> {
+    let own = || group.clone();
+    let wrong = if own().offset(Nanos::ZERO) != own() {
+        "has an offset, but device and models count from release 0: leave it out"
+    } else if own().observer() == own() {
+        "is an observer, which a session's groups cannot be: leave it out"
+    } else if field == "local" && own().latency(Nanos::ZERO) != own() {
+        "has a latency, which only the global group's results can have: leave it out"
+    } else if field == "local" && own().overrun(OverrunPolicy::Rephase) == own() {
+        "has the policy Rephase, but the tool's samples and the models belong to the nominal grid of ticks: use another"
+    } else if field == "local" && own().catches_up().as_secs_f64() > 0.5 * GAP_S {
+        "catches up after stops that the force must come back from slowly (0.1 s): catch up at most 0.05 s, or use Skip"
+    } else if field == "global" && own().release(Release::Periodic) != own() {
+        "is paced by a device, which only the local group has: leave it out"
+    } else {
+        return Ok(());
+    };
+    Err(Error::new(ErrorKind::Runtime, wrong).at(field))
+}

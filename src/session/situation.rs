@@ -1,0 +1,169 @@
+//! What each local model would cost on this body and this machine.
+
+use super::budget::{force_evaluation, nominal_evaluation};
+use super::prepare::Timing;
+use crate::model::body::{Body, State};
+use crate::runtime::Execution;
+use crate::scene::{LocalModelKind as Kind, Scene};
+use crate::time::Nanos;
+
+/// Contact, integration, device and records of a tick of the whole body, as a factor on its force evaluations.
+const OVERHEAD: f64 = 1.25;
+/// The part of a haptic period that the typical tick may take: the slowest of a hundred takes twice as long (`palpate compare`
+/// on the reference scenes: 74 and 168 us for `full`).
+const HAPTIC_SHARE: f64 = 0.5;
+/// The part that a tick of `full` may take where everything else misses the error: some ticks are late then.
+const TIGHT_SHARE: f64 = 0.8;
+/// The part of a global period that its work may take: late results are what the expected errors are of.
+const GLOBAL_SHARE: f64 = 1.0;
+/// The same for both rates on a single core.
+const SINGLE_CORE_SHARE: f64 = 0.8;
+/// What `predictive` pays for looking ahead and for building its patch, in parts of as much simulation of the whole body;
+/// `predicted` runs the whole body (`palpate compare`: global load, against that of `hold`).
+const REDUCED_AHEAD: f64 = 0.6;
+/// In virtual time: one for the haptic thread and one for the others.
+const NOMINAL_CORES: usize = 2;
+
+/// What a choice depends on.
+#[derive(Clone, Debug)]
+pub(super) struct Situation {
+    /// One evaluation of all forces of the body.
+    pub(super) evaluation: Nanos,
+    /// Where that comes from: `measured` or `nominal`.
+    pub(super) origin: &'static str,
+    /// Evaluations per haptic tick.
+    pub(super) substeps: u32,
+    pub(super) haptic_period_s: f64,
+    pub(super) global_period_s: f64,
+    /// How far `predictive` looks ahead, in global periods.
+    pub(super) ahead_periods: f64,
+    pub(super) cores: usize,
+    pub(super) error_pct: f64,
+    /// The models that scene and body allow.
+    pub(super) possible: Vec<Kind>,
+}
+
+/// CPU time of a haptic tick per substep with the default patch (`palpate compare`, column "haptic tick p50"): it does not
+/// depend on the size of the body. `full` has none of its own.
+fn local_substep_s(kind: Kind) -> f64 {
+    match kind {
+        Kind::Full => 0.0,
+        Kind::Hold => 0.3e-6,
+        Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary | Kind::Condensed => 4.5e-6,
+        Kind::Predicted => 5e-6,
+        Kind::Predictive => 7.5e-6,
+    }
+}
+
+/// Linear patches take one implicit step, which costs as much as two, where the stability limit asks for more than four.
+const MOST_LOCAL_STEPS: u32 = 4;
+
+impl Situation {
+    /// Of `scene` with `body` as it is at the start. On threads the forces are evaluated and timed; in virtual time all costs
+    /// are nominal, so that a run is the same everywhere.
+    pub(super) fn of(scene: &Scene, body: &mut dyn Body, state: &State, timing: Timing, execution: Execution) -> Self {
+        let has_springs = body.spring_count().is_some();
+        let is_held = body.inverse_masses().contains(&0.0);
+        let is_possible = |kind: &Kind| {
+            let suits_body = match kind {
+                Kind::Full | Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
+                Kind::Condensed => has_springs && is_held,
+                Kind::Predicted => has_springs,
+                Kind::Predictive => has_springs && scene.local.basis > 0,
+            };
+            suits_body && scene.clone().with_model(*kind).validate().is_ok()
+        };
+        let possible = Kind::ALL.into_iter().filter(is_possible).collect();
+        let (evaluation, origin, cores) = match execution {
+            Execution::Virtual => (nominal_evaluation(body), "nominal", NOMINAL_CORES),
+            Execution::Threaded => {
+                let cores = std::thread::available_parallelism().map_or(1, usize::from);
+                (force_evaluation(body, state), "measured", cores)
+            }
+        };
+        let Timing { haptic, global, substeps, horizon } = timing;
+        let [haptic_period_s, global_period_s] = [haptic, global].map(|rate| rate.period_s());
+        let ahead_periods = f64::from(horizon) * haptic_period_s / global_period_s;
+        Self {
+            evaluation,
+            origin,
+            substeps,
+            haptic_period_s,
+            global_period_s,
+            ahead_periods,
+            cores,
+            error_pct: scene.local.error_pct,
+            possible,
+        }
+    }
+
+    /// What a tick of `full` takes (s).
+    fn full_tick_s(&self) -> f64 {
+        OVERHEAD * f64::from(self.substeps) * self.evaluation.as_secs_f64()
+    }
+
+    /// What a haptic tick of `kind` takes (s).
+    fn tick_s(&self, kind: Kind) -> f64 {
+        let substeps = if kind.is_linear() { self.substeps.min(MOST_LOCAL_STEPS) } else { self.substeps };
+        match kind {
+            Kind::Full => self.full_tick_s(),
+            kind => f64::from(substeps) * local_substep_s(kind),
+        }
+    }
+
+    /// What the global model does in one of its periods (s).
+    fn global_work_s(&self, kind: Kind) -> f64 {
+        let periods = match kind {
+            Kind::Full => 0.0,
+            Kind::Predicted => 1.0 + self.ahead_periods,
+            Kind::Predictive => 1.0 + REDUCED_AHEAD * self.ahead_periods,
+            _ => 1.0,
+        };
+        periods * self.global_period_s / self.haptic_period_s * self.full_tick_s()
+    }
+
+    /// How full the more burdened of its two periods is, against what it may take: it fits up to 1.
+    pub(super) fn load(&self, kind: Kind) -> f64 {
+        let haptic = self.tick_s(kind) / self.haptic_period_s;
+        let global = self.global_work_s(kind) / self.global_period_s;
+        // The haptic thread takes a single core away from the global one.
+        let shared = if self.cores > 1 { global / GLOBAL_SHARE } else { (haptic + global) / SINGLE_CORE_SHARE };
+        (haptic / HAPTIC_SHARE).max(if kind == Kind::Full { 0.0 } else { shared })
+    }
+
+    /// What part of its period a tick of `full` takes, if it can do that with some of them late.
+    pub(super) fn tight_share(&self) -> Option<f64> {
+        Some(self.full_tick_s() / self.haptic_period_s).filter(|share| *share <= TIGHT_SHARE)
+    }
+
+    /// What a tick of `full` takes of its period, in words.
+    pub(super) fn full_in_words(&self, verb: &str) -> String {
+        let (tick, period) = (short(self.full_tick_s()), short(self.haptic_period_s));
+        format!("a full tick {verb} {tick} of {period} ({})", self.origin)
+    }
+
+    /// Why `kind` does not fit.
+    pub(super) fn excess(&self, kind: Kind) -> String {
+        let (tick, work) = (self.tick_s(kind), self.global_work_s(kind));
+        let name = kind.name();
+        if tick > HAPTIC_SHARE * self.haptic_period_s {
+            return format!("a tick of {name} would take {} of {}", short(tick), short(self.haptic_period_s));
+        }
+        let (work, period) = (short(work), short(self.global_period_s));
+        let where_to = if self.cores > 1 { "" } else { " on a single core" };
+        format!("the global model would need {work} of {period} for {name}{where_to}")
+    }
+}
+
+/// A time to three digits.
+fn short(seconds: f64) -> String {
+    let (value, unit) = match seconds {
+        ..1e-3 => (seconds * 1e6, "us"),
+        1e-3..1.0 => (seconds * 1e3, "ms"),
+        _ => (seconds, "s"),
+    };
+    let places = if value < 9.995 { 2 } else { usize::from(value < 99.95) };
+    let text = format!("{value:.places$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    format!("{text} {unit}")
+}
