@@ -3,7 +3,7 @@
 use super::super::Vec3;
 use super::super::mesh::Surface;
 use super::kernel::{InstructionSet, NetworkKernel};
-use super::{Body, Spring, State, TangentBlock};
+use super::{Body, Link, Spring, State, TangentBlock};
 use crate::error::Error;
 
 /// Point masses joined by an arbitrary list of springs; made by [`SpringNetwork::builder`].
@@ -228,6 +228,10 @@ impl Body for SpringNetwork {
                 TangentBlock::pair(row, column, &tangent).into_iter().for_each(&mut *emit);
             }
         }
+    }
+
+    fn springs(&self) -> Option<Vec<Link>> {
+        Some(self.springs.iter().map(|&(a, b, spring)| Link { nodes: [a, b], spring }).collect())
     }
 
     fn duplicate(&self) -> Option<Box<dyn Body>> {
