@@ -71,6 +71,20 @@ impl Chart<'_> {
         svg
     }
 
+    /// The same as a document of its own, drawn on white with `style`.
+    pub(in crate::report) fn to_file(&self, style: &str) -> String {
+        let (width, height) = (self.width, self.height);
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n\
+             <style>\n{style}</style>\n<rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n\
+             <text class=\"title\" x=\"{LEFT}\" y=\"16\">{0}</text>\n",
+            escaped(&self.title)
+        );
+        self.draw(&mut svg);
+        svg.push_str("</svg>\n");
+        svg
+    }
+
     fn across(&self) -> f64 {
         self.width - LEFT - RIGHT
     }
