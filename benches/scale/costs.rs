@@ -8,9 +8,10 @@ use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
 use palpate::model::forecast::ToolForecast;
+use palpate::model::integrator::Spectrum;
 use palpate::model::local::{Kind, LocalModel, Prediction, ResyncView, Template};
 use palpate::model::mesh::Face;
-use palpate::model::simulation::{Simulation, Stepping, stable_substeps};
+use palpate::model::simulation::{Simulation, Stepping};
 use palpate::model::surroundings::{Bases, Basis, SpringGraph};
 use palpate::report::{Picture, Series};
 use palpate::runtime::Stopwatch;
@@ -26,6 +27,8 @@ const STATES: usize = 50;
 /// A basis is left out if it is expected to take longer (s).
 const LONGEST_BASIS_S: f64 = 120.0;
 const ROUNDS: usize = 3;
+/// Measured from here on, in the midst of the drag (s).
+const BEGIN: f64 = 0.3;
 
 /// A tool that presses for 0.15 s and drags at 2 cm/s.
 fn tool(t: f64) -> Vec3 {
@@ -45,7 +48,7 @@ pub struct BasisCost {
     pub seconds: Option<f64>,
 }
 
-/// The surroundings of the patch that the drag of [`tool`] begins on.
+/// The surroundings of the patch that [`tool`] is on in the midst of its drag.
 pub struct Surroundings {
     pub cost: BasisCost,
     bases: Bases,
@@ -55,8 +58,8 @@ pub struct Surroundings {
 impl Surroundings {
     /// Reduces them, unless the cost of smaller bodies says that it would take too long.
     pub fn new(nodes: usize, smaller: &[BasisCost]) -> Result<Self, Error> {
-        let mut sim = simulation(block(nodes)?, 1000.0)?;
-        advance(&mut sim, 0.0, 0.15);
+        let (mut sim, _) = simulation(block(nodes)?, 1000.0)?;
+        advance(&mut sim, 0.0, BEGIN);
         let touched = sim.contact().triangle.ok_or_else(no_contact)?;
         let mut patch = Vec::new();
         sim.body().patch(&[touched], PATCH, &mut patch);
@@ -92,6 +95,8 @@ pub struct Costs {
     pub springs: usize,
     pub rate: f64,
     pub substeps: u32,
+    /// Ticks that one stable step could span.
+    pub ticks_per_step: u32,
     pub full: Tick,
     pub patch: Tick,
     pub predictive: Tick,
@@ -113,6 +118,20 @@ impl Costs {
         (self.follow.as_secs_f64() + build.as_secs_f64()) * GLOBAL_HZ
     }
 
+    /// The same if the global model took the longest stable step in place of one at least per tick.
+    pub fn global_load_with_long_steps(&self) -> f64 {
+        let ticks = u64::from(self.ticks_per_step);
+        let build = self.build();
+        let attempt = build.saturating_sub(self.build_full);
+        let build = if self.held() { build } else { Nanos(attempt.0 + self.build_full.0 / ticks) };
+        (self.follow.as_secs_f64() / ticks as f64 + build.as_secs_f64()) * GLOBAL_HZ
+    }
+
+    /// True if the reduced forecast was used: what falls back takes at least as long as the look ahead.
+    pub fn held(&self) -> bool {
+        self.build_reduced.is_some_and(|reduced| reduced.0 as f64 <= 0.9 * self.build_full.0 as f64)
+    }
+
     /// The cheaper of the two ways to build `predictive`, if there are both.
     pub fn build(&self) -> Nanos {
         self.build_reduced.unwrap_or(self.build_full)
@@ -122,13 +141,13 @@ impl Costs {
 pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<Costs, Error> {
     let body = block(nodes)?;
     let springs = body.spring_count();
-    let mut sim = simulation(body, rate)?;
+    let (mut sim, ticks_per_step) = simulation(body, rate)?;
     let tick = 1.0 / rate;
-    advance(&mut sim, 0.0, 0.15);
+    advance(&mut sim, 0.0, BEGIN);
     let ticks_of_period = (rate / GLOBAL_HZ).ceil() as usize;
     // The simulation that everything else is built from stays where the drag begins; this one goes on.
     let mut dragged = sim.duplicate().ok_or_else(no_contact)?;
-    let motion = |k: usize| ToolMotion { from: tool(0.15 + k as f64 * tick), to: tool(0.15 + (k + 1) as f64 * tick) };
+    let motion = |k: usize| ToolMotion { from: tool(BEGIN + k as f64 * tick), to: tool(BEGIN + (k + 1) as f64 * tick) };
     let full = least_of_rounds(|round| {
         let first = round * 2 * ticks_of_period;
         ticks(2 * ticks_of_period, |k| dragged.tick(motion(first + k)))
@@ -167,6 +186,7 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
         springs,
         rate,
         substeps,
+        ticks_per_step,
         full,
         patch,
         predictive,
@@ -177,12 +197,16 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
     })
 }
 
-fn simulation(mut body: Block, rate: f64) -> Result<Simulation, Error> {
+/// The body at rest, stepped as the stability limit asks for, and the ticks that one stable step could span.
+fn simulation(mut body: Block, rate: f64) -> Result<(Simulation, u32), Error> {
     let tick = 1.0 / rate;
-    let stepping = Stepping { tick, substeps: stable_substeps(&mut body, tick) };
+    let spectrum = Spectrum::estimate(&mut body);
+    let stepping = Stepping { tick, substeps: spectrum.substeps(tick) };
+    // With the margin that substeps have.
+    let span = (1..).take_while(|&ticks| spectrum.substeps(f64::from(ticks) * tick) == 1).last().unwrap_or(1);
     let state = State::at_rest(body.rest());
     let law = Law { friction: 1.0, ..Law::default() };
-    Simulation::new(Box::new(body), state, Contact::default(), law, stepping)
+    Ok((Simulation::new(Box::new(body), state, Contact::default(), law, stepping)?, span))
 }
 
 /// Along [`tool`] from `from` to `to` (s).
@@ -200,7 +224,7 @@ fn no_contact() -> Error {
 
 fn rebuild(model: &mut dyn LocalModel, sim: &mut Simulation, horizon: u32, at: &Surroundings, bases: &Bases) -> Nanos {
     let triangle = sim.contact().triangle.unwrap_or_default();
-    let forecast = ToolForecast { position: tool(0.15), velocity: Vec3::x() * 0.02, acceleration: Vec3::zeros() };
+    let forecast = ToolForecast { position: tool(BEGIN), velocity: Vec3::x() * 0.02, acceleration: Vec3::zeros() };
     let mut stopwatch = Stopwatch::new();
     let resync = ResyncView {
         global: sim,
@@ -240,6 +264,7 @@ pub fn text(all: &[Costs], bases: &[BasisCost]) -> String {
                 format!("{}^3", costs.nodes),
                 format!("{} kHz", costs.rate * 1e-3),
                 costs.springs.to_string(),
+                costs.substeps.to_string(),
                 pair(costs.full),
                 pair(costs.patch),
                 pair(costs.predictive),
@@ -254,6 +279,7 @@ pub fn text(all: &[Costs], bases: &[BasisCost]) -> String {
         "body",
         "rate",
         "springs",
+        "substeps",
         "`full` tick us",
         "`patch` tick us",
         "`predictive` tick us",
@@ -275,15 +301,31 @@ pub fn text(all: &[Costs], bases: &[BasisCost]) -> String {
          time, `predictive` either by its reduced forecast or, where that does not hold the present motion, by the whole body \
          run {PERIODS_AHEAD} periods ahead (*build full*). Without a basis the tick of `predictive` is that without reduced \
          surroundings.\n\n{}\nReducing the surroundings of one place of the patch, once and in the background (time on the wall, \
-         one thread): {}.\n",
+         one thread): {}.\n\n{}",
         table(&heads, 2, &rows),
-        reduced.join(", ")
+        reduced.join(", "),
+        forecasts(all)
+    )
+}
+
+/// Where the forecast of `predictive` was used, and where it fell back.
+fn forecasts(all: &[Costs]) -> String {
+    let list = |held: bool| {
+        let at = all.iter().filter(|costs| costs.build_reduced.is_some() && costs.held() == held);
+        let names: Vec<String> = at.map(|costs| format!("{}^3 at {} kHz", costs.nodes, costs.rate * 1e-3)).collect();
+        if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+    };
+    format!(
+        "The reduced forecast was cheaper than the look ahead of the whole body at: {}. It was not, or did not hold the motion \
+         of this drag so that both were paid, at: {}.\n",
+        list(true),
+        list(false)
     )
 }
 
 /// CPU of a haptic tick against springs.
 pub fn picture(all: &[Costs]) -> Picture {
-    let (mut series, mut periods) = (Vec::new(), Vec::new());
+    let mut series = Vec::new();
     for (model, tick) in [("full", 0), ("predictive", 1), ("patch", 2)] {
         for (rate, is_hollow) in [(1000.0, false), (4000.0, true)] {
             let at: Vec<&Costs> = all.iter().filter(|costs| costs.rate == rate).collect();
@@ -291,27 +333,22 @@ pub fn picture(all: &[Costs]) -> Picture {
                 let ticks = [costs.full, costs.predictive, costs.patch][tick];
                 let is_last = place + 1 == at.len();
                 let label = if is_last { format!("{model}, {} kHz", rate * 1e-3) } else { String::new() };
-                (costs.springs as f64, us(ticks[1]), label)
+                (costs.springs as f64, us(ticks[0]), label)
             };
             let points = at.iter().enumerate().map(point).collect();
             series.push(Series { name: model.to_owned(), colour: colour(model), is_joined: true, is_hollow, points });
-            if tick == 0
-                && let (Some(first), Some(last)) = (at.first(), at.last())
-            {
-                let label = format!("period at {} kHz", rate * 1e-3);
-                let ends = vec![
-                    (first.springs as f64, us(first.period()), label.clone()),
-                    (last.springs as f64, us(last.period()), String::new()),
-                ];
-                periods.push(Series { name: label, colour: 6, is_joined: true, is_hollow: true, points: ends });
-            }
         }
     }
+    let mut periods: Vec<Nanos> = all.iter().map(Costs::period).collect();
+    periods.sort_unstable();
+    periods.dedup();
+    let level = |period: Nanos| (us(period), format!("period of {} kHz", 1e6 / period.0 as f64));
     Picture {
         title: "CPU of a haptic tick against the size of the body (8^3 to 40^3 nodes)".to_owned(),
         x: "springs".to_owned(),
-        y: "CPU per haptic tick, p99 (us)".to_owned(),
+        y: "CPU per haptic tick, p50 (us)".to_owned(),
         marks: Vec::new(),
-        series: periods.into_iter().chain(series).collect(),
+        levels: periods.into_iter().map(level).collect(),
+        series,
     }
 }

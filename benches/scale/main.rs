@@ -42,20 +42,20 @@ fn document(is_quick: bool) -> Result<(), Error> {
             all.push(costs);
         }
     }
-    let runs = runs::all(is_quick)?;
-    let text = [
-        format!("{HEAD}\n{}\n", common::measured_on("cargo bench --bench scale")),
-        verdict::text(&all),
-        costs::text(&all, &basis_costs),
-        runs::text(&runs),
-    ]
-    .join("\n");
-    if is_quick {
-        print!("{text}");
-        return Ok(());
+    if !is_quick {
+        common::write("docs/img/scale.svg", &costs::picture(&all).to_svg())?;
     }
-    common::write("docs/img/scale.svg", &costs::picture(&all).to_svg())?;
-    common::write("docs/scale.md", &text)
+    let date = common::measured_on("cargo bench --bench scale");
+    let first = [format!("{HEAD}\n{date}\n"), verdict::text(&all), costs::text(&all, &basis_costs)].join("\n");
+    // Long: what is there is written after every case.
+    runs::all(is_quick, |runs| {
+        let text = format!("{first}\n{}", runs::text(runs));
+        if is_quick {
+            print!("{text}");
+            return Ok(());
+        }
+        common::write("docs/scale.md", &text)
+    })
 }
 
 fn main() -> ExitCode {

@@ -76,6 +76,7 @@ fn row(costs: &Costs) -> Vec<String> {
         fit.haptic.percent(),
         fit.global.percent(),
         Share(costs.global_load(costs.build_full)).percent(),
+        Share(costs.global_load_with_long_steps()).percent(),
         fit.global_patch.percent(),
         fit.verdict(costs),
     ]
@@ -91,6 +92,7 @@ pub fn text(all: &[Costs]) -> String {
         "`predictive` catching up, of the period",
         "its global group, of a core",
         "with the full prediction",
+        "with the longest stable steps",
         "global group of `patch`",
         "what holds here",
     ];
@@ -102,7 +104,8 @@ pub fn text(all: &[Costs]) -> String {
     format!(
         "## What holds\n\nOne core for the haptic group, one for the global one. `full` fits if its p99 fits the period of a \
          haptic tick. `predictive` fits if a haptic tick that catches up ({CATCH_UP} ticks at p50, or one at p99) fits that period \
-         and the global group takes less than one core. Percentages above 100 say how many cores it would need.\n\n{}\n{}\n",
+         and the global group takes less than one core. Percentages above 100 say how many cores it would need. *With the longest stable steps* is what the global group would take \
+         if its model made one step for several ticks where that is stable; today it makes at least one per haptic tick.\n\n{}\n{}\n",
         table(&heads, 2, &rows),
         lines.join("\n")
     )

@@ -30,17 +30,25 @@ place of the patch, and its results are there at once in these runs; [scale.md](
 ";
 
 fn document(is_quick: bool) -> Result<(), Error> {
-    let parts = [scenes::part(is_quick)?, sizes::part(is_quick)?, rates::part(is_quick)?];
-    let texts: Vec<&str> = parts.iter().map(|part| part.text.as_str()).collect();
-    let text = format!("{HEAD}\n{}\n\n{}", common::measured_on("cargo bench --bench speed_vs_error"), texts.join("\n"));
+    let date = common::measured_on("cargo bench --bench speed_vs_error");
+    let mut text = format!("{HEAD}\n{date}\n");
+    // Long: what is there is written after every part.
+    for part in [scenes::part, sizes::part, rates::part] {
+        let part = part(is_quick)?;
+        text.push('\n');
+        text.push_str(&part.text);
+        if is_quick {
+            continue;
+        }
+        for (name, svg) in &part.pictures {
+            common::write(&format!("docs/img/{name}.svg"), svg)?;
+        }
+        common::write("docs/speed_vs_error.md", &text)?;
+    }
     if is_quick {
         print!("{text}");
-        return Ok(());
     }
-    for (name, svg) in parts.iter().flat_map(|part| &part.pictures) {
-        common::write(&format!("docs/img/{name}.svg"), svg)?;
-    }
-    common::write("docs/speed_vs_error.md", &text)
+    Ok(())
 }
 
 fn main() -> ExitCode {

@@ -14,7 +14,7 @@ use crate::Part;
 use crate::common::{HEADS, cells, colour, compared, scene, table, us};
 
 const SCENES: [&str; 4] = ["hand", "wave", "drag_friction", "drag_slip"];
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 1;
 
 pub fn part(is_quick: bool) -> Result<Part, Error> {
     let (names, rounds) = if is_quick { (&SCENES[..1], 1) } else { (&SCENES[..], ROUNDS) };
@@ -77,6 +77,7 @@ fn picture(comparison: &Comparison) -> Picture {
         x: "CPU per haptic tick, p50 (us)".to_owned(),
         y: "rms error (% of peak)".to_owned(),
         marks: vec![(us(comparison.haptic_period), "haptic period".to_owned())],
+        levels: Vec::new(),
         series: [full].into_iter().chain(runs).collect(),
     }
 }

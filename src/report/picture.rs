@@ -6,6 +6,8 @@ const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 420.0;
 /// Around the points, on axes that are logarithmic.
 const ROOM: f64 = 1.6;
+/// Of the width, to the right of lines that have their labels at their ends.
+const LABELS: f64 = 0.18;
 /// The colours of a page in the light; the first is the reference's.
 const STYLE: &str = "\
 text { font: 11px Helvetica, Arial, sans-serif; fill: #626b79; }
@@ -51,6 +53,8 @@ pub struct Picture {
     pub y: String,
     /// Vertical lines: where, and what they are.
     pub marks: Vec<(f64, String)>,
+    /// Horizontal lines likewise.
+    pub levels: Vec<(f64, String)>,
     /// What is shown.
     pub series: Vec<Series>,
 }
@@ -74,14 +78,21 @@ impl Picture {
                 is_hollow: series.is_hollow,
             })
         });
+        let [from, to] = around(points().map(|point| point.0).chain(self.marks.iter().map(|mark| mark.0)));
+        let is_joined = self.series.iter().any(|series| series.is_joined);
+        let to = if is_joined { to * (to / from).powf(LABELS) } else { to };
+        let marks = |marks: &[(f64, String)]| {
+            marks.iter().map(|(at, label)| Mark { at: *at, label: label.clone() }).collect::<Vec<_>>()
+        };
         let chart = Chart {
             title: self.title.clone(),
             width: WIDTH,
             height: HEIGHT,
-            x: Axis::log(&self.x, around(points().map(|point| point.0).chain(self.marks.iter().map(|mark| mark.0)))),
-            y: Axis::log(&self.y, around(points().map(|point| point.1))),
+            x: Axis::log(&self.x, [from, to]),
+            y: Axis::log(&self.y, around(points().map(|point| point.1).chain(self.levels.iter().map(|level| level.0)))),
             band: None,
-            marks: self.marks.iter().map(|(x, label)| Mark { x: *x, label: label.clone() }).collect(),
+            marks: marks(&self.marks),
+            levels: marks(&self.levels),
             lines: lines.collect(),
             points: discs.filter(|point| point.at.0.is_finite() && point.at.1.is_finite()).collect(),
         };
@@ -109,11 +120,12 @@ mod tests {
             x: "us".into(),
             y: "%".into(),
             marks: vec![(1000.0, "period".into())],
+            levels: vec![(3.0, "level".into())],
             series: vec![series],
         };
         let svg = picture.to_svg();
         assert!(svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && svg.ends_with("</svg>\n"), "{svg}");
-        for words in ["a &lt; b", ">us<", ">%<", ">period<", "class=\"c1\"", "point hollow", ">1000<"] {
+        for words in ["a &lt; b", ">us<", ">%<", ">period<", ">level<", "class=\"c1\"", "point hollow", ">1000<"] {
             assert!(svg.contains(words), "{words:?} is not in {svg}");
         }
         assert!(!svg.contains(">x<") && !svg.contains("inf"), "{svg}");
