@@ -17,12 +17,14 @@ use palpate::time::Nanos;
 pub struct Arguments {
     /// A short form whose figures say nothing: does it run? Writes no file.
     pub is_quick: bool,
+    /// Errors alone, printed; no costs, no file.
+    pub only_errors: bool,
 }
 
 /// The arguments; `None` if this is not a `cargo bench`, such as a test of all targets, which must not write documents.
 pub fn arguments() -> Option<Arguments> {
     let asked = |flag: &str| std::env::args().any(|argument| argument == flag);
-    asked("--bench").then(|| Arguments { is_quick: asked("--quick") })
+    asked("--bench").then(|| Arguments { is_quick: asked("--quick"), only_errors: asked("--only-errors") })
 }
 
 /// A file of the repository.
@@ -108,11 +110,14 @@ pub fn us(time: Nanos) -> f64 {
 
 /// A number with three digits that mean something.
 pub fn figure(value: f64) -> String {
+    if value > 0.0 && value < 0.0005 {
+        return "< 0.001".to_owned();
+    }
     let decimals = match value.abs() {
         size if size >= 99.95 => 0,
         size if size >= 9.995 => 1,
         size if size >= 0.9995 => 2,
-        size if size == 0.0 => 0,
+        0.0 => 0,
         _ => 3,
     };
     format!("{value:.decimals$}")

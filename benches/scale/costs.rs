@@ -296,7 +296,7 @@ pub fn text(all: &[Costs], bases: &[BasisCost]) -> String {
         })
         .collect();
     format!(
-        "## Costs\n\n![CPU of a haptic tick against the size of the body](img/scale.svg)\n\nTicks with contact, p50 / p99. \
+        "## Costs\n\n![CPU of a haptic tick against the size of the body](img/scale.svg)\n\nTicks with contact, p50 / p99, the least of {ROUNDS} rounds. \
          *Follow* is the global model along the tool's path for one period of 33.3 ms; the next model is built once in that \
          time, `predictive` either by its reduced forecast or, where that does not hold the present motion, by the whole body \
          run {PERIODS_AHEAD} periods ahead (*build full*). Without a basis the tick of `predictive` is that without reduced \

@@ -2,7 +2,8 @@
 //! one core for the haptic group and one for the global one, and how far `predictive` is from `full` one period late.
 //! Writes docs/scale.md and its picture.
 //!
-//! `cargo bench --bench scale`; with `-- --quick` a short form that prints and writes nothing.
+//! `cargo bench --bench scale`; with `-- --quick` a short form that prints and writes nothing, with
+//! `-- --only-errors` only the errors, printed as they come.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -60,7 +61,11 @@ fn document(is_quick: bool) -> Result<(), Error> {
 
 fn main() -> ExitCode {
     let Some(arguments) = common::arguments() else { return ExitCode::SUCCESS };
-    match document(arguments.is_quick) {
+    let done = match arguments.only_errors {
+        true => runs::all(arguments.is_quick, |_| Ok(())),
+        false => document(arguments.is_quick),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("{error}");

@@ -78,7 +78,7 @@ fn rows(measured: &[(f64, Comparison)]) -> String {
 /// Up to which rate each model keeps up.
 fn told(measured: &[(f64, Comparison)]) -> String {
     let fits = |(_, comparison): &&(f64, Comparison)| share(comparison, &comparison.full) <= 100.0;
-    let Some((rate, last)) = measured.iter().filter(fits).next_back() else {
+    let Some((rate, last)) = measured.iter().rfind(fits) else {
         return "`full` keeps none of these rates.".to_owned();
     };
     let left = 100.0 / share(last, &last.full);
