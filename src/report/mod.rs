@@ -2,6 +2,7 @@
 
 pub mod compare;
 mod html;
+mod picture;
 mod svg;
 mod units;
 mod verdict;
@@ -18,5 +19,6 @@ mod text;
 pub use export::{Format, export};
 #[cfg(feature = "cli")]
 pub use json::to_json;
+pub use picture::{COLOURS, Picture, Series};
 pub use text::to_text;
 pub use verdict::{Verdict, verdict};

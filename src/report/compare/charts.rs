@@ -122,13 +122,14 @@ impl<'a> Plots<'a> {
             y,
             band: None,
             marks: Vec::new(),
+            levels: Vec::new(),
             lines: lines.clone(),
             points: Vec::new(),
         };
         let mut whole = chart(format!("Force, {}", in_words(latency)), self.whole(), y_whole);
         whole.band = Some(zoom);
         let mut near = chart(format!("Two resyncs, {}", in_words(latency)), zoom, y_near);
-        let mark = |x| Mark { x, label: "resync".to_owned() };
+        let mark = |x| Mark { at: x, label: "resync".to_owned() };
         near.marks = self.resyncs(latency).into_iter().filter(|x| (zoom[0]..zoom[1]).contains(x)).map(mark).collect();
         [whole, near].map(|chart| chart.to_svg())
     }
@@ -153,6 +154,7 @@ impl<'a> Plots<'a> {
             y: Axis::log("error (% of peak)", [SMALLEST_ERROR, largest * 1.2]),
             band: Some(self.zoom(latency)),
             marks: Vec::new(),
+            levels: Vec::new(),
             lines,
             points: Vec::new(),
         }
@@ -191,7 +193,8 @@ impl<'a> Plots<'a> {
             x: Axis::log("CPU per haptic tick, p50 (us)", range),
             y,
             band: None,
-            marks: vec![Mark { x: period_us, label: "haptic period".to_owned() }],
+            marks: vec![Mark { at: period_us, label: "haptic period".to_owned() }],
+            levels: Vec::new(),
             lines: Vec::new(),
             points: [point("full", Nanos::ZERO, &self.comparison.full)].into_iter().chain(runs).collect(),
         }

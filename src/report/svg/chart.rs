@@ -35,10 +35,10 @@ pub(in crate::report) struct Point {
     pub(in crate::report) is_hollow: bool,
 }
 
-/// A vertical line.
+/// A line across the plot.
 #[derive(Clone, Debug)]
 pub(in crate::report) struct Mark {
-    pub(in crate::report) x: f64,
+    pub(in crate::report) at: f64,
     pub(in crate::report) label: String,
 }
 
@@ -52,7 +52,10 @@ pub(in crate::report) struct Chart<'a> {
     pub(in crate::report) y: Axis,
     /// From x to x: shaded.
     pub(in crate::report) band: Option<[f64; 2]>,
+    /// Vertical.
     pub(in crate::report) marks: Vec<Mark>,
+    /// Horizontal.
+    pub(in crate::report) levels: Vec<Mark>,
     pub(in crate::report) lines: Vec<Line<'a>>,
     pub(in crate::report) points: Vec<Point>,
 }
@@ -63,6 +66,20 @@ impl Chart<'_> {
         let (width, height) = (self.width, self.height);
         let mut svg = format!(
             "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n\
+             <text class=\"title\" x=\"{LEFT}\" y=\"16\">{0}</text>\n",
+            escaped(&self.title)
+        );
+        self.draw(&mut svg);
+        svg.push_str("</svg>\n");
+        svg
+    }
+
+    /// The same as a document of its own, drawn on white with `style`.
+    pub(in crate::report) fn to_file(&self, style: &str) -> String {
+        let (width, height) = (self.width, self.height);
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n\
+             <style>\n{style}</style>\n<rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n\
              <text class=\"title\" x=\"{LEFT}\" y=\"16\">{0}</text>\n",
             escaped(&self.title)
         );
@@ -116,12 +133,17 @@ impl Chart<'_> {
             }
         }
         for mark in &self.marks {
-            let x = LEFT + self.px(mark.x);
+            let x = LEFT + self.px(mark.at);
             let _ = writeln!(svg, "<path class=\"mark\" d=\"M{x:.1} {HEAD}v{down}\"/>");
             if !mark.label.is_empty() {
                 let (x, y, label) = (x - 4.0, HEAD + LINE, escaped(&mark.label));
                 let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"end\">{label}</text>");
             }
+        }
+        for level in &self.levels {
+            let (x, y, label) = (LEFT + 6.0, HEAD + self.py(level.at), escaped(&level.label));
+            let _ = writeln!(svg, "<path class=\"mark\" d=\"M{LEFT} {y:.1}h{across}\"/>");
+            let _ = writeln!(svg, "<text x=\"{x}\" y=\"{:.1}\">{label}</text>", y - 4.0);
         }
         // An inner svg cuts off what leaves the plot.
         let _ = writeln!(svg, "<svg x=\"{LEFT}\" y=\"{HEAD}\" width=\"{across}\" height=\"{down}\">");
@@ -214,7 +236,8 @@ mod tests {
             x: Axis::linear("t (s)", [0.0, 1.0]),
             y: Axis::log("error (%)", [0.1, 10.0]),
             band: Some([0.2, 0.4]),
-            marks: vec![Mark { x: 0.5, label: "the period".to_owned() }],
+            marks: vec![Mark { at: 0.5, label: "the period".to_owned() }],
+            levels: vec![Mark { at: 1.0, label: "the level".to_owned() }],
             lines: vec![Line { class: "c1".to_owned(), name: "patch", points: vec![(0.0, 0.0), (1.0, 1e300)] }],
             points: Vec::new(),
         }
@@ -223,9 +246,16 @@ mod tests {
     #[test]
     fn a_chart_is_drawn_with_its_labels_and_without_numbers_that_no_browser_reads() {
         let svg = chart().to_svg();
-        for words in
-            ["a &lt; b", "t (s)", "error (%)", "the period", "class=\"band\"", "<title>patch</title>", ">10</text>"]
-        {
+        for words in [
+            "a &lt; b",
+            "t (s)",
+            "error (%)",
+            "the period",
+            "the level",
+            "class=\"band\"",
+            "<title>patch</title>",
+            ">10</text>",
+        ] {
             assert!(svg.contains(words), "{words:?} is not in {svg}");
         }
         // The plot is 534 by 136: zero is at the bottom, what is too large is cut off above.

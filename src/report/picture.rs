@@ -1,0 +1,139 @@
+//! A chart as an SVG file of its own, for documents.
+
+use super::svg::{Axis, Chart, Line, Mark, Point};
+
+const WIDTH: f64 = 960.0;
+const HEIGHT: f64 = 420.0;
+/// Around the points, on axes that are logarithmic.
+const ROOM: f64 = 1.6;
+/// Of the width, to the right of lines that have their labels at their ends.
+const LABELS: f64 = 0.18;
+/// The colours of a page in the light; the first is the reference's.
+const STYLE: &str = "\
+text { font: 11px Helvetica, Arial, sans-serif; fill: #626b79; }
+.title { font-size: 13px; font-weight: 600; fill: #1d232d; }
+.paper { fill: #ffffff; }
+.frame { fill: none; stroke: #c3c9d3; }
+.grid { stroke: #eceff3; }
+.mark { stroke: #626b79; stroke-dasharray: 3 3; opacity: .7; }
+.line { fill: none; stroke: currentColor; stroke-width: 1.6; stroke-linejoin: round; }
+.point { fill: currentColor; stroke: currentColor; stroke-width: 1.8; }
+.point.hollow { fill: #ffffff; }
+.label { fill: currentColor; font-weight: 600; }
+.c0 { color: #1d232d; } .c1 { color: #0072b2; } .c2 { color: #d55e00; } .c3 { color: #009e73; }
+.c4 { color: #aa4a94; } .c5 { color: #b58900; } .c6 { color: #2a9fd6; } .c7 { color: #7a5230; }
+";
+
+/// The colours that a series can have.
+pub const COLOURS: usize = 8;
+
+/// Points that belong together.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Series {
+    /// What it shows, read out where it is pointed at.
+    pub name: String,
+    /// Below [`COLOURS`]; 0 is for the reference.
+    pub colour: usize,
+    /// Joined by a line, in the order given, which rises in x.
+    pub is_joined: bool,
+    /// Drawn as circles in place of discs.
+    pub is_hollow: bool,
+    /// x, y and the label, which may be empty. What is not above zero lies on the edge.
+    pub points: Vec<(f64, f64, String)>,
+}
+
+/// A chart with two logarithmic axes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// Above it.
+    pub title: String,
+    /// Below the horizontal axis.
+    pub x: String,
+    /// Beside the vertical axis.
+    pub y: String,
+    /// Vertical lines: where, and what they are.
+    pub marks: Vec<(f64, String)>,
+    /// Horizontal lines likewise.
+    pub levels: Vec<(f64, String)>,
+    /// What is shown.
+    pub series: Vec<Series>,
+}
+
+impl Picture {
+    /// The SVG document: light, without fonts or styles from elsewhere.
+    pub fn to_svg(&self) -> String {
+        let points = || self.series.iter().flat_map(|series| &series.points);
+        let class = |series: &Series| format!("c{}", series.colour % COLOURS);
+        let lines = self.series.iter().filter(|series| series.is_joined);
+        let lines = lines.map(|series| Line {
+            class: class(series),
+            name: &series.name,
+            points: series.points.iter().map(|(x, y, _)| (*x, *y)).collect(),
+        });
+        let discs = self.series.iter().flat_map(|series| {
+            series.points.iter().map(|(x, y, label)| Point {
+                class: class(series),
+                label: label.clone(),
+                at: (*x, *y),
+                is_hollow: series.is_hollow,
+            })
+        });
+        let [from, to] = around(points().map(|point| point.0).chain(self.marks.iter().map(|mark| mark.0)));
+        let is_joined = self.series.iter().any(|series| series.is_joined);
+        let to = if is_joined { to * (to / from).powf(LABELS) } else { to };
+        let marks = |marks: &[(f64, String)]| {
+            marks.iter().map(|(at, label)| Mark { at: *at, label: label.clone() }).collect::<Vec<_>>()
+        };
+        let chart = Chart {
+            title: self.title.clone(),
+            width: WIDTH,
+            height: HEIGHT,
+            x: Axis::log(&self.x, [from, to]),
+            y: Axis::log(&self.y, around(points().map(|point| point.1).chain(self.levels.iter().map(|level| level.0)))),
+            band: None,
+            marks: marks(&self.marks),
+            levels: marks(&self.levels),
+            lines: lines.collect(),
+            points: discs.filter(|point| point.at.0.is_finite() && point.at.1.is_finite()).collect(),
+        };
+        chart.to_file(STYLE)
+    }
+}
+
+/// From below the least to above the largest of those above zero.
+fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let shown = values.filter(|value| value.is_finite() && *value > 0.0);
+    let [low, high] = shown.fold([f64::INFINITY, 0.0], |[low, high], value| [value.min(low), value.max(high)]);
+    if low <= high { [low / ROOM, high * ROOM] } else { [0.1, 10.0] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_is_a_document_with_its_words_and_no_number_that_nothing_reads() {
+        let points = vec![(1.0, 0.0, "full".to_owned()), (100.0, 5.0, "a < b".to_owned()), (2.0, f64::NAN, "x".into())];
+        let series = Series { name: "one".into(), colour: 9, is_joined: true, is_hollow: true, points };
+        let picture = Picture {
+            title: "t".into(),
+            x: "us".into(),
+            y: "%".into(),
+            marks: vec![(1000.0, "period".into())],
+            levels: vec![(3.0, "level".into())],
+            series: vec![series],
+        };
+        let svg = picture.to_svg();
+        assert!(svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && svg.ends_with("</svg>\n"), "{svg}");
+        for words in ["a &lt; b", ">us<", ">%<", ">period<", ">level<", "class=\"c1\"", "point hollow", ">1000<"] {
+            assert!(svg.contains(words), "{words:?} is not in {svg}");
+        }
+        assert!(!svg.contains(">x<") && !svg.contains("inf"), "{svg}");
+    }
+
+    #[test]
+    fn without_points_there_are_axes() {
+        assert!(Picture::default().to_svg().contains("class=\"frame\""));
+        assert_eq!(around([0.0, 2.0, f64::NAN].into_iter()), [2.0 / ROOM, 2.0 * ROOM]);
+    }
+}
