@@ -16,6 +16,7 @@ mod basis;
 mod budget;
 mod builder;
 mod compare;
+mod disturbed;
 mod global;
 mod graph;
 mod prepare;

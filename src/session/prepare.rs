@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use super::budget;
+use super::disturbed::Disturbed;
 use super::graph::groups;
 use crate::actors::GAP_S;
 use crate::devices::{Device, Scripted, ToolPath};
@@ -41,6 +42,7 @@ pub(super) struct Parts {
     pub keep_records: bool,
     pub measures_cost: bool,
     pub endless: bool,
+    pub disturbed: Disturbed,
 }
 
 impl Parts {
@@ -59,6 +61,7 @@ impl Parts {
             log: None,
             keep_records: false,
             measures_cost: false,
+            disturbed: Disturbed::default(),
         }
     }
 }
@@ -88,6 +91,7 @@ pub(super) struct Prepared {
     pub log: Option<PathBuf>,
     pub keep_records: bool,
     pub measures_cost: bool,
+    pub disturbed: Disturbed,
     /// The scene file's text, for the log.
     pub source: Option<String>,
     /// The scene as it is run, with everything that a program or the command line changed.
@@ -232,6 +236,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         log: parts.log,
         keep_records: parts.keep_records,
         measures_cost: parts.measures_cost,
+        disturbed: parts.disturbed,
         source: scene.source,
         #[cfg(feature = "scene")]
         as_run,
