@@ -63,7 +63,7 @@ fn check(belongs: impl Fn(&str) -> bool) {
     assert!(checked > 0);
 }
 
-const MATERIALS: [&str; 4] = ["damping", "stiff", "masses", "flat"];
+const MATERIALS: [&str; 3] = ["damping", "stiff", "masses"];
 const MOTIONS: [&str; 4] = ["impact", "teleport", "half", "drag"];
 const LATE: [&str; 3] = ["late", "lost", "stalled"];
 

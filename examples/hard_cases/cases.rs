@@ -116,6 +116,15 @@ pub const CASES: &[Case] = &[
             run(Predictive, 1.0, [0.39, 1.2, 2.2, 0.67]),
         ],
     ),
+    Case {
+        body: Setup::UnequalMasses,
+        ..case(
+            "masses 1:1000",
+            "",
+            "neighbours of 0.5 g and 0.5 mg",
+            &[run(Patch, 0.0, [13.0, 29.0, 4.0, 26.0]), run(LinearBoundary, 0.0, [6.5, 21.0, 2.4, 12.0])],
+        )
+    },
     case(
         "sliver 1:10",
         "hard/sliver_10",
@@ -137,18 +146,6 @@ pub const CASES: &[Case] = &[
             run(LinearBoundary, 0.0, [24.0, 180.0, 24.0, 420.0]),
             run(Predictive, 0.0, [11.0, 121.0, 25.0, 102.0]),
             run(Predictive, 1.0, [23.0, 193.0, 102.0, 376.0]),
-        ],
-    )
-    .ends_free(),
-    case(
-        "flat cells",
-        "hard/flat",
-        "cells 27 times as wide as high",
-        &[
-            run(Patch, 0.0, [f64::INFINITY, f64::INFINITY, f64::INFINITY, f64::INFINITY]),
-            run(LinearBoundary, 0.0, [f64::INFINITY, f64::INFINITY, f64::INFINITY, f64::INFINITY]),
-            run(Predictive, 0.0, [f64::INFINITY, f64::INFINITY, f64::INFINITY, f64::INFINITY]),
-            run(Predictive, 1.0, [f64::INFINITY, f64::INFINITY, f64::INFINITY, f64::INFINITY]),
         ],
     )
     .ends_free(),
@@ -212,6 +209,18 @@ pub const CASES: &[Case] = &[
     )
     .ends_free(),
     case(
+        "rim",
+        "hard/rim",
+        "contact exactly on the edge of the body",
+        &[
+            run(Patch, 0.0, [3.0, 11.0, 121.0, 5.4]),
+            run(LinearBoundary, 0.0, [2.6, 12.0, 121.0, 4.4]),
+            run(Predictive, 0.0, [0.53, 2.4, 121.0, 2.4]),
+            run(Predictive, 1.0, [1.5, 4.7, 121.0, 6.5]),
+        ],
+    )
+    .ends_free(),
+    case(
         "along an edge",
         "hard/along_edge",
         "dragged exactly through edges and nodes",
@@ -259,4 +268,39 @@ pub const CASES: &[Case] = &[
         ],
     )
     .ends_free(),
+    case(
+        "late hand",
+        "hand",
+        "results 1.5 and 2 periods late",
+        &[
+            run(Patch, 1.5, [52.0, 140.0, 8.2, 339.0]),
+            run(Patch, 2.0, [64.0, 157.0, 9.7, 291.0]),
+            run(LinearBoundary, 1.5, [43.0, 105.0, 7.6, 312.0]),
+            run(LinearBoundary, 2.0, [52.0, 113.0, 9.1, 290.0]),
+            run(Predictive, 1.5, [0.78, 2.9, 2.3, 3.5]),
+            run(Predictive, 2.0, [1.7, 5.2, 2.4, 5.9]),
+        ],
+    ),
+    case(
+        "lost hand",
+        "hand",
+        "every second resync is lost",
+        &[
+            run(Patch, 1.0, [46.0, 102.0, 6.7, 280.0]),
+            run(LinearBoundary, 1.0, [41.0, 104.0, 8.6, 292.0]),
+            run(Predictive, 1.0, [1.1, 3.9, 2.4, 3.3]),
+        ],
+    )
+    .upset(Upset::EverySecondLost),
+    case(
+        "stalled hand",
+        "hard/hand_long",
+        "the global model stands still for 1 s",
+        &[
+            run(Patch, 1.0, [37.0, 113.0, 7.3, 339.0]),
+            run(LinearBoundary, 1.0, [32.0, 83.0, 7.2, 273.0]),
+            run(Predictive, 1.0, [5.9, 17.0, 3.8, 1.3]),
+        ],
+    )
+    .upset(Upset::Stall(0.5)),
 ];
