@@ -2,6 +2,7 @@
 #![cfg(feature = "scene")]
 
 #[path = "../examples/hard_cases/cases.rs"]
+#[allow(dead_code, reason = "what is hard about a case is for the table")]
 mod cases;
 #[path = "../examples/hard_cases/measure.rs"]
 #[allow(dead_code, reason = "the example prints what is only compared here")]
