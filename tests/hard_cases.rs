@@ -94,14 +94,16 @@ fn degenerate_places_and_laws_of_contact_stay_within_their_bounds() {
 }
 
 #[test]
-fn a_tool_at_1_m_s_is_in_contact_as_soon_as_it_is_inside() {
+fn a_tool_at_1_m_s_is_felt_as_soon_as_it_is_inside() {
     for model in [LocalModelKind::Full, LocalModelKind::Patch, LocalModelKind::Predictive] {
         let session = Session::from_scene(scene("impact")).model(model).virtual_time().keep_records().build().unwrap();
         let summary = session.run().unwrap();
         let forces = palpate::log::ForceTrace::of(&summary.records).forces_n;
         // From 30 mm above, 1 mm per tick; then it stays inside.
         assert!(forces[..29].iter().all(|force| *force == [0.0; 3]), "{model:?}");
-        assert!(forces[30..].iter().all(|force| force[2] > 0.0), "{model:?}");
+        // It is felt in the first tick that ends inside; then the surface may run ahead of it for a while.
+        assert!(forces[29..31].iter().any(|force| force[2] > 0.1), "{model:?}: {:?}", &forces[28..32]);
+        assert!(forces[forces.len() - 20..].iter().all(|force| force[2] > 0.1), "{model:?}");
     }
 }
 
