@@ -122,7 +122,7 @@ fn without_a_basis_the_prediction_alone_serves() {
     let case = Case::new("hand");
     let (with, _) = case.error(ONE_PERIOD_MS, |_| ());
     let (without, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.basis = 0);
-    let (predicted, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.model = LocalModelKind::Predicted);
+    let (predicted, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.model = LocalModelKind::Predicted.into());
     assert_eq!(without.rms, predicted.rms, "the same model by two names");
     assert!(with.rms < 0.5 * without.rms && without.rms < 20.0, "{with:?} against {without:?}");
 }

@@ -5,7 +5,7 @@ use super::prepare::{Parts, prepare};
 use crate::devices::{Device, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::body::Body;
-use crate::runtime::{Execution, RateGroup};
+use crate::runtime::{Disturbance, Execution, RateGroup};
 use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, ModelChoice, Scene, StepKind};
 
 /// Collects what a session is made of; fills the same [`Scene`] as a scene file and passes the same validation.
@@ -139,6 +139,21 @@ impl SessionBuilder {
     #[must_use]
     pub fn virtual_time(mut self) -> Self {
         self.parts.execution = Execution::Virtual;
+        self
+    }
+
+    /// Virtual time, for tests of robustness: makes the releases of a rate group late, as `disturbance` says of each by its
+    /// number; see [`RuntimeBuilder::disturb`](crate::runtime::RuntimeBuilder::disturb). The groups are `local`, `global`
+    /// (not with `full`, which has none), `basis` (with reduced surroundings only) and `logger`.
+    ///
+    /// [`Session::start`] refuses it on threads, for a group that is not there, and twice for the same group.
+    #[must_use]
+    pub fn disturb(
+        mut self,
+        group: impl Into<String>,
+        disturbance: impl FnMut(u64) -> Disturbance + Send + 'static,
+    ) -> Self {
+        self.parts.disturbed.add(group.into(), disturbance);
         self
     }
 

@@ -56,6 +56,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     if prepared.measures_cost {
         graph.measure_cost();
     }
+    std::mem::take(&mut prepared.disturbed).apply(&mut graph);
     let build_cost = prepared.measures_cost.then(Stopwatch::new);
     let builds = build_cost.as_ref().map(Stopwatch::reader);
     // Before the ports, so that they record what a replay needs. The order of the ports below numbers them in the log.

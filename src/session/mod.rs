@@ -15,8 +15,10 @@
 mod basis;
 mod budget;
 mod builder;
+mod checks;
 mod choice;
 mod compare;
+mod disturbed;
 mod global;
 mod graph;
 mod prepare;

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use super::budget;
+use super::checks::{check_body, check_nodes, check_ramp};
 use super::choice::{Choice, choose};
+use super::disturbed::Disturbed;
 use super::graph::groups;
 use super::rate_groups::{check_group, global_group, local_group};
 use super::situation::Situation;
@@ -42,6 +44,7 @@ pub(super) struct Parts {
     pub keep_records: bool,
     pub measures_cost: bool,
     pub endless: bool,
+    pub disturbed: Disturbed,
 }
 
 impl Parts {
@@ -60,6 +63,7 @@ impl Parts {
             log: None,
             keep_records: false,
             measures_cost: false,
+            disturbed: Disturbed::default(),
         }
     }
 }
@@ -95,6 +99,7 @@ pub(super) struct Prepared {
     pub log: Option<PathBuf>,
     pub keep_records: bool,
     pub measures_cost: bool,
+    pub disturbed: Disturbed,
     /// The scene file's text, for the log.
     pub source: Option<String>,
     /// The scene as it is run, with everything that a program or the command line changed.
@@ -234,6 +239,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         log: parts.log,
         keep_records: parts.keep_records,
         measures_cost: parts.measures_cost,
+        disturbed: parts.disturbed,
         source: scene.source,
         #[cfg(feature = "scene")]
         as_run,
@@ -279,69 +285,6 @@ fn block(spec: &BodySpec) -> Result<Block, Error> {
         .stiffness(spec.material.stiffness_n_per_m)
         .damping_ratio(spec.material.damping_ratio);
     spec.block.fixed.iter().fold(builder, |builder, &face| builder.fix(face)).build().map_err(|error| error.at("body"))
-}
-
-/// The slew limit must not keep the force from being gone when the ramp is over.
-fn check_ramp(limits: &Limits) -> Result<(), Error> {
-    if !(limits.max_force_n.is_finite() && limits.max_force_n > 0.0) {
-        let message = format!("has a largest force of {} N, must be a finite number above 0", limits.max_force_n);
-        return Err(Error::scene("device", message));
-    }
-    let needed_s = limits.max_force_n / limits.max_slew_n_per_s;
-    if limits.ramp_s >= needed_s {
-        return Ok(());
-    }
-    let message = format!(
-        "is {} ms, but the largest force of {} N takes {} ms at the slew limit: use that or more, or raise \
-         safety.max_slew_n_per_ms",
-        limits.ramp_s * 1e3,
-        limits.max_force_n,
-        (needed_s * 1e3).ceil()
-    );
-    Err(Error::scene("safety.ramp_ms", message))
-}
-
-/// What a program's own body can get wrong.
-fn check_body(body: &dyn Body) -> Result<(), Error> {
-    let (nodes, masses) = (body.rest().len(), body.inverse_masses().len());
-    if nodes == 0 || nodes != masses {
-        let message =
-            format!("has {nodes} nodes and {masses} inverse masses, one each for at least one node is needed");
-        return Err(Error::scene("body", message));
-    }
-    if !body.rest().iter().flat_map(Vec3::iter).all(|c| c.is_finite()) {
-        return Err(Error::scene("body", "has rest positions that are not finite"));
-    }
-    if !body.inverse_masses().iter().all(|w| w.is_finite() && *w >= 0.0) {
-        return Err(Error::scene("body", "has inverse masses that are negative or not finite"));
-    }
-    if body.surface().triangles.is_empty() {
-        return Err(Error::scene("body", "has no surface triangles, a tool could not touch it"));
-    }
-    Ok(())
-}
-
-fn check_nodes(body: &dyn Body, attach: Option<u32>, probes: &[u32]) -> Result<(), Error> {
-    let nodes = body.rest().len();
-    let named = attach.map(|node| ("device.attach_node", node)).into_iter();
-    for (field, node) in named.chain(probes.iter().map(|&node| ("probe", node))) {
-        if node as usize >= nodes {
-            let message = format!("node {node} is outside the body, nodes run from 0 to {}", nodes - 1);
-            return Err(Error::scene(field, message));
-        }
-    }
-    match attach {
-        Some(node) if !body.surface().has_node(node) => {
-            let message =
-                format!("node {node} is inside the body, the tool can only be glued to a node of the surface");
-            Err(Error::scene("device.attach_node", message))
-        }
-        Some(node) if body.inverse_masses()[node as usize] == 0.0 => {
-            let message = format!("node {node} is held, the tool could not move it");
-            Err(Error::scene("device.attach_node", message))
-        }
-        _ => Ok(()),
-    }
 }
 
 fn pulled(body: &mut dyn Body, initial: &InitialSpec, id: impl Fn([usize; 3]) -> u32) -> Result<State, Error> {
