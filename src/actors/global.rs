@@ -8,7 +8,7 @@ use crate::log::GlobalTick;
 use crate::model::body::Body;
 use crate::model::contact::ToolMotion;
 use crate::model::forecast::{ToolForecast, ToolHistory};
-use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView};
+use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, wider};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{Actor, Outcome, OutletWriter, QueueReader, Reader, Recorder, Stopwatch, TickContext, Writer};
@@ -151,12 +151,15 @@ impl GlobalActor {
         let now = [0.0, self.plan.lead_s()];
         self.aim.triangles(Some(self.simulation.contact()), &tool, now, &mut self.triangles);
         self.publish_wishes(ctx, &tool);
-        self.choose_patch();
+        let has_bases = self.ports.surroundings.is_some();
+        if has_bases {
+            self.choose_patch();
+        }
         let resync = ResyncView {
             global: &mut self.simulation,
             tick: self.tool.tick,
             triangles: &self.triangles,
-            patch: self.ports.surroundings.is_some().then_some(&self.patch),
+            patch: has_bases.then_some(&self.patch),
             tool,
             horizon: self.plan.horizon,
             bases: &self.plan.bases,
@@ -198,7 +201,7 @@ impl GlobalActor {
             list.wish(&self.triangles, size);
         } else if self.plan.prefetches {
             // In the time that one takes the tool can be in the next cells: a window that is a cell wider serves there too.
-            let wide = [size[0] + 2, size[1] + 2, size[2]];
+            let wide = wider(size);
             if !list.is_covered(&self.triangles, size) {
                 list.wish(&self.triangles, size);
             }

@@ -7,7 +7,7 @@ use crate::actors::{BasisActor, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::forecast::ToolForecast;
-use crate::model::local::Aim;
+use crate::model::local::{Aim, wider};
 use crate::model::surroundings::{Bases, SpringGraph};
 use crate::runtime::{Actor, ExchangePort, RateGroup, RuntimeBuilder};
 
@@ -64,8 +64,7 @@ fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, t
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
     aim.triangles(Some(prepared.simulation.contact()), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
     let size = prepared.template.patch;
-    let wide = [size[0] + 2, size[1] + 2, size[2]];
-    let sizes: &[[usize; 3]] = if prepared.prefetches { &[size, wide] } else { &[size] };
+    let sizes: &[[usize; 3]] = if prepared.prefetches { &[size, wider(size)] } else { &[size] };
     for &size in sizes {
         body.patch(&triangles[..1], size, &mut patch);
         // What cannot be reduced is told by the actor, when it is wanted.

@@ -266,7 +266,7 @@ pub(super) fn as_run(scene: &Scene, named: Option<(Option<u32>, &[u32])>) -> Sce
 }
 
 /// Haptic ticks from the state that a local model is built from to the end of its service: its own lateness, one period
-/// until the next, another if that one is lost, and the time to catch up and to blend.
+/// until the next, and the time to catch up and to blend.
 fn horizon(haptic: Rate, global: Rate, latency_ms: f64, blend_ticks: u32) -> u32 {
     let periods = PERIODS_AHEAD + 1e-3 * latency_ms / global.period_s();
     (periods * haptic.as_hz() / global.as_hz()).ceil() as u32 + blend_ticks

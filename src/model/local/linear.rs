@@ -156,21 +156,14 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
             // The rim stands still, and so must the velocities that a contact on it would see.
             self.state.velocities[movable..].fill(Vec3::zeros());
         }
-        self.inverse_masses.clear();
-        self.inverse_masses.extend(nodes.iter().map(|&node| body.inverse_masses()[node as usize]));
-        self.inverse_masses.resize(window.nodes.len(), 0.0);
+        window.gather_movable(body.inverse_masses(), &mut self.inverse_masses);
         self.forces.resize(movable, Vec3::zeros());
         let share = |row, column| self.boundary.share(body, row, column);
         self.tangent.rebuild(body, state, nodes, &|node| window.movable(node), &share);
         if let Some(stiffness) = self.boundary.compliance(nodes) {
             self.tangent.add_stiffness(&stiffness);
         }
-        self.contact = *global.contact();
-        // A contact outside the window cannot be followed here: detection starts anew.
-        self.contact.triangle = self.contact.triangle.and_then(|t| window.triangle(t));
-        if self.contact.triangle.is_none() {
-            self.contact = Contact { glued: self.contact.glued, ..Contact::default() };
-        }
+        self.contact = window.localised(global.contact());
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
         self.ticks = 0;
         if self.spec.is_implicit {
@@ -209,7 +202,7 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
     }
 
     fn contact(&self) -> Contact {
-        Contact { triangle: self.contact.triangle.map(|t| self.window.triangles[t as usize]), ..self.contact }
+        self.window.globalised(&self.contact)
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {

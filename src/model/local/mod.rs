@@ -24,7 +24,7 @@ use super::forecast::ToolForecast;
 use super::simulation::Simulation;
 use super::surroundings::Bases;
 
-pub use aim::Aim;
+pub use aim::{Aim, wider};
 pub use condensed::{Condensed, Yielding};
 pub use feedback::{Feedback, PatchGeometry};
 pub use full::Full;

@@ -113,12 +113,7 @@ impl Predictive {
         window.gather(&global.state().velocities, &mut self.state.velocities);
         // What is beyond the ring stands still.
         self.state.velocities[window.movable + window.ring..].fill(Vec3::zeros());
-        self.contact = *global.contact();
-        // A contact outside the window cannot be followed here: detection starts anew.
-        self.contact.triangle = self.contact.triangle.and_then(|t| window.triangle(t));
-        if self.contact.triangle.is_none() {
-            self.contact = Contact { glued: self.contact.glued, ..Contact::default() };
-        }
+        self.contact = window.localised(global.contact());
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
         (self.substep, self.has_left, self.force) = (0, false, global.force());
     }
@@ -269,9 +264,7 @@ impl LocalModel for Predictive {
         self.near.rebuild(&self.springs, &self.window);
         let (window, movable) = (&self.window, self.window.movable);
         let body_masses = resync.global.body().inverse_masses();
-        self.inverse_masses.clear();
-        self.inverse_masses.extend(window.nodes[..movable].iter().map(|&node| body_masses[node as usize]));
-        self.inverse_masses.resize(window.nodes.len(), 0.0);
+        window.gather_movable(body_masses, &mut self.inverse_masses);
         self.beyond.clear();
         self.beyond.resize(movable, false);
         self.beyond.extend(window.nodes[movable..].iter().map(|&node| body_masses[node as usize] > 0.0));
@@ -320,7 +313,7 @@ impl LocalModel for Predictive {
     }
 
     fn contact(&self) -> Contact {
-        Contact { triangle: self.contact.triangle.map(|t| self.window.triangles[t as usize]), ..self.contact }
+        self.window.globalised(&self.contact)
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {

@@ -2,6 +2,7 @@
 
 use super::super::Vec3;
 use super::super::body::Body;
+use super::super::contact::Contact;
 use super::super::mesh::{NONE, Surface};
 use super::super::surroundings::SpringGraph;
 
@@ -155,6 +156,26 @@ impl Window {
     /// Place of a global node among the movable ones.
     pub(super) fn movable(&self, global: u32) -> Option<usize> {
         self.node(global).map(|place| place as usize).filter(|&place| place < self.movable)
+    }
+
+    /// The contact in local numbering. One outside the window cannot be followed here: detection starts anew.
+    pub(super) fn localised(&self, contact: &Contact) -> Contact {
+        match contact.triangle.and_then(|triangle| self.triangle(triangle)) {
+            Some(triangle) => Contact { triangle: Some(triangle), ..*contact },
+            None => Contact { glued: contact.glued, ..Contact::default() },
+        }
+    }
+
+    /// The contact in the body's numbering.
+    pub(super) fn globalised(&self, contact: &Contact) -> Contact {
+        Contact { triangle: contact.triangle.map(|triangle| self.triangles[triangle as usize]), ..*contact }
+    }
+
+    /// Writes the inverse mass of each local node (1/kg), zero for those that the patch does not move.
+    pub(super) fn gather_movable(&self, inverse_masses: &[f64], local: &mut Vec<f64>) {
+        local.clear();
+        local.extend(self.nodes[..self.movable].iter().map(|&node| inverse_masses[node as usize]));
+        local.resize(self.nodes.len(), 0.0);
     }
 
     /// Copies the window's share of a global array.

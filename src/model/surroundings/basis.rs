@@ -1,6 +1,6 @@
 //! The surroundings of a patch in few states: how its ring answers to forces, and where it goes by itself.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::super::Vec3;
@@ -167,7 +167,8 @@ impl Forecast {
 /// The bases that are there, by patch.
 #[derive(Clone, Debug, Default)]
 pub struct Bases {
-    of: HashMap<Vec<u32>, Arc<Basis>>,
+    /// In the order of the patches: of two that serve as well, every run takes the same.
+    of: BTreeMap<Vec<u32>, Arc<Basis>>,
 }
 
 impl Bases {
@@ -185,11 +186,7 @@ impl Bases {
     /// For the global actor: looks at all bases.
     pub fn around(&self, patch: &[u32]) -> Option<&[u32]> {
         let holds = |basis: &&Arc<Basis>| patch.iter().all(|node| basis.patch.binary_search(node).is_ok());
-        self.of
-            .values()
-            .filter(holds)
-            .map(|basis| &basis.patch[..])
-            .min_by_key(|patch| (patch.len(), patch.first().copied()))
+        self.of.values().filter(holds).map(|basis| &basis.patch[..]).min_by_key(|patch| patch.len())
     }
 
     /// Adds one.
