@@ -131,8 +131,8 @@ fn without_a_basis_the_prediction_alone_serves() {
 #[test]
 fn a_late_basis_is_waited_for() {
     let mut scene = Case::new("drag_slip").scene.with_model(LocalModelKind::Predictive);
-    scene.global.basis_latency_ms = 300.0;
-    scene.run.duration_s = 1.2;
+    scene.global.basis_latency_ms = 900.0;
+    scene.run.duration_s = 1.8;
     let (late, shares) = forces(scene);
     assert!(late.iter().all(|force| force.iter().all(|c| c.is_finite())));
     assert!(shares.contains("predicted") && shares.contains("predictive"), "{shares}");

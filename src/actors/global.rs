@@ -169,14 +169,18 @@ impl GlobalActor {
         self.ports.models.publish(ctx)
     }
 
-    /// The patch that the next model is made for: the one around the triangles, or a larger one if there is a basis for that
-    /// and not for this.
+    /// The patch that the next model is made for: the one around the triangles, or if there is no basis for this and there is
+    /// one for another, that: a larger one, or one that at least holds the triangles.
     fn choose_patch(&mut self) {
-        self.simulation.body().patch(&self.triangles, self.plan.patch, &mut self.patch);
-        if self.plan.bases.get(&self.patch).is_none()
-            && let Some(larger) = self.plan.bases.around(&self.patch)
-        {
-            self.patch = larger.to_vec();
+        let body = self.simulation.body();
+        body.patch(&self.triangles, self.plan.patch, &mut self.patch);
+        let bases = &self.plan.bases;
+        if bases.get(&self.patch).is_some() {
+            return;
+        }
+        let corners = || self.triangles.iter().flat_map(|&t| body.surface().triangles[t as usize]);
+        if let Some(other) = bases.around(&self.patch).or_else(|| bases.holding(corners, &self.patch)) {
+            self.patch = other.to_vec();
         }
     }
 

@@ -146,7 +146,7 @@ impl Predictive {
         let (ring, forecast, stepping) = (self.ring(), basis.forecast(), self.stepping);
         let span = f64::from(resync.horizon) * stepping.tick;
         let (state, forces) = resync.global.internal_forces();
-        if !forecast.launch(&mut self.surroundings, state, forces, span) {
+        if !forecast.launch(&mut self.surroundings, (state, self.springs.rest()), forces, span) {
             return false;
         }
         self.path.clear(self.window.ring, stepping.step(), (resync.horizon * stepping.substeps) as usize + 1);
@@ -159,8 +159,9 @@ impl Predictive {
         let mut substep = 0;
         for n in 0..resync.horizon {
             if self.contact_is_beyond() {
-                // What the patch would do from here on is wrong: the ring coasts.
-                break;
+                // What the patch would do from here on is wrong.
+                self.take_present(resync);
+                return false;
             }
             stepping.tick(resync.tool.motion(n, stepping.tick), |tool, _| {
                 self.take_near_forces();

@@ -23,8 +23,8 @@ const LEADING: usize = 110;
 const FORECAST_STATES: usize = 64;
 /// And smooth fields of this degree: the waves of the whole body.
 const SMOOTH_DEGREE: i32 = 2;
-/// A forecast is used where it holds the present motion to this share.
-const HELD: f64 = 0.05;
+/// A forecast is used where what it leaves out moves less than this share of what there is.
+const LEFT_OUT: f64 = 0.02;
 
 /// The surroundings of one patch, linear around rest, in few states.
 ///
@@ -136,18 +136,26 @@ impl Forecast {
         &self.model
     }
 
-    /// Sets `motion` to the present `state` of the body, with the forces in it (N); `span` is how far the forecast has to
-    /// reach (s). False if the states do not hold the present motion well enough.
+    /// Sets `motion` to the present `state` of a body with nodes at rest at `rest` (m), with the forces in it (N); `span` is
+    /// how far the forecast has to reach (s). False if the states leave out too much of the present motion.
     ///
     /// # Real-time
     /// For the global actor: reads all modes once; may allocate.
-    pub(crate) fn launch(&self, motion: &mut ReducedMotion, state: &State, forces: &[Vec3], span: f64) -> bool {
+    pub(crate) fn launch(
+        &self,
+        motion: &mut ReducedMotion,
+        (state, rest): (&State, &[Vec3]),
+        forces: &[Vec3],
+        span: f64,
+    ) -> bool {
         let (mut momentum, mut force) =
             (Vec::with_capacity(3 * self.nodes.len()), Vec::with_capacity(3 * self.nodes.len()));
         // In the norm of the mass, in which the modes are orthonormal.
-        let (mut speed, mut acceleration) = (0.0, 0.0);
+        let (mut displacement, mut speed, mut acceleration) = (0.0, 0.0, 0.0);
         for (&node, mass) in self.nodes.iter().zip(&self.masses) {
-            let (v, f) = (state.velocities[node as usize], forces[node as usize]);
+            let node = node as usize;
+            let (v, f) = (state.velocities[node], forces[node]);
+            displacement += mass * (state.positions[node] - rest[node]).norm_squared();
             speed += mass * v.norm_squared();
             acceleration += f.norm_squared() / mass;
             momentum.extend((v * *mass).iter());
@@ -155,12 +163,13 @@ impl Forecast {
         }
         let (mut rate, mut load) = (vec![0.0; self.model.states()], vec![0.0; self.model.states()]);
         self.modes.project_all([&momentum, &force], [&mut rate, &mut load]);
-        let missing = |all: f64, held: &[f64]| (all - held.iter().map(|x| x * x).sum::<f64>()).max(0.0).sqrt();
-        let travel = |v: f64, a: f64| v * span + 0.5 * a * span * span;
-        let (all, lost) =
-            (travel(speed.sqrt(), acceleration.sqrt()), travel(missing(speed, &rate), missing(acceleration, &load)));
         motion.launch(&rate, &load);
-        lost <= HELD * all
+        let missing = |all: f64, held: &[f64]| (all - held.iter().map(|x| x * x).sum::<f64>()).max(0.0).sqrt();
+        // What is left out swings as fast as the faster modes, so that it does not come far.
+        let swing = 1.0 / self.model.middle_frequency();
+        let left_out = missing(speed, &rate) * span.min(swing)
+            + missing(acceleration, &load) * (0.5 * span * span).min(2.0 * swing * swing);
+        left_out <= LEFT_OUT * displacement.sqrt()
     }
 }
 
@@ -187,6 +196,16 @@ impl Bases {
     pub fn around(&self, patch: &[u32]) -> Option<&[u32]> {
         let holds = |basis: &&Arc<Basis>| patch.iter().all(|node| basis.patch.binary_search(node).is_ok());
         self.of.values().filter(holds).map(|basis| &basis.patch[..]).min_by_key(|patch| patch.len())
+    }
+
+    /// Of the bases whose patch holds all of `nodes`, the patch of the one that has most nodes of `wanted`.
+    ///
+    /// # Real-time
+    /// For the global actor: looks at all bases.
+    pub fn holding<I: Iterator<Item = u32>>(&self, nodes: impl Fn() -> I, wanted: &[u32]) -> Option<&[u32]> {
+        let holds = |basis: &&Arc<Basis>| nodes().all(|node| basis.patch.binary_search(&node).is_ok());
+        let common = |patch: &&[u32]| wanted.iter().filter(|&node| patch.binary_search(node).is_ok()).count();
+        self.of.values().filter(holds).map(|basis| &basis.patch[..]).max_by_key(common)
     }
 
     /// Adds one.

@@ -19,7 +19,7 @@ pub(crate) struct Reduced {
     pub(super) states: usize,
     /// Phi on the ring (1/sqrt(kg)): three numbers for each node.
     pub(super) shapes: Columns,
-    /// One number per state (1/s^2), negative.
+    /// One number per state (1/s^2), negative, in increasing order.
     pub(super) stiffness: Vec<f64>,
     pub(super) damping: Damping,
 }
@@ -53,6 +53,11 @@ impl Reduced {
 
     pub(crate) fn states(&self) -> usize {
         self.states
+    }
+
+    /// Half of the modes are slower than this (rad/s).
+    pub(crate) fn middle_frequency(&self) -> f64 {
+        self.stiffness[self.states / 2].abs().sqrt()
     }
 
     /// The longest stable step of [`step`](Self::step) (s): w^2 d^2 + 2 c d = 4 of the stiffest state.
