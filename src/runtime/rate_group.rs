@@ -166,6 +166,11 @@ impl RateGroup {
         self
     }
 
+    /// The latency that it declares.
+    pub(crate) fn declared_latency(&self) -> Nanos {
+        self.latency
+    }
+
     /// Threads: the processor core to stay on.
     #[must_use]
     pub fn pin(mut self, cpu: usize) -> Self {

@@ -139,6 +139,7 @@ impl SessionBuilder {
     #[must_use]
     pub fn virtual_time(mut self) -> Self {
         self.parts.execution = Execution::Virtual;
+        self.parts.in_real_time = false;
         self
     }
 

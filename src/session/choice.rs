@@ -90,7 +90,7 @@ mod tests {
     use super::*;
     use crate::time::Nanos;
 
-    /// Two substeps at 1 kHz and 30 Hz on two cores, 1.25 periods ahead, 1 % wanted, every model possible.
+    /// Two substeps at 1 kHz and 30 Hz on two cores, 42 ticks ahead, 20^3 nodes, 1 % wanted, every model possible.
     fn situation(evaluation_us: u64) -> Situation {
         Situation {
             evaluation: Nanos(evaluation_us * 1000),
@@ -98,7 +98,8 @@ mod tests {
             substeps: 2,
             haptic_period_s: 1e-3,
             global_period_s: 1.0 / 30.0,
-            ahead_periods: 1.25,
+            ahead_ticks: 42,
+            nodes: 8000,
             cores: 2,
             error_pct: 1.0,
             possible: Kind::ALL.to_vec(),
@@ -142,16 +143,19 @@ mod tests {
 
     #[test]
     fn a_tight_full_is_better_than_a_model_that_is_wrong() {
-        let why = ["takes 675 us of 1 ms", "no other model that fits meets 1 %"];
-        assert_chosen(&situation(270), Kind::Full, &why, Some("takes 68 % of its period, some will be late"));
+        let why = ["takes 788 us of 1 ms", "no other model that fits meets 1 %"];
+        assert_chosen(&situation(315), Kind::Full, &why, Some("takes 79 % of its period, some will be late"));
         // On a single core both rates would not fit for `predictive`.
-        assert_chosen(&Situation { cores: 1, ..situation(210) }, Kind::Full, &["takes 525 us"], Some("52 %"));
+        assert_chosen(&Situation { cores: 1, ..situation(240) }, Kind::Full, &["takes 600 us"], Some("60 %"));
     }
 
     #[test]
     fn what_misses_the_error_is_said_with_by_how_much_and_what_was_too_dear() {
-        let why =
-            ["would take 875 us of 1 ms", "would need 51 ms of 33.3 ms for predictive", "linear_boundary is the best"];
+        let why = [
+            "would take 875 us of 1 ms",
+            "would need 37.5 ms of 33.3 ms for predictive",
+            "linear_boundary is the best",
+        ];
         assert_chosen(&situation(350), Kind::LinearBoundary, &why, Some("linear_boundary is expected to be 25 % off"));
         // A body that is not made of springs.
         let possible = vec![Kind::Hold, Kind::Patch, Kind::LinearBoundary, Kind::ScaledBoundary, Kind::Full];
@@ -162,7 +166,7 @@ mod tests {
     #[test]
     fn a_tick_of_a_patch_has_to_fit_too() {
         // At 20 kHz and 4 substeps a predictive patch takes 30 us of 50 us.
-        let fast = Situation { haptic_period_s: 5e-5, substeps: 4, error_pct: 10.0, ..situation(9) };
+        let fast = Situation { haptic_period_s: 5e-5, ahead_ticks: 840, substeps: 4, error_pct: 10.0, ..situation(9) };
         assert_chosen(
             &fast,
             Kind::LinearBoundary,

@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use super::budget;
+use super::budget::{self, nominal_evaluation};
 use super::checks::{check_body, check_nodes, check_ramp};
 use super::choice::{Choice, choose};
 use super::disturbed::Disturbed;
 use super::graph::groups;
+use super::horizon::{horizon, lateness};
 use super::rate_groups::{check_group, global_group, local_group};
 use super::situation::Situation;
 use super::substeps::substeps;
@@ -39,6 +40,8 @@ pub(super) struct Parts {
     pub global: Option<RateGroup>,
     pub local: Option<RateGroup>,
     pub execution: Execution,
+    /// On threads, or executing a log of such a run.
+    pub in_real_time: bool,
     #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
@@ -59,6 +62,7 @@ impl Parts {
             global: None,
             local: None,
             execution: Execution::Threaded,
+            in_real_time: true,
             #[cfg(feature = "log")]
             log: None,
             keep_records: false,
@@ -159,7 +163,10 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         None => State::at_rest(body.rest()),
     };
     let blend_ticks = (scene.local.blend.ms * 1e-3 / tick).round().max(1.0) as u32;
-    let horizon = horizon(haptic, global_rate, scene.global.compute_latency_ms, blend_ticks);
+    let global = global_group(parts.global, &scene.global, global_rate, parts.execution)?;
+    let work = Nanos(nominal_evaluation(&*body).0 * u64::from(substeps));
+    let lateness = lateness(&global, haptic, work, parts.in_real_time);
+    let horizon = horizon(haptic, global_rate, lateness, blend_ticks);
     let timing = Timing { haptic, global: global_rate, substeps, horizon };
     let (kind, choice, measured) = match scene.local.model {
         ModelChoice::Named(kind) => (kind, None, None),
@@ -206,7 +213,6 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         .with_prediction(scene.local.prediction)
         .with_period(period_ticks);
     let template = if is_implicit { template.with_implicit_steps() } else { template };
-    let global = global_group(parts.global, &scene.global, global_rate, parts.execution)?;
     let local = local_group(parts.local, haptic, limits.ramp_s, exerts_force);
     let [local, global] = match parts.execution {
         Execution::Virtual => [local, global],
@@ -233,7 +239,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         local,
         global,
         execution: parts.execution,
-        prefetches: parts.execution == Execution::Threaded,
+        prefetches: parts.in_real_time,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
         #[cfg(feature = "log")]
         log: parts.log,
@@ -264,16 +270,6 @@ pub(super) fn as_run(scene: &Scene, named: Option<(Option<u32>, &[u32])>) -> Sce
     }
     scene
 }
-
-/// Haptic ticks from the state that a local model is built from to the end of its service: its own lateness, one period
-/// until the next, and the time to catch up and to blend.
-fn horizon(haptic: Rate, global: Rate, latency_ms: f64, blend_ticks: u32) -> u32 {
-    let periods = PERIODS_AHEAD + 1e-3 * latency_ms / global.period_s();
-    (periods * haptic.as_hz() / global.as_hz()).ceil() as u32 + blend_ticks
-}
-
-/// One period of service, and what catching up takes.
-const PERIODS_AHEAD: f64 = 1.25;
 
 fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
     Rate::from_hz(hz).ok_or_else(|| Error::scene(field, format!("is {hz}, which is no rate")))

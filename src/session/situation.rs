@@ -18,9 +18,11 @@ const TIGHT_SHARE: f64 = 0.8;
 const GLOBAL_SHARE: f64 = 1.0;
 /// The same for both rates on a single core.
 const SINGLE_CORE_SHARE: f64 = 0.8;
-/// What `predictive` pays for looking ahead and for building its patch, in parts of as much simulation of the whole body;
-/// `predicted` runs the whole body (`palpate compare`: global load, against that of `hold`).
-const REDUCED_AHEAD: f64 = 0.6;
+/// What starting a reduced look ahead costs for each node (s): all modes are read (`cargo bench --bench scale`: 0.2 us with
+/// 12^3 nodes, 0.6 us with 20^3).
+const LAUNCH_S: f64 = 0.5e-6;
+/// The share of models for which the whole body is run ahead after all, as the forecast does not hold.
+const RUN_AHEAD: f64 = 0.1;
 /// In virtual time: one for the haptic thread and one for the others.
 const NOMINAL_CORES: usize = 2;
 
@@ -35,8 +37,9 @@ pub(super) struct Situation {
     pub(super) substeps: u32,
     pub(super) haptic_period_s: f64,
     pub(super) global_period_s: f64,
-    /// How far `predictive` looks ahead, in global periods.
-    pub(super) ahead_periods: f64,
+    /// Haptic ticks that `predictive` and `predicted` look ahead.
+    pub(super) ahead_ticks: u32,
+    pub(super) nodes: usize,
     pub(super) cores: usize,
     pub(super) error_pct: f64,
     /// The models that scene and body allow.
@@ -83,14 +86,14 @@ impl Situation {
         };
         let Timing { haptic, global, substeps, horizon } = timing;
         let [haptic_period_s, global_period_s] = [haptic, global].map(|rate| rate.period_s());
-        let ahead_periods = f64::from(horizon) * haptic_period_s / global_period_s;
         Self {
             evaluation,
             origin,
             substeps,
             haptic_period_s,
             global_period_s,
-            ahead_periods,
+            ahead_ticks: horizon,
+            nodes: body.rest().len(),
             cores,
             error_pct: scene.local.error_pct,
             possible,
@@ -111,15 +114,20 @@ impl Situation {
         }
     }
 
-    /// What the global model does in one of its periods (s).
+    /// What the global model does in one of its periods (s): it follows the tool, and looks ahead.
     fn global_work_s(&self, kind: Kind) -> f64 {
-        let periods = match kind {
-            Kind::Full => 0.0,
-            Kind::Predicted => 1.0 + self.ahead_periods,
-            Kind::Predictive => 1.0 + REDUCED_AHEAD * self.ahead_periods,
-            _ => 1.0,
+        let follow = self.global_period_s / self.haptic_period_s * self.full_tick_s();
+        let run_ahead = f64::from(self.ahead_ticks) * self.full_tick_s();
+        let ahead = match kind {
+            Kind::Full => return 0.0,
+            Kind::Predicted => run_ahead,
+            Kind::Predictive => {
+                let reduced = f64::from(self.ahead_ticks) * self.tick_s(kind) + self.nodes as f64 * LAUNCH_S;
+                reduced + RUN_AHEAD * run_ahead
+            }
+            _ => 0.0,
         };
-        periods * self.global_period_s / self.haptic_period_s * self.full_tick_s()
+        follow + ahead
     }
 
     /// How full the more burdened of its two periods is, against what it may take: it fits up to 1.

@@ -72,6 +72,8 @@ impl Replay {
         parts.device =
             Some(Box::new(Replayed::new(logged.first, logged.samples, max_force_n.unwrap_or(f64::INFINITY))));
         parts.execution = Execution::Virtual;
+        // How far models reach ahead, and the bases that were wished for, are part of the recording.
+        parts.in_real_time = logged.in_real_time;
         parts.log = None;
         parts.keep_records = false;
         let mut prepared = prepare(parts).map_err(|error| error.at(&place))?;
@@ -80,8 +82,6 @@ impl Replay {
             let message = format!("it is the log of another session: `{there}` was run, this one has `{here}`");
             return Err(Error::new(ErrorKind::Log, message).at(place));
         }
-        // The bases that were wished for are part of the recording.
-        prepared.prefetches = logged.in_real_time;
         let comparison = logged.comparison;
         let ends = [logged.recording.end(), logged.end];
         prepared.reexecuted = Some(Reexecuted { recording: logged.recording, comparison: comparison.clone() });
