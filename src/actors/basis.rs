@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::basis_store::BasisStore;
 use super::cause::Cause;
-use crate::model::surroundings::{Bases, SpringGraph};
+use crate::error::Error;
+use crate::model::surroundings::{Bases, Basis, Reduction, SpringGraph};
 use crate::runtime::{Actor, Outcome, Reader, TickContext, Writer};
 
 /// Patches whose surroundings are wanted.
@@ -26,28 +27,71 @@ pub struct BasisPorts {
 /// Computes reduced surroundings.
 ///
 /// # Real-time
-/// Not real-time safe: a release may take seconds. Its group needs a core that the haptic group does not use.
+/// Not real-time safe: a release may take a second. Its group needs a core that the haptic group does not use.
 #[derive(Debug)]
 pub struct BasisActor {
     springs: Arc<SpringGraph>,
     store: BasisStore,
-    /// Bases that one release computes at most.
-    most: usize,
+    pace: Pace,
     bases: Bases,
+    /// What a release has begun and the next ones go on with.
+    begun: Option<Reduction>,
     /// Patches whose surroundings cannot be reduced: they are not tried again.
     hopeless: Vec<Vec<u32>>,
     ports: BasisPorts,
 }
 
 impl BasisActor {
-    /// Of a body with `springs`; bases come from `store`, `bases` are there already, and one release computes
-    /// `most` at most.
+    /// Of a body with `springs`; bases come from `store`, and `bases` are there already.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(springs: Arc<SpringGraph>, store: BasisStore, bases: Bases, most: usize, ports: BasisPorts) -> Self {
-        Self { springs, store, most, bases, hopeless: Vec::new(), ports }
+    pub fn new(springs: Arc<SpringGraph>, store: BasisStore, bases: Bases, pace: Pace, ports: BasisPorts) -> Self {
+        Self { springs, store, pace, bases, begun: None, hopeless: Vec::new(), ports }
     }
+
+    /// Goes on with what was begun. For a large body it does one part only: a stop does not wait for more.
+    fn go_on(&mut self) -> Result<Option<Basis>, Error> {
+        while let Some(reduction) = &mut self.begun {
+            let advanced = reduction.advance(&self.springs);
+            if !matches!(advanced, Ok(None)) {
+                self.begun = None;
+                let basis = advanced?;
+                basis.iter().for_each(|basis| self.store.keep(&self.springs, basis));
+                return Ok(basis);
+            }
+            if reduction.is_large() && self.pace == Pace::OneByOne {
+                break;
+            }
+        }
+        Ok(None)
+    }
+
+    /// The basis of `patch`, if it can be had in this release.
+    fn get(&mut self, patch: &[u32]) -> Result<Option<Basis>, Error> {
+        if let Some(basis) = self.store.read(&self.springs, patch) {
+            return Ok(Some(basis));
+        }
+        self.begun = Reduction::new(&self.springs, patch, self.store.states);
+        if self.begun.is_none() {
+            self.hopeless.push(patch.to_vec());
+        }
+        self.go_on()
+    }
+
+    fn publish(&mut self, ctx: &TickContext) {
+        self.ports.bases.buffer().clone_from(&self.bases);
+        self.ports.bases.publish(ctx);
+    }
+}
+
+/// How many bases a release makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// All that are wanted: in virtual time they take as long as they are said to.
+    All,
+    /// One, or a part of one for a large body: what is wanted changes meanwhile.
+    OneByOne,
 }
 
 impl Actor for BasisActor {
@@ -56,38 +100,52 @@ impl Actor for BasisActor {
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        if let Some(patch) = self.begun.as_ref().map(|reduction| reduction.patch().to_vec()) {
+            return match self.go_on() {
+                Ok(Some(basis)) => {
+                    self.bases.insert(Arc::new(basis));
+                    self.publish(ctx);
+                    Outcome::Continue
+                }
+                Ok(None) => Outcome::Continue,
+                Err(_) => {
+                    self.hopeless.push(patch);
+                    Outcome::Degraded(Cause::NoBasis.code())
+                }
+            };
+        }
         if !self.ports.wishes.refresh(ctx) {
             return Outcome::Continue;
         }
         let mut outcome = Outcome::Continue;
-        let (mut computed, mut known) = (0, 0);
-        for patch in &self.ports.wishes.get().patches {
-            if computed == self.most {
-                break;
-            }
-            if self.bases.get(patch).is_some() {
-                known += 1;
+        let mut has_news = false;
+        for patch in self.ports.wishes.get().patches.clone() {
+            if self.bases.get(&patch).is_some() {
+                // A global model that was started again wants what is there already.
+                has_news = true;
                 continue;
             }
-            if self.hopeless.contains(patch) {
+            if self.hopeless.contains(&patch) {
                 continue;
             }
-            match self.store.get(&self.springs, patch) {
+            match self.get(&patch) {
                 Ok(Some(basis)) => {
                     self.bases.insert(Arc::new(basis));
-                    computed += 1;
+                    has_news = true;
                 }
-                Ok(None) => self.hopeless.push(patch.clone()),
+                Ok(None) => {}
                 Err(_) => {
-                    self.hopeless.push(patch.clone());
+                    self.hopeless.push(patch);
                     outcome = Outcome::Degraded(Cause::NoBasis.code());
+                    continue;
                 }
             }
+            if self.pace == Pace::OneByOne {
+                break;
+            }
         }
-        // A global model that was started again wants what is there already.
-        if computed + known > 0 {
-            self.ports.bases.buffer().clone_from(&self.bases);
-            self.ports.bases.publish(ctx);
+        if has_news {
+            self.publish(ctx);
         }
         outcome
     }

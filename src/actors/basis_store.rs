@@ -24,26 +24,45 @@ impl BasisStore {
     /// # Real-time
     /// Not real-time safe: reads and writes files, and computes for seconds.
     pub fn get(&self, springs: &SpringGraph, patch: &[u32]) -> Result<Option<Basis>, Error> {
-        let compute = || Basis::compute(springs, patch, self.states);
-        let Some(folder) = &self.folder else { return compute() };
-        let key = self.key(springs, patch);
-        let file = folder.join(format!("{key:016x}.basis"));
-        let stored = std::fs::read(&file).ok().and_then(|bytes| Basis::from_bytes(&bytes, key));
-        if let Some(basis) = stored.filter(|basis| basis.patch() == patch) {
+        if let Some(basis) = self.read(springs, patch) {
             return Ok(Some(basis));
         }
-        let basis = compute()?;
+        let basis = Basis::compute(springs, patch, self.states)?;
         if let Some(basis) = &basis {
-            // Another run may read it meanwhile: it appears whole or not at all.
-            let part = folder.join(format!("{key:016x}.{}", std::process::id()));
-            let written = std::fs::create_dir_all(folder)
-                .and_then(|()| std::fs::write(&part, basis.to_bytes(key)))
-                .and_then(|()| std::fs::rename(&part, &file));
-            if let Err(error) = written {
-                tracing::warn!("the basis could not be kept in {}: {error}", folder.display());
-            }
+            self.keep(springs, basis);
         }
         Ok(basis)
+    }
+
+    /// The basis of `patch`, if it was kept.
+    ///
+    /// # Real-time
+    /// Not real-time safe: reads a file.
+    pub fn read(&self, springs: &SpringGraph, patch: &[u32]) -> Option<Basis> {
+        let key = self.key(springs, patch);
+        let stored = Basis::from_bytes(&std::fs::read(self.file(key)?).ok()?, key);
+        stored.filter(|basis| basis.patch() == patch)
+    }
+
+    /// Keeps `basis`, if there is a folder for it.
+    ///
+    /// # Real-time
+    /// Not real-time safe: writes a file.
+    pub fn keep(&self, springs: &SpringGraph, basis: &Basis) {
+        let key = self.key(springs, basis.patch());
+        let (Some(folder), Some(file)) = (&self.folder, self.file(key)) else { return };
+        // Another run may read it meanwhile: it appears whole or not at all.
+        let part = folder.join(format!("{key:016x}.{}", std::process::id()));
+        let written = std::fs::create_dir_all(folder)
+            .and_then(|()| std::fs::write(&part, basis.to_bytes(key)))
+            .and_then(|()| std::fs::rename(&part, &file));
+        if let Err(error) = written {
+            tracing::warn!("the basis could not be kept in {}: {error}", folder.display());
+        }
+    }
+
+    fn file(&self, key: u64) -> Option<PathBuf> {
+        self.folder.as_ref().map(|folder| folder.join(format!("{key:016x}.basis")))
     }
 
     /// Of body, patch and states.

@@ -17,7 +17,7 @@ mod local;
 mod logger;
 mod messages;
 
-pub use basis::{BasisActor, BasisPorts, Wishes};
+pub use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub use basis_store::BasisStore;
 pub use cause::Cause;
 pub(crate) use device::GAP_S;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::prepare::Prepared;
-use crate::actors::{BasisActor, BasisPorts, BasisStore, Wishes};
+use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::forecast::ToolForecast;
@@ -22,7 +22,7 @@ pub(super) struct BasisSide {
     pub(super) known: Bases,
     springs: Arc<SpringGraph>,
     store: BasisStore,
-    most: usize,
+    pace: BasisPace,
 }
 
 impl BasisSide {
@@ -35,20 +35,20 @@ impl BasisSide {
             return Ok(None);
         };
         let store = BasisStore { states: prepared.basis_states, folder: prepared.basis_folder.clone() };
-        let most = if prepared.prefetches { 1 } else { usize::MAX };
+        let pace = if prepared.prefetches { BasisPace::OneByOne } else { BasisPace::All };
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
             known: first_bases(prepared, &springs, &store, tool)?,
             store,
             springs,
-            most,
+            pace,
         }))
     }
 
     pub(super) fn actor(&self) -> Box<dyn Actor> {
         let ports = BasisPorts { wishes: self.wishes.reader(), bases: self.bases.writer() };
-        Box::new(BasisActor::new(Arc::clone(&self.springs), self.store.clone(), self.known.clone(), self.most, ports))
+        Box::new(BasisActor::new(Arc::clone(&self.springs), self.store.clone(), self.known.clone(), self.pace, ports))
     }
 }
 

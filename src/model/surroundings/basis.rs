@@ -5,24 +5,12 @@ use std::sync::Arc;
 
 use super::super::Vec3;
 use super::super::body::State;
-use super::super::dense;
-use super::super::sparse::SparseFactor;
 use super::SpringGraph;
-use super::far::Far;
 use super::products::Columns;
 use super::reduced::{Reduced, ReducedMotion};
-use crate::error::{Error, ErrorKind};
+use super::reduction::Reduction;
+use crate::error::Error;
 
-/// The real frequency that the answers are expanded at (rad/s): between rest and the fastest that a hand does.
-const EXPANSION: f64 = 2.0 * std::f64::consts::PI * 30.0;
-/// Moments: Z_0, Z_1 and Z_2.
-const MOMENTS: usize = 3;
-/// Combinations of unit forces that are followed to higher moments.
-const LEADING: usize = 110;
-/// The forecast has this many answers of the ring, at most.
-const FORECAST_STATES: usize = 64;
-/// And smooth fields of this degree: the waves of the whole body.
-const SMOOTH_DEGREE: i32 = 2;
 /// A forecast is used where what it leaves out moves less than this share of what there is.
 const LEFT_OUT: f64 = 0.02;
 
@@ -47,28 +35,15 @@ impl Basis {
     /// If nothing holds the surroundings together, so that they have no finite answer.
     ///
     /// # Real-time
-    /// Not real-time safe: factorises a matrix of the whole body's size, seconds of work for a large one.
+    /// Not real-time safe: factorises a matrix of the whole body's size, seconds of work for a large one. [`Reduction`] does
+    /// the same in parts.
     pub fn compute(graph: &SpringGraph, patch: &[u32], states: usize) -> Result<Option<Self>, Error> {
-        let (mut ring, mut held) = (Vec::new(), Vec::new());
-        graph.neighbours(patch, &mut ring, &mut held);
-        let far = Far::new(graph, patch);
-        if ring.is_empty() || states == 0 {
-            return Ok(None);
+        let Some(mut reduction) = Reduction::new(graph, patch, states) else { return Ok(None) };
+        loop {
+            if let Some(basis) = reduction.advance(graph)? {
+                return Ok(Some(basis));
+            }
         }
-        let indefinite =
-            || Error::new(ErrorKind::Scene, "the surroundings of a patch are not held together").at("local.patch");
-        let factor = SparseFactor::new(far.unknowns(), &far.shifted(EXPANSION)).ok_or_else(indefinite)?;
-        let moments = moments(&far, &factor, &ring);
-        let wide = dense::leading_left_singular_vectors(&moments, far.unknowns(), FORECAST_STATES.max(states));
-        let narrow = &wide[..wide.len().min(states * far.unknowns())];
-        let (answers, _) = Reduced::new(&far, &ring, narrow).ok_or_else(indefinite)?;
-        let mut smooth = far.smooth_fields(graph, SMOOTH_DEGREE);
-        factor.solve(&mut smooth);
-        let shapes = [normalised(&wide, far.unknowns()), normalised(&smooth, far.unknowns())].concat();
-        let (model, modes) = Reduced::new(&far, &ring, &shapes).ok_or_else(indefinite)?;
-        let modes = Columns::new(&modes, far.unknowns());
-        let forecast = Forecast { nodes: far.nodes, masses: far.masses, modes, model };
-        Ok(Some(Self { patch: patch.to_vec(), answers, forecast }))
     }
 
     /// Ids of the patch nodes, in increasing order.
@@ -86,38 +61,6 @@ impl Basis {
     pub(crate) fn forecast(&self) -> &Forecast {
         &self.forecast
     }
-}
-
-/// `[Z_0/|Z_0|, Z_1/|Z_1|, ...]`, each in the combinations of its columns that are largest in Z_0: what is small there is
-/// even smaller in the rest.
-fn moments(far: &Far, factor: &SparseFactor, ring: &[u32]) -> Vec<f64> {
-    let (rows, columns) = (far.unknowns(), 3 * ring.len());
-    let mut moment = vec![0.0; rows * columns];
-    for (place, &node) in ring.iter().enumerate() {
-        for axis in 0..3 {
-            moment[(3 * place + axis) * rows + far.unknown(node, axis)] = 1.0;
-        }
-    }
-    let mut all = Vec::with_capacity(MOMENTS * rows * LEADING.min(columns));
-    for n in 0..MOMENTS {
-        factor.solve(&mut moment);
-        let scale = 1.0 / moment.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if n == 0 {
-            moment = dense::leading_combinations(&moment, rows, LEADING);
-        }
-        all.extend(moment.iter().map(|x| x * scale));
-        far.times_mass(&mut moment);
-    }
-    all
-}
-
-/// Every column divided by its norm: directions count, not lengths.
-fn normalised(columns: &[f64], rows: usize) -> Vec<f64> {
-    let scaled = columns.chunks_exact(rows).flat_map(|column| {
-        let norm = column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-        column.iter().map(move |x| x / norm)
-    });
-    scaled.collect()
 }
 
 /// The surroundings as they go on from a given state of the whole body.

@@ -7,9 +7,11 @@ mod far;
 mod graph;
 mod products;
 mod reduced;
+mod reduction;
 mod stored;
 
 pub use basis::{Bases, Basis};
 pub use condense::Condensation;
 pub use graph::SpringGraph;
 pub(crate) use reduced::ReducedMotion;
+pub use reduction::Reduction;

@@ -1,0 +1,168 @@
+//! The computation of a basis, in parts that end in time.
+
+use super::super::dense;
+use super::super::sparse::SparseFactor;
+use super::SpringGraph;
+use super::basis::{Basis, Forecast};
+use super::far::Far;
+use super::products::Columns;
+use super::reduced::Reduced;
+use crate::error::{Error, ErrorKind};
+
+/// The real frequency that the answers are expanded at (rad/s): between rest and the fastest that a hand does.
+const EXPANSION: f64 = 2.0 * std::f64::consts::PI * 30.0;
+/// Moments: Z_0, Z_1 and Z_2.
+const MOMENTS: usize = 3;
+/// Combinations of unit forces that are followed to higher moments.
+const LEADING: usize = 110;
+/// The forecast has this many answers of the ring, at most.
+const FORECAST_STATES: usize = 64;
+/// And smooth fields of this degree: the waves of the whole body.
+const SMOOTH_DEGREE: i32 = 2;
+/// More unknowns than this take longer than a stop waits for.
+const LARGE: usize = 20_000;
+
+/// A [`Basis`] in the making. Each part costs at most what the factorisation of the surroundings costs.
+pub struct Reduction {
+    patch: Vec<u32>,
+    ring: Vec<u32>,
+    states: usize,
+    far: Far,
+    stage: Stage,
+}
+
+enum Stage {
+    Factorise,
+    /// So many moments are there; `last` is the right-hand side of the next.
+    Moments {
+        factor: SparseFactor,
+        count: usize,
+        last: Vec<f64>,
+        all: Vec<f64>,
+    },
+    Project {
+        factor: SparseFactor,
+        moments: Vec<f64>,
+    },
+    Done,
+}
+
+impl std::fmt::Debug for Reduction {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Reduction").field("unknowns", &self.far.unknowns()).finish_non_exhaustive()
+    }
+}
+
+impl Reduction {
+    /// Of the surroundings of `patch` (ids in increasing order) in at most `states` states; `None` if nothing around the
+    /// patch can move.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn new(graph: &SpringGraph, patch: &[u32], states: usize) -> Option<Self> {
+        let (mut ring, mut held) = (Vec::new(), Vec::new());
+        graph.neighbours(patch, &mut ring, &mut held);
+        let can_move = !ring.is_empty() && states > 0;
+        can_move.then(|| Self {
+            patch: patch.to_vec(),
+            ring,
+            states,
+            far: Far::new(graph, patch),
+            stage: Stage::Factorise,
+        })
+    }
+
+    /// Ids of the patch nodes.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn patch(&self) -> &[u32] {
+        &self.patch
+    }
+
+    /// True for a body so large that the parts should not be done in one go.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn is_large(&self) -> bool {
+        self.far.unknowns() > LARGE
+    }
+
+    /// Does the next part; the basis after the last.
+    ///
+    /// # Errors
+    /// If nothing holds the surroundings together, so that they have no finite answer.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates, and takes a second for a large body.
+    pub fn advance(&mut self, graph: &SpringGraph) -> Result<Option<Basis>, Error> {
+        let (far, ring) = (&self.far, &self.ring);
+        match std::mem::replace(&mut self.stage, Stage::Done) {
+            Stage::Factorise => {
+                let factor = SparseFactor::new(far.unknowns(), &far.shifted(EXPANSION)).ok_or_else(indefinite)?;
+                let last = unit_forces(far, ring);
+                self.stage = Stage::Moments { factor, count: 0, last, all: Vec::new() };
+            }
+            Stage::Moments { factor, count, mut last, mut all } => {
+                factor.solve(&mut last);
+                append_moment(far, &mut last, &mut all, count);
+                self.stage = match count + 1 {
+                    MOMENTS => Stage::Project { factor, moments: all },
+                    count => Stage::Moments { factor, count, last, all },
+                };
+            }
+            Stage::Project { factor, moments } => return self.project(graph, &factor, &moments).map(Some),
+            Stage::Done => {}
+        }
+        Ok(None)
+    }
+
+    fn project(&self, graph: &SpringGraph, factor: &SparseFactor, moments: &[f64]) -> Result<Basis, Error> {
+        let Self { far, ring, states, .. } = self;
+        let wide = dense::leading_left_singular_vectors(moments, far.unknowns(), FORECAST_STATES.max(*states));
+        let narrow = &wide[..wide.len().min(states * far.unknowns())];
+        let (answers, _) = Reduced::new(far, ring, narrow).ok_or_else(indefinite)?;
+        let mut smooth = far.smooth_fields(graph, SMOOTH_DEGREE);
+        factor.solve(&mut smooth);
+        let shapes = [normalised(&wide, far.unknowns()), normalised(&smooth, far.unknowns())].concat();
+        let (model, modes) = Reduced::new(far, ring, &shapes).ok_or_else(indefinite)?;
+        let modes = Columns::new(&modes, far.unknowns());
+        let forecast = Forecast { nodes: far.nodes.clone(), masses: far.masses.clone(), modes, model };
+        Ok(Basis { patch: self.patch.clone(), answers, forecast })
+    }
+}
+
+fn indefinite() -> Error {
+    Error::new(ErrorKind::Scene, "the surroundings of a patch are not held together").at("local.patch")
+}
+
+/// A unit force on each node of the ring along each axis, as columns.
+fn unit_forces(far: &Far, ring: &[u32]) -> Vec<f64> {
+    let mut forces = vec![0.0; far.unknowns() * 3 * ring.len()];
+    for (place, &node) in ring.iter().enumerate() {
+        for axis in 0..3 {
+            forces[(3 * place + axis) * far.unknowns() + far.unknown(node, axis)] = 1.0;
+        }
+    }
+    forces
+}
+
+/// Appends Z_n/|Z_n| to `all` and makes `moment`, which is Z_n, M Z_n. From the first on they are followed in the
+/// combinations of columns that are largest in Z_0: what is small there is even smaller in the rest.
+fn append_moment(far: &Far, moment: &mut Vec<f64>, all: &mut Vec<f64>, n: usize) {
+    let scale = 1.0 / moment.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if n == 0 {
+        *moment = dense::leading_combinations(moment, far.unknowns(), LEADING);
+    }
+    all.extend(moment.iter().map(|x| x * scale));
+    far.times_mass(moment);
+}
+
+/// Every column divided by its norm: directions count, not lengths.
+fn normalised(columns: &[f64], rows: usize) -> Vec<f64> {
+    let scaled = columns.chunks_exact(rows).flat_map(|column| {
+        let norm = column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+        column.iter().map(move |x| x / norm)
+    });
+    scaled.collect()
+}
