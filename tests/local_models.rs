@@ -6,43 +6,24 @@
 use std::path::Path;
 
 use palpate::Session;
-use palpate::log::LogRecord;
-use palpate::model::Vec3;
+use palpate::log::{ForceTrace, LogRecord, ModelError};
 use palpate::scene::{BlendKind, BlendSpec, Feedback, LocalModelKind, Scene, StepKind};
-
-/// Percent of the peak of `full`: rms and largest difference, largest change from one tick to the next.
-#[derive(Clone, Copy, Debug)]
-struct Error {
-    rms: f64,
-    max: f64,
-    jump: f64,
-}
 
 fn scene(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(format!("{name}.toml"));
     Scene::load(&path).expect("a scene of the project")
 }
 
-fn forces(scene: Scene) -> Vec<Vec3> {
+fn forces(scene: Scene) -> ForceTrace {
     let session = Session::from_scene(scene).virtual_time().keep_records().build().expect("a valid scene");
     let summary = session.run().expect("it runs");
     assert_eq!(summary.runtime.fault, None);
-    let force = |record: &LogRecord| match record {
-        LogRecord::Force(sample) => Some(Vec3::from(sample.force_n)),
-        _ => None,
-    };
-    summary.records.iter().filter_map(force).collect()
+    ForceTrace::of(&summary.records)
 }
 
-fn error(forces: &[Vec3], full: &[Vec3]) -> Error {
-    assert_eq!(forces.len(), full.len());
-    let percent = 100.0 / full.iter().map(|f| f.norm()).fold(0.0, f64::max);
-    let differences: Vec<f64> = forces.iter().zip(full).map(|(a, b)| (a - b).norm()).collect();
-    Error {
-        rms: percent * (differences.iter().map(|e| e * e).sum::<f64>() / differences.len() as f64).sqrt(),
-        max: percent * differences.iter().copied().fold(0.0, f64::max),
-        jump: percent * forces.windows(2).map(|f| (f[1] - f[0]).norm()).fold(0.0, f64::max),
-    }
+fn error(run: &ForceTrace, full: &ForceTrace) -> ModelError {
+    assert_eq!(run.forces_n.len(), full.forces_n.len());
+    ModelError::between(run, full)
 }
 
 use Feedback::{ContactNodes, Geometry, Trajectory};
@@ -195,7 +176,7 @@ fn a_drag_with_friction_has_the_known_errors() {
 }
 
 /// A hundred times the stiffness asks for some 15 explicit steps per tick.
-fn stiff(step: StepKind) -> Vec<Vec3> {
+fn stiff(step: StepKind) -> ForceTrace {
     let mut scene = Way { step, ..way(LinearBoundary, Trajectory) }.scene("hand");
     let body = scene.body.as_mut().expect("a block");
     body.material.stiffness_n_per_m *= 100.0;
@@ -239,7 +220,7 @@ fn the_global_model_in_blocks_gives_the_same_bits_as_full_tick_by_tick() {
                 _ => None,
             });
             for force in served {
-                let expected: [f64; 3] = full[resync.last_tick as usize - 1].into();
+                let expected = full.forces_n[resync.last_tick as usize - 1];
                 assert_eq!(force, expected, "{name}, resync {}", resync.version);
                 compared += 1;
             }

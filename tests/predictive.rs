@@ -5,25 +5,16 @@
 use std::path::Path;
 
 use palpate::Session;
-use palpate::log::LogRecord;
-use palpate::model::Vec3;
+use palpate::log::{ForceTrace, ModelError};
 use palpate::scene::{LocalModelKind, Prediction, Scene};
 
 const IN_TIME: f64 = 0.0;
 /// A period of 30 Hz is 33.33 ms.
 const ONE_PERIOD_MS: f64 = 33.34;
 
-/// Percent of the peak of `full`: rms and largest difference, largest change from one tick to the next.
-#[derive(Clone, Copy, Debug)]
-struct Error {
-    rms: f64,
-    max: f64,
-    jump: f64,
-}
-
 struct Case {
     scene: Scene,
-    full: Vec<Vec3>,
+    full: ForceTrace,
 }
 
 impl Case {
@@ -35,36 +26,26 @@ impl Case {
     }
 
     /// The error of `predictive`, and what `full` itself jumps.
-    fn error(&self, latency_ms: f64, change: impl Fn(&mut Scene)) -> (Error, f64) {
+    fn error(&self, latency_ms: f64, change: impl Fn(&mut Scene)) -> (ModelError, f64) {
         let mut scene = self.scene.clone().with_model(LocalModelKind::Predictive);
         scene.global.compute_latency_ms = latency_ms;
         change(&mut scene);
         let (forces, served) = forces(scene);
-        assert_eq!(forces.len(), self.full.len());
-        let percent = 100.0 / self.full.iter().map(|f| f.norm()).fold(0.0, f64::max);
-        let differences: Vec<f64> = forces.iter().zip(&self.full).map(|(a, b)| percent * (a - b).norm()).collect();
-        let jump = |forces: &[Vec3]| percent * forces.windows(2).map(|f| (f[1] - f[0]).norm()).fold(0.0, f64::max);
-        let error = Error {
-            rms: (differences.iter().map(|e| e * e).sum::<f64>() / differences.len() as f64).sqrt(),
-            max: differences.iter().copied().fold(0.0, f64::max),
-            jump: jump(&forces),
-        };
-        println!("{latency_ms} ms late: {error:.3?}, full jumps {:.2}; {served}", jump(&self.full));
-        (error, jump(&self.full))
+        assert_eq!(forces.forces_n.len(), self.full.forces_n.len());
+        let error = ModelError::between(&forces, &self.full);
+        let own_jump = ModelError::between(&self.full, &self.full).jump;
+        println!("{latency_ms} ms late: {error:.3?}, full jumps {own_jump:.2}; {served}");
+        (error, own_jump)
     }
 }
 
-fn forces(scene: Scene) -> (Vec<Vec3>, String) {
+fn forces(scene: Scene) -> (ForceTrace, String) {
     let session = Session::from_scene(scene).virtual_time().keep_records().build().expect("a valid scene");
     let summary = session.run().expect("it runs");
     assert_eq!(summary.runtime.fault, None);
-    let force = |record: &LogRecord| match record {
-        LogRecord::Force(sample) => Some(Vec3::from(sample.force_n)),
-        _ => None,
-    };
     let shares = summary.report.force.shares().map(|(model, share)| format!("{} {share:.4}", model.name()));
     let shares = shares.collect::<Vec<_>>().join(", ");
-    (summary.records.iter().filter_map(force).collect(), shares)
+    (ForceTrace::of(&summary.records), shares)
 }
 
 /// One period late: at most `rms` and `max`, and no jump more than 1 % above the reference's own.
@@ -134,6 +115,6 @@ fn a_late_basis_is_waited_for() {
     scene.global.basis_latency_ms = 900.0;
     scene.run.duration_s = 1.8;
     let (late, shares) = forces(scene);
-    assert!(late.iter().all(|force| force.iter().all(|c| c.is_finite())));
+    assert!(late.forces_n.iter().flatten().all(|c| c.is_finite()));
     assert!(shares.contains("predicted") && shares.contains("predictive"), "{shares}");
 }
