@@ -48,7 +48,7 @@ pub const CASES: &[Case] = &[
         "lost drag 0.2 m/s",
         "hard/drag_200",
         "every second resync is lost",
-        &[run(Predictive, 1.0, [9e9, 9e9, 9e9, 9e9])],
+        &[run(Predictive, 1.0, [2.8, 21.0, 35.0, 3.8])],
     )
     .ends_free()
     .upset(Upset::EverySecondLost),
@@ -67,7 +67,7 @@ pub const CASES: &[Case] = &[
         "stalled drag",
         "hard/drag_long",
         "the global model stands still for 1 s",
-        &[run(LinearBoundary, 1.0, [9e9, 9e9, 9e9, 9e9]), run(Predictive, 1.0, [9e9, 9e9, 9e9, 9e9])],
+        &[run(LinearBoundary, 1.0, [115.0, 188.0, 20.0, 39.0]), run(Predictive, 1.0, [43.0, 75.0, 9.7, 33.0])],
     )
     .ends_free()
     .upset(Upset::Stall(0.4)),

@@ -80,10 +80,10 @@ pub const CASES: &[Case] = &[
         "hard/drag_200",
         "friction 0.3",
         &[
-            run(Patch, 0.0, [21.0, 97.0, 21.0, 65.0]),
-            run(LinearBoundary, 0.0, [19.0, 78.0, 20.0, 45.0]),
-            run(Predictive, 0.0, [0.39, 3.3, 32.0, 0.68]),
-            run(Predictive, 1.0, [2.1, 20.0, 31.0, 2.6]),
+            run(Patch, 0.0, [21.0, 98.0, 21.0, 66.0]),
+            run(LinearBoundary, 0.0, [19.0, 79.0, 20.0, 45.0]),
+            run(Predictive, 0.0, [0.44, 2.1, 33.0, 1.4]),
+            run(Predictive, 1.0, [1.7, 21.0, 31.0, 3.1]),
         ],
     )
     .ends_free(),
