@@ -1,14 +1,14 @@
 //! Whole sessions in situations in which simulations usually fail: each local model against `full`, in virtual time.
 #![cfg(feature = "scene")]
 
-#[path = "../examples/hard_cases/cases.rs"]
+#[path = "../examples/hard_cases/cases/mod.rs"]
 #[allow(dead_code, reason = "what is hard about a case is for the table")]
 mod cases;
 #[path = "../examples/hard_cases/measure.rs"]
 #[allow(dead_code, reason = "the example prints what is only compared here")]
 mod measure;
 
-use cases::{Bound, CASES, Case};
+use cases::{Bound, Case, Run, Upset};
 use measure::{MAX_FORCE_N, Measured, Traced};
 use palpate::log::LogRecord;
 use palpate::model::body::{Block, Body, State};
@@ -47,50 +47,61 @@ fn check_error(what: &str, measured: &Measured, at_most: &Bound) {
     }
 }
 
-/// The cases that `belongs` selects.
-fn check(belongs: impl Fn(&str) -> bool) {
-    let mut checked = 0;
-    for case in CASES.iter().filter(|case| belongs(case.name)) {
+/// What `predictive` promises of drags, of lost resyncs and of stalls, whatever was measured.
+fn check_promise(what: &str, case: &Case, run: &Run, measured: &Measured, full: &Traced) {
+    let (error, peak) = (measured.error, measured.peaks_n[0] / measured.peaks_n[1]);
+    if case.name.starts_with("drag") {
+        assert!(peak <= 1.3, "{what}: {peak} times as strong");
+        // At 0.6 m/s a result that is a period late does not reach it: docs/hard_cases.md.
+        let is_missed = case.name == "drag 0.6 m/s" && run.late > 0.0;
+        assert!(is_missed || error.rms <= 3.0, "{what}: {}", error.rms);
+    }
+    match case.upset {
+        Upset::Nothing => {}
+        Upset::EverySecondLost => assert!(error.rms <= 1.5, "{what}: {}", error.rms),
+        Upset::Stall(_) => {
+            let own = Measured::between(full, full).error.jump;
+            assert!(error.jump <= own + 7.0, "{what}: jumps by {}, the reference by {own}", error.jump);
+            assert!(peak <= 1.3, "{what}: {peak} times as strong");
+        }
+    }
+}
+
+fn check(cases: &[Case]) {
+    for case in cases {
         let full = measure::full(case).unwrap();
         check_safe(&format!("{}, full", case.name), case, &full);
         for run in case.runs {
             let what = format!("{}, {} {} periods late", case.name, run.model.name(), run.late);
             let traced = measure::run(case, run).unwrap();
             check_safe(&what, case, &traced);
-            check_error(&what, &Measured::between(&traced, &full), &run.at_most);
+            let measured = Measured::between(&traced, &full);
+            check_error(&what, &measured, &run.at_most);
+            if run.model == LocalModelKind::Predictive {
+                check_promise(&what, case, run, &measured, &full);
+            }
         }
-        checked += 1;
     }
-    assert!(checked > 0);
-}
-
-const MATERIALS: [&str; 3] = ["damping", "stiff", "masses"];
-const MOTIONS: [&str; 4] = ["impact", "teleport", "half", "drag"];
-const LATE: [&str; 3] = ["late", "lost", "stalled"];
-
-fn is_one_of(kinds: &[&str], name: &str) -> bool {
-    kinds.iter().any(|kind| name.starts_with(kind))
 }
 
 #[test]
 fn extreme_materials_and_shapes_stay_within_their_bounds() {
-    check(|name| is_one_of(&MATERIALS, name) || name.starts_with("sliver"));
+    check(cases::materials::CASES);
 }
 
 #[test]
 fn fast_and_deep_motions_stay_within_their_bounds() {
-    check(|name| is_one_of(&MOTIONS, name));
+    check(cases::motions::CASES);
+}
+
+#[test]
+fn degenerate_places_and_rest_stay_within_their_bounds() {
+    check(cases::places::CASES);
 }
 
 #[test]
 fn late_lost_and_stalled_resyncs_stay_within_their_bounds() {
-    check(|name| is_one_of(&LATE, name));
-}
-
-#[test]
-fn degenerate_places_and_laws_of_contact_stay_within_their_bounds() {
-    let others = |name: &str| is_one_of(&MATERIALS, name) || is_one_of(&MOTIONS, name) || is_one_of(&LATE, name);
-    check(|name| !others(name) && !name.starts_with("sliver"));
+    check(cases::late::CASES);
 }
 
 #[test]

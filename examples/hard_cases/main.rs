@@ -12,7 +12,7 @@ mod measure;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use cases::{CASES, Case, Setup};
+use cases::{Case, KINDS, Setup};
 use measure::Measured;
 
 /// What the table in the docs begins after.
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if !bounds {
         print!("{table}");
     }
-    for case in CASES.iter().filter(|case| all || names.iter().any(|name| case.name.starts_with(name))) {
+    for case in KINDS.into_iter().flatten().filter(|case| all || names.iter().any(|name| case.name.starts_with(name))) {
         let rows = rows(case, bounds)?;
         print!("{rows}");
         table += &rows;

@@ -105,7 +105,9 @@ fn session(case: &Case, model: LocalModelKind, late: f64) -> Result<SessionBuild
                 vec![[0.0225, 0.0238, 0.051], [0.0225, 0.0238, 0.046], [0.0285, 0.0238, 0.046]],
             )?;
             let session = Session::builder(body).path(path).duration_s(0.4).friction(0.3).model(model);
-            Ok(session.global(RateGroup::hz(GLOBAL_HZ as u32)).crossfade_ms(10.0))
+            Ok(session
+                .global(RateGroup::hz(GLOBAL_HZ as u32).latency(Nanos::from_secs_f64(late_ms * 1e-3)))
+                .crossfade_ms(10.0))
         }
     }
 }

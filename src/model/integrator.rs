@@ -33,6 +33,9 @@ pub fn advance(positions: &mut [Vec3], velocities: &[Vec3], d: f64) {
     }
 }
 
+/// Share of an eigenvalue up to which a body's is found.
+const PRECISION: f64 = 1e-7;
+
 /// The largest eigenvalues of a body's linearisation at rest; they bound the explicit step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spectrum {
@@ -54,7 +57,7 @@ impl Spectrum {
         let extent = rest.iter().flat_map(|x| x.iter()).fold(0.0_f64, |size, c| size.max(c.abs())).max(1e-9);
         let small = 1e-6 * extent;
         let (mut plus, mut minus) = (vec![Vec3::zeros(); rest.len()], vec![Vec3::zeros(); rest.len()]);
-        let stiffness = largest_eigenvalue(body.inverse_masses().to_vec(), |direction, product| {
+        let stiffness = largest_eigenvalue(body.inverse_masses().to_vec(), PRECISION, |direction, product| {
             let scale = small / direction.iter().map(|u| u.norm()).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
             let mut displaced = |sign: f64, forces: &mut [Vec3]| {
                 for ((x, rest), u) in state.positions.iter_mut().zip(&rest).zip(direction) {
@@ -69,7 +72,7 @@ impl Spectrum {
             }
         });
         let mut state = State::at_rest(&rest);
-        let damping = largest_eigenvalue(body.inverse_masses().to_vec(), |direction, product| {
+        let damping = largest_eigenvalue(body.inverse_masses().to_vec(), PRECISION, |direction, product| {
             state.velocities.copy_from_slice(direction);
             body.forces(&state, product);
             product.iter_mut().for_each(|force| *force = -*force);
@@ -99,7 +102,12 @@ impl Spectrum {
 }
 
 /// Power iteration for the largest eigenvalue of M^-1 A; `apply` computes A u. Deterministic; held nodes stay zero.
-fn largest_eigenvalue(inverse_masses: Vec<f64>, mut apply: impl FnMut(&[Vec3], &mut [Vec3])) -> f64 {
+/// Ends when an iteration changes the estimate by less than its share `precision`.
+pub(super) fn largest_eigenvalue(
+    inverse_masses: Vec<f64>,
+    precision: f64,
+    mut apply: impl FnMut(&[Vec3], &mut [Vec3]),
+) -> f64 {
     // A rough direction excites the stiffest modes; sines of incommensurable steps are never orthogonal to them.
     let mut direction: Vec<Vec3> = (0..inverse_masses.len())
         .map(|n| Vec3::new((1.9 * n as f64).sin(), (2.3 * n as f64).cos(), (2.9 * n as f64).sin()))
@@ -123,7 +131,7 @@ fn largest_eigenvalue(inverse_masses: Vec<f64>, mut apply: impl FnMut(&[Vec3], &
         }
         // |M^-1 A u| over |u|: grows towards the eigenvalue and needs no second product.
         let estimate = product.iter().map(Vec3::norm_squared).sum::<f64>().sqrt();
-        let settled = (estimate - eigenvalue).abs() <= 1e-7 * estimate;
+        let settled = (estimate - eigenvalue).abs() <= precision * estimate;
         eigenvalue = estimate;
         std::mem::swap(&mut direction, &mut product);
         if settled && iteration > 20 {

@@ -91,9 +91,10 @@ fn reaches(start: &[Vec3; 3], motion: &[Vec3; 3], tool: ToolMotion) -> bool {
     })
 }
 
-/// The shallowest triangle that `point` is behind, by face normals and less than 5 mm deep.
+/// The nearest triangle, if `point` is behind it, by face normals and less than 5 mm deep. Near a thin sheet a point that is
+/// outside is behind the far side too: what is nearer to the front of a triangle is not inside.
 fn inside(surface: &Surface, candidates: &[u32], x: &[Vec3], point: &Vec3) -> Option<Hit> {
-    let mut best: Option<(f64, Hit)> = None;
+    let (mut nearest, mut best) = (MAX_DEPTH, None);
     for &t in candidates {
         let corners = surface.triangles[t as usize].map(|node| x[node as usize]);
         // A point behind the triangle and projecting into it lies in its box grown by the depth.
@@ -106,10 +107,65 @@ fn inside(surface: &Surface, candidates: &[u32], x: &[Vec3], point: &Vec3) -> Op
             continue;
         }
         let Some(seen) = Projection::new(&corners, point) else { continue };
-        let shallowest = best.map_or(-MAX_DEPTH, |(distance, _)| distance);
-        if seen.distance < 0.0 && seen.distance > shallowest && seen.is_inside(1e-9) {
-            best = Some((seen.distance, Hit { triangle: t, weights: seen.weights, share: 0.0 }));
+        if seen.is_inside(1e-9) {
+            if seen.distance.abs() < nearest {
+                nearest = seen.distance.abs();
+                best = (seen.distance < 0.0).then_some(Hit { triangle: t, weights: seen.weights, share: 0.0 });
+            }
+        } else if seen.distance > 0.0 && seen.distance < nearest {
+            // In front of a ridge a point is over none of its triangles.
+            let beside = distance_to_edges(&corners, point);
+            if beside < nearest {
+                (nearest, best) = (beside, None);
+            }
         }
     }
-    best.map(|(_, hit)| hit)
+    best
+}
+
+/// From `point` to the nearest edge of the triangle `corners` (m).
+fn distance_to_edges(corners: &[Vec3; 3], point: &Vec3) -> f64 {
+    let to_edge = |i: usize| {
+        let (edge, r) = (corners[(i + 1) % 3] - corners[i], point - corners[i]);
+        let share = (r.dot(&edge) / edge.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (r - edge * share).norm()
+    };
+    to_edge(0).min(to_edge(1)).min(to_edge(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::body::{Block, Body};
+    use super::super::super::mesh::Face;
+    use super::*;
+
+    fn found(body: &Block, point: Vec3) -> Option<Hit> {
+        let candidates: Vec<u32> = (0..body.surface().triangles.len() as u32).collect();
+        inside(body.surface(), &candidates, body.rest(), &point)
+    }
+
+    #[test]
+    fn above_a_thin_sheet_nothing_is_inside_though_it_is_behind_the_far_side() {
+        let sheet = Block::builder([4, 4, 3], [0.03, 0.03, 0.001]).fix(Face::ZMin).build().unwrap();
+        let at = |z: f64| found(&sheet, Vec3::new(0.0142, 0.0153, z));
+        for z in [0.00101, 0.0015, 0.003, -0.00001, -0.002] {
+            assert_eq!(at(z), None, "{z}");
+        }
+        for (z, side) in [(0.0009, 1e-3), (0.0006, 1e-3), (0.0002, 0.0)] {
+            let hit = at(z).unwrap();
+            let corners = sheet.surface().triangles[hit.triangle as usize].map(|node| sheet.rest()[node as usize].z);
+            assert_eq!(corners, [side; 3], "{z}");
+        }
+    }
+
+    #[test]
+    fn in_front_of_a_ridge_nothing_is_inside() {
+        // Bent upwards along a row of nodes; a point above the ridge is over neither of its slopes.
+        let sheet = Block::builder([5, 4, 3], [0.04, 0.03, 0.001]).fix(Face::ZMin).build().unwrap();
+        let bent: Vec<Vec3> = sheet.rest().iter().map(|x| x - Vec3::z() * (x.x - 0.02).abs()).collect();
+        let candidates: Vec<u32> = (0..sheet.surface().triangles.len() as u32).collect();
+        let at = |z: f64| inside(sheet.surface(), &candidates, &bent, &Vec3::new(0.02, 0.0153, z));
+        assert_eq!(at(0.0015), None);
+        assert!(at(0.0008).is_some());
+    }
 }

@@ -11,6 +11,7 @@ use super::super::implicit::ImplicitStep;
 use super::super::simulation::Stepping;
 use super::super::tangent::{Drift, PatchTangent};
 use super::feedback::{Feedback, PatchGeometry};
+use super::stable::stable_stepping;
 use super::window::Window;
 use super::{Kind, LocalModel, ResyncView, Watched};
 
@@ -21,7 +22,7 @@ pub struct LinearSpec {
     pub size: [usize; 3],
     /// What it tells the global model.
     pub feedback: Feedback,
-    /// One implicit step per tick in place of the global model's explicit ones.
+    /// One implicit step per tick in place of the global model's explicit ones, even where these are stable.
     pub is_implicit: bool,
 }
 
@@ -76,6 +77,12 @@ pub struct LinearPatch<B> {
     built_at: u64,
     /// Ticks since then.
     ticks: u32,
+    is_implicit: bool,
+    /// Window nodes that move in the body but not in this model.
+    beyond: Vec<bool>,
+    /// Of the last tick whose contact was inside the patch (N).
+    force: Vec3,
+    has_left: bool,
     watched: Watched,
 }
 
@@ -99,6 +106,10 @@ impl<B: Boundary> LinearPatch<B> {
             stepping: Stepping { tick: 1e-3, substeps: 1 },
             built_at: 0,
             ticks: 0,
+            is_implicit: false,
+            beyond: Vec::new(),
+            force: Vec3::zeros(),
+            has_left: false,
             watched: Watched::default(),
         }
     }
@@ -122,7 +133,7 @@ impl<B: Boundary> LinearPatch<B> {
     /// One step from `t` seconds into the present tick; returns the force on the tool (N).
     fn step(&mut self, tool: ToolMotion, t: f64, d: f64) -> Vec3 {
         // An implicit step takes its forces at its end.
-        let ahead = if self.spec.is_implicit { d } else { 0.0 };
+        let ahead = if self.is_implicit { d } else { 0.0 };
         let drift = self.drift(t + ahead);
         let movable = self.window.movable;
         let (x, v) = (&self.state.positions[..movable], &self.state.velocities[..movable]);
@@ -135,7 +146,7 @@ impl<B: Boundary> LinearPatch<B> {
             candidates: &self.window.candidates,
         };
         let (forces, contact, law) = (&self.forces, &mut self.contact, &self.law);
-        if self.spec.is_implicit {
+        if self.is_implicit {
             step_implicit(&mut deformable, &mut self.system, forces, contact, law, tool)
         } else {
             step(&mut deformable, forces, contact, law, tool, d)
@@ -157,6 +168,9 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
             self.state.velocities[movable..].fill(Vec3::zeros());
         }
         window.gather_movable(body.inverse_masses(), &mut self.inverse_masses);
+        self.beyond.clear();
+        self.beyond.extend(window.nodes.iter().map(|&node| body.inverse_masses()[node as usize] > 0.0));
+        self.beyond[..movable].fill(false);
         self.forces.resize(movable, Vec3::zeros());
         let share = |row, column| self.boundary.share(body, row, column);
         self.tangent.rebuild(body, state, nodes, &|node| window.movable(node), &share);
@@ -166,8 +180,10 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
         self.contact = window.localised(global.contact());
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
         self.ticks = 0;
-        if self.spec.is_implicit {
-            self.stepping.substeps = 1;
+        (self.has_left, self.force) = (false, global.force());
+        (self.stepping, self.is_implicit) =
+            stable_stepping(self.spec.is_implicit, &self.tangent, &self.inverse_masses, self.stepping, &self.law);
+        if self.is_implicit {
             self.law.equations = Equations::Corrected;
             self.system.rebuild(&self.tangent, &self.inverse_masses, self.stepping.step());
         }
@@ -175,6 +191,9 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Vec3 {
+        if self.has_left {
+            return self.force;
+        }
         let (stepping, mut t) = (self.stepping, 0.0);
         let force = stepping.tick(tool, |tool, d| {
             let force = self.step(tool, t, d);
@@ -186,7 +205,14 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
             self.state.velocities[self.window.movable..].fill(Vec3::zeros());
         }
         // A state that is not finite touches nothing: its zero force would look like a free tool.
-        if self.state.is_finite() { force } else { Vec3::repeat(f64::NAN) }
+        if !self.state.is_finite() {
+            return Vec3::repeat(f64::NAN);
+        }
+        self.has_left = self.window.is_on(&self.contact, &self.beyond);
+        if !self.has_left {
+            self.force = force;
+        }
+        self.force
     }
 
     fn built_at(&self) -> u64 {
@@ -194,7 +220,7 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
     }
 
     fn serves_as(&self) -> Kind {
-        B::KIND
+        if self.has_left { Kind::Hold } else { B::KIND }
     }
 
     fn catches_up(&self) -> bool {
@@ -221,6 +247,8 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
         geometry.clear();
         geometry.contact = self.contact();
         match self.spec.feedback {
+            // What has left is as it was then.
+            _ if self.has_left => return false,
             Feedback::Trajectory => return false,
             Feedback::Geometry => (0..self.window.movable).for_each(|place| self.add_to(geometry, place)),
             Feedback::ContactNodes => {

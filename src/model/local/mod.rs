@@ -13,6 +13,7 @@ mod patch;
 mod predictive;
 mod ring_path;
 mod scaled_boundary;
+mod stable;
 mod succession;
 mod template;
 mod window;

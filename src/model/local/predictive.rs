@@ -236,9 +236,7 @@ impl Predictive {
 
     /// True if the contact is on a node that gives way in the body but not here.
     fn contact_is_beyond(&self) -> bool {
-        let touched = self.contact.triangle.filter(|_| self.contact.is_touching());
-        touched
-            .is_some_and(|t| self.window.surface.triangles[t as usize].iter().any(|&node| self.beyond[node as usize]))
+        self.window.is_on(&self.contact, &self.beyond)
     }
 }
 

@@ -171,6 +171,12 @@ impl Window {
         Contact { triangle: contact.triangle.map(|triangle| self.triangles[triangle as usize]), ..*contact }
     }
 
+    /// True if `contact`, in local numbering, presses on a node of `beyond`: one that gives way in the body, but not here.
+    pub(super) fn is_on(&self, contact: &Contact, beyond: &[bool]) -> bool {
+        let touched = contact.triangle.filter(|_| contact.is_touching());
+        touched.is_some_and(|t| self.surface.triangles[t as usize].iter().any(|&node| beyond[node as usize]))
+    }
+
     /// Writes the inverse mass of each local node (1/kg), zero for those that the patch does not move.
     pub(super) fn gather_movable(&self, inverse_masses: &[f64], local: &mut Vec<f64>) {
         local.clear();
