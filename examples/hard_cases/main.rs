@@ -29,6 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if names.is_empty() {
         names = QUICK.to_vec();
     }
+    let bases = tempfile::tempdir()?;
     let all = docs || asked("--all");
     let mut table = String::from(
         "| case | scene | what is hard | model | late | rms | max | jump | energy | peak | verdict |\n\
@@ -38,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         print!("{table}");
     }
     for case in KINDS.into_iter().flatten().filter(|case| all || names.iter().any(|name| case.name.starts_with(name))) {
-        let rows = rows(case, bounds)?;
+        let rows = rows(case, bounds, bases.path())?;
         print!("{rows}");
         table += &rows;
     }
@@ -52,7 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// The rows of one case: a run each.
-fn rows(case: &Case, bounds: bool) -> Result<String, Box<dyn std::error::Error>> {
+fn rows(case: &Case, bounds: bool, bases: &Path) -> Result<String, Box<dyn std::error::Error>> {
     let full = measure::full(case)?;
     let scene = match case.body {
         Setup::Scene(name) => format!("`{name}`"),
@@ -60,7 +61,7 @@ fn rows(case: &Case, bounds: bool) -> Result<String, Box<dyn std::error::Error>>
     };
     let mut rows = String::new();
     for run in case.runs {
-        let traced = measure::run(case, run);
+        let traced = measure::run(case, run, bases);
         let (name, late) = (run.model.name(), run.late);
         if bounds {
             let Ok(traced) = traced else { continue };

@@ -64,15 +64,15 @@ impl Measured {
 /// # Errors
 /// If it cannot be run.
 pub fn full(case: &Case) -> Result<Traced, Error> {
-    traced(session(case, LocalModelKind::Full, 0.0)?)
+    traced(session(case, LocalModelKind::Full, 0.0, None)?)
 }
 
-/// Runs a model on the case.
+/// Runs a model on the case; `bases` is a folder that keeps reduced surroundings from run to run.
 ///
 /// # Errors
 /// If it is refused.
-pub fn run(case: &Case, run: &Run) -> Result<Traced, Error> {
-    let session = session(case, run.model, run.late)?;
+pub fn run(case: &Case, run: &Run, bases: &Path) -> Result<Traced, Error> {
+    let session = session(case, run.model, run.late, Some(bases))?;
     traced(match case.upset {
         Upset::Nothing => session,
         Upset::Stall(at_s) => {
@@ -88,7 +88,7 @@ pub fn run(case: &Case, run: &Run) -> Result<Traced, Error> {
     })
 }
 
-fn session(case: &Case, model: LocalModelKind, late: f64) -> Result<SessionBuilder, Error> {
+fn session(case: &Case, model: LocalModelKind, late: f64, bases: Option<&Path>) -> Result<SessionBuilder, Error> {
     let late_ms = late * PERIOD.as_secs_f64() * 1e3;
     match case.body {
         Setup::Scene(name) => {
@@ -96,6 +96,7 @@ fn session(case: &Case, model: LocalModelKind, late: f64) -> Result<SessionBuild
             let mut scene = Scene::load(&folder.join(name).with_extension("toml"))?.with_model(model);
             scene.global.compute_latency_ms = late_ms;
             scene.safety.max_force_n = Some(MAX_FORCE_N);
+            scene.local.basis_folder = bases.map(Path::to_owned);
             Ok(Session::from_scene(scene).crossfade_ms(10.0))
         }
         Setup::UnequalMasses => {
