@@ -3,7 +3,7 @@
 mod session_support;
 
 use palpate::actors::{DeviceSample, ForceCommand, LocalActor, LocalPorts, ModelSource, SurfaceView, ToolView};
-use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
 use palpate::log::{ForceSample, LogRecord};
 use palpate::model::Vec3;
 use palpate::model::blend::Blend;
@@ -262,14 +262,14 @@ impl Device for Claims {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: self.0 }
+        Capabilities { max_force_n: self.0, ..Capabilities::default() }
     }
 
     fn read(&mut self, _: Nanos) -> Result<DeviceState, DeviceFault> {
         Ok(DeviceState::default())
     }
 
-    fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
+    fn write(&mut self, _: ForceCommand) -> Result<(), DeviceFault> {
         Ok(())
     }
 }
