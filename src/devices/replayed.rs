@@ -127,7 +127,8 @@ mod tests {
     #[test]
     fn it_gives_what_was_logged_at_each_time_and_fails_where_the_device_failed() {
         let sample = |ms: u64, id| ReplayedSample { time: Nanos(ms), id, state: state(f64::from(id)) };
-        let mut device = Replayed::new(state(9.0), vec![sample(0, 1), sample(1, 1), sample(2, 2), sample(7, 3)], LIMITS);
+        let mut device =
+            Replayed::new(state(9.0), vec![sample(0, 1), sample(1, 1), sample(2, 2), sample(7, 3)], LIMITS);
         let reads = [0, 0, 1, 3, 7].map(|time| device.read(Nanos(time)));
         let expected =
             [Ok(state(9.0)), Ok(state(1.0)), Err(DeviceFault::Stale), Err(DeviceFault::Disconnected), Ok(state(3.0))];

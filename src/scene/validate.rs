@@ -2,8 +2,8 @@
 
 use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 use super::{
-    BlendKind, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec,
-    LocalModelKind, LocalSpec, ModelChoice, SafetySpec, Scene, StepKind, validate_device,
+    BlendKind, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec, LocalModelKind,
+    LocalSpec, ModelChoice, SafetySpec, Scene, StepKind, validate_device,
 };
 use crate::error::Error;
 use crate::time::Rate;

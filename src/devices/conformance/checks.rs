@@ -267,7 +267,7 @@ pub(super) fn after_disconnect(device: &mut dyn Device) -> Seen {
         if device.write(ForceCommand::until(Vec3::zeros(), at(tick + 5))).is_ok() {
             return wrong("it takes a force without being connected");
         }
-        device.wait(Duration::ZERO);
     }
+    device.wait(Duration::ZERO);
     Ok(())
 }

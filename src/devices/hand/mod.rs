@@ -149,7 +149,8 @@ impl Device for Hand {
 
     fn capabilities(&self) -> Capabilities {
         let resolution = Some(self.plant.encoder_step_m).filter(|step| *step > 0.0);
-        let degrees_of_freedom = [Axis::X, Axis::Y, Axis::Z].iter().filter(|axis| self.plant.axes.contains(axis)).count();
+        let degrees_of_freedom =
+            [Axis::X, Axis::Y, Axis::Z].iter().filter(|axis| self.plant.axes.contains(axis)).count();
         Capabilities {
             degrees_of_freedom: degrees_of_freedom as u8,
             position_resolution_m: resolution.or(self.capabilities.position_resolution_m),

@@ -98,7 +98,8 @@ impl PlantSpec {
         }
         if self.delay_ms + self.jitter_ms > LONGEST_DELAY_MS {
             let (delay_ms, jitter_ms) = (self.delay_ms, self.jitter_ms);
-            let message = format!("and jitter_ms are {delay_ms} and {jitter_ms}, must be {LONGEST_DELAY_MS} ms at most");
+            let message =
+                format!("and jitter_ms are {delay_ms} and {jitter_ms}, must be {LONGEST_DELAY_MS} ms at most");
             return Some(("delay_ms", message));
         }
         if !STEP_MS.contains(&self.step_ms) {
