@@ -6,11 +6,9 @@ mod common;
 use std::path::Path;
 
 use common::{reference, rms_percent};
-use palpate::actors::Cause;
-use palpate::devices::SafetyStop;
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
-use palpate::prelude::{DeviceFault, Session};
+use palpate::prelude::Session;
 use palpate::scene::{FaultKind, FaultSpec, LocalModelKind, Scene};
 use palpate::session::Summary;
 
@@ -25,14 +23,6 @@ fn run(scene: Scene) -> Summary {
 fn forces(summary: &Summary) -> Vec<Vec3> {
     let force = |record: &LogRecord| if let LogRecord::Force(row) = record { Some(row.force_n.into()) } else { None };
     summary.records.iter().filter_map(force).collect()
-}
-
-fn commands(summary: &Summary) -> Vec<(u64, Vec3)> {
-    let command = |record: &LogRecord| match record {
-        LogRecord::Command(row) => Some((row.time.0 / 1_000_000, row.force_n.into())),
-        _ => None,
-    };
-    summary.records.iter().filter_map(command).collect()
 }
 
 fn tools(summary: &Summary) -> Vec<Vec3> {
@@ -86,36 +76,6 @@ fn a_run_with_a_hand_is_the_same_every_time() {
 }
 
 #[test]
-fn a_failing_device_gets_finite_forces_within_their_limits_and_every_fault_is_counted() {
-    let summary = run(load("device_faults"));
-    let mut last = Vec3::zeros();
-    for (tick, force) in commands(&summary) {
-        assert!(force.iter().all(|c| c.is_finite()) && force.norm() <= 7.9 * (1.0 + 1e-12), "{force:?} N at {tick} ms");
-        assert!((force - last).norm() <= 0.5 * (1.0 + 1e-9), "{force:?} N after {last:?} N at {tick} ms");
-        last = force;
-    }
-    let causes: Vec<u64> = summary
-        .records
-        .iter()
-        .filter_map(|record| if let LogRecord::Event(event) = record { Some(event.detail) } else { None })
-        .collect();
-    for cause in [
-        Cause::Device(DeviceFault::Stale),
-        Cause::DeviceNotFinite,
-        Cause::Device(DeviceFault::Disconnected),
-        Cause::Device(DeviceFault::SafetyStop(SafetyStop::Stall)),
-    ] {
-        assert!(causes.contains(&cause.code().into()), "{cause:?}: {summary}");
-    }
-    // 50 or so lost frames, 20 that are no numbers, 200 without a cable, 100 after the stop.
-    let degraded = summary.runtime.groups[0].degraded;
-    assert!((350..390).contains(&degraded), "{degraded}");
-    assert_eq!(summary.runtime.fault, None);
-    // Check that it had something to hold.
-    assert!(summary.report.force.peak_n > 0.5, "{summary}");
-}
-
-#[test]
 fn faults_act_on_the_scripted_tool_too_and_only_while_they_last() {
     let mut scene = load("drag_slip").with_model(LocalModelKind::Full);
     scene.run.duration_s = 0.5;
@@ -129,12 +89,55 @@ fn faults_act_on_the_scripted_tool_too_and_only_while_they_last() {
 #[cfg(feature = "log")]
 mod logged {
     use super::*;
+    use palpate::actors::Cause;
+    use palpate::devices::{DeviceFault, SafetyStop};
+    use palpate::log::{LogEntry, LogReader};
     use palpate::scene::DeviceKind;
+
+    fn commands(summary: &Summary) -> Vec<(u64, Vec3)> {
+        let command = |record: &LogRecord| match record {
+            LogRecord::Command(row) => Some((row.time.0 / 1_000_000, row.force_n.into())),
+            _ => None,
+        };
+        summary.records.iter().filter_map(command).collect()
+    }
 
     fn recorded(scene: Scene, folder: &Path) -> (Summary, std::path::PathBuf) {
         let log = folder.join("hand.mcap");
         let builder = Session::from_scene(scene).virtual_time().keep_records().log(&log);
         (builder.build().unwrap().run().unwrap(), log)
+    }
+
+    #[test]
+    fn a_failing_device_gets_finite_forces_within_their_limits_and_every_fault_is_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let (summary, log) = recorded(load("device_faults"), folder.path());
+        let mut last = Vec3::zeros();
+        for (tick, force) in commands(&summary) {
+            assert!(
+                force.iter().all(|c| c.is_finite()) && force.norm() <= 7.9 * (1.0 + 1e-12),
+                "{force:?} N at {tick} ms"
+            );
+            assert!((force - last).norm() <= 0.5 * (1.0 + 1e-9), "{force:?} N after {last:?} N at {tick} ms");
+            last = force;
+        }
+        let told = |entry| if let LogEntry::Text(event) = entry { Some(event.message) } else { None };
+        let told: Vec<String> = LogReader::open(&log).unwrap().filter_map(told).collect();
+        for cause in [
+            Cause::Device(DeviceFault::Stale),
+            Cause::DeviceNotFinite,
+            Cause::Device(DeviceFault::Disconnected),
+            Cause::Device(DeviceFault::SafetyStop(SafetyStop::Stall)),
+        ] {
+            let words = Cause::describe(cause.code()).unwrap();
+            assert!(told.iter().any(|message| message.contains(words)), "{words}: {told:?}");
+        }
+        // 50 or so lost frames, 20 that are no numbers, 200 without a cable, 100 after the stop.
+        let degraded = summary.runtime.groups[0].degraded;
+        assert!((350..390).contains(&degraded), "{degraded}");
+        assert_eq!(summary.runtime.fault, None);
+        // Check that it had something to hold.
+        assert!(summary.report.force.peak_n > 0.5, "{summary}");
     }
 
     #[test]
