@@ -3,7 +3,7 @@
 mod session_support;
 
 use palpate::actors::{DeviceSample, ForceCommand, LocalActor, LocalPorts, ModelSource, SurfaceView, ToolView};
-use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
 use palpate::log::{ForceSample, LogRecord};
 use palpate::model::Vec3;
 use palpate::model::blend::Blend;
@@ -269,7 +269,7 @@ impl Device for Claims {
         Ok(DeviceState::default())
     }
 
-    fn write(&mut self, _: ForceCommand) -> Result<(), DeviceFault> {
+    fn write(&mut self, _: palpate::ForceCommand) -> Result<(), DeviceFault> {
         Ok(())
     }
 }
