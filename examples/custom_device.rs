@@ -66,7 +66,7 @@ impl Device for Hand {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: 4.0 }
+        Capabilities { max_force_n: 4.0, ..Capabilities::default() }
     }
 
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
@@ -79,8 +79,8 @@ impl Device for Hand {
         Ok(DeviceState { position: self.position, velocity: self.velocity, buttons: 0 })
     }
 
-    fn write(&mut self, force: Vec3) -> Result<(), DeviceFault> {
-        self.force = force;
+    fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {
+        self.force = command.force;
         Ok(())
     }
 }

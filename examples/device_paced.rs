@@ -66,7 +66,7 @@ impl Device for Paced {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: 4.0 }
+        Capabilities { max_force_n: 4.0, ..Capabilities::default() }
     }
 
     fn wait(&mut self, timeout: Duration) -> bool {
@@ -88,7 +88,7 @@ impl Device for Paced {
         Ok(DeviceState { position: self.position, velocity: Vec3::zeros(), buttons: 0 })
     }
 
-    fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
+    fn write(&mut self, _: ForceCommand) -> Result<(), DeviceFault> {
         Ok(())
     }
 }

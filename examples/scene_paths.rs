@@ -13,10 +13,11 @@ const SPACING_M: f64 = 0.1 / 11.0;
 type Formula = fn(f64) -> [f64; 3];
 
 /// Name, length (s) and formula of every path file.
-const PATHS: [(&str, f64, Formula); 5] = [
+const PATHS: [(&str, f64, Formula); 6] = [
     ("demo.csv", 5.0, demo),
     ("drag.csv", 2.5, drag),
     ("hand.csv", 0.8, hand),
+    ("hand_release.csv", 0.4, hand_release),
     ("hover.csv", 0.0, hover),
     ("pull_release.csv", 1.0, pull_release),
 ];
@@ -52,6 +53,11 @@ fn hand(t: f64) -> [f64; 3] {
     let x = 5.0 * SPACING_M + grown * 0.004 * wave(3.0);
     let z = 0.1 + grown * (-0.008 * wave(2.0) - 0.004 * wave(5.0));
     [x, 5.0 * SPACING_M, z]
+}
+
+/// Where the hand of the reference wants to be: from 1 mm below the surface to 11 mm.
+fn hand_release(t: f64) -> [f64; 3] {
+    [0.0475, 0.0512, 0.099 - 0.010 * min_jerk(t / 0.4)]
 }
 
 /// 1 cm above node [8, 5, 11], motionless.

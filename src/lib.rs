@@ -14,7 +14,7 @@
 //! | [`actors`] | global, local, device, logger: the glue between the layers below |
 //! | [`model`] | physics without threads or clocks: [bodies](model::body), [contact](model::contact), [local models](model::local) |
 //! | [`runtime`] | actors, rate groups, ports, real and virtual time; without physics, usable on its own |
-//! | [`devices`] | what moves the tool: a scripted path, or a program's own [`Device`] |
+//! | [`devices`] | what moves the tool: a path, a simulated hand, a log, or a program's own [`Device`] |
 //! | [`safety`] | what stands between a computed force and a device |
 //! | [`log`], [`report`] | records, MCAP files with feature `log`, and what they say about a run |
 //!
@@ -66,13 +66,13 @@ pub mod scene;
 pub mod session;
 pub mod time;
 
-pub use devices::{Device, DeviceFault, DeviceState};
+pub use devices::{Device, DeviceFault, DeviceState, ForceCommand};
 pub use error::{Error, ErrorKind};
 pub use session::{Running, Session, SessionBuilder, Summary, Viewer};
 
 /// What most programs need.
 pub mod prelude {
-    pub use crate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
+    pub use crate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
     pub use crate::error::Error;
     pub use crate::model::Vec3;
     pub use crate::model::body::Block;

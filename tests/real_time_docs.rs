@@ -18,8 +18,9 @@ const USED_BY_TICKS: &str = "
 /// Types whose own section speaks for all of their methods: plain values, actors, what is gone before a run.
 const SPEAK_FOR_ALL: &str = "
     Nanos Rate TickContext Record TickTiming Event PortUse PortUseKind SlipCause SlipCounts Snapshot
-    LogRecord ContactMode Cause DeviceFault Actions Contact ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice
-    DeviceActor LocalActor GlobalActor LoggerActor LogSink Scripted Replayed
+    LogRecord ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice
+    DeviceActor LocalActor GlobalActor LoggerActor LogSink
+    Scripted Replayed
     Block BlockBuilder SpringNetwork SpringNetworkBuilder InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";
 
 /// The name of a public type, trait or function, or `Owner::name` of a public method; and whether its docs have the section,

@@ -4,7 +4,7 @@
 
 mod session_support;
 
-use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use palpate::log::{ContactMode, Environment, Level, LogEntry, LogReader, LogRecord, McapWriter, TextEvent};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
@@ -91,7 +91,7 @@ impl Device for Moody {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: 1.25 }
+        Capabilities { max_force_n: 1.25, ..Capabilities::default() }
     }
 
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
@@ -111,7 +111,7 @@ impl Device for Moody {
         }
     }
 
-    fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
+    fn write(&mut self, _: ForceCommand) -> Result<(), DeviceFault> {
         if self.reads.is_multiple_of(11) { Err(DeviceFault::NotReady) } else { Ok(()) }
     }
 }

@@ -5,7 +5,7 @@ mod device_clock;
 mod session_support;
 
 use device_clock::DeviceClock;
-use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::runtime::{OverrunPolicy, RateGroup, SlipCause};
@@ -57,7 +57,7 @@ impl Device for Probing {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: MAX_FORCE_N }
+        Capabilities { max_force_n: MAX_FORCE_N, ..Capabilities::default() }
     }
 
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
@@ -66,8 +66,8 @@ impl Device for Probing {
         (self.spoil)(self.reads, DeviceState { position, ..DeviceState::default() })
     }
 
-    fn write(&mut self, force: Vec3) -> Result<(), DeviceFault> {
-        self.written.lock().unwrap().push(force);
+    fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {
+        self.written.lock().unwrap().push(command.force);
         if self.refuse_writes { Err(DeviceFault::NotReady) } else { Ok(()) }
     }
 }
@@ -146,8 +146,8 @@ impl Device for Pacing {
         self.inner.read(time)
     }
 
-    fn write(&mut self, force: Vec3) -> Result<(), DeviceFault> {
-        self.inner.write(force)
+    fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {
+        self.inner.write(command)
     }
 }
 

@@ -262,14 +262,14 @@ impl Device for Claims {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: self.0 }
+        Capabilities { max_force_n: self.0, ..Capabilities::default() }
     }
 
     fn read(&mut self, _: Nanos) -> Result<DeviceState, DeviceFault> {
         Ok(DeviceState::default())
     }
 
-    fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
+    fn write(&mut self, _: palpate::ForceCommand) -> Result<(), DeviceFault> {
         Ok(())
     }
 }

@@ -4,7 +4,7 @@
 mod altered_block;
 
 use altered_block::AlteredBlock;
-use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::mesh::Face;
@@ -143,7 +143,7 @@ impl Device for Tool {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: 8.0 }
+        Capabilities { max_force_n: 8.0, ..Capabilities::default() }
     }
 
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
@@ -160,7 +160,7 @@ impl Device for Tool {
         Ok(DeviceState { position, ..DeviceState::default() })
     }
 
-    fn write(&mut self, force: Vec3) -> Result<(), DeviceFault> {
+    fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {
         if !std::mem::take(&mut self.read) {
             self.now += 1e-3;
         }
@@ -168,7 +168,7 @@ impl Device for Tool {
             self.done = true;
             panic!("the driver gave way");
         }
-        self.written.lock().expect("no writer panics").1.push((self.now, force.into()));
+        self.written.lock().expect("no writer panics").1.push((self.now, command.force.into()));
         Ok(())
     }
 }

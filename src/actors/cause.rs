@@ -39,10 +39,10 @@ impl Cause {
 
     /// What the number means, in words; `None` if it is not palpate's.
     pub fn describe(code: u32) -> Option<&'static str> {
+        if let Some(fault) = code.checked_sub(Self::DEVICE).and_then(DeviceFault::from_code) {
+            return Some(fault.words());
+        }
         Some(match code {
-            257 => "the device had no new state",
-            258 => "the device is not ready",
-            259 => "the device is disconnected",
             300 => "the device reported numbers that are not finite",
             301 => "the local model's force is not finite, zero is commanded",
             302 => "the global model's state is not finite, it publishes nothing any more",
@@ -59,11 +59,12 @@ mod tests {
 
     #[test]
     fn every_cause_has_words() {
-        let faults = [DeviceFault::Stale, DeviceFault::NotReady, DeviceFault::Disconnected];
         let others =
             [Cause::DeviceNotFinite, Cause::LocalNotFinite, Cause::GlobalNotFinite, Cause::SamplesLost, Cause::NoBasis];
-        for cause in faults.map(Cause::Device).into_iter().chain(others) {
+        let causes: Vec<Cause> = DeviceFault::ALL.map(Cause::Device).into_iter().chain(others).collect();
+        for (index, cause) in causes.iter().enumerate() {
             assert!(Cause::describe(cause.code()).is_some(), "{cause:?}");
+            assert!(causes[..index].iter().all(|other| other.code() != cause.code()), "{cause:?}");
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use super::cause::Cause;
 use super::messages::{DeviceSample, ForceCommand};
-use crate::devices::{Device, DeviceFault, DeviceState};
+use crate::devices::{self, Calibration, Device, DeviceFault, DeviceState};
 use crate::error::{Error, ErrorKind};
 use crate::log::{CommandSample, ToolSample};
 use crate::model::Vec3;
@@ -59,7 +59,7 @@ impl DeviceActor {
         let state = self.device.read(ctx.scheduled);
         self.reading = false;
         match state {
-            Ok(state) if is_finite(&state) => {
+            Ok(state) if state.is_finite() => {
                 self.last = DeviceSample { id: self.last.id.wrapping_add(1), state };
                 Outcome::Continue
             }
@@ -111,7 +111,10 @@ impl Actor for DeviceActor {
         } else {
             self.safety.apply(Request::Force(command.force.into()), dt)
         };
-        let outcome = self.device.write(Vec3::from(force_n)).map_or_else(degraded, |()| Outcome::Continue);
+        // As long as the force would be taken up where it was, and no longer.
+        let expires = ctx.scheduled + Nanos::from_secs_f64(GAP_S);
+        let exerted = devices::ForceCommand::until(Vec3::from(force_n), expires);
+        let outcome = self.device.write(exerted).map_or_else(degraded, |()| Outcome::Continue);
         let time = if self.missed_commands == 0 { command.time } else { ctx.scheduled };
         self.recorder.push(CommandSample { time, force_n, limits: actions.0 });
         outcome
@@ -124,7 +127,7 @@ impl Actor for DeviceActor {
 
     fn stop(&mut self, _: &TickContext) {
         // A device that is gone cannot be told; there is nobody left to report to.
-        let _ = self.device.write(Vec3::zeros());
+        let _ = self.device.write(devices::ForceCommand::ZERO);
     }
 }
 
@@ -132,23 +135,21 @@ impl Actor for DeviceActor {
 /// body, and the first local model is built around it.
 ///
 /// # Errors
-/// [`ErrorKind::Device`] if it gives none or one that is not finite.
+/// [`ErrorKind::Device`] if it is not calibrated, gives none or one that is not finite.
 ///
 /// # Real-time
 /// Not called in a tick: an error allocates.
 pub fn first_state(device: &mut dyn Device) -> Result<DeviceState, Error> {
-    let message = match device.read(Nanos::ZERO) {
-        Ok(state) if is_finite(&state) => return Ok(state),
-        Ok(_) => "its first state is not finite".to_owned(),
-        Err(fault) => format!("no first state: {fault}"),
+    let message = match (device.calibration(), device.read(Nanos::ZERO)) {
+        (Calibration::Needed, _) => "it is not calibrated: calibrate it, then start again".to_owned(),
+        (Calibration::Running, _) => "it is being calibrated: start again when that is done".to_owned(),
+        (_, Ok(state)) if state.is_finite() => return Ok(state),
+        (_, Ok(_)) => "its first state is not finite".to_owned(),
+        (_, Err(fault)) => format!("no first state: {fault}"),
     };
     Err(Error::new(ErrorKind::Device, message).at(format!("device `{}`", device.name())))
 }
 
 fn degraded(fault: DeviceFault) -> Outcome {
     Outcome::Degraded(Cause::Device(fault).code())
-}
-
-fn is_finite(state: &DeviceState) -> bool {
-    state.position.iter().chain(state.velocity.iter()).all(|c| c.is_finite())
 }

@@ -24,7 +24,11 @@ pub struct ToolTick {
     pub position: Vec3,
 }
 
-/// The newest force for the device.
+/// The newest force for the device, as the local model computed it. What is written is a
+/// [`devices::ForceCommand`](crate::devices::ForceCommand), after the safety pipeline and with an expiry.
+///
+/// # Real-time
+/// A plain value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ForceCommand {
     /// End of the tick that it belongs to.

@@ -52,6 +52,9 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
         let folder = args.scene.parent().unwrap_or(Path::new(""));
         output::refuse_to_overwrite(&folder.join(path_csv), &args.out)?;
     }
+    if let Some(log) = &scene.device.log {
+        output::refuse_to_overwrite(log, &args.out)?;
+    }
     let name = args.scene.display().to_string();
     if let Some(model) = args.model {
         scene = scene.with_model(model);

@@ -1,6 +1,7 @@
 //! A tool that follows a path and ignores the force.
 
-use super::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
+use super::device::take_nothing;
+use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use crate::model::Vec3;
 use crate::time::Nanos;
 
@@ -11,16 +12,20 @@ use crate::time::Nanos;
 #[derive(Clone, Debug)]
 pub struct Scripted {
     path: ToolPath,
+    capabilities: Capabilities,
     last: Option<(Nanos, Vec3)>,
 }
 
 impl Scripted {
-    /// The largest force of the device that the paper used, Phantom Premium 1.5 (N).
-    const MAX_FORCE_N: f64 = 8.5;
-
-    /// A tool on `path`; past its end it holds the last sample.
+    /// A tool on `path`; past its end it holds the last sample. Its limits are those of the paper's device.
     pub fn new(path: ToolPath) -> Self {
-        Self { path, last: None }
+        Self { path, capabilities: Capabilities::PHANTOM_PREMIUM, last: None }
+    }
+
+    /// The same with the limits of another device.
+    #[must_use]
+    pub fn with_capabilities(self, capabilities: Capabilities) -> Self {
+        Self { capabilities, ..self }
     }
 }
 
@@ -30,7 +35,7 @@ impl Device for Scripted {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: Self::MAX_FORCE_N }
+        self.capabilities
     }
 
     fn exerts_force(&self) -> bool {
@@ -47,7 +52,7 @@ impl Device for Scripted {
         Ok(DeviceState { position, velocity, buttons: 0 })
     }
 
-    fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
-        Ok(())
+    fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {
+        take_nothing(command)
     }
 }

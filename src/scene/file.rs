@@ -6,6 +6,7 @@ use toml::de::DeTable;
 
 use super::fault::{Fault, plain_key};
 use super::locate::{exact_offset_of, line_of, offset_of, table_at};
+use super::validate_device::tool;
 use super::{Scene, ToolPath, reader};
 use crate::error::{Error, ErrorKind};
 
@@ -25,15 +26,17 @@ impl Scene {
         Self::from_toml(&text, &name, path.parent())
     }
 
-    /// The scene in `text`; `name` stands for the file in errors, and `device.path_csv` is found in the folder `base`, or
-    /// in the current one.
+    /// The scene in `text`; `name` stands for the file in errors, and `device.path_csv` and `device.log` are found in the
+    /// folder `base`, or in the current one.
     ///
     /// # Errors
     /// As [`load`](Self::load).
     pub fn from_toml(text: &str, name: &str, base: Option<&Path>) -> Result<Self, Error> {
-        Self::from_toml_with(text, name, |path_csv| {
-            ToolPath::read_csv(&base.map_or_else(|| path_csv.to_owned(), |base| base.join(path_csv)))
-        })
+        let found = |file: &Path| base.map_or_else(|| file.to_owned(), |base| base.join(file));
+        let mut scene = Self::from_toml_with(text, name, |path_csv| ToolPath::read_csv(&found(path_csv)))?;
+        // It is read when a session is built.
+        scene.device.log = scene.device.log.map(|log| found(&log));
+        Ok(scene)
     }
 
     /// As [`from_toml`](Self::from_toml), with the tool's path fetched by `read_path`.
@@ -59,7 +62,7 @@ impl Scene {
             })?;
             scene.device.path = Some(read);
         }
-        scene.validate().and_then(|()| scene.check_tool()).map_err(|error| {
+        scene.validate().and_then(|()| tool(&scene.device)).map_err(|error| {
             let offset = offset_of(root, error.place());
             on_line(error, offset)
         })?;
@@ -100,15 +103,6 @@ impl Scene {
         let scene = Self::parse(text, name)?;
         scene.validate().map_err(|error| error.at(name))?;
         Ok(scene)
-    }
-
-    /// A scene file must move its tool itself; a program may bring a device of its own.
-    fn check_tool(&self) -> Result<(), Error> {
-        if self.device.path.is_none() && self.device.attach_node.is_none() {
-            let message = "has no tool, give path_csv (a file t_s,x_m,y_m,z_m), attach_node or both";
-            return Err(Error::scene("device", message));
-        }
-        Ok(())
     }
 }
 

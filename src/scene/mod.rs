@@ -10,8 +10,10 @@ mod check;
 mod choice;
 mod contact;
 mod device;
+mod device_fault;
 mod models;
 mod validate;
+mod validate_device;
 
 #[cfg(feature = "scene")]
 mod demo;
@@ -32,10 +34,11 @@ pub use body::{BlockSpec, BodyKind, BodySpec, MaterialSpec};
 pub use choice::ModelChoice;
 pub use contact::{ContactSpec, Friction};
 
-pub use crate::devices::ToolPath;
+pub use crate::devices::{Axis, HandSpec, PlantSpec, SafetyStop, ToolPath};
 pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
-pub use device::{DeviceKind, DeviceSpec, SafetySpec};
+pub use device::{DeviceKind, DeviceProfile, DeviceSpec, SafetySpec};
+pub use device_fault::{FaultKind, FaultSpec};
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
 
 /// Everything a run needs to know.

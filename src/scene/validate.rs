@@ -2,8 +2,8 @@
 
 use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 use super::{
-    BlendKind, BlockSpec, BodySpec, DeviceSpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec,
-    LocalModelKind, LocalSpec, ModelChoice, SafetySpec, Scene, StepKind,
+    BlendKind, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec, LocalModelKind,
+    LocalSpec, ModelChoice, SafetySpec, Scene, StepKind, validate_device,
 };
 use crate::error::Error;
 use crate::time::Rate;
@@ -42,7 +42,7 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
             "\"implicit\" has the corrected contact equations only, leave it out or use equations = \"corrected\"";
         return Err(Error::scene("local.step", message));
     }
-    device(&scene.device)?;
+    validate_device::device(&scene.device)?;
     safety(&scene.safety)?;
     if let Some(spec) = &scene.initial {
         lengths_within("initial.pull.offset_m", spec.pull.offset_m, MAX_LENGTH_M)?;
@@ -236,14 +236,6 @@ fn patch(patch: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
             "is {patch:?}, {nodes} nodes, must be at most {MAX_PATCH_NODES}: its tangent is dense; use model = \"full\""
         );
         return Err(Error::scene("local.patch", message));
-    }
-    Ok(())
-}
-
-fn device(device: &DeviceSpec) -> Result<(), Error> {
-    if device.path_csv.is_some() && device.path.is_none() {
-        let message = "was not read, use Scene::load, or set device.path to a ToolPath";
-        return Err(Error::scene("device.path_csv", message));
     }
     Ok(())
 }

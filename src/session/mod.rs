@@ -18,6 +18,7 @@ mod builder;
 mod checks;
 mod choice;
 mod compare;
+mod device;
 mod disturbed;
 mod global;
 mod graph;

@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use super::budget::{self, nominal_evaluation};
 use super::checks::{check_body, check_nodes, check_ramp};
 use super::choice::{Choice, choose};
+use super::device;
 use super::disturbed::Disturbed;
 use super::graph::groups;
 use super::horizon::{horizon, lateness};
 use super::rate_groups::{check_group, global_group, local_group};
 use super::situation::Situation;
 use super::substeps::substeps;
-use crate::devices::{Device, Scripted, ToolPath};
-use crate::error::{Error, ErrorKind};
+use crate::devices::Device;
+use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::blend::Blend;
 use crate::model::body::{Block, Body, State};
@@ -48,6 +49,8 @@ pub(super) struct Parts {
     pub measures_cost: bool,
     pub endless: bool,
     pub disturbed: Disturbed,
+    /// The device gives the samples of the very run that is executed again.
+    pub is_replay: bool,
 }
 
 impl Parts {
@@ -68,6 +71,7 @@ impl Parts {
             keep_records: false,
             measures_cost: false,
             disturbed: Disturbed::default(),
+            is_replay: false,
         }
     }
 }
@@ -182,8 +186,10 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let mut as_run = as_run(&scene, Some((attach, &probes)));
     let device = match parts.device {
         Some(device) => device,
-        None => scripted(scene.device.path, attach.map(|node| state.positions[node as usize]))?,
+        None => device::device(&scene.device, attach.map(|node| state.positions[node as usize]))?,
     };
+    // What is executed again has met them already.
+    let device = if parts.is_replay { device } else { device::with_faults(device, &scene.device) };
     let exerts_force = device.exerts_force();
     let law = Law {
         friction: scene.contact.friction.coefficient(),
@@ -262,7 +268,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
 pub(super) fn as_run(scene: &Scene, named: Option<(Option<u32>, &[u32])>) -> Scene {
     let mut scene = scene.clone();
     scene.source = None;
-    (scene.device.path_csv, scene.device.path) = (None, None);
+    (scene.device.path_csv, scene.device.path, scene.device.log) = (None, None, None);
     if let (Some(body), Some((attach, probes))) = (&scene.body, named) {
         let lattice = Lattice { nodes: body.block.nodes };
         scene.device.attach_node = attach.map(|node| lattice.place(node));
@@ -296,27 +302,4 @@ fn glued(body: &dyn Body, node: u32) -> Contact {
     let triangle = body.surface().at_node(node)[0];
     let weights = body.surface().triangles[triangle as usize].map(|corner| f64::from(u8::from(corner == node)));
     Contact::glued(triangle, weights)
-}
-
-/// A glued tool that starts farther from its node would tear it there in the first tick (m).
-const LARGEST_START_GAP: f64 = 1e-3;
-
-/// A tool that follows `path`, or stays where the node that it is glued to is at the start.
-fn scripted(path: Option<ToolPath>, glued_at: Option<Vec3>) -> Result<Box<dyn Device>, Error> {
-    let path = match (path, glued_at) {
-        (Some(path), Some(node)) if (Vec3::from(path.at(0.0)) - node).norm() > LARGEST_START_GAP => {
-            let gap = (Vec3::from(path.at(0.0)) - node).norm();
-            let place: [f64; 3] = node.into();
-            let message =
-                format!("starts {gap} m away from the node that the tool is glued to, must start at {place:?}");
-            return Err(Error::scene("device.path_csv", message));
-        }
-        (Some(path), _) => path,
-        (None, Some(position)) => ToolPath::constant(position.into())?,
-        (None, None) => {
-            let message = "nothing moves the tool: give it a path_csv, an attach_node or a device of the program's own";
-            return Err(Error::new(ErrorKind::Scene, message).at("device"));
-        }
-    };
-    Ok(Box::new(Scripted::new(path)))
 }

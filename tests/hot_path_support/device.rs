@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
 use palpate::model::Vec3;
 use palpate::runtime::exchange::ExchangeWriter;
 use palpate::time::Nanos;
@@ -101,7 +101,7 @@ impl Device for GuardedDevice {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: 4.0 }
+        Capabilities { max_force_n: 4.0, ..Capabilities::default() }
     }
 
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
@@ -123,7 +123,7 @@ impl Device for GuardedDevice {
         Ok(DeviceState { position: tool(time.as_secs_f64()), ..DeviceState::default() })
     }
 
-    fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
+    fn write(&mut self, _: ForceCommand) -> Result<(), DeviceFault> {
         Ok(())
     }
 }

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use super::Session;
 use super::prepare::{Parts, as_run, prepare};
-use crate::devices::Replayed;
+use crate::devices::{Capabilities, Replayed};
 use crate::error::{Error, ErrorKind};
 use crate::runtime::{Execution, Recording, RuntimeReport};
 use crate::scene::ModelChoice;
@@ -69,8 +69,12 @@ impl Replay {
         if parts.scene.local.model == ModelChoice::Auto {
             parts.scene.local.model = logged.scene.local.model;
         }
-        parts.device =
-            Some(Box::new(Replayed::new(logged.first, logged.samples, max_force_n.unwrap_or(f64::INFINITY))));
+        let capabilities = Capabilities {
+            max_force_n: max_force_n.unwrap_or(f64::INFINITY),
+            ..logged.scene.device.profile.capabilities()
+        };
+        parts.device = Some(Box::new(Replayed::new(logged.first, logged.samples, capabilities)));
+        parts.is_replay = true;
         parts.execution = Execution::Virtual;
         // How far models reach ahead, and the bases that were wished for, are part of the recording.
         parts.in_real_time = logged.in_real_time;

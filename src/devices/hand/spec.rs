@@ -1,0 +1,215 @@
+//! The parameters of a simulated device and of the hand that holds it.
+
+/// What is wrong with a parameter: its name and what would be right.
+pub(crate) type SpecFault = (&'static str, String);
+
+/// An axis of space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum Axis {
+    /// The first.
+    X,
+    /// The second.
+    Y,
+    /// The third.
+    Z,
+}
+
+/// A simulated device: a mass with friction along each axis, and what lies between its motors and sensors and the program.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+pub struct PlantSpec {
+    /// Moving mass m (kg).
+    pub mass_kg: f64,
+    /// Viscous friction b (N s/m).
+    pub damping_n_s_per_m: f64,
+    /// Coulomb friction F_c of each axis (N): below it the device sticks.
+    pub friction_n: f64,
+    /// A constant force, such as a weight that nothing balances (N).
+    pub bias_n: [f64; 3],
+    /// The axes along which it moves; it stands still along the others.
+    pub axes: Vec<Axis>,
+    /// Where it starts, at rest (m); where the hand wants to be if absent.
+    pub start_m: Option<[f64; 3]>,
+    /// Step of the position that it tells (m); 0 for none.
+    pub encoder_step_m: f64,
+    /// Cut-off of the low-pass filter over the differences of position that it tells as velocity (Hz); none if absent.
+    pub velocity_cutoff_hz: Option<f64>,
+    /// From a command to the motors (ms). A delay on the way of the state has the same effect on a loop: add it.
+    pub delay_ms: f64,
+    /// What is added to the delay of each command at most (ms), evenly spread; no command overtakes another.
+    pub jitter_ms: f64,
+    /// Seed of the jitter.
+    pub seed: u64,
+    /// Longest step of the integration (ms).
+    pub step_ms: f64,
+}
+
+impl Default for PlantSpec {
+    /// A small device of 100 g with an encoder step of 30 um, without delay.
+    fn default() -> Self {
+        Self {
+            mass_kg: 0.1,
+            damping_n_s_per_m: 0.1,
+            friction_n: 0.05,
+            bias_n: [0.0; 3],
+            axes: vec![Axis::X, Axis::Y, Axis::Z],
+            start_m: None,
+            encoder_step_m: 30e-6,
+            velocity_cutoff_hz: Some(100.0),
+            delay_ms: 0.0,
+            jitter_ms: 0.0,
+            seed: 0,
+            step_ms: 0.1,
+        }
+    }
+}
+
+/// Beyond this a transport is broken, not slow (ms).
+const LONGEST_DELAY_MS: f64 = 100.0;
+/// A step of the integration (ms): finer ones cost more than a tick, coarser ones hide the device.
+const STEP_MS: std::ops::RangeInclusive<f64> = 0.001..=10.0;
+
+impl PlantSpec {
+    pub(crate) fn fault(&self) -> Option<SpecFault> {
+        let not_negative = [
+            ("damping_n_s_per_m", self.damping_n_s_per_m),
+            ("friction_n", self.friction_n),
+            ("encoder_step_m", self.encoder_step_m),
+            ("delay_ms", self.delay_ms),
+            ("jitter_ms", self.jitter_ms),
+        ];
+        if let Some(fault) = not_positive("mass_kg", self.mass_kg) {
+            return Some(fault);
+        }
+        if let Some(fault) = not_negative.into_iter().find_map(|(field, value)| negative(field, value)) {
+            return Some(fault);
+        }
+        for (field, value) in [("bias_n", Some(self.bias_n)), ("start_m", self.start_m)] {
+            if let Some(value) = value.filter(|value| !value.iter().all(|c| c.is_finite())) {
+                return Some((field, format!("is {value:?}, must be three finite numbers")));
+            }
+        }
+        if self.axes.is_empty() {
+            return Some(("axes", "is empty, name at least one of \"x\", \"y\" and \"z\"".to_owned()));
+        }
+        if let Some(fault) = self.velocity_cutoff_hz.and_then(|hz| not_positive("velocity_cutoff_hz", hz)) {
+            return Some(fault);
+        }
+        if self.delay_ms + self.jitter_ms > LONGEST_DELAY_MS {
+            let (delay_ms, jitter_ms) = (self.delay_ms, self.jitter_ms);
+            let message =
+                format!("and jitter_ms are {delay_ms} and {jitter_ms}, must be {LONGEST_DELAY_MS} ms at most");
+            return Some(("delay_ms", message));
+        }
+        if !STEP_MS.contains(&self.step_ms) {
+            let message = format!("is {}, must be {} to {} ms", self.step_ms, STEP_MS.start(), STEP_MS.end());
+            return Some(("step_ms", message));
+        }
+        None
+    }
+}
+
+/// A hand that holds the device: its mass moves with the device, and a spring draws both to where it wants to be.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+pub struct HandSpec {
+    /// Mass of hand and arm that moves with the device (kg).
+    pub mass_kg: f64,
+    /// Its damping, against rest (N s/m).
+    pub damping_n_s_per_m: f64,
+    /// Stiffness of the spring to the intended place (N/m).
+    pub stiffness_n_per_m: f64,
+    /// How firmly it holds over time: rows of time (s) and level. The level multiplies mass, damping and stiffness; linear
+    /// in between, held outside; 1 throughout if empty.
+    pub grip: Vec<[f64; 2]>,
+    /// When it lets go for good (s); never if absent.
+    pub release_s: Option<f64>,
+}
+
+impl Default for HandSpec {
+    /// A light grip.
+    fn default() -> Self {
+        Self { mass_kg: 0.1, damping_n_s_per_m: 4.0, stiffness_n_per_m: 300.0, grip: Vec::new(), release_s: None }
+    }
+}
+
+impl HandSpec {
+    pub(crate) fn fault(&self) -> Option<SpecFault> {
+        let numbers = [
+            ("mass_kg", self.mass_kg),
+            ("damping_n_s_per_m", self.damping_n_s_per_m),
+            ("stiffness_n_per_m", self.stiffness_n_per_m),
+            ("release_s", self.release_s.unwrap_or_default()),
+        ];
+        if let Some(fault) = numbers.into_iter().find_map(|(field, value)| negative(field, value)) {
+            return Some(fault);
+        }
+        let rows = self.grip.iter();
+        if let Some(row) = rows.clone().find(|row| !row.iter().all(|value| value.is_finite() && *value >= 0.0)) {
+            return Some(("grip", format!("has the row {row:?}, time (s) and level must be finite and at least 0")));
+        }
+        let unordered = self.grip.windows(2).find(|pair| pair[1][0] <= pair[0][0]);
+        unordered.map(|pair| ("grip", format!("has {} s after {} s, times must increase", pair[1][0], pair[0][0])))
+    }
+
+    /// How firmly it holds at `time_s` (s).
+    pub(super) fn level_at(&self, time_s: f64) -> f64 {
+        let next = self.grip.partition_point(|row| row[0] <= time_s);
+        match (next.checked_sub(1).and_then(|last| self.grip.get(last)), self.grip.get(next)) {
+            (None, None) => 1.0,
+            (Some(row), None) | (None, Some(row)) => row[1],
+            (Some([from_s, from]), Some([to_s, to])) => from + (to - from) * (time_s - from_s) / (to_s - from_s),
+        }
+    }
+}
+
+fn not_positive(field: &'static str, value: f64) -> Option<SpecFault> {
+    let is_good = value.is_finite() && value > 0.0;
+    (!is_good).then(|| (field, format!("is {value}, must be a finite number above 0")))
+}
+
+fn negative(field: &'static str, value: f64) -> Option<SpecFault> {
+    let is_good = value.is_finite() && value >= 0.0;
+    (!is_good).then(|| (field, format!("is {value}, must be a finite number of at least 0")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_grip_is_linear_between_its_rows_and_held_outside() {
+        let hand = HandSpec { grip: vec![[1.0, 1.0], [2.0, 0.2]], ..HandSpec::default() };
+        let levels = [0.0, 1.0, 1.5, 2.0, 9.0].map(|time_s| hand.level_at(time_s));
+        assert_eq!(levels, [1.0, 1.0, 0.6, 0.2, 0.2]);
+        assert_eq!(HandSpec::default().level_at(3.0), 1.0);
+    }
+
+    #[test]
+    fn what_cannot_be_is_named() {
+        let plant = PlantSpec::default();
+        for (bad, field) in [
+            (PlantSpec { mass_kg: 0.0, ..plant.clone() }, "mass_kg"),
+            (PlantSpec { friction_n: -0.1, ..plant.clone() }, "friction_n"),
+            (PlantSpec { bias_n: [0.0, f64::NAN, 0.0], ..plant.clone() }, "bias_n"),
+            (PlantSpec { axes: Vec::new(), ..plant.clone() }, "axes"),
+            (PlantSpec { start_m: Some([f64::INFINITY; 3]), ..plant.clone() }, "start_m"),
+            (PlantSpec { velocity_cutoff_hz: Some(0.0), ..plant.clone() }, "velocity_cutoff_hz"),
+            (PlantSpec { jitter_ms: 101.0, ..plant.clone() }, "delay_ms"),
+            (PlantSpec { step_ms: 0.0, ..plant.clone() }, "step_ms"),
+        ] {
+            assert_eq!(bad.fault().map(|fault| fault.0), Some(field));
+        }
+        let hand = HandSpec::default();
+        for (bad, field) in [
+            (HandSpec { stiffness_n_per_m: f64::NAN, ..hand.clone() }, "stiffness_n_per_m"),
+            (HandSpec { release_s: Some(-1.0), ..hand.clone() }, "release_s"),
+            (HandSpec { grip: vec![[0.0, -1.0]], ..hand.clone() }, "grip"),
+            (HandSpec { grip: vec![[1.0, 1.0], [1.0, 0.5]], ..hand.clone() }, "grip"),
+        ] {
+            assert_eq!(bad.fault().map(|fault| fault.0), Some(field));
+        }
+        assert_eq!((plant.fault(), hand.fault()), (None, None));
+    }
+}

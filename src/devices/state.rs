@@ -1,0 +1,77 @@
+//! What goes to and fro between a run and a device: newest state, force with an expiry, calibration.
+
+use crate::model::Vec3;
+use crate::time::Nanos;
+
+/// The newest state of a device.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DeviceState {
+    /// Tool position (m).
+    pub position: Vec3,
+    /// Tool velocity (m/s).
+    pub velocity: Vec3,
+    /// Pressed buttons, a bit each.
+    pub buttons: u16,
+}
+
+impl DeviceState {
+    /// True if every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.position.iter().chain(self.velocity.iter()).all(|c| c.is_finite())
+    }
+}
+
+/// A force for a device and how long it may act.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceCommand {
+    /// Force on the tool (N).
+    pub force: Vec3,
+    /// From this time on, on the clock of [`Device::read`](super::Device::read), the force is zero unless another command
+    /// came. A device that has a clock of its own sees to that itself, so that nothing stays when nobody drives it.
+    pub expires: Nanos,
+}
+
+impl ForceCommand {
+    /// No force, for good.
+    pub const ZERO: Self = Self { force: Vec3::new(0.0, 0.0, 0.0), expires: Nanos(u64::MAX) };
+
+    /// `force` (N) until `expires`.
+    pub fn until(force: Vec3, expires: Nanos) -> Self {
+        Self { force, expires }
+    }
+
+    /// True if every number of the force is finite.
+    pub fn is_finite(&self) -> bool {
+        self.force.iter().all(|c| c.is_finite())
+    }
+
+    /// The force at `time` (N): zero from the expiry on.
+    pub fn at(&self, time: Nanos) -> Vec3 {
+        if time < self.expires { self.force } else { Vec3::zeros() }
+    }
+}
+
+impl Default for ForceCommand {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
+/// Whether a device knows where it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Calibration {
+    /// It does, or has no need to.
+    #[default]
+    Done,
+    /// It is finding out; its reads are [`NotReady`](super::DeviceFault::NotReady) until then.
+    Running,
+    /// Somebody has to do it; its reads are [`NotReady`](super::DeviceFault::NotReady) until then.
+    Needed,
+}

@@ -1,0 +1,188 @@
+//! Simulated device and hand in a session: against an independent implementation, repeated, replayed, and failing.
+#![cfg(feature = "scene")]
+
+mod common;
+
+use std::path::Path;
+
+use common::{reference, rms_percent};
+use palpate::log::LogRecord;
+use palpate::model::Vec3;
+use palpate::prelude::Session;
+use palpate::scene::{FaultKind, FaultSpec, LocalModelKind, Scene};
+use palpate::session::Summary;
+
+fn load(name: &str) -> Scene {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("toml")).unwrap()
+}
+
+fn run(scene: Scene) -> Summary {
+    Session::from_scene(scene).virtual_time().keep_records().build().unwrap().run().unwrap()
+}
+
+fn forces(summary: &Summary) -> Vec<Vec3> {
+    let force = |record: &LogRecord| if let LogRecord::Force(row) = record { Some(row.force_n.into()) } else { None };
+    summary.records.iter().filter_map(force).collect()
+}
+
+fn tools(summary: &Summary) -> Vec<Vec3> {
+    let tool = |record: &LogRecord| if let LogRecord::Tool(row) = record { Some(row.position_m.into()) } else { None };
+    summary.records.iter().filter_map(tool).collect()
+}
+
+/// Energy that the simulation absorbed (J), as the reference counts it: the force of the tick before, along the mean of
+/// the velocities at both ends.
+fn absorbed(tools: &[Vec3], forces: &[Vec3]) -> f64 {
+    let dt = 1e-3;
+    let velocity = |n: usize| if n == 0 { 0.0 } else { (tools[n].z - tools[n - 1].z) / dt };
+    let work = |n: usize| forces[n - 1].z * 0.5 * (velocity(n) + velocity(n + 1)) * dt;
+    -(1..tools.len() - 1).map(work).sum::<f64>()
+}
+
+#[test]
+fn a_hand_that_presses_and_lets_go_feels_the_reference_force() {
+    let rows = reference("hand_release");
+    let summary = run(load("hand_release").with_model(LocalModelKind::Full));
+    let (forces, tools) = (forces(&summary), tools(&summary));
+    let (forces, tools) = (&forces[..rows.len()], &tools[..=rows.len()]);
+    let expected: Vec<Vec3> = rows.iter().map(|row| Vec3::z() * row[2]).collect();
+    let along: Vec<Vec3> = forces.iter().map(|force| Vec3::z() * force.z).collect();
+    let rms = rms_percent(&along, &expected);
+    let farthest = tools[1..].iter().zip(&rows).map(|(tool, row)| (tool.z - row[1]).abs()).fold(0.0, f64::max);
+    let energy = (absorbed(tools, forces), rows[rows.len() - 1][3]);
+    println!("hand_release: force {rms:.4} % rms, place within {:.2} um, energy {energy:?} J", farthest * 1e6);
+    assert!(rms <= 2.0, "{rms} %");
+    assert!(farthest <= 0.02 * 0.011, "{farthest} m, of 11 mm of motion");
+    assert!((energy.0 - energy.1).abs() <= 0.02 * energy.1, "{energy:?} J");
+    // Check that the run is the reference's: along z only, and nothing between force and device but the clamp.
+    assert!(tools.iter().all(|tool| (tool.x, tool.y) == (0.0475, 0.0512)));
+    let limits = |record: &LogRecord| match record {
+        LogRecord::Command(row) if row.time.as_secs_f64() <= 2.4 => Some(row.limits),
+        _ => None,
+    };
+    let limits: Vec<u16> = summary.records.iter().filter_map(limits).collect();
+    assert_eq!(limits, vec![0; rows.len()], "{summary}");
+}
+
+#[test]
+fn a_run_with_a_hand_is_the_same_every_time() {
+    let mut scene = load("device_faults");
+    scene.run.duration_s = 0.9;
+    let [one, other] = [0, 1].map(|_| run(scene.clone()));
+    assert_eq!((forces(&one), tools(&one)), (forces(&other), tools(&other)));
+    // Another seed of jitter and losses is another run.
+    scene.device.plant.seed = 2;
+    assert_ne!(tools(&run(scene)), tools(&one));
+}
+
+#[test]
+fn faults_act_on_the_scripted_tool_too_and_only_while_they_last() {
+    let mut scene = load("drag_slip").with_model(LocalModelKind::Full);
+    scene.run.duration_s = 0.5;
+    let without = tools(&run(scene.clone()));
+    scene.device.faults = vec![FaultSpec::new(FaultKind::Frozen, 0.2, 0.21)];
+    let with = tools(&run(scene));
+    let differing: Vec<usize> = (0..501).filter(|&tick| with[tick] != without[tick]).collect();
+    assert_eq!(differing, (200..210).collect::<Vec<_>>());
+}
+
+#[cfg(feature = "log")]
+mod logged {
+    use super::*;
+    use palpate::actors::Cause;
+    use palpate::devices::{DeviceFault, SafetyStop};
+    use palpate::log::{LogEntry, LogReader};
+    use palpate::scene::DeviceKind;
+
+    fn commands(summary: &Summary) -> Vec<(u64, Vec3)> {
+        let command = |record: &LogRecord| match record {
+            LogRecord::Command(row) => Some((row.time.0 / 1_000_000, row.force_n.into())),
+            _ => None,
+        };
+        summary.records.iter().filter_map(command).collect()
+    }
+
+    fn recorded(scene: Scene, folder: &Path) -> (Summary, std::path::PathBuf) {
+        let log = folder.join("hand.mcap");
+        let builder = Session::from_scene(scene).virtual_time().keep_records().log(&log);
+        (builder.build().unwrap().run().unwrap(), log)
+    }
+
+    #[test]
+    fn a_failing_device_gets_finite_forces_within_their_limits_and_every_fault_is_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let (summary, log) = recorded(load("device_faults"), folder.path());
+        let mut last = Vec3::zeros();
+        for (tick, force) in commands(&summary) {
+            assert!(
+                force.iter().all(|c| c.is_finite()) && force.norm() <= 7.9 * (1.0 + 1e-12),
+                "{force:?} N at {tick} ms"
+            );
+            assert!((force - last).norm() <= 0.5 * (1.0 + 1e-9), "{force:?} N after {last:?} N at {tick} ms");
+            last = force;
+        }
+        let told = |entry| if let LogEntry::Text(event) = entry { Some(event.message) } else { None };
+        let told: Vec<String> = LogReader::open(&log).unwrap().filter_map(told).collect();
+        for cause in [
+            Cause::Device(DeviceFault::Stale),
+            Cause::DeviceNotFinite,
+            Cause::Device(DeviceFault::Disconnected),
+            Cause::Device(DeviceFault::SafetyStop(SafetyStop::Stall)),
+        ] {
+            let words = Cause::describe(cause.code()).unwrap();
+            assert!(told.iter().any(|message| message.contains(words)), "{words}: {told:?}");
+        }
+        // 50 or so lost frames, 20 that are no numbers, 200 without a cable, 100 after the stop.
+        let degraded = summary.runtime.groups[0].degraded;
+        assert!((350..390).contains(&degraded), "{degraded}");
+        assert_eq!(summary.runtime.fault, None);
+        // Check that it had something to hold.
+        assert!(summary.report.force.peak_n > 0.5, "{summary}");
+    }
+
+    #[test]
+    fn a_log_of_a_hand_is_executed_again_bit_for_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scene = load("device_faults");
+        scene.run.duration_s = 1.5;
+        let (_, log) = recorded(scene, folder.path());
+        let report = Session::replay(&log).unwrap().run().unwrap();
+        assert_eq!(report.first_difference, None);
+        assert!(report.force.logged > 1400 && report.force.identical == report.force.logged, "{report:?}");
+    }
+
+    // Check that the tool of a log moves another model as it moved its own, and that at another rate it is on the same way.
+    #[test]
+    fn a_scene_replays_the_tool_of_a_log() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scene = load("hand_release");
+        scene.run.duration_s = 0.5;
+        let (summary, log) = recorded(scene.clone(), folder.path());
+        scene.device = palpate::scene::DeviceSpec {
+            kind: DeviceKind::Replay,
+            log: Some(log),
+            ..palpate::scene::DeviceSpec::default()
+        };
+        let again = run(scene.clone());
+        assert_eq!(tools(&again)[..501], tools(&summary)[..501]);
+        assert_eq!(forces(&again)[..500], forces(&summary)[..500]);
+        scene.local.rate_hz = 2000.0;
+        let finer = tools(&run(scene));
+        assert!((0..500).all(|tick| (finer[2 * tick] - tools(&summary)[tick]).norm() < 1e-12));
+    }
+
+    #[test]
+    fn a_scene_that_names_no_log_or_a_bad_one_is_refused_with_its_field() {
+        let mut scene = load("hand_release");
+        scene.device = palpate::scene::DeviceSpec {
+            kind: DeviceKind::Replay,
+            log: Some("nowhere.mcap".into()),
+            ..palpate::scene::DeviceSpec::default()
+        };
+        let error = Session::from_scene(scene.clone()).virtual_time().build().unwrap_err().to_string();
+        assert!(error.starts_with("device.log: nowhere.mcap"), "{error}");
+        scene.device.log = None;
+        let error = Session::from_scene(scene).virtual_time().build().unwrap_err().to_string();
+        assert!(error.starts_with("device.log: is missing"), "{error}");
+    }
+}
