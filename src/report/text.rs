@@ -91,6 +91,10 @@ fn about(page: &mut Page, environment: &Environment) {
         page.wrapped("model", &format!("{}: {}", environment.model, reason.why));
         reason.warning.iter().for_each(|warning| page.wrapped("warning", warning));
     }
+    if !environment.safety_off.is_empty() {
+        page.wrapped("SAFETY OFF", &environment.safety_off.join(", "));
+    }
+    environment.coupling.iter().for_each(|design| page.wrapped("coupling", design));
     for (i, (what, granted)) in environment.granted.iter().take(GRANT_LINES).enumerate() {
         page.wrapped(if i == 0 { "granted" } else { "" }, &format!("{what}: {granted}"));
     }
@@ -171,6 +175,14 @@ fn haptics(page: &mut Page, report: &RunReport) {
     page.named(
         "force",
         format!("peak {}, commanded {}{not_finite}", force(report.force.peak_n), force(report.force.peak_commanded_n)),
+    );
+    let energy = report.limits.energy;
+    page.named(
+        "energy",
+        format!(
+            "ledger least {:.2e} J, end {:.2e} J; tank least {:.2e} J",
+            energy.least_j, energy.last_j, energy.least_tank_j
+        ),
     );
     if report.limits.limited > 0 {
         let stages = report.limits.stages.iter().map(|(name, count)| format!("{name} {count}"));

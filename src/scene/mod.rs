@@ -11,6 +11,7 @@ mod choice;
 mod contact;
 mod device;
 mod models;
+mod safety;
 mod validate;
 
 #[cfg(feature = "scene")]
@@ -35,8 +36,9 @@ pub use contact::{ContactSpec, Friction};
 pub use crate::devices::ToolPath;
 pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
-pub use device::{DeviceKind, DeviceSpec, SafetySpec};
+pub use device::{DeviceKind, DeviceSpec};
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
+pub use safety::{SafetySpec, SafetyStage};
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug, PartialEq)]

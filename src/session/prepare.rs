@@ -8,6 +8,7 @@ use super::choice::{Choice, choose};
 use super::disturbed::Disturbed;
 use super::graph::groups;
 use super::rate_groups::{check_group, global_group, local_group};
+use super::safety;
 use super::situation::Situation;
 use super::substeps::substeps;
 use crate::devices::{Device, Scripted, ToolPath};
@@ -22,9 +23,10 @@ use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, RateGroup, admit_here};
 use crate::safety::Limits;
+use crate::safety::coupling::Design;
 #[cfg(feature = "scene")]
 use crate::scene::ProbeSpec;
-use crate::scene::{BodySpec, Equations, Feedback, InitialSpec, ModelChoice, Scene, StepKind};
+use crate::scene::{BodySpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind};
 use crate::time::{Nanos, Rate};
 
 /// What a builder has collected.
@@ -86,6 +88,10 @@ pub(super) struct Prepared {
     pub blend: Blend,
     pub device: Box<dyn Device>,
     pub limits: Limits,
+    /// Stages of the safety pipeline that the scene switched off.
+    pub safety_off: Vec<SafetyStage>,
+    /// Between device and simulated tool.
+    pub coupling: Option<Design>,
     pub probes: Vec<u32>,
     pub haptic: Rate,
     pub global_rate: Rate,
@@ -173,9 +179,11 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let contact = attach.map_or_else(Contact::default, |node| glued(&*body, node));
     #[cfg(feature = "scene")]
     let mut as_run = as_run(&scene, Some((attach, &probes)));
+    let tool_start = scene.device.path.as_ref().map(|path| Vec3::from(path.at(0.0)));
+    let tool_start = tool_start.or(attach.map(|node| state.positions[node as usize]));
     let device = match parts.device {
         Some(device) => device,
-        None => scripted(scene.device.path, attach.map(|node| state.positions[node as usize]))?,
+        None => scripted(scene.device.path.take(), attach.map(|node| state.positions[node as usize]))?,
     };
     let exerts_force = device.exerts_force();
     let law = Law {
@@ -183,16 +191,20 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         normals: scene.contact.normals,
         equations: scene.contact.equations,
     };
-    let limits = Limits {
-        max_force_n: scene.safety.max_force_n.unwrap_or(device.capabilities().max_force_n),
-        max_slew_n_per_s: scene.safety.max_slew_n_per_ms * 1e3,
-        ramp_s: scene.safety.ramp_ms * 1e-3,
-    };
+    let device_limits = safety::device_limits(&scene.safety, &device.capabilities());
+    let stored_j = safety::stored_energy(&mut *body, &state);
+    let resolved = safety::resolved(&scene, &device_limits);
+    let limits = safety::limits(&resolved, &device_limits, stored_j, tick);
     check_ramp(&limits)?;
+    let coupling = match scene.local.coupling {
+        true => Some(safety::coupling(&mut *body, tool_start.unwrap_or_default(), &device_limits, tick)?),
+        false => None,
+    };
+    let safety_off = resolved.off.clone();
     #[cfg(feature = "scene")]
     {
-        // The device's own limit too; one without a limit has none to note.
-        as_run.safety.max_force_n = limits.max_force_n.is_finite().then_some(limits.max_force_n);
+        // With what it left to the device.
+        as_run.safety = resolved;
     }
     let is_implicit = match scene.local.step {
         StepKind::Explicit => false,
@@ -227,6 +239,8 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         blend: Blend::new(scene.local.blend.kind, blend_ticks),
         device,
         limits,
+        safety_off,
+        coupling,
         probes,
         haptic,
         global_rate,
