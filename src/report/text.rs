@@ -176,18 +176,15 @@ fn haptics(page: &mut Page, report: &RunReport) {
         "force",
         format!("peak {}, commanded {}{not_finite}", force(report.force.peak_n), force(report.force.peak_commanded_n)),
     );
-    let energy = report.limits.energy;
-    page.named(
-        "energy",
-        format!(
-            "ledger least {:.2e} J, end {:.2e} J; tank least {:.2e} J",
-            energy.least_j, energy.last_j, energy.least_tank_j
-        ),
-    );
+    if report.limits.ticks > 0 {
+        let energy = report.limits.energy;
+        let [least, last, tank] = [energy.least_j, energy.last_j, energy.least_tank_j].map(|j| 1e3 * j);
+        page.named("energy", format!("ledger least {least:.3} mJ, end {last:.3} mJ; tank least {tank:.3} mJ"));
+    }
     if report.limits.limited > 0 {
         let stages = report.limits.stages.iter().map(|(name, count)| format!("{name} {count}"));
         let share = 100.0 * report.limits.share();
-        page.named("limits", format!("{} ({share:.2} % of ticks)", stages.collect::<Vec<_>>().join(", ")));
+        page.wrapped("limits", &format!("{} ({share:.2} % of ticks)", stages.collect::<Vec<_>>().join(", ")));
     }
 }
 

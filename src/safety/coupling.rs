@@ -29,6 +29,8 @@ pub struct Design {
     pub coupling: Coupling,
     /// Stiffness of the body under the tool, K_l (N/m).
     pub local_n_per_m: f64,
+    /// How stiff it is within one tick, masses and dampers included: what the simulated tool reckons with (N/m).
+    pub tick_n_per_m: f64,
     /// What the device feels, K (N/m).
     pub felt_n_per_m: f64,
     /// The largest stiffness that it may feel (N/m).
@@ -73,6 +75,7 @@ pub fn design(device: &DeviceLimits, local_n_per_m: f64, period_s: f64) -> Desig
     Design {
         coupling: Coupling { stiffness_n_per_m: stiffness, damping_n_s_per_m: damper },
         local_n_per_m,
+        tick_n_per_m: local_n_per_m,
         felt_n_per_m: felt,
         limit_n_per_m: limit,
         margin: b / (felt * (0.5 * period_s + device.delay_s) + damper),
@@ -93,12 +96,13 @@ impl std::fmt::Display for Design {
 
 /// A tool without mass that hangs on the device by a coupling.
 ///
-/// Each tick it stands where coupling and body would balance if the body's force went on from its last value with its known
-/// stiffness: implicit in both springs, so no choice of gains makes it oscillate by itself.
+/// Each tick it stands where coupling and body would balance if the body's force went on from its last value with its
+/// stiffness within a tick: implicit in both springs, so no choice of gains makes it swing by itself while the body is less
+/// than twice as stiff as that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoupledTool {
     gains: Coupling,
-    local_n_per_m: f64,
+    tick_n_per_m: f64,
     tool: [f64; 3],
     device: [f64; 3],
     /// The body's force on the tool in the last tick (N).
@@ -113,8 +117,8 @@ impl CoupledTool {
     /// Wait-free, real-time safe.
     pub fn new(design: &Design) -> Self {
         let zero = [0.0; 3];
-        let Design { coupling: gains, local_n_per_m, .. } = *design;
-        Self { gains, local_n_per_m, tool: zero, device: zero, force: zero, felt: zero }
+        let Design { coupling: gains, tick_n_per_m, .. } = *design;
+        Self { gains, tick_n_per_m, tool: zero, device: zero, force: zero, felt: zero }
     }
 
     /// Puts device and tool at `position` (m), without a force.
@@ -144,7 +148,7 @@ impl CoupledTool {
     pub fn lead(&mut self, device: [f64; 3], dt: f64) -> [f64; 3] {
         let Coupling { stiffness_n_per_m: k, damping_n_s_per_m: b } = self.gains;
         // In free space there is no body that could give way.
-        let local = if self.force == [0.0; 3] { 0.0 } else { self.local_n_per_m };
+        let local = if self.force == [0.0; 3] { 0.0 } else { self.tick_n_per_m };
         let (damper, from) = (b / dt, self.tool);
         for i in 0..3 {
             let with_device = from[i] + device[i] - self.device[i];
@@ -199,7 +203,8 @@ mod tests {
 
     #[test]
     fn a_held_tool_feels_both_springs_in_series_and_a_free_one_nothing() {
-        let design = design(&DeviceLimits::of_force(3.3), 300.0, 1e-3);
+        let mut design = design(&DeviceLimits::of_force(3.3), 300.0, 1e-3);
+        design.tick_n_per_m = 1500.0;
         let mut tool = CoupledTool::new(&design);
         tool.begin([0.0; 3]);
         let mut felt = [0.0; 3];

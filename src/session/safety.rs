@@ -2,9 +2,9 @@
 
 use crate::devices::Capabilities;
 use crate::error::Error;
-use crate::model::Vec3;
 use crate::model::body::{Body, State};
 use crate::model::equilibrium::static_equilibrium;
+use crate::model::{Mat3, Vec3};
 use crate::safety::coupling::{Design, design};
 use crate::safety::{DeviceLimits, Limits, ModelAge, Passivity, StartUp, Tank, ToolSpeed, Watchdog};
 use crate::scene::{SafetySpec, SafetyStage, Scene};
@@ -120,7 +120,22 @@ pub(super) fn coupling(
     let state = static_equilibrium(body, &[(node, at)]).map_err(|error| error.at("local.coupling"))?;
     let mut forces = vec![Vec3::zeros(); state.positions.len()];
     body.forces(&state, &mut forces);
-    Ok(design(device, forces[node as usize].norm() / inwards.norm(), period_s))
+    let local = forces[node as usize].norm() / inwards.norm();
+    let design = design(device, local, period_s);
+    Ok(Design { tick_n_per_m: tick_stiffness(body, &state, node, period_s).max(local), ..design })
+}
+
+/// What moves `node` within one tick (N/m): its springs and dampers with all others standing still, and its mass.
+fn tick_stiffness(body: &dyn Body, state: &State, node: u32, period_s: f64) -> f64 {
+    let (mut springs, mut dampers) = (Mat3::zeros(), Mat3::zeros());
+    body.tangent(state, &[node], true, &mut |block| {
+        if block.row == node && block.column == node {
+            springs += block.position;
+            dampers += block.velocity;
+        }
+    });
+    let inertia = 1.0 / (body.inverse_masses()[node as usize] * period_s * period_s);
+    springs.norm() + dampers.norm() / period_s + inertia
 }
 
 #[cfg(test)]
@@ -138,7 +153,7 @@ mod tests {
     fn the_stored_energy_is_the_work_of_pulling() {
         let mut body = block();
         let node = body.lattice().id([2, 2, 3]);
-        assert_eq!(stored_energy(&mut body, &State::at_rest(&block().rest().to_vec())), 0.0);
+        assert_eq!(stored_energy(&mut body, &State::at_rest(block().rest())), 0.0);
         let offset = 1e-4;
         let held = [(node, body.rest()[node as usize] + Vec3::z() * offset)];
         let state = static_equilibrium(&mut body, &held).unwrap();
