@@ -179,8 +179,6 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let contact = attach.map_or_else(Contact::default, |node| glued(&*body, node));
     #[cfg(feature = "scene")]
     let mut as_run = as_run(&scene, Some((attach, &probes)));
-    let tool_start = scene.device.path.as_ref().map(|path| Vec3::from(path.at(0.0)));
-    let tool_start = tool_start.or(attach.map(|node| state.positions[node as usize]));
     let device = match parts.device {
         Some(device) => device,
         None => scripted(scene.device.path.take(), attach.map(|node| state.positions[node as usize]))?,
@@ -197,7 +195,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let limits = safety::limits(&resolved, &device_limits, stored_j, tick);
     check_ramp(&limits)?;
     let coupling = match scene.local.coupling {
-        true => Some(safety::coupling(&mut *body, tool_start.unwrap_or_default(), &device_limits, tick)?),
+        true => Some(safety::coupling(&mut *body, attach, &device_limits, tick)?),
         false => None,
     };
     let safety_off = resolved.off.clone();

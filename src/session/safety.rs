@@ -96,21 +96,26 @@ pub(super) fn stored_energy(body: &mut dyn Body, state: &State) -> f64 {
 /// How far a node is moved to measure how stiff the body is there, as a share of the distance to its neighbours.
 const PROBE_SHARE: f64 = 1e-3;
 
-/// The coupling for a tool that starts near `place` (m): its gains follow from the static stiffness of the nearest node of
-/// the surface that can move.
+/// The coupling for a body whose stiffness is measured at `node`, or without one at the movable node of the surface nearest to
+/// the middle of all: a replay, which has no path, must find the same.
 ///
 /// # Errors
 /// If the body has no equilibrium to measure.
 pub(super) fn coupling(
     body: &mut dyn Body,
-    place: Vec3,
+    node: Option<u32>,
     device: &DeviceLimits,
     period_s: f64,
 ) -> Result<Design, Error> {
-    let surface = body.surface().triangles.iter().flatten().copied();
-    let movable = surface.filter(|&node| body.inverse_masses()[node as usize] > 0.0);
-    let distance = |node: u32| (body.rest()[node as usize] - place).norm();
-    let Some(node) = movable.min_by(|&a, &b| distance(a).total_cmp(&distance(b))) else {
+    let movable = |node: &u32| body.inverse_masses()[*node as usize] > 0.0;
+    let mut surface: Vec<u32> = body.surface().triangles.iter().flatten().copied().filter(movable).collect();
+    surface.sort_unstable();
+    surface.dedup();
+    let rest = |node: u32| body.rest()[node as usize];
+    let middle = surface.iter().map(|&node| rest(node)).sum::<Vec3>() / surface.len().max(1) as f64;
+    let distance = |node: u32| (rest(node) - middle).norm();
+    let nearest = || surface.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+    let Some(node) = node.filter(movable).or_else(nearest) else {
         return Err(Error::scene("local.coupling", "needs a surface that can move"));
     };
     let triangle = body.surface().triangles[body.surface().at_node(node)[0] as usize];
@@ -182,9 +187,9 @@ mod tests {
     #[test]
     fn a_coupling_knows_the_body_under_the_tool() {
         let device = DeviceLimits::of_force(3.0);
-        let design = coupling(&mut block(), Vec3::new(0.02, 0.02, 0.04), &device, 1e-3).unwrap();
+        let design = coupling(&mut block(), None, &device, 1e-3).unwrap();
         assert!(design.local_n_per_m > 10.0 && design.local_n_per_m < 1e4, "{design}");
         let mut floating = Block::builder([4; 3], [0.03; 3]).build().unwrap();
-        assert!(coupling(&mut floating, Vec3::zeros(), &device, 1e-3).is_err());
+        assert!(coupling(&mut floating, None, &device, 1e-3).is_err());
     }
 }
