@@ -147,12 +147,12 @@ impl CoupledTool {
     /// Wait-free, real-time safe.
     pub fn lead(&mut self, device: [f64; 3], dt: f64) -> [f64; 3] {
         let Coupling { stiffness_n_per_m: k, damping_n_s_per_m: b } = self.gains;
-        // In free space there is no body that could give way.
-        let local = if self.force == [0.0; 3] { 0.0 } else { self.tick_n_per_m };
-        let (damper, from) = (b / dt, self.tool);
+        // Reckoned from where the tool would be if it moved with the device: what moves freely is not held back, and what
+        // lost its contact goes back to the device over some ticks, not in one.
+        let (damper, local, from) = (b / dt, self.tick_n_per_m, self.tool);
         for i in 0..3 {
             let with_device = from[i] + device[i] - self.device[i];
-            let pulled = k * device[i] + damper * with_device + local * from[i] + self.force[i];
+            let pulled = k * device[i] + (damper + local) * with_device + self.force[i];
             self.tool[i] = pulled / (k + damper + local);
             self.felt[i] = k * (self.tool[i] - device[i]) + damper * (self.tool[i] - with_device);
         }

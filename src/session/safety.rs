@@ -189,7 +189,7 @@ mod tests {
         let device = DeviceLimits::of_force(3.0);
         let design = coupling(&mut block(), None, &device, 1e-3).unwrap();
         assert!(design.local_n_per_m > 10.0 && design.local_n_per_m < 1e4, "{design}");
-        let mut floating = Block::builder([4; 3], [0.03; 3]).build().unwrap();
-        assert!(coupling(&mut floating, None, &device, 1e-3).is_err());
+        let held = Face::ALL.into_iter().fold(Block::builder([4; 3], [0.03; 3]), |block, face| block.fix(face));
+        assert!(coupling(&mut held.build().unwrap(), None, &device, 1e-3).is_err());
     }
 }
