@@ -64,6 +64,8 @@ fn an_interrupt_ramps_the_force_out_closes_the_log_and_says_so() {
 #[test]
 fn after_a_stopped_process_goes_on_the_first_command_is_zero_and_then_ramps_in() {
     let folder = Folder::new();
+    // The model that served before the pause is old when it is over, and would fade.
+    folder.spoil("off = [\"start_up\"]", "off = [\"start_up\", \"model_age\"]");
     let child = start(&folder, "6", "run.mcap");
     signal(&child, "-STOP");
     // Longer than what a thread is given to return: nobody hung while everything stood still.

@@ -13,7 +13,7 @@ const USED_BY_TICKS: &str = "
     Actor Reader Writer QueueReader QueueWriter OutletReader OutletWriter Recorder RecordDrain
     ExchangePort QueuePort OutletPort RecorderPort MailReceiver MailSender StopHandle GrantHandle
     ExchangeReader ExchangeWriter Consumer Producer HistogramReader HistogramWriter GroupLive
-    Device ToolPath Pipeline Ramp Body LocalModel PatchGeometry Simulation Succession step";
+    Device ToolPath Pipeline Ramp Engagement AgeFade TankState Ledger Watchdog CoupledTool Body LocalModel PatchGeometry Simulation Succession step";
 
 /// Types whose own section speaks for all of their methods: plain values, actors, what is gone before a run.
 const SPEAK_FOR_ALL: &str = "

@@ -431,7 +431,7 @@ macro_rules! field {
     };
 }
 
-const FIELDS: [Field; 25] = [
+const FIELDS: [Field; 27] = [
     field!("/force", "force_n", Force, |r| flip(&mut r.force_n[1], 0)),
     field!("/force", "model_version", Force, |r| r.model_version ^= 1),
     field!("/force", "model_age_s", Force, |r| flip(&mut r.model_age_s, 0)),
@@ -439,6 +439,8 @@ const FIELDS: [Field; 25] = [
     field!("/force", "time", Force, |r| r.time.0 ^= 1),
     field!("/force_commanded", "force_n", Command, |r| flip(&mut r.force_n[1], 0)),
     field!("/force_commanded", "limits", Command, |r| r.limits ^= 1),
+    field!("/force_commanded", "energy_j", Command, |r| flip(&mut r.energy_j, 0)),
+    field!("/force_commanded", "tank_j", Command, |r| flip(&mut r.tank_j, 0)),
     field!("/contact", "mode", Contact, |r| r.mode =
         if r.mode == ContactMode::Free { ContactMode::Lost } else { ContactMode::Free }),
     field!("/contact", "triangle", Contact, |r| r.triangle ^= 1),

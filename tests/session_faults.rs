@@ -3,7 +3,9 @@
 #[path = "../examples/fault_traces/scenarios.rs"]
 mod scenarios;
 
+use palpate::log::{CommandSample, LogRecord};
 use palpate::model::Vec3;
+use palpate::safety::Actions;
 use palpate::session::Summary;
 use scenarios::{FAULT_S, Fault, RAMP_S, Trace};
 
@@ -51,6 +53,13 @@ fn assert_ramps_out(trace: &Trace, fault: Fault) {
     }
 }
 
+fn commands(summary: &Summary) -> impl Iterator<Item = CommandSample> + '_ {
+    summary.records.iter().filter_map(|record| match record {
+        LogRecord::Command(sample) => Some(*sample),
+        _ => None,
+    })
+}
+
 fn words(summary: &Summary) -> String {
     summary.report.events.iter().map(|event| event.message.clone() + "\n").collect()
 }
@@ -93,12 +102,29 @@ fn faults_of_the_global_model_leave_the_haptic_side_alone() {
         let restarts = usize::from(matches!(fault, Fault::GlobalPanics | Fault::GlobalNeverReturns));
         assert_eq!(summary.runtime.restarts.len(), restarts, "{fault:?}");
         assert_eq!(words(summary).contains("restarted"), restarts == 1, "{fault:?}: {}", words(summary));
-        // Check that the tool is felt all the while, and that newer models come again
-        let during = |from: f64, to: f64| trace.magnitudes().filter(move |sample| (from..to).contains(&sample.0));
+        // Check that the tool is felt all the while that device and model are fresh, that the force is gone where the model
+        // is old and the device silent, and that newer models come again
         let end = summary.report.duration.as_secs_f64() - RAMP_S - 0.02;
-        assert!(during(FAULT_S, end).all(|sample| sample.1 > 0.05), "{fault:?}");
+        let commands: Vec<_> = commands(summary).filter(|command| command.time.as_secs_f64() < end).collect();
+        let after = || commands.iter().filter(|command| command.time.as_secs_f64() > FAULT_S);
+        let has = |command: &CommandSample, stage| Actions(command.limits).contains(stage);
+        let is_faded = |command: &CommandSample| {
+            [Actions::MODEL_AGE, Actions::WATCHDOG, Actions::RAMP].iter().any(|&stage| has(command, stage))
+        };
+        let felt = |command: &CommandSample| Vec3::from(command.force_n).norm() > 0.05;
+        assert!(after().filter(|command| !is_faded(command)).all(felt), "{fault:?}");
+        assert!(after().filter(|command| felt(command)).count() > 100, "{fault:?}");
+        let answer = match fault {
+            Fault::DeviceNotFinite => Some(Actions::WATCHDOG),
+            Fault::GlobalStalls | Fault::GlobalNeverReturns => Some(Actions::MODEL_AGE),
+            _ => None,
+        };
+        if let Some(stage) = answer {
+            let gone = after().filter(|command| has(command, stage) && command.force_n == [0.0; 3]).count();
+            assert!(gone > 20, "{fault:?}: {gone}");
+        }
         let newest = summary.records.iter().rev().find_map(|record| match record {
-            palpate::log::LogRecord::Force(force) => Some(*force),
+            LogRecord::Force(force) => Some(*force),
             _ => None,
         });
         assert!(newest.unwrap().model_age_s < 0.5, "{fault:?}: {newest:?}");

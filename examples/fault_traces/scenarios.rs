@@ -9,7 +9,7 @@ use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::mesh::Face;
 use palpate::prelude::*;
-use palpate::scene::LocalModelKind;
+use palpate::scene::{LocalModelKind, SafetyStage};
 #[cfg(feature = "log")]
 use palpate::session::SessionBuilder;
 use palpate::session::Summary;
@@ -228,6 +228,8 @@ pub fn run(fault: Fault) -> Result<Trace, Error> {
         .device(device)
         .model(fault.model())
         .substeps_per_ms(2)
+        // It would not be over when the fault comes.
+        .safety_off([SafetyStage::StartUp])
         .keep_records()
         .duration_s(fault.duration_s());
     #[cfg(feature = "log")]

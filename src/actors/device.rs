@@ -10,7 +10,7 @@ use crate::error::{Error, ErrorKind};
 use crate::log::{CommandSample, ToolSample};
 use crate::model::Vec3;
 use crate::runtime::{Actor, Mode, Outcome, Reader, Recorder, TickContext, Writer};
-use crate::safety::{Pipeline, Request};
+use crate::safety::{Input, Output, Pipeline, Request};
 use crate::time::Nanos;
 
 /// Releases without a new command after which the force goes to rest.
@@ -32,6 +32,8 @@ pub struct DeviceActor {
     recorder: Recorder,
     last: DeviceSample,
     missed_commands: u32,
+    /// Releases since the device gave a new state.
+    stale_ticks: u32,
     /// Set while the device reads: still set after it panicked there.
     reading: bool,
 }
@@ -47,25 +49,47 @@ impl DeviceActor {
         recorder: Recorder,
     ) -> Self {
         let last = DeviceSample { id: 0, state: first };
-        Self { device, samples, commands, safety, recorder, last, missed_commands: 0, reading: false }
+        Self { device, samples, commands, safety, recorder, last, missed_commands: 0, stale_ticks: 0, reading: false }
     }
 
     fn read(&mut self, ctx: &TickContext) -> Outcome {
         if self.reading {
-            // It panicked: the last state is all there will be.
+            // It panicked: the last state is all there will be, and the run ends with a ramp.
             return Outcome::Continue;
         }
+        self.stale_ticks = self.stale_ticks.saturating_add(1);
         self.reading = true;
         let state = self.device.read(ctx.scheduled);
         self.reading = false;
         match state {
             Ok(state) if state.is_finite() => {
                 self.last = DeviceSample { id: self.last.id.wrapping_add(1), state };
+                self.stale_ticks = 0;
                 Outcome::Continue
             }
             Ok(_) => Outcome::Degraded(Cause::DeviceNotFinite.code()),
             Err(fault) => degraded(fault),
         }
+    }
+}
+
+impl DeviceActor {
+    fn safety_output(&mut self, ctx: &TickContext, command: &ForceCommand) -> Output {
+        let dt = ctx.dt_nominal * (f64::from(ctx.slips) + 1.0);
+        if dt >= GAP_S {
+            return self.safety.release();
+        }
+        let rests = ctx.mode == Mode::Stopping || self.missed_commands > COMMAND_EXPIRES;
+        let request = if rests { Request::Rest } else { Request::Force(command.force.into()) };
+        // What happened in a tick counts once, however often its command is used.
+        let is_new = self.missed_commands == 0;
+        self.safety.apply(&Input {
+            stale_ticks: self.stale_ticks,
+            model_age_ticks: command.age_ticks.saturating_add(self.missed_commands),
+            swap_step: if is_new { command.swap_step.into() } else { [0.0; 3] },
+            dissipated_j: if is_new { command.dissipated_j } else { 0.0 },
+            ..Input::new(request, self.last.state.position.into(), dt)
+        })
     }
 }
 
@@ -103,20 +127,13 @@ impl Actor for DeviceActor {
             self.missed_commands = self.missed_commands.saturating_add(1);
         }
         let command = *self.commands.get();
-        let dt = ctx.dt_nominal * (f64::from(ctx.slips) + 1.0);
-        let (force_n, actions) = if dt >= GAP_S {
-            self.safety.release()
-        } else if ctx.mode == Mode::Stopping || self.missed_commands > COMMAND_EXPIRES {
-            self.safety.apply(Request::Rest, dt)
-        } else {
-            self.safety.apply(Request::Force(command.force.into()), dt)
-        };
+        let Output { force, actions, energy_j, tank_j } = self.safety_output(ctx, &command);
         // As long as the force would be taken up where it was, and no longer.
         let expires = ctx.scheduled + Nanos::from_secs_f64(GAP_S);
-        let exerted = devices::ForceCommand::until(Vec3::from(force_n), expires);
+        let exerted = devices::ForceCommand::until(Vec3::from(force), expires);
         let outcome = self.device.write(exerted).map_or_else(degraded, |()| Outcome::Continue);
         let time = if self.missed_commands == 0 { command.time } else { ctx.scheduled };
-        self.recorder.push(CommandSample { time, force_n, limits: actions.0 });
+        self.recorder.push(CommandSample { time, force_n: force, limits: actions.0, energy_j, tank_j });
         outcome
     }
 

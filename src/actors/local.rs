@@ -9,6 +9,7 @@ use crate::model::local::{Kind, LocalModel, PatchGeometry, Resynced, Served, Suc
 use crate::runtime::{
     Actor, Mode as RunMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
 };
+use crate::safety::coupling::CoupledTool;
 use crate::time::{Nanos, Rate};
 
 /// Haptic ticks that one release advances at most. After a long stall the rest is made up by the releases that follow:
@@ -66,19 +67,31 @@ pub struct LocalActor {
     probes: Vec<u32>,
     /// Energy that the tool has given to the simulation (J).
     energy: f64,
+    /// A spring between device and simulated tool, if there is one.
+    coupled: Option<CoupledTool>,
     begun: bool,
 }
 
 impl LocalActor {
     /// An actor over `models`; `haptic` and `global` are the rates of the two groups, `probes` the logged nodes.
     pub fn new(models: Succession, haptic: Rate, global: Rate, probes: Vec<u32>, ports: LocalPorts) -> Self {
-        Self { models, ports, haptic, global, resync: 0, probes, energy: 0.0, begun: false }
+        Self { models, ports, haptic, global, resync: 0, probes, energy: 0.0, coupled: None, begun: false }
+    }
+
+    /// The simulated tool hangs on the device by a virtual coupling; the logged force is then that of the coupling.
+    #[must_use]
+    pub fn coupled(mut self, tool: CoupledTool) -> Self {
+        self.coupled = Some(tool);
+        self
     }
 
     /// Release 0: the first sample and the first model, no force.
     fn begin(&mut self, ctx: &TickContext) {
         self.begun = true;
         let tool = self.ports.samples.get().state.position;
+        if let Some(coupled) = &mut self.coupled {
+            coupled.begin(tool.into());
+        }
         match &mut self.ports.source {
             ModelSource::Global { models, .. } => {
                 models.refresh(ctx);
@@ -91,8 +104,8 @@ impl LocalActor {
     }
 
     /// Advances the model to this release, or as far towards it as one release may.
-    fn advance(&mut self, ctx: &TickContext, target: Vec3) -> Served {
-        let mut served = Served::default();
+    fn advance(&mut self, ctx: &TickContext, target: Vec3) -> (Served, f64) {
+        let (mut served, mut dissipated_j) = (Served::default(), 0.0);
         let owed = ctx.tick.saturating_sub(self.models.now());
         let most = match ctx.mode {
             RunMode::Normal | RunMode::Stopping => MAX_TICKS_PER_RELEASE,
@@ -101,14 +114,25 @@ impl LocalActor {
         for i in 0..owed.min(most) {
             // The tool is interpolated over all periods that are owed.
             let from = self.models.tool();
-            let tool = from + (target - from) / (owed - i) as f64;
-            let resync = served.resync;
+            let tool = match &mut self.coupled {
+                None => from + (target - from) / (owed - i) as f64,
+                Some(coupled) => coupled.follow(target.into(), owed - i, ctx.dt_nominal).into(),
+            };
+            let before = served;
             served = self.models.tick(tool);
-            served.resync = served.resync.or(resync);
-            self.energy -= finite_or_zero(served.force).dot(&(tool - from));
+            served.resync = served.resync.or(before.resync);
+            served.swap_step += before.swap_step;
+            let force = finite_or_zero(served.force);
+            self.energy -= force.dot(&(tool - from));
+            dissipated_j += friction_work(&self.models.serving().contact(), force, tool - from);
+            if let Some(coupled) = &mut self.coupled
+                && force == served.force
+            {
+                served.force = coupled.feel(force.into()).into();
+            }
             self.publish_state(ctx);
         }
-        served
+        (served, dissipated_j)
     }
 
     /// Tells the global model where the tool and the patch are.
@@ -142,14 +166,19 @@ impl LocalActor {
         }
     }
 
+    /// Ticks since the last resync of the model that serves.
+    fn age_ticks(&self) -> u64 {
+        match self.ports.source {
+            ModelSource::Alone(_) => 0,
+            ModelSource::Global { .. } => self.models.now().saturating_sub(self.models.serving().built_at()),
+        }
+    }
+
     fn record(&mut self, time: Nanos, force: Vec3, resync: Option<Resynced>) {
-        let model = self.models.serving();
         let age = |ticks: u64| self.haptic.release(ticks);
+        let model_age_s = age(self.age_ticks()).as_secs_f64();
+        let model = self.models.serving();
         let recorder = &mut self.ports.recorder;
-        let model_age_s = match self.ports.source {
-            ModelSource::Alone(_) => 0.0,
-            ModelSource::Global { .. } => age(self.models.now().saturating_sub(model.built_at())).as_secs_f64(),
-        };
         recorder.push(ForceSample {
             time,
             force_n: force.into(),
@@ -199,10 +228,11 @@ impl Actor for LocalActor {
             self.models.offer(models.get_mut(), version);
         }
         let target = self.ports.samples.get().state.position;
-        let Served { force: computed, resync } = self.advance(ctx, target);
+        let (Served { force: computed, resync, swap_step }, dissipated_j) = self.advance(ctx, target);
         let force = finite_or_zero(computed);
         let time = self.haptic.release(self.models.now());
-        *self.ports.commands.buffer() = ForceCommand { time, force };
+        let age_ticks = u32::try_from(self.age_ticks()).unwrap_or(u32::MAX);
+        *self.ports.commands.buffer() = ForceCommand { time, force, age_ticks, swap_step, dissipated_j };
         self.ports.commands.publish(ctx);
         let mode = self.models.serving().contact().mode;
         *self.ports.view.buffer() = ToolView { time, position: self.models.tool(), force, mode };
@@ -232,6 +262,15 @@ fn served_by(kind: Kind) -> ServedBy {
 
 fn finite_or_zero(force: Vec3) -> Vec3 {
     if force.iter().all(|c| c.is_finite()) { force } else { Vec3::zeros() }
+}
+
+/// What sliding took of the tool's motion `moved` (m) under `force` (N).
+fn friction_work(contact: &Contact, force: Vec3, moved: Vec3) -> f64 {
+    if contact.mode != Mode::Slip {
+        return 0.0;
+    }
+    let tangential = force - contact.normal * force.dot(&contact.normal);
+    (-tangential.dot(&moved)).max(0.0)
 }
 
 fn contact_sample(time: Nanos, contact: &Contact, force: Vec3) -> ContactSample {

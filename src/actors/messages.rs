@@ -35,6 +35,12 @@ pub struct ForceCommand {
     pub time: Nanos,
     /// Mean force over that tick (N).
     pub force: Vec3,
+    /// Age of the local model that it comes from (ticks of the local group).
+    pub age_ticks: u32,
+    /// How much of its change a swap of local models made (N).
+    pub swap_step: Vec3,
+    /// What friction took of the tool's motion (J).
+    pub dissipated_j: f64,
 }
 
 /// The newest tool and force, for a program that draws.

@@ -258,7 +258,12 @@ mod tests {
                 ..ForceSample::default()
             }));
             let limits = if n <= 10 { 0b1010 } else { 0 };
-            analysis.push(&LogRecord::Command(CommandSample { time, force_n: [1.0, 0.0, 0.0], limits }));
+            analysis.push(&LogRecord::Command(CommandSample {
+                time,
+                force_n: [1.0, 0.0, 0.0],
+                limits,
+                ..CommandSample::default()
+            }));
             let mode = ContactMode::from_code((n % 4) as u16);
             analysis.push(&LogRecord::Contact(ContactSample { time, mode, ..ContactSample::default() }));
         }

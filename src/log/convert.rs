@@ -97,13 +97,25 @@ impl From<schema::Force> for ForceSample {
 
 impl From<&CommandSample> for schema::CommandedForce {
     fn from(r: &CommandSample) -> Self {
-        Self { time_ns: r.time.0, force_n: r.force_n.into(), limits: r.limits.into() }
+        Self {
+            time_ns: r.time.0,
+            force_n: r.force_n.into(),
+            limits: r.limits.into(),
+            energy_j: r.energy_j,
+            tank_j: r.tank_j,
+        }
     }
 }
 
 impl From<schema::CommandedForce> for CommandSample {
     fn from(m: schema::CommandedForce) -> Self {
-        Self { time: Nanos(m.time_ns), force_n: m.force_n.into(), limits: narrow(m.limits) }
+        Self {
+            time: Nanos(m.time_ns),
+            force_n: m.force_n.into(),
+            limits: narrow(m.limits),
+            energy_j: m.energy_j,
+            tank_j: m.tank_j,
+        }
     }
 }
 

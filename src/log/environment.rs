@@ -58,6 +58,13 @@ pub struct Environment {
     pub groups: Vec<GroupInfo>,
     /// Names of the bits in [`CommandSample::limits`](super::CommandSample::limits), lowest first.
     pub limit_stages: Vec<String>,
+    /// Stages of the safety pipeline that the scene switched off.
+    pub safety_off: Vec<String>,
+    /// Energy that the scene stores at the start (J): where the ledger in
+    /// [`CommandSample::energy_j`](super::CommandSample::energy_j) begins.
+    pub stored_j: f64,
+    /// The gains of the virtual coupling and the margin that they leave; `None` without one.
+    pub coupling: Option<String>,
     /// What the system granted: policy, priority, cpu, mlock, ...
     pub granted: BTreeMap<String, String>,
     /// The first state that the device gave, before the start.
@@ -130,6 +137,11 @@ impl Environment {
         for (i, stage) in self.limit_stages.iter().enumerate() {
             map.insert(format!("limit_stage.{i}"), stage.clone());
         }
+        for (i, stage) in self.safety_off.iter().enumerate() {
+            map.insert(format!("safety_off.{i}"), stage.clone());
+        }
+        map.insert("stored_j".to_owned(), self.stored_j.to_string());
+        map.extend(self.coupling.iter().map(|design| ("coupling".to_owned(), design.clone())));
         if let Some(first) = &self.first_tool {
             map.insert(format!("{FIRST_TOOL}.position_m"), spaced(first.position_m));
             map.insert(format!("{FIRST_TOOL}.velocity_m_s"), spaced(first.velocity_m_s));
@@ -144,6 +156,7 @@ impl Environment {
     pub fn from_map(map: &BTreeMap<String, String>) -> Self {
         let text = |key: &str| map.get(key).cloned().unwrap_or_default();
         let number = |key: &str| map.get(key).and_then(|value| value.parse::<f64>().ok()).unwrap_or(0.0);
+        let listed = |key: &str| (0..).map_while(|i| map.get(&format!("{key}.{i}")).cloned()).collect();
         let execution = match text("execution").as_str() {
             "threaded" => Execution::Threaded { start_unix_ns: text("start_unix_ns").parse().unwrap_or(0) },
             _ => Execution::Virtual,
@@ -171,7 +184,10 @@ impl Environment {
             haptic_hz: number("haptic_hz"),
             global_hz: number("global_hz"),
             groups,
-            limit_stages: (0..).map_while(|i| map.get(&format!("limit_stage.{i}")).cloned()).collect(),
+            limit_stages: listed("limit_stage"),
+            safety_off: listed("safety_off"),
+            stored_j: number("stored_j"),
+            coupling: map.get("coupling").cloned(),
             granted,
             first_tool: first_tool(map),
             scene: None,
@@ -225,6 +241,9 @@ mod tests {
                 GroupInfo { name: "global".into(), rate_hz: 29.97, background: true },
             ],
             limit_stages: vec!["clamp".into(), "slew".into()],
+            safety_off: vec!["tank".into()],
+            stored_j: 0.125,
+            coupling: Some("K_c 400 N/m".into()),
             granted: [("policy".to_owned(), "other".to_owned())].into(),
             first_tool: Some(ToolSample {
                 position_m: [0.1, -0.0, 1.0 / 3.0],

@@ -53,7 +53,7 @@ pub struct ContactReport {
 }
 
 /// What the safety pipeline did.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LimitReport {
     /// Commands that passed the pipeline.
     pub ticks: u64,
@@ -61,6 +61,19 @@ pub struct LimitReport {
     pub limited: u64,
     /// The stages that acted, with the number of ticks on which they did.
     pub stages: Vec<(String, u64)>,
+    /// Ledger and tank.
+    pub energy: EnergyReport,
+}
+
+/// The passivity ledger and the energy tank; all zero without a command.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnergyReport {
+    /// The least that stood in the ledger (J): negative is a deficit.
+    pub least_j: f64,
+    /// What stood in it at the end (J).
+    pub last_j: f64,
+    /// The least that was in the tank (J).
+    pub least_tank_j: f64,
 }
 
 impl LimitReport {
@@ -82,6 +95,7 @@ pub(super) struct HapticsCounter {
     commands: u64,
     limited: u64,
     limits: [u64; LIMIT_BITS],
+    energy: EnergyReport,
 }
 
 impl HapticsCounter {
@@ -99,6 +113,12 @@ impl HapticsCounter {
 
     pub(super) fn push_command(&mut self, sample: &CommandSample) {
         self.commands += 1;
+        let energy = &mut self.energy;
+        let is_first = self.commands == 1;
+        let least = |so_far: f64, now: f64| if is_first { now } else { so_far.min(now) };
+        energy.least_j = least(energy.least_j, sample.energy_j);
+        energy.least_tank_j = least(energy.least_tank_j, sample.tank_j);
+        energy.last_j = sample.energy_j;
         self.limited += u64::from(sample.limits != 0);
         for (bit, count) in self.limits.iter_mut().enumerate() {
             *count += u64::from(sample.limits >> bit & 1);
@@ -149,6 +169,7 @@ impl HapticsCounter {
             ticks: self.commands,
             limited: self.limited,
             stages: acted.map(|(bit, &count)| (name(bit), count)).collect(),
+            energy: self.energy,
         }
     }
 }

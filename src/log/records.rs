@@ -92,6 +92,11 @@ pub struct CommandSample {
     pub force_n: [f64; 3],
     /// Safety stages that acted: a bit each, see `safety::Actions`.
     pub limits: u16,
+    /// The passivity ledger: what the virtual environment has taken in less what it gave out, and what it stored at the
+    /// start (J).
+    pub energy_j: f64,
+    /// What is in the energy tank of model swaps (J).
+    pub tank_j: f64,
 }
 
 /// The tool as the device reported it.
@@ -261,7 +266,9 @@ impl LogRecord {
                 model_age_s: d,
                 energy_j: e,
             }),
-            COMMAND => Self::Command(CommandSample { time, force_n: [a, b, c], limits: record.code }),
+            COMMAND => {
+                Self::Command(CommandSample { time, force_n: [a, b, c], limits: record.code, energy_j: d, tank_j: e })
+            }
             TOOL => Self::Tool(ToolSample {
                 time,
                 id: record.index,
@@ -311,7 +318,7 @@ impl From<ForceSample> for Record {
 
 impl From<CommandSample> for Record {
     fn from(r: CommandSample) -> Self {
-        Self::with_floats(r.time, COMMAND, r.limits, 0, join(r.force_n, [0.0; 3]))
+        Self::with_floats(r.time, COMMAND, r.limits, 0, join(r.force_n, [r.energy_j, r.tank_j, 0.0]))
     }
 }
 
@@ -395,7 +402,13 @@ mod tests {
                 model_age_s: 0.033,
                 energy_j: 1e-9,
             }),
-            LogRecord::Command(CommandSample { time, force_n: [1.0, 2.0, 3.0], limits: 5 }),
+            LogRecord::Command(CommandSample {
+                time,
+                force_n: [1.0, 2.0, 3.0],
+                limits: 5,
+                energy_j: -1e-3,
+                tank_j: 1e-4,
+            }),
             LogRecord::Tool(ToolSample {
                 time,
                 id: 9,

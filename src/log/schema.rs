@@ -155,6 +155,8 @@ proto_schema! {
         time_ns: uint64 = 1,
         force_n: message of Vector3 = 2,
         limits: uint32 = 3,
+        energy_j: double = 4,
+        tank_j: double = 5,
     }
 
     /// `/tool`: the raw device sample.

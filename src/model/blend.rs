@@ -29,6 +29,8 @@ pub struct Blend {
     step: Vec3,
     /// What the blend added to the new model's force in the last tick (N).
     residue: Vec3,
+    /// What the swap and its blend changed in the last tick (N).
+    step_now: Vec3,
     jump: Jump,
 }
 
@@ -66,6 +68,11 @@ impl Blend {
         }
     }
 
+    /// How much of the force's change in the last tick was the swap's, not the model's (N). Read it after [`mix`](Self::mix).
+    pub fn step_now(&self) -> Vec3 {
+        self.step_now
+    }
+
     /// The blended force of one tick, and the resync's jump when the blend is over. `old` is read where it is
     /// [needed](Self::needs_old).
     pub fn mix(&mut self, new: Vec3, old: Vec3) -> (Vec3, Option<Jump>) {
@@ -81,7 +88,8 @@ impl Blend {
             BlendKind::Crossfade => (old - new) * (1.0 - share),
             BlendKind::None | BlendKind::Offset => self.step * (1.0 - minimum_jerk(share)),
         };
-        self.jump.after = self.jump.after.max((residue - self.residue).norm());
+        self.step_now = self.residue - residue;
+        self.jump.after = self.jump.after.max(self.step_now.norm());
         self.residue = residue;
         let over = share >= 1.0;
         self.elapsed = (!over).then_some(elapsed + 1);

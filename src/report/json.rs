@@ -11,12 +11,12 @@
 //! | `virtual_time` | true if lateness is zero by construction |
 //! | `damage` | what is wrong with the log and where, or `null` |
 //! | `messages` | number of messages read, by topic |
-//! | `environment` | versions, rates, in `model_reason` and `model_warning` why `model` was chosen (`null` if it was named), and in `granted` what the system granted; `null` if unknown |
+//! | `environment` | versions, rates, in `model_reason` and `model_warning` why `model` was chosen (`null` if it was named), in `granted` what the system granted, `safety_off`, `stored_j` and `coupling`; `null` if unknown |
 //! | `groups[]` | `name`, `rate_hz`, `released`, `skipped`, `missed`, `elapsed_periods`, `in_degraded_mode`, `lost_records`, `skipped_by_cause`, `missed_by_cause`, `lateness_ns`, `execution_ns`, `period_error_ns` |
 //! | `resyncs` | `count`, `jump_before_n`, `jump_after_n`, `age_ns` |
 //! | `force` | `ticks`, `peak_n`, `peak_commanded_n`, `not_finite`, `model_age_s`, `served` (share of ticks by local model) |
 //! | `contact` | haptic ticks `free`, `stick`, `slip`, `lost` |
-//! | `limits` | `ticks`, `limited`, `share` (0 to 1), `stages` by name |
+//! | `limits` | `ticks`, `limited`, `share` (0 to 1), `stages` by name, `energy_j` (`least` and `last` of the passivity ledger), `tank_j` (`least`) |
 //! | `lost_records` | of all groups |
 //! | `events` | `count`, `worst`, `first[]` with `t_s`, `level`, `message` |
 //!
@@ -70,6 +70,8 @@ pub fn to_json(report: &RunReport) -> String {
             "ticks": limits.ticks,
             "limited": limits.limited,
             "share": limits.share(),
+            "energy_j": { "least": limits.energy.least_j, "last": limits.energy.last_j },
+            "tank_j": { "least": limits.energy.least_tank_j },
             "stages": limits.stages.iter().map(|(name, count)| (name.clone(), json!(count))).collect::<Map<_, _>>(),
         },
         "lost_records": report.lost_records(),
@@ -97,6 +99,9 @@ fn environment(environment: &Environment) -> Value {
         "haptic_hz": environment.haptic_hz,
         "global_hz": environment.global_hz,
         "granted": environment.granted,
+        "safety_off": environment.safety_off,
+        "stored_j": environment.stored_j,
+        "coupling": environment.coupling,
     })
 }
 

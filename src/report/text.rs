@@ -91,6 +91,10 @@ fn about(page: &mut Page, environment: &Environment) {
         page.wrapped("model", &format!("{}: {}", environment.model, reason.why));
         reason.warning.iter().for_each(|warning| page.wrapped("warning", warning));
     }
+    if !environment.safety_off.is_empty() {
+        page.wrapped("SAFETY OFF", &environment.safety_off.join(", "));
+    }
+    environment.coupling.iter().for_each(|design| page.wrapped("coupling", design));
     for (i, (what, granted)) in environment.granted.iter().take(GRANT_LINES).enumerate() {
         page.wrapped(if i == 0 { "granted" } else { "" }, &format!("{what}: {granted}"));
     }
@@ -172,10 +176,15 @@ fn haptics(page: &mut Page, report: &RunReport) {
         "force",
         format!("peak {}, commanded {}{not_finite}", force(report.force.peak_n), force(report.force.peak_commanded_n)),
     );
+    if report.limits.ticks > 0 {
+        let energy = report.limits.energy;
+        let [least, last, tank] = [energy.least_j, energy.last_j, energy.least_tank_j].map(|j| 1e3 * j);
+        page.named("energy", format!("ledger least {least:.3} mJ, end {last:.3} mJ; tank least {tank:.3} mJ"));
+    }
     if report.limits.limited > 0 {
         let stages = report.limits.stages.iter().map(|(name, count)| format!("{name} {count}"));
         let share = 100.0 * report.limits.share();
-        page.named("limits", format!("{} ({share:.2} % of ticks)", stages.collect::<Vec<_>>().join(", ")));
+        page.wrapped("limits", &format!("{} ({share:.2} % of ticks)", stages.collect::<Vec<_>>().join(", ")));
     }
 }
 

@@ -1,4 +1,4 @@
-//! Stage 3: the force comes and goes within a declared time.
+//! The force comes and goes within a declared time.
 
 /// A gain between 0 (at rest) and 1 (the force passes as it is).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-//! Stage 4: the largest change from one command to the next.
+//! Stage 3 and again at the end: the largest change from one force to the next.
 
 use super::{Force, norm};
 

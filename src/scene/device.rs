@@ -83,21 +83,3 @@ impl DeviceProfile {
         }
     }
 }
-
-/// Limits on what reaches the device.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
-pub struct SafetySpec {
-    /// Largest force (N); the device's own limit if absent.
-    pub max_force_n: Option<f64>,
-    /// Largest change of the force (N/ms).
-    pub max_slew_n_per_ms: f64,
-    /// Time in which the force goes to zero when the run stops or fails, and comes back after a gap (ms).
-    pub ramp_ms: f64,
-}
-
-impl Default for SafetySpec {
-    fn default() -> Self {
-        Self { max_force_n: None, max_slew_n_per_ms: 0.5, ramp_ms: 100.0 }
-    }
-}

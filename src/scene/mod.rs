@@ -12,6 +12,7 @@ mod contact;
 mod device;
 mod device_fault;
 mod models;
+mod safety;
 mod validate;
 mod validate_device;
 
@@ -37,9 +38,10 @@ pub use contact::{ContactSpec, Friction};
 pub use crate::devices::{Axis, HandSpec, PlantSpec, SafetyStop, ToolPath};
 pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
-pub use device::{DeviceKind, DeviceProfile, DeviceSpec, SafetySpec};
+pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub use device_fault::{FaultKind, FaultSpec};
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
+pub use safety::{SafetySpec, SafetyStage};
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug, PartialEq)]

@@ -53,6 +53,8 @@ pub struct LocalSpec {
     pub step: StepKind,
     /// How a resync's discontinuity is spread.
     pub blend: BlendSpec,
+    /// The tool hangs on the device by a spring and damper whose gains follow from the device and the body.
+    pub coupling: bool,
 }
 
 impl Default for LocalSpec {
@@ -68,6 +70,7 @@ impl Default for LocalSpec {
             feedback: None,
             step: StepKind::default(),
             blend: BlendSpec::default(),
+            coupling: false,
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 use super::{
     BlendKind, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec, LocalModelKind,
-    LocalSpec, ModelChoice, SafetySpec, Scene, StepKind, validate_device,
+    LocalSpec, ModelChoice, Scene, StepKind, safety, validate_device,
 };
 use crate::error::Error;
 use crate::time::Rate;
@@ -43,7 +43,7 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
         return Err(Error::scene("local.step", message));
     }
     validate_device::device(&scene.device)?;
-    safety(&scene.safety)?;
+    safety::validate(&scene.safety)?;
     if let Some(spec) = &scene.initial {
         lengths_within("initial.pull.offset_m", spec.pull.offset_m, MAX_LENGTH_M)?;
     }
@@ -246,22 +246,6 @@ fn attached(node: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
     if !on_surface(node, block.nodes) {
         let message = format!("{node:?} is inside the body, the tool can only be glued to a node of the surface");
         return Err(Error::scene(field, message));
-    }
-    Ok(())
-}
-
-/// A force that fades longer than this is no stop any more.
-const LONGEST_RAMP_MS: f64 = 2000.0;
-
-fn safety(safety: &SafetySpec) -> Result<(), Error> {
-    if let Some(force_n) = safety.max_force_n {
-        positive("safety.max_force_n", force_n)?;
-    }
-    positive("safety.max_slew_n_per_ms", safety.max_slew_n_per_ms)?;
-    positive("safety.ramp_ms", safety.ramp_ms)?;
-    if safety.ramp_ms > LONGEST_RAMP_MS {
-        let message = format!("is {}, a stop may take {LONGEST_RAMP_MS} ms at most", safety.ramp_ms);
-        return Err(Error::scene("safety.ramp_ms", message));
     }
     Ok(())
 }

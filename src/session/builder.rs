@@ -6,7 +6,7 @@ use crate::devices::{Device, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::model::body::Body;
 use crate::runtime::{Disturbance, Execution, RateGroup};
-use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, ModelChoice, Scene, StepKind};
+use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, ModelChoice, SafetyStage, Scene, StepKind};
 
 /// Collects what a session is made of; fills the same [`Scene`] as a scene file and passes the same validation.
 #[derive(Debug)]
@@ -124,6 +124,21 @@ impl SessionBuilder {
     #[must_use]
     pub fn substeps_per_ms(mut self, substeps: u32) -> Self {
         self.parts.scene.global.substeps_per_ms = Some(substeps);
+        self
+    }
+
+    /// Switches stages of the safety pipeline off; the log and the report say so. [`build`](Self::build) refuses the finite
+    /// check and the clamp.
+    #[must_use]
+    pub fn safety_off(mut self, stages: impl IntoIterator<Item = SafetyStage>) -> Self {
+        self.parts.scene.safety.off.extend(stages);
+        self
+    }
+
+    /// Hangs the tool on the device by a virtual coupling, see [`safety::coupling`](crate::safety::coupling).
+    #[must_use]
+    pub fn coupling(mut self) -> Self {
+        self.parts.scene.local.coupling = true;
         self
     }
 

@@ -18,6 +18,7 @@ use crate::model::Vec3;
 use crate::model::body::Block;
 use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
 use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, Restart, Runtime, Stopwatch};
+use crate::safety::coupling::CoupledTool;
 use crate::safety::{Actions, Pipeline};
 use crate::time::Rate;
 
@@ -144,6 +145,10 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     };
     let succession = Succession::new(models, prepared.blend, Vec3::zeros());
     let local = LocalActor::new(succession, prepared.haptic, prepared.global_rate, probes, ports);
+    let local = match &prepared.coupling {
+        Some(design) => local.coupled(CoupledTool::new(design)),
+        None => local,
+    };
 
     let outcome = LoggerOutcome::default();
     let logger = |drain| -> Box<dyn Actor> {
@@ -208,6 +213,9 @@ fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, 
         global_hz: if is_multi_rate { prepared.global_rate.as_hz() } else { 0.0 },
         groups,
         limit_stages: Actions::NAMES.map(str::to_owned).into(),
+        safety_off: prepared.safety_off.iter().map(|stage| stage.name().to_owned()).collect(),
+        stored_j: prepared.limits.passivity.map_or(0.0, |passivity| passivity.stored_j),
+        coupling: prepared.coupling.map(|design| design.to_string()),
         granted: Default::default(),
         first_tool: Some(ToolSample {
             position_m: first.position.into(),

@@ -28,6 +28,7 @@ mod rate_groups;
 #[cfg(all(feature = "log", feature = "scene"))]
 mod replay;
 mod running;
+mod safety;
 mod sink;
 mod situation;
 mod substeps;

@@ -10,6 +10,7 @@ use super::disturbed::Disturbed;
 use super::graph::groups;
 use super::horizon::{horizon, lateness};
 use super::rate_groups::{check_group, global_group, local_group};
+use super::safety;
 use super::situation::Situation;
 use super::substeps::substeps;
 use crate::devices::Device;
@@ -24,9 +25,10 @@ use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, RateGroup, admit_here};
 use crate::safety::Limits;
+use crate::safety::coupling::Design;
 #[cfg(feature = "scene")]
 use crate::scene::ProbeSpec;
-use crate::scene::{BodySpec, Equations, Feedback, InitialSpec, ModelChoice, Scene, StepKind};
+use crate::scene::{BodySpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind};
 use crate::time::{Nanos, Rate};
 
 /// What a builder has collected.
@@ -94,6 +96,10 @@ pub(super) struct Prepared {
     pub blend: Blend,
     pub device: Box<dyn Device>,
     pub limits: Limits,
+    /// Stages of the safety pipeline that the scene switched off.
+    pub safety_off: Vec<SafetyStage>,
+    /// Between device and simulated tool.
+    pub coupling: Option<Design>,
     pub probes: Vec<u32>,
     pub haptic: Rate,
     pub global_rate: Rate,
@@ -196,16 +202,20 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         normals: scene.contact.normals,
         equations: scene.contact.equations,
     };
-    let limits = Limits {
-        max_force_n: scene.safety.max_force_n.unwrap_or(device.capabilities().max_force_n),
-        max_slew_n_per_s: scene.safety.max_slew_n_per_ms * 1e3,
-        ramp_s: scene.safety.ramp_ms * 1e-3,
-    };
+    let device_limits = safety::device_limits(&scene.safety, &device.capabilities());
+    let stored_j = safety::stored_energy(&mut *body, &state);
+    let resolved = safety::resolved(&scene, &device_limits);
+    let limits = safety::limits(&resolved, &device_limits, stored_j, tick);
     check_ramp(&limits)?;
+    let coupling = match scene.local.coupling {
+        true => Some(safety::coupling(&mut *body, attach, &device_limits, tick)?),
+        false => None,
+    };
+    let safety_off = resolved.off.clone();
     #[cfg(feature = "scene")]
     {
-        // The device's own limit too; one without a limit has none to note.
-        as_run.safety.max_force_n = limits.max_force_n.is_finite().then_some(limits.max_force_n);
+        // With what it left to the device.
+        as_run.safety = resolved;
     }
     let is_implicit = match scene.local.step {
         StepKind::Explicit => false,
@@ -239,6 +249,8 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         blend: Blend::new(scene.local.blend.kind, blend_ticks),
         device,
         limits,
+        safety_off,
+        coupling,
         probes,
         haptic,
         global_rate,

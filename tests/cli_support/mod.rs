@@ -16,7 +16,7 @@ pub struct Called {
 #[derive(Debug)]
 pub struct Folder(tempfile::TempDir);
 
-/// A block of 6^3 nodes that a tool touches after 9 ms, slips along and leaves.
+/// A block of 6^3 nodes that a tool touches after 9 ms, slips along and leaves: before a start-up would be over.
 pub const SCENE: &str = r#"[body.block]
 nodes = [6, 6, 6]
 size_m = [0.1, 0.1, 0.1]
@@ -40,6 +40,7 @@ path_csv = "path.csv"
 [safety]
 max_force_n = 8.0
 max_slew_n_per_ms = 0.5
+off = ["start_up"]
 [[probe]]
 node = [3, 3, 5]
 [run]

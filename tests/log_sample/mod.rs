@@ -66,7 +66,13 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
                     model_age_s: (n % 33) as f64 * 1e-3,
                     energy_j: -phase,
                 }),
-                LogRecord::Command(CommandSample { time, force_n, limits: (n % 5) as u16 }),
+                LogRecord::Command(CommandSample {
+                    time,
+                    force_n,
+                    limits: (n % 5) as u16,
+                    energy_j: 1e-3 * n as f64,
+                    tank_j: 1e-4,
+                }),
                 LogRecord::Tool(ToolSample {
                     time,
                     id: n as u32,

@@ -17,6 +17,8 @@ pub struct Served {
     pub force: Vec3,
     /// The resync whose blend ended with this tick.
     pub resync: Option<Resynced>,
+    /// How much of the force's change in this tick a swap made (N).
+    pub swap_step: Vec3,
 }
 
 /// A resync that is over.
@@ -108,13 +110,13 @@ impl Succession {
         self.history[place] = tool;
         let new = self.serving.tick(motion);
         if !self.blend.is_under_way() {
-            return Served { force: new, resync: None };
+            return Served { force: new, ..Served::default() };
         }
         let old = if self.blend.needs_old() { self.fading.tick(motion) } else { new };
         // A diverged old model must not spoil a good new one.
         let old = if old.iter().all(|c| c.is_finite()) { old } else { new };
         let (force, jump) = self.blend.mix(new, old);
-        Served { force, resync: jump.map(|jump| Resynced { jump, ..self.resync }) }
+        Served { force, resync: jump.map(|jump| Resynced { jump, ..self.resync }), swap_step: self.blend.step_now() }
     }
 
     /// Brings an arrived model nearer to the present; when it is there and no blend is under way, it serves.

@@ -28,6 +28,8 @@ fn fields(record: &LogRecord) -> Vec<(&'static str, u64)> {
         LogRecord::Command(r) => {
             add("force_n", &r.force_n.map(f64::to_bits));
             add("limits", &[r.limits.into()]);
+            add("energy_j", &[r.energy_j.to_bits()]);
+            add("tank_j", &[r.tank_j.to_bits()]);
         }
         LogRecord::Contact(r) => {
             add("mode", &[r.mode as u64]);

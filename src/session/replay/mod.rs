@@ -64,7 +64,11 @@ impl Replay {
     fn new(mut parts: Parts, logged: Logged, log: &Path) -> Result<Self, Error> {
         let place = log.display().to_string();
         let max_force_n = logged.scene.safety.max_force_n;
-        parts.scene.safety.max_force_n = max_force_n;
+        // What the device of the run was: this one has no force.
+        let (safety, logged_safety) = (&mut parts.scene.safety, &logged.scene.safety);
+        safety.max_force_n = max_force_n;
+        safety.max_damping_n_s_per_m = logged_safety.max_damping_n_s_per_m;
+        safety.noise_m_s = logged_safety.noise_m_s;
         // What the machine of the log chose, and not what this one would.
         if parts.scene.local.model == ModelChoice::Auto {
             parts.scene.local.model = logged.scene.local.model;

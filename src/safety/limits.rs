@@ -1,0 +1,109 @@
+//! What the pipeline is told before a run.
+
+use super::{ModelAge, Passivity, StartUp, Tank, ToolSpeed, Watchdog};
+
+/// What the pipeline needs to know of a device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeviceLimits {
+    /// Largest force (N).
+    pub max_force_n: f64,
+    /// Largest stiffness that it renders stably at its own rate (N/m).
+    pub max_stiffness_n_per_m: f64,
+    /// Largest damping that it renders stably (N s/m).
+    pub max_damping_n_s_per_m: f64,
+    /// Its own mechanical damping (N s/m).
+    pub damping_n_s_per_m: f64,
+    /// Its own dry friction (N).
+    pub friction_n: f64,
+    /// Smallest step of its position (m).
+    pub resolution_m: f64,
+    /// From a force that is computed to one that is felt, beyond the hold of one tick (s).
+    pub delay_s: f64,
+}
+
+impl DeviceLimits {
+    /// A device of which only the largest force is known. The others are those of a Touch, the least of the common desktop
+    /// devices: 400 N/m and 4 N s/m at 1 kHz, and the mechanical damping that the sampled wall asks for at that stiffness,
+    /// K T / 2.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn of_force(max_force_n: f64) -> Self {
+        Self {
+            max_force_n,
+            max_stiffness_n_per_m: 400.0,
+            max_damping_n_s_per_m: 4.0,
+            damping_n_s_per_m: 400.0 * 1e-3 / 2.0,
+            friction_n: 0.0,
+            resolution_m: 0.0,
+            delay_s: 0.0,
+        }
+    }
+}
+
+/// The limits of the pipeline; a stage without is off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest force (N).
+    pub max_force_n: f64,
+    /// Largest change of the force (N/s); infinite if there is none.
+    pub max_slew_n_per_s: f64,
+    /// Time in which the force goes to zero when it has to, and comes back afterwards (s).
+    pub ramp_s: f64,
+    /// Period of the local group (s).
+    pub tick_s: f64,
+    /// A tool that is too fast.
+    pub tool_speed: Option<ToolSpeed>,
+    /// Steps of model swaps.
+    pub tank: Option<Tank>,
+    /// Energy.
+    pub passivity: Option<Passivity>,
+    /// A model that is too old.
+    pub model_age: Option<ModelAge>,
+    /// The first seconds.
+    pub start_up: Option<StartUp>,
+    /// A silent device.
+    pub watchdog: Option<Watchdog>,
+}
+
+impl Limits {
+    /// Every stage with its default, at 1 kHz, for a `device` in an environment that stores nothing at the start.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn new(device: &DeviceLimits) -> Self {
+        Self {
+            tool_speed: Some(ToolSpeed::default()),
+            tank: Some(Tank::default()),
+            passivity: Some(Passivity {
+                stored_j: 0.0,
+                tolerance_j: 2e-3,
+                max_damping_n_s_per_m: device.max_damping_n_s_per_m,
+                noise_m_s: device.resolution_m / 1e-3,
+            }),
+            model_age: Some(ModelAge::default()),
+            start_up: Some(StartUp::default()),
+            watchdog: Some(Watchdog::default()),
+            ..Self::bare(device.max_force_n)
+        }
+    }
+
+    /// Finite check, clamp to `max_force_n` (N), slew limit and ramp alone.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn bare(max_force_n: f64) -> Self {
+        Self {
+            max_force_n,
+            max_slew_n_per_s: 500.0,
+            ramp_s: 0.1,
+            tick_s: 1e-3,
+            tool_speed: None,
+            tank: None,
+            passivity: None,
+            model_age: None,
+            start_up: None,
+            watchdog: None,
+        }
+    }
+}

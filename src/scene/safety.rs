@@ -1,0 +1,184 @@
+//! What stands between the computed force and the device.
+
+use super::check::{not_negative, positive};
+use crate::error::Error;
+
+/// Limits on what reaches the device. What is left out follows from the device and the rates.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+pub struct SafetySpec {
+    /// Largest force (N); the device's own limit if absent.
+    pub max_force_n: Option<f64>,
+    /// Largest change of the force (N/ms).
+    pub max_slew_n_per_ms: f64,
+    /// Time in which the force goes to zero when the run stops or fails, and comes back after a gap (ms).
+    pub ramp_ms: f64,
+    /// Tool speed from which on the force fades (m/s).
+    pub fade_speed_m_s: f64,
+    /// Tool speed from which on there is none (m/s).
+    pub stop_speed_m_s: f64,
+    /// What the energy tank of model swaps holds at the start, and at most (J).
+    pub tank_j: f64,
+    /// Below this no step of a swap passes unblended (J).
+    pub tank_min_j: f64,
+    /// Over this time a step is blended that the tank cannot pay (ms).
+    pub swap_blend_ms: f64,
+    /// Energy deficit at which no force is left (J).
+    pub energy_tolerance_j: f64,
+    /// Largest damping of the passivity controller (N s/m); what the device renders stably if absent.
+    pub max_damping_n_s_per_m: Option<f64>,
+    /// Tool speed that may be nothing but noise (m/s); a step of the device's resolution per tick if absent.
+    pub noise_m_s: Option<f64>,
+    /// Age of the local model from which on the force fades (ms); three periods of the global model and its declared latency
+    /// if absent, at least 100.
+    pub max_age_ms: Option<f64>,
+    /// The time in which it fades (ms).
+    pub age_fade_ms: f64,
+    /// The force engages once the computed one has been below this for four ticks (N).
+    pub engage_force_n: f64,
+    /// Then it ramps in over this time (ms).
+    pub start_up_ms: f64,
+    /// Ticks without a new state of the device after which its force goes to zero.
+    pub watchdog_ticks: u32,
+    /// Stages that are switched off.
+    pub off: Vec<SafetyStage>,
+}
+
+impl SafetySpec {
+    /// True if `stage` is not switched off.
+    pub fn has(&self, stage: SafetyStage) -> bool {
+        !self.off.contains(&stage)
+    }
+}
+
+impl Default for SafetySpec {
+    fn default() -> Self {
+        Self {
+            max_force_n: None,
+            max_slew_n_per_ms: 0.5,
+            ramp_ms: 100.0,
+            fade_speed_m_s: 1.0,
+            stop_speed_m_s: 2.0,
+            tank_j: 1e-3,
+            tank_min_j: 1e-5,
+            swap_blend_ms: 10.0,
+            energy_tolerance_j: 2e-3,
+            max_damping_n_s_per_m: None,
+            noise_m_s: None,
+            max_age_ms: None,
+            age_fade_ms: 200.0,
+            engage_force_n: 0.2,
+            start_up_ms: 2000.0,
+            watchdog_ticks: 2,
+            off: Vec::new(),
+        }
+    }
+}
+
+/// A force that fades longer than this is no stop any more (ms).
+const LONGEST_RAMP_MS: f64 = 2000.0;
+/// A minute: longer is a wrong unit (ms).
+const LONGEST_MS: f64 = 60_000.0;
+
+pub(super) fn validate(safety: &SafetySpec) -> Result<(), Error> {
+    if let Some(force_n) = safety.max_force_n {
+        positive("safety.max_force_n", force_n)?;
+    }
+    positive("safety.max_slew_n_per_ms", safety.max_slew_n_per_ms)?;
+    positive("safety.ramp_ms", safety.ramp_ms)?;
+    if safety.ramp_ms > LONGEST_RAMP_MS {
+        let message = format!("is {}, a stop may take {LONGEST_RAMP_MS} ms at most", safety.ramp_ms);
+        return Err(Error::scene("safety.ramp_ms", message));
+    }
+    not_negative("safety.fade_speed_m_s", safety.fade_speed_m_s)?;
+    positive("safety.stop_speed_m_s", safety.stop_speed_m_s)?;
+    if safety.stop_speed_m_s <= safety.fade_speed_m_s {
+        let (stop, fade) = (safety.stop_speed_m_s, safety.fade_speed_m_s);
+        let message = format!("is {stop}, must be above safety.fade_speed_m_s, which is {fade}");
+        return Err(Error::scene("safety.stop_speed_m_s", message));
+    }
+    positive("safety.tank_j", safety.tank_j)?;
+    not_negative("safety.tank_min_j", safety.tank_min_j)?;
+    positive("safety.energy_tolerance_j", safety.energy_tolerance_j)?;
+    not_negative("safety.max_damping_n_s_per_m", safety.max_damping_n_s_per_m.unwrap_or(0.0))?;
+    not_negative("safety.noise_m_s", safety.noise_m_s.unwrap_or(0.0))?;
+    positive("safety.engage_force_n", safety.engage_force_n)?;
+    for (field, ms) in [
+        ("safety.swap_blend_ms", safety.swap_blend_ms),
+        ("safety.max_age_ms", safety.max_age_ms.unwrap_or(1.0)),
+        ("safety.age_fade_ms", safety.age_fade_ms),
+        ("safety.start_up_ms", safety.start_up_ms),
+    ] {
+        positive(field, ms)?;
+        if ms > LONGEST_MS {
+            return Err(Error::scene(field, format!("is {ms}, must be at most {LONGEST_MS} ms")));
+        }
+    }
+    match safety.off.iter().find(|stage| !stage.can_be_off()) {
+        None => Ok(()),
+        Some(stage) => {
+            let message =
+                format!("names {:?}, which no device may be without: it cannot be switched off", stage.name());
+            Err(Error::scene("safety.off", message))
+        }
+    }
+}
+
+/// A stage of the safety pipeline, in its order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum SafetyStage {
+    /// Numbers that are not finite become zero. Cannot be switched off.
+    Finite,
+    /// The largest force. Cannot be switched off.
+    Clamp,
+    /// The largest change of the force, at both places.
+    Slew,
+    /// A tool that is too fast.
+    ToolSpeed,
+    /// Steps of model swaps.
+    Tank,
+    /// Energy that the environment gives out beyond what it had.
+    Passivity,
+    /// A local model that nobody renews.
+    ModelAge,
+    /// No force until the computed one was near zero, then a ramp.
+    StartUp,
+    /// A silent device.
+    Watchdog,
+}
+
+impl SafetyStage {
+    /// All, in the order of the pipeline.
+    pub const ALL: [Self; 9] = [
+        Self::Finite,
+        Self::Clamp,
+        Self::Slew,
+        Self::ToolSpeed,
+        Self::Tank,
+        Self::Passivity,
+        Self::ModelAge,
+        Self::StartUp,
+        Self::Watchdog,
+    ];
+
+    /// Its name in scenes, logs and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Finite => "finite",
+            Self::Clamp => "clamp",
+            Self::Slew => "slew",
+            Self::ToolSpeed => "tool_speed",
+            Self::Tank => "tank",
+            Self::Passivity => "passivity",
+            Self::ModelAge => "model_age",
+            Self::StartUp => "start_up",
+            Self::Watchdog => "watchdog",
+        }
+    }
+
+    /// False for the two that no device may be without.
+    pub fn can_be_off(self) -> bool {
+        !matches!(self, Self::Finite | Self::Clamp)
+    }
+}
