@@ -40,7 +40,6 @@ pub(super) fn stable_stepping(
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::Vec3;
     use super::super::super::body::{Block, Body, State};
     use super::super::super::mesh::Face;
     use super::*;
