@@ -116,7 +116,8 @@ fn a_killed_run_leaves_a_readable_log() {
     child.wait().unwrap();
     let called = folder.call(&["export", "killed.mcap", "--topic", "/force"]);
     assert_eq!((called.code, called.err.lines().count()), (Some(0), 1), "{called:?}");
-    assert!(called.err.contains("the run was cut off"), "{called:?}");
+    // Between two records or in one: a kill waits for neither.
+    assert!(called.err.contains("cut off"), "{called:?}");
     assert!(cli_support::rows(&called.out).len() > 100);
 }
 

@@ -79,6 +79,18 @@ impl BasisActor {
         self.go_on()
     }
 
+    /// Keeps what was made for `patch`; true if there is a basis more.
+    fn settle(&mut self, patch: Vec<u32>, made: Result<Option<Basis>, Error>, outcome: &mut Outcome) -> bool {
+        match made {
+            Ok(basis) => basis.map(|basis| self.bases.insert(Arc::new(basis))).is_some(),
+            Err(_) => {
+                self.hopeless.push(patch);
+                *outcome = Outcome::Degraded(Cause::NoBasis.code());
+                false
+            }
+        }
+    }
+
     fn publish(&mut self, ctx: &TickContext) {
         self.ports.bases.buffer().clone_from(&self.bases);
         self.ports.bases.publish(ctx);
@@ -100,48 +112,26 @@ impl Actor for BasisActor {
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        let (mut outcome, mut has_news) = (Outcome::Continue, false);
         if let Some(patch) = self.begun.as_ref().map(|reduction| reduction.patch().to_vec()) {
-            return match self.go_on() {
-                Ok(Some(basis)) => {
-                    self.bases.insert(Arc::new(basis));
-                    self.publish(ctx);
-                    Outcome::Continue
-                }
-                Ok(None) => Outcome::Continue,
-                Err(_) => {
-                    self.hopeless.push(patch);
-                    Outcome::Degraded(Cause::NoBasis.code())
-                }
-            };
-        }
-        if !self.ports.wishes.refresh(ctx) {
-            return Outcome::Continue;
-        }
-        let mut outcome = Outcome::Continue;
-        let mut has_news = false;
-        for patch in self.ports.wishes.get().patches.clone() {
-            if self.bases.get(&patch).is_some() {
-                // A global model that was started again wants what is there already.
-                has_news = true;
-                continue;
-            }
-            if self.hopeless.contains(&patch) {
-                continue;
-            }
-            match self.get(&patch) {
-                Ok(Some(basis)) => {
-                    self.bases.insert(Arc::new(basis));
+            let made = self.go_on();
+            has_news = self.settle(patch, made, &mut outcome);
+        } else if self.ports.wishes.refresh(ctx) {
+            for patch in self.ports.wishes.get().patches.clone() {
+                if self.bases.get(&patch).is_some() {
+                    // A global model that was started again wants what is there already.
                     has_news = true;
-                }
-                Ok(None) => {}
-                Err(_) => {
-                    self.hopeless.push(patch);
-                    outcome = Outcome::Degraded(Cause::NoBasis.code());
                     continue;
                 }
-            }
-            if self.pace == Pace::OneByOne {
-                break;
+                if self.hopeless.contains(&patch) {
+                    continue;
+                }
+                let made = self.get(&patch);
+                let is_tried = made.is_ok();
+                has_news |= self.settle(patch, made, &mut outcome);
+                if is_tried && self.pace == Pace::OneByOne {
+                    break;
+                }
             }
         }
         if has_news {

@@ -20,7 +20,7 @@ use crate::model::blend::Blend;
 use crate::model::body::{Block, Body, State};
 use crate::model::contact::{Contact, Law};
 use crate::model::equilibrium::static_equilibrium;
-use crate::model::local::Template;
+use crate::model::local::{MOST_EXPLICIT_STEPS, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, RateGroup, admit_here};
@@ -140,10 +140,6 @@ pub(super) struct Timing {
     /// Haptic ticks that a local model may have to reach ahead.
     pub horizon: u32,
 }
-
-/// A linear patch whose stability asks for more takes one implicit step per tick: that costs as much as two explicit ones,
-/// and damps what four still show.
-const MOST_EXPLICIT_STEPS: u32 = 4;
 
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let mut scene = parts.scene;

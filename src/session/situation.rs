@@ -3,6 +3,7 @@
 use super::budget::{force_evaluation, nominal_evaluation};
 use super::prepare::Timing;
 use crate::model::body::{Body, State};
+use crate::model::local::MOST_EXPLICIT_STEPS;
 use crate::runtime::Execution;
 use crate::scene::{LocalModelKind as Kind, Scene};
 use crate::time::Nanos;
@@ -58,9 +59,6 @@ fn local_substep_s(kind: Kind) -> f64 {
     }
 }
 
-/// Linear patches take one implicit step, which costs as much as two, where the stability limit asks for more than four.
-const MOST_LOCAL_STEPS: u32 = 4;
-
 impl Situation {
     /// Of `scene` with `body` as it is at the start. On threads the forces are evaluated and timed; in virtual time all costs
     /// are nominal, so that a run is the same everywhere.
@@ -107,7 +105,7 @@ impl Situation {
 
     /// What a haptic tick of `kind` takes (s).
     fn tick_s(&self, kind: Kind) -> f64 {
-        let substeps = if kind.is_linear() { self.substeps.min(MOST_LOCAL_STEPS) } else { self.substeps };
+        let substeps = if kind.is_linear() { self.substeps.min(MOST_EXPLICIT_STEPS) } else { self.substeps };
         match kind {
             Kind::Full => self.full_tick_s(),
             kind => f64::from(substeps) * local_substep_s(kind),

@@ -230,6 +230,10 @@ impl Body for SpringNetwork {
         }
     }
 
+    fn spring_count(&self) -> Option<usize> {
+        Some(self.springs.len())
+    }
+
     fn springs(&self) -> Option<Vec<Link>> {
         Some(self.springs.iter().map(|&(a, b, spring)| Link { nodes: [a, b], spring }).collect())
     }

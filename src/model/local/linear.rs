@@ -78,8 +78,6 @@ pub struct LinearPatch<B> {
     /// Ticks since then.
     ticks: u32,
     is_implicit: bool,
-    /// Window nodes that move in the body but not in this model.
-    beyond: Vec<bool>,
     /// Of the last tick whose contact was inside the patch (N).
     force: Vec3,
     has_left: bool,
@@ -107,7 +105,6 @@ impl<B: Boundary> LinearPatch<B> {
             built_at: 0,
             ticks: 0,
             is_implicit: false,
-            beyond: Vec::new(),
             force: Vec3::zeros(),
             has_left: false,
             watched: Watched::default(),
@@ -168,9 +165,6 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
             self.state.velocities[movable..].fill(Vec3::zeros());
         }
         window.gather_movable(body.inverse_masses(), &mut self.inverse_masses);
-        self.beyond.clear();
-        self.beyond.extend(window.nodes.iter().map(|&node| body.inverse_masses()[node as usize] > 0.0));
-        self.beyond[..movable].fill(false);
         self.forces.resize(movable, Vec3::zeros());
         let share = |row, column| self.boundary.share(body, row, column);
         self.tangent.rebuild(body, state, nodes, &|node| window.movable(node), &share);
@@ -208,7 +202,7 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
         if !self.state.is_finite() {
             return Vec3::repeat(f64::NAN);
         }
-        self.has_left = self.window.is_on(&self.contact, &self.beyond);
+        self.has_left = self.window.has_left(&self.contact);
         if !self.has_left {
             self.force = force;
         }

@@ -36,6 +36,7 @@ pub use linear_boundary::{Drifting, LinearBoundary};
 pub use patch::{Patch, Still};
 pub use predictive::{Prediction, Predictive};
 pub use scaled_boundary::{Layered, ScaledBoundary};
+pub use stable::MOST_EXPLICIT_STEPS;
 pub use succession::{Resynced, Served, Succession};
 pub use template::Template;
 

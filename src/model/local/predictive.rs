@@ -38,8 +38,6 @@ pub struct Predictive {
     prediction: Prediction,
     springs: Arc<SpringGraph>,
     window: Window,
-    /// True for window nodes that move in the body but not by contact forces in this model.
-    beyond: Vec<bool>,
     near: NearSprings,
     /// Of all window nodes: the patch, the ring, then what stands still.
     state: State,
@@ -79,7 +77,6 @@ impl Predictive {
             prediction,
             springs,
             window: Window::default(),
-            beyond: Vec::new(),
             near: NearSprings::default(),
             state: State::default(),
             inverse_masses: Vec::new(),
@@ -158,7 +155,7 @@ impl Predictive {
         let resting = flat(&self.forces[ring.clone()]);
         let mut substep = 0;
         for n in 0..resync.horizon {
-            if self.contact_is_beyond() {
+            if self.window.has_left(&self.contact) {
                 // What the patch would do from here on is wrong.
                 self.take_present(resync);
                 return false;
@@ -233,11 +230,6 @@ impl Predictive {
         self.place_ring_before(0.0);
         force
     }
-
-    /// True if the contact is on a node that gives way in the body but not here.
-    fn contact_is_beyond(&self) -> bool {
-        self.window.is_on(&self.contact, &self.beyond)
-    }
 }
 
 /// The numbers of `vectors`, one after the other.
@@ -262,11 +254,7 @@ impl LocalModel for Predictive {
         });
         self.near.rebuild(&self.springs, &self.window);
         let (window, movable) = (&self.window, self.window.movable);
-        let body_masses = resync.global.body().inverse_masses();
-        window.gather_movable(body_masses, &mut self.inverse_masses);
-        self.beyond.clear();
-        self.beyond.resize(movable, false);
-        self.beyond.extend(window.nodes[movable..].iter().map(|&node| body_masses[node as usize] > 0.0));
+        window.gather_movable(resync.global.body().inverse_masses(), &mut self.inverse_masses);
         self.forces.resize(window.nodes.len(), Vec3::zeros());
         self.basis = resync.bases.get(&window.nodes[..movable]).cloned();
         for numbers in [&mut self.ring_positions, &mut self.ring_velocities, &mut self.ring_forces] {
@@ -288,7 +276,7 @@ impl LocalModel for Predictive {
         if !self.state.is_finite() {
             return Vec3::repeat(f64::NAN);
         }
-        self.has_left = self.contact_is_beyond();
+        self.has_left = self.window.has_left(&self.contact);
         if !self.has_left {
             self.force = force;
         }

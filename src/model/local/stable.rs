@@ -6,8 +6,9 @@ use super::super::tangent::PatchTangent;
 
 /// A step above this share of the stability limit is replaced: the limit is known up to a percent.
 const STABLE_SHARE: f64 = 0.98;
-/// Where stability asks for more, one implicit step is cheaper.
-const MOST_EXPLICIT_STEPS: u32 = 4;
+/// A linear patch whose stability asks for more takes one implicit step per tick: that costs as much as two explicit ones,
+/// and damps what four still show.
+pub const MOST_EXPLICIT_STEPS: u32 = 4;
 /// With the paper's equations, which have no implicit step: a tick stays bounded.
 const MOST_SUBSTEPS: u32 = 32;
 

@@ -22,6 +22,8 @@ pub(super) struct Window {
     pub triangles: Vec<u32>,
     /// Local triangles with a movable node, and those around the centre: those that detection looks at.
     pub candidates: Vec<u32>,
+    /// By local node: true for those that give way in the body, but not here.
+    beyond: Vec<bool>,
     /// Local place of each global node and triangle, or [`NONE`]; as long as the body, only touched entries change.
     local_node: Vec<u32>,
     local_triangle: Vec<u32>,
@@ -99,6 +101,11 @@ impl Window {
             self.surface.neighbours.push(whole.neighbours[t as usize].map(local));
         }
         self.surface.index_nodes(self.nodes.len());
+
+        let masses = body.inverse_masses();
+        self.beyond.clear();
+        self.beyond.resize(self.movable, false);
+        self.beyond.extend(self.nodes[self.movable..].iter().map(|&node| masses[node as usize] > 0.0));
     }
 
     fn add_node(&mut self, node: u32) {
@@ -171,10 +178,10 @@ impl Window {
         Contact { triangle: contact.triangle.map(|triangle| self.triangles[triangle as usize]), ..*contact }
     }
 
-    /// True if `contact`, in local numbering, presses on a node of `beyond`: one that gives way in the body, but not here.
-    pub(super) fn is_on(&self, contact: &Contact, beyond: &[bool]) -> bool {
+    /// True if `contact`, in local numbering, presses on a node that gives way in the body, but not here.
+    pub(super) fn has_left(&self, contact: &Contact) -> bool {
         let touched = contact.triangle.filter(|_| contact.is_touching());
-        touched.is_some_and(|t| self.surface.triangles[t as usize].iter().any(|&node| beyond[node as usize]))
+        touched.is_some_and(|t| self.surface.triangles[t as usize].iter().any(|&node| self.beyond[node as usize]))
     }
 
     /// Writes the inverse mass of each local node (1/kg), zero for those that the patch does not move.
