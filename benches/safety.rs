@@ -27,13 +27,16 @@ fn measure(mut input: impl FnMut(u32) -> Input) -> (Vec<f64>, u64) {
     (times, limited)
 }
 
+/// A name, and the input of each tick.
+type Case = (&'static str, Box<dyn FnMut(u32) -> Input>);
+
 fn main() {
     // Both after the start-up: 2 s and more are over in the first hundredth of the batches.
     let pressing = |n: u32| {
         let depth = -0.002 * (f64::from(n) * 0.006).sin().abs();
         (depth, Input::new(Request::Force([0.0, 0.0, -100.0 * depth]), [0.0, 0.0, depth], 1e-3))
     };
-    let cases: [(&str, Box<dyn FnMut(u32) -> Input>); 3] = [
+    let cases: [Case; 3] = [
         ("passive contact", Box::new(move |n| pressing(n).1)),
         ("energy deficit", {
             // Pushes along the motion: damped and withdrawn in every tick.

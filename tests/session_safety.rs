@@ -2,7 +2,7 @@
 
 mod session_support;
 
-use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use palpate::log::{ForceSample, LogRecord, ToolSample};
 use palpate::model::Vec3;
 use palpate::runtime::Disturbance;
@@ -126,7 +126,7 @@ impl Device for Silent {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { max_force_n: 3.3 }
+        Capabilities::default()
     }
 
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
@@ -137,7 +137,7 @@ impl Device for Silent {
         Ok(DeviceState { position: Vec3::from(self.0.at(t)), ..DeviceState::default() })
     }
 
-    fn write(&mut self, _: Vec3) -> Result<(), DeviceFault> {
+    fn write(&mut self, _: ForceCommand) -> Result<(), DeviceFault> {
         Ok(())
     }
 }
