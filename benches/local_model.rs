@@ -27,7 +27,7 @@ fn pressed(nodes: usize) -> (Simulation, Vec3) {
     for k in 0..100 {
         sim.tick(ToolMotion { from: at(k), to: at(k + 1) });
     }
-    assert!(sim.contact().is_touching());
+    assert!(sim.contact(0).is_touching());
     (sim, at(100))
 }
 
@@ -42,13 +42,14 @@ fn model(template: &Template, sim: &mut Simulation) -> Box<dyn LocalModel> {
 }
 
 fn rebuild(patch: &mut dyn LocalModel, sim: &mut Simulation) {
-    let triangle = sim.contact().triangle.expect("the tool touches");
+    let triangle = sim.contact(0).triangle.expect("the tool touches");
     patch.rebuild(ResyncView {
         global: sim,
         tick: 100,
         triangles: &[triangle],
         patch: None,
-        tool: ToolForecast::default(),
+        tools: &[ToolForecast::default()],
+        index: 0,
         horizon: 0,
         bases: &Bases::default(),
     });
@@ -103,7 +104,7 @@ fn condense(c: &mut Criterion) {
     });
     let body = Condensation::new(springs).expect("held");
     let mut nodes = Vec::new();
-    sim.body().patch(&[sim.contact().triangle.expect("the tool touches")], [4, 4, 2], &mut nodes);
+    sim.body().patch(&[sim.contact(0).triangle.expect("the tool touches")], [4, 4, 2], &mut nodes);
     group.bench_function("a new window", |b| b.iter(|| black_box(body.compliance(&nodes))));
     group.finish();
 }

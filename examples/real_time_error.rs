@@ -66,7 +66,7 @@ fn compare(name: &str, scene: Scene) -> Result<(), Error> {
     let real =
         Session::from_scene(scene.clone().with_model(LocalModelKind::Predictive)).keep_records().build()?.run()?;
     let mut reference = scene.with_model(LocalModelKind::Full);
-    reference.device.path = Some(reported(&real)?);
+    reference.devices[0].path = Some(reported(&real)?);
     let full = Session::from_scene(reference).virtual_time().keep_records().build()?.run()?;
 
     let (forces, expected) = (forces(&real), forces(&full));
@@ -83,8 +83,11 @@ fn compare(name: &str, scene: Scene) -> Result<(), Error> {
         }
     }
     let left_out = 100.0 * (1.0 - clear.len() as f64 / all.len() as f64);
-    let shares: Vec<String> =
-        real.report.force.shares().map(|(model, share)| format!("{} {:.2} %", model.name(), 100.0 * share)).collect();
+    let shares: Vec<String> = real.report.devices[0]
+        .force
+        .shares()
+        .map(|(model, share)| format!("{} {:.2} %", model.name(), 100.0 * share))
+        .collect();
     println!(
         "{name}: rms {:.3} %, max {:.2} % of the peak; over all ticks rms {:.3} % ({left_out:.1} % left out, {} slips); \
          served by {}",

@@ -13,11 +13,12 @@ const SPACING_M: f64 = 0.1 / 11.0;
 type Formula = fn(f64) -> [f64; 3];
 
 /// Name, length (s) and formula of every path file.
-const PATHS: [(&str, f64, Formula); 6] = [
+const PATHS: [(&str, f64, Formula); 7] = [
     ("demo.csv", 5.0, demo),
     ("drag.csv", 2.5, drag),
     ("hand.csv", 0.8, hand),
     ("hand_release.csv", 0.4, hand_release),
+    ("hold_right.csv", 2.5, hold_right),
     ("hover.csv", 0.0, hover),
     ("pull_release.csv", 1.0, pull_release),
 ];
@@ -58,6 +59,12 @@ fn hand(t: f64) -> [f64; 3] {
 /// Where the hand of the reference wants to be: from 1 mm below the surface to 11 mm.
 fn hand_release(t: f64) -> [f64; 3] {
     [0.0475, 0.0512, 0.099 - 0.010 * min_jerk(t / 0.4)]
+}
+
+/// Press 8 mm deep on the right, hold, lift.
+fn hold_right(t: f64) -> [f64; 3] {
+    let z = 0.101 - 0.009 * min_jerk((t - 0.4) / 0.4) + 0.011 * min_jerk((t - 2.0) / 0.4);
+    [0.0712, 0.0471, z]
 }
 
 /// 1 cm above node [8, 5, 11], motionless.

@@ -70,6 +70,17 @@ impl Error {
         self
     }
 
+    /// The same error with the field `from` at the start of its place called `to`.
+    #[must_use]
+    pub(crate) fn with_place_of(mut self, from: &str, to: &str) -> Self {
+        if let Some(rest) = self.place.strip_prefix(from)
+            && (rest.is_empty() || rest.starts_with(['.', '[', ':']))
+        {
+            self.place = format!("{to}{rest}");
+        }
+        self
+    }
+
     /// The kind, for programs.
     pub fn kind(&self) -> ErrorKind {
         self.kind

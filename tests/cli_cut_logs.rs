@@ -61,8 +61,8 @@ fn every_cut_can_be_analysed() {
         let (analysis, damage) = analysed(&bytes[..cut]);
         assert!(damage.is_some(), "cut at {cut}");
         let report = analysis.report();
-        assert!(report.force.ticks >= last, "cut at {cut}");
-        last = report.force.ticks;
+        assert!(report.devices[0].force.ticks >= last, "cut at {cut}");
+        last = report.devices[0].force.ticks;
         let json: serde_json::Value = serde_json::from_str(&to_json(&report)).expect("one JSON document");
         assert!(!to_text(&report).is_empty() && json.is_object(), "cut at {cut}");
     }

@@ -20,7 +20,7 @@ fn press(x: f64, y: f64, friction: f64) -> (Vec3, Contact) {
     let mut sim = simulation(block(STD), Contact::default(), friction);
     let path: Vec<Vec3> = (0..=150).map(|k| Vec3::new(x, y, 0.101 - 0.004 * minjerk(f64::from(k) / 100.0))).collect();
     let force = *forces(&mut sim, &path).last().unwrap();
-    (force, *sim.contact())
+    (force, *sim.contact(0))
 }
 
 #[test]
@@ -72,11 +72,11 @@ fn a_tool_on_a_fixed_face_is_lost_without_force() {
     let path: Vec<Vec3> = (0..=20).map(|k| Vec3::new(0.05, 0.0512, -0.001 + 0.0001 * f64::from(k))).collect();
     let felt = forces(&mut sim, &path);
     assert!(felt.iter().all(|force| *force == Vec3::zeros()));
-    assert_eq!(sim.contact().mode, Mode::Lost);
+    assert_eq!(sim.contact(0).mode, Mode::Lost);
     // It lets go like any other contact: below the face, nothing is tracked any more.
     let away = Vec3::new(0.05, 0.0512, -0.01);
     sim.tick(ToolMotion { from: *path.last().unwrap(), to: away });
-    assert_eq!((sim.contact().mode, sim.contact().triangle), (Mode::Lost, None));
+    assert_eq!((sim.contact(0).mode, sim.contact(0).triangle), (Mode::Lost, None));
 }
 
 #[test]
@@ -96,7 +96,8 @@ fn a_patch_on_a_held_face_reports_the_lost_contact_too() {
         tick: 0,
         triangles: &[bottom],
         patch: None,
-        tool: ToolForecast::default(),
+        tools: &[ToolForecast::default()],
+        index: 0,
         horizon: 0,
         bases: &Bases::default(),
     });
@@ -114,7 +115,7 @@ fn a_frictionless_tool_that_jumps_far_over_a_flat_surface_feels_no_sideways_forc
     let mut sim = simulation(body, Contact::default(), 0.0);
     let at = |x: f64| Vec3::new(x, 0.0512, 0.0099);
     sim.tick(ToolMotion { from: at(0.02) + Vec3::z() * 0.001, to: at(0.02) });
-    assert!(sim.contact().is_touching());
+    assert!(sim.contact(0).is_touching());
     for (from, to) in [(0.02, 0.08), (0.08, 0.08), (0.08, 0.08)] {
         let force = sim.tick(ToolMotion { from: at(from), to: at(to) });
         assert!(force.xy().norm() < 0.2 * force.z.abs() + 1e-9, "{force}");
@@ -153,7 +154,7 @@ proptest! {
             peak = peak.max(force.norm());
             let inside = (position(k + 1) - target).dot(&inward) > 1e-5;
             if inside {
-                prop_assert!(sim.contact().triangle.is_some(), "tick {}: {:?}", k, sim.contact());
+                prop_assert!(sim.contact(0).triangle.is_some(), "tick {}: {:?}", k, sim.contact(0));
             }
         }
         prop_assert!(peak > 0.0);
@@ -251,12 +252,12 @@ fn a_released_tool_is_tracked_without_new_detection_and_dropped_when_it_leaves()
         }
     };
     run(&mut sim, 0.101, 0.098, 60);
-    assert!(sim.contact().is_touching());
+    assert!(sim.contact(0).is_touching());
     // Off the surface by a tenth of a millimetre: no force, but still tracked.
     run(&mut sim, 0.098, 0.1001, 60);
     run(&mut sim, 0.1001, 0.1001, 600);
-    assert_eq!((sim.contact().mode, sim.contact().triangle.is_some()), (Mode::Free, true));
-    assert_eq!(sim.force(), Vec3::zeros());
+    assert_eq!((sim.contact(0).mode, sim.contact(0).triangle.is_some()), (Mode::Free, true));
+    assert_eq!(sim.force(0), Vec3::zeros());
     run(&mut sim, 0.1001, 0.102, 20);
-    assert_eq!(sim.contact().triangle, None);
+    assert_eq!(sim.contact(0).triangle, None);
 }

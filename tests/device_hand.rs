@@ -71,7 +71,7 @@ fn a_run_with_a_hand_is_the_same_every_time() {
     let [one, other] = [0, 1].map(|_| run(scene.clone()));
     assert_eq!((forces(&one), tools(&one)), (forces(&other), tools(&other)));
     // Another seed of jitter and losses is another run.
-    scene.device.plant.seed = 2;
+    scene.devices[0].plant.seed = 2;
     assert_ne!(tools(&run(scene)), tools(&one));
 }
 
@@ -80,7 +80,7 @@ fn faults_act_on_the_scripted_tool_too_and_only_while_they_last() {
     let mut scene = load("drag_slip").with_model(LocalModelKind::Full);
     scene.run.duration_s = 0.5;
     let without = tools(&run(scene.clone()));
-    scene.device.faults = vec![FaultSpec::new(FaultKind::Frozen, 0.2, 0.21)];
+    scene.devices[0].faults = vec![FaultSpec::new(FaultKind::Frozen, 0.2, 0.21)];
     let with = tools(&run(scene));
     let differing: Vec<usize> = (0..501).filter(|&tick| with[tick] != without[tick]).collect();
     assert_eq!(differing, (200..210).collect::<Vec<_>>());
@@ -137,7 +137,7 @@ mod logged {
         assert!((350..390).contains(&degraded), "{degraded}");
         assert_eq!(summary.runtime.fault, None);
         // Check that it had something to hold.
-        assert!(summary.report.force.peak_n > 0.5, "{summary}");
+        assert!(summary.report.devices[0].force.peak_n > 0.5, "{summary}");
     }
 
     #[test]
@@ -158,7 +158,7 @@ mod logged {
         let mut scene = load("hand_release");
         scene.run.duration_s = 0.5;
         let (summary, log) = recorded(scene.clone(), folder.path());
-        scene.device = palpate::scene::DeviceSpec {
+        scene.devices[0] = palpate::scene::DeviceSpec {
             kind: DeviceKind::Replay,
             log: Some(log),
             ..palpate::scene::DeviceSpec::default()
@@ -174,14 +174,14 @@ mod logged {
     #[test]
     fn a_scene_that_names_no_log_or_a_bad_one_is_refused_with_its_field() {
         let mut scene = load("hand_release");
-        scene.device = palpate::scene::DeviceSpec {
+        scene.devices[0] = palpate::scene::DeviceSpec {
             kind: DeviceKind::Replay,
             log: Some("nowhere.mcap".into()),
             ..palpate::scene::DeviceSpec::default()
         };
         let error = Session::from_scene(scene.clone()).virtual_time().build().unwrap_err().to_string();
         assert!(error.starts_with("device.log: nowhere.mcap"), "{error}");
-        scene.device.log = None;
+        scene.devices[0].log = None;
         let error = Session::from_scene(scene).virtual_time().build().unwrap_err().to_string();
         assert!(error.starts_with("device.log: is missing"), "{error}");
     }

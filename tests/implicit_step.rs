@@ -40,7 +40,8 @@ fn patch(factor: f64, zeta: f64, friction: f64, is_implicit: bool, ticks: u32) -
         tick: 0,
         triangles: &[triangle],
         patch: None,
-        tool: ToolForecast::default(),
+        tools: &[ToolForecast::default()],
+        index: 0,
         horizon: 0,
         bases: &Bases::default(),
     });

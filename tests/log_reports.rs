@@ -73,7 +73,7 @@ fn every_cut_of_a_log_can_be_analysed_and_exported() {
         let report = analyse(&bytes[..cut]);
         let forces = table(&bytes[..cut], "/force");
         assert!(to_text(&report).contains("damage"));
-        assert_eq!(forces.lines().count() as u64, 1 + report.force.ticks);
+        assert_eq!(forces.lines().count() as u64, 1 + report.devices[0].force.ticks);
         assert!(forces.lines().count() >= rows);
         rows = forces.lines().count();
     }

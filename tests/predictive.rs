@@ -43,7 +43,7 @@ fn forces(scene: Scene) -> (ForceTrace, String) {
     let session = Session::from_scene(scene).virtual_time().keep_records().build().expect("a valid scene");
     let summary = session.run().expect("it runs");
     assert_eq!(summary.runtime.fault, None);
-    let shares = summary.report.force.shares().map(|(model, share)| format!("{} {share:.4}", model.name()));
+    let shares = summary.report.devices[0].force.shares().map(|(model, share)| format!("{} {share:.4}", model.name()));
     let shares = shares.collect::<Vec<_>>().join(", ");
     (ForceTrace::of(&summary.records), shares)
 }

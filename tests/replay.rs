@@ -38,7 +38,7 @@ fn assert_identical(report: &ReplayReport, summary: &Summary) {
     assert_eq!((&report.logged_fault, &report.unrepeated), (&None, &None));
     assert_eq!(
         (report.force.logged, report.commanded.logged),
-        (summary.report.force.ticks, summary.report.limits.ticks)
+        (summary.report.devices[0].force.ticks, summary.report.devices[0].limits.ticks)
     );
     assert!(report.force.logged > 50, "{report}");
 }
@@ -51,7 +51,7 @@ fn demo(seconds: f64) -> SessionBuilder {
 fn the_demo_in_real_time_is_replayed_bit_for_bit() {
     let folder = folder();
     let (summary, log) = record(demo(2.0), &folder);
-    assert!(summary.report.resyncs.age_ns.count > 0 && summary.report.contact.slip > 0);
+    assert!(summary.report.devices[0].resyncs.age_ns.count > 0 && summary.report.devices[0].contact.slip > 0);
     assert_identical(&Session::replay(&log).unwrap().run().unwrap(), &summary);
 }
 
@@ -146,7 +146,7 @@ fn stalls_late_models_and_failed_reads_are_replayed_bit_for_bit() {
     let (summary, log) = record(own(slow).device(moody(pressing())).duration_s(2.0), &folder);
     // Check that it was such a run: releases skipped on both sides, models that came late, reads that failed
     assert!(summary.runtime.groups.iter().take(2).all(|group| group.skipped > 0), "{summary}");
-    assert!(summary.runtime.groups[0].degraded > 0 && summary.report.force.peak_n > 0.05, "{summary}");
+    assert!(summary.runtime.groups[0].degraded > 0 && summary.report.devices[0].force.peak_n > 0.05, "{summary}");
     let report = own(block()).duration_s(2.0).replay(&log).unwrap().run().unwrap();
     assert_identical(&report, &summary);
 }
@@ -172,7 +172,7 @@ fn a_glued_tool_and_a_changed_scene_are_replayed_from_the_log_alone() {
     let builder = Session::from_scene(scene).attach_node(top()).probe(top()).friction(f64::INFINITY).patch([4, 3, 2]);
     let builder = builder.device(moody(wiggling())).crossfade_ms(7.0).duration_s(0.8);
     let (summary, log) = record(builder, &folder);
-    assert!(summary.report.force.peak_n > 0.05, "{summary}");
+    assert!(summary.report.devices[0].force.peak_n > 0.05, "{summary}");
     assert_identical(&Session::replay(&log).unwrap().run().unwrap(), &summary);
 }
 
@@ -230,7 +230,7 @@ fn a_run_whose_global_model_was_started_again_is_compared_up_to_the_fault() {
         assert!(report.is_identical() && report.topics().all(Compared::is_identical), "{report}");
         let logged = report.logged_fault.as_ref().unwrap();
         assert!(logged.time == fault.at && logged.restarted, "{report}");
-        assert_eq!(report.force.logged + report.force.left_out, summary.report.force.ticks);
+        assert_eq!(report.force.logged + report.force.left_out, summary.report.devices[0].force.ticks);
         assert!(report.force.logged > 50 && report.force.left_out > 50 && report.end > fault.at, "{report}");
         assert!(report.to_string().contains("a new global model served after it"), "{report}");
     }
@@ -562,7 +562,7 @@ const LOSSES: [Loss; 14] = [
     ("the session", "no attachment session.toml", |all| {
         all.retain(|e| !matches!(e, LogEntry::Attachment { name, .. } if name == Environment::SESSION));
     }),
-    ("the first state", "first state", |all| environment(all).first_tool = None),
+    ("the first state", "first state", |all| environment(all).first_tools.clear()),
     ("lost records", "9 records were lost", |all| {
         for entry in all {
             if let LogEntry::Stats(stats) = entry {

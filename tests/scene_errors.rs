@@ -326,7 +326,7 @@ fn a_bad_path_file_is_named_with_its_own_line() {
     assert!(message.contains("path.csv:3: y_m is NaN"), "{message}");
 
     std::fs::write(&csv, "t_s,x_m,y_m,z_m\n0,0,0,0\n1,0,0,2\n").unwrap();
-    let path = Scene::load(&scene).unwrap().device.path.unwrap();
+    let path = Scene::load(&scene).unwrap().devices[0].path.clone().unwrap();
     assert_eq!(path.at(0.5), [0.0, 0.0, 1.0]);
 }
 

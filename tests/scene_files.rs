@@ -40,6 +40,7 @@ fn every_scene_loads_and_says_what_it_shows() {
             "hand",
             "hand_release",
             "pull_release",
+            "two_hands",
             "wave",
             "wave_probe"
         ]
@@ -49,7 +50,8 @@ fn every_scene_loads_and_says_what_it_shows() {
         let source = scene.source.as_deref().unwrap();
         assert!(source.starts_with("# ") && source.contains("Look for:"), "{}", file.display());
         assert_eq!(scene.validate().map_err(|error| error.to_string()), Ok(()), "{}", file.display());
-        assert_eq!(scene.local.model, LocalModelKind::Patch.into(), "{}", file.display());
+        let model = if scene.devices.len() > 1 { LocalModelKind::Predictive } else { LocalModelKind::Patch };
+        assert_eq!(scene.local.model, model.into(), "{}", file.display());
     }
 }
 
@@ -135,7 +137,7 @@ fn the_reference_scenes_have_the_reference_parameters() {
         assert_eq!(scene.run.duration_s, duration_s, "{name}");
     }
     let wave = load("wave");
-    assert_eq!((wave.device.attach_node, &wave.device.path), (Some([8, 5, 11]), &None));
+    assert_eq!((wave.devices[0].attach_node, &wave.devices[0].path), (Some([8, 5, 11]), &None));
     assert_eq!(wave.initial.unwrap().hold, [[8, 5, 11]]);
     let probe = load("wave_probe");
     assert_eq!((probe.probes[0].node, probe.initial.unwrap().hold.len()), ([8, 5, 11], 0));
@@ -165,8 +167,8 @@ fn the_path_files_are_what_their_formulas_give() {
 fn a_glued_tool_starts_where_its_node_rests() {
     for name in ["hand", "pull_release"] {
         let scene = load(name);
-        let (block, node) = (&scene.body.as_ref().unwrap().block, scene.device.attach_node.unwrap());
-        let start = scene.device.path.as_ref().unwrap().at(0.0);
+        let (block, node) = (&scene.body.as_ref().unwrap().block, scene.devices[0].attach_node.unwrap());
+        let start = scene.devices[0].path.as_ref().unwrap().at(0.0);
         for axis in 0..3 {
             let rest = block.size_m[axis] * node[axis] as f64 / (block.nodes[axis] - 1) as f64;
             assert!((start[axis] - rest).abs() < 1e-15, "{name}");

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 
 /// The scene without what its text does not hold.
 fn without_path(mut scene: Scene) -> Scene {
-    (scene.source, scene.device.path) = (None, None);
+    (scene.source, scene.devices[0].path) = (None, None);
     scene
 }
 
@@ -27,7 +27,7 @@ fn every_scene_that_comes_with_palpate_survives_the_trip() {
         let scene = Scene::load(&path).unwrap();
         let text = scene.to_toml().unwrap();
         let again = Scene::from_toml(&text, "again.toml", Some(&folder)).unwrap_or_else(|e| panic!("{e}\n{text}"));
-        assert_eq!(again.device.path, scene.device.path, "the path is found by its name");
+        assert_eq!(again.devices[0].path, scene.devices[0].path, "the path is found by its name");
         assert_eq!(without_path(again), without_path(scene), "{}", path.display());
         scenes += 1;
     }
@@ -91,7 +91,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
                 },
             });
             scene.probes = probes.into_iter().map(|node| ProbeSpec { node }).collect();
-            scene.device.attach_node = scene.initial.is_none().then_some([2, 2, 5]);
+            scene.devices[0].attach_node = scene.initial.is_none().then_some([2, 2, 5]);
         }
         scene.body = body;
         // What does not fit the model is left out.

@@ -27,7 +27,7 @@ fn run(fault: Fault) -> Trace {
         for group in &summary.runtime.groups {
             assert_eq!(group.released + group.skipped, group.elapsed_periods, "{fault:?}: {}", group.name);
         }
-        assert_eq!(summary.report.force.not_finite, 0);
+        assert_eq!(summary.report.devices[0].force.not_finite, 0);
         assert_eq!(summary.runtime.lost_records, 0);
     }
     assert_eq!(trace.written.last().unwrap().1, [0.0; 3], "{fault:?}: the last command is zero");

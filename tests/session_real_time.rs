@@ -115,7 +115,7 @@ fn assert_sound(summary: &Summary, written: &Written) {
 }
 
 fn stages(summary: &Summary) -> Vec<&str> {
-    summary.report.limits.stages.iter().map(|(name, _)| &**name).collect()
+    summary.report.devices[0].limits.stages.iter().map(|(name, _)| &**name).collect()
 }
 
 fn events(summary: &Summary) -> String {
@@ -203,12 +203,12 @@ fn a_run_balances_its_books_and_resyncs() {
                 // Bases are made by a group of its own, at the global model's rate.
                 let slow = if model == LocalModelKind::Predictive { 2 } else { 1 };
                 assert_eq!(periods[..periods.len() - 1], [&[1001 + WIND_DOWN][..], &[31; 2][..slow]].concat());
-                assert!(summary.report.resyncs.age_ns.count > 0, "{model:?} never resynced");
+                assert!(summary.report.devices[0].resyncs.age_ns.count > 0, "{model:?} never resynced");
                 assert!(!global_ticks(&summary).is_empty());
             }
         }
-        assert_eq!(summary.report.force.ticks, forces(&summary).len() as u64);
-        assert!(summary.report.force.peak_n > 0.05, "{model:?} felt nothing");
+        assert_eq!(summary.report.devices[0].force.ticks, forces(&summary).len() as u64);
+        assert!(summary.report.devices[0].force.peak_n > 0.05, "{model:?} felt nothing");
     }
 }
 
@@ -269,8 +269,8 @@ fn a_device_that_lies_or_faults_never_gets_a_command_beyond_the_limits() {
     for stage in ["clamp", "slew", "ramp", "tool_speed", "start_up"] {
         assert!(stages(&summary).contains(&stage), "no {stage} in {:?}", stages(&summary));
     }
-    assert!(summary.report.force.peak_n > MAX_FORCE_N, "nothing was there to be clamped");
-    assert!(summary.report.force.not_finite == 0);
+    assert!(summary.report.devices[0].force.peak_n > MAX_FORCE_N, "nothing was there to be clamped");
+    assert!(summary.report.devices[0].force.not_finite == 0);
     let degraded = summary.runtime.groups[0].degraded;
     assert!(degraded > 20, "{degraded}");
     let events = events(&summary);
@@ -342,7 +342,7 @@ fn a_global_model_that_turns_nan_is_reported_and_its_patch_goes_on() {
     assert_eq!(summary.runtime.fault, None);
     assert!(events(&summary).contains("global: the global model's state is not finite"), "{}", events(&summary));
     assert!(summary.runtime.groups[1].degraded > 0);
-    assert_eq!(summary.report.force.not_finite, 0);
+    assert_eq!(summary.report.devices[0].force.not_finite, 0);
     let last = *forces(&summary).last().unwrap();
     assert!(last.model_age_s > 0.1, "no newer model can have come: {last:?}");
 }
@@ -434,7 +434,7 @@ fn a_log_that_cannot_be_written_does_not_end_the_run() {
     let summary = run(session(device).log("/dev/full"), 0.8);
     assert_sound(&summary, &written);
     assert_eq!((&summary.runtime.fault, summary.runtime.groups[0].elapsed_periods), (&None, 801 + WIND_DOWN));
-    assert_eq!(summary.report.force.ticks, forces(&summary).len() as u64, "the report is complete");
+    assert_eq!(summary.report.devices[0].force.ticks, forces(&summary).len() as u64, "the report is complete");
     let error = summary.log_error.as_ref().expect("an error");
     assert!(error.to_string().contains("/dev/full"), "{error}");
     assert!(summary.to_string().contains("/dev/full"), "{summary}");

@@ -32,7 +32,8 @@ fn run(builder: SessionBuilder, seconds: f64) -> Summary {
 
 /// How many commands a stage acted on, as the report counts them and as the records show.
 fn count(summary: &Summary, name: &str, stage: Actions) -> u64 {
-    let told = summary.report.limits.stages.iter().find(|(stage, _)| stage == name).map_or(0, |stage| stage.1);
+    let told =
+        summary.report.devices[0].limits.stages.iter().find(|(stage, _)| stage == name).map_or(0, |stage| stage.1);
     let recorded = commands(summary).iter().filter(|command| Actions(command.limits).contains(stage)).count();
     assert_eq!(told, recorded as u64, "{name}");
     told
@@ -80,7 +81,7 @@ fn what_is_off_is_in_environment_and_report_and_two_stages_cannot_be() {
     assert_eq!(told.join(" "), "slew tool_speed tank passivity model_age start_up watchdog");
     assert!(summary.report.to_string().contains("SAFETY OFF slew, tool_speed, tank, passivity"), "{}", summary.report);
     // Nothing acted, so the device gets what was computed, bit for bit.
-    assert_eq!(summary.report.limits.limited, 0);
+    assert_eq!(summary.report.devices[0].limits.limited, 0);
     assert!(commands(&summary).iter().zip(forces(&summary)).all(|(command, force)| command.force_n == force.force_n));
     for stage in SafetyStage::ALL {
         let built = session().safety_off([stage]).build();
@@ -168,7 +169,7 @@ fn the_ledger_is_in_the_log_and_begins_with_what_the_scene_stores() {
     let told = commands.last().unwrap().energy_j;
     assert!(told > 1e-4 && (told - booked).abs() < 1e-12, "{told} J told, {booked} J done");
     let booked = told;
-    assert_eq!(summary.report.limits.energy.last_j, booked);
+    assert_eq!(summary.report.devices[0].limits.energy.last_j, booked);
     assert!(summary.report.environment.unwrap().stored_j == 0.0);
 }
 
@@ -179,7 +180,7 @@ fn a_coupling_names_its_gains_and_margin_and_none_leaves_the_forces_alone() {
     assert!(told.contains("K_c") && told.contains("margin"), "{told}");
     assert!(coupled.report.to_string().contains("coupling   K_c"), "{}", coupled.report);
     let direct = run(session().model(LocalModelKind::Full), 0.6);
-    let peak = |summary: &Summary| summary.report.force.peak_n;
+    let peak = |summary: &Summary| summary.report.devices[0].force.peak_n;
     // In series with the body it is softer, and not by much.
     assert!(peak(&coupled) < peak(&direct) && peak(&coupled) > 0.4 * peak(&direct), "{told}: {}", peak(&coupled));
 }

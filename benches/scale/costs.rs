@@ -60,7 +60,7 @@ impl Surroundings {
     pub fn new(nodes: usize, smaller: &[BasisCost]) -> Result<Self, Error> {
         let (mut sim, _) = simulation(block(nodes)?, 1000.0)?;
         advance(&mut sim, 0.0, BEGIN);
-        let touched = sim.contact().triangle.ok_or_else(no_contact)?;
+        let touched = sim.contact(0).triangle.ok_or_else(no_contact)?;
         let mut patch = Vec::new();
         sim.body().patch(&[touched], PATCH, &mut patch);
         let springs = SpringGraph::new(sim.body()).ok_or_else(no_contact)?;
@@ -223,7 +223,7 @@ fn no_contact() -> Error {
 }
 
 fn rebuild(model: &mut dyn LocalModel, sim: &mut Simulation, horizon: u32, at: &Surroundings, bases: &Bases) -> Nanos {
-    let triangle = sim.contact().triangle.unwrap_or_default();
+    let triangle = sim.contact(0).triangle.unwrap_or_default();
     let forecast = ToolForecast { position: tool(BEGIN), velocity: Vec3::x() * 0.02, acceleration: Vec3::zeros() };
     let mut stopwatch = Stopwatch::new();
     let resync = ResyncView {
@@ -231,7 +231,8 @@ fn rebuild(model: &mut dyn LocalModel, sim: &mut Simulation, horizon: u32, at: &
         tick: 0,
         triangles: &[triangle],
         patch: Some(&at.patch),
-        tool: forecast,
+        tools: &[forecast],
+        index: 0,
         horizon,
         bases,
     };

@@ -104,7 +104,7 @@ fn of(case: &Case) -> Result<Scene, Error> {
     if !case.is_whole {
         let at = |x: f64, z: f64| [x, 0.0512, z];
         let places = vec![at(0.04, 0.101), at(0.04, 0.092), at(0.05, 0.092), at(0.05, 0.101)];
-        scene.device.path = Some(ToolPath::new(vec![0.0, 0.2, 0.5, 0.6], places)?);
+        scene.devices[0].path = Some(ToolPath::new(vec![0.0, 0.2, 0.5, 0.6], places)?);
         scene.run.duration_s = 0.6;
     }
     let global = Rate::from_hz(scene.global.rate_hz).expect("a scene has a rate");
@@ -127,7 +127,10 @@ fn measured(summary: &Summary, full: &ForceTrace) -> Outcome {
     let total = |name: &str| cost(name).map_or(0.0, |cpu| cpu.sum().as_secs_f64());
     let haptic = cost("local");
     let builds = summary.builds.as_ref();
-    let served = summary.report.force.shares().map(|(model, share)| format!("{} {:.1} %", model.name(), 100.0 * share));
+    let served = summary.report.devices[0]
+        .force
+        .shares()
+        .map(|(model, share)| format!("{} {:.1} %", model.name(), 100.0 * share));
     Outcome {
         error: ModelError::between(&trace(summary), full),
         tick: [0.5, 0.99, 1.0].map(|q| haptic.map_or(Nanos::ZERO, |cpu| cpu.percentile(q))),

@@ -30,6 +30,8 @@ pub struct DeviceActor {
     commands: Reader<ForceCommand>,
     safety: Pipeline,
     recorder: Recorder,
+    /// Its number in the log.
+    number: u16,
     last: DeviceSample,
     missed_commands: u32,
     /// Releases since the device gave a new state.
@@ -49,7 +51,15 @@ impl DeviceActor {
         recorder: Recorder,
     ) -> Self {
         let last = DeviceSample { id: 0, state: first };
-        Self { device, samples, commands, safety, recorder, last, missed_commands: 0, stale_ticks: 0, reading: false }
+        let (number, missed_commands, stale_ticks, reading) = (0, 0, 0, false);
+        Self { device, samples, commands, safety, recorder, number, last, missed_commands, stale_ticks, reading }
+    }
+
+    /// The same as one of several: its records are those of device `number`.
+    #[must_use]
+    pub fn numbered(mut self, number: u16) -> Self {
+        self.number = number;
+        self
     }
 
     fn read(&mut self, ctx: &TickContext) -> Outcome {
@@ -113,6 +123,7 @@ impl Actor for DeviceActor {
             position_m: state.position.into(),
             velocity_m_s: state.velocity.into(),
             buttons: state.buttons,
+            device: self.number,
         });
         outcome
     }
@@ -133,7 +144,8 @@ impl Actor for DeviceActor {
         let exerted = devices::ForceCommand::until(Vec3::from(force), expires);
         let outcome = self.device.write(exerted).map_or_else(degraded, |()| Outcome::Continue);
         let time = if self.missed_commands == 0 { command.time } else { ctx.scheduled };
-        self.recorder.push(CommandSample { time, force_n: force, limits: actions.0, energy_j, tank_j });
+        let (limits, device) = (actions.0, self.number);
+        self.recorder.push(CommandSample { time, force_n: force, limits, energy_j, tank_j, device });
         outcome
     }
 

@@ -17,12 +17,15 @@ use crate::time::{Nanos, Rate};
 /// The ports of a [`GlobalActor`].
 #[derive(Debug)]
 pub struct GlobalPorts {
-    /// The tool at every haptic tick.
-    pub ticks: QueueReader<ToolTick>,
-    /// The patch's geometry at the tick of the resync, if it is fed back.
-    pub geometry: Option<Reader<PatchGeometry>>,
-    /// The next local model.
-    pub models: Writer<Box<dyn LocalModel>>,
+    /// Of each tool, in the order of the devices.
+    pub tools: Vec<ToolPorts>,
+    /// The others.
+    pub shared: GlobalSharedPorts,
+}
+
+/// The ports of a [`GlobalActor`] that are there once, for however many tools.
+#[derive(Debug)]
+pub struct GlobalSharedPorts {
     /// To and from the basis actor, if the models use what it makes.
     pub surroundings: Option<SurroundingsPorts>,
     /// The newest surface for a program that draws.
@@ -33,6 +36,17 @@ pub struct GlobalPorts {
     pub recorder: Recorder,
     /// What building the next local model costs, if that is measured.
     pub build_cost: Option<Stopwatch>,
+}
+
+/// The global half of what a [`LocalActor`](super::LocalActor) and the global one say to each other.
+#[derive(Debug)]
+pub struct ToolPorts {
+    /// The tool at every haptic tick.
+    pub ticks: QueueReader<ToolTick>,
+    /// The patch's geometry at the tick of the resync, if it is fed back.
+    pub geometry: Option<Reader<PatchGeometry>>,
+    /// The next local model.
+    pub models: Writer<Box<dyn LocalModel>>,
 }
 
 /// The global half of the ports of a [`BasisActor`](super::BasisActor).
@@ -71,6 +85,46 @@ impl GlobalPlan {
     }
 }
 
+/// What the global model knows of one tool.
+#[derive(Debug)]
+struct ToolSide {
+    ports: ToolPorts,
+    /// The tool at the last tick taken: the state's own time.
+    tool: ToolTick,
+    history: ToolHistory,
+    /// Triangles that the window of its next model has to hold.
+    triangles: Vec<u32>,
+    /// The patch of its next model.
+    patch: Vec<u32>,
+}
+
+impl ToolSide {
+    /// Takes the patch's geometry in place of the global model's own, if it belongs to the same tick.
+    fn take_feedback(&mut self, ctx: &TickContext, simulation: &mut Simulation, index: usize) {
+        if let Some(reader) = &mut self.ports.geometry {
+            reader.refresh(ctx);
+            let geometry = reader.get();
+            if geometry.tick == self.tool.tick && geometry.is_usable() {
+                geometry.write_to(simulation, index);
+            }
+        }
+    }
+
+    /// The patch that the next model is made for: the one around the triangles, or if there is no basis for this and there is
+    /// one for another, that: a larger one, or one that at least holds the triangles.
+    fn choose_patch(&mut self, body: &dyn Body, plan: &GlobalPlan) {
+        body.patch(&self.triangles, plan.patch, &mut self.patch);
+        let bases = &plan.bases;
+        if bases.get(&self.patch).is_some() {
+            return;
+        }
+        let corners = || self.triangles.iter().flat_map(|&t| body.surface().triangles[t as usize]);
+        if let Some(other) = bases.around(&self.patch).or_else(|| bases.holding(corners, &self.patch)) {
+            self.patch = other.to_vec();
+        }
+    }
+}
+
 /// Runs the slow, detailed simulation.
 ///
 /// # Real-time
@@ -80,108 +134,121 @@ impl GlobalPlan {
 pub struct GlobalActor {
     simulation: Simulation,
     aim: Aim,
-    ports: GlobalPorts,
+    ports: GlobalSharedPorts,
     plan: GlobalPlan,
-    /// The tool at the last tick taken: the state's own time.
-    tool: ToolTick,
-    history: ToolHistory,
-    /// Working memory: triangles that a window has to hold.
-    triangles: Vec<u32>,
-    /// Working memory: the same for other windows.
+    tools: Vec<ToolSide>,
+    /// Working memory: where each tool is and is expected.
+    forecasts: Vec<ToolForecast>,
+    /// Working memory: how each tool moves in a tick.
+    motions: Vec<ToolMotion>,
+    /// Working memory: triangles of other windows.
     others: Vec<u32>,
-    /// The patch of the next model.
-    patch: Vec<u32>,
 }
 
 impl GlobalActor {
-    /// A global model that starts with `simulation` and the tool at `tool`, also in the midst of a run.
+    /// A global model that starts with `simulation` and its tools at `tools`, also in the midst of a run.
     ///
     /// # Errors
     /// If the body's surface has no triangles.
-    pub fn new(simulation: Simulation, tool: ToolTick, plan: GlobalPlan, ports: GlobalPorts) -> Result<Self, Error> {
+    ///
+    /// # Panics
+    /// If simulation, `tools` and `ports` are not for the same number of tools.
+    pub fn new(
+        simulation: Simulation,
+        tools: &[ToolTick],
+        plan: GlobalPlan,
+        ports: GlobalPorts,
+    ) -> Result<Self, Error> {
+        let GlobalPorts { tools: of_tools, shared } = ports;
+        assert_eq!([tools.len(), of_tools.len()], [simulation.tools(); 2], "ports and places for each tool");
         let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
-        let history = ToolHistory::new(tool.position, plan.haptic.period_s());
-        Ok(Self {
-            simulation,
-            aim,
+        let side = |(&tool, ports): (&ToolTick, ToolPorts)| ToolSide {
             ports,
-            plan,
             tool,
-            history,
+            history: ToolHistory::new(tool.position, plan.haptic.period_s()),
             triangles: Vec::new(),
-            others: Vec::new(),
             patch: Vec::new(),
-        })
+        };
+        let tools = tools.iter().zip(of_tools).map(side).collect();
+        let (forecasts, motions) = (Vec::new(), Vec::new());
+        Ok(Self { simulation, aim, ports: shared, plan, tools, forecasts, motions, others: Vec::new() })
+    }
+
+    /// The haptic tick of the state.
+    fn now(&self) -> u64 {
+        self.tools[0].tool.tick
     }
 
     /// Advances along every tool sample up to `until`; returns whether all of them were there.
-    fn follow_tool(&mut self, ctx: &TickContext, until: Nanos) -> bool {
+    ///
+    /// The samples of all tools come in step. Where one lacks a sample that another has, it is interpolated.
+    fn follow_tools(&mut self, ctx: &TickContext, until: Nanos) -> bool {
         let mut complete = true;
-        while let Some(next) = self.ports.ticks.peek(ctx).filter(|next| self.plan.haptic.release(next.tick) <= until) {
-            self.ports.ticks.pop(ctx);
-            let gap = next.tick.saturating_sub(self.tool.tick);
+        while let Some(next) = self.next_tick(ctx).filter(|&next| self.plan.haptic.release(next) <= until) {
+            let gap = next.saturating_sub(self.now());
             complete &= gap <= 1;
-            let path = ToolMotion { from: self.tool.position, to: next.position };
             for i in 0..gap {
-                let share = |i: u64| i as f64 / gap as f64;
-                let part = path.part(share(i), share(i + 1));
-                self.simulation.tick(part);
-                self.history.push(part.to);
+                self.motions.clear();
+                for side in &mut self.tools {
+                    let sample = side.ports.ticks.peek(ctx).unwrap_or(side.tool);
+                    let owed = sample.tick.saturating_sub(side.tool.tick).max(1) as f64;
+                    let path = ToolMotion { from: side.tool.position, to: sample.position };
+                    let motion = path.part(i as f64 / owed, (i + 1) as f64 / owed);
+                    side.history.push(motion.to);
+                    self.motions.push(motion);
+                }
+                self.simulation.tick_all(&self.motions);
             }
-            self.tool = next;
+            for (index, side) in self.tools.iter_mut().enumerate() {
+                if let Some(sample) = side.ports.ticks.peek(ctx).filter(|sample| sample.tick <= next) {
+                    side.ports.ticks.pop(ctx);
+                    side.tool = sample;
+                } else if let Some(motion) = self.motions.get(index) {
+                    side.tool = ToolTick { tick: next, position: motion.to };
+                }
+            }
         }
         complete
     }
 
-    /// Takes the patch's geometry in place of the global model's own, if it belongs to the same tick.
-    fn take_feedback(&mut self, ctx: &TickContext) {
-        if let Some(reader) = &mut self.ports.geometry {
-            reader.refresh(ctx);
-            let geometry = reader.get();
-            if geometry.tick == self.tool.tick && geometry.is_usable() {
-                geometry.write_to(&mut self.simulation);
-            }
-        }
+    /// The earliest tick that waits, once there is one of every tool.
+    fn next_tick(&mut self, ctx: &TickContext) -> Option<u64> {
+        let waiting = |side: &mut ToolSide| side.ports.ticks.peek(ctx).map(|sample| sample.tick);
+        self.tools.iter_mut().map(waiting).reduce(|a, b| Some(a?.min(b?)))?
     }
 
-    /// Builds the next local model around the contact, or around the surface nearest to the tool, and where it is going.
-    fn publish_model(&mut self, ctx: &TickContext) -> u64 {
-        let tool = self.history.forecast();
+    /// Builds the next local model of each tool around its contact, or around the surface nearest to it, and where it is
+    /// going.
+    fn publish_models(&mut self, ctx: &TickContext) -> u64 {
+        self.forecasts.clear();
+        self.forecasts.extend(self.tools.iter().map(|side| side.history.forecast()));
         self.aim.refit(&self.simulation.state().positions);
         let now = [0.0, self.plan.lead_s()];
-        self.aim.triangles(Some(self.simulation.contact()), &tool, now, &mut self.triangles);
-        self.publish_wishes(ctx, &tool);
-        let has_bases = self.ports.surroundings.is_some();
-        if has_bases {
-            self.choose_patch();
+        for (index, (side, tool)) in self.tools.iter_mut().zip(&self.forecasts).enumerate() {
+            self.aim.triangles(Some(self.simulation.contact(index)), tool, now, &mut side.triangles);
         }
-        let resync = ResyncView {
-            global: &mut self.simulation,
-            tick: self.tool.tick,
-            triangles: &self.triangles,
-            patch: has_bases.then_some(&self.patch),
-            tool,
-            horizon: self.plan.horizon,
-            bases: &self.plan.bases,
-        };
-        let model = self.ports.models.buffer();
-        Stopwatch::around(self.ports.build_cost.as_mut(), || model.rebuild(resync));
-        self.ports.models.publish(ctx)
-    }
-
-    /// The patch that the next model is made for: the one around the triangles, or if there is no basis for this and there is
-    /// one for another, that: a larger one, or one that at least holds the triangles.
-    fn choose_patch(&mut self) {
-        let body = self.simulation.body();
-        body.patch(&self.triangles, self.plan.patch, &mut self.patch);
-        let bases = &self.plan.bases;
-        if bases.get(&self.patch).is_some() {
-            return;
+        self.publish_wishes(ctx);
+        let mut version = 0;
+        for (index, side) in self.tools.iter_mut().enumerate() {
+            let has_bases = self.ports.surroundings.is_some();
+            if has_bases {
+                side.choose_patch(self.simulation.body(), &self.plan);
+            }
+            let resync = ResyncView {
+                global: &mut self.simulation,
+                tick: side.tool.tick,
+                triangles: &side.triangles,
+                patch: has_bases.then_some(&side.patch),
+                tools: &self.forecasts,
+                index,
+                horizon: self.plan.horizon,
+                bases: &self.plan.bases,
+            };
+            let model = side.ports.models.buffer();
+            Stopwatch::around(self.ports.build_cost.as_mut(), || model.rebuild(resync));
+            version = side.ports.models.publish(ctx);
         }
-        let corners = || self.triangles.iter().flat_map(|&t| body.surface().triangles[t as usize]);
-        if let Some(other) = bases.around(&self.patch).or_else(|| bases.holding(corners, &self.patch)) {
-            self.patch = other.to_vec();
-        }
+        version
     }
 
     /// Takes the bases that are there by now.
@@ -194,38 +261,40 @@ impl GlobalActor {
     }
 
     /// Asks for the bases that are missing.
-    fn publish_wishes(&mut self, ctx: &TickContext, tool: &ToolForecast) {
+    fn publish_wishes(&mut self, ctx: &TickContext) {
         let Some(ports) = &mut self.ports.surroundings else { return };
         let wishes = ports.wishes.buffer();
         wishes.patches.clear();
         let mut list = WishList { body: self.simulation.body(), bases: &self.plan.bases, wishes };
         let (aim, size, lead, ahead) = (&self.aim, self.plan.patch, self.plan.lead_s(), &mut self.others);
-        if self.simulation.contact().glued {
-            // The tool stays where it is.
-            list.wish(&self.triangles, size);
-        } else if self.plan.prefetches {
-            // In the time that one takes the tool can be in the next cells: a window that is a cell wider serves there too.
-            let wide = wider(size);
-            if !list.is_covered(&self.triangles, size) {
-                list.wish(&self.triangles, size);
-            }
-            list.wish(&self.triangles[..1], wide);
-            aim.heading(list.body, tool, self.triangles[0], ahead);
-            list.wish(&ahead[ahead.len() - 1..], wide);
-            for seconds in PREFETCH_S {
-                aim.triangles(None, tool, [seconds, 0.0], ahead);
-                list.wish(&ahead[..1], wide);
-            }
-            list.wish(&self.triangles, size);
-        } else {
-            list.wish(&self.triangles, size);
-            aim.triangles(None, tool, [self.plan.global.period_s(), lead], ahead);
-            list.wish(ahead, size);
-            // It may leave for the next cells sooner or later than expected.
-            aim.heading(list.body, tool, self.triangles[0], ahead);
-            for last in 1..=ahead.len() {
-                list.wish(&ahead[..last], size);
-                list.wish(&ahead[last - 1..], size);
+        for (index, (ToolSide { triangles, .. }, tool)) in self.tools.iter().zip(&self.forecasts).enumerate() {
+            if self.simulation.contact(index).glued {
+                // The tool stays where it is.
+                list.wish(triangles, size);
+            } else if self.plan.prefetches {
+                // In the time that one takes the tool can be in the next cells: a window that is a cell wider serves there too.
+                let wide = wider(size);
+                if !list.is_covered(triangles, size) {
+                    list.wish(triangles, size);
+                }
+                list.wish(&triangles[..1], wide);
+                aim.heading(list.body, tool, triangles[0], ahead);
+                list.wish(&ahead[ahead.len() - 1..], wide);
+                for seconds in PREFETCH_S {
+                    aim.triangles(None, tool, [seconds, 0.0], ahead);
+                    list.wish(&ahead[..1], wide);
+                }
+                list.wish(triangles, size);
+            } else {
+                list.wish(triangles, size);
+                aim.triangles(None, tool, [self.plan.global.period_s(), lead], ahead);
+                list.wish(ahead, size);
+                // It may leave for the next cells sooner or later than expected.
+                aim.heading(list.body, tool, triangles[0], ahead);
+                for last in 1..=ahead.len() {
+                    list.wish(&ahead[..last], size);
+                    list.wish(&ahead[last - 1..], size);
+                }
             }
         }
         if !wishes.patches.is_empty() {
@@ -235,15 +304,17 @@ impl GlobalActor {
 
     fn publish_checkpoint(&mut self, ctx: &TickContext) {
         let checkpoint = self.ports.checkpoint.buffer();
-        checkpoint.tool = self.tool;
+        checkpoint.tools.clear();
+        let contacts = (0..).map(|tool| *self.simulation.contact(tool));
+        checkpoint.tools.extend(self.tools.iter().map(|side| side.tool).zip(contacts));
         checkpoint.state.clone_from(self.simulation.state());
-        checkpoint.contact = *self.simulation.contact();
         self.ports.checkpoint.publish(ctx);
     }
 
     fn publish_surface(&mut self, ctx: &TickContext) {
+        let time = self.plan.haptic.release(self.now());
         let view = self.ports.surface.buffer();
-        view.time = self.plan.haptic.release(self.tool.tick);
+        view.time = time;
         view.positions.clone_from(&self.simulation.state().positions);
         self.ports.surface.publish(ctx);
     }
@@ -282,31 +353,33 @@ impl Actor for GlobalActor {
     }
 
     fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
-        self.publish_model(ctx);
+        self.publish_models(ctx);
         self.publish_surface(ctx);
         Ok(())
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
-        let before = self.tool.tick;
+        let before = self.now();
         self.take_bases(ctx);
-        let complete = self.follow_tool(ctx, ctx.scheduled);
-        if self.tool.tick == before {
-            // Release 0, or a local model that stands still: there is nothing new to say.
+        let complete = self.follow_tools(ctx, ctx.scheduled);
+        if self.now() == before {
+            // Release 0, or local models that stand still: there is nothing new to say.
             return Outcome::Continue;
         }
-        self.take_feedback(ctx);
+        for (index, side) in self.tools.iter_mut().enumerate() {
+            side.take_feedback(ctx, &mut self.simulation, index);
+        }
         if !self.simulation.state().is_finite() {
             return Outcome::Degraded(Cause::GlobalNotFinite.code());
         }
-        let version = self.publish_model(ctx);
+        let version = self.publish_models(ctx);
         self.publish_surface(ctx);
         self.publish_checkpoint(ctx);
         self.ports.recorder.push(GlobalTick {
             time: ctx.scheduled,
             version: version as u32,
             first_tick: before + 1,
-            last_tick: self.tool.tick,
+            last_tick: self.now(),
         });
         if complete { Outcome::Continue } else { Outcome::Degraded(Cause::SamplesLost.code()) }
     }

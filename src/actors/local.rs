@@ -69,13 +69,23 @@ pub struct LocalActor {
     energy: f64,
     /// A spring between device and simulated tool, if there is one.
     coupled: Option<CoupledTool>,
+    /// Number of its device in the log.
+    number: u16,
     begun: bool,
 }
 
 impl LocalActor {
     /// An actor over `models`; `haptic` and `global` are the rates of the two groups, `probes` the logged nodes.
     pub fn new(models: Succession, haptic: Rate, global: Rate, probes: Vec<u32>, ports: LocalPorts) -> Self {
-        Self { models, ports, haptic, global, resync: 0, probes, energy: 0.0, coupled: None, begun: false }
+        let (resync, energy, coupled, number, begun) = (0, 0.0, None, 0, false);
+        Self { models, ports, haptic, global, resync, probes, energy, coupled, number, begun }
+    }
+
+    /// The same for one of several devices: its records are those of device `number`.
+    #[must_use]
+    pub fn numbered(mut self, number: u16) -> Self {
+        self.number = number;
+        self
     }
 
     /// The simulated tool hangs on the device by a virtual coupling; the logged force is then that of the coupling.
@@ -177,7 +187,7 @@ impl LocalActor {
     fn record(&mut self, time: Nanos, force: Vec3, resync: Option<Resynced>) {
         let age = |ticks: u64| self.haptic.release(ticks);
         let model_age_s = age(self.age_ticks()).as_secs_f64();
-        let model = self.models.serving();
+        let (model, device) = (self.models.serving(), self.number);
         let recorder = &mut self.ports.recorder;
         recorder.push(ForceSample {
             time,
@@ -186,12 +196,14 @@ impl LocalActor {
             served_by: served_by(model.serves_as()),
             model_age_s,
             energy_j: self.energy,
+            device,
         });
-        recorder.push(contact_sample(time, &model.contact(), force));
+        recorder.push(ContactSample { device, ..contact_sample(time, &model.contact(), force) });
         for (place, &node) in self.probes.iter().enumerate() {
             let global = model.global_position(place).unwrap_or_default();
             let local = model.position(node).unwrap_or(global);
-            recorder.push(ProbeSample { time, node, local_m: local.into(), global_m: global.into() });
+            let (local_m, global_m) = (local.into(), global.into());
+            recorder.push(ProbeSample { time, node, local_m, global_m, device });
         }
         if let Some(resync) = resync {
             recorder.push(Resync {
@@ -201,6 +213,7 @@ impl LocalActor {
                 jump_before_n: resync.jump.before,
                 jump_after_n: resync.jump.after,
                 energy_j: self.energy,
+                device,
             });
         }
     }
@@ -288,5 +301,6 @@ fn contact_sample(time: Nanos, contact: &Contact, force: Vec3) -> ContactSample 
         normal: contact.normal.into(),
         normal_force_n: along as f32,
         tangential_force_n: (force - contact.normal * along).norm() as f32,
+        device: 0,
     }
 }

@@ -68,10 +68,8 @@ pub struct SurfaceView {
 /// The global model after its last good resync: what it goes on from when it is started again.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Checkpoint {
-    /// The tool, and the haptic tick that the state belongs to.
-    pub tool: ToolTick,
+    /// Each tool with the haptic tick that the state belongs to, and its contact.
+    pub tools: Vec<(ToolTick, Contact)>,
     /// Positions (m) and velocities (m/s) of all nodes.
     pub state: State,
-    /// The contact.
-    pub contact: Contact,
 }

@@ -6,6 +6,8 @@
 //!                                                              <--Bases--
 //! every actor --records--> logger
 //! ```
+//!
+//! There is a device and a local actor for each tool, and one global actor for all.
 
 mod basis;
 mod basis_store;
@@ -22,7 +24,7 @@ pub use basis_store::BasisStore;
 pub use cause::Cause;
 pub(crate) use device::GAP_S;
 pub use device::{DeviceActor, first_state};
-pub use global::{GlobalActor, GlobalPlan, GlobalPorts, SurroundingsPorts};
+pub use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
 pub use local::{LocalActor, LocalPorts, ModelSource};
 pub use logger::{LOG_FAILURE, LogSink, LoggerActor, LoggerOutcome};
 pub use messages::{Checkpoint, DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};

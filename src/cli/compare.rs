@@ -37,7 +37,7 @@ pub fn run(args: &CompareArgs) -> Result<(), Error> {
     let scene = Scene::load(&args.scene)?;
     if let Some(html) = &args.html {
         output::refuse_to_overwrite(&args.scene, html)?;
-        if let Some(path_csv) = &scene.device.path_csv {
+        for path_csv in scene.devices.iter().filter_map(|device| device.path_csv.as_ref()) {
             let folder = args.scene.parent().unwrap_or(Path::new(""));
             output::refuse_to_overwrite(&folder.join(path_csv), html)?;
         }

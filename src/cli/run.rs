@@ -48,11 +48,11 @@ pub fn demo() -> Result<(), Error> {
 pub fn run(args: &RunArgs) -> Result<(), Error> {
     let mut scene = Scene::load(&args.scene)?;
     output::refuse_to_overwrite(&args.scene, &args.out)?;
-    if let Some(path_csv) = &scene.device.path_csv {
+    for path_csv in scene.devices.iter().filter_map(|device| device.path_csv.as_ref()) {
         let folder = args.scene.parent().unwrap_or(Path::new(""));
         output::refuse_to_overwrite(&folder.join(path_csv), &args.out)?;
     }
-    if let Some(log) = &scene.device.log {
+    for log in scene.devices.iter().filter_map(|device| device.log.as_ref()) {
         output::refuse_to_overwrite(log, &args.out)?;
     }
     let name = args.scene.display().to_string();

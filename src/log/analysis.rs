@@ -6,7 +6,7 @@ use super::entry::LogEntry;
 use super::environment::{Environment, Execution};
 use super::event::{Level, TextEvent};
 use super::group::{GroupCounter, GroupReport};
-use super::haptics::{ContactReport, ForceReport, HapticsCounter, LimitReport, ResyncReport};
+use super::haptics::{DeviceReport, HapticsCounter};
 use super::records::LogRecord;
 use crate::runtime::record::Event;
 use crate::time::Nanos;
@@ -23,14 +23,8 @@ pub struct RunReport {
     pub duration: Nanos,
     /// The rate groups in their order.
     pub groups: Vec<GroupReport>,
-    /// Resyncs.
-    pub resyncs: ResyncReport,
-    /// The force.
-    pub force: ForceReport,
-    /// The contact.
-    pub contact: ContactReport,
-    /// The safety pipeline.
-    pub limits: LimitReport,
+    /// The devices in their order; there is always one.
+    pub devices: Vec<DeviceReport>,
     /// The first events, in words.
     pub events: Vec<TextEvent>,
     /// The number of all events.
@@ -92,7 +86,8 @@ pub struct Analysis {
     environment: Option<Environment>,
     duration: Nanos,
     groups: BTreeMap<u16, GroupCounter>,
-    haptics: HapticsCounter,
+    /// By device.
+    haptics: BTreeMap<u16, HapticsCounter>,
     coded_events: Vec<Event>,
     events: Vec<TextEvent>,
     event_count: u64,
@@ -106,12 +101,16 @@ impl Analysis {
         match record {
             LogRecord::Tick(r) => self.groups.entry(r.group).or_default().push(r),
             LogRecord::Event(r) => self.push_event(r),
-            LogRecord::Force(r) => self.haptics.push_force(r),
-            LogRecord::Command(r) => self.haptics.push_command(r),
-            LogRecord::Contact(r) => self.haptics.push_contact(r),
-            LogRecord::Resync(r) => self.haptics.push_resync(r),
+            LogRecord::Force(r) => self.device(record).push_force(r),
+            LogRecord::Command(r) => self.device(record).push_command(r),
+            LogRecord::Contact(r) => self.device(record).push_contact(r),
+            LogRecord::Resync(r) => self.device(record).push_resync(r),
             LogRecord::Tool(_) | LogRecord::Global(_) | LogRecord::Port(_) | LogRecord::Probe(_) => {}
         }
+    }
+
+    fn device(&mut self, record: &LogRecord) -> &mut HapticsCounter {
+        self.haptics.entry(record.device()).or_default()
     }
 
     /// Counts one entry of a log.
@@ -165,16 +164,23 @@ impl Analysis {
             environment: self.environment.clone(),
             duration: self.duration,
             groups,
-            resyncs: self.haptics.resyncs(),
-            force: self.haptics.force(),
-            contact: self.haptics.contact(),
-            limits: self.haptics.limits(&environment.limit_stages),
+            devices: self.devices(environment),
             events,
             event_count: self.event_count,
             worst_event: self.worst_event,
             damage: None,
             messages: BTreeMap::new(),
         }
+    }
+
+    /// Those that the environment promised, those with records, and at least one.
+    fn devices(&self, environment: &Environment) -> Vec<DeviceReport> {
+        let mut devices = self.haptics.clone();
+        for device in 0..u16::try_from(environment.devices.len().max(1)).unwrap_or(u16::MAX) {
+            devices.entry(device).or_default();
+        }
+        let name = |device| environment.device_prefix(device).trim_start_matches('/').to_owned();
+        devices.iter().map(|(&device, counter)| counter.report(name(device), &environment.limit_stages)).collect()
     }
 
     fn push_event(&mut self, event: &Event) {
@@ -189,7 +195,7 @@ impl Analysis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::{CommandSample, ContactMode, ContactSample, ForceSample, GroupInfo, Resync};
+    use crate::log::{CommandSample, ContactMode, ContactReport, ContactSample, ForceSample, GroupInfo, Resync};
     use crate::runtime::Mode;
     use crate::runtime::record::{SlipCause, TickTiming};
 
@@ -269,12 +275,15 @@ mod tests {
         }
         analysis.push(&LogRecord::Resync(Resync { jump_before_n: 0.5, age: Nanos(7), ..Resync::default() }));
         let report = analysis.report();
-        assert_eq!((report.force.ticks, report.force.peak_n, report.force.not_finite), (100, 5.0, 1));
-        assert_eq!((report.force.peak_commanded_n, report.force.model_age_s.p99), (1.0, 99.0));
-        assert_eq!(report.contact, ContactReport { free: 25, stick: 25, slip: 25, lost: 25 });
-        assert_eq!(report.limits.stages, [("clamp".to_owned(), 10), ("bit 3".to_owned(), 10)]);
-        assert_eq!(report.limits.share(), 0.1);
-        assert_eq!((report.resyncs.jump_before_n.max, report.resyncs.age_ns.p50), (0.5, 7));
+        assert_eq!(
+            (report.devices[0].force.ticks, report.devices[0].force.peak_n, report.devices[0].force.not_finite),
+            (100, 5.0, 1)
+        );
+        assert_eq!((report.devices[0].force.peak_commanded_n, report.devices[0].force.model_age_s.p99), (1.0, 99.0));
+        assert_eq!(report.devices[0].contact, ContactReport { free: 25, stick: 25, slip: 25, lost: 25 });
+        assert_eq!(report.devices[0].limits.stages, [("clamp".to_owned(), 10), ("bit 3".to_owned(), 10)]);
+        assert_eq!(report.devices[0].limits.share(), 0.1);
+        assert_eq!((report.devices[0].resyncs.jump_before_n.max, report.devices[0].resyncs.age_ns.p50), (0.5, 7));
         assert_eq!((report.groups[0].name.as_str(), report.groups[0].released), ("haptic", 0));
     }
 

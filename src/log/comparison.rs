@@ -16,10 +16,15 @@ pub struct ForceTrace {
 }
 
 impl ForceTrace {
-    /// Takes it from the records of a run.
+    /// Takes it from the records of a run, of its first device.
     pub fn of(records: &[LogRecord]) -> Self {
+        Self::of_device(records, 0)
+    }
+
+    /// Takes that of one of several devices from the records of a run.
+    pub fn of_device(records: &[LogRecord], device: u16) -> Self {
         let mut trace = Self::default();
-        for record in records {
+        for record in records.iter().filter(|record| record.device() == device) {
             match record {
                 LogRecord::Force(sample) => {
                     trace.forces_n.push(sample.force_n);

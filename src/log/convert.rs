@@ -78,6 +78,7 @@ impl From<&ForceSample> for schema::Force {
             model_age_s: r.model_age_s,
             served_by: r.served_by as i32,
             energy_j: r.energy_j,
+            device: r.device.into(),
         }
     }
 }
@@ -91,6 +92,7 @@ impl From<schema::Force> for ForceSample {
             model_age_s: m.model_age_s,
             served_by: ServedBy::from_code(code(m.served_by)),
             energy_j: m.energy_j,
+            device: narrow(m.device),
         }
     }
 }
@@ -103,6 +105,7 @@ impl From<&CommandSample> for schema::CommandedForce {
             limits: r.limits.into(),
             energy_j: r.energy_j,
             tank_j: r.tank_j,
+            device: r.device.into(),
         }
     }
 }
@@ -115,6 +118,7 @@ impl From<schema::CommandedForce> for CommandSample {
             limits: narrow(m.limits),
             energy_j: m.energy_j,
             tank_j: m.tank_j,
+            device: narrow(m.device),
         }
     }
 }
@@ -127,6 +131,7 @@ impl From<&ToolSample> for schema::Tool {
             position_m: r.position_m.into(),
             velocity_m_s: r.velocity_m_s.into(),
             buttons: r.buttons.into(),
+            device: r.device.into(),
         }
     }
 }
@@ -139,6 +144,7 @@ impl From<schema::Tool> for ToolSample {
             position_m: m.position_m.into(),
             velocity_m_s: m.velocity_m_s.into(),
             buttons: narrow(m.buttons),
+            device: narrow(m.device),
         }
     }
 }
@@ -156,6 +162,7 @@ impl From<&ContactSample> for schema::Contact {
             normal: r.normal.into(),
             normal_force_n: r.normal_force_n,
             tangential_force_n: r.tangential_force_n,
+            device: r.device.into(),
         }
     }
 }
@@ -170,6 +177,7 @@ impl From<schema::Contact> for ContactSample {
             normal: m.normal.into(),
             normal_force_n: m.normal_force_n,
             tangential_force_n: m.tangential_force_n,
+            device: narrow(m.device),
         }
     }
 }
@@ -183,6 +191,7 @@ impl From<&Resync> for schema::Resync {
             jump_before_n: r.jump_before_n,
             jump_after_n: r.jump_after_n,
             energy_j: r.energy_j,
+            device: r.device.into(),
         }
     }
 }
@@ -196,6 +205,7 @@ impl From<schema::Resync> for Resync {
             jump_before_n: m.jump_before_n,
             jump_after_n: m.jump_after_n,
             energy_j: m.energy_j,
+            device: narrow(m.device),
         }
     }
 }
@@ -243,13 +253,25 @@ impl From<schema::PortUse> for PortUse {
 
 impl From<&ProbeSample> for schema::Probe {
     fn from(r: &ProbeSample) -> Self {
-        Self { time_ns: r.time.0, node: r.node, local_m: r.local_m.into(), global_m: r.global_m.into() }
+        Self {
+            time_ns: r.time.0,
+            node: r.node,
+            local_m: r.local_m.into(),
+            global_m: r.global_m.into(),
+            device: r.device.into(),
+        }
     }
 }
 
 impl From<schema::Probe> for ProbeSample {
     fn from(m: schema::Probe) -> Self {
-        Self { time: Nanos(m.time_ns), node: m.node, local_m: m.local_m.into(), global_m: m.global_m.into() }
+        Self {
+            time: Nanos(m.time_ns),
+            node: m.node,
+            local_m: m.local_m.into(),
+            global_m: m.global_m.into(),
+            device: narrow(m.device),
+        }
     }
 }
 

@@ -56,6 +56,8 @@ pub struct Environment {
     pub global_hz: f64,
     /// The rate groups.
     pub groups: Vec<GroupInfo>,
+    /// Names of the devices, if there are several: the topics of each are `/NAME/force` and so on.
+    pub devices: Vec<String>,
     /// Names of the bits in [`CommandSample::limits`](super::CommandSample::limits), lowest first.
     pub limit_stages: Vec<String>,
     /// Stages of the safety pipeline that the scene switched off.
@@ -67,8 +69,8 @@ pub struct Environment {
     pub coupling: Option<String>,
     /// What the system granted: policy, priority, cpu, mlock, ...
     pub granted: BTreeMap<String, String>,
-    /// The first state that the device gave, before the start.
-    pub first_tool: Option<ToolSample>,
+    /// The first state that each device gave, before the start.
+    pub first_tools: Vec<ToolSample>,
     /// The scene file as text. It travels as the attachment [`SCENE`](Self::SCENE); a reader leaves it empty.
     pub scene: Option<String>,
     /// What was run, as a scene file: the scene with everything that a program or the command line changed. It travels as
@@ -96,6 +98,15 @@ impl Environment {
         match self.groups.get(usize::from(group)) {
             Some(info) => info.name.clone(),
             None => format!("group-{group}"),
+        }
+    }
+
+    /// What the topics of device `device` begin with: its name, or nothing if it is the only one.
+    pub fn device_prefix(&self, device: u16) -> String {
+        match self.devices.get(usize::from(device)) {
+            Some(name) => format!("/{name}"),
+            None if device == 0 => String::new(),
+            None => format!("/device-{device}"),
         }
     }
 
@@ -134,6 +145,9 @@ impl Environment {
             map.insert(format!("group.{i}.rate_hz"), group.rate_hz.to_string());
             map.insert(format!("group.{i}.background"), group.background.to_string());
         }
+        for (i, device) in self.devices.iter().enumerate() {
+            map.insert(format!("device.{i}"), device.clone());
+        }
         for (i, stage) in self.limit_stages.iter().enumerate() {
             map.insert(format!("limit_stage.{i}"), stage.clone());
         }
@@ -142,10 +156,11 @@ impl Environment {
         }
         map.insert("stored_j".to_owned(), self.stored_j.to_string());
         map.extend(self.coupling.iter().map(|design| ("coupling".to_owned(), design.clone())));
-        if let Some(first) = &self.first_tool {
-            map.insert(format!("{FIRST_TOOL}.position_m"), spaced(first.position_m));
-            map.insert(format!("{FIRST_TOOL}.velocity_m_s"), spaced(first.velocity_m_s));
-            map.insert(format!("{FIRST_TOOL}.buttons"), first.buttons.to_string());
+        for (device, first) in self.first_tools.iter().enumerate() {
+            let of = first_tool_key(device);
+            map.insert(format!("{of}.position_m"), spaced(first.position_m));
+            map.insert(format!("{of}.velocity_m_s"), spaced(first.velocity_m_s));
+            map.insert(format!("{of}.buttons"), first.buttons.to_string());
         }
         map.extend(self.granted.iter().map(|(key, value)| (format!("granted.{key}"), value.clone())));
         map
@@ -184,12 +199,13 @@ impl Environment {
             haptic_hz: number("haptic_hz"),
             global_hz: number("global_hz"),
             groups,
+            devices: listed("device"),
             limit_stages: listed("limit_stage"),
             safety_off: listed("safety_off"),
             stored_j: number("stored_j"),
             coupling: map.get("coupling").cloned(),
             granted,
-            first_tool: first_tool(map),
+            first_tools: (0..).map_while(|device| first_tool(map, device)).collect(),
             scene: None,
             session: None,
         }
@@ -200,16 +216,19 @@ impl Environment {
 const MODEL_REASON: &str = "model_reason";
 const MODEL_WARNING: &str = "model_warning";
 
-/// Where the keys of the device's first state begin.
-const FIRST_TOOL: &str = "first_tool";
+/// Where the keys of a device's first state begin.
+fn first_tool_key(device: usize) -> String {
+    if device == 0 { "first_tool".to_owned() } else { format!("first_tool.{device}") }
+}
 
 /// Numbers as text that reads back exactly.
 fn spaced(vector: [f64; 3]) -> String {
     vector.map(|component| component.to_string()).join(" ")
 }
 
-fn first_tool(map: &BTreeMap<String, String>) -> Option<ToolSample> {
-    let text = |key: &str| map.get(&format!("{FIRST_TOOL}.{key}"));
+fn first_tool(map: &BTreeMap<String, String>, device: usize) -> Option<ToolSample> {
+    let of = first_tool_key(device);
+    let text = |key: &str| map.get(&format!("{of}.{key}"));
     let vector = |key: &str| -> Option<[f64; 3]> {
         let numbers: Option<Vec<f64>> = text(key)?.split(' ').map(|number| number.parse().ok()).collect();
         numbers?.try_into().ok()
@@ -218,6 +237,7 @@ fn first_tool(map: &BTreeMap<String, String>) -> Option<ToolSample> {
         position_m: vector("position_m")?,
         velocity_m_s: vector("velocity_m_s")?,
         buttons: text("buttons")?.parse().ok()?,
+        device: u16::try_from(device).ok()?,
         ..ToolSample::default()
     })
 }
@@ -240,17 +260,21 @@ mod tests {
                 GroupInfo { name: "haptic".into(), rate_hz: 1000.0, background: false },
                 GroupInfo { name: "global".into(), rate_hz: 29.97, background: true },
             ],
+            devices: vec!["left".into(), "right".into()],
             limit_stages: vec!["clamp".into(), "slew".into()],
             safety_off: vec!["tank".into()],
             stored_j: 0.125,
             coupling: Some("K_c 400 N/m".into()),
             granted: [("policy".to_owned(), "other".to_owned())].into(),
-            first_tool: Some(ToolSample {
-                position_m: [0.1, -0.0, 1.0 / 3.0],
-                velocity_m_s: [1e-300, 5.0, -1e12],
-                buttons: 3,
-                ..ToolSample::default()
-            }),
+            first_tools: [0, 1]
+                .map(|device| ToolSample {
+                    position_m: [0.1, -0.0, 1.0 / 3.0],
+                    velocity_m_s: [1e-300, 5.0, -1e12],
+                    buttons: 3,
+                    device,
+                    ..ToolSample::default()
+                })
+                .into(),
             scene: None,
             session: None,
         };

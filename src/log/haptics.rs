@@ -83,6 +83,21 @@ impl LimitReport {
     }
 }
 
+/// All of it for one device.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DeviceReport {
+    /// Its name; empty for the only one.
+    pub name: String,
+    /// Resyncs of its local model.
+    pub resyncs: ResyncReport,
+    /// Its force.
+    pub force: ForceReport,
+    /// Its contact.
+    pub contact: ContactReport,
+    /// Its safety pipeline.
+    pub limits: LimitReport,
+}
+
 /// Gathers the reports above.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HapticsCounter {
@@ -145,7 +160,13 @@ impl HapticsCounter {
         self.resync_age.push(resync.age.0);
     }
 
-    pub(super) fn resyncs(&self) -> ResyncReport {
+    /// `names` are those of the limit bits, lowest first.
+    pub(super) fn report(&self, name: String, names: &[String]) -> DeviceReport {
+        let (resyncs, force, contact) = (self.resyncs(), self.force(), self.contact);
+        DeviceReport { name, resyncs, force, contact, limits: self.limits(names) }
+    }
+
+    fn resyncs(&self) -> ResyncReport {
         ResyncReport {
             jump_before_n: self.jump_before.percentiles(),
             jump_after_n: self.jump_after.percentiles(),
@@ -153,16 +174,11 @@ impl HapticsCounter {
         }
     }
 
-    pub(super) fn force(&self) -> ForceReport {
+    fn force(&self) -> ForceReport {
         ForceReport { model_age_s: self.model_age.percentiles(), ..self.force }
     }
 
-    pub(super) fn contact(&self) -> ContactReport {
-        self.contact
-    }
-
-    /// `names` are those of the bits, lowest first.
-    pub(super) fn limits(&self, names: &[String]) -> LimitReport {
+    fn limits(&self, names: &[String]) -> LimitReport {
         let name = |bit: usize| names.get(bit).cloned().unwrap_or_else(|| format!("bit {bit}"));
         let acted = self.limits.iter().enumerate().filter(|&(_, &count)| count > 0);
         LimitReport {

@@ -40,7 +40,7 @@ pub use entry::LogEntry;
 pub use environment::{Environment, Execution, GroupInfo, ModelReason};
 pub use event::{Level, TextEvent};
 pub use group::{CauseCounts, GroupReport};
-pub use haptics::{ContactReport, EnergyReport, ForceReport, LimitReport, ResyncReport};
+pub use haptics::{ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport};
 pub use percentiles::{Distribution, Magnitudes, Percentiles};
 pub use records::{
     CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ServedBy,

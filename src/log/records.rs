@@ -81,6 +81,8 @@ pub struct ForceSample {
     pub model_age_s: f64,
     /// Energy that the tool has given to the simulation since the start, negative if it got some (J).
     pub energy_j: f64,
+    /// Whose: the number of the device in the scene, from 0.
+    pub device: u16,
 }
 
 /// What the device was commanded.
@@ -97,6 +99,8 @@ pub struct CommandSample {
     pub energy_j: f64,
     /// What is in the energy tank of model swaps (J).
     pub tank_j: f64,
+    /// Whose: the number of the device in the scene, from 0.
+    pub device: u16,
 }
 
 /// The tool as the device reported it.
@@ -112,6 +116,8 @@ pub struct ToolSample {
     pub velocity_m_s: [f64; 3],
     /// Pressed buttons, a bit each.
     pub buttons: u16,
+    /// Whose: the number of the device in the scene, from 0.
+    pub device: u16,
 }
 
 /// The state of a contact.
@@ -161,6 +167,8 @@ pub struct ContactSample {
     pub normal_force_n: f32,
     /// Magnitude of the force across it (N).
     pub tangential_force_n: f32,
+    /// Whose: the number of the device in the scene, from 0.
+    pub device: u16,
 }
 
 /// A resync: the local model was replaced by a newer one.
@@ -178,6 +186,8 @@ pub struct Resync {
     pub jump_after_n: f64,
     /// Energy that the tool has given to the simulation since the start, negative if it got some (J).
     pub energy_j: f64,
+    /// Whose: the number of the device in the scene, from 0.
+    pub device: u16,
 }
 
 /// One release of the global model.
@@ -204,6 +214,8 @@ pub struct ProbeSample {
     pub local_m: [f64; 3],
     /// Position in the newest global model that the tick could see (m).
     pub global_m: [f64; 3],
+    /// Whose: the number of the device in the scene, from 0.
+    pub device: u16,
 }
 
 /// Everything that a log can hold per tick.
@@ -225,13 +237,22 @@ pub enum LogRecord {
     Probe(ProbeSample),
 }
 
-const FORCE: Channel = Channel(Channel::FIRST_USER.0);
-const TOOL: Channel = Channel(Channel::FIRST_USER.0 + 1);
-const CONTACT: Channel = Channel(Channel::FIRST_USER.0 + 2);
-const RESYNC: Channel = Channel(Channel::FIRST_USER.0 + 3);
-const GLOBAL: Channel = Channel(Channel::FIRST_USER.0 + 4);
-const PROBE: Channel = Channel(Channel::FIRST_USER.0 + 5);
-const COMMAND: Channel = Channel(Channel::FIRST_USER.0 + 6);
+/// What a record is about, beside whose it is.
+const FORCE: u16 = 0;
+const TOOL: u16 = 1;
+const CONTACT: u16 = 2;
+const RESYNC: u16 = 3;
+const GLOBAL: u16 = 4;
+const PROBE: u16 = 5;
+const COMMAND: u16 = 6;
+
+/// Channels of a device: each has its own of every kind.
+const CHANNELS: u16 = 16;
+
+/// The channel of `kind` for `device`.
+fn channel(kind: u16, device: u16) -> Channel {
+    Channel(Channel::FIRST_USER.0.saturating_add(device.saturating_mul(CHANNELS)).saturating_add(kind))
+}
 
 impl LogRecord {
     /// The log time: end of the tick, or the scheduled time of the release.
@@ -250,14 +271,32 @@ impl LogRecord {
         }
     }
 
+    /// Whose it is: the number of the device; 0 for what belongs to none.
+    pub fn device(&self) -> u16 {
+        match self {
+            Self::Force(r) => r.device,
+            Self::Command(r) => r.device,
+            Self::Tool(r) => r.device,
+            Self::Contact(r) => r.device,
+            Self::Resync(r) => r.device,
+            Self::Probe(r) => r.device,
+            Self::Tick(_) | Self::Event(_) | Self::Port(_) | Self::Global(_) => 0,
+        }
+    }
+
     /// Reads a record back; `None` for channels that are not palpate's.
     pub fn from_record(record: &Record) -> Option<Self> {
         let time = record.stamp;
         let [a, b, c, d, e, f] = record.floats();
-        Some(match record.channel {
-            Channel::TICK => Self::Tick(TickTiming::from_record(record)?),
-            Channel::EVENT => Self::Event(Event::from_record(record)?),
-            Channel::PORT => Self::Port(PortUse::from_record(record)?),
+        match record.channel {
+            Channel::TICK => return Some(Self::Tick(TickTiming::from_record(record)?)),
+            Channel::EVENT => return Some(Self::Event(Event::from_record(record)?)),
+            Channel::PORT => return Some(Self::Port(PortUse::from_record(record)?)),
+            _ => {}
+        }
+        let number = record.channel.0.checked_sub(Channel::FIRST_USER.0)?;
+        let device = number / CHANNELS;
+        Some(match number % CHANNELS {
             FORCE => Self::Force(ForceSample {
                 time,
                 force_n: [a, b, c],
@@ -265,9 +304,11 @@ impl LogRecord {
                 served_by: ServedBy::from_code(record.code),
                 model_age_s: d,
                 energy_j: e,
+                device,
             }),
             COMMAND => {
-                Self::Command(CommandSample { time, force_n: [a, b, c], limits: record.code, energy_j: d, tank_j: e })
+                let limits = record.code;
+                Self::Command(CommandSample { time, force_n: [a, b, c], limits, energy_j: d, tank_j: e, device })
             }
             TOOL => Self::Tool(ToolSample {
                 time,
@@ -275,6 +316,7 @@ impl LogRecord {
                 position_m: [a, b, c],
                 velocity_m_s: [d, e, f],
                 buttons: record.code,
+                device,
             }),
             CONTACT => Self::Contact(ContactSample {
                 time,
@@ -284,6 +326,7 @@ impl LogRecord {
                 normal: [c, d, e],
                 normal_force_n: f32::from_bits((record.words[5] >> 32) as u32),
                 tangential_force_n: f32::from_bits(record.words[5] as u32),
+                device,
             }),
             RESYNC => Self::Resync(Resync {
                 time,
@@ -292,6 +335,7 @@ impl LogRecord {
                 jump_before_n: b,
                 jump_after_n: c,
                 energy_j: d,
+                device,
             }),
             GLOBAL => Self::Global(GlobalTick {
                 time,
@@ -299,7 +343,9 @@ impl LogRecord {
                 first_tick: record.words[0],
                 last_tick: record.words[1],
             }),
-            PROBE => Self::Probe(ProbeSample { time, node: record.index, local_m: [a, b, c], global_m: [d, e, f] }),
+            PROBE => {
+                Self::Probe(ProbeSample { time, node: record.index, local_m: [a, b, c], global_m: [d, e, f], device })
+            }
             _ => return None,
         })
     }
@@ -312,19 +358,25 @@ fn join(a: [f64; 3], b: [f64; 3]) -> [f64; 6] {
 impl From<ForceSample> for Record {
     fn from(r: ForceSample) -> Self {
         let [x, y, z] = r.force_n;
-        Self::with_floats(r.time, FORCE, r.served_by as u16, r.model_version, [x, y, z, r.model_age_s, r.energy_j, 0.0])
+        Self::with_floats(
+            r.time,
+            channel(FORCE, r.device),
+            r.served_by as u16,
+            r.model_version,
+            [x, y, z, r.model_age_s, r.energy_j, 0.0],
+        )
     }
 }
 
 impl From<CommandSample> for Record {
     fn from(r: CommandSample) -> Self {
-        Self::with_floats(r.time, COMMAND, r.limits, 0, join(r.force_n, [r.energy_j, r.tank_j, 0.0]))
+        Self::with_floats(r.time, channel(COMMAND, r.device), r.limits, 0, join(r.force_n, [r.energy_j, r.tank_j, 0.0]))
     }
 }
 
 impl From<ToolSample> for Record {
     fn from(r: ToolSample) -> Self {
-        Self::with_floats(r.time, TOOL, r.buttons, r.id, join(r.position_m, r.velocity_m_s))
+        Self::with_floats(r.time, channel(TOOL, r.device), r.buttons, r.id, join(r.position_m, r.velocity_m_s))
     }
 }
 
@@ -332,7 +384,7 @@ impl From<ContactSample> for Record {
     fn from(r: ContactSample) -> Self {
         let mut record = Self::with_floats(
             r.time,
-            CONTACT,
+            channel(CONTACT, r.device),
             r.mode as u16,
             r.triangle,
             [r.weights[0], r.weights[1], r.normal[0], r.normal[1], r.normal[2], 0.0],
@@ -346,7 +398,7 @@ impl From<Resync> for Record {
     fn from(r: Resync) -> Self {
         let mut record = Self::with_floats(
             r.time,
-            RESYNC,
+            channel(RESYNC, r.device),
             0,
             r.version,
             [0.0, r.jump_before_n, r.jump_after_n, r.energy_j, 0.0, 0.0],
@@ -359,13 +411,13 @@ impl From<Resync> for Record {
 impl From<GlobalTick> for Record {
     fn from(r: GlobalTick) -> Self {
         let words = [r.first_tick, r.last_tick, 0, 0, 0, 0];
-        Self { stamp: r.time, channel: GLOBAL, code: 0, index: r.version, words }
+        Self { stamp: r.time, channel: channel(GLOBAL, 0), code: 0, index: r.version, words }
     }
 }
 
 impl From<ProbeSample> for Record {
     fn from(r: ProbeSample) -> Self {
-        Self::with_floats(r.time, PROBE, 0, r.node, join(r.local_m, r.global_m))
+        Self::with_floats(r.time, channel(PROBE, r.device), 0, r.node, join(r.local_m, r.global_m))
     }
 }
 
@@ -401,6 +453,7 @@ mod tests {
                 served_by: ServedBy::Predictive,
                 model_age_s: 0.033,
                 energy_j: 1e-9,
+                device: 0,
             }),
             LogRecord::Command(CommandSample {
                 time,
@@ -408,6 +461,7 @@ mod tests {
                 limits: 5,
                 energy_j: -1e-3,
                 tank_j: 1e-4,
+                device: 1,
             }),
             LogRecord::Tool(ToolSample {
                 time,
@@ -415,6 +469,7 @@ mod tests {
                 position_m: [1.0, 2.0, 3.0],
                 velocity_m_s: [4.0, 5.0, 6.0],
                 buttons: 1,
+                device: 2,
             }),
             LogRecord::Contact(ContactSample {
                 time,
@@ -424,6 +479,7 @@ mod tests {
                 normal: [0.0, 0.0, 1.0],
                 normal_force_n: 1.5,
                 tangential_force_n: 0.5,
+                device: 3,
             }),
             LogRecord::Resync(Resync {
                 time,
@@ -432,10 +488,17 @@ mod tests {
                 jump_before_n: 0.25,
                 jump_after_n: 0.125,
                 energy_j: -1e-6,
+                device: 4,
             }),
             LogRecord::Port(PortUse { time, port: 3, tick: 33, count: 1, ..PortUse::default() }),
             LogRecord::Global(GlobalTick { time, version: 2, first_tick: 1, last_tick: 33 }),
-            LogRecord::Probe(ProbeSample { time, node: 5, local_m: [1.0, 2.0, 3.0], global_m: [4.0, 5.0, 6.0] }),
+            LogRecord::Probe(ProbeSample {
+                time,
+                node: 5,
+                local_m: [1.0, 2.0, 3.0],
+                global_m: [4.0, 5.0, 6.0],
+                device: 5,
+            }),
         ];
         for record in records {
             assert_eq!(LogRecord::from_record(&record.into()), Some(record));

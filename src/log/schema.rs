@@ -148,6 +148,7 @@ proto_schema! {
         model_age_s: double = 4,
         energy_j: double = 5,
         served_by: int32 as ServedBy = 6,
+        device: uint32 = 7,
     }
 
     /// `/force_commanded`: the force after the safety pipeline.
@@ -157,6 +158,7 @@ proto_schema! {
         limits: uint32 = 3,
         energy_j: double = 4,
         tank_j: double = 5,
+        device: uint32 = 6,
     }
 
     /// `/tool`: the raw device sample.
@@ -166,6 +168,7 @@ proto_schema! {
         position_m: message of Vector3 = 3,
         velocity_m_s: message of Vector3 = 4,
         buttons: uint32 = 5,
+        device: uint32 = 6,
     }
 
     /// `/contact`: the state of the contact.
@@ -179,6 +182,7 @@ proto_schema! {
         normal: message of Vector3 = 7,
         normal_force_n: float = 8,
         tangential_force_n: float = 9,
+        device: uint32 = 10,
     }
 
     /// `/resync`: the local model was replaced by a newer one.
@@ -189,6 +193,7 @@ proto_schema! {
         jump_before_n: double = 4,
         jump_after_n: double = 5,
         energy_j: double = 6,
+        device: uint32 = 7,
     }
 
     /// `/global`: one release of the global model.
@@ -216,6 +221,7 @@ proto_schema! {
         node: uint32 = 2,
         local_m: message of Vector3 = 3,
         global_m: message of Vector3 = 4,
+        device: uint32 = 5,
     }
 
     /// `/stats/GROUP`: how a group has kept time, once a second.

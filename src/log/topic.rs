@@ -9,14 +9,14 @@ use super::schema::{self, LogMessage};
 pub(crate) enum Topic {
     Timing(u16),
     Stats(u16),
-    Force,
-    ForceCommanded,
-    Tool,
-    Contact,
-    Resync,
+    Force(u16),
+    ForceCommanded(u16),
+    Tool(u16),
+    Contact(u16),
+    Resync(u16),
     Global,
     Ports,
-    Probe,
+    Probe(u16),
     Log,
 }
 
@@ -37,47 +37,48 @@ pub(crate) enum Kind {
 }
 
 impl Topic {
-    /// The topics that every log declares, beside those of its groups.
-    pub(crate) const FIXED: [Self; 9] = [
-        Self::Force,
-        Self::ForceCommanded,
-        Self::Tool,
-        Self::Contact,
-        Self::Resync,
-        Self::Global,
-        Self::Ports,
-        Self::Probe,
-        Self::Log,
-    ];
+    /// The topics that the log of `environment` declares, whether or not anything is written there.
+    pub(crate) fn declared(environment: &Environment) -> impl Iterator<Item = Self> {
+        let number = |count: usize| 0..u16::try_from(count).unwrap_or(u16::MAX);
+        let of_groups = number(environment.groups.len()).flat_map(|group| [Self::Timing(group), Self::Stats(group)]);
+        of_groups.chain(number(environment.devices.len().max(1)).flat_map(Self::of_device)).chain(Self::SHARED)
+    }
+
+    const SHARED: [Self; 3] = [Self::Global, Self::Ports, Self::Log];
+
+    fn of_device(device: u16) -> [Self; 6] {
+        [Self::Force, Self::ForceCommanded, Self::Tool, Self::Contact, Self::Resync, Self::Probe].map(|of| of(device))
+    }
 
     /// Where `record` belongs.
     pub(crate) fn of(record: &LogRecord) -> Self {
         match record {
             LogRecord::Tick(r) => Self::Timing(r.group),
             LogRecord::Event(_) => Self::Log,
-            LogRecord::Force(_) => Self::Force,
-            LogRecord::Command(_) => Self::ForceCommanded,
-            LogRecord::Tool(_) => Self::Tool,
-            LogRecord::Contact(_) => Self::Contact,
-            LogRecord::Resync(_) => Self::Resync,
+            LogRecord::Force(r) => Self::Force(r.device),
+            LogRecord::Command(r) => Self::ForceCommanded(r.device),
+            LogRecord::Tool(r) => Self::Tool(r.device),
+            LogRecord::Contact(r) => Self::Contact(r.device),
+            LogRecord::Resync(r) => Self::Resync(r.device),
             LogRecord::Global(_) => Self::Global,
             LogRecord::Port(_) => Self::Ports,
-            LogRecord::Probe(_) => Self::Probe,
+            LogRecord::Probe(r) => Self::Probe(r.device),
         }
     }
 
     pub(crate) fn name(self, environment: &Environment) -> String {
+        let of_device = |device, what| format!("{}/{what}", environment.device_prefix(device));
         match self {
             Self::Timing(group) => format!("/timing/{}", environment.group_name(group)),
             Self::Stats(group) => format!("/stats/{}", environment.group_name(group)),
-            Self::Force => "/force".into(),
-            Self::ForceCommanded => "/force_commanded".into(),
-            Self::Tool => "/tool".into(),
-            Self::Contact => "/contact".into(),
-            Self::Resync => "/resync".into(),
+            Self::Force(device) => of_device(device, "force"),
+            Self::ForceCommanded(device) => of_device(device, "force_commanded"),
+            Self::Tool(device) => of_device(device, "tool"),
+            Self::Contact(device) => of_device(device, "contact"),
+            Self::Resync(device) => of_device(device, "resync"),
             Self::Global => "/global".into(),
             Self::Ports => "/ports".into(),
-            Self::Probe => "/probe".into(),
+            Self::Probe(device) => of_device(device, "probe"),
             Self::Log => "/log".into(),
         }
     }
@@ -86,14 +87,14 @@ impl Topic {
         match self {
             Self::Timing(_) => Kind::Timing,
             Self::Stats(_) => Kind::Stats,
-            Self::Force => Kind::Force,
-            Self::ForceCommanded => Kind::ForceCommanded,
-            Self::Tool => Kind::Tool,
-            Self::Contact => Kind::Contact,
-            Self::Resync => Kind::Resync,
+            Self::Force(_) => Kind::Force,
+            Self::ForceCommanded(_) => Kind::ForceCommanded,
+            Self::Tool(_) => Kind::Tool,
+            Self::Contact(_) => Kind::Contact,
+            Self::Resync(_) => Kind::Resync,
             Self::Global => Kind::Global,
             Self::Ports => Kind::Ports,
-            Self::Probe => Kind::Probe,
+            Self::Probe(_) => Kind::Probe,
             Self::Log => Kind::Log,
         }
     }
@@ -139,15 +140,19 @@ impl Kind {
     /// What a topic of this name carries in any log of palpate's.
     pub(crate) fn of_topic(name: &str) -> Option<Self> {
         let environment = Environment::default();
-        let fixed = Topic::FIXED.into_iter().find(|topic| topic.name(&environment) == name).map(Topic::kind);
-        let of_group = || {
-            let (kind, group) = name.strip_prefix('/')?.split_once('/')?;
-            match (kind, group.is_empty()) {
+        let shared = || Topic::declared(&environment).find(|topic| topic.name(&environment) == name).map(Topic::kind);
+        let of_one = || {
+            let (first, second) = name.strip_prefix('/')?.split_once('/')?;
+            match (first, second.is_empty()) {
                 ("timing", false) => Some(Self::Timing),
                 ("stats", false) => Some(Self::Stats),
-                _ => None,
+                // A device's own, where there are several.
+                _ => Topic::of_device(0)
+                    .into_iter()
+                    .find(|topic| topic.name(&environment).strip_prefix('/') == Some(second))
+                    .map(Topic::kind),
             }
         };
-        fixed.or_else(of_group)
+        shared().or_else(of_one)
     }
 }

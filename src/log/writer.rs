@@ -208,9 +208,8 @@ impl<W: Write> McapWriter<W> {
         self.attach(output, Environment::SCENE)?;
         self.attach(output, Environment::SESSION)?;
         if self.channels.is_empty() {
-            let groups = 0..u16::try_from(self.environment.groups.len()).unwrap_or(u16::MAX);
-            let of_groups = groups.flat_map(|group| [Topic::Timing(group), Topic::Stats(group)]);
-            for topic in of_groups.chain(Topic::FIXED) {
+            let declared: Vec<Topic> = Topic::declared(&self.environment).collect();
+            for topic in declared {
                 self.channel(output, topic)?;
             }
         }

@@ -1,8 +1,8 @@
-//! A whole body with its contact, advanced tick by tick: the global model, and `full` at the haptic rate.
+//! A whole body with its contacts, advanced tick by tick: the global model, and `full` at the haptic rate.
 
 use super::Vec3;
 use super::body::{Body, State};
-use super::contact::{Contact, Deformable, Law, ToolMotion, step};
+use super::contact::{Contact, Deformable, Law, ToolMotion, Touch, step_all};
 use super::integrator::Spectrum;
 use crate::error::Error;
 
@@ -35,24 +35,24 @@ impl Stepping {
     }
 }
 
-/// A body, its state and the tool's contact with it.
+/// A body, its state and the contacts of the tools with it. Tools are numbered in the order of their devices.
 #[derive(Debug)]
 pub struct Simulation {
     body: Box<dyn Body>,
     state: State,
     forces: Vec<Vec3>,
-    contact: Contact,
+    touches: Vec<Touch>,
     law: Law,
     stepping: Stepping,
-    /// All surface triangles: the tool may touch anywhere.
+    /// All surface triangles: a tool may touch anywhere.
     candidates: Vec<u32>,
     inverse_masses: Vec<f64>,
-    /// Mean force of the last tick, or of the resting contact before the first (N).
-    force: Vec3,
+    /// On each tool: mean force of the last tick, or of the resting contact before the first (N).
+    means: Vec<Vec3>,
 }
 
 impl Simulation {
-    /// A simulation of `body` from `state`; the tool starts in `contact` (default: not touching).
+    /// A simulation of `body` from `state`; the one tool starts in `contact` (default: not touching).
     ///
     /// # Errors
     /// If the state does not fit the body or is not finite.
@@ -78,10 +78,21 @@ impl Simulation {
         let candidates = (0..body.surface().triangles.len() as u32).collect();
         let inverse_masses = body.inverse_masses().to_vec();
         let forces = vec![Vec3::zeros(); nodes];
-        let force = Vec3::zeros();
-        let mut new = Self { body, state, forces, contact, law, stepping, candidates, inverse_masses, force };
-        new.force = new.resting_force();
-        Ok(new)
+        let (touches, means) = (Vec::new(), Vec::new());
+        let new = Self { body, state, forces, touches, law, stepping, candidates, inverse_masses, means };
+        Ok(new.with_tool(contact))
+    }
+
+    /// The same with one more tool, in `contact`.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    #[must_use]
+    pub fn with_tool(mut self, contact: Contact) -> Self {
+        self.touches.push(Touch { contact, force: Vec3::zeros() });
+        let force = self.resting_force(&contact);
+        self.means.push(force);
+        self
     }
 
     /// A copy, if the body can make one.
@@ -93,22 +104,22 @@ impl Simulation {
             body: self.body.duplicate()?,
             state: self.state.clone(),
             forces: self.forces.clone(),
-            contact: self.contact,
+            touches: self.touches.clone(),
             law: self.law,
             stepping: self.stepping,
             candidates: self.candidates.clone(),
             inverse_masses: self.inverse_masses.clone(),
-            force: self.force,
+            means: self.means.clone(),
         })
     }
 
     /// The force that holds the contact point still in the present state (N): what a tool feels before the first tick.
-    fn resting_force(&mut self) -> Vec3 {
-        let Some(triangle) = self.contact.triangle else { return Vec3::zeros() };
+    fn resting_force(&mut self, contact: &Contact) -> Vec3 {
+        let Some(triangle) = contact.triangle else { return Vec3::zeros() };
         self.body.forces(&self.state, &mut self.forces);
         let nodes = self.body.surface().triangles[triangle as usize];
         let (mut acceleration, mut compliance) = (Vec3::zeros(), 0.0);
-        for (&node, w) in nodes.iter().zip(&self.contact.weights) {
+        for (&node, w) in nodes.iter().zip(&contact.weights) {
             let mobility = w * self.inverse_masses[node as usize];
             acceleration += self.forces[node as usize] * mobility;
             compliance += w * mobility;
@@ -116,18 +127,29 @@ impl Simulation {
         if compliance > 0.0 { acceleration / compliance } else { Vec3::zeros() }
     }
 
-    /// Advances one haptic tick while the tool moves along `tool`; returns the force on the tool, its mean over the
-    /// tick (N).
+    /// Advances one haptic tick while the one tool moves along `tool`; returns the force on it, its mean over the tick (N).
+    ///
+    /// # Real-time
+    /// As [`tick_all`](Self::tick_all).
+    pub fn tick(&mut self, tool: ToolMotion) -> Vec3 {
+        self.tick_all(&[tool]);
+        self.means[0]
+    }
+
+    /// Advances one haptic tick while each tool moves along its own of `motions`, one for each tool.
     ///
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
-    pub fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-        self.advance(tool, &mut |_| ())
+    pub fn tick_all(&mut self, motions: &[ToolMotion]) {
+        self.advance(|tool| motions[tool], &mut |_| ());
     }
 
-    fn advance(&mut self, tool: ToolMotion, watch: &mut impl FnMut(&State)) -> Vec3 {
-        let Self { body, state, forces, contact, law, candidates, inverse_masses, stepping, .. } = self;
-        self.force = stepping.tick(tool, |tool, d| {
+    fn advance(&mut self, motion: impl Fn(usize) -> ToolMotion, watch: &mut impl FnMut(&State)) {
+        let Self { body, state, forces, touches, law, candidates, inverse_masses, stepping, means } = self;
+        let (n, d) = (f64::from(stepping.substeps), stepping.step());
+        means.fill(Vec3::zeros());
+        for u in 0..stepping.substeps {
+            let u = f64::from(u);
             watch(state);
             body.forces(state, forces);
             let mut deformable = Deformable {
@@ -137,40 +159,63 @@ impl Simulation {
                 surface: body.surface(),
                 candidates,
             };
-            step(&mut deformable, forces, contact, law, tool, d)
-        });
-        self.force
+            let part = |tool| motion(tool).part(u / n, (u + 1.0) / n);
+            step_all(&mut deformable, forces, touches, law, part, d);
+            means.iter_mut().zip(&*touches).for_each(|(sum, touch)| *sum += touch.force);
+        }
+        means.iter_mut().for_each(|sum| *sum /= n);
     }
 
-    /// Runs on for `ticks` haptic ticks along `motion` (of each, from 0), shows `watch` the state at the start of every
-    /// substep and at the end, and goes back to the present.
+    /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the state at the
+    /// start of every substep and at the end, and goes back to the present.
     ///
     /// # Real-time
     /// For the global actor: costs as much as the ticks; `present` keeps the state meanwhile and may grow.
     pub fn look_ahead(
         &mut self,
         ticks: u32,
-        motion: impl Fn(u32) -> ToolMotion,
+        motion: impl Fn(usize, u32) -> ToolMotion,
         present: &mut State,
         mut watch: impl FnMut(&State),
     ) {
         present.clone_from(&self.state);
-        let (contact, force) = (self.contact, self.force);
+        let (touches, means) = (self.touches.clone(), self.means.clone());
         for tick in 0..ticks {
-            self.advance(motion(tick), &mut watch);
+            self.advance(|tool| motion(tool, tick), &mut watch);
         }
         watch(&self.state);
         std::mem::swap(&mut self.state, present);
-        (self.contact, self.force) = (contact, force);
+        (self.touches, self.means) = (touches, means);
     }
 
-    /// The state, and the internal force on every node in it (N).
+    /// The state, and the force on every node in it (N): the internal one, and what all tools but `tool` exert.
     ///
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
-    pub fn internal_forces(&mut self) -> (&State, &[Vec3]) {
+    pub fn forces_without(&mut self, tool: usize) -> (&State, &[Vec3]) {
         self.body.forces(&self.state, &mut self.forces);
+        for other in (0..self.touches.len()).filter(|&other| other != tool) {
+            for (node, force) in self.exerted(other) {
+                self.forces[node as usize] += force;
+            }
+        }
         (&self.state, &self.forces)
+    }
+
+    /// What all tools but `tool` exert: nodes, each with a force on it (N).
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
+    pub fn exerted_beside(&self, tool: usize) -> impl Iterator<Item = (u32, Vec3)> {
+        (0..self.touches.len()).filter(move |&other| other != tool).flat_map(|other| self.exerted(other))
+    }
+
+    /// The three nodes that `tool` touches with the force on each (N), its mean over the last tick.
+    fn exerted(&self, tool: usize) -> impl Iterator<Item = (u32, Vec3)> + use<> {
+        let Contact { triangle, weights, .. } = self.touches[tool].contact;
+        let force = self.means[tool];
+        let nodes = triangle.map(|triangle| self.body.surface().triangles[triangle as usize]);
+        nodes.into_iter().flat_map(move |nodes| (0..3).map(move |i| (nodes[i], -force * weights[i])))
     }
 
     /// The body.
@@ -189,20 +234,36 @@ impl Simulation {
         &self.state
     }
 
-    /// Positions, velocities and contact, to put in what a local model found.
+    /// Positions and velocities, to put in what a local model found.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn state_mut(&mut self) -> (&mut State, &mut Contact) {
-        (&mut self.state, &mut self.contact)
+    pub fn state_mut(&mut self) -> &mut State {
+        &mut self.state
     }
 
-    /// The tool's contact; triangles are the body's.
+    /// Number of tools.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn contact(&self) -> &Contact {
-        &self.contact
+    pub fn tools(&self) -> usize {
+        self.touches.len()
+    }
+
+    /// The contact of a tool; its triangle is the body's.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn contact(&self, tool: usize) -> &Contact {
+        &self.touches[tool].contact
+    }
+
+    /// The same, to put in what a local model found.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn contact_mut(&mut self, tool: usize) -> &mut Contact {
+        &mut self.touches[tool].contact
     }
 
     /// How contacts are resolved.
@@ -221,12 +282,12 @@ impl Simulation {
         self.stepping
     }
 
-    /// Mean force of the last tick on the tool (N).
+    /// Mean force of the last tick on a tool (N).
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn force(&self) -> Vec3 {
-        self.force
+    pub fn force(&self, tool: usize) -> Vec3 {
+        self.means[tool]
     }
 }
 

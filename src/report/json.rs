@@ -17,6 +17,7 @@
 //! | `force` | `ticks`, `peak_n`, `peak_commanded_n`, `not_finite`, `model_age_s`, `served` (share of ticks by local model) |
 //! | `contact` | haptic ticks `free`, `stick`, `slip`, `lost` |
 //! | `limits` | `ticks`, `limited`, `share` (0 to 1), `stages` by name, `energy_j` (`least` and `last` of the passivity ledger), `tank_j` (`least`) |
+//! | `devices[]` | of each of several devices `name`, `resyncs`, `force`, `contact` and `limits`; without it these are the only device's, with it they are also the first's |
 //! | `lost_records` | of all groups |
 //! | `events` | `count`, `worst`, `first[]` with `t_s`, `level`, `message` |
 //!
@@ -26,17 +27,16 @@
 use serde_json::{Map, Value, json};
 
 use super::verdict::verdict;
-use crate::log::{CauseCounts, Environment, Execution, GroupReport, Level, Percentiles, RunReport, TextEvent};
+use crate::log::{
+    CauseCounts, DeviceReport, Environment, Execution, ForceReport, GroupReport, Level, Percentiles, RunReport,
+    TextEvent,
+};
 use crate::runtime::record::SlipCause;
 
 /// The report as one JSON document.
 pub fn to_json(report: &RunReport) -> String {
     let (verdict, reason) = verdict(report);
-    let resyncs = &report.resyncs;
-    let force = &report.force;
-    let contact = &report.contact;
-    let limits = &report.limits;
-    let document = json!({
+    let mut document = json!({
         "schema_version": 1,
         "verdict": verdict.name(),
         "reason": reason,
@@ -46,34 +46,6 @@ pub fn to_json(report: &RunReport) -> String {
         "messages": report.messages,
         "environment": report.environment.as_ref().map(environment),
         "groups": report.groups.iter().map(group).collect::<Vec<_>>(),
-        "resyncs": {
-            "count": resyncs.jump_before_n.count,
-            "jump_before_n": percentiles(resyncs.jump_before_n),
-            "jump_after_n": percentiles(resyncs.jump_after_n),
-            "age_ns": percentiles(resyncs.age_ns),
-        },
-        "force": {
-            "ticks": force.ticks,
-            "peak_n": force.peak_n,
-            "peak_commanded_n": force.peak_commanded_n,
-            "not_finite": force.not_finite,
-            "model_age_s": percentiles(force.model_age_s),
-            "served": force.shares().map(|(model, share)| (model.name().to_owned(), json!(share))).collect::<Map<_, _>>(),
-        },
-        "contact": {
-            "free": contact.free,
-            "stick": contact.stick,
-            "slip": contact.slip,
-            "lost": contact.lost,
-        },
-        "limits": {
-            "ticks": limits.ticks,
-            "limited": limits.limited,
-            "share": limits.share(),
-            "energy_j": { "least": limits.energy.least_j, "last": limits.energy.last_j },
-            "tank_j": { "least": limits.energy.least_tank_j },
-            "stages": limits.stages.iter().map(|(name, count)| (name.clone(), json!(count))).collect::<Map<_, _>>(),
-        },
         "lost_records": report.lost_records(),
         "events": {
             "count": report.event_count,
@@ -81,7 +53,69 @@ pub fn to_json(report: &RunReport) -> String {
             "first": report.events.iter().map(event).collect::<Vec<_>>(),
         },
     });
+    // The first device where the only one has always been, and all of them where there are several.
+    if let (Some(document), Some(first)) = (document.as_object_mut(), report.devices.first()) {
+        document.extend(device(first));
+        if report.devices.len() > 1 {
+            let named = |of: &DeviceReport| {
+                let mut all = device(of);
+                all.insert("name".to_owned(), json!(of.name));
+                Value::Object(all)
+            };
+            document.insert("devices".to_owned(), report.devices.iter().map(named).collect());
+        }
+    }
     document.to_string()
+}
+
+fn device(DeviceReport { resyncs, force, contact, limits, .. }: &DeviceReport) -> Map<String, Value> {
+    let fields = [
+        (
+            "resyncs",
+            json!({
+                "count": resyncs.jump_before_n.count,
+                "jump_before_n": percentiles(resyncs.jump_before_n),
+                "jump_after_n": percentiles(resyncs.jump_after_n),
+                "age_ns": percentiles(resyncs.age_ns),
+            }),
+        ),
+        (
+            "force",
+            json!({
+                "ticks": force.ticks,
+                "peak_n": force.peak_n,
+                "peak_commanded_n": force.peak_commanded_n,
+                "not_finite": force.not_finite,
+                "model_age_s": percentiles(force.model_age_s),
+                "served": shares(force),
+            }),
+        ),
+        (
+            "contact",
+            json!({
+                "free": contact.free,
+                "stick": contact.stick,
+                "slip": contact.slip,
+                "lost": contact.lost,
+            }),
+        ),
+        (
+            "limits",
+            json!({
+                "ticks": limits.ticks,
+                "limited": limits.limited,
+                "share": limits.share(),
+                "energy_j": { "least": limits.energy.least_j, "last": limits.energy.last_j },
+                "tank_j": { "least": limits.energy.least_tank_j },
+                "stages": limits.stages.iter().map(|(name, count)| (name.clone(), json!(count))).collect::<Map<_, _>>(),
+            }),
+        ),
+    ];
+    fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+fn shares(force: &ForceReport) -> Map<String, Value> {
+    force.shares().map(|(model, share)| (model.name().to_owned(), json!(share))).collect()
 }
 
 fn environment(environment: &Environment) -> Value {

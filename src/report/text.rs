@@ -6,7 +6,7 @@ use std::fmt;
 
 use super::units::{duration, force, seconds};
 use super::verdict::verdict;
-use crate::log::{CauseCounts, Environment, Execution, GroupReport, Percentiles, RunReport};
+use crate::log::{CauseCounts, DeviceReport, Environment, Execution, GroupReport, Percentiles, RunReport};
 
 const WIDTH: usize = 80;
 const NAME_WIDTH: usize = 11;
@@ -32,7 +32,12 @@ pub fn to_text(report: &RunReport) -> String {
     page.line(String::new());
     groups(&mut page, report);
     page.line(String::new());
-    haptics(&mut page, report);
+    for device in &report.devices {
+        if report.devices.len() > 1 {
+            page.named("DEVICE", device.name.clone());
+        }
+        haptics(&mut page, device);
+    }
     events(&mut page, report);
     page.text
 }
@@ -143,7 +148,7 @@ fn percentiles(page: &mut Page, group: &str, what: &str, p: Percentiles<u64>) {
     page.line(format!("{group:<11}{what:<14}{p50:>11}{p90:>11}{p99:>11}{p999:>11}{max:>11}"));
 }
 
-fn haptics(page: &mut Page, report: &RunReport) {
+fn haptics(page: &mut Page, report: &DeviceReport) {
     let resyncs = &report.resyncs;
     page.named("resyncs", resyncs.jump_before_n.count.to_string());
     if resyncs.jump_before_n.count > 0 {

@@ -9,6 +9,8 @@ use crate::devices::{Capabilities, HandSpec, PlantSpec};
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
 pub struct DeviceSpec {
+    /// Its name: each of several devices has one.
+    pub name: Option<String>,
     /// The kind of device.
     pub kind: DeviceKind,
     /// A CSV file `t_s,x_m,y_m,z_m`, relative to the scene file: where the tool goes, or where the hand wants to be.

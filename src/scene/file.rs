@@ -7,7 +7,7 @@ use toml::de::DeTable;
 use super::fault::{Fault, plain_key};
 use super::locate::{exact_offset_of, line_of, offset_of, table_at};
 use super::validate_device::tool;
-use super::{Scene, ToolPath, reader};
+use super::{Scene, ToolPath, numbered, reader};
 use crate::error::{Error, ErrorKind};
 
 impl Scene {
@@ -35,7 +35,9 @@ impl Scene {
         let found = |file: &Path| base.map_or_else(|| file.to_owned(), |base| base.join(file));
         let mut scene = Self::from_toml_with(text, name, |path_csv| ToolPath::read_csv(&found(path_csv)))?;
         // It is read when a session is built.
-        scene.device.log = scene.device.log.map(|log| found(&log));
+        for device in &mut scene.devices {
+            device.log = device.log.take().map(|log| found(&log));
+        }
         Ok(scene)
     }
 
@@ -43,7 +45,7 @@ impl Scene {
     pub(super) fn from_toml_with(
         text: &str,
         name: &str,
-        read_path: impl FnOnce(&Path) -> Result<ToolPath, Error>,
+        read_path: impl Fn(&Path) -> Result<ToolPath, Error>,
     ) -> Result<Self, Error> {
         let (document, _) = DeTable::parse_recoverable(text);
         let root = document.get_ref();
@@ -54,15 +56,22 @@ impl Scene {
             return Err(on_line(Error::scene("body", message), 0));
         }
         scene.source = Some(text.to_owned());
-        if let Some(path_csv) = &scene.device.path_csv {
+        let several = scene.devices.len() > 1;
+        for (index, device) in scene.devices.iter_mut().enumerate() {
+            let Some(path_csv) = &device.path_csv else { continue };
+            let field = if several { format!("device[{index}].path_csv") } else { "device.path_csv".to_owned() };
             let read = read_path(path_csv).map_err(|error| match error.kind() {
                 // A file that is there but wrong has a line of its own to name.
-                ErrorKind::Io => on_line(error.at("device.path_csv"), offset_of(root, "device.path_csv")),
+                ErrorKind::Io => on_line(error.at(&field), offset_of(root, &field)),
                 _ => error,
             })?;
-            scene.device.path = Some(read);
+            device.path = Some(read);
         }
-        scene.validate().and_then(|()| tool(&scene.device)).map_err(|error| {
+        let tools = || {
+            let mut devices = scene.devices.iter().enumerate();
+            devices.try_for_each(|(index, device)| tool(device).map_err(|error| numbered(error, index, &scene.devices)))
+        };
+        scene.validate().and_then(|()| tools()).map_err(|error| {
             let offset = offset_of(root, error.place());
             on_line(error, offset)
         })?;

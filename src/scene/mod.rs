@@ -11,6 +11,7 @@ mod choice;
 mod contact;
 mod device;
 mod device_fault;
+mod devices;
 mod models;
 mod safety;
 mod validate;
@@ -40,6 +41,7 @@ pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub use device_fault::{FaultKind, FaultSpec};
+pub(crate) use devices::{MAX_DEVICES, numbered};
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
 pub use safety::{SafetySpec, SafetyStage};
 
@@ -58,9 +60,9 @@ pub struct Scene {
     /// The fast, small one.
     #[cfg_attr(feature = "scene", serde(default))]
     pub local: LocalSpec,
-    /// What moves the tool and feels the force.
-    #[cfg_attr(feature = "scene", serde(default))]
-    pub device: DeviceSpec,
+    /// What moves a tool and feels its force: one device, or several with names.
+    #[cfg_attr(feature = "scene", serde(rename = "device", with = "devices::one_or_many", default = "one_device"))]
+    pub devices: Vec<DeviceSpec>,
     /// Limits on what reaches the device.
     #[cfg_attr(feature = "scene", serde(default))]
     pub safety: SafetySpec,
@@ -121,6 +123,11 @@ impl Default for RunSpec {
     }
 }
 
+/// A scene that names no device has one, for a program to replace.
+fn one_device() -> Vec<DeviceSpec> {
+    vec![DeviceSpec::default()]
+}
+
 impl Scene {
     /// The defaults around a program's own body: default rates, frictionless, `auto`, nothing moves the tool yet.
     pub fn of_program() -> Self {
@@ -129,7 +136,7 @@ impl Scene {
             contact: ContactSpec::default(),
             global: GlobalSpec::default(),
             local: LocalSpec::default(),
-            device: DeviceSpec::default(),
+            devices: one_device(),
             safety: SafetySpec::default(),
             initial: None,
             probes: Vec::new(),

@@ -3,7 +3,7 @@
 use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 use super::{
     BlendKind, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec, LocalModelKind,
-    LocalSpec, ModelChoice, Scene, StepKind, safety, validate_device,
+    LocalSpec, ModelChoice, Scene, StepKind, devices, safety,
 };
 use crate::error::Error;
 use crate::time::Rate;
@@ -42,7 +42,7 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
             "\"implicit\" has the corrected contact equations only, leave it out or use equations = \"corrected\"";
         return Err(Error::scene("local.step", message));
     }
-    validate_device::device(&scene.device)?;
+    devices::validate(scene)?;
     safety::validate(&scene.safety)?;
     if let Some(spec) = &scene.initial {
         lengths_within("initial.pull.offset_m", spec.pull.offset_m, MAX_LENGTH_M)?;
@@ -63,8 +63,10 @@ fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
     {
         patch(scene.local.patch, block)?;
     }
-    if let Some(node) = scene.device.attach_node {
-        attached(node, block)?;
+    for (index, device) in scene.devices.iter().enumerate() {
+        if let Some(node) = device.attach_node {
+            attached(node, block).map_err(|error| devices::numbered(error, index, &scene.devices))?;
+        }
     }
     if let Some(spec) = &scene.initial {
         initial(spec, block)?;
@@ -78,7 +80,7 @@ fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
 /// A program's own body has node ids and no lattice: the builder's methods name its nodes.
 fn on_no_lattice(scene: &Scene) -> Result<(), Error> {
     let named = [
-        ("device.attach_node", scene.device.attach_node.is_some()),
+        ("device.attach_node", scene.devices.iter().any(|device| device.attach_node.is_some())),
         ("initial", scene.initial.is_some()),
         ("probe", !scene.probes.is_empty()),
     ];

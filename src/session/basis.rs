@@ -26,11 +26,11 @@ pub(super) struct BasisSide {
 }
 
 impl BasisSide {
-    /// Its ports, and the bases around `tool` (m).
+    /// Its ports, and the bases around each of `tools` (m).
     ///
     /// # Errors
     /// If the surface cannot be searched.
-    pub(super) fn new(graph: &mut RuntimeBuilder, prepared: &Prepared, tool: Vec3) -> Result<Option<Self>, Error> {
+    pub(super) fn new(graph: &mut RuntimeBuilder, prepared: &Prepared, tools: &[Vec3]) -> Result<Option<Self>, Error> {
         let Some(springs) = prepared.template.springs.clone().filter(|_| prepared.reduces()) else {
             return Ok(None);
         };
@@ -39,7 +39,7 @@ impl BasisSide {
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
-            known: first_bases(prepared, &springs, &store, tool)?,
+            known: first_bases(prepared, &springs, &store, tools)?,
             store,
             springs,
             pace,
@@ -57,19 +57,24 @@ pub(super) fn group(prepared: &Prepared) -> RateGroup {
     RateGroup::new(prepared.global_rate).name(GROUP).latency(prepared.basis_latency)
 }
 
-/// The basis where the tool is, and before a run on threads one that holds a cell more around it.
-fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, tool: Vec3) -> Result<Bases, Error> {
+/// The basis where each tool is, and before a run on threads one that holds a cell more around it.
+fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, tools: &[Vec3]) -> Result<Bases, Error> {
     let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
     let aim = Aim::new(body.surface(), &state.positions)?;
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
-    aim.triangles(Some(prepared.simulation.contact()), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
     let size = prepared.template.patch;
     let sizes: &[[usize; 3]] = if prepared.prefetches { &[size, wider(size)] } else { &[size] };
-    for &size in sizes {
-        body.patch(&triangles[..1], size, &mut patch);
-        // What cannot be reduced is told by the actor, when it is wanted.
-        if let Ok(Some(basis)) = store.get(springs, &patch) {
-            bases.insert(Arc::new(basis));
+    for (index, &tool) in tools.iter().enumerate() {
+        let contact = prepared.simulation.contact(index);
+        aim.triangles(Some(contact), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
+        for &size in sizes {
+            body.patch(&triangles[..1], size, &mut patch);
+            // What cannot be reduced is told by the actor, when it is wanted.
+            if bases.get(&patch).is_none()
+                && let Ok(Some(basis)) = store.get(springs, &patch)
+            {
+                bases.insert(Arc::new(basis));
+            }
         }
     }
     Ok(bases)

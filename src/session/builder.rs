@@ -20,23 +20,36 @@ impl SessionBuilder {
     }
 
     /// The device; without one the tool follows the scene's path.
+    ///
+    /// Called again, it adds a device. Each of several has its own contact and local model, and needs a name: see
+    /// [`named_device`](Self::named_device).
     #[must_use]
     pub fn device(mut self, device: impl Device + 'static) -> Self {
-        self.parts.device = Some(Box::new(device));
+        self.parts.devices.push((None, Box::new(device)));
         self
     }
 
-    /// A scripted tool that follows `path`.
+    /// A device among several: its records are in the topics `/NAME/force` and so on.
+    #[must_use]
+    pub fn named_device(mut self, name: impl Into<String>, device: impl Device + 'static) -> Self {
+        self.parts.devices.push((Some(name.into()), Box::new(device)));
+        self
+    }
+
+    /// A scripted tool that follows `path`: the scene's first.
     #[must_use]
     pub fn path(mut self, path: ToolPath) -> Self {
-        self.parts.scene.device.path = Some(path);
+        self.parts.scene.devices[0].path = Some(path);
         self
     }
 
-    /// Glues the tool to a surface node, by id.
+    /// Glues the tool to a surface node, by id: the tool of the device given last.
     #[must_use]
     pub fn attach_node(mut self, node: u32) -> Self {
-        self.parts.attach = Some(node);
+        let device = self.parts.devices.len().saturating_sub(1);
+        let attached = &mut self.parts.attached;
+        attached.resize(attached.len().max(device + 1), None);
+        attached[device] = Some(node);
         self
     }
 

@@ -3,7 +3,9 @@
 use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::body::Body;
+use crate::model::local::Kind;
 use crate::safety::Limits;
+use crate::scene::Scene;
 
 /// The slew limit must not keep the force from being gone when the ramp is over.
 pub(super) fn check_ramp(limits: &Limits) -> Result<(), Error> {
@@ -45,25 +47,40 @@ pub(super) fn check_body(body: &dyn Body) -> Result<(), Error> {
     Ok(())
 }
 
-pub(super) fn check_nodes(body: &dyn Body, attach: Option<u32>, probes: &[u32]) -> Result<(), Error> {
+pub(super) fn check_nodes(body: &dyn Body, attached: &[Option<u32>], probes: &[u32]) -> Result<(), Error> {
     let nodes = body.rest().len();
-    let named = attach.map(|node| ("device.attach_node", node)).into_iter();
-    for (field, node) in named.chain(probes.iter().map(|&node| ("probe", node))) {
+    let field = |index: usize| match attached.len() {
+        1 => "device.attach_node".to_owned(),
+        _ => format!("device[{index}].attach_node"),
+    };
+    let glued = || attached.iter().enumerate().filter_map(|(index, node)| Some((field(index), (*node)?)));
+    for (field, node) in glued().chain(probes.iter().map(|&node| ("probe".to_owned(), node))) {
         if node as usize >= nodes {
             let message = format!("node {node} is outside the body, nodes run from 0 to {}", nodes - 1);
-            return Err(Error::scene(field, message));
+            return Err(Error::scene(&field, message));
         }
     }
-    match attach {
-        Some(node) if !body.surface().has_node(node) => {
+    for (field, node) in glued() {
+        if !body.surface().has_node(node) {
             let message =
                 format!("node {node} is inside the body, the tool can only be glued to a node of the surface");
-            Err(Error::scene("device.attach_node", message))
+            return Err(Error::scene(&field, message));
         }
-        Some(node) if body.inverse_masses()[node as usize] == 0.0 => {
-            let message = format!("node {node} is held, the tool could not move it");
-            Err(Error::scene("device.attach_node", message))
+        if body.inverse_masses()[node as usize] == 0.0 {
+            return Err(Error::scene(&field, format!("node {node} is held, the tool could not move it")));
         }
-        _ => Ok(()),
     }
+    Ok(())
+}
+
+/// A model of the whole body cannot be each tool's own.
+pub(super) fn check_model(kind: Kind, scene: &Scene) -> Result<(), Error> {
+    if kind != Kind::Full || scene.devices.len() == 1 {
+        return Ok(());
+    }
+    let message = format!(
+        "is `full`, which is one model of the whole body, and the {} devices need one each: use another, such as          \"predictive\"",
+        scene.devices.len()
+    );
+    Err(Error::scene("local.model", message))
 }

@@ -63,6 +63,10 @@ pub fn compare(
     options: &CompareOptions,
     mut progress: impl FnMut(CompareProgress),
 ) -> Result<Comparison, Error> {
+    if scene.devices.len() > 1 {
+        let message = "is given several times, and what is compared is the force of one against `full`: leave one";
+        return Err(Error::scene("device", message));
+    }
     let global = Rate::from_hz(scene.global.rate_hz)
         .ok_or_else(|| Error::scene("global.rate_hz", format!("is {}, which is no rate", scene.global.rate_hz)))?;
     let latencies = match options.latencies.is_empty() {

@@ -75,20 +75,25 @@ fn replayed(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dyn Device>
     let Some(log) = &spec.log else {
         return Err(Error::scene("device.log", "is missing, name the log whose device is replayed"));
     };
-    let (first, samples) = recorded(log).map_err(|error| error.at("device.log"))?;
+    let (first, samples) = recorded(log, spec.name.as_deref()).map_err(|error| error.at("device.log"))?;
     check_start("device.log", first.position, glued_at)?;
     Ok(Box::new(Replayed::new(first, samples, spec.profile.capabilities()).at_any_rate()))
 }
 
-/// The first state and the samples of the tool in a log, as far as it is whole.
+/// The first state and the samples of the tool in a log, as far as it is whole: of the device called `name` if the log has
+/// it, else of the first.
 #[cfg(feature = "log")]
-fn recorded(log: &Path) -> Result<(DeviceState, Vec<ReplayedSample>), Error> {
+fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<ReplayedSample>), Error> {
     let mut reader = LogReader::open(log)?;
-    let (mut first, mut samples) = (None, Vec::new());
+    let (mut number, mut first, mut samples) = (0, None, Vec::new());
     for entry in reader.by_ref() {
         match entry {
-            LogEntry::Environment(environment) => first = environment.first_tool.as_ref().map(state),
-            LogEntry::Record(LogRecord::Tool(sample)) => {
+            LogEntry::Environment(environment) => {
+                let place = environment.devices.iter().position(|device| Some(device.as_str()) == name);
+                number = place.unwrap_or_default() as u16;
+                first = environment.first_tools.get(usize::from(number)).map(state);
+            }
+            LogEntry::Record(LogRecord::Tool(sample)) if sample.device == number => {
                 samples.push(ReplayedSample { time: sample.time, id: sample.id, state: state(&sample) });
             }
             _ => {}

@@ -1,19 +1,36 @@
 //! Makes the global actor: once at the start, and again after a fault, from its last good state.
 
 use crate::actors::{
-    Checkpoint, GlobalActor, GlobalPlan, GlobalPorts, SurfaceView, SurroundingsPorts, ToolTick, Wishes,
+    Checkpoint, GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurfaceView, SurroundingsPorts, ToolPorts,
+    ToolTick, Wishes,
 };
 use crate::error::{Error, ErrorKind};
+use crate::model::Vec3;
 use crate::model::local::{LocalModel, PatchGeometry};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RecorderPort, Stopwatch};
 
-/// The ports whose global halves a new actor takes again.
-pub(super) struct GlobalSide {
+/// Between the local actor of a tool and the global one.
+pub(super) struct ToolLink {
     pub(super) ticks: QueuePort<ToolTick>,
     pub(super) geometry: Option<ExchangePort<PatchGeometry>>,
     pub(super) models: ExchangePort<Box<dyn LocalModel>>,
+}
+
+impl ToolLink {
+    fn take(&self) -> ToolPorts {
+        ToolPorts {
+            ticks: self.ticks.reader(),
+            geometry: self.geometry.as_ref().map(ExchangePort::reader),
+            models: self.models.writer(),
+        }
+    }
+}
+
+/// The ports whose global halves a new actor takes again.
+pub(super) struct GlobalSide {
+    pub(super) tools: Vec<ToolLink>,
     pub(super) surroundings: Option<(ExchangePort<Wishes>, ExchangePort<Bases>)>,
     pub(super) surface: OutletPort<SurfaceView>,
     pub(super) checkpoint: OutletPort<Checkpoint>,
@@ -22,19 +39,18 @@ pub(super) struct GlobalSide {
 
 impl GlobalSide {
     fn take(&self) -> GlobalPorts {
-        GlobalPorts {
-            ticks: self.ticks.reader(),
-            geometry: self.geometry.as_ref().map(ExchangePort::reader),
-            models: self.models.writer(),
-            surroundings: self
-                .surroundings
-                .as_ref()
-                .map(|(wishes, bases)| SurroundingsPorts { wishes: wishes.writer(), bases: bases.reader() }),
+        let surroundings = self
+            .surroundings
+            .as_ref()
+            .map(|(wishes, bases)| SurroundingsPorts { wishes: wishes.writer(), bases: bases.reader() });
+        let shared = GlobalSharedPorts {
+            surroundings,
             surface: self.surface.writer(),
             checkpoint: self.checkpoint.writer(),
             recorder: self.recorder.recorder(),
             build_cost: None,
-        }
+        };
+        GlobalPorts { tools: self.tools.iter().map(ToolLink::take).collect(), shared }
     }
 }
 
@@ -54,9 +70,12 @@ pub(super) struct GlobalMaker {
 }
 
 impl GlobalMaker {
-    pub(super) fn new(simulation: Simulation, tool: ToolTick, plan: GlobalPlan, side: GlobalSide) -> Self {
+    /// With the tools at `tools` (m).
+    pub(super) fn new(simulation: Simulation, tools: &[Vec3], plan: GlobalPlan, side: GlobalSide) -> Self {
         let spare = simulation.duplicate();
-        let last = Checkpoint { tool, state: simulation.state().clone(), contact: *simulation.contact() };
+        let contact = |(tool, &position)| (ToolTick { tick: 0, position }, *simulation.contact(tool));
+        let tools = tools.iter().enumerate().map(contact).collect();
+        let last = Checkpoint { tools, state: simulation.state().clone() };
         let saved = side.checkpoint.reader();
         Self { first: Some(simulation), spare, last, saved, plan, side, build_cost: None }
     }
@@ -80,20 +99,23 @@ impl GlobalMaker {
         if self.saved.refresh() {
             self.last.clone_from(self.saved.get());
         }
-        let ports = GlobalPorts { build_cost: self.build_cost.take(), ..self.side.take() };
+        let mut ports = self.side.take();
+        ports.shared.build_cost = self.build_cost.take();
+        let tools: Vec<ToolTick> = self.last.tools.iter().map(|&(tool, _)| tool).collect();
         let simulation = match self.first.take() {
             Some(first) => first,
             None => self.restored()?,
         };
-        Ok(vec![Box::new(GlobalActor::new(simulation, self.last.tool, self.plan.clone(), ports)?)])
+        Ok(vec![Box::new(GlobalActor::new(simulation, &tools, self.plan.clone(), ports)?)])
     }
 
     fn restored(&self) -> Result<Simulation, Error> {
         let copy = self.spare.as_ref().and_then(Simulation::duplicate);
         let mut simulation = copy.ok_or_else(|| Error::new(ErrorKind::Fault, "the body cannot be copied"))?;
-        let (state, contact) = simulation.state_mut();
-        state.clone_from(&self.last.state);
-        *contact = self.last.contact;
+        simulation.state_mut().clone_from(&self.last.state);
+        for (tool, &(_, contact)) in self.last.tools.iter().enumerate() {
+            *simulation.contact_mut(tool) = contact;
+        }
         Ok(simulation)
     }
 }

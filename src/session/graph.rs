@@ -1,15 +1,16 @@
 //! Wires actors and ports into a runtime and starts it.
 
 use super::basis::{self, BasisSide};
-use super::global::{GlobalMaker, GlobalSide};
+use super::global::{GlobalMaker, GlobalSide, ToolLink};
 use super::prepare::Prepared;
 #[cfg(all(feature = "log", feature = "scene"))]
 use super::replay::{Comparer, Reexecuted};
 use super::running::{Running, Viewer};
 use super::sink::{Memory, Sinks};
+use super::tools::Tool;
 use crate::actors::{
     Checkpoint, DeviceActor, DeviceSample, ForceCommand, GlobalPlan, LocalActor, LocalPorts, LoggerActor,
-    LoggerOutcome, ModelSource, SurfaceView, ToolTick, ToolView, first_state,
+    LoggerOutcome, ModelSource, SurfaceView, ToolView, first_state,
 };
 use crate::devices::DeviceState;
 use crate::error::Error;
@@ -17,7 +18,10 @@ use crate::log::{Environment, Execution as LogExecution, GroupInfo, ToolSample};
 use crate::model::Vec3;
 use crate::model::body::Block;
 use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
-use crate::runtime::{Actor, ExchangePort, Execution, RateGroup, Restart, Runtime, Stopwatch};
+use crate::runtime::{
+    Actor, ExchangePort, Execution, OutletReader, OutletWriter, RateGroup, Reader, Restart, Runtime, RuntimeBuilder,
+    Stopwatch, Writer,
+};
 use crate::safety::coupling::CoupledTool;
 use crate::safety::{Actions, Pipeline};
 use crate::time::Rate;
@@ -43,8 +47,29 @@ fn logger_group() -> RateGroup {
     RateGroup::new(LOGGER).name("logger").observer()
 }
 
+/// Both ends of what a tool's device and local actor say to each other and to a program that draws.
+struct ToolEnds {
+    sample_writer: Writer<DeviceSample>,
+    samples: Reader<DeviceSample>,
+    command_writer: Writer<ForceCommand>,
+    commands: Reader<ForceCommand>,
+    view_writer: OutletWriter<ToolView>,
+    view: Option<OutletReader<ToolView>>,
+}
+
+impl ToolEnds {
+    fn new(graph: &mut RuntimeBuilder) -> Self {
+        let (sample_writer, samples) = graph.exchange(DeviceSample::default);
+        let (command_writer, commands) = graph.exchange(ForceCommand::default);
+        let (view_writer, view) = graph.outlet(ToolView::default);
+        Self { sample_writer, samples, command_writer, commands, view_writer, view: Some(view) }
+    }
+}
+
 pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
-    let first = first_state(&mut *prepared.device)?;
+    let first: Vec<DeviceState> =
+        prepared.tools.iter_mut().map(|tool| first_state(&mut *tool.device)).collect::<Result<_, _>>()?;
+    let places: Vec<Vec3> = first.iter().map(|state| state.position).collect();
     let environment = environment(&prepared, &first)?;
     let (sinks, memory) = sinks(&prepared, &environment)?;
     #[cfg(all(feature = "log", feature = "scene"))]
@@ -69,14 +94,12 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
     let nodes = positions.len();
     let triangles = prepared.simulation.body().surface().triangles.clone();
-    let (view_writer, view) = graph.outlet(ToolView::default);
     let surface_port =
         graph.outlet_port(move || SurfaceView { positions: positions.clone(), ..SurfaceView::default() });
     let surface = surface_port.reader();
-    let (sample_writer, samples) = graph.exchange(DeviceSample::default);
-    let (command_writer, commands) = graph.exchange(ForceCommand::default);
+    let mut ends: Vec<ToolEnds> = prepared.tools.iter().map(|_| ToolEnds::new(&mut graph)).collect();
 
-    let bases = BasisSide::new(&mut graph, &prepared, first.position)?;
+    let bases = BasisSide::new(&mut graph, &prepared, &places)?;
     let reducing = bases.as_ref().map(|bases| (basis::group(&prepared), bases.actor()));
 
     let probes = prepared.probes;
@@ -85,10 +108,10 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
         model
     };
     let spare = || Box::new(Hold::default()) as Box<dyn LocalModel>;
-    let (source, models, global) = match prepared.template.empty() {
+    let (sources, global) = match prepared.template.empty() {
         None => {
             let full = watching(Box::new(Full::new(prepared.simulation)), &probes);
-            (ModelSource::Alone(surface_port.writer()), [full, spare(), spare()], None)
+            (vec![(ModelSource::Alone(surface_port.writer()), [full, spare(), spare()])], None)
         }
         Some(_) => {
             let (surroundings, known) = match bases {
@@ -97,25 +120,25 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
             };
             let (template, watched) = (prepared.template.clone(), probes.clone());
             let model = move || watching(template.empty().unwrap_or_else(spare), &watched);
-            let rotating = [model(), model(), model()];
-            let ports = GlobalSide {
+            let feeds_back = prepared.template.feeds_back();
+            let link = |_| ToolLink {
                 ticks: graph.queue_port(ticks_buffered),
-                geometry: prepared
-                    .template
-                    .feeds_back()
-                    .then(|| graph.exchange_port(move || PatchGeometry::with_room(nodes))),
-                models: graph.exchange_port(model),
+                geometry: feeds_back.then(|| graph.exchange_port(move || PatchGeometry::with_room(nodes))),
+                models: graph.exchange_port(model.clone()),
+            };
+            let side = GlobalSide {
+                tools: prepared.tools.iter().map(link).collect(),
                 surroundings,
                 surface: surface_port,
                 checkpoint: graph.outlet_port(Checkpoint::default),
                 recorder: graph.recorder_port(ticks_buffered),
             };
-            let source = ModelSource::Global {
-                models: ports.models.reader(),
-                ticks: ports.ticks.writer(),
-                geometry: ports.geometry.as_ref().map(ExchangePort::writer),
+            let source = |link: &ToolLink| ModelSource::Global {
+                models: link.models.reader(),
+                ticks: link.ticks.writer(),
+                geometry: link.geometry.as_ref().map(ExchangePort::writer),
             };
-            let tool = ToolTick { tick: 0, position: first.position };
+            let sources = side.tools.iter().map(|link| (source(link), [model(), model(), model()])).collect();
             let plan = GlobalPlan {
                 haptic: prepared.haptic,
                 global: prepared.global_rate,
@@ -124,31 +147,34 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
                 bases: known,
                 prefetches: prepared.prefetches,
             };
-            let maker = GlobalMaker::new(prepared.simulation, tool, plan, ports);
-            (source, rotating, Some(maker.measured_by(build_cost)))
+            let maker = GlobalMaker::new(prepared.simulation, &places, plan, side);
+            (sources, Some(maker.measured_by(build_cost)))
         }
     };
-    let device = DeviceActor::new(
-        prepared.device,
-        first,
-        sample_writer,
-        commands,
-        Pipeline::new(prepared.limits),
-        graph.recorder(ticks_buffered * 2),
-    );
-    let ports = LocalPorts {
-        samples,
-        commands: command_writer,
-        source,
-        view: view_writer,
-        recorder: graph.recorder(ticks_buffered * per_tick),
-    };
-    let succession = Succession::new(models, prepared.blend, Vec3::zeros());
-    let local = LocalActor::new(succession, prepared.haptic, prepared.global_rate, probes, ports);
-    let local = match &prepared.coupling {
-        Some(design) => local.coupled(CoupledTool::new(design)),
-        None => local,
-    };
+    let views = ends.iter_mut().filter_map(|ends| ends.view.take()).collect();
+    let mut haptic_actors: Vec<Box<dyn Actor>> = Vec::new();
+    for (number, (((tool, ends), state), (source, models))) in
+        (0..).zip(prepared.tools.into_iter().zip(ends).zip(&first).zip(sources))
+    {
+        let safety = Pipeline::new(tool.limits);
+        let recorder = graph.recorder(ticks_buffered * 2);
+        let device = DeviceActor::new(tool.device, *state, ends.sample_writer, ends.commands, safety, recorder);
+        let ports = LocalPorts {
+            samples: ends.samples,
+            commands: ends.command_writer,
+            source,
+            view: ends.view_writer,
+            recorder: graph.recorder(ticks_buffered * per_tick),
+        };
+        let succession = Succession::new(models, prepared.blend, Vec3::zeros());
+        let local = LocalActor::new(succession, prepared.haptic, prepared.global_rate, probes.clone(), ports);
+        let local = match &tool.coupling {
+            Some(design) => local.coupled(CoupledTool::new(design)),
+            None => local,
+        };
+        haptic_actors.push(Box::new(device.numbered(number)));
+        haptic_actors.push(Box::new(local.numbered(number)));
+    }
 
     let outcome = LoggerOutcome::default();
     let logger = |drain| -> Box<dyn Actor> {
@@ -161,7 +187,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     };
     #[cfg(not(all(feature = "log", feature = "scene")))]
     let logger = logger(drain);
-    graph.group(prepared.local, vec![Box::new(device), Box::new(local)]);
+    graph.group(prepared.local, haptic_actors);
     if let Some((group, actor)) = reducing {
         graph.group(group, vec![actor]);
     }
@@ -178,10 +204,10 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
         graph.until(until);
     }
     let running = graph.build()?.start()?;
-    Ok(Running::new(running, outcome, memory, Viewer::new(triangles, surface, view), prepared.until).measuring(builds))
+    Ok(Running::new(running, outcome, memory, Viewer::new(triangles, surface, views), prepared.until).measuring(builds))
 }
 
-fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, Error> {
+fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment, Error> {
     let group = |name: &str, rate: Rate| GroupInfo {
         name: name.to_owned(),
         rate_hz: rate.as_hz(),
@@ -214,18 +240,38 @@ fn environment(prepared: &Prepared, first: &DeviceState) -> Result<Environment, 
         groups,
         limit_stages: Actions::NAMES.map(str::to_owned).into(),
         safety_off: prepared.safety_off.iter().map(|stage| stage.name().to_owned()).collect(),
-        stored_j: prepared.limits.passivity.map_or(0.0, |passivity| passivity.stored_j),
-        coupling: prepared.coupling.map(|design| design.to_string()),
+        devices: match prepared.tools.as_slice() {
+            [_] => Vec::new(),
+            several => several.iter().map(|tool| tool.name.clone()).collect(),
+        },
+        // All of it: each device's ledger begins with an even share.
+        stored_j: prepared.tools.iter().filter_map(|tool| Some(tool.limits.passivity?.stored_j)).sum(),
+        coupling: couplings(&prepared.tools),
         granted: Default::default(),
-        first_tool: Some(ToolSample {
-            position_m: first.position.into(),
-            velocity_m_s: first.velocity.into(),
-            buttons: first.buttons,
-            ..ToolSample::default()
-        }),
+        first_tools: (0..).zip(first).map(first_tool).collect(),
         scene: prepared.source.clone(),
         session,
     })
+}
+
+fn first_tool((device, first): (u16, &DeviceState)) -> ToolSample {
+    ToolSample {
+        position_m: first.position.into(),
+        velocity_m_s: first.velocity.into(),
+        buttons: first.buttons,
+        device,
+        ..ToolSample::default()
+    }
+}
+
+/// The gains of each tool's coupling in words.
+fn couplings(tools: &[Tool]) -> Option<String> {
+    let named = |tool: &Tool| {
+        let design = tool.coupling?;
+        Some(if tool.name.is_empty() { design.to_string() } else { format!("{}: {design}", tool.name) })
+    };
+    let all: Vec<String> = tools.iter().filter_map(named).collect();
+    (!all.is_empty()).then(|| all.join("; "))
 }
 
 fn unix_now_ns() -> u64 {

@@ -7,7 +7,7 @@
 //! let body = Block::builder([6, 6, 6], [0.05; 3]).fix(Face::ZMin).build()?;
 //! let top = body.lattice().id([2, 2, 5]);
 //! let summary = Session::builder(body).attach_node(top).virtual_time().duration_s(0.1).build()?.run()?;
-//! assert_eq!(summary.report.force.ticks, 100);
+//! assert_eq!(summary.report.devices[0].force.ticks, 100);
 //! # Ok(())
 //! # }
 //! ```
@@ -32,6 +32,7 @@ mod safety;
 mod sink;
 mod situation;
 mod substeps;
+mod tools;
 
 pub use builder::SessionBuilder;
 pub use choice::Choice;

@@ -3,32 +3,29 @@
 use std::path::PathBuf;
 
 use super::budget::{self, nominal_evaluation};
-use super::checks::{check_body, check_nodes, check_ramp};
+use super::checks::{check_body, check_model, check_nodes};
 use super::choice::{Choice, choose};
-use super::device;
 use super::disturbed::Disturbed;
 use super::graph::groups;
 use super::horizon::{horizon, lateness};
 use super::rate_groups::{check_group, global_group, local_group};
-use super::safety;
 use super::situation::Situation;
 use super::substeps::substeps;
+use super::tools::{Making, Tool, complete, tools};
 use crate::devices::Device;
 use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::blend::Blend;
 use crate::model::body::{Block, Body, State};
-use crate::model::contact::{Contact, Law};
+use crate::model::contact::Law;
 use crate::model::equilibrium::static_equilibrium;
 use crate::model::local::{MOST_EXPLICIT_STEPS, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, RateGroup, admit_here};
-use crate::safety::Limits;
-use crate::safety::coupling::Design;
 #[cfg(feature = "scene")]
 use crate::scene::ProbeSpec;
-use crate::scene::{BodySpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind};
+use crate::scene::{BodySpec, DeviceSpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind};
 use crate::time::{Nanos, Rate};
 
 /// What a builder has collected.
@@ -37,8 +34,10 @@ pub(super) struct Parts {
     pub scene: Scene,
     /// The program's own body, in place of the scene's.
     pub body: Option<Box<dyn Body>>,
-    pub device: Option<Box<dyn Device>>,
-    pub attach: Option<u32>,
+    /// The program's own devices with their names, in place of the scene's first ones.
+    pub devices: Vec<(Option<String>, Box<dyn Device>)>,
+    /// The nodes that the program glues tools to, by device.
+    pub attached: Vec<Option<u32>>,
     pub probes: Vec<u32>,
     pub global: Option<RateGroup>,
     pub local: Option<RateGroup>,
@@ -61,8 +60,8 @@ impl Parts {
             endless: body.is_some(),
             scene,
             body,
-            device: None,
-            attach: None,
+            devices: Vec::new(),
+            attached: Vec::new(),
             probes: Vec::new(),
             global: None,
             local: None,
@@ -94,12 +93,10 @@ pub(super) struct Prepared {
     /// Haptic ticks that a local model may have to reach ahead.
     pub horizon: u32,
     pub blend: Blend,
-    pub device: Box<dyn Device>,
-    pub limits: Limits,
+    /// In the order of their devices.
+    pub tools: Vec<Tool>,
     /// Stages of the safety pipeline that the scene switched off.
     pub safety_off: Vec<SafetyStage>,
-    /// Between device and simulated tool.
-    pub coupling: Option<Design>,
     pub probes: Vec<u32>,
     pub haptic: Rate,
     pub global_rate: Rate,
@@ -142,7 +139,8 @@ pub(super) struct Timing {
 }
 
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
-    let mut scene = parts.scene;
+    let mut scene = parts.scene.clone();
+    complete(&mut scene, &parts);
     scene.validate()?;
     for (field, group) in [("local", &parts.local), ("global", &parts.global)] {
         group.as_ref().map_or(Ok(()), |group| check_group(field, group))?;
@@ -158,9 +156,11 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
 
     let lattice = scene.body.as_ref().map(|spec| Lattice { nodes: spec.block.nodes });
     let id = |node: [usize; 3]| lattice.map_or(0, |lattice| lattice.id(node));
-    let attach = parts.attach.or(scene.device.attach_node.map(id));
+    let named =
+        |(index, spec): (usize, &DeviceSpec)| parts.attached.get(index).copied().flatten().or(spec.attach_node.map(id));
+    let attached: Vec<Option<u32>> = scene.devices.iter().enumerate().map(named).collect();
     let probes: Vec<u32> = parts.probes.into_iter().chain(scene.probes.iter().map(|probe| id(probe.node))).collect();
-    check_nodes(&*body, attach, &probes)?;
+    check_nodes(&*body, &attached, &probes)?;
 
     let tick = haptic.period_s();
     let (substeps, stable_substeps) = substeps(&mut *body, scene.global.substeps_per_ms, tick)?;
@@ -183,30 +183,17 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         }
     };
     scene.local.model = kind.into();
-    let contact = attach.map_or_else(Contact::default, |node| glued(&*body, node));
+    check_model(kind, &scene)?;
     #[cfg(feature = "scene")]
-    let mut as_run = as_run(&scene, Some((attach, &probes)));
-    let device = match parts.device {
-        Some(device) => device,
-        None => device::device(&scene.device, attach.map(|node| state.positions[node as usize]))?,
-    };
-    // What is executed again has met them already.
-    let device = if parts.is_replay { device } else { device::with_faults(device, &scene.device) };
-    let exerts_force = device.exerts_force();
+    let mut as_run = as_run(&scene, Some((&attached, &probes)));
     let law = Law {
         friction: scene.contact.friction.coefficient(),
         normals: scene.contact.normals,
         equations: scene.contact.equations,
     };
-    let device_limits = safety::device_limits(&scene.safety, &device.capabilities());
-    let stored_j = safety::stored_energy(&mut *body, &state);
-    let resolved = safety::resolved(&scene, &device_limits);
-    let limits = safety::limits(&resolved, &device_limits, stored_j, tick);
-    check_ramp(&limits)?;
-    let coupling = match scene.local.coupling {
-        true => Some(safety::coupling(&mut *body, attach, &device_limits, tick)?),
-        false => None,
-    };
+    let is_replay = parts.is_replay;
+    let making = Making { scene: &scene, body: &mut *body, state: &state, tick, attached: &attached, is_replay };
+    let (tools, resolved) = tools(parts.devices, making)?;
     let safety_off = resolved.off.clone();
     #[cfg(feature = "scene")]
     {
@@ -225,7 +212,9 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         .with_prediction(scene.local.prediction)
         .with_period(period_ticks);
     let template = if is_implicit { template.with_implicit_steps() } else { template };
-    let local = local_group(parts.local, haptic, limits.ramp_s, exerts_force);
+    let ramp_s = tools.iter().map(|tool| tool.limits.ramp_s).fold(0.0, f64::max);
+    let exerts_force = tools.iter().any(|tool| tool.device.exerts_force());
+    let local = local_group(parts.local, haptic, ramp_s, exerts_force);
     let [local, global] = match parts.execution {
         Execution::Virtual => [local, global],
         Execution::Threaded => {
@@ -241,12 +230,10 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         basis_folder: scene.local.basis_folder.clone(),
         basis_latency: Nanos::from_secs_f64(scene.global.basis_latency_ms * 1e-3),
         horizon,
-        simulation: Simulation::new(body, state, contact, law, Stepping { tick, substeps })?,
+        simulation: simulation(body, state, &tools, law, Stepping { tick, substeps })?,
         blend: Blend::new(scene.local.blend.kind, blend_ticks),
-        device,
-        limits,
+        tools,
         safety_off,
-        coupling,
         probes,
         haptic,
         global_rate,
@@ -273,13 +260,17 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
 
 /// The scene without what a log holds in other places, and with the nodes that a program named, if it has a lattice.
 #[cfg(feature = "scene")]
-pub(super) fn as_run(scene: &Scene, named: Option<(Option<u32>, &[u32])>) -> Scene {
+pub(super) fn as_run(scene: &Scene, named: Option<(&[Option<u32>], &[u32])>) -> Scene {
     let mut scene = scene.clone();
     scene.source = None;
-    (scene.device.path_csv, scene.device.path, scene.device.log) = (None, None, None);
-    if let (Some(body), Some((attach, probes))) = (&scene.body, named) {
+    for device in &mut scene.devices {
+        (device.path_csv, device.path, device.log) = (None, None, None);
+    }
+    if let (Some(body), Some((attached, probes))) = (&scene.body, named) {
         let lattice = Lattice { nodes: body.block.nodes };
-        scene.device.attach_node = attach.map(|node| lattice.place(node));
+        for (device, node) in scene.devices.iter_mut().zip(attached) {
+            device.attach_node = node.map(|node| lattice.place(node));
+        }
         scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.place(node) }).collect();
     }
     scene
@@ -305,9 +296,14 @@ fn pulled(body: &mut dyn Body, initial: &InitialSpec, id: impl Fn([usize; 3]) ->
     static_equilibrium(body, &held)
 }
 
-/// The contact that glues the tool to `node`.
-fn glued(body: &dyn Body, node: u32) -> Contact {
-    let triangle = body.surface().at_node(node)[0];
-    let weights = body.surface().triangles[triangle as usize].map(|corner| f64::from(u8::from(corner == node)));
-    Contact::glued(triangle, weights)
+fn simulation(
+    body: Box<dyn Body>,
+    state: State,
+    tools: &[Tool],
+    law: Law,
+    stepping: Stepping,
+) -> Result<Simulation, Error> {
+    let mut contacts = tools.iter().map(|tool| tool.contact);
+    let first = Simulation::new(body, state, contacts.next().unwrap_or_default(), law, stepping)?;
+    Ok(contacts.fold(first, Simulation::with_tool))
 }

@@ -106,16 +106,17 @@ impl Running {
 pub struct Viewer {
     triangles: Arc<[[u32; 3]]>,
     surface: OutletReader<SurfaceView>,
-    tool: OutletReader<ToolView>,
+    /// In the order of the devices.
+    tools: Vec<OutletReader<ToolView>>,
 }
 
 impl Viewer {
     pub(super) fn new(
         triangles: Vec<[u32; 3]>,
         surface: OutletReader<SurfaceView>,
-        tool: OutletReader<ToolView>,
+        tools: Vec<OutletReader<ToolView>>,
     ) -> Self {
-        Self { triangles: triangles.into(), surface, tool }
+        Self { triangles: triangles.into(), surface, tools }
     }
 
     /// Node ids of the surface triangles, counter-clockwise seen from outside; they never change.
@@ -132,13 +133,23 @@ impl Viewer {
         self.surface.get()
     }
 
-    /// The newest tool and force, at the haptic rate.
+    /// The newest tool and force, at the haptic rate: of the first device, if there are several.
     ///
     /// # Real-time
     /// Wait-free, for this side and for the writer.
     pub fn tool(&mut self) -> ToolView {
-        self.tool.refresh();
-        *self.tool.get()
+        self.tools().next().unwrap_or_default()
+    }
+
+    /// The newest tool and force of every device.
+    ///
+    /// # Real-time
+    /// Wait-free, for this side and for the writer.
+    pub fn tools(&mut self) -> impl Iterator<Item = ToolView> {
+        self.tools.iter_mut().map(|tool| {
+            tool.refresh();
+            *tool.get()
+        })
     }
 }
 

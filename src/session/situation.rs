@@ -67,7 +67,9 @@ impl Situation {
         let is_held = body.inverse_masses().contains(&0.0);
         let is_possible = |kind: &Kind| {
             let suits_body = match kind {
-                Kind::Full | Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
+                // One model of the whole body, and each device needs its own.
+                Kind::Full => scene.devices.len() == 1,
+                Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
                 Kind::Condensed => has_springs && is_held,
                 Kind::Predicted => has_springs,
                 Kind::Predictive => has_springs && scene.local.basis > 0,

@@ -54,6 +54,7 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
             normal: [0.0, phase.sin(), phase.cos()],
             normal_force_n: phase as f32,
             tangential_force_n: -0.0,
+            device: 0,
         };
         let force_n = [phase.sin(), -0.0, f64::MIN_POSITIVE * n as f64];
         entries.extend(
@@ -65,6 +66,7 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
                     served_by: ServedBy::Patch,
                     model_age_s: (n % 33) as f64 * 1e-3,
                     energy_j: -phase,
+                    device: 0,
                 }),
                 LogRecord::Command(CommandSample {
                     time,
@@ -72,6 +74,7 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
                     limits: (n % 5) as u16,
                     energy_j: 1e-3 * n as f64,
                     tank_j: 1e-4,
+                    device: 0,
                 }),
                 LogRecord::Tool(ToolSample {
                     time,
@@ -79,10 +82,11 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
                     position_m: [phase, 0.1, -phase],
                     velocity_m_s: [0.0, -0.0, 1.0 / 3.0],
                     buttons: 3,
+                    device: 0,
                 }),
                 LogRecord::Contact(contact),
                 LogRecord::Port(PortUse { time, port: 2, tick: n, count: n + 1, sequence: n, ..PortUse::default() }),
-                LogRecord::Probe(ProbeSample { time, node: 851, local_m: [phase; 3], global_m: [0.1; 3] }),
+                LogRecord::Probe(ProbeSample { time, node: 851, local_m: [phase; 3], global_m: [0.1; 3], device: 0 }),
             ]
             .map(LogEntry::Record),
         );
@@ -144,6 +148,7 @@ fn resync(k: u64, time: Nanos) -> [LogEntry; 2] {
             jump_before_n: 0.01 * k as f64,
             jump_after_n: 0.001 * k as f64,
             energy_j: 1e-6,
+            device: 0,
         }),
     ]
     .map(LogEntry::Record)

@@ -11,7 +11,7 @@
 //! force on the tool: J / d
 //! ```
 //!
-//! [`step_implicit`] differs in v*, which comes from a linear system, and in the impulse, which moves every node.
+//! [`step_all`] does the same for several tools, and [`step_implicit`] differs in v*, which comes from a linear system, and in the impulse, which moves every node.
 
 mod coupled;
 mod deformable;
@@ -26,7 +26,7 @@ mod walk;
 use super::Vec3;
 
 pub use deformable::Deformable;
-pub use step::{step, step_implicit};
+pub use step::{Touch, step, step_all, step_implicit};
 
 /// The state of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

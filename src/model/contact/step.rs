@@ -7,6 +7,15 @@ use super::deformable::Deformable;
 use super::resolve::{Place, Resolution, resolve};
 use super::{Contact, Equations, Law, Mode, ToolMotion, paper};
 
+/// A tool on a body: where it touches, and what it felt in the last step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Touch {
+    /// The contact.
+    pub contact: Contact,
+    /// The force on the tool (N), the impulse over the full step.
+    pub force: Vec3,
+}
+
 /// One explicit step of `d` seconds: velocities take `forces`, the tool's contact is found and resolved, positions move.
 /// Returns the force on the tool (N), the impulse over the full step.
 ///
@@ -27,6 +36,37 @@ pub fn step(
     }
     integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
     move_with_tool(body, contact, law, tool, d, |body, place, tool, d_c| resolve(body, law, place, tool, d_c, d))
+}
+
+/// The same for several tools, each with its own contact; `motion` is that of the tool at a place of `touches`.
+///
+/// They are resolved one after the other: exact as long as no two of them touch the same node, else the later one has its
+/// way. The equations of the paper are for one tool, and for one alone.
+///
+/// # Real-time
+/// Bounded, real-time safe.
+pub fn step_all(
+    body: &mut Deformable<'_>,
+    forces: &[Vec3],
+    touches: &mut [Touch],
+    law: &Law,
+    motion: impl Fn(usize) -> ToolMotion,
+    d: f64,
+) {
+    if let [touch] = touches {
+        touch.force = step(body, forces, &mut touch.contact, law, motion(0), d);
+        return;
+    }
+    integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
+    for (k, touch) in touches.iter_mut().enumerate() {
+        touch.force = press(body, &mut touch.contact, motion(k), d, |body, place, tool, d_c| {
+            resolve(body, law, place, tool, d_c, d)
+        });
+    }
+    body.drift(d);
+    for (k, touch) in touches.iter_mut().enumerate() {
+        follow(body, &mut touch.contact, law, motion(k));
+    }
 }
 
 /// The same for the implicit step `system` of a linear patch: `forces` are those at its end for unchanged velocities, and
@@ -58,20 +98,41 @@ fn move_with_tool(
     d: f64,
     resolution: impl FnOnce(&mut Deformable<'_>, Place<'_>, ToolMotion, f64) -> Resolution,
 ) -> Vec3 {
+    let force = press(body, contact, tool, d, resolution);
+    body.drift(d);
+    follow(body, contact, law, tool);
+    force
+}
+
+/// Detection and `resolution`: velocities become those after the impact. Positions are left so that drifting with these for
+/// the whole step ends where two drifts, before the impact and after it, would.
+fn press(
+    body: &mut Deformable<'_>,
+    contact: &mut Contact,
+    tool: ToolMotion,
+    d: f64,
+    resolution: impl FnOnce(&mut Deformable<'_>, Place<'_>, ToolMotion, f64) -> Resolution,
+) -> Vec3 {
     let Some((triangle, share)) = body.detect(contact, tool, d) else {
-        body.drift(d);
         return Vec3::zeros();
     };
     if share > 0.0 {
         body.drift(share * d);
     }
-    let d_c = (1.0 - share) * d;
     let place = Place { triangle, weights: &contact.weights, is_glued: contact.glued };
-    let Resolution { mode, impulse, normal } = resolution(body, place, tool.part(share, 1.0), d_c);
+    let Resolution { mode, impulse, normal } = resolution(body, place, tool.part(share, 1.0), (1.0 - share) * d);
     (contact.mode, contact.normal) = (mode, normal);
-    body.drift(d_c);
-    if mode != Mode::Stick {
-        body.reseat(contact, law, triangle, &tool.to);
+    if share > 0.0 {
+        body.drift(-share * d);
     }
     impulse / d
+}
+
+/// After the motion: the contact of a tool that slid is where the tool is now.
+fn follow(body: &Deformable<'_>, contact: &mut Contact, law: &Law, tool: ToolMotion) {
+    if let Some(triangle) = contact.triangle
+        && contact.mode != Mode::Stick
+    {
+        body.reseat(contact, law, triangle, &tool.to);
+    }
 }

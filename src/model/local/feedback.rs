@@ -112,16 +112,16 @@ impl PatchGeometry {
         self.state.is_finite() && self.contact.weights.iter().all(|w| w.is_finite())
     }
 
-    /// Puts the nodes and the contact in place of the global model's own.
+    /// Puts the nodes and the contact in place of the global model's own of `tool`.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn write_to(&self, global: &mut Simulation) {
-        let (state, contact) = global.state_mut();
+    pub fn write_to(&self, global: &mut Simulation, tool: usize) {
+        let state = global.state_mut();
         for ((&node, x), v) in self.nodes.iter().zip(&self.state.positions).zip(&self.state.velocities) {
             state.positions[node as usize] = *x;
             state.velocities[node as usize] = *v;
         }
-        *contact = self.contact;
+        *global.contact_mut(tool) = self.contact;
     }
 }

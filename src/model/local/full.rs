@@ -55,7 +55,7 @@ impl LocalModel for Full {
     }
 
     fn contact(&self) -> Contact {
-        *self.simulation.contact()
+        *self.simulation.contact(0)
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {

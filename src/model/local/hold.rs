@@ -15,8 +15,8 @@ pub struct Hold {
 
 impl LocalModel for Hold {
     fn rebuild(&mut self, resync: ResyncView<'_>) {
-        self.force = resync.global.force();
-        self.contact = *resync.global.contact();
+        self.force = resync.global.force(resync.index);
+        self.contact = *resync.global.contact(resync.index);
         self.built_at = resync.tick;
         self.watched.take(resync.global.state());
     }

@@ -168,13 +168,18 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
         self.forces.resize(movable, Vec3::zeros());
         let share = |row, column| self.boundary.share(body, row, column);
         self.tangent.rebuild(body, state, nodes, &|node| window.movable(node), &share);
+        for (node, force) in global.exerted_beside(resync.index) {
+            if let Some(place) = window.movable(node) {
+                self.tangent.add_force(place, force);
+            }
+        }
         if let Some(stiffness) = self.boundary.compliance(nodes) {
             self.tangent.add_stiffness(&stiffness);
         }
-        self.contact = window.localised(global.contact());
+        self.contact = window.localised(global.contact(resync.index));
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
         self.ticks = 0;
-        (self.has_left, self.force) = (false, global.force());
+        (self.has_left, self.force) = (false, global.force(resync.index));
         (self.stepping, self.is_implicit) =
             stable_stepping(self.spec.is_implicit, &self.tangent, &self.inverse_masses, self.stepping, &self.law);
         if self.is_implicit {
@@ -285,7 +290,17 @@ mod tests {
 
     fn rebuilt<B: Boundary>(mut model: LinearPatch<B>, (global, top): (&mut Simulation, u32)) -> LinearPatch<B> {
         let (tool, bases) = (ToolForecast::default(), Bases::default());
-        model.rebuild(ResyncView { global, tick: 0, triangles: &[top], patch: None, tool, horizon: 0, bases: &bases });
+        let (triangles, tools) = (&[top], &[tool]);
+        model.rebuild(ResyncView {
+            global,
+            tick: 0,
+            triangles,
+            patch: None,
+            tools,
+            index: 0,
+            horizon: 0,
+            bases: &bases,
+        });
         model
     }
 
@@ -337,7 +352,7 @@ mod tests {
         let before = global.state().clone();
         let mut moved = touched;
         moved.state.positions[0] += Vec3::z();
-        moved.write_to(&mut global);
+        moved.write_to(&mut global, 0);
         let changed = |n: &usize| global.state().positions[*n] != before.positions[*n];
         assert_eq!((0..before.positions.len()).filter(changed).collect::<Vec<_>>(), [corners[0] as usize]);
     }

@@ -52,8 +52,10 @@ pub struct ResyncView<'a> {
     pub triangles: &'a [u32],
     /// The patch to use, if it is not to be the one around the triangles: node ids in increasing order.
     pub patch: Option<&'a [u32]>,
-    /// Where the tool is, and where it is expected.
-    pub tool: ToolForecast,
+    /// Where each tool is, and where it is expected.
+    pub tools: &'a [ToolForecast],
+    /// The tool that the model is for.
+    pub index: usize,
     /// Haptic ticks that the model may have to reach ahead, catching up included.
     pub horizon: u32,
     /// Reduced surroundings that are there.

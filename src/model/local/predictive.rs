@@ -44,6 +44,8 @@ pub struct Predictive {
     /// Zero for all but the patch: the ring is moved by its path.
     inverse_masses: Vec<f64>,
     forces: Vec<Vec3>,
+    /// Movable nodes that other tools touch, with the force that they exert at the resync, and are taken to go on with (N).
+    others: Vec<(usize, Vec3)>,
     path: RingPath,
     /// Substeps since it was built.
     substep: usize,
@@ -81,6 +83,7 @@ impl Predictive {
             state: State::default(),
             inverse_masses: Vec::new(),
             forces: Vec::new(),
+            others: Vec::new(),
             path: RingPath::default(),
             substep: 0,
             basis: None,
@@ -110,15 +113,16 @@ impl Predictive {
         window.gather(&global.state().velocities, &mut self.state.velocities);
         // What is beyond the ring stands still.
         self.state.velocities[window.movable + window.ring..].fill(Vec3::zeros());
-        self.contact = window.localised(global.contact());
+        self.contact = window.localised(global.contact(resync.index));
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
-        (self.substep, self.has_left, self.force) = (0, false, global.force());
+        (self.substep, self.has_left, self.force) = (0, false, global.force(resync.index));
     }
 
     /// Finds the ring's path: by the forecast of the surroundings where it holds the present motion, or else by running
-    /// the whole body ahead.
+    /// the whole body ahead. The forecast knows no tool but its own: one that presses elsewhere moves on in the whole body.
     fn predict(&mut self, resync: &mut ResyncView<'_>) {
-        let basis = self.basis.clone().filter(|_| self.prediction == Prediction::Reduced);
+        let is_alone = resync.global.exerted_beside(resync.index).all(|(_, force)| force == Vec3::zeros());
+        let basis = self.basis.clone().filter(|_| is_alone && self.prediction == Prediction::Reduced);
         if !basis.is_some_and(|basis| self.predict_by_forecast(&basis, resync)) {
             self.predict_by_global(resync);
         }
@@ -128,7 +132,7 @@ impl Predictive {
         let ring = self.ring();
         let Self { window, near, state, forces, path, present, stepping, .. } = self;
         path.clear(window.ring, stepping.step(), (resync.horizon * stepping.substeps + 1) as usize);
-        let motion = |n| resync.tool.motion(n, stepping.tick);
+        let motion = |tool: usize, n| resync.tools[tool].motion(n, stepping.tick);
         resync.global.look_ahead(resync.horizon, motion, present, |global| {
             window.gather(&global.positions, &mut state.positions);
             window.gather(&global.velocities, &mut state.velocities);
@@ -142,7 +146,7 @@ impl Predictive {
     fn predict_by_forecast(&mut self, basis: &Basis, resync: &mut ResyncView<'_>) -> bool {
         let (ring, forecast, stepping) = (self.ring(), basis.forecast(), self.stepping);
         let span = f64::from(resync.horizon) * stepping.tick;
-        let (state, forces) = resync.global.internal_forces();
+        let (state, forces) = resync.global.forces_without(resync.index);
         if !forecast.launch(&mut self.surroundings, (state, self.springs.rest()), forces, span) {
             return false;
         }
@@ -160,7 +164,7 @@ impl Predictive {
                 self.take_present(resync);
                 return false;
             }
-            stepping.tick(resync.tool.motion(n, stepping.tick), |tool, _| {
+            stepping.tick(resync.tools[resync.index].motion(n, stepping.tick), |tool, _| {
                 self.take_near_forces();
                 let Self { path, state, ring_forces, surroundings, ring_positions: x, ring_velocities: v, .. } = self;
                 let forces = &self.forces[ring.clone()];
@@ -198,6 +202,9 @@ impl Predictive {
 
     fn take_near_forces(&mut self) {
         self.near.forces(&self.state.positions, &self.state.velocities, &mut self.forces);
+        for &(place, force) in &self.others {
+            self.forces[place] += force;
+        }
     }
 
     /// The patch one substep on, under the near forces and the tool's.
@@ -260,6 +267,9 @@ impl LocalModel for Predictive {
         for numbers in [&mut self.ring_positions, &mut self.ring_velocities, &mut self.ring_forces] {
             numbers.resize(3 * self.window.ring, 0.0);
         }
+        let beside = resync.global.exerted_beside(resync.index);
+        self.others.clear();
+        self.others.extend(beside.filter_map(|(node, force)| Some((self.window.movable(node)?, force))));
         self.take_present(&resync);
         self.predict(&mut resync);
         self.surroundings.rest(self.basis.as_ref().map_or(0, |basis| basis.answers().states()));

@@ -6,6 +6,7 @@ use super::fields::{first_difference, in_words};
 use super::report::{Compared, Difference};
 use crate::log::LogRecord;
 use crate::runtime::{Actor, Outcome, Record, RecordDrain, TickContext};
+use crate::scene::MAX_DEVICES;
 use crate::time::Nanos;
 
 /// The topics whose samples are computed, and whether the local group makes them.
@@ -31,6 +32,11 @@ fn place(record: &LogRecord) -> Option<usize> {
     }
 }
 
+/// The place of its device. A number that no scene has comes from a damaged log, and is compared with what is not there.
+fn device(record: &LogRecord) -> usize {
+    usize::from(record.device()).min(MAX_DEVICES - 1)
+}
+
 /// From when on samples of the log have no counterpart, for each side: the log goes on behind its first fault.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
@@ -44,7 +50,9 @@ pub(super) struct End {
 #[derive(Debug)]
 struct Topic {
     name: &'static str,
-    logged: Vec<LogRecord>,
+    /// By device: each makes its samples in the order of time.
+    logged: [Vec<LogRecord>; MAX_DEVICES],
+    followed: [usize; MAX_DEVICES],
     computed: u64,
     identical: u64,
     last: Option<Nanos>,
@@ -53,11 +61,14 @@ struct Topic {
 
 impl Topic {
     fn new(name: &'static str) -> Self {
-        Self { name, logged: Vec::new(), computed: 0, identical: 0, last: None, first: None }
+        let logged = std::array::from_fn(|_| Vec::new());
+        Self { name, logged, followed: [0; MAX_DEVICES], computed: 0, identical: 0, last: None, first: None }
     }
 
     fn compare(&mut self, computed: LogRecord) {
-        let logged = self.logged.get(self.computed as usize).copied();
+        let device = device(&computed);
+        let logged = self.logged[device].get(self.followed[device]).copied();
+        self.followed[device] += 1;
         self.computed += 1;
         self.last = Some(computed.time());
         match logged.map_or(Some("count"), |logged| first_difference(&logged, &computed)) {
@@ -75,16 +86,19 @@ impl Topic {
 
     /// Sums up. Logged samples that nothing was computed for are a difference, but from `end` on.
     fn finish(&mut self, end: Option<Nanos>) -> Compared {
-        let left = self.logged.get(self.computed as usize..).unwrap_or_default();
+        let left =
+            |(logged, &followed): (&'_ Vec<LogRecord>, &usize)| logged.get(followed..).unwrap_or_default().to_vec();
+        let left: Vec<LogRecord> = self.logged.iter().zip(&self.followed).flat_map(left).collect();
         let is_owed = |sample: &&LogRecord| end.is_none_or(|end| sample.time() < end);
         let owed = left.iter().filter(is_owed).count();
-        let (first_owed, left_out) = (left.iter().find(is_owed).copied(), left.len() - owed);
+        let first_owed = left.iter().filter(is_owed).min_by_key(|sample| sample.time()).copied();
+        let left_out = left.len() - owed;
         if first_owed.is_some() {
             self.note("count", first_owed, None);
         }
         Compared {
             topic: self.name,
-            logged: (self.logged.len() - left_out) as u64,
+            logged: (self.logged.iter().map(Vec::len).sum::<usize>() - left_out) as u64,
             computed: self.computed,
             identical: self.identical,
             left_out: left_out as u64,
@@ -104,13 +118,13 @@ impl Comparison {
     /// Adds a sample of the log, if it is one that a replay computes.
     pub(super) fn log(&self, record: &LogRecord) {
         if let Some(place) = place(record) {
-            self.topics()[place].logged.push(*record);
+            self.topics()[place].logged[device(record)].push(*record);
         }
     }
 
     /// Forces in the log before `time`.
     pub(super) fn forces_before(&self, time: Nanos) -> usize {
-        self.topics()[0].logged.iter().filter(|sample| sample.time() < time).count()
+        self.topics()[0].logged.iter().flatten().filter(|sample| sample.time() < time).count()
     }
 
     /// How each topic compares, and the earliest difference.

@@ -13,7 +13,7 @@ use crate::log::{
 };
 use crate::model::body::Block;
 use crate::runtime::{Recording, TickTiming};
-use crate::scene::Scene;
+use crate::scene::{MAX_DEVICES, Scene};
 use crate::time::Nanos;
 
 /// The rate group that is no part of what is repeated.
@@ -26,8 +26,8 @@ pub(super) struct Logged {
     pub(super) recording: Recording,
     /// True if it was written on threads.
     pub(super) in_real_time: bool,
-    pub(super) first: DeviceState,
-    pub(super) samples: Vec<ReplayedSample>,
+    /// Of each device its first state and its samples.
+    pub(super) tools: Vec<(DeviceState, Vec<ReplayedSample>)>,
     pub(super) comparison: Comparison,
     /// When the last release was due.
     pub(super) end: Nanos,
@@ -40,7 +40,8 @@ struct Gathered {
     environment: Option<Environment>,
     session: Option<String>,
     recording: Recording,
-    samples: Vec<ReplayedSample>,
+    /// By device.
+    samples: Vec<Vec<ReplayedSample>>,
     comparison: Comparison,
     stats: BTreeMap<u16, GroupStats>,
     timings: BTreeMap<u16, Vec<TickTiming>>,
@@ -114,7 +115,9 @@ impl Gathered {
             }
             LogRecord::Port(used) => self.recording.push_use(used),
             LogRecord::Tool(sample) => {
-                self.samples.push(ReplayedSample { time: sample.time, id: sample.id, state: state(sample) });
+                let device = usize::from(sample.device).min(MAX_DEVICES);
+                self.samples.resize_with(self.samples.len().max(device + 1), Vec::new);
+                self.samples[device].push(ReplayedSample { time: sample.time, id: sample.id, state: state(sample) });
             }
             LogRecord::Event(event) => self.push_event(TextEvent::describe(event, &format!("group {}", event.group))),
             computed => self.comparison.log(computed),
@@ -141,16 +144,26 @@ impl Gathered {
         })?;
         let scene = Scene::from_session_toml(&session, Environment::SESSION)
             .map_err(|error| refusal(format!("what was run cannot be read: {error}")))?;
-        let first = environment.first_tool.ok_or_else(|| refusal("it lacks the device's first state"))?;
+        let devices = scene.devices.len();
+        if environment.first_tools.len() != devices {
+            return Err(refusal("it lacks the device's first state"));
+        }
+        if self.samples.len() > devices {
+            return Err(refusal("it holds samples of a device that the scene does not have"));
+        }
+        self.samples.resize_with(devices, Vec::new);
         self.check_sums(&environment)?;
         let end = self.recording.end();
         // Ports are counted anew after a restart and releases half done: what is behind a fault is not repeated.
         let cut = self.cut(&environment)?;
         self.recording.check(|group| environment.group_name(group))?;
-        self.check_samples(&environment, &first)?;
+        for (samples, first) in self.samples.iter().zip(&environment.first_tools) {
+            self.check_samples(&environment, samples, first)?;
+        }
         let Self { recording, samples, comparison, .. } = self;
         let in_real_time = environment.execution != Execution::Virtual;
-        Ok(Logged { scene, recording, in_real_time, first: state(&first), samples, comparison, end, cut })
+        let tools = environment.first_tools.iter().map(state).zip(samples).collect();
+        Ok(Logged { scene, recording, in_real_time, tools, comparison, end, cut })
     }
 
     /// Leaves out what is behind the first fault.
@@ -167,7 +180,7 @@ impl Gathered {
             return Err(refusal(message));
         }
         self.recording = std::mem::take(&mut self.recording).before(time);
-        self.samples.retain(|sample| sample.time < time);
+        self.samples.iter_mut().for_each(|samples| samples.retain(|sample| sample.time < time));
         let fault = LoggedFault { restarted: self.restarted.is_some_and(|restarted| restarted >= time), ..fault };
         let is_virtual = environment.execution == Execution::Virtual;
         // Observers are not repeated.
@@ -215,10 +228,15 @@ impl Gathered {
     }
 
     /// Every release of the local group read the device.
-    fn check_samples(&self, environment: &Environment, first: &ToolSample) -> Result<(), Error> {
+    fn check_samples(
+        &self,
+        environment: &Environment,
+        samples: &[ReplayedSample],
+        first: &ToolSample,
+    ) -> Result<(), Error> {
         let local = environment.groups.iter().position(|group| group.name == "local");
         let local = local.ok_or_else(|| refusal("it has no rate group `local`, so it is no log of a session"))?;
-        let mut samples = self.samples.iter();
+        let mut samples = samples.iter();
         let mut last = ReplayedSample { time: Nanos::ZERO, id: 0, state: state(first) };
         for (tick, time) in self.recording.releases(local as u16) {
             match samples.next() {

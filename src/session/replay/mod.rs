@@ -14,10 +14,10 @@ use std::time::Duration;
 
 use super::Session;
 use super::prepare::{Parts, as_run, prepare};
-use crate::devices::{Capabilities, Replayed};
+use crate::devices::{Capabilities, Device, DeviceState, Replayed, ReplayedSample};
 use crate::error::{Error, ErrorKind};
 use crate::runtime::{Execution, Recording, RuntimeReport};
-use crate::scene::ModelChoice;
+use crate::scene::{DeviceSpec, ModelChoice};
 use crate::time::Nanos;
 use compare::End;
 use cut::Cut;
@@ -73,11 +73,12 @@ impl Replay {
         if parts.scene.local.model == ModelChoice::Auto {
             parts.scene.local.model = logged.scene.local.model;
         }
-        let capabilities = Capabilities {
-            max_force_n: max_force_n.unwrap_or(f64::INFINITY),
-            ..logged.scene.device.profile.capabilities()
+        let device = |(spec, (first, samples)): (&DeviceSpec, (DeviceState, Vec<ReplayedSample>))| {
+            let known = spec.profile.capabilities();
+            let capabilities = Capabilities { max_force_n: max_force_n.unwrap_or(known.max_force_n), ..known };
+            (spec.name.clone(), Box::new(Replayed::new(first, samples, capabilities)) as Box<dyn Device>)
         };
-        parts.device = Some(Box::new(Replayed::new(logged.first, logged.samples, capabilities)));
+        parts.devices = logged.scene.devices.iter().zip(logged.tools).map(device).collect();
         parts.is_replay = true;
         parts.execution = Execution::Virtual;
         // How far models reach ahead, and the bases that were wished for, are part of the recording.
