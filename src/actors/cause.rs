@@ -43,6 +43,8 @@ impl Cause {
             257 => "the device had no new state",
             258 => "the device is not ready",
             259 => "the device is disconnected",
+            260 => "the device has stopped for safety",
+            261 => "the device is in use by another program",
             300 => "the device reported numbers that are not finite",
             301 => "the local model's force is not finite, zero is commanded",
             302 => "the global model's state is not finite, it publishes nothing any more",
@@ -59,7 +61,13 @@ mod tests {
 
     #[test]
     fn every_cause_has_words() {
-        let faults = [DeviceFault::Stale, DeviceFault::NotReady, DeviceFault::Disconnected];
+        let faults = [
+            DeviceFault::Stale,
+            DeviceFault::NotReady,
+            DeviceFault::Disconnected,
+            DeviceFault::SafetyStop,
+            DeviceFault::Busy,
+        ];
         let others =
             [Cause::DeviceNotFinite, Cause::LocalNotFinite, Cause::GlobalNotFinite, Cause::SamplesLost, Cause::NoBasis];
         for cause in faults.map(Cause::Device).into_iter().chain(others) {

@@ -1,5 +1,7 @@
 //! Devices: what moves the tool and feels the force. One file per device; a program brings its own.
 
+#[cfg(feature = "haply")]
+pub mod haply;
 mod path_csv;
 mod replayed;
 mod scripted;
@@ -44,6 +46,10 @@ pub enum DeviceFault {
     NotReady,
     /// It is gone. A retry does not help until it is connected again.
     Disconnected,
+    /// It has stopped itself, or was stopped: a brake, a stall, something in its way. A retry helps once that is over.
+    SafetyStop,
+    /// Another program has it. A retry helps once that one lets go.
+    Busy,
 }
 
 impl DeviceFault {
@@ -53,6 +59,8 @@ impl DeviceFault {
             Self::Stale => 1,
             Self::NotReady => 2,
             Self::Disconnected => 3,
+            Self::SafetyStop => 4,
+            Self::Busy => 5,
         }
     }
 }
@@ -63,6 +71,8 @@ impl std::fmt::Display for DeviceFault {
             Self::Stale => "the device had no new state",
             Self::NotReady => "the device is not ready",
             Self::Disconnected => "the device is disconnected",
+            Self::SafetyStop => "the device has stopped for safety",
+            Self::Busy => "the device is in use by another program",
         })
     }
 }

@@ -1,0 +1,131 @@
+//! What the events channel has said about the device: may it exert a force now?
+//!
+//! | event | until |
+//! | --- | --- |
+//! | `ebrake_triggered` | `ebrake_released` |
+//! | `fod_stage_changed` up | `fod_stage_changed` down |
+//! | `device-disconnected` | `device-connected` |
+//! | `stall_detected`, `stability_ceiling`, `device-busy`, an unknown safety event | [`PAUSE`] without another one |
+//! | the channel itself is lost | it is back |
+//!
+//! A new connection to the service forgets all but the last two: a service that was started again has no brake to release.
+
+use super::protocol::Notice;
+use crate::devices::DeviceFault;
+use std::time::{Duration, Instant};
+
+/// How long the force stays away after an event that nothing takes back.
+pub(super) const PAUSE: Duration = Duration::from_secs(1);
+
+/// News for the tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum News {
+    /// Of the device.
+    Of(Notice),
+    /// The channel itself is lost: whatever happens now is not heard of.
+    ChannelLost,
+    /// It is back.
+    ChannelBack,
+}
+
+/// The state that the news have left.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Guard {
+    is_braked: bool,
+    is_guarded: bool,
+    is_gone: bool,
+    is_deaf: bool,
+    pause: Option<(Instant, DeviceFault)>,
+}
+
+impl Guard {
+    /// Takes one piece of news.
+    pub(super) fn take(&mut self, news: News, now: Instant) {
+        match news {
+            News::ChannelLost => self.is_deaf = true,
+            News::ChannelBack => self.is_deaf = false,
+            News::Of(Notice::EbrakeTriggered) => self.is_braked = true,
+            News::Of(Notice::EbrakeReleased) => self.is_braked = false,
+            News::Of(Notice::FodRaised) => self.is_guarded = true,
+            News::Of(Notice::FodLowered) => self.is_guarded = false,
+            News::Of(Notice::Disconnected) => self.is_gone = true,
+            News::Of(Notice::Connected) => self.is_gone = false,
+            News::Of(Notice::Stall | Notice::StabilityCeiling | Notice::UnknownSafety) => {
+                self.pause = Some((now + PAUSE, DeviceFault::SafetyStop));
+            }
+            News::Of(Notice::Busy) => self.pause = Some((now + PAUSE, DeviceFault::Busy)),
+        }
+    }
+
+    /// Forgets what another connection to the service was about.
+    pub(super) fn reconnected(&mut self) {
+        *self = Self { is_deaf: self.is_deaf, pause: self.pause, ..Self::default() };
+    }
+
+    /// Why there may be no force now.
+    pub(super) fn fault(&mut self, now: Instant) -> Option<DeviceFault> {
+        if self.pause.is_some_and(|(until, _)| now >= until) {
+            self.pause = None;
+        }
+        if self.is_gone {
+            Some(DeviceFault::Disconnected)
+        } else if self.is_braked || self.is_guarded || self.is_deaf {
+            Some(DeviceFault::SafetyStop)
+        } else {
+            self.pause.map(|(_, fault)| fault)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_event_stops_the_force_and_what_ends_it_lets_it_back() {
+        let now = Instant::now();
+        for (stop, end, fault) in [
+            (News::Of(Notice::EbrakeTriggered), News::Of(Notice::EbrakeReleased), DeviceFault::SafetyStop),
+            (News::Of(Notice::FodRaised), News::Of(Notice::FodLowered), DeviceFault::SafetyStop),
+            (News::Of(Notice::Disconnected), News::Of(Notice::Connected), DeviceFault::Disconnected),
+            (News::ChannelLost, News::ChannelBack, DeviceFault::SafetyStop),
+        ] {
+            let mut guard = Guard::default();
+            assert_eq!(guard.fault(now), None);
+            guard.take(stop, now);
+            assert_eq!(guard.fault(now + 100 * PAUSE), Some(fault), "{stop:?}");
+            guard.take(end, now);
+            assert_eq!(guard.fault(now), None, "{end:?}");
+        }
+    }
+
+    #[test]
+    fn what_nothing_takes_back_stops_the_force_for_a_while() {
+        let now = Instant::now();
+        for (notice, fault) in [
+            (Notice::Stall, DeviceFault::SafetyStop),
+            (Notice::StabilityCeiling, DeviceFault::SafetyStop),
+            (Notice::UnknownSafety, DeviceFault::SafetyStop),
+            (Notice::Busy, DeviceFault::Busy),
+        ] {
+            let mut guard = Guard::default();
+            guard.take(News::Of(notice), now);
+            guard.take(News::Of(notice), now + PAUSE / 2);
+            assert_eq!(guard.fault(now + PAUSE), Some(fault));
+            assert_eq!(guard.fault(now + 3 * PAUSE / 2), None);
+        }
+    }
+
+    #[test]
+    fn a_service_that_was_started_again_has_no_brake_to_release() {
+        let now = Instant::now();
+        let mut guard = Guard::default();
+        guard.take(News::Of(Notice::EbrakeTriggered), now);
+        guard.take(News::Of(Notice::Disconnected), now);
+        guard.reconnected();
+        assert_eq!(guard.fault(now), None);
+        guard.take(News::ChannelLost, now);
+        guard.reconnected();
+        assert_eq!(guard.fault(now), Some(DeviceFault::SafetyStop));
+    }
+}
