@@ -3,3 +3,6 @@
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 # The proof of the hot path must run here, not say why it could not.
 PALPATE_REQUIRE_SECCOMP=1 cargo test --locked
+# What only other features have.
+cargo test --locked --all-features --lib haply
+cargo test --locked --all-features --test haply

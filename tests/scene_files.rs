@@ -31,7 +31,7 @@ fn every_scene_loads_and_says_what_it_shows() {
     let names: Vec<_> = files.iter().map(|path| path.file_stem().unwrap().to_str().unwrap()).collect();
     assert_eq!(
         names,
-        ["demo", "drag_friction", "drag_slip", "drag_stick", "hand", "pull_release", "wave", "wave_probe"]
+        ["demo", "drag_friction", "drag_slip", "drag_stick", "hand", "haply", "pull_release", "wave", "wave_probe"]
     );
     for file in files {
         let scene = Scene::load(&file).unwrap();
@@ -69,7 +69,7 @@ fn the_demo_file_reads_as_it_is_written() {
 #[test]
 fn the_demo_file_documents_every_key() {
     let everything = "[body]\n[body.block]\nnodes = [2, 2, 2]\nsize_m = [1, 1, 1]\n[body.material]\nnode_mass_kg = 1\n\
-        stiffness_n_per_m = 1\ndamping_ratio = 1\n[contact]\n[global]\n[local]\n[device]\n[safety]\n[run]\n[initial]\n\
+        stiffness_n_per_m = 1\ndamping_ratio = 1\n[contact]\n[global]\n[local]\n[device]\n[device.haply]\nmax_force_n = 1\n[safety]\n[run]\n[initial]\n\
         pull = { node = [0, 0, 1], offset_m = [0, 0, 0] }\n[[probe]]\nnode = [0, 0, 0]\n";
     let demo = Scene::demo().source.unwrap();
     let words: Vec<&str> = demo.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).collect();
@@ -82,6 +82,7 @@ fn the_demo_file_documents_every_key() {
         "[global]",
         "[local]",
         "[device]",
+        "[device.haply]",
         "[safety]",
         "[run]",
         "[initial]",

@@ -6,7 +6,7 @@ use toml::de::DeTable;
 
 use super::fault::{Fault, plain_key};
 use super::locate::{exact_offset_of, line_of, offset_of, table_at};
-use super::{Scene, ToolPath, reader};
+use super::{DeviceKind, Scene, ToolPath, reader};
 use crate::error::{Error, ErrorKind};
 
 impl Scene {
@@ -104,7 +104,8 @@ impl Scene {
 
     /// A scene file must move its tool itself; a program may bring a device of its own.
     fn check_tool(&self) -> Result<(), Error> {
-        if self.device.path.is_none() && self.device.attach_node.is_none() {
+        let is_scripted = self.device.kind == DeviceKind::Scripted;
+        if is_scripted && self.device.path.is_none() && self.device.attach_node.is_none() {
             let message = "has no tool, give path_csv (a file t_s,x_m,y_m,z_m), attach_node or both";
             return Err(Error::scene("device", message));
         }

@@ -35,7 +35,7 @@ pub use contact::{ContactSpec, Friction};
 pub use crate::devices::ToolPath;
 pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
-pub use device::{DeviceKind, DeviceSpec, SafetySpec};
+pub use device::{DeviceKind, DeviceSpec, HaplySpec, SafetySpec};
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
 
 /// Everything a run needs to know.

@@ -2,8 +2,8 @@
 
 use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 use super::{
-    BlendKind, BlockSpec, BodySpec, DeviceSpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec,
-    LocalModelKind, LocalSpec, ModelChoice, SafetySpec, Scene, StepKind,
+    BlendKind, BlockSpec, BodySpec, DeviceKind, DeviceSpec, Equations, Face, Feedback, Friction, GlobalSpec, HaplySpec,
+    InitialSpec, LocalModelKind, LocalSpec, ModelChoice, SafetySpec, Scene, StepKind,
 };
 use crate::error::Error;
 use crate::time::Rate;
@@ -244,6 +244,38 @@ fn device(device: &DeviceSpec) -> Result<(), Error> {
     if device.path_csv.is_some() && device.path.is_none() {
         let message = "was not read, use Scene::load, or set device.path to a ToolPath";
         return Err(Error::scene("device.path_csv", message));
+    }
+    match (device.kind, &device.haply) {
+        (DeviceKind::Haply, Some(spec)) => haply(device, spec),
+        (DeviceKind::Haply, None) => {
+            let message = "is missing: a haply device needs the table [device.haply] with max_force_n";
+            Err(Error::scene("device.haply", message))
+        }
+        (DeviceKind::Scripted, Some(_)) => {
+            Err(Error::scene("device.haply", "needs kind = \"haply\", and the kind is \"scripted\""))
+        }
+        (DeviceKind::Scripted, None) => Ok(()),
+    }
+}
+
+/// Longer than any operator would wait to see that a cable is out (ms).
+const LONGEST_WATCHDOG_MS: f64 = 1000.0;
+
+fn haply(device: &DeviceSpec, spec: &HaplySpec) -> Result<(), Error> {
+    if device.path_csv.is_some() || device.path.is_some() {
+        let message = "belongs to a scripted tool, and a haply device is moved by a hand: leave it out";
+        return Err(Error::scene("device.path_csv", message));
+    }
+    if device.attach_node.is_some() {
+        let message = "glues a tool that starts at its node, and a hand starts anywhere: leave it out";
+        return Err(Error::scene("device.attach_node", message));
+    }
+    positive("device.haply.max_force_n", spec.max_force_n)?;
+    lengths_within("device.haply.origin_m", spec.origin_m, MAX_LENGTH_M)?;
+    positive("device.haply.watchdog_ms", spec.watchdog_ms)?;
+    if spec.watchdog_ms > LONGEST_WATCHDOG_MS {
+        let message = format!("is {}, must be at most {LONGEST_WATCHDOG_MS} ms", spec.watchdog_ms);
+        return Err(Error::scene("device.haply.watchdog_ms", message));
     }
     Ok(())
 }

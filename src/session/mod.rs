@@ -21,6 +21,7 @@ mod compare;
 mod disturbed;
 mod global;
 mod graph;
+mod hardware;
 mod prepare;
 mod rate_groups;
 #[cfg(all(feature = "log", feature = "scene"))]

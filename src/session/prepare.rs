@@ -7,6 +7,7 @@ use super::checks::{check_body, check_nodes, check_ramp};
 use super::choice::{Choice, choose};
 use super::disturbed::Disturbed;
 use super::graph::groups;
+use super::hardware::{haply, paced};
 use super::rate_groups::{check_group, global_group, local_group};
 use super::situation::Situation;
 use super::substeps::substeps;
@@ -24,7 +25,7 @@ use crate::runtime::{Execution, RateGroup, admit_here};
 use crate::safety::Limits;
 #[cfg(feature = "scene")]
 use crate::scene::ProbeSpec;
-use crate::scene::{BodySpec, Equations, Feedback, InitialSpec, ModelChoice, Scene, StepKind};
+use crate::scene::{BodySpec, DeviceKind, Equations, Feedback, InitialSpec, ModelChoice, Scene, StepKind};
 use crate::time::{Nanos, Rate};
 
 /// What a builder has collected.
@@ -175,7 +176,8 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let mut as_run = as_run(&scene, Some((attach, &probes)));
     let device = match parts.device {
         Some(device) => device,
-        None => scripted(scene.device.path, attach.map(|node| state.positions[node as usize]))?,
+        None if scene.device.kind == DeviceKind::Haply => haply(&scene, parts.execution)?,
+        None => scripted(scene.device.path.clone(), attach.map(|node| state.positions[node as usize]))?,
     };
     let exerts_force = device.exerts_force();
     let law = Law {
@@ -207,7 +209,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         .with_period(period_ticks);
     let template = if is_implicit { template.with_implicit_steps() } else { template };
     let global = global_group(parts.global, &scene.global, global_rate, parts.execution)?;
-    let local = local_group(parts.local, haptic, limits.ramp_s, exerts_force);
+    let local = paced(local_group(parts.local, haptic, limits.ramp_s, exerts_force), &scene.device, parts.execution);
     let [local, global] = match parts.execution {
         Execution::Virtual => [local, global],
         Execution::Threaded => {

@@ -143,6 +143,14 @@ impl MockService {
         locked(&self.world).counts
     }
 
+    /// Fails in this way with the next command, in place of what the options said.
+    ///
+    /// # Real-time
+    /// Not for a tick: may block.
+    pub fn fail(&self, kind: MockFaultKind) {
+        locked(&self.world).fail(kind);
+    }
+
     /// The forces that were commanded since the fault began (N), at most ten thousand.
     ///
     /// # Real-time
@@ -262,5 +270,55 @@ fn announce(stream: TcpStream, world: &Mutex<World>) {
                 return;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn service() -> (MockService, WebSocket) {
+        let service = MockService::start(MockOptions { port: 0, events_port: 0, ..MockOptions::default() }).unwrap();
+        let socket = WebSocket::connect(&service.address()).unwrap();
+        (service, socket)
+    }
+
+    fn exchange(socket: &mut WebSocket, message: &str) -> String {
+        socket.send(|out| out.extend_from_slice(message.as_bytes())).unwrap();
+        assert_eq!(socket.receive(), Ok(true), "{message}");
+        String::from_utf8(socket.message().to_vec()).unwrap()
+    }
+
+    const FORCE: &str =
+        r#"{"inverse3":[{"device_id":"049D","commands":{"set_cursor_force":{"vector":{"x":0,"y":1,"z":0}}}}]}"#;
+
+    #[test]
+    fn a_client_gets_one_inventory_and_then_one_state_for_each_message() {
+        let (service, mut socket) = service();
+        assert_eq!(socket.receive(), Ok(true));
+        assert!(socket.message().starts_with(b"{") && String::from_utf8_lossy(socket.message()).contains("\"config\""));
+        let state = exchange(&mut socket, FORCE);
+        assert!(state.contains("\"control_mode\":\"force\"") && !state.contains("\"config\""), "{state}");
+        // Check that nothing is pushed, and that what is no message has its reply and its event as well
+        socket.block_for(Duration::from_millis(50)).unwrap();
+        assert_eq!(socket.receive(), Ok(false));
+        exchange(&mut socket, "garbage");
+        exchange(&mut socket, r#"{"session":{"force_render_full_state":{}}}"#);
+        let counts = service.counts();
+        assert_eq!((counts.messages, counts.replies, counts.commands, counts.malformed), (3, 3, 1, 1));
+    }
+
+    #[test]
+    fn two_commands_in_one_frame_conflict_and_a_device_without_commands_goes_idle() {
+        let (service, mut socket) = service();
+        assert_eq!(socket.receive(), Ok(true));
+        let both = FORCE.replace("{\"set_c", "{\"set_cursor_position\":{},\"set_c");
+        exchange(&mut socket, &both);
+        assert_eq!((service.counts().conflicts, service.applied_n()), (1, [0.0; 3]));
+        exchange(&mut socket, FORCE);
+        sleep(Duration::from_millis(50));
+        let probe = r#"{"inverse3":[{"device_id":"049D","commands":{"probe_position":{}}}]}"#;
+        assert!(exchange(&mut socket, probe).contains("\"control_mode\":\"idle\""));
+        assert_eq!(service.applied_n(), [0.0; 3]);
     }
 }

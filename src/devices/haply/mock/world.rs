@@ -3,7 +3,7 @@
 use super::fault::{Event, MockFaultKind};
 use super::plant::Plant;
 use super::request::{Request, request};
-use super::{MockCounts, MockOptions};
+use super::{MockCounts, MockFault, MockOptions};
 use crossbeam_channel::Sender;
 use std::time::{Duration, Instant};
 
@@ -67,6 +67,14 @@ impl World {
     pub(super) fn applied_n(&mut self) -> [f64; 3] {
         self.go_on();
         self.plant.force_n()
+    }
+
+    /// Fails with the next command.
+    pub(super) fn fail(&mut self, kind: MockFaultKind) {
+        self.options.fault = Some(MockFault { kind, after: self.counts.commands });
+        (self.faulty, self.away_until, self.ends) = (None, None, None);
+        (self.is_braked, self.is_unplugged) = (false, false);
+        self.forces_n.clear();
     }
 
     /// Time goes on, and with it the plant and a fault that ends by itself.

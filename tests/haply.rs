@@ -1,0 +1,300 @@
+//! The Haply client against the mock service over loopback: pace, faults, safety events, and what it costs.
+
+use std::fmt::Write as _;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use palpate::ErrorKind;
+use palpate::devices::haply::mock::{MockFaultKind, MockOptions, MockService};
+use palpate::devices::haply::{Haply, HaplyCounts, HaplyOptions};
+use palpate::prelude::*;
+use palpate::runtime::{Actor, Execution, Outcome, RateGroup, Runtime, TickContext};
+use tracing::field::{Field, Visit};
+use tracing::{Event, Metadata, Subscriber, span};
+
+#[path = "hot_path_support/allocator.rs"]
+mod allocator;
+
+#[global_allocator]
+static GUARDED: allocator::Guarded = allocator::Guarded;
+
+const MS: Duration = Duration::from_millis(1);
+
+/// Longer than anything here takes on a machine that does other things too.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+fn service() -> MockService {
+    MockService::start(MockOptions { port: 0, events_port: 0, ..MockOptions::default() }).unwrap()
+}
+
+fn options(service: &MockService) -> HaplyOptions {
+    let (address, events_address) = (service.address(), Some(service.events_address()));
+    HaplyOptions { address, events_address, ..HaplyOptions::new(3.0) }
+}
+
+/// One tick, at least a millisecond long: reads, commands 1 N upwards. Gives what was sent, and why it was less.
+fn tick(device: &mut Haply) -> (f64, Option<DeviceFault>) {
+    std::thread::sleep(MS);
+    let _ = device.read(Nanos::ZERO);
+    let fault = device.write(Vec3::new(0.0, 0.0, 1.0)).err();
+    (device.commanded_n()[2], fault)
+}
+
+/// Ticks until `device` exerts the whole force.
+fn engage(device: &mut Haply) {
+    let begun = Instant::now();
+    while tick(device).0 < 0.999 {
+        assert!(begun.elapsed() < PATIENCE, "the force does not come: {:?}", device.counts());
+    }
+}
+
+/// What the crate has said to the program's log, a line per event.
+static SAID: Mutex<String> = Mutex::new(String::new());
+
+struct Listener;
+
+impl Subscriber for Listener {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        metadata.target().starts_with("palpate::devices::haply")
+    }
+    fn new_span(&self, _: &span::Attributes<'_>) -> span::Id {
+        span::Id::from_u64(1)
+    }
+    fn record(&self, _: &span::Id, _: &span::Record<'_>) {}
+    fn record_follows_from(&self, _: &span::Id, _: &span::Id) {}
+    fn event(&self, event: &Event<'_>) {
+        struct Text<'a>(&'a mut String);
+        impl Visit for Text<'_> {
+            fn record_debug(&mut self, _: &Field, value: &dyn std::fmt::Debug) {
+                let _ = writeln!(self.0, "{value:?}");
+            }
+        }
+        event.record(&mut Text(&mut SAID.lock().unwrap()));
+    }
+    fn enter(&self, _: &span::Id) {}
+    fn exit(&self, _: &span::Id) {}
+}
+
+/// Waits until the log says `text` about the service at `address`.
+fn hears(address: &str, text: &str) {
+    let begun = Instant::now();
+    let is_said = || SAID.lock().unwrap().lines().any(|line| line.contains(address) && line.contains(text));
+    while !is_said() {
+        assert!(begun.elapsed() < PATIENCE, "nobody says {text:?}: {}", SAID.lock().unwrap());
+        std::thread::sleep(MS);
+    }
+}
+
+/// A fault of the service: the force is zero within 3 ticks, the log says why, and the force comes back over a new connection.
+fn ends_in_zero_force_and_comes_back(kind: MockFaultKind, message: &str) {
+    let _ = tracing::subscriber::set_global_default(Listener);
+    let service = service();
+    let mut device = Haply::connect(options(&service)).unwrap();
+    engage(&mut device);
+    service.fail(kind);
+    let begun = device.counts().commands;
+    // The first tick with the fault is the one whose command is the first that is not answered as it should be.
+    let after: Vec<f64> = (0..20).map(|_| tick(&mut device).0).collect();
+    assert!(device.counts().commands > begun);
+    let zero_from = after.iter().rposition(|force| *force != 0.0).map_or(0, |last| last + 1);
+    assert!(zero_from <= 3, "{kind:?}: {after:?}");
+    // Check the same at the other end: after the command with which it began, the third is zero at the latest
+    let received = service.forces_since_fault_n();
+    assert!(received.iter().skip(2).all(|force| force[2] == 0.0), "{kind:?}: {received:?}");
+    if kind != MockFaultKind::Vanish {
+        assert!(!received.is_empty(), "{kind:?}");
+    }
+
+    hears(&service.address(), message);
+    engage(&mut device);
+    hears(&service.address(), "connected to the service at");
+    let counts = device.counts();
+    assert!(counts.reconnects >= 1 && counts.lost >= 1, "{kind:?}: {counts:?}");
+    let seen = service.counts();
+    assert_eq!((seen.conflicts, seen.malformed), (0, 0));
+    assert!(seen.connections >= 2 && seen.sessions >= 2, "each connection begins with its session: {seen:?}");
+}
+
+#[test]
+fn a_silent_service_ends_in_zero_force_within_three_ticks_and_is_connected_again() {
+    ends_in_zero_force_and_comes_back(MockFaultKind::Silent, "is too late with its replies, or silent");
+}
+
+#[test]
+fn a_slow_service_ends_in_zero_force_within_three_ticks_and_is_connected_again() {
+    ends_in_zero_force_and_comes_back(MockFaultKind::Slow, "is too late with its replies, or silent");
+}
+
+#[test]
+fn a_service_that_sends_garbage_ends_in_zero_force_within_three_ticks_and_is_connected_again() {
+    ends_in_zero_force_and_comes_back(MockFaultKind::Garbage, "sent something that is no state");
+}
+
+#[test]
+fn a_service_that_vanishes_ends_in_zero_force_within_three_ticks_and_is_connected_again() {
+    ends_in_zero_force_and_comes_back(MockFaultKind::Vanish, "closed the connection");
+}
+
+#[test]
+fn every_safety_event_stops_the_force_and_its_end_lets_it_back() {
+    let service = service();
+    let mut device = Haply::connect(options(&service)).unwrap();
+    for (kind, expected) in [
+        (MockFaultKind::Ebrake, DeviceFault::SafetyStop),
+        (MockFaultKind::Fod, DeviceFault::SafetyStop),
+        (MockFaultKind::Stall, DeviceFault::SafetyStop),
+        (MockFaultKind::Ceiling, DeviceFault::SafetyStop),
+        (MockFaultKind::Unknown, DeviceFault::SafetyStop),
+        (MockFaultKind::Unplug, DeviceFault::Disconnected),
+        (MockFaultKind::Busy, DeviceFault::Busy),
+    ] {
+        engage(&mut device);
+        service.fail(kind);
+        let begun = Instant::now();
+        loop {
+            let (force, fault) = tick(&mut device);
+            if fault == Some(expected) {
+                // Check that the tick that knows of it commands nothing
+                assert_eq!(force, 0.0, "{kind:?}");
+                break;
+            }
+            assert!(begun.elapsed() < PATIENCE, "{kind:?} is not heard of, {fault:?}");
+        }
+    }
+    engage(&mut device);
+    assert_eq!((device.counts().reconnects, service.counts().connections), (0, 1));
+}
+
+#[test]
+fn no_force_that_is_not_finite_or_above_the_limit_reaches_the_service() {
+    let service = service();
+    let mut device = Haply::connect(options(&service)).unwrap();
+    engage(&mut device);
+    service.fail(MockFaultKind::Stall);
+    for bad in [f64::NAN, f64::INFINITY, 1e300, -4.0] {
+        std::thread::sleep(MS);
+        let _ = device.read(Nanos::ZERO);
+        let _ = device.write(Vec3::new(bad, 0.0, 0.0));
+        assert!(device.commanded_n()[0].abs() <= 3.0, "{bad}: {:?}", device.commanded_n());
+    }
+    std::thread::sleep(50 * MS);
+    assert_eq!(service.counts().malformed, 0);
+    assert!(service.forces_since_fault_n().iter().flatten().all(|c| c.abs() <= 3.0));
+}
+
+/// The device as an actor that counts.
+struct Counting {
+    device: Haply,
+    counts: Arc<Mutex<HaplyCounts>>,
+}
+
+impl Actor for Counting {
+    fn name(&self) -> &str {
+        "counting"
+    }
+    fn wait(&mut self, timeout: Nanos) -> bool {
+        self.device.wait(timeout.to_duration())
+    }
+    fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        let _ = self.device.read(ctx.scheduled);
+        match self.device.write(Vec3::new(0.0, 0.0, 1.0)) {
+            Ok(()) => Outcome::Continue,
+            Err(fault) => Outcome::Degraded(fault.code()),
+        }
+    }
+    fn stop(&mut self, _: &TickContext) {
+        *self.counts.lock().unwrap() = self.device.counts();
+    }
+}
+
+#[test]
+fn five_seconds_at_1_khz_lose_no_command() {
+    let service = service();
+    let counts: Arc<Mutex<HaplyCounts>> = Arc::default();
+    let actor = Counting { device: Haply::connect(options(&service)).unwrap(), counts: Arc::clone(&counts) };
+    let group = RateGroup::hz(1000).name("haptic").realtime(80).device_paced(Nanos(3_000_000));
+    let graph =
+        Runtime::builder(Execution::Threaded).group(group, vec![Box::new(actor)]).until(Nanos(5_000_000_000)).build();
+    let running = graph.unwrap().start().unwrap();
+    running.wait_for(PATIENCE);
+    let report = running.stop();
+    let (counts, group) = (*counts.lock().unwrap(), &report.groups[0]);
+    println!("{report}\n{counts:?}\n{:?}", service.counts());
+    assert_eq!((report.fault, group.elapsed_periods), (None, 5001));
+    // Check that every command was answered but those under way at the end, on the first connection
+    assert_eq!((counts.lost, counts.reconnects), (0, 0));
+    assert!(counts.commands - counts.replies <= 4, "{counts:?}");
+    // Check that there is one command per release, and one more only where a reply was missing or none was under way
+    assert!(counts.commands >= group.released, "{counts:?}");
+    assert!(counts.commands <= group.released + counts.stale + group.skipped + 2, "{counts:?} {report}");
+    let seen = service.counts();
+    assert_eq!((seen.conflicts, seen.malformed, seen.replies), (0, 0, seen.messages));
+}
+
+#[test]
+fn a_tick_allocates_nothing() {
+    let service = service();
+    let mut device = Haply::connect(options(&service)).unwrap();
+    engage(&mut device);
+    let replies = device.counts().replies;
+    allocator::arm();
+    for _ in 0..500 {
+        let _ = device.wait(20 * MS);
+        let _ = device.read(Nanos::ZERO);
+        let _ = device.write(Vec3::new(0.1, 0.0, 0.5));
+    }
+    allocator::disarm();
+    assert!(device.counts().replies > replies + 100, "{:?}", device.counts());
+}
+
+#[test]
+fn what_cannot_be_connected_to_is_said_in_one_line() {
+    let error = |options: HaplyOptions| {
+        let error = Haply::connect(options).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Device);
+        let text = error.to_string();
+        assert!(text.starts_with("haply: ") && !text.contains('\n'), "{text}");
+        text
+    };
+    let service = service();
+    let nobody = HaplyOptions { address: "127.0.0.1:1".to_owned(), ..options(&service) };
+    assert!(error(nobody).contains("the service at 127.0.0.1:1 does not answer"));
+    let no_events = HaplyOptions { events_address: Some("127.0.0.1:1".to_owned()), ..options(&service) };
+    assert!(error(no_events).contains("the events channel at 127.0.0.1:1 does not answer"));
+    let other = HaplyOptions { device_id: Some("FFFF".to_owned()), ..options(&service) };
+    assert!(error(other).contains("has no device \"FFFF\", it has [\"049D\"]"));
+    let escape = HaplyOptions { profile: "a\"b".to_owned(), ..options(&service) };
+    assert!(error(escape).contains("profile is"));
+    assert!(error(HaplyOptions { max_force_n: f64::NAN, ..options(&service) }).contains("max_force_n is NaN"));
+}
+
+#[test]
+fn a_session_is_released_by_the_service_and_feels_the_block() {
+    let service = service();
+    let origin_m = Vec3::new(0.05, 0.15, -0.045);
+    let device = Haply::connect(HaplyOptions { origin_m, ..options(&service) }).unwrap();
+    let body = Block::builder([8; 3], [0.1; 3]).build().unwrap();
+    let session = Session::builder(body)
+        .device(device)
+        .model(palpate::scene::LocalModelKind::Patch)
+        .local(RateGroup::hz(1000).realtime(80).device_paced(Nanos(3_000_000)))
+        .duration_s(3.0)
+        .keep_records()
+        .build()
+        .unwrap();
+    let summary = session.run().unwrap();
+    let forces: Vec<f64> = summary
+        .records
+        .iter()
+        .filter_map(|record| match record {
+            palpate::log::LogRecord::Command(sample) => Some(sample.force_n[2]),
+            _ => None,
+        })
+        .collect();
+    // The mock's hand is down to 1.5 cm below the top after 2 s: the block pushes it up.
+    assert!(forces.iter().copied().fold(0.0, f64::max) > 0.05, "{summary}");
+    let seen = service.counts();
+    assert!(seen.commands > 500 && seen.conflicts == 0 && seen.malformed == 0, "{seen:?}");
+    // Check that the session's last word was zero
+    assert_eq!(service.applied_n(), [0.0; 3]);
+}
