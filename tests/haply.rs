@@ -1,7 +1,7 @@
 //! The Haply client against the mock service over loopback: pace, faults, safety events, and what it costs.
 
 use std::fmt::Write as _;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use palpate::ErrorKind;
@@ -51,6 +51,11 @@ fn engage(device: &mut Haply) {
 /// What the crate has said to the program's log, a line per event.
 static SAID: Mutex<String> = Mutex::new(String::new());
 
+fn said() -> MutexGuard<'static, String> {
+    // A test that fails while it holds the text has not harmed it.
+    SAID.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 struct Listener;
 
 impl Subscriber for Listener {
@@ -69,7 +74,7 @@ impl Subscriber for Listener {
                 let _ = writeln!(self.0, "{value:?}");
             }
         }
-        event.record(&mut Text(&mut SAID.lock().unwrap()));
+        event.record(&mut Text(&mut said()));
     }
     fn enter(&self, _: &span::Id) {}
     fn exit(&self, _: &span::Id) {}
@@ -78,9 +83,9 @@ impl Subscriber for Listener {
 /// Waits until the log says `text` about the service at `address`.
 fn hears(address: &str, text: &str) {
     let begun = Instant::now();
-    let is_said = || SAID.lock().unwrap().lines().any(|line| line.contains(address) && line.contains(text));
+    let is_said = || said().lines().any(|line| line.contains(address) && line.contains(text));
     while !is_said() {
-        assert!(begun.elapsed() < PATIENCE, "nobody says {text:?}: {}", SAID.lock().unwrap());
+        assert!(begun.elapsed() < PATIENCE, "nobody says {text:?} of {address}: {}", said());
         std::thread::sleep(MS);
     }
 }
@@ -92,10 +97,8 @@ fn ends_in_zero_force_and_comes_back(kind: MockFaultKind, message: &str) {
     let mut device = Haply::connect(options(&service)).unwrap();
     engage(&mut device);
     service.fail(kind);
-    let begun = device.counts().commands;
-    // The first tick with the fault is the one whose command is the first that is not answered as it should be.
+    // It begins with the next command that the service reads: at the latest with that of the first of these ticks.
     let after: Vec<f64> = (0..20).map(|_| tick(&mut device).0).collect();
-    assert!(device.counts().commands > begun);
     let zero_from = after.iter().rposition(|force| *force != 0.0).map_or(0, |last| last + 1);
     assert!(zero_from <= 3, "{kind:?}: {after:?}");
     // Check the same at the other end: after the command with which it began, the third is zero at the latest
@@ -105,11 +108,12 @@ fn ends_in_zero_force_and_comes_back(kind: MockFaultKind, message: &str) {
         assert!(!received.is_empty(), "{kind:?}");
     }
 
-    hears(&service.address(), message);
     engage(&mut device);
+    hears(&service.address(), message);
     hears(&service.address(), "connected to the service at");
     let counts = device.counts();
-    assert!(counts.reconnects >= 1 && counts.lost >= 1, "{kind:?}: {counts:?}");
+    assert!(counts.reconnects >= 1, "{kind:?}: {counts:?}");
+    assert!(kind != MockFaultKind::Silent || counts.lost >= 1, "{kind:?}: {counts:?}");
     let seen = service.counts();
     assert_eq!((seen.conflicts, seen.malformed), (0, 0));
     assert!(seen.connections >= 2 && seen.sessions >= 2, "each connection begins with its session: {seen:?}");
@@ -220,7 +224,7 @@ fn five_seconds_at_1_khz_lose_no_command() {
     let report = running.stop();
     let (counts, group) = (*counts.lock().unwrap(), &report.groups[0]);
     println!("{report}\n{counts:?}\n{:?}", service.counts());
-    assert_eq!((report.fault, group.elapsed_periods), (None, 5001));
+    assert_eq!((&report.fault, group.elapsed_periods), (&None, 5001));
     // Check that every command was answered but those under way at the end, on the first connection
     assert_eq!((counts.lost, counts.reconnects), (0, 0));
     assert!(counts.commands - counts.replies <= 4, "{counts:?}");

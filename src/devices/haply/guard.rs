@@ -8,7 +8,8 @@
 //! | `stall_detected`, `stability_ceiling`, `device-busy`, an unknown safety event | [`PAUSE`] without another one |
 //! | the channel itself is lost | it is back |
 //!
-//! A new connection to the service forgets all but the last two: a service that was started again has no brake to release.
+//! What was latched is forgotten when both channels were connected again since: a service that was started again has no brake to
+//! release. One of them alone says nothing about the brake.
 
 use super::protocol::Notice;
 use crate::devices::DeviceFault;
@@ -35,15 +36,24 @@ pub(super) struct Guard {
     is_guarded: bool,
     is_gone: bool,
     is_deaf: bool,
+    /// Since the last event that latched something: simulation channel and events channel are new.
+    renewed: [bool; 2],
     pause: Option<(Instant, DeviceFault)>,
 }
 
 impl Guard {
     /// Takes one piece of news.
     pub(super) fn take(&mut self, news: News, now: Instant) {
+        if matches!(news, News::Of(Notice::EbrakeTriggered | Notice::FodRaised | Notice::Disconnected)) {
+            self.renewed = [false; 2];
+        }
         match news {
             News::ChannelLost => self.is_deaf = true,
-            News::ChannelBack => self.is_deaf = false,
+            News::ChannelBack => {
+                self.is_deaf = false;
+                self.renewed[1] = true;
+                self.forget_another_service();
+            }
             News::Of(Notice::EbrakeTriggered) => self.is_braked = true,
             News::Of(Notice::EbrakeReleased) => self.is_braked = false,
             News::Of(Notice::FodRaised) => self.is_guarded = true,
@@ -57,9 +67,16 @@ impl Guard {
         }
     }
 
-    /// Forgets what another connection to the service was about.
+    /// The simulation channel is connected again.
     pub(super) fn reconnected(&mut self) {
-        *self = Self { is_deaf: self.is_deaf, pause: self.pause, ..Self::default() };
+        self.renewed[0] = true;
+        self.forget_another_service();
+    }
+
+    fn forget_another_service(&mut self) {
+        if self.renewed == [true; 2] {
+            (self.is_braked, self.is_guarded, self.is_gone) = (false, false, false);
+        }
     }
 
     /// Why there may be no force now.
@@ -122,10 +139,16 @@ mod tests {
         let mut guard = Guard::default();
         guard.take(News::Of(Notice::EbrakeTriggered), now);
         guard.take(News::Of(Notice::Disconnected), now);
+        // Check that one new connection alone, before or after, does not release a brake
         guard.reconnected();
-        assert_eq!(guard.fault(now), None);
+        assert_eq!(guard.fault(now), Some(DeviceFault::Disconnected));
         guard.take(News::ChannelLost, now);
+        guard.take(News::ChannelBack, now);
+        assert_eq!(guard.fault(now), None);
+        guard.take(News::Of(Notice::EbrakeTriggered), now);
         guard.reconnected();
         assert_eq!(guard.fault(now), Some(DeviceFault::SafetyStop));
+        guard.take(News::ChannelBack, now);
+        assert_eq!(guard.fault(now), None);
     }
 }

@@ -5,8 +5,11 @@
 
 use std::time::{Duration, Instant};
 
-/// Commands without a reply at most: one more per missed tick, and the zero that says that it is over.
-pub(super) const MOST_WAITING: usize = 4;
+/// Commands without a reply at most, one more per missed tick.
+const MOST_WAITING: usize = 4;
+
+/// One more for the zero that says that it is over.
+const SLOTS: usize = MOST_WAITING + 1;
 
 /// Ticks that a reply may take. Half a tick more than two, so that a look which is itself a little early or late does not decide.
 const LATE_TICKS: f64 = 2.5;
@@ -28,11 +31,13 @@ const TOO_MANY_LATE: u32 = 50;
 pub(super) struct Pulse {
     late: Duration,
     /// When the commands without a reply were sent, oldest first.
-    sent: [Option<Instant>; MOST_WAITING],
+    sent: [Option<Instant>; SLOTS],
     in_time: u32,
     late_replies: u32,
-    /// The oldest command's reply is missing for too long.
+    /// A reply was missing for too long, and that has not been made up for.
     is_stale: bool,
+    /// The reply to the oldest command is missing for too long.
+    is_oldest_late: bool,
     /// When the force was asked for last, while it is allowed.
     ramped: Option<Instant>,
     gain: f64,
@@ -43,10 +48,11 @@ impl Pulse {
     pub(super) fn new(period: Duration) -> Self {
         Self {
             late: period.mul_f64(LATE_TICKS),
-            sent: [None; MOST_WAITING],
+            sent: [None; SLOTS],
             in_time: 0,
             late_replies: 0,
             is_stale: false,
+            is_oldest_late: false,
             ramped: None,
             gain: 0.0,
             round_trip: None,
@@ -76,11 +82,10 @@ impl Pulse {
             return;
         };
         self.sent.rotate_left(1);
-        self.sent[MOST_WAITING - 1] = None;
-        let round_trip = now.saturating_duration_since(sent);
-        self.round_trip = Some(round_trip);
-        // A late look at a reply that came in time is no fault of the service.
-        if self.is_stale && round_trip > self.late {
+        self.sent[SLOTS - 1] = None;
+        self.round_trip = Some(now.saturating_duration_since(sent));
+        // Late is what a look has missed: a late look at a reply that came in time is no fault of the service.
+        if std::mem::take(&mut self.is_oldest_late) {
             self.in_time = 0;
             self.late_replies += 1;
             return;
@@ -99,6 +104,7 @@ impl Pulse {
         }
         let turns = is_late && !self.is_stale;
         self.is_stale |= is_late;
+        self.is_oldest_late = is_late;
         turns
     }
 
