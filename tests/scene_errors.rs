@@ -104,6 +104,9 @@ const CASES: &[Case] = &[
     case("patch = [4, 4, 2]", "step = \"euler\"", "scene.toml:21: local.step: ", &["\"auto\", \"explicit\" or \"implicit\""]),
     case("kind = \"scripted\"", "kind = \"phantom\"", "scene.toml:25: device.kind: ", &["\"scripted\""]),
     case("kind = \"mass_spring\"", "kind = 7", "scene.toml:2: body.kind: ", &["is 7", "\"mass_spring\""]),
+    case("kind = \"scripted\"", "kind = \"haply\"", "scene.toml:", &["device.haply", "max_force_n"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\nhaply = { max_force_n = 3 }", "scene.toml:26: device.haply: ", &["kind = \"haply\""]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\nhaply = { address = \"x\" }", "scene.toml:26: device.haply.max_force_n: ", &["missing"]),
     // TOML itself.
     case("nodes = [12, 12, 12]", "nodes = [12, 12, 12", "scene.toml:5: ", &["TOML syntax"]),
     case("rate_hz = 30", "rate_hz 30", "scene.toml:15: ", &["TOML syntax"]),

@@ -43,6 +43,14 @@ fn every_scene_loads_and_says_what_it_shows() {
 }
 
 #[test]
+#[cfg(not(feature = "haply"))]
+fn a_device_that_this_build_lacks_is_refused_with_the_feature_that_has_it() {
+    let error = palpate::Session::from_scene(load("haply")).build().unwrap_err();
+    let message = "device.kind: is \"haply\", which this build does not have: build it with `--features haply`";
+    assert_eq!(error.to_string(), message);
+}
+
+#[test]
 fn the_built_in_demo_is_the_demo_file() {
     assert_eq!(Scene::demo(), load("demo"));
 }
