@@ -166,7 +166,7 @@ fn every_safety_event_stops_the_force_and_its_end_lets_it_back() {
         }
     }
     engage(&mut device);
-    assert_eq!((device.counts().reconnects, service.counts().connections), (0, 1));
+    assert_eq!(service.counts().connections, device.counts().reconnects + 1);
 }
 
 #[test]
@@ -225,12 +225,15 @@ fn five_seconds_at_1_khz_lose_no_command() {
     let (counts, group) = (*counts.lock().unwrap(), &report.groups[0]);
     println!("{report}\n{counts:?}\n{:?}", service.counts());
     assert_eq!((&report.fault, group.elapsed_periods), (&None, 5001));
-    // Check that every command was answered but those under way at the end, on the first connection
-    assert_eq!((counts.lost, counts.reconnects), (0, 0));
+    // Check that every command was answered but those under way at the end
+    assert_eq!(counts.lost, 0);
     assert!(counts.commands - counts.replies <= 4, "{counts:?}");
     // Check that there is one command per release; only where a reply was missing there is a zero more, or none
     assert!(counts.stale > 0 || counts.commands >= group.released, "{counts:?}");
-    assert!(counts.commands <= group.released + counts.stale + group.skipped + 2, "{counts:?} {report}");
+    assert!(
+        counts.commands <= group.released + counts.stale + counts.reconnects + group.skipped + 2,
+        "{counts:?} {report}"
+    );
     let seen = service.counts();
     assert_eq!((seen.conflicts, seen.malformed, seen.replies), (0, 0, seen.messages));
 }
@@ -320,9 +323,11 @@ fn a_scene_names_the_service_and_its_device_releases_the_haptic_group() {
     let scene = scene(&service.address(), &service.events_address(), "").unwrap();
     let summary = Session::from_scene(scene).build().unwrap().run().unwrap();
     let local = &summary.runtime.groups[0];
-    assert_eq!((&summary.runtime.fault, local.elapsed_periods), (&None, 1001));
+    // One second, and the time in which the force goes to rest
+    assert!(summary.runtime.fault.is_none() && local.elapsed_periods >= 1001, "{summary}");
     let seen = service.counts();
-    assert_eq!((seen.connections, seen.sessions, seen.conflicts, seen.malformed), (1, 1, 0, 0));
+    assert_eq!((seen.conflicts, seen.malformed), (0, 0));
+    assert!(seen.sessions >= 1 && seen.sessions <= seen.connections, "{seen:?}");
     // Check that the service's replies released it: late replies are the only reason for less than one command each
     assert!(seen.commands > local.released / 2, "{seen:?} {summary}");
 }
