@@ -116,6 +116,9 @@ const CASES: &[Case] = &[
     case("[safety]", "[[device.fault]]\nkind = \"melted\"\nfrom_s = 1\nto_s = 2\n[safety]", "scene.toml:28: device.fault[0].kind: ", &["\"late\", \"lost\""]),
     case("[safety]", "[[device.fault]]\nkind = \"lost\"\nfrom_s = 1\nto_s = 2\nprobability = 2\n[safety]", "scene.toml:31: device.fault[0].probability: ", &["0 to 1"]),
     case("kind = \"mass_spring\"", "kind = 7", "scene.toml:2: body.kind: ", &["is 7", "\"mass_spring\""]),
+    case("kind = \"scripted\"", "kind = \"haply\"", "scene.toml:", &["device.haply", "max_force_n"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\nhaply = { max_force_n = 3 }", "scene.toml:26: device.haply: ", &["belongs to kind = \"haply\""]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\nhaply = { address = \"x\" }", "scene.toml:26: device.haply.max_force_n: ", &["missing"]),
     // TOML itself.
     case("nodes = [12, 12, 12]", "nodes = [12, 12, 12", "scene.toml:5: ", &["TOML syntax"]),
     case("rate_hz = 30", "rate_hz 30", "scene.toml:15: ", &["TOML syntax"]),

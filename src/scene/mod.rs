@@ -11,6 +11,7 @@ mod choice;
 mod contact;
 mod device;
 mod device_fault;
+mod haply;
 mod models;
 mod safety;
 mod validate;
@@ -40,6 +41,7 @@ pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub use device_fault::{FaultKind, FaultSpec};
+pub use haply::HaplySpec;
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
 pub use safety::{SafetySpec, SafetyStage};
 

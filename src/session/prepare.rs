@@ -8,6 +8,7 @@ use super::choice::{Choice, choose};
 use super::device;
 use super::disturbed::Disturbed;
 use super::graph::groups;
+use super::hardware::paced;
 use super::horizon::{horizon, lateness};
 use super::rate_groups::{check_group, global_group, local_group};
 use super::safety;
@@ -188,7 +189,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let mut as_run = as_run(&scene, Some((attach, &probes)));
     let device = match parts.device {
         Some(device) => device,
-        None => device::device(&scene.device, attach.map(|node| state.positions[node as usize]))?,
+        None => device::device(&scene, attach.map(|node| state.positions[node as usize]), parts.execution)?,
     };
     // What is executed again has met them already.
     let device = if parts.is_replay { device } else { device::with_faults(device, &scene.device) };
@@ -225,7 +226,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         .with_prediction(scene.local.prediction)
         .with_period(period_ticks);
     let template = if is_implicit { template.with_implicit_steps() } else { template };
-    let local = local_group(parts.local, haptic, limits.ramp_s, exerts_force);
+    let local = paced(local_group(parts.local, haptic, limits.ramp_s, exerts_force), &scene.device, parts.execution);
     let [local, global] = match parts.execution {
         Execution::Virtual => [local, global],
         Execution::Threaded => {
