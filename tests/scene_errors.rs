@@ -102,7 +102,7 @@ const CASES: &[Case] = &[
     case("feedback = \"geometry\"", "feedback = \"patch\"", "scene.toml:22: local.feedback: ", &["\"trajectory\", \"contact_nodes\" or \"geometry\""]),
     case("kind = \"crossfade\"", "kind = \"fade\"", "scene.toml:23: local.blend.kind: ", &["\"none\", \"crossfade\" or \"offset\""]),
     case("patch = [4, 4, 2]", "step = \"euler\"", "scene.toml:21: local.step: ", &["\"auto\", \"explicit\" or \"implicit\""]),
-    case("kind = \"scripted\"", "kind = \"phantom\"", "scene.toml:25: device.kind: ", &["\"scripted\", \"hand\" or \"replay\""]),
+    case("kind = \"scripted\"", "kind = \"phantom\"", "scene.toml:25: device.kind: ", &["\"scripted\", \"hand\", \"replay\" or \"haply\""]),
     case("kind = \"scripted\"", "kind = \"scripted\"\nplant = { mass_kg = 0.2 }", "scene.toml:26: device.plant: ", &["kind = \"hand\""]),
     case("kind = \"scripted\"", "kind = \"hand\"\nplant = { mass_kg = 0 }", "scene.toml:26: device.plant.mass_kg: ", &["is 0", "above 0"]),
     case("kind = \"scripted\"", "kind = \"hand\"\nplant = { axes = [\"w\"] }", "scene.toml:26: device.plant.axes[0]: ", &["\"x\", \"y\" or \"z\""]),
@@ -119,6 +119,8 @@ const CASES: &[Case] = &[
     case("kind = \"scripted\"", "kind = \"haply\"", "scene.toml:", &["device.haply", "max_force_n"]),
     case("kind = \"scripted\"", "kind = \"scripted\"\nhaply = { max_force_n = 3 }", "scene.toml:26: device.haply: ", &["belongs to kind = \"haply\""]),
     case("kind = \"scripted\"", "kind = \"scripted\"\nhaply = { address = \"x\" }", "scene.toml:26: device.haply.max_force_n: ", &["missing"]),
+    case("kind = \"scripted\"", "kind = \"haply\"\nhaply = { max_force_n = 3 }", "scene.toml:27: device.attach_node: ", &["glues a tool"]),
+    case("kind = \"scripted\"\nattach_node = [5, 5, 11]", "kind = \"haply\"\nprofile = \"touch\"\nhaply = { max_force_n = 3 }", "scene.toml:26: device.profile: ", &["simulated device"]),
     // TOML itself.
     case("nodes = [12, 12, 12]", "nodes = [12, 12, 12", "scene.toml:5: ", &["TOML syntax"]),
     case("rate_hz = 30", "rate_hz 30", "scene.toml:15: ", &["TOML syntax"]),
