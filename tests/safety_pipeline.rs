@@ -73,7 +73,7 @@ impl Law {
             Self::Spring(k) => tool.position.map(|c| -k * c),
             Self::Active(k, b) => std::array::from_fn(|i| -k * tool.position[i] + b * tool.velocity[i]),
             Self::Along(f) => tool.velocity.map(|c| f * c / norm(tool.velocity).max(1e-9)),
-            Self::Hold(k) if n % 33 == 0 => tool.position.map(|c| -k * c),
+            Self::Hold(k) if n.is_multiple_of(33) => tool.position.map(|c| -k * c),
             Self::Hold(_) => last,
             Self::Noise(f) => random.vector(f),
             Self::Constant(f) => f,
