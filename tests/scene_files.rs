@@ -39,6 +39,7 @@ fn every_scene_loads_and_says_what_it_shows() {
             "drag_stick",
             "hand",
             "hand_release",
+            "haply",
             "pull_release",
             "two_hands",
             "wave",
@@ -53,6 +54,14 @@ fn every_scene_loads_and_says_what_it_shows() {
         let model = if scene.devices.len() > 1 { LocalModelKind::Predictive } else { LocalModelKind::Patch };
         assert_eq!(scene.local.model, model.into(), "{}", file.display());
     }
+}
+
+#[test]
+#[cfg(not(feature = "haply"))]
+fn a_device_that_this_build_lacks_is_refused_with_the_feature_that_has_it() {
+    let error = palpate::Session::from_scene(load("haply")).build().unwrap_err();
+    let message = "device.kind: is \"haply\", which this build does not have: build it with `--features haply`";
+    assert_eq!(error.to_string(), message);
 }
 
 #[test]
@@ -82,7 +91,7 @@ fn the_demo_file_reads_as_it_is_written() {
 #[test]
 fn the_demo_file_documents_every_key() {
     let everything = "[body]\n[body.block]\nnodes = [2, 2, 2]\nsize_m = [1, 1, 1]\n[body.material]\nnode_mass_kg = 1\n\
-        stiffness_n_per_m = 1\ndamping_ratio = 1\n[contact]\n[global]\n[local]\n[device]\n[device.plant]\n[device.hand]\n[[device.fault]]\nkind = \"late\"\nfrom_s = 1\nto_s = 2\n[safety]\n[run]\n[initial]\n\
+        stiffness_n_per_m = 1\ndamping_ratio = 1\n[contact]\n[global]\n[local]\n[device]\n[device.plant]\n[device.hand]\n[device.haply]\nmax_force_n = 1\n[[device.fault]]\nkind = \"late\"\nfrom_s = 1\nto_s = 2\n[safety]\n[run]\n[initial]\n\
         pull = { node = [0, 0, 1], offset_m = [0, 0, 0] }\n[[probe]]\nnode = [0, 0, 0]\n";
     let demo = Scene::demo().source.unwrap();
     let words: Vec<&str> = demo.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).collect();
@@ -97,6 +106,7 @@ fn the_demo_file_documents_every_key() {
         "[device]",
         "[device.plant]",
         "[device.hand]",
+        "[device.haply]",
         "[[device.fault]]",
         "[safety]",
         "[run]",

@@ -25,13 +25,26 @@ impl Interrupt {
 /// # Errors
 /// If the system refuses the handler.
 pub fn stops(running: &Running) -> Result<Interrupt, Error> {
-    static CAME: OnceLock<()> = OnceLock::new();
     let stop = running.stop_handle();
+    on_interrupt(move || stop.request())
+}
+
+/// Notes Ctrl-C for a command that looks whether it came; a second one ends the command at once.
+///
+/// # Errors
+/// If the system refuses the handler.
+#[cfg(feature = "haply")]
+pub fn waits() -> Result<Interrupt, Error> {
+    on_interrupt(|| {})
+}
+
+fn on_interrupt(act: impl Fn() + Send + 'static) -> Result<Interrupt, Error> {
+    static CAME: OnceLock<()> = OnceLock::new();
     let handler = move || {
         if CAME.set(()).is_err() {
             std::process::exit(EXIT_CODE.into());
         }
-        stop.request();
+        act();
     };
     ctrlc::set_handler(handler)
         .map_err(|error| Error::new(ErrorKind::Runtime, format!("no handler for Ctrl-C: {error}")))?;

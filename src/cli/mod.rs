@@ -5,6 +5,7 @@
 
 pub mod compare;
 pub mod export;
+pub mod mock;
 pub mod replay;
 pub mod run;
 pub mod timing;
@@ -44,6 +45,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Write one topic of a log as a table
     Export(export::ExportArgs),
+    /// Be a device's service without the device, to try a scene against it
+    Mock(mock::MockArgs),
 }
 
 /// Parses the command line, runs it and says how it ended.
@@ -67,6 +70,7 @@ pub fn main() -> ExitCode {
             Some(Command::Timing(args)) => timing::run(&args),
             Some(Command::Export(args)) => export::run(&args),
             Some(Command::Replay(args)) => replay::run(&args),
+            Some(Command::Mock(args)) => mock::run(&args),
         },
         Err(error) if error.use_stderr() => Err(usage_error(&error)),
         Err(help) => return print_help(&help),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{FaultSpec, ToolPath};
+use super::{FaultSpec, HaplySpec, ToolPath};
 use crate::devices::{Capabilities, HandSpec, PlantSpec};
 
 /// What moves the tool.
@@ -31,6 +31,9 @@ pub struct DeviceSpec {
     /// How it fails, and when.
     #[cfg_attr(feature = "scene", serde(rename = "fault", skip_serializing_if = "is_default"))]
     pub faults: Vec<FaultSpec>,
+    /// The service of a `haply` device.
+    #[cfg_attr(feature = "scene", serde(skip_serializing_if = "Option::is_none"))]
+    pub haply: Option<HaplySpec>,
     /// The path itself: read from `path_csv`, or given by a program.
     #[cfg_attr(feature = "scene", serde(skip))]
     pub path: Option<ToolPath>,
@@ -53,6 +56,8 @@ pub enum DeviceKind {
     Hand,
     /// A tool that moves as in a log and ignores the force.
     Replay,
+    /// An Inverse3 behind the Haply Inverse service; needs feature `haply`.
+    Haply,
 }
 
 /// The devices whose limits are known; see [`Capabilities`].

@@ -12,6 +12,7 @@ mod contact;
 mod device;
 mod device_fault;
 mod devices;
+mod haply;
 mod models;
 mod safety;
 mod validate;
@@ -42,6 +43,7 @@ pub use crate::model::mesh::Face;
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub use device_fault::{FaultKind, FaultSpec};
 pub(crate) use devices::{MAX_DEVICES, numbered};
+pub use haply::HaplySpec;
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
 pub use safety::{SafetySpec, SafetyStage};
 

@@ -1,6 +1,6 @@
 //! What can be wrong with the tool's part of a scene.
 
-use super::{DeviceKind, DeviceSpec, HandSpec, PlantSpec};
+use super::{DeviceKind, DeviceSpec, HandSpec, PlantSpec, haply};
 use crate::error::Error;
 
 pub(super) fn device(device: &DeviceSpec) -> Result<(), Error> {
@@ -31,6 +31,7 @@ pub(super) fn device(device: &DeviceSpec) -> Result<(), Error> {
     if let Some((field, message)) = device.hand.fault() {
         return Err(Error::scene(&format!("device.hand.{field}"), message));
     }
+    haply::validate(device)?;
     device.faults.iter().enumerate().try_for_each(|(index, fault)| fault.check(&format!("device.fault[{index}]")))
 }
 

@@ -3,6 +3,7 @@
 #[cfg(feature = "log")]
 use std::path::Path;
 
+use super::hardware::haply;
 use crate::devices::{Device, Faulty, Hand, Scripted, ToolPath};
 #[cfg(feature = "log")]
 use crate::devices::{DeviceState, Replayed, ReplayedSample};
@@ -10,13 +11,19 @@ use crate::error::{Error, ErrorKind};
 #[cfg(feature = "log")]
 use crate::log::{LogEntry, LogReader, LogRecord, ToolSample};
 use crate::model::Vec3;
+use crate::runtime::Execution;
 use crate::scene::{DeviceKind, DeviceSpec};
 
 /// A glued tool that starts farther from its node would tear it there in the first tick (m).
 const LARGEST_START_GAP: f64 = 1e-3;
 
-/// The device of `spec`; `glued_at` is where the node that the tool is glued to is at the start.
-pub(super) fn device(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dyn Device>, Error> {
+/// The device of `spec` for ticks of `tick` (s); `glued_at` is where the node that the tool is glued to is at the start.
+pub(super) fn device(
+    spec: &DeviceSpec,
+    tick: f64,
+    glued_at: Option<Vec3>,
+    execution: Execution,
+) -> Result<Box<dyn Device>, Error> {
     let capabilities = spec.profile.capabilities();
     match spec.kind {
         DeviceKind::Scripted => {
@@ -31,6 +38,7 @@ pub(super) fn device(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dy
             Ok(Box::new(Hand::new(path, spec.plant.clone(), spec.hand.clone(), capabilities)?))
         }
         DeviceKind::Replay => replayed(spec, glued_at),
+        DeviceKind::Haply => haply(spec, tick, execution),
     }
 }
 

@@ -22,6 +22,7 @@ mod device;
 mod disturbed;
 mod global;
 mod graph;
+mod hardware;
 mod horizon;
 mod prepare;
 mod rate_groups;

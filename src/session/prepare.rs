@@ -7,6 +7,7 @@ use super::checks::{check_body, check_model, check_nodes};
 use super::choice::{Choice, choose};
 use super::disturbed::Disturbed;
 use super::graph::groups;
+use super::hardware::paced;
 use super::horizon::{horizon, lateness};
 use super::rate_groups::{check_group, global_group, local_group};
 use super::situation::Situation;
@@ -192,7 +193,15 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         equations: scene.contact.equations,
     };
     let is_replay = parts.is_replay;
-    let making = Making { scene: &scene, body: &mut *body, state: &state, tick, attached: &attached, is_replay };
+    let making = Making {
+        scene: &scene,
+        body: &mut *body,
+        state: &state,
+        tick,
+        attached: &attached,
+        execution: parts.execution,
+        is_replay,
+    };
     let (tools, resolved) = tools(parts.devices, making)?;
     let safety_off = resolved.off.clone();
     #[cfg(feature = "scene")]
@@ -214,7 +223,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let template = if is_implicit { template.with_implicit_steps() } else { template };
     let ramp_s = tools.iter().map(|tool| tool.limits.ramp_s).fold(0.0, f64::max);
     let exerts_force = tools.iter().any(|tool| tool.device.exerts_force());
-    let local = local_group(parts.local, haptic, ramp_s, exerts_force);
+    let local = paced(local_group(parts.local, haptic, ramp_s, exerts_force), &scene.devices, parts.execution);
     let [local, global] = match parts.execution {
         Execution::Virtual => [local, global],
         Execution::Threaded => {

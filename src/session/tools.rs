@@ -7,6 +7,7 @@ use crate::devices::Device;
 use crate::error::Error;
 use crate::model::body::{Body, State};
 use crate::model::contact::Contact;
+use crate::runtime::Execution;
 use crate::safety::Limits;
 use crate::safety::coupling::Design;
 use crate::scene::{DeviceSpec, SafetySpec, Scene, numbered};
@@ -33,6 +34,7 @@ pub(super) struct Making<'a> {
     pub(super) tick: f64,
     /// The nodes that tools are glued to, one for each device.
     pub(super) attached: &'a [Option<u32>],
+    pub(super) execution: Execution,
     pub(super) is_replay: bool,
 }
 
@@ -57,7 +59,7 @@ pub(super) fn tools(
     brought: Vec<(Option<String>, Box<dyn Device>)>,
     making: Making<'_>,
 ) -> Result<(Vec<Tool>, SafetySpec), Error> {
-    let Making { scene, body, state, tick, attached, is_replay } = making;
+    let Making { scene, body, state, tick, attached, execution, is_replay } = making;
     // Both ledgers begin with a share of what is stored: together they give out no more than all of it.
     let stored_j = safety::stored_energy(body, state) / scene.devices.len() as f64;
     let mut brought = brought.into_iter();
@@ -66,7 +68,10 @@ pub(super) fn tools(
         let of_this = |error: Error| numbered(error, index, &scene.devices);
         let device = match brought.next() {
             Some((_, device)) => device,
-            None => device::device(spec, node.map(|node| state.positions[node as usize])).map_err(of_this)?,
+            None => {
+                let glued_at = node.map(|node| state.positions[node as usize]);
+                device::device(spec, tick, glued_at, execution).map_err(of_this)?
+            }
         };
         // What is executed again has met them already.
         let device = if is_replay { device } else { device::with_faults(device, spec) };

@@ -1,0 +1,131 @@
+//! The simulation channel's connection, made and made again by a thread of its own: a tick never waits for a connection.
+
+use super::protocol::{self, Reply};
+use super::websocket::{Broken, WebSocket};
+use crossbeam_channel::{Receiver, Sender, bounded};
+use std::time::Duration;
+use tracing::warn;
+
+/// Between two attempts to connect.
+const RETRY: Duration = Duration::from_millis(100);
+
+/// Why the tick gave a connection up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lost {
+    /// The socket said so.
+    Broken(Broken),
+    /// It sent something that is no state.
+    Garbage,
+    /// Its replies came late or not at all, for too long.
+    Silent,
+}
+
+impl std::fmt::Display for Lost {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Broken(broken) => broken.fmt(f),
+            Self::Garbage => f.write_str("sent something that is no state"),
+            Self::Silent => f.write_str("is too late with its replies, or silent"),
+        }
+    }
+}
+
+/// A connection with the state that it began with.
+#[derive(Debug)]
+pub(super) struct Link {
+    pub(super) socket: WebSocket,
+    pub(super) first: Reply,
+}
+
+/// The tick's side of the thread; it ends when this is dropped.
+#[derive(Debug)]
+pub(super) struct Links {
+    lost: Sender<(Lost, WebSocket)>,
+    made: Receiver<Link>,
+}
+
+/// Connects, reads the inventory and finds the device: the one of this id, or the first.
+///
+/// # Errors
+/// What went wrong, as the end of a sentence that begins with the service and its address.
+pub(super) fn connect(address: &str, wanted: Option<&str>) -> Result<(Link, String), String> {
+    let mut socket = WebSocket::connect(address).map_err(|error| format!("does not answer: {error}"))?;
+    let is_received = socket.receive().map_err(|broken| broken.to_string())?;
+    if !is_received {
+        return Err("sent no inventory within 2 s".to_owned());
+    }
+    let not_a_state = |_| "sent an inventory that cannot be read".to_owned();
+    let ids = protocol::device_ids(socket.message()).map_err(not_a_state)?;
+    let id = match wanted {
+        None => ids.first().cloned().ok_or("has no Inverse3")?,
+        Some(id) if ids.iter().any(|found| found == id) => id.to_owned(),
+        Some(id) => return Err(format!("has no device {id:?}, it has {ids:?}")),
+    };
+    let first = protocol::reply(socket.message(), &id).map_err(not_a_state)?;
+    socket.never_block().map_err(|error| error.to_string())?;
+    Ok((Link { socket, first }, id))
+}
+
+impl Links {
+    /// Starts the thread that connects to `address` again whenever it is told to; a second writer on each new connection
+    /// goes to `watch`.
+    pub(super) fn new(address: String, device: String, watch: Sender<WebSocket>) -> std::io::Result<Self> {
+        let (lost, losses) = bounded::<(Lost, WebSocket)>(1);
+        let (sender, made) = bounded(1);
+        std::thread::Builder::new().name("haply-link".to_owned()).spawn(move || {
+            // Ends with the tick's side: then there is nobody to lose a connection.
+            for (why, mut socket) in &losses {
+                warn!("haply: the service at {address} {why}: the force is zero, reconnecting");
+                // For every writer on it.
+                socket.close();
+                if !reconnect(&address, &device, &losses, &sender, &watch) {
+                    return;
+                }
+            }
+        })?;
+        Ok(Self { lost, made })
+    }
+
+    /// Hands over a connection that is of no use any more, and asks for another. Neither waits nor closes it.
+    pub(super) fn lose(&self, why: Lost, socket: WebSocket) {
+        // There is one connection, and the thread takes a loss before it makes the next one: there is room.
+        let _ = self.lost.try_send((why, socket));
+    }
+
+    /// The new connection, once it is there. Does not wait.
+    pub(super) fn take(&self) -> Option<Link> {
+        self.made.try_recv().ok()
+    }
+}
+
+/// Tries until it has a connection; false if nobody wants one any more.
+fn reconnect(
+    address: &str,
+    device: &str,
+    losses: &Receiver<(Lost, WebSocket)>,
+    sender: &Sender<Link>,
+    watch: &Sender<WebSocket>,
+) -> bool {
+    let mut last = String::new();
+    loop {
+        // Nothing is lost while there is nothing: what comes here is the end.
+        if losses.recv_timeout(RETRY).is_err_and(|error| error.is_disconnected()) {
+            return false;
+        }
+        let made = connect(address, Some(device)).and_then(|(link, _)| {
+            let second = link.socket.second().map_err(|error| error.to_string())?;
+            Ok((link, second))
+        });
+        match made {
+            Ok((link, second)) => {
+                warn!("haply: connected to the service at {address} again, device {device}");
+                return watch.send(second).is_ok() && sender.send(link).is_ok();
+            }
+            Err(why) if why != last => {
+                warn!("haply: the service at {address} {why}");
+                last = why;
+            }
+            Err(_) => {}
+        }
+    }
+}
