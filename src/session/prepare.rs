@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::budget::{self, nominal_evaluation};
-use super::checks::{check_body, check_nodes, check_ramp};
+use super::checks::{check_body, check_capabilities, check_nodes, check_ramp};
 use super::choice::{Choice, choose};
 use super::device;
 use super::disturbed::Disturbed;
@@ -203,6 +203,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let resolved = safety::resolved(&scene, &device_limits);
     let limits = safety::limits(&resolved, &device_limits, stored_j, tick);
     check_ramp(&limits)?;
+    check_capabilities(device.capabilities(), &limits)?;
     let coupling = match scene.local.coupling {
         true => Some(safety::coupling(&mut *body, attach, &device_limits, tick)?),
         false => None,
