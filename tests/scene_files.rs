@@ -41,7 +41,8 @@ fn every_scene_loads_and_says_what_it_shows() {
             "hand_release",
             "pull_release",
             "wave",
-            "wave_probe"
+            "wave_probe",
+            "z_width"
         ]
     );
     for file in files {

@@ -165,13 +165,13 @@ impl CoupledTool {
     /// Wait-free, real-time safe.
     pub fn lead(&mut self, device: [f64; 3], dt: f64) -> [f64; 3] {
         let Coupling { stiffness_n_per_m: k, damping_n_s_per_m: b } = self.gains;
-        for i in 0..3 {
-            let device_velocity = (device[i] - self.device[i]) / dt;
+        for (i, &place) in device.iter().enumerate() {
+            let device_velocity = (place - self.device[i]) / dt;
             let pushed = self.mass_kg * self.velocity[i]
-                + dt * (self.force[i] + k * (device[i] - self.tool[i]) + b * device_velocity);
+                + dt * (self.force[i] + k * (place - self.tool[i]) + b * device_velocity);
             self.velocity[i] = pushed / (self.mass_kg + dt * (b + k * dt));
             self.tool[i] += dt * self.velocity[i];
-            self.felt[i] = k * (self.tool[i] - device[i]) + b * (self.velocity[i] - device_velocity);
+            self.felt[i] = k * (self.tool[i] - place) + b * (self.velocity[i] - device_velocity);
         }
         self.device = device;
         self.tool
