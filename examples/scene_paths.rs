@@ -13,13 +13,14 @@ const SPACING_M: f64 = 0.1 / 11.0;
 type Formula = fn(f64) -> [f64; 3];
 
 /// Name, length (s) and formula of every path file.
-const PATHS: [(&str, f64, Formula); 7] = [
+const PATHS: [(&str, f64, Formula); 8] = [
     ("demo.csv", 5.0, demo),
     ("drag.csv", 2.5, drag),
     ("hand.csv", 0.8, hand),
     ("hand_release.csv", 0.4, hand_release),
     ("hold_right.csv", 2.5, hold_right),
     ("hover.csv", 0.0, hover),
+    ("press.csv", 0.4, press),
     ("pull_release.csv", 1.0, pull_release),
 ];
 
@@ -70,6 +71,11 @@ fn hold_right(t: f64) -> [f64; 3] {
 /// 1 cm above node [8, 5, 11], motionless.
 fn hover(_: f64) -> [f64; 3] {
     [8.0 * SPACING_M, 5.0 * SPACING_M, 0.11]
+}
+
+/// From 1 mm above node [3, 3, 5] of a block of 6 x 6 x 6 nodes to 10 mm below, where a hand wants to be that presses.
+fn press(t: f64) -> [f64; 3] {
+    [0.0603, 0.0602, 0.101 - 0.011 * min_jerk(t / 0.4)]
 }
 
 /// Node [5, 5, 11] pulled up 2 cm and let back.

@@ -186,3 +186,101 @@ mod logged {
         assert!(error.starts_with("device.log: is missing"), "{error}");
     }
 }
+
+/// The paper's Fig. 17: what the local models make of a device that gives way and is let go.
+mod hand_release {
+    use super::*;
+    use palpate::safety::Actions;
+    use palpate::scene::{SafetySpec, SafetyStage};
+
+    const RELEASE: usize = 1000;
+
+    struct Run {
+        /// Height of the tool at the end of each tick of the reference (m).
+        z: Vec<f64>,
+        /// Least of the passivity ledger (J).
+        least_j: f64,
+        summary: Summary,
+    }
+
+    fn of(scene: Scene, ticks: usize) -> Run {
+        let summary = run(scene);
+        assert_eq!(summary.runtime.fault, None);
+        let z = tools(&summary)[1..=ticks].iter().map(|tool| tool.z).collect();
+        Run { z, least_j: summary.report.devices[0].limits.energy.least_j, summary }
+    }
+
+    fn rms(values: impl Iterator<Item = f64> + Clone) -> f64 {
+        (values.clone().map(|value| value * value).sum::<f64>() / values.count() as f64).sqrt()
+    }
+
+    /// Largest less least of the ticks `range` (m).
+    fn span(z: &[f64], range: std::ops::Range<usize>) -> f64 {
+        let ends = |(low, high): (f64, f64), z: &f64| (low.min(*z), high.max(*z));
+        let (low, high) = z[range].iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+        high - low
+    }
+
+    #[test]
+    fn every_local_model_but_hold_stays_passive_and_predictive_is_near_the_reference() {
+        let rows = reference("hand_release");
+        let after = &rows[RELEASE..];
+        let mean = after.iter().map(|row| row[1]).sum::<f64>() / after.len() as f64;
+        let deviation = rms(after.iter().map(|row| row[1] - mean));
+        for model in LocalModelKind::ALL {
+            let Run { z, least_j, .. } = of(load("hand_release").with_model(model), rows.len());
+            let apart = rms(z[RELEASE..].iter().zip(after).map(|(z, row)| z - row[1])) / deviation;
+            let swings = [RELEASE..RELEASE + 300, rows.len() - 300..rows.len()].map(|range| span(&z, range));
+            println!(
+                "{:15} {:.1} % of the deviation, least {least_j:.2e} J, {swings:?} m",
+                model.name(),
+                100.0 * apart
+            );
+            match model {
+                LocalModelKind::Hold => {
+                    assert!(swings[1] > 3.0 * swings[0] && swings[1] > 0.1, "it does not diverge: {swings:?} m");
+                    assert!(least_j < -10e-3, "{least_j} J");
+                }
+                // Of the 4 mJ that it takes in.
+                _ => assert!(least_j >= -10e-6 && swings[1] < 0.3 * swings[0], "{model:?}: {least_j} J, {swings:?} m"),
+            }
+            let bound = if model == LocalModelKind::Predictive { 0.1 } else { f64::INFINITY };
+            assert!(apart <= bound, "{model:?}: {apart} of the reference's standard deviation");
+        }
+    }
+
+    fn hold_with(safety: SafetySpec) -> Run {
+        let mut scene = load("hand_release").with_model(LocalModelKind::Hold);
+        scene.safety = safety;
+        scene.run.duration_s = 6.0;
+        of(scene, 6000)
+    }
+
+    #[test]
+    fn with_the_safety_defaults_hold_is_bounded_by_the_passivity_controller() {
+        let Run { z, least_j, summary } = hold_with(SafetySpec::default());
+        let count = |name: &str| {
+            summary.report.devices[0].limits.stages.iter().find(|stage| stage.0 == name).map_or(0, |stage| stage.1)
+        };
+        let swing = span(&z, 5700..6000);
+        println!("{:.1} mm in all, {:.3} mm at the end, least {least_j:.2e} J", span(&z, 0..6000) * 1e3, swing * 1e3);
+        println!("passivity {}, withdrawn {}", count("passivity"), count("withdrawn"));
+        // It stays in contact and comes to rest; the press alone is 11 mm.
+        assert!(span(&z, 0..6000) < 0.025 && swing < 0.1e-3, "{summary}");
+        assert!(count("passivity") > 100 && count("withdrawn") > 0, "{summary}");
+        assert!(least_j >= -SafetySpec::default().energy_tolerance_j, "{least_j} J");
+        assert_eq!((count("final_finite"), count("final_clamp")), (0, 0));
+        let mut last = Vec3::zeros();
+        for record in &summary.records {
+            let LogRecord::Command(command) = record else { continue };
+            let force = Vec3::from(command.force_n);
+            assert!(force.norm() <= 8.5 && (force - last).norm() <= 0.5 * (1.0 + 1e-9), "{command:?}");
+            assert!(command.limits & (Actions::FINITE.0 | Actions::CLAMP.0) == 0, "{command:?}");
+            last = force;
+        }
+        // Check that it is this stage that does it: all others are on.
+        let without = hold_with(SafetySpec { off: vec![SafetyStage::Passivity], ..SafetySpec::default() });
+        println!("without: {:.1} mm at the end", span(&without.z, 5700..6000) * 1e3);
+        assert!(span(&without.z, 5700..6000) > 10.0 * swing && without.least_j < 10.0 * least_j);
+    }
+}

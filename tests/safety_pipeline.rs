@@ -239,6 +239,7 @@ fn run_for_energy(seed: u64, with_controller: bool) -> Result<Energy, TestCaseEr
     let mut tool = Tool::new(fastest);
     let (mut last, mut known, mut wanted) = ([0.0; 3], None::<V3>, [0.0; 3]);
     let (mut balance, mut out_j) = (0.0, 0.0_f64);
+    let mut asks_nothing = true;
     for n in 0..4 * TICKS {
         let dt = 1e-3 * if slips && random.chance(0.05) { 1.0 + (random.next() * 5.0).floor() } else { 1.0 };
         tool.advance(dt, random);
@@ -257,8 +258,12 @@ fn run_for_energy(seed: u64, with_controller: bool) -> Result<Energy, TestCaseEr
             prop_assert!((output.energy_j - booked).abs() < 1e-9, "{} J booked, {booked} J done", output.energy_j);
             // A deficit is never served in silence.
             let acted = output.actions.0 & (Actions::PASSIVITY.0 | Actions::WITHDRAWN.0) != 0;
-            // Of no force, or of a NaN's zero, nothing can be withdrawn.
-            let is_empty = output.force == [0.0; 3] || output.actions.contains(Actions::FINITE);
+            // Of no force, or of a NaN's zero, nothing can be withdrawn; a rest keeps what was asked last, also that.
+            if let Request::Force(asked) = request {
+                let is_zero = asked == [0.0; 3] || output.actions.contains(Actions::FINITE);
+                asks_nothing = is_zero && !output.actions.contains(Actions::SLEW);
+            }
+            let is_empty = output.force == [0.0; 3] || asks_nothing || output.actions.contains(Actions::FINITE);
             prop_assert!(acted || is_empty || booked >= -0.5 * passivity.tolerance_j, "{output:?}");
         }
         last = output.force;

@@ -43,7 +43,8 @@ fn every_scene_loads_and_says_what_it_shows() {
             "pull_release",
             "two_hands",
             "wave",
-            "wave_probe"
+            "wave_probe",
+            "z_width"
         ]
     );
     for file in files {

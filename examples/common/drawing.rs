@@ -25,6 +25,9 @@ const ZOOMED: RGBColor = RGBColor(255, 243, 214);
 pub const BLUE: RGBColor = RGBColor(0, 114, 178);
 pub const ORANGE: RGBColor = RGBColor(222, 143, 5);
 
+/// The usual `x_label`.
+pub const TIME: &str = "time (s)";
+
 /// One curve of a panel.
 pub struct Curve {
     pub points: Vec<(f64, f64)>,
@@ -39,11 +42,12 @@ impl Curve {
     }
 }
 
-/// One plot over time.
+/// One plot, usually over time.
 pub struct Panel {
     pub caption: String,
+    pub x_label: &'static str,
     pub y_label: &'static str,
-    /// Shown times (s).
+    /// Shown times (s), or whatever `x_label` says.
     pub times: Range<f64>,
     pub curves: Vec<Curve>,
     /// Times (s) of thin vertical lines.
@@ -138,7 +142,7 @@ impl Panel {
         }
         chart
             .configure_mesh()
-            .x_desc("time (s)")
+            .x_desc(self.x_label)
             .y_desc(self.y_label)
             .axis_desc_style(font(12.0, FAINT))
             .label_style(font(12.0, INK))

@@ -9,7 +9,7 @@
 mod drawing;
 mod scenarios;
 
-use drawing::{BLUE, Curve, ORANGE, Panel, Sheet};
+use drawing::{BLUE, Curve, ORANGE, Panel, Sheet, TIME};
 use palpate::log::LogRecord;
 use scenarios::{FAULT_S, Fault, RAMP_S, Trace};
 use std::path::Path;
@@ -106,6 +106,7 @@ fn panel(fault: Fault, trace: &Trace) -> Panel {
     let (times, values): (Vec<f64>, Vec<f64>) = trace.magnitudes().unzip();
     Panel {
         caption: title(fault).to_owned(),
+        x_label: TIME,
         y_label: "N",
         times: 0.3..end,
         curves: vec![Curve::new(&times, values, if fault.leaves_the_force() { ORANGE } else { BLUE }, 1.5)],

@@ -7,7 +7,7 @@ use std::path::Path;
 use palpate::model::Vec3;
 use palpate::scene::LocalModelKind;
 
-use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet};
+use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet, TIME};
 use crate::runs::{ForceRun, ForceRuns};
 
 /// A component of the force on the tool.
@@ -99,6 +99,7 @@ impl ForceFigure {
         let (closer, zoomed) = (self.closer.0, self.closer.1.clone());
         let component = |component: Component, times: Range<f64>| Panel {
             caption: String::new(),
+            x_label: TIME,
             y_label: component.label(),
             times,
             curves: drawing_order(runs).map(|run| curve(runs, run, |f, _| component.of(f))).into(),
@@ -117,6 +118,7 @@ impl ForceFigure {
         };
         let error = Panel {
             caption: "off the reference: |F - F of full|".to_owned(),
+            x_label: TIME,
             y_label: "difference (N)",
             curves: [&runs.hold, &runs.patch].map(|run| curve(runs, run, |f, full| (f - full).norm())).into(),
             ..component(closer, whole.clone())

@@ -10,7 +10,7 @@ use palpate::prelude::*;
 use palpate::scene::LocalModelKind;
 
 use crate::delay::Delay;
-use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet};
+use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet, TIME};
 use crate::forces::{Difference, peak};
 use crate::runs::{resyncs, run};
 use crate::table::{Row, Table};
@@ -100,6 +100,7 @@ impl Probe {
         let whole = 0.0..self.times.last().copied().unwrap_or_default() + 1e-9;
         let panel = |times, caption: &str| Panel {
             caption: caption.to_owned(),
+            x_label: TIME,
             y_label: "height above rest (mm)",
             times,
             curves: curves(),

@@ -4,6 +4,7 @@
 /// [`default`](Self::default), which is weaker and softer than any device of the table below.
 ///
 /// The constants hold the limits that CHAI3D ships for these devices. What no source confirms is `None`.
+/// Safety limits and coupling gains follow from these numbers.
 ///
 /// | constant | force | stiffness | damping | workspace radius |
 /// | --- | ---: | ---: | ---: | ---: |
@@ -27,6 +28,13 @@ pub struct Capabilities {
     pub max_stiffness_n_per_m: f64,
     /// Largest damping that it renders without a limit cycle (N s/m).
     pub max_damping_n_s_per_m: f64,
+    /// Its own mechanical damping (N s/m): what keeps a rendered spring passive. Where it is unknown it is taken to be K T / 2
+    /// for the stiffness K that it renders, which a sampled wall asks for at least.
+    pub damping_n_s_per_m: Option<f64>,
+    /// Its own dry friction (N).
+    pub friction_n: Option<f64>,
+    /// From a command to the force of its motors (s), beyond the hold until the next command.
+    pub delay_s: Option<f64>,
     /// Radius of a ball in its workspace (m).
     pub workspace_radius_m: f64,
     /// Smallest change of position that it tells (m).
@@ -54,6 +62,9 @@ impl Capabilities {
             continuous_force_n: None,
             max_stiffness_n_per_m: stiffness,
             max_damping_n_s_per_m: damping,
+            damping_n_s_per_m: None,
+            friction_n: None,
+            delay_s: None,
             workspace_radius_m: radius_m,
             position_resolution_m: None,
             native_rate_hz: None,
@@ -77,6 +88,9 @@ impl Capabilities {
             ),
             (is_size(self.max_stiffness_n_per_m), "max_stiffness_n_per_m must be a finite number above 0"),
             (is_size(self.max_damping_n_s_per_m), "max_damping_n_s_per_m must be a finite number above 0"),
+            (is_size_if_known(self.damping_n_s_per_m), "damping_n_s_per_m must be a finite number above 0"),
+            (is_size_if_known(self.friction_n), "friction_n must be a finite number above 0"),
+            (is_size_if_known(self.delay_s), "delay_s must be a finite number above 0"),
             (is_size(self.workspace_radius_m), "workspace_radius_m must be a finite number above 0"),
             (is_size_if_known(self.position_resolution_m), "position_resolution_m must be a finite number above 0"),
             (is_size_if_known(self.native_rate_hz), "native_rate_hz must be a finite number above 0"),
@@ -126,6 +140,9 @@ mod tests {
             (Capabilities { continuous_force_n: Some(4.0), ..good }, "continuous_force_n"),
             (Capabilities { max_stiffness_n_per_m: 0.0, ..good }, "max_stiffness_n_per_m"),
             (Capabilities { max_damping_n_s_per_m: -1.0, ..good }, "max_damping_n_s_per_m"),
+            (Capabilities { damping_n_s_per_m: Some(f64::NAN), ..good }, "damping_n_s_per_m"),
+            (Capabilities { friction_n: Some(-0.1), ..good }, "friction_n"),
+            (Capabilities { delay_s: Some(f64::INFINITY), ..good }, "delay_s"),
             (Capabilities { workspace_radius_m: f64::INFINITY, ..good }, "workspace_radius_m"),
             (Capabilities { position_resolution_m: Some(0.0), ..good }, "position_resolution_m"),
             (Capabilities { native_rate_hz: Some(f64::NAN), ..good }, "native_rate_hz"),

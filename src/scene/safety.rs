@@ -27,6 +27,16 @@ pub struct SafetySpec {
     pub energy_tolerance_j: f64,
     /// Largest damping of the passivity controller (N s/m); what the device renders stably if absent.
     pub max_damping_n_s_per_m: Option<f64>,
+    /// Largest stiffness of the virtual coupling (N/m); what the device renders stably if absent.
+    pub max_stiffness_n_per_m: Option<f64>,
+    /// The device's own mechanical damping (N s/m); what the device says if absent.
+    pub device_damping_n_s_per_m: Option<f64>,
+    /// Its dry friction (N); what the device says if absent.
+    pub device_friction_n: Option<f64>,
+    /// Smallest step of its position (m); what the device says if absent.
+    pub device_resolution_m: Option<f64>,
+    /// From a command to its motors (ms); what the device says if absent.
+    pub device_delay_ms: Option<f64>,
     /// Tool speed that may be nothing but noise (m/s); a step of the device's resolution per tick if absent.
     pub noise_m_s: Option<f64>,
     /// Age of the local model from which on the force fades (ms); three periods of the global model and its declared latency
@@ -64,6 +74,11 @@ impl Default for SafetySpec {
             swap_blend_ms: 10.0,
             energy_tolerance_j: 2e-3,
             max_damping_n_s_per_m: None,
+            max_stiffness_n_per_m: None,
+            device_damping_n_s_per_m: None,
+            device_friction_n: None,
+            device_resolution_m: None,
+            device_delay_ms: None,
             noise_m_s: None,
             max_age_ms: None,
             age_fade_ms: 200.0,
@@ -100,8 +115,17 @@ pub(super) fn validate(safety: &SafetySpec) -> Result<(), Error> {
     positive("safety.tank_j", safety.tank_j)?;
     not_negative("safety.tank_min_j", safety.tank_min_j)?;
     positive("safety.energy_tolerance_j", safety.energy_tolerance_j)?;
-    not_negative("safety.max_damping_n_s_per_m", safety.max_damping_n_s_per_m.unwrap_or(0.0))?;
-    not_negative("safety.noise_m_s", safety.noise_m_s.unwrap_or(0.0))?;
+    for (field, value) in [
+        ("safety.max_damping_n_s_per_m", safety.max_damping_n_s_per_m),
+        ("safety.device_friction_n", safety.device_friction_n),
+        ("safety.device_resolution_m", safety.device_resolution_m),
+        ("safety.device_delay_ms", safety.device_delay_ms),
+        ("safety.noise_m_s", safety.noise_m_s),
+    ] {
+        not_negative(field, value.unwrap_or(0.0))?;
+    }
+    positive("safety.max_stiffness_n_per_m", safety.max_stiffness_n_per_m.unwrap_or(1.0))?;
+    positive("safety.device_damping_n_s_per_m", safety.device_damping_n_s_per_m.unwrap_or(1.0))?;
     positive("safety.engage_force_n", safety.engage_force_n)?;
     for (field, ms) in [
         ("safety.swap_blend_ms", safety.swap_blend_ms),

@@ -1,11 +1,18 @@
 //! What a session refuses beyond what a scene's own validation can see.
 
+use crate::devices::Capabilities;
 use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::body::Body;
 use crate::model::local::Kind;
 use crate::safety::Limits;
 use crate::scene::Scene;
+
+/// Limits and gains follow from what the device says, so it must be possible; its largest force is [`check_ramp`]'s.
+pub(super) fn check_capabilities(capabilities: Capabilities, limits: &Limits) -> Result<(), Error> {
+    let asked = Capabilities { max_force_n: limits.max_force_n, continuous_force_n: None, ..capabilities };
+    asked.fault().map_or(Ok(()), |words| Err(Error::scene("device", format!("has impossible capabilities: {words}"))))
+}
 
 /// The slew limit must not keep the force from being gone when the ramp is over.
 pub(super) fn check_ramp(limits: &Limits) -> Result<(), Error> {

@@ -1,5 +1,7 @@
 //! From a scene's safety section to the limits of the pipeline, and the gains of a virtual coupling.
 
+use std::collections::BTreeMap;
+
 use crate::devices::Capabilities;
 use crate::error::Error;
 use crate::model::body::{Body, State};
@@ -14,9 +16,26 @@ const PERIODS_UNTIL_OLD: f64 = 3.0;
 /// And nothing younger than this is (ms).
 const YOUNGEST_OLD_MS: f64 = 100.0;
 
-/// What a device is taken for.
+/// At which the limits of a device without a rate of its own are told (s).
+const USUAL_PERIOD_S: f64 = 1e-3;
+
+/// What a device is taken for: what the scene says of it, else what the device says, else what is least. No stage knows how
+/// hot a motor is, so a force that it cannot exert for long is none that it gets by default.
 pub(super) fn device_limits(safety: &SafetySpec, capabilities: &Capabilities) -> DeviceLimits {
-    DeviceLimits::of_force(safety.max_force_n.unwrap_or(capabilities.max_force_n))
+    let Capabilities { max_stiffness_n_per_m: stiffness, native_rate_hz, .. } = *capabilities;
+    let stiffness = safety.max_stiffness_n_per_m.unwrap_or(stiffness);
+    let held_n = capabilities.continuous_force_n.unwrap_or(capabilities.max_force_n);
+    // What a sampled wall of that stiffness asks for: b > K T / 2.
+    let least_damping = 0.5 * stiffness * native_rate_hz.map_or(USUAL_PERIOD_S, f64::recip);
+    DeviceLimits {
+        max_force_n: safety.max_force_n.unwrap_or(held_n),
+        max_stiffness_n_per_m: stiffness,
+        max_damping_n_s_per_m: safety.max_damping_n_s_per_m.unwrap_or(capabilities.max_damping_n_s_per_m),
+        damping_n_s_per_m: safety.device_damping_n_s_per_m.or(capabilities.damping_n_s_per_m).unwrap_or(least_damping),
+        friction_n: safety.device_friction_n.or(capabilities.friction_n).unwrap_or(0.0),
+        resolution_m: safety.device_resolution_m.or(capabilities.position_resolution_m).unwrap_or(0.0),
+        delay_s: safety.device_delay_ms.map(|ms| 1e-3 * ms).or(capabilities.delay_s).unwrap_or(0.0),
+    }
 }
 
 /// The scene's safety section with everything that it left to the device and the rates.
@@ -28,6 +47,14 @@ pub(super) fn resolved(scene: &Scene, device: &DeviceLimits) -> SafetySpec {
     safety.max_damping_n_s_per_m.get_or_insert(device.max_damping_n_s_per_m);
     safety.noise_m_s.get_or_insert(device.resolution_m * scene.local.rate_hz);
     safety.max_age_ms.get_or_insert(old_ms.max(YOUNGEST_OLD_MS));
+    if scene.local.coupling {
+        // What its gains follow from: a replay has no device to ask.
+        safety.max_stiffness_n_per_m.get_or_insert(device.max_stiffness_n_per_m);
+        safety.device_damping_n_s_per_m.get_or_insert(device.damping_n_s_per_m);
+        safety.device_friction_n.get_or_insert(device.friction_n);
+        safety.device_resolution_m.get_or_insert(device.resolution_m);
+        safety.device_delay_ms.get_or_insert(1e3 * device.delay_s);
+    }
     safety
 }
 
@@ -126,21 +153,34 @@ pub(super) fn coupling(
     let mut forces = vec![Vec3::zeros(); state.positions.len()];
     body.forces(&state, &mut forces);
     let local = forces[node as usize].norm() / inwards.norm();
-    let design = design(device, local, period_s);
-    Ok(Design { tick_n_per_m: tick_stiffness(body, &state, node, period_s).max(local), ..design })
+    Ok(design(device, local, mass_on_tool(body, &state, period_s), period_s))
 }
 
-/// What moves `node` within one tick (N/m): its springs and dampers with all others standing still, and its mass.
-fn tick_stiffness(body: &dyn Body, state: &State, node: u32, period_s: f64) -> f64 {
-    let (mut springs, mut dampers) = (Mat3::zeros(), Mat3::zeros());
-    body.tangent(state, &[node], true, &mut |block| {
-        if block.row == node && block.column == node {
-            springs += block.position;
-            dampers += block.velocity;
-        }
+/// The most that `body` puts on a tool within a tick (kg), wherever on its surface: the nodes of a triangle that move as one,
+/// with what their dampers and springs resist within the tick.
+///
+/// A contact with weights w moves the body by w^T A^-1 w per impulse, A = M + T B + T^2 K. With w^T u = 1 for u = (1, 1, 1) that is
+/// at least 1 / u^T A u, by Cauchy's inequality: u^T A u is the bound for all weights. A triangle with a held corner has none,
+/// and counts by the nodes that move.
+fn mass_on_tool(body: &dyn Body, state: &State, period_s: f64) -> f64 {
+    let triangles = &body.surface().triangles;
+    let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes.retain(|&node| body.inverse_masses()[node as usize] > 0.0);
+    let mut resisting: BTreeMap<(u32, u32), Mat3> = BTreeMap::new();
+    body.tangent(state, &nodes, true, &mut |block| {
+        let within_tick = block.position * (period_s * period_s) + block.velocity * period_s;
+        *resisting.entry((block.row, block.column)).or_default() -= within_tick;
     });
-    let inertia = 1.0 / (body.inverse_masses()[node as usize] * period_s * period_s);
-    springs.norm() + dampers.norm() / period_s + inertia
+    let of_triangle = |corners: &[u32; 3]| {
+        let moving = || corners.iter().filter(|&node| nodes.binary_search(node).is_ok());
+        let mass: f64 = moving().map(|&node| 1.0 / body.inverse_masses()[node as usize]).sum();
+        let pairs = moving().flat_map(|&row| moving().map(move |&column| (row, column)));
+        let sum: Mat3 = pairs.filter_map(|pair| resisting.get(&pair)).sum();
+        mass + sum.symmetric_eigenvalues().amax()
+    };
+    triangles.iter().map(of_triangle).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The tools of a session: each with its device, its contact, its limits.
 
-use super::checks::check_ramp;
+use super::checks::{check_capabilities, check_ramp};
 use super::prepare::Parts;
 use super::{device, safety};
 use crate::devices::Device;
@@ -79,6 +79,7 @@ pub(super) fn tools(
         let resolved = safety::resolved(scene, &device_limits);
         let limits = safety::limits(&resolved, &device_limits, stored_j, tick);
         check_ramp(&limits).map_err(of_this)?;
+        check_capabilities(device.capabilities(), &limits).map_err(of_this)?;
         let coupling = match scene.local.coupling {
             true => Some(safety::coupling(body, node, &device_limits, tick)?),
             false => None,

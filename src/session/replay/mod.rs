@@ -69,6 +69,11 @@ impl Replay {
         safety.max_force_n = max_force_n;
         safety.max_damping_n_s_per_m = logged_safety.max_damping_n_s_per_m;
         safety.noise_m_s = logged_safety.noise_m_s;
+        safety.max_stiffness_n_per_m = logged_safety.max_stiffness_n_per_m;
+        safety.device_damping_n_s_per_m = logged_safety.device_damping_n_s_per_m;
+        safety.device_friction_n = logged_safety.device_friction_n;
+        safety.device_resolution_m = logged_safety.device_resolution_m;
+        safety.device_delay_ms = logged_safety.device_delay_ms;
         // What the machine of the log chose, and not what this one would.
         if parts.scene.local.model == ModelChoice::Auto {
             parts.scene.local.model = logged.scene.local.model;

@@ -1,0 +1,106 @@
+//! The paper's Fig. 17: a hand that presses and lets go, with each model and without any safety stage; and `hold` with all.
+
+use std::path::Path;
+
+use palpate::Summary;
+use palpate::log::LogRecord;
+use palpate::prelude::*;
+use palpate::scene::{LocalModelKind, SafetySpec, Scene};
+
+use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet, TIME};
+use crate::{GREEN, RED};
+
+/// The models shown, in the order of the legend.
+const MODELS: [(LocalModelKind, RGBColor); 4] = [
+    (LocalModelKind::Full, BLUE),
+    (LocalModelKind::Predictive, GREEN),
+    (LocalModelKind::Patch, ORANGE),
+    (LocalModelKind::Hold, RED),
+];
+/// The hand lets go (s).
+const RELEASE_S: f64 = 1.0;
+/// Top of the block at rest (m).
+const TOP_M: f64 = 0.1;
+
+/// A run of the scene: with every stage that it switches off, or with the defaults.
+fn run(model: LocalModelKind, defaults: bool) -> Result<Summary, Error> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hand_release.toml");
+    let mut scene = Scene::load(&path)?.with_model(model);
+    if defaults {
+        scene.safety = SafetySpec::default();
+    }
+    Session::from_scene(scene).virtual_time().keep_records().build()?.run()
+}
+
+/// Height of the tool over the top of the block (mm) at each time (s).
+fn height(summary: &Summary) -> Vec<(f64, f64)> {
+    let of = |record: &LogRecord| match record {
+        LogRecord::Tool(tool) => Some((tool.time.as_secs_f64(), 1e3 * (tool.position_m[2] - TOP_M))),
+        _ => None,
+    };
+    summary.records.iter().filter_map(of).collect()
+}
+
+/// The reference's, if it is there: a clone has it, a package does not.
+fn reference() -> Vec<(f64, f64)> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/hand_release.csv");
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let point = |line: &str| {
+        let mut cells = line.split(',').map_while(|cell| cell.parse::<f64>().ok());
+        Some((cells.next()?, 1e3 * (cells.next()? - TOP_M)))
+    };
+    text.lines().filter_map(point).collect()
+}
+
+fn curve(points: Vec<(f64, f64)>, color: RGBColor, width: f64) -> Curve {
+    let (times, values): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+    Curve::new(&times, values, color, width)
+}
+
+/// Runs everything and draws it.
+pub fn sheet() -> Result<Sheet, Error> {
+    let mut bare = Vec::new();
+    for (model, color) in MODELS {
+        eprintln!("hand_release: {}", model.name());
+        bare.push((model, color, height(&run(model, false)?)));
+    }
+    eprintln!("hand_release: hold with the defaults");
+    let guarded = run(LocalModelKind::Hold, true)?;
+    let acted: Vec<String> =
+        guarded.report.devices[0].limits.stages.iter().map(|(name, n)| format!("{name} {n}")).collect();
+    println!("hand_release, hold with the safety defaults, ticks in which a stage acted: {}\n", acted.join(", "));
+    // Before it leaves the picture.
+    let shown = |points: &[(f64, f64)]| points.iter().copied().take_while(|point| point.1.abs() < 30.0).collect();
+    let reference = || curve(reference(), INK, 3.5);
+    let mut whole = vec![reference()];
+    whole.extend(bare.iter().rev().map(|(_, color, points)| curve(shown(points), *color, 1.5)));
+    let mut closer = vec![reference()];
+    let quiet = bare.iter().rev().filter(|(model, ..)| *model != LocalModelKind::Hold);
+    closer.extend(quiet.map(|(_, color, points)| curve(points.clone(), *color, 1.5)));
+    let panel = |caption: &str, times, curves| Panel {
+        caption: caption.to_owned(),
+        x_label: TIME,
+        y_label: "tool over the surface (mm)",
+        times,
+        curves,
+        marks: vec![RELEASE_S],
+        zoomed: None,
+    };
+    let mut legend = vec![("reference".to_owned(), INK)];
+    legend.extend(MODELS.map(|(model, color)| (model.name().to_owned(), color)));
+    Ok(Sheet {
+        title: "hand_release: a hand presses 9 mm deep and lets go at 1 s".to_owned(),
+        subtitle: "a device of 75 g that gives way to the force; the height of the tool; hold with a force of 30 Hz"
+            .to_owned(),
+        legend,
+        rows: vec![
+            vec![panel("every safety stage off", 0.0..2.4, whole)],
+            vec![panel("the same without hold, after the release", 0.95..2.4, closer)],
+            vec![panel(
+                "hold with the safety defaults: the passivity controller bounds it",
+                0.0..2.4,
+                vec![curve(height(&guarded), RED, 1.5)],
+            )],
+        ],
+    })
+}
