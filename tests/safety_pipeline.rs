@@ -250,7 +250,7 @@ fn run_for_energy(seed: u64, with_controller: bool) -> Result<Energy, TestCaseEr
         known = Some(position);
         out_j = out_j.max(balance);
         wanted = spoilt(law.force(n, &tool, wanted, random), random);
-        let step = if n % 33 == 0 { random.vector(0.5) } else { [0.0; 3] };
+        let step = if n.is_multiple_of(33) { random.vector(0.5) } else { [0.0; 3] };
         let request = if random.chance(0.01) { Request::Rest } else { Request::Force(wanted) };
         let output = pipeline.apply(&Input { swap_step: step, ..Input::new(request, position, dt) });
         if with_controller {

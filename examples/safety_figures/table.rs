@@ -1,8 +1,7 @@
 //! All borders of the sweep: measured on all cores, as a table and as a picture.
 
 use std::fmt;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 use palpate::prelude::*;
@@ -54,11 +53,12 @@ impl Table {
         }
         // The longest first.
         cases.sort_by(|a, b| b.rate_hz.total_cmp(&a.rate_hz));
-        let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+        let (queue, done) = (Mutex::new(cases.iter()), Mutex::new(Vec::new()));
+        let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
         let work = || -> Result<(), Error> {
-            while let Some(&case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+            while let Some(&case) = next() {
                 let border = sweep.border(case.model, case.rate_hz, case.damping)?;
-                let mut done = done.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
                 done.push((case, border));
                 let Case { model, rate_hz, damping } = case;
                 let (name, n, of) = (model.name(), done.len(), cases.len());
@@ -74,7 +74,7 @@ impl Table {
                 Err(panic) => std::panic::resume_unwind(panic),
             })
         })?;
-        let borders = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let borders = done.into_inner().unwrap_or_else(PoisonError::into_inner);
         Ok(Self { rates_hz, dampings, device_damping: sweep.device_damping(), borders })
     }
 
