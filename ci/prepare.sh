@@ -4,6 +4,8 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
+# Everything is compiled once: what would make a second time quicker only costs.
+export CARGO_INCREMENTAL=0
 
 # Installs Debian packages if that is possible here: install_packages REASON PACKAGE...
 install_packages() {
