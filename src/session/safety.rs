@@ -225,6 +225,29 @@ mod tests {
     }
 
     #[test]
+    fn limits_are_what_the_scene_says_else_what_the_device_says_else_the_least() {
+        let touch = Capabilities { position_resolution_m: Some(50e-6), ..Capabilities::TOUCH };
+        let device = device_limits(&SafetySpec::default(), &touch);
+        assert_eq!((device.max_force_n, device.max_stiffness_n_per_m, device.max_damping_n_s_per_m), (3.3, 400.0, 4.0));
+        assert_eq!((device.damping_n_s_per_m, device.friction_n, device.resolution_m), (0.2, 0.0, 50e-6));
+        let resolved = resolved(&Scene::of_program(), &device);
+        assert_eq!((resolved.max_damping_n_s_per_m, resolved.noise_m_s), (Some(4.0), Some(0.05)));
+        let own = Capabilities {
+            continuous_force_n: Some(1.4),
+            damping_n_s_per_m: Some(0.7),
+            friction_n: Some(0.1),
+            delay_s: Some(1e-3),
+            ..Capabilities::FALCON
+        };
+        let device = device_limits(&SafetySpec::default(), &own);
+        assert_eq!((device.max_force_n, device.damping_n_s_per_m, device.friction_n), (1.4, 0.7, 0.1));
+        assert_eq!((device.max_stiffness_n_per_m, device.delay_s), (3000.0, 1e-3));
+        let said = SafetySpec { max_force_n: Some(5.0), max_stiffness_n_per_m: Some(100.0), ..SafetySpec::default() };
+        let device = device_limits(&said, &Capabilities::FALCON);
+        assert_eq!((device.max_force_n, device.max_stiffness_n_per_m, device.damping_n_s_per_m), (5.0, 100.0, 0.05));
+    }
+
+    #[test]
     fn a_coupling_knows_the_body_under_the_tool() {
         let device = DeviceLimits::of_force(3.0);
         let design = coupling(&mut block(), None, &device, 1e-3).unwrap();
