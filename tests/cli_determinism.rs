@@ -32,9 +32,16 @@ fn scenes() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let entries = std::fs::read_dir(folder).expect("scenes/").map(|entry| entry.expect("readable").path());
     let mut scenes: Vec<_> = entries.filter(|path| path.extension().is_some_and(|ending| ending == "toml")).collect();
+    // A device that is really there has no virtual time.
+    scenes.retain(|path| !path.ends_with("haply.toml"));
     scenes.sort();
     assert!(scenes.len() >= 8, "{scenes:?}");
     scenes
+}
+
+/// What the topics of the first device begin with.
+fn device(scene: &str) -> &'static str {
+    if scene.ends_with("two_hands.toml") { "/left" } else { "" }
 }
 
 /// Two runs of a scene, byte for byte the same file; gives the exported forces.
@@ -43,8 +50,9 @@ fn run_twice(folder: &Folder, scene: &str, more: &[&str]) -> String {
     let reports = [run("a.mcap"), run("b.mcap")].map(|text| text.lines().filter(|l| !l.starts_with("log:")).count());
     assert_eq!(reports[0], reports[1]);
     let export = |log: &str, topic: &str| folder.succeed(&["export", log, "--topic", topic]);
-    let force = export("a.mcap", "/force");
-    assert!(force == export("b.mcap", "/force"), "{scene}: /force");
+    let topic = format!("{}/force", device(scene));
+    let force = export("a.mcap", &topic);
+    assert!(force == export("b.mcap", &topic), "{scene}: {topic}");
     let read = |log| std::fs::read(folder.path(log)).unwrap();
     // One comparison for every topic; which of them differs is asked only if one does.
     if read("a.mcap") != read("b.mcap") {
@@ -68,7 +76,8 @@ fn two_virtual_runs_of_every_scene_are_byte_identical() {
             assert_eq!(row[0], (n + 1) as f64 / 1000.0, "{scene}");
             assert!(row.iter().all(|cell| cell.is_finite()), "{scene}: {row:?}");
         }
-        let resyncs = folder.succeed(&["export", "a.mcap", "--topic", "/resync"]);
+        let topic = format!("{}/resync", device(scene));
+        let resyncs = folder.succeed(&["export", "a.mcap", "--topic", &topic]);
         assert!(rows(&resyncs).len() >= 8, "{scene}: {resyncs}");
     }
 }

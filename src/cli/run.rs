@@ -94,7 +94,9 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
         // The run itself went well; but what was promised, a log, is not there.
         return Err(Error::new(ErrorKind::Fault, format!("the log is incomplete: {error}")));
     }
-    output::print(&format!("log: {0} (`palpate timing {0}`, `palpate export {0} --topic /force`)\n", log.display()))?;
+    let first = summary.report.devices.first().map(|device| device.name.as_str()).filter(|name| !name.is_empty());
+    let topic = first.map_or("/force".to_owned(), |name| format!("/{name}/force"));
+    output::print(&format!("log: {0} (`palpate timing {0}`, `palpate export {0} --topic {topic}`)\n", log.display()))?;
     match until.filter(|_| interrupt.came()) {
         Some(until) if ended < until => {
             let (ended, until) = (ended.as_secs_f64(), until.as_secs_f64());

@@ -15,7 +15,7 @@ use crate::time::Nanos;
 const EVENTS_KEPT: usize = 100;
 
 /// What [`Analysis`] found.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RunReport {
     /// About the run as a whole, if it is known.
     pub environment: Option<Environment>,
@@ -35,6 +35,13 @@ pub struct RunReport {
     pub damage: Option<String>,
     /// Messages in that log by topic; set by whoever read it.
     pub messages: BTreeMap<String, u64>,
+}
+
+impl Default for RunReport {
+    /// Of a run of which nothing is known.
+    fn default() -> Self {
+        Analysis::default().report()
+    }
 }
 
 impl RunReport {

@@ -135,6 +135,11 @@ impl Far {
         (stiffness, damping)
     }
 
+    /// False if its nodes hang on the patch alone, as around a patch that is nearly all of a small body.
+    pub(super) fn has_springs(&self) -> bool {
+        !self.springs.is_empty()
+    }
+
     /// Damping over stiffness, if it is the same for every spring.
     pub(super) fn proportional_damping(&self) -> Option<f64> {
         let first = self.springs.first().filter(|spring| spring.stiffness > 0.0)?;

@@ -26,8 +26,11 @@ pub(crate) struct Reduced {
 
 impl Reduced {
     /// The surroundings `far` in the span of the columns of `shapes`, with its modes there on all of `far` as columns.
-    /// `None` if there is no motion in that span or a number is not finite.
+    /// `None` if there is no motion in that span, nothing that holds it or a number is not finite.
     pub(super) fn new(far: &Far, ring: &[u32], shapes: &[f64]) -> Option<(Self, Vec<f64>)> {
+        if !far.has_springs() {
+            return None;
+        }
         let columns = shapes.len() / far.unknowns().max(1);
         let (stiffness, damping) = far.stiffness_and_damping(shapes);
         let (modes, values) = dense::modes(&far.mass(shapes), &stiffness);

@@ -166,3 +166,22 @@ fn normalised(columns: &[f64], rows: usize) -> Vec<f64> {
     });
     scaled.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::body::{Block, Body};
+    use super::super::super::mesh::Face;
+    use super::*;
+
+    // Check a small body whose patch is all that can move but a corner: what is left hangs on the patch alone.
+    #[test]
+    fn surroundings_that_only_the_patch_holds_are_refused() {
+        let block = Block::builder([3; 3], [0.02; 3]).fix(Face::ZMin).build().unwrap();
+        let corner = block.lattice().id([0, 0, 2]);
+        let is_in_patch = |node: &u32| *node != corner && block.inverse_masses()[*node as usize] > 0.0;
+        let patch: Vec<u32> = (0..block.rest().len() as u32).filter(is_in_patch).collect();
+        let graph = SpringGraph::new(&block).unwrap();
+        let refused = Basis::compute(&graph, &patch, 20).unwrap_err().to_string();
+        assert!(refused.contains("not held together"), "{refused}");
+    }
+}
