@@ -138,6 +138,9 @@ impl Simulation {
 
     /// Advances one haptic tick while each tool moves along its own of `motions`, one for each tool.
     ///
+    /// # Panics
+    /// If a tool has none.
+    ///
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
     pub fn tick_all(&mut self, motions: &[ToolMotion]) {
