@@ -234,7 +234,7 @@ fn scene(random: &mut Random, seconds: f64) -> Scene {
     scene.safety = safety(random);
     scene.run.duration_s = seconds;
     // What gives most energy out comes more often.
-    let name = if random.chance(0.3) { "hold" } else { random.one_of(&ModelChoice::NAMES) };
+    let name = if random.chance(0.3) { "hold" } else { random.one_of(ModelChoice::NAMES) };
     scene.with_model(ModelChoice::from_name(name).unwrap())
 }
 
