@@ -11,7 +11,7 @@ use palpate::devices::{Scripted, ToolPath};
 use palpate::log::{ForceTrace, LogEntry, LogReader, ModelError, ToolSample};
 use palpate::model::Vec3;
 use palpate::model::contact::{Contact, ToolMotion};
-use palpate::scene::{DeviceSpec, LocalModelKind, Scene};
+use palpate::scene::{DeviceKind, DeviceSpec, LocalModelKind, Scene};
 use palpate::session::{SessionBuilder, Summary};
 use palpate::time::Nanos;
 
@@ -147,11 +147,48 @@ fn each_device_has_its_topics_and_its_part_of_the_report_and_replays() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
+fn two_hands() -> Scene {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two_hands.toml")).unwrap()
+}
+
+/// Check devices that are not alike, where every number of the pipeline and of the coupling is each one's own.
+#[test]
+fn a_run_of_unlike_devices_replays_and_its_log_moves_the_tool_that_is_named() {
+    let folder = std::env::temp_dir().join(format!("palpate-unlike-devices-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let log = folder.join("unlike.mcap");
+    let mut scene = two_hands();
+    scene.local.coupling = true;
+    let summary = run(Session::from_scene(scene).duration_s(0.8).virtual_time().log(&log));
+    assert!(summary.report.devices.iter().all(|device| device.force.peak_n > 0.1), "{summary}");
+    let report = Session::replay(&log).unwrap().run().unwrap();
+    assert!(report.is_identical() && report.commanded.is_identical(), "{report}");
+
+    let moved_by = |name: &str| {
+        let mut scene = two_hands();
+        scene.devices = vec![DeviceSpec {
+            name: Some(name.into()),
+            kind: DeviceKind::Replay,
+            log: Some(log.clone()),
+            ..DeviceSpec::default()
+        }];
+        let builder = Session::from_scene(scene).duration_s(0.5).virtual_time().keep_records();
+        let summary = builder.build().map_err(|error| error.to_string())?.run().unwrap();
+        Ok(ForceTrace::of(&summary.records).forces_n.len())
+    };
+    assert_eq!(moved_by("right"), Ok(500));
+    let refused: Result<usize, String> = moved_by("middle");
+    assert!(
+        refused.as_ref().is_err_and(|error| error.contains("no device \"middle\", but left and right")),
+        "{refused:?}"
+    );
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
 #[test]
 fn what_cannot_be_is_refused_with_the_device_named() {
-    let scene = || Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two_hands.toml")).unwrap();
     let refused = |change: fn(&mut Scene)| {
-        let mut scene = scene();
+        let mut scene = two_hands();
         change(&mut scene);
         Session::from_scene(scene).virtual_time().build().unwrap_err().to_string()
     };

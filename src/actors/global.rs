@@ -186,7 +186,8 @@ impl GlobalActor {
         let mut complete = true;
         while let Some(next) = self.next_tick(ctx).filter(|&next| self.plan.haptic.release(next) <= until) {
             let gap = next.saturating_sub(self.now());
-            complete &= gap <= 1;
+            let is_there = |side: &mut ToolSide| side.ports.ticks.peek(ctx).is_some_and(|sample| sample.tick <= next);
+            complete &= gap <= 1 && self.tools.iter_mut().all(is_there);
             for i in 0..gap {
                 self.motions.clear();
                 for side in &mut self.tools {
@@ -305,8 +306,9 @@ impl GlobalActor {
     fn publish_checkpoint(&mut self, ctx: &TickContext) {
         let checkpoint = self.ports.checkpoint.buffer();
         checkpoint.tools.clear();
-        let contacts = (0..).map(|tool| *self.simulation.contact(tool));
-        checkpoint.tools.extend(self.tools.iter().map(|side| side.tool).zip(contacts));
+        let with_contact =
+            |(tool, side): (usize, &ToolSide)| (side.tool, *self.simulation.contact(tool), self.simulation.force(tool));
+        checkpoint.tools.extend(self.tools.iter().enumerate().map(with_contact));
         checkpoint.state.clone_from(self.simulation.state());
         self.ports.checkpoint.publish(ctx);
     }

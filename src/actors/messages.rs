@@ -68,8 +68,8 @@ pub struct SurfaceView {
 /// The global model after its last good resync: what it goes on from when it is started again.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Checkpoint {
-    /// Each tool with the haptic tick that the state belongs to, and its contact.
-    pub tools: Vec<(ToolTick, Contact)>,
+    /// Each tool with the haptic tick that the state belongs to, its contact and the force on it (N).
+    pub tools: Vec<(ToolTick, Contact, Vec3)>,
     /// Positions (m) and velocities (m/s) of all nodes.
     pub state: State,
 }

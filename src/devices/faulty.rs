@@ -98,6 +98,12 @@ impl<D> Faulty<D> {
         self.told[newest.saturating_sub(back.min(FaultWindow::LATEST)) % ROOM]
     }
 
+    /// Remembers what the device has told.
+    fn tell(&mut self, state: DeviceState) {
+        self.told[self.reads % ROOM] = state;
+        self.reads += 1;
+    }
+
     fn is_lost(&self, probability: f64, seed: u64) -> bool {
         uniform(seed, self.now) < probability
     }
@@ -126,14 +132,21 @@ impl<D: Device> Device for Faulty<D> {
 
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
         self.now = time;
-        let state = self.device.read(time)?;
-        let fault = self.active();
+        let (state, fault) = (self.device.read(time), self.active());
+        if let Some(InjectedFault::SafetyStop(stop)) = fault {
+            // Whether or not it can say where it is.
+            self.device.write(ForceCommand::ZERO)?;
+            if let Ok(state) = state {
+                self.tell(state);
+            }
+            return Err(DeviceFault::SafetyStop(stop));
+        }
+        let state = state?;
         if fault == Some(InjectedFault::Frozen) {
             // Also where nothing has been told yet: then there is no last state to repeat.
             return if self.reads == 0 { Err(DeviceFault::NotReady) } else { Ok(self.state_before(0)) };
         }
-        self.told[self.reads % ROOM] = state;
-        self.reads += 1;
+        self.tell(state);
         match fault {
             Some(InjectedFault::Late { reads }) => Ok(self.state_before(reads)),
             Some(InjectedFault::Lost { probability, seed }) if self.is_lost(probability, seed) => {
@@ -144,10 +157,6 @@ impl<D: Device> Device for Faulty<D> {
                 Ok(DeviceState { position: nowhere, velocity: nowhere, ..state })
             }
             Some(InjectedFault::Disconnected) => Err(DeviceFault::Disconnected),
-            Some(InjectedFault::SafetyStop(stop)) => {
-                self.device.write(ForceCommand::ZERO)?;
-                Err(DeviceFault::SafetyStop(stop))
-            }
             _ => Ok(state),
         }
     }

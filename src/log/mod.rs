@@ -42,6 +42,7 @@ pub use event::{Level, TextEvent};
 pub use group::{CauseCounts, GroupReport};
 pub use haptics::{ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport};
 pub use percentiles::{Distribution, Magnitudes, Percentiles};
+pub(crate) use records::MAX_DEVICES;
 pub use records::{
     CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ServedBy,
     ToolSample,

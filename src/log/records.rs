@@ -249,6 +249,9 @@ const COMMAND: u16 = 6;
 /// Channels of a device: each has its own of every kind.
 const CHANNELS: u16 = 16;
 
+/// As many devices as a scene can have; channels beyond theirs are a program's own.
+pub(crate) const MAX_DEVICES: u16 = 8;
+
 /// The channel of `kind` for `device`.
 fn channel(kind: u16, device: u16) -> Channel {
     Channel(Channel::FIRST_USER.0.saturating_add(device.saturating_mul(CHANNELS)).saturating_add(kind))
@@ -296,6 +299,9 @@ impl LogRecord {
         }
         let number = record.channel.0.checked_sub(Channel::FIRST_USER.0)?;
         let device = number / CHANNELS;
+        if device >= MAX_DEVICES {
+            return None;
+        }
         Some(match number % CHANNELS {
             FORCE => Self::Force(ForceSample {
                 time,

@@ -269,6 +269,14 @@ impl Simulation {
         &mut self.touches[tool].contact
     }
 
+    /// Puts `tool` in `contact` with the mean `force` of a last tick on it (N): to go on from what another one has saved.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn restore_tool(&mut self, tool: usize, contact: Contact, force: Vec3) {
+        (self.touches[tool].contact, self.means[tool]) = (contact, force);
+    }
+
     /// How contacts are resolved.
     ///
     /// # Real-time

@@ -42,9 +42,7 @@ pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub use device_fault::{FaultKind, FaultSpec};
-#[cfg(all(feature = "log", feature = "scene"))]
-pub(crate) use devices::MAX_DEVICES;
-pub(crate) use devices::numbered;
+pub(crate) use devices::{MAX_DEVICES, numbered};
 pub use haply::HaplySpec;
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
 pub use safety::{SafetySpec, SafetyStage};

@@ -79,14 +79,14 @@ fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
 
 /// A program's own body has node ids and no lattice: the builder's methods name its nodes.
 fn on_no_lattice(scene: &Scene) -> Result<(), Error> {
-    let named = [
-        ("device.attach_node", scene.devices.iter().any(|device| device.attach_node.is_some())),
-        ("initial", scene.initial.is_some()),
-        ("probe", !scene.probes.is_empty()),
-    ];
+    const WHY: &str = "names nodes of a block, and the body is the program's own";
+    if let Some(index) = scene.devices.iter().position(|device| device.attach_node.is_some()) {
+        return Err(devices::numbered(Error::scene("device.attach_node", WHY), index, &scene.devices));
+    }
+    let named = [("initial", scene.initial.is_some()), ("probe", !scene.probes.is_empty())];
     match named.iter().find(|(_, is_used)| *is_used) {
         None => Ok(()),
-        Some((field, _)) => Err(Error::scene(field, "names nodes of a block, and the body is the program's own")),
+        Some((field, _)) => Err(Error::scene(field, WHY)),
     }
 }
 

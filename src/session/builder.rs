@@ -39,7 +39,9 @@ impl SessionBuilder {
     /// A scripted tool that follows `path`: the scene's first.
     #[must_use]
     pub fn path(mut self, path: ToolPath) -> Self {
-        self.parts.scene.devices[0].path = Some(path);
+        if let Some(first) = self.parts.scene.devices.first_mut() {
+            first.path = Some(path);
+        }
         self
     }
 
@@ -210,8 +212,9 @@ impl SessionBuilder {
     }
 
     /// Reads the log of an earlier run of this session, to execute it again in simulated time, as
-    /// [`Session::replay`] does for a scene. The builder must be filled as it was for that run, without the device: a body
-    /// of the program's own is not in the log.
+    /// [`Session::replay`] does for a scene. The builder must be filled as it was for that run, a body of the program's own is not
+    /// in the log. Devices may be left out, those of the log are used; where several are glued give any in their places, as
+    /// [`attach_node`](Self::attach_node) belongs to the one given last.
     ///
     /// # Errors
     /// As [`Session::replay`]; also [`ErrorKind::Log`](crate::ErrorKind::Log) if the log is one of another session.

@@ -86,7 +86,8 @@ pub(super) fn check_model(kind: Kind, scene: &Scene) -> Result<(), Error> {
         return Ok(());
     }
     let message = format!(
-        "is `full`, which is one model of the whole body, and the {} devices need one each: use another, such as          \"predictive\"",
+        "is `full`, which is one model of the whole body, and the {} devices need one each: use another, such as \
+         \"predictive\"",
         scene.devices.len()
     );
     Err(Error::scene("local.model", message))

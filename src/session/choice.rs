@@ -102,6 +102,7 @@ mod tests {
             nodes: 8000,
             cores: 2,
             error_pct: 1.0,
+            devices: 1,
             possible: Kind::ALL.to_vec(),
         }
     }

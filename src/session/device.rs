@@ -89,15 +89,21 @@ fn replayed(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dyn Device>
 }
 
 /// The first state and the samples of the tool in a log, as far as it is whole: of the device called `name` if the log has
-/// it, else of the first.
+/// several, where no name means the first.
 #[cfg(feature = "log")]
 fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<ReplayedSample>), Error> {
     let mut reader = LogReader::open(log)?;
+    let reader_place = reader.place().to_owned();
     let (mut number, mut first, mut samples) = (0, None, Vec::new());
     for entry in reader.by_ref() {
         match entry {
             LogEntry::Environment(environment) => {
-                let place = environment.devices.iter().position(|device| Some(device.as_str()) == name);
+                let devices = &environment.devices;
+                let place = devices.iter().position(|device| Some(device.as_str()) == name);
+                if let (None, Some(name), false) = (place, name, devices.is_empty()) {
+                    let message = format!("it has no device {name:?}, but {}", devices.join(" and "));
+                    return Err(Error::new(ErrorKind::Log, message).at(reader_place));
+                }
                 number = place.unwrap_or_default() as u16;
                 first = environment.first_tools.get(usize::from(number)).map(state);
             }

@@ -73,7 +73,8 @@ impl GlobalMaker {
     /// With the tools at `tools` (m).
     pub(super) fn new(simulation: Simulation, tools: &[Vec3], plan: GlobalPlan, side: GlobalSide) -> Self {
         let spare = simulation.duplicate();
-        let contact = |(tool, &position)| (ToolTick { tick: 0, position }, *simulation.contact(tool));
+        let contact =
+            |(tool, &position)| (ToolTick { tick: 0, position }, *simulation.contact(tool), simulation.force(tool));
         let tools = tools.iter().enumerate().map(contact).collect();
         let last = Checkpoint { tools, state: simulation.state().clone() };
         let saved = side.checkpoint.reader();
@@ -101,7 +102,7 @@ impl GlobalMaker {
         }
         let mut ports = self.side.take();
         ports.shared.build_cost = self.build_cost.take();
-        let tools: Vec<ToolTick> = self.last.tools.iter().map(|&(tool, _)| tool).collect();
+        let tools: Vec<ToolTick> = self.last.tools.iter().map(|&(tool, ..)| tool).collect();
         let simulation = match self.first.take() {
             Some(first) => first,
             None => self.restored()?,
@@ -113,8 +114,8 @@ impl GlobalMaker {
         let copy = self.spare.as_ref().and_then(Simulation::duplicate);
         let mut simulation = copy.ok_or_else(|| Error::new(ErrorKind::Fault, "the body cannot be copied"))?;
         simulation.state_mut().clone_from(&self.last.state);
-        for (tool, &(_, contact)) in self.last.tools.iter().enumerate() {
-            *simulation.contact_mut(tool) = contact;
+        for (tool, &(_, contact, force)) in self.last.tools.iter().enumerate() {
+            simulation.restore_tool(tool, contact, force);
         }
         Ok(simulation)
     }

@@ -67,8 +67,7 @@ impl ToolEnds {
 }
 
 pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
-    let first: Vec<DeviceState> =
-        prepared.tools.iter_mut().map(|tool| first_state(&mut *tool.device)).collect::<Result<_, _>>()?;
+    let first: Vec<DeviceState> = prepared.tools.iter_mut().map(first_of).collect::<Result<_, _>>()?;
     let places: Vec<Vec3> = first.iter().map(|state| state.position).collect();
     let environment = environment(&prepared, &first)?;
     let (sinks, memory) = sinks(&prepared, &environment)?;
@@ -262,6 +261,12 @@ fn first_tool((device, first): (u16, &DeviceState)) -> ToolSample {
         device,
         ..ToolSample::default()
     }
+}
+
+/// The first state of a tool's device, or why there is none.
+fn first_of(tool: &mut Tool) -> Result<DeviceState, Error> {
+    let Tool { name, device, .. } = tool;
+    first_state(&mut **device).map_err(|error| if name.is_empty() { error } else { error.at(&*name) })
 }
 
 /// The gains of each tool's coupling in words.

@@ -49,7 +49,8 @@ fn in_real_time(execution: Execution) -> Result<(), Error> {
 pub(super) fn paced(local: RateGroup, devices: &[DeviceSpec], execution: Execution) -> RateGroup {
     match (devices, execution) {
         ([DeviceSpec { kind: DeviceKind::Haply, haply: Some(spec), .. }], Execution::Threaded) => {
-            local.device_paced(Nanos::from_secs_f64(spec.watchdog_ms * 1e-3))
+            let watchdog = Nanos::from_secs_f64(spec.watchdog_ms * 1e-3).max(local.rate().period());
+            local.device_paced(watchdog)
         }
         _ => local,
     }

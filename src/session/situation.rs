@@ -43,6 +43,8 @@ pub(super) struct Situation {
     pub(super) nodes: usize,
     pub(super) cores: usize,
     pub(super) error_pct: f64,
+    /// Devices, with a local model each.
+    pub(super) devices: usize,
     /// The models that scene and body allow.
     pub(super) possible: Vec<Kind>,
 }
@@ -96,6 +98,7 @@ impl Situation {
             nodes: body.rest().len(),
             cores,
             error_pct: scene.local.error_pct,
+            devices: scene.devices.len(),
             possible,
         }
     }
@@ -105,7 +108,12 @@ impl Situation {
         OVERHEAD * f64::from(self.substeps) * self.evaluation.as_secs_f64()
     }
 
-    /// What a haptic tick of `kind` takes (s).
+    /// What a haptic tick takes with one model of `kind` for each device (s).
+    fn haptic_s(&self, kind: Kind) -> f64 {
+        self.devices as f64 * self.tick_s(kind)
+    }
+
+    /// What a haptic tick of one model of `kind` takes (s).
     fn tick_s(&self, kind: Kind) -> f64 {
         let substeps = if kind.is_linear() { self.substeps.min(MOST_EXPLICIT_STEPS) } else { self.substeps };
         match kind {
@@ -123,16 +131,17 @@ impl Situation {
             Kind::Predicted => run_ahead,
             Kind::Predictive => {
                 let reduced = f64::from(self.ahead_ticks) * self.tick_s(kind) + self.nodes as f64 * LAUNCH_S;
-                reduced + RUN_AHEAD * run_ahead
+                // While another tool presses there is no forecast.
+                reduced + if self.devices > 1 { run_ahead } else { RUN_AHEAD * run_ahead }
             }
             _ => 0.0,
         };
-        follow + ahead
+        follow + self.devices as f64 * ahead
     }
 
     /// How full the more burdened of its two periods is, against what it may take: it fits up to 1.
     pub(super) fn load(&self, kind: Kind) -> f64 {
-        let haptic = self.tick_s(kind) / self.haptic_period_s;
+        let haptic = self.haptic_s(kind) / self.haptic_period_s;
         let global = self.global_work_s(kind) / self.global_period_s;
         // The haptic thread takes a single core away from the global one.
         let shared = if self.cores > 1 { global / GLOBAL_SHARE } else { (haptic + global) / SINGLE_CORE_SHARE };
@@ -152,7 +161,7 @@ impl Situation {
 
     /// Why `kind` does not fit.
     pub(super) fn excess(&self, kind: Kind) -> String {
-        let (tick, work) = (self.tick_s(kind), self.global_work_s(kind));
+        let (tick, work) = (self.haptic_s(kind), self.global_work_s(kind));
         let name = kind.name();
         if tick > HAPTIC_SHARE * self.haptic_period_s {
             return format!("a tick of {name} would take {} of {}", short(tick), short(self.haptic_period_s));

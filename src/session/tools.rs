@@ -12,6 +12,8 @@ use crate::safety::Limits;
 use crate::safety::coupling::Design;
 use crate::scene::{DeviceSpec, SafetySpec, Scene, numbered};
 
+const _: () = assert!(crate::scene::MAX_DEVICES == crate::log::MAX_DEVICES as usize, "the log numbers every device");
+
 /// A tool before the start.
 #[derive(Debug)]
 pub(super) struct Tool {

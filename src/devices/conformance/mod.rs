@@ -8,7 +8,8 @@
 //! ```
 //!
 //! Each check takes a device of its own from the maker, drives it with times as a run would, and drops it. A real device
-//! moves: its tool must be free, or held by hand. Forces reach its limit for a few milliseconds of scheduled time.
+//! moves and is held by hand, never free: one that shortens forces above its limit exerts its whole limit for a quarter of a
+//! second of scheduled time.
 
 mod checks;
 

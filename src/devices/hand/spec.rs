@@ -33,7 +33,8 @@ pub struct PlantSpec {
     pub start_m: Option<[f64; 3]>,
     /// Step of the position that it tells (m); 0 for none.
     pub encoder_step_m: f64,
-    /// Cut-off of the low-pass filter over the differences of position that it tells as velocity (Hz); none if absent.
+    /// Cut-off of the low-pass filter over the differences of position that it tells as velocity (Hz); none if `None`. A scene
+    /// that leaves it out has 100.
     pub velocity_cutoff_hz: Option<f64>,
     /// From a command to the motors (ms). A delay on the way of the state has the same effect on a loop: add it.
     pub delay_ms: f64,

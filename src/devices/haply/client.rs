@@ -15,6 +15,8 @@ use crate::model::Vec3;
 use crate::time::Nanos;
 use std::time::{Duration, Instant};
 
+/// Replies that one look takes: the service sends one for each command, and few are under way.
+const MOST_PER_LOOK: usize = 64;
 /// Between two looks at the socket while a reply is waited for. The system's own timeouts of a blocking socket count in its
 /// ticks (asked for 2 ms, 12 ms passed at 250 Hz), which is too coarse for a force that has to be gone within three of ours.
 const LOOK_AGAIN: Duration = Duration::from_micros(20);
@@ -233,7 +235,8 @@ impl Haply {
     }
 
     fn receive(&mut self) {
-        while let Some(mut socket) = self.link.take() {
+        for _ in 0..MOST_PER_LOOK {
+            let Some(mut socket) = self.link.take() else { return };
             let lost = match socket.receive() {
                 Ok(false) => {
                     self.link = Some(socket);
@@ -252,6 +255,11 @@ impl Haply {
                 Err(broken) => Lost::Broken(broken),
             };
             self.lose(lost, socket);
+            return;
+        }
+        // Nobody has asked for so many.
+        if let Some(socket) = self.link.take() {
+            self.lose(Lost::Garbage, socket);
         }
     }
 
@@ -263,6 +271,7 @@ impl Haply {
         self.counts.lost += self.pulse.waiting() as u64;
         self.pulse = Pulse::new(self.options.period);
         self.commanded = [0.0; 3];
+        self.watch.expect(None);
         self.links.lose(why, socket);
     }
 

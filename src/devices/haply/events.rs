@@ -1,7 +1,7 @@
 //! The events channel: a thread of its own that reads, says what happened and passes on what the tick must know.
 
 use super::guard::News;
-use super::protocol;
+use super::protocol::{self, Notice};
 use super::websocket::WebSocket;
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
 use std::io;
@@ -71,8 +71,9 @@ impl Listener {
                     Err(why) => break why,
                 }
             };
-            warn!("haply: the events channel at {} {why}: no force until it is back", self.address);
+            // First the tick, then the words: whoever reads these may keep this thread waiting.
             self.tell(News::ChannelLost);
+            warn!("haply: the events channel at {} {why}: no force until it is back", self.address);
             socket = loop {
                 std::thread::sleep(RETRY);
                 if self.is_stopped() {
@@ -82,8 +83,8 @@ impl Listener {
                     break socket;
                 }
             };
-            warn!("haply: the events channel at {} is back", self.address);
             self.tell(News::ChannelBack);
+            warn!("haply: the events channel at {} is back", self.address);
         }
     }
 
@@ -95,11 +96,15 @@ impl Listener {
         let text = String::from_utf8_lossy(message);
         match protocol::notice(message, &self.device) {
             Ok(Some(notice)) => {
-                warn!("haply: device {}: {notice:?}: {text}", self.device);
                 self.tell(News::Of(notice));
+                warn!("haply: device {}: {notice:?}: {text}", self.device);
             }
             Ok(None) => debug!("haply: {text}"),
-            Err(_) => warn!("haply: the events channel sent what is no event: {text:.80}"),
+            Err(_) => {
+                // It may have been one that concerns safety.
+                self.tell(News::Of(Notice::UnknownSafety));
+                warn!("haply: the events channel sent what is no event, no force for now: {text:.80}");
+            }
         }
     }
 

@@ -1,6 +1,8 @@
 //! The opening handshake of RFC 6455, both sides: one HTTP request, one answer, and a digest that proves that both speak it.
 
+use super::websocket::PATIENCE;
 use std::io::{self, Read, Write};
+use std::time::Instant;
 
 /// The string of RFC 6455, section 1.3.
 const MAGIC: &[u8] = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
@@ -45,8 +47,9 @@ pub(super) fn answer(stream: &mut (impl Read + Write)) -> io::Result<()> {
 fn head(stream: &mut impl Read) -> io::Result<String> {
     let mut head = Vec::new();
     let mut byte = [0];
+    let until = Instant::now() + PATIENCE;
     while !head.ends_with(b"\r\n\r\n") {
-        if head.len() >= MAX_HEAD {
+        if head.len() >= MAX_HEAD || Instant::now() > until {
             return Err(refused("its HTTP head has no end".to_owned()));
         }
         stream.read_exact(&mut byte)?;

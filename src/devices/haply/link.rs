@@ -75,9 +75,9 @@ impl Links {
         std::thread::Builder::new().name("haply-link".to_owned()).spawn(move || {
             // Ends with the tick's side: then there is nobody to lose a connection.
             for (why, mut socket) in &losses {
-                warn!("haply: the service at {address} {why}: the force is zero, reconnecting");
-                // For every writer on it.
+                // For every writer on it; then the words, which may have to wait for a reader.
                 socket.close();
+                warn!("haply: the service at {address} {why}: the force is zero, reconnecting");
                 if !reconnect(&address, &device, &losses, &sender, &watch) {
                     return;
                 }

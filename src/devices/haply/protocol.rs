@@ -95,17 +95,20 @@ fn inverse(json: &mut Json<'_>, id: &str) -> Result<Option<Inverse>, Malformed> 
             Ok(())
         }),
         b"status" => {
-            let mut found = Inverse { is_calibrated: true, is_ready: true, is_powered: true, ..Inverse::default() };
+            // What is not said is not so; only a device without a supply of its own need not speak of it.
+            let mut found = Inverse { is_powered: true, ..Inverse::default() };
+            let (mut is_ready, mut is_started) = (false, false);
             json.object(|json, key| {
                 match key {
                     b"calibrated" => found.is_calibrated = json.boolean()?,
-                    b"ready" | b"started" => found.is_ready &= json.boolean()?,
+                    b"ready" => is_ready = json.boolean()?,
+                    b"started" => is_started = json.boolean()?,
                     b"power_supply" => found.is_powered = json.boolean()?,
                     _ => json.skip()?,
                 }
                 Ok(())
             })?;
-            found.is_ready &= found.is_calibrated;
+            found.is_ready = is_ready && is_started && found.is_calibrated;
             found.is_powered &= found.is_ready;
             status = Some(found);
             Ok(())
@@ -286,7 +289,8 @@ mod tests {
     fn another_device_is_not_ours_and_half_a_frame_is_none() {
         assert_eq!(reply(STATE.as_bytes(), "FFFF").unwrap().device, None);
         let other = reply(STATE.as_bytes(), "04C3").unwrap().device.unwrap();
-        assert!(other.is_calibrated && !other.is_ready && !other.is_powered, "{other:?}");
+        // What its status does not say is not so.
+        assert!(!other.is_calibrated && !other.is_ready && !other.is_powered, "{other:?}");
         for length in 0..STATE.len() {
             assert!(reply(&STATE.as_bytes()[..length], "049D").is_err(), "{length}");
         }

@@ -8,11 +8,15 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
+/// The body of a control frame has no more [bytes].
+const MAX_CONTROL: usize = 125;
+/// A receiver that has taken so many frames and has no message is being kept busy.
+const MOST_FRAMES: u32 = 64;
 /// Longest message: an inventory of many devices has some ten kilobytes.
 const MAX_MESSAGE: usize = 64 * 1024;
 
 /// For connecting and for the handshake; never in a tick.
-const PATIENCE: Duration = Duration::from_secs(2);
+pub(super) const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Why a connection is of no use any more. `Copy`, so that a tick can pass it on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -164,8 +168,9 @@ impl WebSocket {
 
     /// Receives one message; false if there is none yet.
     pub(super) fn receive(&mut self) -> Result<bool, Broken> {
+        let mut frames = 0;
         loop {
-            if self.next_frame()? {
+            if self.next_frame(&mut frames)? {
                 return Ok(true);
             }
             if self.start > 0 {
@@ -189,12 +194,16 @@ impl WebSocket {
         &self.message
     }
 
-    /// Takes frames out of the input; true at the end of a message.
-    fn next_frame(&mut self) -> Result<bool, Broken> {
+    /// Takes frames out of the input and counts them; true at the end of a message.
+    fn next_frame(&mut self, frames: &mut u32) -> Result<bool, Broken> {
         while let Some((opcode, is_last, header, length)) = self.header()? {
             let body = self.start + header..self.start + header + length;
             if body.end > self.end {
                 return Ok(false);
+            }
+            *frames += 1;
+            if *frames > MOST_FRAMES {
+                return Err(Broken::Protocol("too many frames without a message"));
             }
             if self.mask.is_none() {
                 let key = &self.input[body.start - 4..body.start];
@@ -254,6 +263,10 @@ impl WebSocket {
         };
         if length > MAX_MESSAGE {
             return Err(Broken::Protocol("a message is too long"));
+        }
+        // RFC 6455, 5.5.
+        if first & 0x08 != 0 && (length > MAX_CONTROL || first & 0x80 == 0) {
+            return Err(Broken::Protocol("a control frame is too long or in parts"));
         }
         let header = header + if is_masked { 4 } else { 0 };
         Ok(Some((first & 0x0f, first & 0x80 != 0, header, length)))

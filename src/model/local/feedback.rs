@@ -112,13 +112,17 @@ impl PatchGeometry {
         self.state.is_finite() && self.contact.weights.iter().all(|w| w.is_finite())
     }
 
-    /// Puts the nodes and the contact in place of the global model's own of `tool`.
+    /// Puts the nodes and the contact in place of the global model's own of `tool`. What another tool touches is that tool's:
+    /// this patch knows it as a force alone.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
     pub fn write_to(&self, global: &mut Simulation, tool: usize) {
-        let state = global.state_mut();
         for ((&node, x), v) in self.nodes.iter().zip(&self.state.positions).zip(&self.state.velocities) {
+            if global.exerted_beside(tool).any(|(touched, _)| touched == node) {
+                continue;
+            }
+            let state = global.state_mut();
             state.positions[node as usize] = *x;
             state.velocities[node as usize] = *v;
         }

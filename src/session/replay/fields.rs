@@ -65,12 +65,13 @@ fn fields(record: &LogRecord) -> Vec<(&'static str, u64)> {
 /// A sample in one line.
 pub(super) fn in_words(record: &LogRecord) -> String {
     let t = record.time().as_secs_f64();
+    let whose = if record.device() > 0 { format!("device {}, ", record.device()) } else { String::new() };
     match record {
         LogRecord::Force(r) => format!(
-            "{:?} N (t = {t} s, model {}, age {:?} s, energy {:?} J)",
+            "{:?} N ({whose}t = {t} s, model {}, age {:?} s, energy {:?} J)",
             r.force_n, r.model_version, r.model_age_s, r.energy_j
         ),
-        LogRecord::Command(r) => format!("{:?} N (t = {t} s, limits {})", r.force_n, r.limits),
+        LogRecord::Command(r) => format!("{:?} N ({whose}t = {t} s, limits {})", r.force_n, r.limits),
         other => format!("{other:?}"),
     }
 }

@@ -14,10 +14,10 @@ use std::time::Duration;
 
 use super::Session;
 use super::prepare::{Parts, as_run, prepare};
-use crate::devices::{Capabilities, Device, DeviceState, Replayed, ReplayedSample};
+use crate::devices::{Capabilities, Device, DeviceState, Hand, Replayed, ReplayedSample, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::runtime::{Execution, Recording, RuntimeReport};
-use crate::scene::{DeviceSpec, ModelChoice};
+use crate::scene::{DeviceKind, DeviceSpec, ModelChoice};
 use crate::time::Nanos;
 use compare::End;
 use cut::Cut;
@@ -79,11 +79,12 @@ impl Replay {
             parts.scene.local.model = logged.scene.local.model;
         }
         let device = |(spec, (first, samples)): (&DeviceSpec, (DeviceState, Vec<ReplayedSample>))| {
-            let known = spec.profile.capabilities();
+            let known = capabilities(spec)?;
             let capabilities = Capabilities { max_force_n: max_force_n.unwrap_or(known.max_force_n), ..known };
-            (spec.name.clone(), Box::new(Replayed::new(first, samples, capabilities)) as Box<dyn Device>)
+            Ok((spec.name.clone(), Box::new(Replayed::new(first, samples, capabilities)) as Box<dyn Device>))
         };
-        parts.devices = logged.scene.devices.iter().zip(logged.tools).map(device).collect();
+        let devices = logged.scene.devices.iter().zip(logged.tools).map(device).collect::<Result<_, Error>>();
+        parts.devices = devices.map_err(|error| error.at(&place))?;
         parts.is_replay = true;
         parts.execution = Execution::Virtual;
         // How far models reach ahead, and the bases that were wished for, are part of the recording.
@@ -128,6 +129,19 @@ impl Replay {
         }
         Ok(report(&self.comparison, self.ends[1], self.cut, running.stop().runtime))
     }
+}
+
+/// What the device of `spec` said that it can do; of a program's own, what its profile says.
+fn capabilities(spec: &DeviceSpec) -> Result<Capabilities, Error> {
+    let of_profile = spec.profile.capabilities();
+    Ok(match (spec.kind, &spec.haply) {
+        (DeviceKind::Hand, _) => {
+            let path = ToolPath::constant([0.0; 3])?;
+            Hand::new(path, spec.plant.clone(), spec.hand.clone(), of_profile)?.capabilities()
+        }
+        (DeviceKind::Haply, Some(haply)) => Capabilities { max_force_n: haply.max_force_n, ..Capabilities::default() },
+        _ => of_profile,
+    })
 }
 
 fn report(comparison: &Comparison, end: Nanos, cut: Option<Cut>, mut runtime: RuntimeReport) -> ReplayReport {
