@@ -5,6 +5,6 @@ need_component clippy clippy
 cargo clippy --locked --all-targets --all-features -- -D warnings
 cargo clippy --locked --all-targets --no-default-features -- -D warnings
 # Tests and examples have no code of their own for the sets in between; library and program have.
-for features in scene log scene,log cli parallel; do
+for features in scene log cli; do
     cargo clippy --locked --lib --bins --no-default-features --features "$features" -- -D warnings
 done

@@ -381,14 +381,14 @@ fn run_all(seeds: std::ops::Range<u64>, with_controller: bool) -> [usize; 2] {
 
 #[test]
 fn no_scene_makes_a_force_that_is_not_finite_too_large_too_fast_or_gives_out_energy() {
-    let [energy, bounded] = run_all(0..400, true);
+    let [energy, bounded] = run_all(0..200, true);
     assert_eq!(energy, bounded);
 }
 
 /// Check that the bound of the energy can be broken: the same scenes without the controller do.
 #[test]
 fn without_the_controller_some_of_the_same_scenes_give_out_more() {
-    let [energy, bounded] = run_all(0..400, false);
+    let [energy, bounded] = run_all(0..200, false);
     assert!(bounded < energy, "{bounded} of {energy}");
 }
 

@@ -91,10 +91,9 @@ fn tools_can_be_given_in_any_order() {
     assert!(felt > 1.0, "the tools are to feel each other through the body: {felt} %");
 }
 
-/// The errors of both tools, in % of each one's peak, one period late.
-fn errors(model: LocalModelKind, late_ms: f64) -> [ModelError; 2] {
+/// The errors of both tools, in % of each one's peak.
+fn errors(model: LocalModelKind, late_ms: f64, references: &[ForceTrace; 2]) -> [ModelError; 2] {
     let summary = run(builder(model, late_ms));
-    let references = reference([drag_path, press_path]).map(|forces| trace(&forces));
     [0, 1].map(|device: u16| {
         let forces = ForceTrace::of_device(&summary.records, device);
         assert_eq!(forces.forces_n.len(), TICKS as usize);
@@ -106,12 +105,13 @@ fn errors(model: LocalModelKind, late_ms: f64) -> [ModelError; 2] {
 
 #[test]
 fn each_tool_has_a_local_model_that_knows_of_the_other() {
+    let references = reference([drag_path, press_path]).map(|forces| trace(&forces));
     for (late_ms, rms, max) in [(0.0, 0.2, 2.0), (33.34, 0.8, 5.0)] {
-        for error in errors(LocalModelKind::Predictive, late_ms) {
+        for error in errors(LocalModelKind::Predictive, late_ms, &references) {
             assert!(error.rms < rms && error.max < max, "{late_ms} ms late: {error:?}");
         }
     }
-    for error in errors(LocalModelKind::Patch, 33.34) {
+    for error in errors(LocalModelKind::Patch, 33.34, &references) {
         assert!(error.rms < 15.0, "{error:?}");
     }
 }
