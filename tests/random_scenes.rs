@@ -6,6 +6,8 @@
 //! `cargo test --release --test random_scenes -- --ignored --nocapture`.
 #![cfg(feature = "scene")]
 
+mod random;
+
 use std::sync::{Arc, Mutex};
 
 use palpate::Session;
@@ -23,39 +25,10 @@ use palpate::scene::{
     SafetyStage, Scene,
 };
 use palpate::time::Nanos;
+use random::Random;
 
 /// After so long nobody knows what the device did, and the force starts from zero (s).
 const GAP_S: f64 = 0.1;
-
-/// SplitMix64: a scene is its seed.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    /// Evenly over the decades.
-    fn sized(&mut self, low: f64, high: f64) -> f64 {
-        low * (high / low).powf(self.next())
-    }
-
-    fn chance(&mut self, probability: f64) -> bool {
-        self.next() < probability
-    }
-
-    fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
-        all[(self.next() * all.len() as f64) as usize]
-    }
-}
 
 /// What came to the device, and what it did with it.
 #[derive(Debug, Default)]

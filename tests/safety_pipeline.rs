@@ -1,8 +1,11 @@
 //! The safety pipeline over random inputs: limits, energy, and that nothing is done in silence. Pure functions of state and
 //! counted time: no session, no threads.
 
+mod random;
+
 use palpate::safety::{Actions, DeviceLimits, Input, Limits, Pipeline, Request, ToolSpeed};
 use proptest::prelude::*;
+use random::Random;
 
 type V3 = [f64; 3];
 
@@ -12,31 +15,6 @@ fn norm(v: V3) -> f64 {
 
 fn dot(a: V3, b: V3) -> f64 {
     (0..3).map(|i| a[i] * b[i]).sum()
-}
-
-/// SplitMix64: a case is its seed.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn chance(&mut self, probability: f64) -> bool {
-        self.next() < probability
-    }
-
-    fn vector(&mut self, size: f64) -> V3 {
-        std::array::from_fn(|_| self.within(-size, size))
-    }
 }
 
 /// What computes the force.

@@ -94,7 +94,7 @@ pub fn sheet() -> Result<Sheet, Error> {
             .to_owned(),
         legend,
         rows: vec![
-            vec![panel("every safety stage off", 0.0..2.4, whole)],
+            vec![panel("every safety stage off that can be", 0.0..2.4, whole)],
             vec![panel("the same without hold, after the release", 0.95..2.4, closer)],
             vec![panel(
                 "hold with the safety defaults: the passivity controller bounds it",

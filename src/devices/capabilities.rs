@@ -55,6 +55,14 @@ impl Capabilities {
     /// Force Dimension omega.3.
     pub const OMEGA_3: Self = Self::of_table(12.0, 5000.0, 30.0, 0.075);
 
+    /// A device of which only the largest force is known (N): the rest is [`default`](Self::default)'s.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn of_force(max_force_n: f64) -> Self {
+        Self { max_force_n, ..Self::default() }
+    }
+
     const fn of_table(max_force_n: f64, stiffness: f64, damping: f64, radius_m: f64) -> Self {
         Self {
             degrees_of_freedom: 3,

@@ -30,7 +30,7 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
 }
 
 fn name(index: usize, device: &DeviceSpec, devices: &[DeviceSpec]) -> Result<(), Error> {
-    let field = format!("device[{index}].name");
+    let field = format!("{}.name", field(index, devices.len()));
     let Some(name) = &device.name else {
         return Err(Error::scene(
             &field,
@@ -51,7 +51,12 @@ fn name(index: usize, device: &DeviceSpec, devices: &[DeviceSpec]) -> Result<(),
 
 /// `error` about `device`, which is the `index`-th of `devices`: with its number if there are several.
 pub(crate) fn numbered(error: Error, index: usize, devices: &[DeviceSpec]) -> Error {
-    if devices.len() < 2 { error } else { error.with_place_of("device", &format!("device[{index}]")) }
+    error.with_place_of("device", &field(index, devices.len()))
+}
+
+/// Where the `index`-th of `count` devices stands in a scene: its number is given if there are several.
+pub(crate) fn field(index: usize, count: usize) -> String {
+    if count < 2 { "device".to_owned() } else { format!("device[{index}]") }
 }
 
 /// One table `[device]`, or several `[[device]]`.

@@ -7,7 +7,7 @@ use toml::de::DeTable;
 use super::fault::{Fault, plain_key};
 use super::locate::{exact_offset_of, line_of, offset_of, table_at};
 use super::validate_device::tool;
-use super::{Scene, ToolPath, numbered, reader};
+use super::{Scene, ToolPath, device_field, numbered, reader};
 use crate::error::{Error, ErrorKind};
 
 impl Scene {
@@ -56,10 +56,10 @@ impl Scene {
             return Err(on_line(Error::scene("body", message), 0));
         }
         scene.source = Some(text.to_owned());
-        let several = scene.devices.len() > 1;
+        let count = scene.devices.len();
         for (index, device) in scene.devices.iter_mut().enumerate() {
             let Some(path_csv) = &device.path_csv else { continue };
-            let field = if several { format!("device[{index}].path_csv") } else { "device.path_csv".to_owned() };
+            let field = format!("{}.path_csv", device_field(index, count));
             let read = read_path(path_csv).map_err(|error| match error.kind() {
                 // A file that is there but wrong has a line of its own to name.
                 ErrorKind::Io => on_line(error.at(&field), offset_of(root, &field)),

@@ -42,7 +42,7 @@ pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub use device_fault::{FaultKind, FaultSpec};
-pub(crate) use devices::{MAX_DEVICES, numbered};
+pub(crate) use devices::{MAX_DEVICES, field as device_field, numbered};
 pub use haply::HaplySpec;
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
 pub use safety::{SafetySpec, SafetyStage};

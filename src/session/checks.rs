@@ -6,7 +6,7 @@ use crate::model::Vec3;
 use crate::model::body::Body;
 use crate::model::local::Kind;
 use crate::safety::Limits;
-use crate::scene::Scene;
+use crate::scene::{Scene, device_field};
 
 /// Limits and gains follow from what the device says, so it must be possible; its largest force is [`check_ramp`]'s.
 pub(super) fn check_capabilities(capabilities: Capabilities, limits: &Limits) -> Result<(), Error> {
@@ -56,10 +56,7 @@ pub(super) fn check_body(body: &dyn Body) -> Result<(), Error> {
 
 pub(super) fn check_nodes(body: &dyn Body, attached: &[Option<u32>], probes: &[u32]) -> Result<(), Error> {
     let nodes = body.rest().len();
-    let field = |index: usize| match attached.len() {
-        1 => "device.attach_node".to_owned(),
-        _ => format!("device[{index}].attach_node"),
-    };
+    let field = |index: usize| format!("{}.attach_node", device_field(index, attached.len()));
     let glued = || attached.iter().enumerate().filter_map(|(index, node)| Some((field(index), (*node)?)));
     for (field, node) in glued().chain(probes.iter().map(|&node| ("probe".to_owned(), node))) {
         if node as usize >= nodes {

@@ -148,19 +148,7 @@ impl Device for Hand {
     }
 
     fn capabilities(&self) -> Capabilities {
-        // Of the plant what it has, of the rest what the profile says.
-        let known = |value: f64| Some(value).filter(|value| *value > 0.0);
-        let (plant, profile) = (&self.plant, self.capabilities);
-        let degrees_of_freedom =
-            [Axis::X, Axis::Y, Axis::Z].iter().filter(|axis| self.plant.axes.contains(axis)).count();
-        Capabilities {
-            degrees_of_freedom: degrees_of_freedom as u8,
-            position_resolution_m: known(plant.encoder_step_m).or(profile.position_resolution_m),
-            damping_n_s_per_m: known(plant.damping_n_s_per_m).or(profile.damping_n_s_per_m),
-            friction_n: known(plant.friction_n).or(profile.friction_n),
-            delay_s: known(1e-3 * (plant.delay_ms + plant.jitter_ms)).or(profile.delay_s),
-            ..profile
-        }
+        self.plant.capabilities(self.capabilities)
     }
 
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {

@@ -1,5 +1,7 @@
 //! The parameters of a simulated device and of the hand that holds it.
 
+use super::super::Capabilities;
+
 /// What is wrong with a parameter: its name and what would be right.
 pub(crate) type SpecFault = (&'static str, String);
 
@@ -72,6 +74,23 @@ const LONGEST_DELAY_MS: f64 = 100.0;
 const STEP_MS: std::ops::RangeInclusive<f64> = 0.001..=10.0;
 
 impl PlantSpec {
+    /// What such a device can do: of the plant what it has, of the rest what `profile` says.
+    ///
+    /// # Real-time
+    /// Not called in a tick.
+    pub fn capabilities(&self, profile: Capabilities) -> Capabilities {
+        let known = |value: f64| Some(value).filter(|value| *value > 0.0);
+        let degrees_of_freedom = [Axis::X, Axis::Y, Axis::Z].iter().filter(|axis| self.axes.contains(axis)).count();
+        Capabilities {
+            degrees_of_freedom: degrees_of_freedom as u8,
+            position_resolution_m: known(self.encoder_step_m).or(profile.position_resolution_m),
+            damping_n_s_per_m: known(self.damping_n_s_per_m).or(profile.damping_n_s_per_m),
+            friction_n: known(self.friction_n).or(profile.friction_n),
+            delay_s: known(1e-3 * (self.delay_ms + self.jitter_ms)).or(profile.delay_s),
+            ..profile
+        }
+    }
+
     pub(crate) fn fault(&self) -> Option<SpecFault> {
         let not_negative = [
             ("damping_n_s_per_m", self.damping_n_s_per_m),

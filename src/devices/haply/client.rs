@@ -362,7 +362,7 @@ impl Device for Haply {
 
     fn capabilities(&self) -> Capabilities {
         // No source names more: the service has no pace of its own for its clients, and the pages no limits.
-        Capabilities { max_force_n: self.options.max_force_n, ..Capabilities::default() }
+        Capabilities::of_force(self.options.max_force_n)
     }
 
     fn calibration(&self) -> Calibration {

@@ -11,6 +11,7 @@ use super::super::implicit::ImplicitStep;
 use super::super::simulation::Stepping;
 use super::super::tangent::{Drift, PatchTangent};
 use super::feedback::{Feedback, PatchGeometry};
+use super::felt::Felt;
 use super::stable::stable_stepping;
 use super::window::Window;
 use super::{Kind, LocalModel, ResyncView, Watched};
@@ -78,9 +79,7 @@ pub struct LinearPatch<B> {
     /// Ticks since then.
     ticks: u32,
     is_implicit: bool,
-    /// Of the last tick whose contact was inside the patch (N).
-    force: Vec3,
-    has_left: bool,
+    felt: Felt,
     watched: Watched,
 }
 
@@ -105,8 +104,7 @@ impl<B: Boundary> LinearPatch<B> {
             built_at: 0,
             ticks: 0,
             is_implicit: false,
-            force: Vec3::zeros(),
-            has_left: false,
+            felt: Felt::default(),
             watched: Watched::default(),
         }
     }
@@ -179,7 +177,7 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
         self.contact = window.localised(global.contact(resync.index));
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
         self.ticks = 0;
-        (self.has_left, self.force) = (false, global.force(resync.index));
+        self.felt = Felt::new(global.force(resync.index));
         (self.stepping, self.is_implicit) =
             stable_stepping(self.spec.is_implicit, &self.tangent, &self.inverse_masses, self.stepping, &self.law);
         if self.is_implicit {
@@ -190,8 +188,8 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-        if self.has_left {
-            return self.force;
+        if let Some(force) = self.felt.held() {
+            return force;
         }
         let (stepping, mut t) = (self.stepping, 0.0);
         let force = stepping.tick(tool, |tool, d| {
@@ -203,15 +201,7 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
         if self.ticks == self.boundary.moving_ticks() {
             self.state.velocities[self.window.movable..].fill(Vec3::zeros());
         }
-        // A state that is not finite touches nothing: its zero force would look like a free tool.
-        if !self.state.is_finite() {
-            return Vec3::repeat(f64::NAN);
-        }
-        self.has_left = self.window.has_left(&self.contact);
-        if !self.has_left {
-            self.force = force;
-        }
-        self.force
+        self.felt.after(force, &self.state, self.window.has_left(&self.contact))
     }
 
     fn built_at(&self) -> u64 {
@@ -219,7 +209,7 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
     }
 
     fn serves_as(&self) -> Kind {
-        if self.has_left { Kind::Hold } else { B::KIND }
+        if self.felt.held().is_some() { Kind::Hold } else { B::KIND }
     }
 
     fn catches_up(&self) -> bool {
@@ -247,7 +237,7 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
         geometry.contact = self.contact();
         match self.spec.feedback {
             // What has left is as it was then.
-            _ if self.has_left => return false,
+            _ if self.felt.held().is_some() => return false,
             Feedback::Trajectory => return false,
             Feedback::Geometry => (0..self.window.movable).for_each(|place| self.add_to(geometry, place)),
             Feedback::ContactNodes => {

@@ -3,6 +3,7 @@
 mod aim;
 mod condensed;
 mod feedback;
+mod felt;
 mod full;
 mod hold;
 mod kind;

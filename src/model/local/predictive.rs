@@ -7,6 +7,7 @@ use super::super::body::State;
 use super::super::contact::{Contact, Deformable, Law, ToolMotion, step};
 use super::super::simulation::Stepping;
 use super::super::surroundings::{Basis, ReducedMotion, SpringGraph};
+use super::felt::Felt;
 use super::near::NearSprings;
 use super::ring_path::RingPath;
 use super::window::Window;
@@ -60,9 +61,7 @@ pub struct Predictive {
     law: Law,
     stepping: Stepping,
     built_at: u64,
-    /// Of the last tick whose contact was inside the patch (N).
-    force: Vec3,
-    has_left: bool,
+    felt: Felt,
     watched: Watched,
     /// The global model's present while it looks ahead.
     present: State,
@@ -95,8 +94,7 @@ impl Predictive {
             law: Law::default(),
             stepping: Stepping { tick: 1e-3, substeps: 1 },
             built_at: 0,
-            force: Vec3::zeros(),
-            has_left: false,
+            felt: Felt::default(),
             watched: Watched::default(),
             present: State::default(),
         }
@@ -115,7 +113,7 @@ impl Predictive {
         self.state.velocities[window.movable + window.ring..].fill(Vec3::zeros());
         self.contact = window.localised(global.contact(resync.index));
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
-        (self.substep, self.has_left, self.force) = (0, false, global.force(resync.index));
+        (self.substep, self.felt) = (0, Felt::new(global.force(resync.index)));
     }
 
     /// Finds the ring's path: by the forecast of the surroundings where it holds the present motion, or else by running
@@ -277,20 +275,12 @@ impl LocalModel for Predictive {
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-        if self.has_left {
-            return self.force;
+        if let Some(force) = self.felt.held() {
+            return force;
         }
         let stepping = self.stepping;
         let force = stepping.tick(tool, |tool, d| self.substep(tool, d));
-        // A state that is not finite touches nothing: its zero force would look like a free tool.
-        if !self.state.is_finite() {
-            return Vec3::repeat(f64::NAN);
-        }
-        self.has_left = self.window.has_left(&self.contact);
-        if !self.has_left {
-            self.force = force;
-        }
-        self.force
+        self.felt.after(force, &self.state, self.window.has_left(&self.contact))
     }
 
     fn built_at(&self) -> u64 {
@@ -299,7 +289,7 @@ impl LocalModel for Predictive {
 
     fn serves_as(&self) -> Kind {
         match &self.basis {
-            _ if self.has_left => Kind::Hold,
+            _ if self.felt.held().is_some() => Kind::Hold,
             None => Kind::Predicted,
             Some(_) => Kind::Predictive,
         }

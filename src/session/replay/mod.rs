@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use super::Session;
 use super::prepare::{Parts, as_run, prepare};
-use crate::devices::{Capabilities, Device, DeviceState, Hand, Replayed, ReplayedSample, ToolPath};
+use crate::devices::{Capabilities, Device, DeviceState, Replayed, ReplayedSample};
 use crate::error::{Error, ErrorKind};
 use crate::runtime::{Execution, Recording, RuntimeReport};
 use crate::scene::{DeviceKind, DeviceSpec, ModelChoice};
@@ -79,12 +79,11 @@ impl Replay {
             parts.scene.local.model = logged.scene.local.model;
         }
         let device = |(spec, (first, samples)): (&DeviceSpec, (DeviceState, Vec<ReplayedSample>))| {
-            let known = capabilities(spec)?;
+            let known = capabilities(spec);
             let capabilities = Capabilities { max_force_n: max_force_n.unwrap_or(known.max_force_n), ..known };
-            Ok((spec.name.clone(), Box::new(Replayed::new(first, samples, capabilities)) as Box<dyn Device>))
+            (spec.name.clone(), Box::new(Replayed::new(first, samples, capabilities)) as Box<dyn Device>)
         };
-        let devices = logged.scene.devices.iter().zip(logged.tools).map(device).collect::<Result<_, Error>>();
-        parts.devices = devices.map_err(|error| error.at(&place))?;
+        parts.devices = logged.scene.devices.iter().zip(logged.tools).map(device).collect();
         parts.is_replay = true;
         parts.execution = Execution::Virtual;
         // How far models reach ahead, and the bases that were wished for, are part of the recording.
@@ -132,16 +131,13 @@ impl Replay {
 }
 
 /// What the device of `spec` said that it can do; of a program's own, what its profile says.
-fn capabilities(spec: &DeviceSpec) -> Result<Capabilities, Error> {
+fn capabilities(spec: &DeviceSpec) -> Capabilities {
     let of_profile = spec.profile.capabilities();
-    Ok(match (spec.kind, &spec.haply) {
-        (DeviceKind::Hand, _) => {
-            let path = ToolPath::constant([0.0; 3])?;
-            Hand::new(path, spec.plant.clone(), spec.hand.clone(), of_profile)?.capabilities()
-        }
-        (DeviceKind::Haply, Some(haply)) => Capabilities { max_force_n: haply.max_force_n, ..Capabilities::default() },
+    match (spec.kind, &spec.haply) {
+        (DeviceKind::Hand, _) => spec.plant.capabilities(of_profile),
+        (DeviceKind::Haply, Some(haply)) => Capabilities::of_force(haply.max_force_n),
         _ => of_profile,
-    })
+    }
 }
 
 fn report(comparison: &Comparison, end: Nanos, cut: Option<Cut>, mut runtime: RuntimeReport) -> ReplayReport {
