@@ -187,6 +187,7 @@ impl LoggerActor {
         if let Some(grant) = self.grants.get() {
             self.grants_known = true;
             self.environment.granted = granted(&grant);
+            self.environment.pin_groups(&grant.groups);
             self.analysis.set_environment(&self.environment);
             self.sink.environment(&self.environment);
         }

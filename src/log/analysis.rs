@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use super::entry::LogEntry;
 use super::environment::{Environment, Execution};
 use super::event::{Level, TextEvent};
-use super::group::{GroupCounter, GroupReport};
+use super::group::{GroupCounter, GroupReport, TickFigures};
 use super::haptics::{DeviceReport, HapticsCounter};
 use super::records::LogRecord;
-use crate::runtime::record::Event;
+use crate::runtime::record::{Event, TickTiming};
 use crate::time::Nanos;
 
 /// Events that a report lists; the others are only counted.
@@ -112,7 +112,11 @@ impl Analysis {
             LogRecord::Command(r) => self.device(record).push_command(r),
             LogRecord::Contact(r) => self.device(record).push_contact(r),
             LogRecord::Resync(r) => self.device(record).push_resync(r),
-            LogRecord::Tool(_) | LogRecord::Global(_) | LogRecord::Port(_) | LogRecord::Probe(_) => {}
+            LogRecord::Actors(_)
+            | LogRecord::Tool(_)
+            | LogRecord::Global(_)
+            | LogRecord::Port(_)
+            | LogRecord::Probe(_) => {}
         }
     }
 
@@ -150,14 +154,32 @@ impl Analysis {
         self.groups.entry(group).or_default().set_lost(total);
     }
 
-    /// What has been found so far.
-    pub fn report(&self) -> RunReport {
-        // Groups that the environment promised and that never ran are part of the report.
+    /// What the run is about, if it is known.
+    pub(super) fn environment(&self) -> Option<&Environment> {
+        self.environment.as_ref()
+    }
+
+    /// The figures of a release that is pushed next.
+    pub(super) fn figures(&self, timing: &TickTiming) -> TickFigures {
+        self.groups
+            .get(&timing.group)
+            .map_or_else(|| GroupCounter::default().figures(timing), |group| group.figures(timing))
+    }
+
+    /// The groups that have records and those that the environment promised: they are part of a report though they never
+    /// ran.
+    pub(super) fn groups(&self) -> BTreeMap<u16, GroupCounter> {
         let promised = self.environment.as_ref().map_or(0, |environment| environment.groups.len());
         let mut groups = self.groups.clone();
         for group in 0..u16::try_from(promised).unwrap_or(u16::MAX) {
             groups.entry(group).or_default();
         }
+        groups
+    }
+
+    /// What has been found so far.
+    pub fn report(&self) -> RunReport {
+        let groups = self.groups();
         let unknown = Environment::default();
         let environment = self.environment.as_ref().unwrap_or(&unknown);
         let rate = |group: u16| environment.groups.get(usize::from(group)).map(|info| info.rate_hz);
@@ -258,7 +280,7 @@ mod tests {
         let mut analysis = Analysis::default();
         analysis.set_environment(&Environment {
             limit_stages: vec!["finite".into(), "clamp".into()],
-            groups: vec![GroupInfo { name: "haptic".into(), rate_hz: 1000.0, background: false }],
+            groups: vec![GroupInfo::new("haptic", 1000.0)],
             ..Environment::default()
         });
         for n in 1..=100_u64 {

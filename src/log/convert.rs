@@ -8,7 +8,7 @@ use super::records::{
 use super::schema::{self, Vector3};
 use super::stats::{EventSum, GroupStats};
 use crate::runtime::Mode;
-use crate::runtime::record::{Event, SlipCause, TickTiming};
+use crate::runtime::record::{ActorTimes, Event, SlipCause, TickTiming};
 use crate::runtime::{PortUse, PortUseKind};
 use crate::time::Nanos;
 
@@ -66,6 +66,22 @@ impl From<schema::TickTiming> for TickTiming {
             given_up: u8::try_from(m.given_up).unwrap_or(u8::MAX),
             mode: Mode::from_code(u8::try_from(m.mode).unwrap_or(u8::MAX)),
         }
+    }
+}
+
+impl From<&ActorTimes> for schema::ActorTimes {
+    fn from(r: &ActorTimes) -> Self {
+        let spent_ns = r.spent().iter().map(|spent| spent.0).collect();
+        Self { time_ns: r.scheduled.0, group: r.group.into(), spent_ns }
+    }
+}
+
+impl From<schema::ActorTimes> for ActorTimes {
+    fn from(m: schema::ActorTimes) -> Self {
+        let mut spent = [Nanos::ZERO; ActorTimes::MAX];
+        spent.iter_mut().zip(&m.spent_ns).for_each(|(to, from)| *to = Nanos(*from));
+        let actors = u8::try_from(m.spent_ns.len()).unwrap_or(u8::MAX);
+        Self { group: narrow(m.group), scheduled: Nanos(m.time_ns), actors, spent }
     }
 }
 

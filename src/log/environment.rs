@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::records::ToolSample;
+use crate::runtime::GroupGrant;
+use crate::time::Nanos;
 
 /// How a run was executed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,6 +28,24 @@ pub struct GroupInfo {
     pub rate_hz: f64,
     /// Its releases take as long as they take: no run is late for its sake.
     pub background: bool,
+    /// The computing time that was declared for a release.
+    pub budget: Option<Nanos>,
+    /// The core that its thread is pinned to, once the system has granted it.
+    pub cpu: Option<usize>,
+    /// Its actors in the order of [`ActorTimes`](crate::runtime::ActorTimes); empty if there is one.
+    pub actors: Vec<String>,
+}
+
+impl GroupInfo {
+    /// A group with this name and rate (Hz); the rest is not known.
+    pub fn new(name: impl Into<String>, rate_hz: f64) -> Self {
+        Self { name: name.into(), rate_hz, ..Self::default() }
+    }
+
+    /// The name of actor `number`.
+    pub fn actor_name(&self, number: usize) -> String {
+        self.actors.get(number).cloned().unwrap_or_else(|| format!("actor {number}"))
+    }
 }
 
 /// Why a run has the local model that it has, if nobody named one.
@@ -101,6 +121,13 @@ impl Environment {
         }
     }
 
+    /// Notes which cores the groups were given.
+    pub fn pin_groups(&mut self, granted: &[GroupGrant]) {
+        for info in &mut self.groups {
+            info.cpu = granted.iter().find(|grant| grant.name == info.name).and_then(|grant| grant.cpu);
+        }
+    }
+
     /// What the topics of device `device` begin with: its name, or nothing if it is the only one.
     pub fn device_prefix(&self, device: u16) -> String {
         match self.devices.get(usize::from(device)) {
@@ -144,6 +171,11 @@ impl Environment {
             map.insert(format!("group.{i}.name"), group.name.clone());
             map.insert(format!("group.{i}.rate_hz"), group.rate_hz.to_string());
             map.insert(format!("group.{i}.background"), group.background.to_string());
+            map.extend(group.budget.map(|budget| (format!("group.{i}.budget_ns"), budget.0.to_string())));
+            map.extend(group.cpu.map(|cpu| (format!("group.{i}.cpu"), cpu.to_string())));
+            for (k, actor) in group.actors.iter().enumerate() {
+                map.insert(format!("group.{i}.actor.{k}"), actor.clone());
+            }
         }
         for (i, device) in self.devices.iter().enumerate() {
             map.insert(format!("device.{i}"), device.clone());
@@ -171,7 +203,8 @@ impl Environment {
     pub fn from_map(map: &BTreeMap<String, String>) -> Self {
         let text = |key: &str| map.get(key).cloned().unwrap_or_default();
         let number = |key: &str| map.get(key).and_then(|value| value.parse::<f64>().ok()).unwrap_or(0.0);
-        let listed = |key: &str| (0..).map_while(|i| map.get(&format!("{key}.{i}")).cloned()).collect();
+        let listed =
+            |key: &str| -> Vec<String> { (0..).map_while(|i| map.get(&format!("{key}.{i}")).cloned()).collect() };
         let execution = match text("execution").as_str() {
             "threaded" => Execution::Threaded { start_unix_ns: text("start_unix_ns").parse().unwrap_or(0) },
             _ => Execution::Virtual,
@@ -182,6 +215,9 @@ impl Environment {
                 name: name.clone(),
                 rate_hz: number(&format!("group.{i}.rate_hz")),
                 background: text(&format!("group.{i}.background")) == "true",
+                budget: text(&format!("group.{i}.budget_ns")).parse().ok().map(Nanos),
+                cpu: text(&format!("group.{i}.cpu")).parse().ok(),
+                actors: listed(&format!("group.{i}.actor")),
             })
             .collect();
         let granted = map
@@ -257,8 +293,8 @@ mod tests {
             haptic_hz: 1000.0,
             global_hz: 29.97,
             groups: vec![
-                GroupInfo { name: "haptic".into(), rate_hz: 1000.0, background: false },
-                GroupInfo { name: "global".into(), rate_hz: 29.97, background: true },
+                GroupInfo { cpu: Some(1), actors: vec!["device".into()], ..GroupInfo::new("haptic", 1000.0) },
+                GroupInfo { background: true, budget: Some(Nanos(7)), ..GroupInfo::new("global", 29.97) },
             ],
             devices: vec!["left".into(), "right".into()],
             limit_stages: vec!["clamp".into(), "slew".into()],

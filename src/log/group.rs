@@ -55,13 +55,17 @@ pub struct GroupReport {
     pub execution: Percentiles<u64>,
     /// Magnitude of the difference between the time from wake-up to wake-up and the time that was scheduled (ns).
     pub period_error: Percentiles<u64>,
+    /// Cycle-to-cycle jitter: magnitude of the difference between one period error and the next, with their signs (ns).
+    pub jitter: Percentiles<u64>,
+    /// Execution time of all releases together.
+    pub busy: Nanos,
     /// The scheduled time of the last release.
     pub last_release: Nanos,
 }
 
 /// Gathers a [`GroupReport`].
 #[derive(Clone, Debug, Default)]
-pub(super) struct GroupCounter {
+pub(crate) struct GroupCounter {
     released: u64,
     skipped: CauseCounts,
     missed: CauseCounts,
@@ -69,9 +73,25 @@ pub(super) struct GroupCounter {
     first_tick: u64,
     last: TickTiming,
     lost_records: u64,
-    lateness: Distribution,
-    execution: Distribution,
-    period_error: Distribution,
+    busy: Nanos,
+    last_error: Option<i64>,
+    pub(super) lateness: Distribution,
+    pub(super) execution: Distribution,
+    pub(super) period_error: Distribution,
+    pub(super) jitter: Distribution,
+}
+
+/// The figures of one release (ns).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct TickFigures {
+    /// Woke - scheduled.
+    pub(crate) lateness: u64,
+    /// End - start.
+    pub(crate) execution: u64,
+    /// Time since the wake-up before less the time that was scheduled; `None` for the first release.
+    pub(crate) period_error: Option<i64>,
+    /// Change of the period error; `None` for the first two.
+    pub(crate) jitter: Option<u64>,
 }
 
 impl GroupCounter {
@@ -83,18 +103,35 @@ impl GroupCounter {
         if timing.missed() {
             self.missed.add(timing.cause, 1);
         }
-        self.lateness.push(timing.woke.saturating_sub(timing.scheduled).0);
-        self.execution.push(timing.end.saturating_sub(timing.start).0);
+        let figures = self.figures(timing);
+        self.lateness.push(figures.lateness);
+        self.execution.push(figures.execution);
+        figures.period_error.into_iter().for_each(|error| self.period_error.push(error.unsigned_abs()));
+        figures.jitter.into_iter().for_each(|jitter| self.jitter.push(jitter));
         if self.released == 0 {
             // Periods skipped before the first release belong to the run as well.
             self.first_tick = timing.tick.saturating_sub(timing.slips.into());
-        } else {
-            let scheduled = timing.scheduled.saturating_sub(self.last.scheduled).0;
-            let measured = timing.woke.saturating_sub(self.last.woke).0;
-            self.period_error.push(measured.abs_diff(scheduled));
         }
+        self.busy = self.busy + Nanos(figures.execution);
+        self.last_error = figures.period_error;
         self.released += 1;
         self.last = *timing;
+    }
+
+    /// The figures of the release that comes next.
+    pub(crate) fn figures(&self, timing: &TickTiming) -> TickFigures {
+        let between = |later: Nanos, earlier: Nanos| later.0.wrapping_sub(earlier.0).cast_signed();
+        let error = || {
+            let measured = between(timing.woke, self.last.woke);
+            measured.wrapping_sub(between(timing.scheduled, self.last.scheduled))
+        };
+        let period_error = (self.released > 0).then(error);
+        TickFigures {
+            lateness: timing.woke.saturating_sub(timing.scheduled).0,
+            execution: timing.end.saturating_sub(timing.start).0,
+            period_error,
+            jitter: period_error.zip(self.last_error).map(|(error, before)| error.abs_diff(before)),
+        }
     }
 
     /// Notes that `total` records have been lost since the start.
@@ -116,6 +153,8 @@ impl GroupCounter {
             lateness: self.lateness.percentiles(),
             execution: self.execution.percentiles(),
             period_error: self.period_error.percentiles(),
+            jitter: self.jitter.percentiles(),
+            busy: self.busy,
             last_release: self.last.scheduled,
         }
     }

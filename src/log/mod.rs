@@ -18,6 +18,7 @@ mod haptics;
 mod percentiles;
 mod records;
 mod stats;
+pub mod timing;
 
 #[cfg(feature = "log")]
 mod chunk;

@@ -4,8 +4,6 @@
 //! It is always one of the samples, never interpolated, so any other program that sorts the same samples finds the
 //! same number.
 
-use std::collections::BTreeMap;
-
 /// The percentiles that every report shows. All zero if `count` is zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Percentiles<T> {
@@ -37,35 +35,57 @@ impl<T> Percentiles<T> {
 /// values, a few megabytes.
 #[derive(Clone, Debug, Default)]
 pub struct Distribution {
-    counts: BTreeMap<u64, u64>,
-    total: u64,
+    /// Value and how often, rising.
+    counts: Vec<(u64, u64)>,
+    /// Not yet counted: sorting many at once is several times cheaper than finding the place of each.
+    pending: Vec<u64>,
 }
+
+/// Values that are kept before they are counted, at least; with many distinct values a quarter of those.
+const PENDING: usize = 4096;
 
 impl Distribution {
     /// Counts one value. Allocates.
     pub fn push(&mut self, value: u64) {
-        *self.counts.entry(value).or_insert(0) += 1;
-        self.total += 1;
+        self.pending.push(value);
+        if self.pending.len() >= PENDING.max(self.counts.len() / 4) {
+            self.counts = self.merged();
+            self.pending.clear();
+        }
+    }
+
+    /// Counts a value as often as it occurred.
+    pub fn push_many(&mut self, value: u64, count: u64) {
+        if count > 0 {
+            self.counts = merge(&self.counts, &[(value, count)]);
+        }
     }
 
     /// The number of values.
     pub fn count(&self) -> u64 {
-        self.total
+        self.counts.iter().map(|&(_, count)| count).sum::<u64>() + self.pending.len() as u64
     }
 
     /// Forgets all values.
     pub fn clear(&mut self) {
         self.counts.clear();
-        self.total = 0;
+        self.pending.clear();
+    }
+
+    /// Every value with the number of times it occurred, rising.
+    pub fn counts(&self) -> Vec<(u64, u64)> {
+        self.merged()
     }
 
     /// The percentiles.
     pub fn percentiles(&self) -> Percentiles<u64> {
+        let counts = self.merged();
+        let total = counts.iter().map(|&(_, count)| count).sum();
         // Ranks in thousandths, so that no rounding of 0.999 * n can pick a neighbour.
-        let ranks = [500, 900, 990, 999, 1000].map(|permille| (u128::from(self.total) * permille).div_ceil(1000));
+        let ranks = [500, 900, 990, 999, 1000].map(|permille| (u128::from(total) * permille).div_ceil(1000));
         let mut found = [0; 5];
         let (mut seen, mut next) = (0_u128, 0);
-        for (&value, &count) in &self.counts {
+        for (value, count) in counts {
             seen += u128::from(count);
             while next < ranks.len() && ranks[next] <= seen {
                 found[next] = value;
@@ -73,7 +93,42 @@ impl Distribution {
             }
         }
         let [p50, p90, p99, p999, max] = found;
-        Percentiles { count: self.total, p50, p90, p99, p999, max }
+        Percentiles { count: total, p50, p90, p99, p999, max }
+    }
+
+    fn merged(&self) -> Vec<(u64, u64)> {
+        let mut pending = self.pending.clone();
+        pending.sort_unstable();
+        let counted: Vec<(u64, u64)> =
+            pending.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u64)).collect();
+        merge(&self.counts, &counted)
+    }
+}
+
+/// Two rising lists as one; counts of the same value are added.
+fn merge(a: &[(u64, u64)], b: &[(u64, u64)]) -> Vec<(u64, u64)> {
+    let mut merged = Vec::with_capacity(a.len() + b.len());
+    let (mut a, mut b) = (a.iter().copied().peekable(), b.iter().copied().peekable());
+    loop {
+        merged.push(match (a.peek().copied(), b.peek().copied()) {
+            (Some((value, count)), Some((other, more))) if value == other => {
+                (a.next(), b.next());
+                (value, count + more)
+            }
+            (Some(first), Some(second)) if first.0 < second.0 => {
+                a.next();
+                first
+            }
+            (_, Some(second)) => {
+                b.next();
+                second
+            }
+            (Some(first), None) => {
+                a.next();
+                first
+            }
+            (None, None) => return merged,
+        });
     }
 }
 
@@ -86,6 +141,11 @@ impl Magnitudes {
     pub fn push(&mut self, value: f64) {
         // The bits of non-negative doubles sort as the doubles do.
         self.0.push(value.abs().to_bits());
+    }
+
+    /// Every magnitude with the number of times it occurred, rising.
+    pub fn counts(&self) -> Vec<(f64, u64)> {
+        self.0.counts().into_iter().map(|(bits, count)| (f64::from_bits(bits), count)).collect()
     }
 
     /// The percentiles.
@@ -106,7 +166,7 @@ mod tests {
     proptest! {
         // Check that counting gives what sorting gives.
         #[test]
-        fn percentiles_equal_those_of_the_sorted_vector(mut values in prop::collection::vec(0_u64..50, 1..3000)) {
+        fn percentiles_equal_those_of_the_sorted_vector(mut values in prop::collection::vec(0_u64..50, 1..9000)) {
             let mut distribution = Distribution::default();
             values.iter().for_each(|&value| distribution.push(value));
             values.sort_unstable();

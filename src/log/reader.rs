@@ -193,6 +193,7 @@ fn decode_data(kind: Kind, data: &[u8]) -> Result<LogEntry, prost::DecodeError> 
     }
     Ok(LogEntry::Record(match kind {
         Kind::Timing => LogRecord::Tick(parse::<schema::TickTiming>(data)?.into()),
+        Kind::Actors => LogRecord::Actors(parse::<schema::ActorTimes>(data)?.into()),
         Kind::Force => LogRecord::Force(parse::<schema::Force>(data)?.into()),
         Kind::ForceCommanded => LogRecord::Command(parse::<schema::CommandedForce>(data)?.into()),
         Kind::Tool => LogRecord::Tool(parse::<schema::Tool>(data)?.into()),

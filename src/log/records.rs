@@ -1,7 +1,7 @@
 //! The records of a haptic run, each fitting the runtime's 64-byte [`Record`].
 
 use crate::runtime::PortUse;
-use crate::runtime::record::{Channel, Event, Record, TickTiming};
+use crate::runtime::record::{ActorTimes, Channel, Event, Record, TickTiming};
 use crate::time::Nanos;
 
 /// What served a haptic tick: a local model, or what it fell back to.
@@ -226,6 +226,7 @@ pub struct ProbeSample {
 #[allow(missing_docs)]
 pub enum LogRecord {
     Tick(TickTiming),
+    Actors(ActorTimes),
     Event(Event),
     Port(PortUse),
     Force(ForceSample),
@@ -262,6 +263,7 @@ impl LogRecord {
     pub fn time(&self) -> Nanos {
         match self {
             Self::Tick(r) => r.scheduled,
+            Self::Actors(r) => r.scheduled,
             Self::Event(r) => r.stamp,
             Self::Port(r) => r.time,
             Self::Force(r) => r.time,
@@ -283,7 +285,7 @@ impl LogRecord {
             Self::Contact(r) => r.device,
             Self::Resync(r) => r.device,
             Self::Probe(r) => r.device,
-            Self::Tick(_) | Self::Event(_) | Self::Port(_) | Self::Global(_) => 0,
+            Self::Tick(_) | Self::Actors(_) | Self::Event(_) | Self::Port(_) | Self::Global(_) => 0,
         }
     }
 
@@ -293,6 +295,7 @@ impl LogRecord {
         let [a, b, c, d, e, f] = record.floats();
         match record.channel {
             Channel::TICK => return Some(Self::Tick(TickTiming::from_record(record)?)),
+            Channel::ACTORS => return Some(Self::Actors(ActorTimes::from_record(record)?)),
             Channel::EVENT => return Some(Self::Event(Event::from_record(record)?)),
             Channel::PORT => return Some(Self::Port(PortUse::from_record(record)?)),
             _ => {}
@@ -431,6 +434,7 @@ impl From<LogRecord> for Record {
     fn from(record: LogRecord) -> Self {
         match record {
             LogRecord::Tick(r) => r.into(),
+            LogRecord::Actors(r) => r.into(),
             LogRecord::Event(r) => r.into(),
             LogRecord::Port(r) => r.into(),
             LogRecord::Force(r) => r.into(),

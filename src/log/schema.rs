@@ -58,6 +58,13 @@ proto_schema! {
         mode: int32 as Mode = 11,
     }
 
+    /// `/actors/GROUP`: what each actor of a group took of one release.
+    message ActorTimes {
+        time_ns: uint64 = 1,
+        group: uint32 = 2,
+        spent_ns: repeated uint64 = 3,
+    }
+
     /// `/force`: the force on the tool before the safety pipeline.
     message Force {
         time_ns: uint64 = 1,

@@ -8,6 +8,7 @@ use super::schema::{self, LogMessage};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Topic {
     Timing(u16),
+    Actors(u16),
     Stats(u16),
     Force(u16),
     ForceCommanded(u16),
@@ -24,6 +25,7 @@ pub(crate) enum Topic {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Timing,
+    Actors,
     Stats,
     Force,
     ForceCommanded,
@@ -37,10 +39,14 @@ pub(crate) enum Kind {
 }
 
 impl Topic {
-    /// The topics that the log of `environment` declares, whether or not anything is written there.
+    /// The topics that the log of `environment` declares, whether or not anything is written there; `/actors` only where
+    /// there are several.
     pub(crate) fn declared(environment: &Environment) -> impl Iterator<Item = Self> {
         let number = |count: usize| 0..u16::try_from(count).unwrap_or(u16::MAX);
+        let has_actors =
+            |group: &u16| environment.groups.get(usize::from(*group)).is_some_and(|g| !g.actors.is_empty());
         let of_groups = number(environment.groups.len()).flat_map(|group| [Self::Timing(group), Self::Stats(group)]);
+        let of_groups = of_groups.chain(number(environment.groups.len()).filter(has_actors).map(Self::Actors));
         of_groups.chain(number(environment.devices.len().max(1)).flat_map(Self::of_device)).chain(Self::SHARED)
     }
 
@@ -54,6 +60,7 @@ impl Topic {
     pub(crate) fn of(record: &LogRecord) -> Self {
         match record {
             LogRecord::Tick(r) => Self::Timing(r.group),
+            LogRecord::Actors(r) => Self::Actors(r.group),
             LogRecord::Event(_) => Self::Log,
             LogRecord::Force(r) => Self::Force(r.device),
             LogRecord::Command(r) => Self::ForceCommanded(r.device),
@@ -70,6 +77,7 @@ impl Topic {
         let of_device = |device, what| format!("{}/{what}", environment.device_prefix(device));
         match self {
             Self::Timing(group) => format!("/timing/{}", environment.group_name(group)),
+            Self::Actors(group) => format!("/actors/{}", environment.group_name(group)),
             Self::Stats(group) => format!("/stats/{}", environment.group_name(group)),
             Self::Force(device) => of_device(device, "force"),
             Self::ForceCommanded(device) => of_device(device, "force_commanded"),
@@ -86,6 +94,7 @@ impl Topic {
     pub(crate) fn kind(self) -> Kind {
         match self {
             Self::Timing(_) => Kind::Timing,
+            Self::Actors(_) => Kind::Actors,
             Self::Stats(_) => Kind::Stats,
             Self::Force(_) => Kind::Force,
             Self::ForceCommanded(_) => Kind::ForceCommanded,
@@ -101,8 +110,9 @@ impl Topic {
 }
 
 impl Kind {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::Timing,
+        Self::Actors,
         Self::Stats,
         Self::Force,
         Self::ForceCommanded,
@@ -119,6 +129,7 @@ impl Kind {
     pub(crate) fn schema(self) -> &'static str {
         match self {
             Self::Timing => schema::TickTiming::NAME,
+            Self::Actors => schema::ActorTimes::NAME,
             Self::Stats => schema::Stats::NAME,
             Self::Force => schema::Force::NAME,
             Self::ForceCommanded => schema::CommandedForce::NAME,
@@ -145,6 +156,7 @@ impl Kind {
             let (first, second) = name.strip_prefix('/')?.split_once('/')?;
             match (first, second.is_empty()) {
                 ("timing", false) => Some(Self::Timing),
+                ("actors", false) => Some(Self::Actors),
                 ("stats", false) => Some(Self::Stats),
                 // A device's own, where there are several.
                 _ => Topic::of_device(0)

@@ -111,6 +111,7 @@ impl<W: Write> McapWriter<W> {
         let time = record.time();
         match record {
             LogRecord::Tick(r) => self.push(topic, time, &schema::TickTiming::from(r)),
+            LogRecord::Actors(r) => self.push(topic, time, &schema::ActorTimes::from(r)),
             LogRecord::Event(r) => {
                 let group = self.environment.group_name(r.group);
                 self.push(topic, time, &schema::Log::coded(r, &group))

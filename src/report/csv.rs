@@ -12,6 +12,7 @@ use crate::log::{ContactMode, ContactSample, GroupStats, LogEntry, LogRecord, Te
 pub(super) fn header(kind: Kind) -> &'static str {
     match kind {
         Kind::Timing => "tick,scheduled_ns,woke_ns,start_ns,end_ns,deadline_ns,slips,cause,given_up,mode\n",
+        Kind::Actors => "scheduled_ns,actor,spent_ns\n",
         Kind::Stats => {
             "t_s,released,skipped,missed,lost_records,lateness_p50_ns,lateness_p99_ns,lateness_max_ns,\
              execution_p50_ns,execution_p99_ns,execution_max_ns,port_uses\n"
@@ -49,6 +50,11 @@ fn record_row(record: &LogRecord, out: &mut impl Write) -> io::Result<()> {
                 "{},{scheduled},{woke},{start},{end},{deadline},{},{cause},{given_up},{mode}",
                 r.tick, r.slips
             )
+        }
+        LogRecord::Actors(r) => {
+            let scheduled = r.scheduled.0;
+            let mut rows = r.spent().iter().enumerate();
+            rows.try_for_each(|(actor, spent)| writeln!(out, "{scheduled},{actor},{}", spent.0))
         }
         LogRecord::Force(r) => vector_row(t_s, r.force_n, out),
         LogRecord::Command(r) => vector_row(t_s, r.force_n, out),

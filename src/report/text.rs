@@ -230,7 +230,7 @@ mod tests {
         analysis.set_environment(&Environment {
             execution: Execution::Threaded { start_unix_ns: 1 },
             model: "patch".into(),
-            groups: names.map(|name| GroupInfo { name: name.into(), rate_hz: 29.97, background: false }).into(),
+            groups: names.map(|name| GroupInfo::new(name, 29.97)).into(),
             granted: (0..30).map(|i| (format!("grant_{i}"), "refused by the system".into())).collect(),
             ..Environment::default()
         });
@@ -269,10 +269,7 @@ mod tests {
     fn a_normal_report_fits_forty_lines() {
         let mut analysis = Analysis::default();
         analysis.set_environment(&Environment {
-            groups: vec![
-                GroupInfo { name: "haptic".into(), rate_hz: 1000.0, background: false },
-                GroupInfo { name: "global".into(), rate_hz: 30.0, background: false },
-            ],
+            groups: vec![GroupInfo::new("haptic", 1000.0), GroupInfo::new("global", 30.0)],
             granted: (0..30).map(|i| (format!("grant_{i}"), "refused".into())).collect(),
             ..Environment::default()
         });

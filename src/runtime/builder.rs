@@ -302,9 +302,9 @@ impl RuntimeBuilder {
     }
 }
 
-/// Room for four seconds of timing, so that a logger stuck for that long loses nothing; at most 4 MB.
+/// Room for four seconds of two records a release, so that a logger stuck for that long loses nothing; at most 4 MB.
 fn ring_capacity(rate: Rate) -> usize {
-    ((4.0 * rate.as_hz()) as usize).clamp(256, 65_536)
+    ((8.0 * rate.as_hz()) as usize).clamp(256, 65_536)
 }
 
 impl fmt::Debug for RuntimeBuilder {

@@ -39,6 +39,8 @@ impl GroupThread {
         if self.watched {
             self.group.book_under(Arc::clone(&self.tenure));
         }
+        let base_ns = self.base_ns;
+        self.group.time_actors(move || since(base_ns));
         let failed = self.release_all(&mut waiter);
         if self.tenure.is_dismissed() {
             // Its place is taken: it says nothing any more, and its actors go with it.

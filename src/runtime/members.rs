@@ -1,6 +1,7 @@
 //! The actors of one group: every call to them is caught, and one that fails is out for the rest.
 
 use super::actor::{Actor, Outcome, TickContext};
+use super::laps::Laps;
 use super::panic_hook::{quietly, text_of};
 use crate::error::{Error, ErrorKind};
 use crate::time::Nanos;
@@ -37,6 +38,10 @@ impl Members {
             Member { actor, name, started: false, failed: false, recovered: false }
         };
         Self(actors.into_iter().map(member).collect())
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.0.len()
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -85,7 +90,7 @@ impl Members {
     }
 
     /// All ticks, then all commits in reverse; the first code of a degraded result, if there was one.
-    pub(super) fn work(&mut self, ctx: &TickContext) -> Result<Option<u32>, Broken> {
+    pub(super) fn work(&mut self, ctx: &TickContext, mut laps: Option<&mut Laps>) -> Result<Option<u32>, Broken> {
         let mut current = 0;
         let mut degraded = None;
         let members = &mut self.0;
@@ -98,12 +103,16 @@ impl Members {
                 }
                 Outcome::Fault(code) => Err(code),
             };
-            for (index, member) in members.iter_mut().enumerate().filter(|(_, member)| !member.failed) {
+            let mut call = |index| {
                 current = index;
+                laps.iter_mut().for_each(|laps| laps.pass_to(index));
+            };
+            for (index, member) in members.iter_mut().enumerate().filter(|(_, member)| !member.failed) {
+                call(index);
                 note(member.actor.tick(ctx))?;
             }
             for (index, member) in members.iter_mut().enumerate().rev().filter(|(_, member)| !member.failed) {
-                current = index;
+                call(index);
                 note(member.actor.commit(ctx))?;
             }
             Ok(())

@@ -244,6 +244,11 @@ impl RateGroup {
         self.budget.is_some()
     }
 
+    /// The budget that was given.
+    pub(crate) fn declared_budget(&self) -> Option<Nanos> {
+        self.budget
+    }
+
     /// The rate.
     pub fn rate(&self) -> Rate {
         self.rate

@@ -14,6 +14,8 @@ impl Channel {
     pub const EVENT: Self = Self(1);
     /// What a release saw through a port: see [`PortUse`](super::PortUse).
     pub const PORT: Self = Self(2);
+    /// What each actor of a group took of one release: see [`ActorTimes`].
+    pub const ACTORS: Self = Self(3);
     /// The first number that programs may use.
     pub const FIRST_USER: Self = Self(16);
 }
@@ -176,6 +178,59 @@ impl TickTiming {
     }
 }
 
+/// What each actor of a group took of one release: its share of the time from [`TickTiming::start`] to
+/// [`TickTiming::end`], in the order of the actors.
+///
+/// Recorded on threads by groups with more than one actor; the parts add up to the whole.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ActorTimes {
+    /// The rate group, in the order the groups were added.
+    pub group: u16,
+    /// When the release was due.
+    pub scheduled: Nanos,
+    /// How many of the times are actors'.
+    pub actors: u8,
+    /// Each at most 4.29 s, the most that a record holds.
+    pub spent: [Nanos; Self::MAX],
+}
+
+impl ActorTimes {
+    /// The most actors that are told apart; what further ones take counts for the last.
+    pub const MAX: usize = 12;
+
+    /// The times of the actors there are.
+    pub fn spent(&self) -> &[Nanos] {
+        &self.spent[..usize::from(self.actors).min(Self::MAX)]
+    }
+
+    /// Reads the times back; `None` if the record is about something else.
+    pub fn from_record(record: &Record) -> Option<Self> {
+        let spent = |i: usize| Nanos(record.words[i / 2] >> (32 * (i % 2)) & u64::from(u32::MAX));
+        (record.channel == Channel::ACTORS).then(|| Self {
+            group: record.code,
+            scheduled: record.stamp,
+            actors: u8::try_from(record.index).unwrap_or(u8::MAX),
+            spent: std::array::from_fn(spent),
+        })
+    }
+}
+
+impl From<ActorTimes> for Record {
+    fn from(t: ActorTimes) -> Self {
+        let half = |i: usize| u64::from(u32::try_from(t.spent[i].0).unwrap_or(u32::MAX));
+        Self {
+            stamp: t.scheduled,
+            channel: Channel::ACTORS,
+            code: t.group,
+            index: t.actors.into(),
+            words: std::array::from_fn(|word| half(2 * word) | half(2 * word + 1) << 32),
+        }
+    }
+}
+
 /// Something that happened once and that a reader of the log wants to know.
 ///
 /// # Real-time
@@ -265,5 +320,15 @@ mod tests {
     fn slips_that_the_policy_gave_up_are_told_from_the_others() {
         let timing = TickTiming { slips: 4, cause: SlipCause::LongTick, given_up: 1, ..TickTiming::default() };
         assert_eq!(timing.slips_by_cause(), [(SlipCause::LongTick, 3), (SlipCause::Policy, 1)]);
+    }
+
+    #[test]
+    fn the_times_of_actors_survive_the_trip_through_a_record() {
+        let spent = std::array::from_fn(|i| Nanos([0, 1, u64::from(u32::MAX), 7][i % 4]));
+        let times = ActorTimes { group: 2, scheduled: Nanos(5), actors: 12, spent };
+        assert_eq!(ActorTimes::from_record(&times.into()), Some(times));
+        let long = ActorTimes { spent: [Nanos(u64::MAX); 12], actors: 1, ..times };
+        assert_eq!(ActorTimes::from_record(&long.into()).unwrap().spent(), [Nanos(u32::MAX.into())]);
+        assert_eq!(TickTiming::from_record(&times.into()), None);
     }
 }

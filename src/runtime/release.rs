@@ -4,12 +4,13 @@ use super::actor::{Actor, Mode, Phase, TickContext};
 use super::deadline::Ledger;
 use super::disturbance::Disturb;
 use super::exchange::ExchangeWriter;
+use super::laps::Laps;
 use super::live::{LiveReader, LiveWriter, live};
 use super::members::{Fatal, Members};
 use super::overrun::Decision;
 use super::panic_hook::place;
 use super::rate_group::RateGroup;
-use super::record::{Event, TickTiming};
+use super::record::{ActorTimes, Event, TickTiming};
 use super::recorder::Recorder;
 use super::recording::RecordedRelease;
 use super::report::{GroupReport, RuntimeFault};
@@ -30,6 +31,8 @@ pub(crate) struct GroupRun {
     /// Who keeps the books, if a supervisor may take them away.
     tenure: Option<Arc<Tenure>>,
     members: Members,
+    /// Threads: what each of several actors takes.
+    laps: Option<Laps>,
     recorder: Option<Recorder>,
     /// Where a supervisor reads how far a group is that may have to be left behind.
     books: Option<ExchangeWriter<Ledger>>,
@@ -82,6 +85,7 @@ impl GroupRun {
             shown,
             tenure: None,
             members: Members::new(actors),
+            laps: None,
             recorder,
             books: None,
             disturb: None,
@@ -131,6 +135,13 @@ impl GroupRun {
     /// Books releases for as long as `tenure` lasts.
     pub(super) fn book_under(&mut self, tenure: Arc<Tenure>) {
         self.tenure = Some(tenure);
+    }
+
+    /// Records what each actor takes, if somebody reads records and there are several; `clock` counts from the start of the run.
+    pub(super) fn time_actors(&mut self, clock: impl Fn() -> Nanos + Send + 'static) {
+        if self.recorder.is_some() && self.members.count() > 1 {
+            self.laps = Some(Laps::new(clock));
+        }
     }
 
     /// What shows this group while it runs.
@@ -250,6 +261,7 @@ impl GroupRun {
             phase: if self.spec.observer { Phase::Observer } else { Phase::Release },
         };
         self.last = ctx;
+        self.laps.iter_mut().for_each(|laps| laps.begin(now));
         let result = self.work(&ctx);
         if self.tenure.as_ref().is_some_and(|tenure| !tenure.begin_booking()) {
             return Ok(());
@@ -260,6 +272,10 @@ impl GroupRun {
         self.live.release(&timing, &self.ledger);
         if let Some(recorder) = &mut self.recorder {
             recorder.push(timing);
+            if let Some(laps) = &mut self.laps {
+                let actors = self.members.count().min(ActorTimes::MAX) as u8;
+                recorder.push(ActorTimes { group: self.index, scheduled, actors, spent: laps.end(end) });
+            }
         }
         if let Some(books) = &mut self.books {
             *books.buffer() = self.ledger;
@@ -272,7 +288,7 @@ impl GroupRun {
     }
 
     fn work(&mut self, ctx: &TickContext) -> Result<(), RuntimeFault> {
-        match self.members.work(ctx) {
+        match self.members.work(ctx, self.laps.as_mut()) {
             Ok(degraded) => {
                 self.note_degraded(ctx, degraded);
                 Ok(())

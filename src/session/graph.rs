@@ -207,18 +207,21 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
 }
 
 fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment, Error> {
-    let group = |name: &str, rate: Rate| GroupInfo {
-        name: name.to_owned(),
-        rate_hz: rate.as_hz(),
-        background: name == basis::GROUP,
-    };
+    let group =
+        |name: &str, rate: Rate| GroupInfo { background: name == basis::GROUP, ..GroupInfo::new(name, rate.as_hz()) };
     let is_multi_rate = prepared.template.kind != Kind::Full;
-    let mut groups = vec![group("local", prepared.haptic)];
+    let local = GroupInfo {
+        budget: prepared.local.declared_budget(),
+        actors: prepared.tools.iter().flat_map(|tool| haptic_actor_names(&tool.name)).collect(),
+        ..group("local", prepared.haptic)
+    };
+    let mut groups = vec![local];
     if prepared.reduces() {
         groups.push(group(basis::GROUP, prepared.global_rate));
     }
     if is_multi_rate {
-        groups.push(group("global", prepared.global_rate));
+        let budget = prepared.global.declared_budget();
+        groups.push(GroupInfo { budget, ..group("global", prepared.global_rate) });
     }
     groups.push(group("logger", LOGGER));
     #[cfg(feature = "scene")]
@@ -251,6 +254,11 @@ fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment
         scene: prepared.source.clone(),
         session,
     })
+}
+
+/// The two actors that each tool has, in the order of their ticks; `tool` is empty for the only one.
+fn haptic_actor_names(tool: &str) -> [String; 2] {
+    ["device", "local"].map(|actor| if tool.is_empty() { actor.to_owned() } else { format!("{tool}/{actor}") })
 }
 
 fn first_tool((device, first): (u16, &DeviceState)) -> ToolSample {

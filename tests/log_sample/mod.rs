@@ -17,10 +17,7 @@ pub fn environment() -> Environment {
         model: "patch".into(),
         haptic_hz: 1000.0,
         global_hz: 30.0,
-        groups: vec![
-            GroupInfo { name: "haptic".into(), rate_hz: 1000.0, background: false },
-            GroupInfo { name: "global".into(), rate_hz: 30.0, background: false },
-        ],
+        groups: vec![GroupInfo::new("haptic", 1000.0), GroupInfo::new("global", 30.0)],
         limit_stages: vec!["finite".into(), "clamp".into(), "slew".into()],
         granted: [("policy", "SCHED_OTHER"), ("mlock", "refused")]
             .map(|(key, value)| (key.to_owned(), value.to_owned()))

@@ -1,0 +1,26 @@
+//! The timing of a run in detail: who was late, why, and what it did to the force, from one pass over its log.
+//!
+//! [`TimingAnalysis`] reads entries in the order of the log and keeps what a report needs: memory grows with the number
+//! of distinct durations and not with the length of the run. [`TimingReport`] holds the result.
+
+mod analysis;
+mod blocks;
+mod charts;
+mod cores;
+mod group;
+mod haptics;
+mod over_time;
+mod recent;
+mod selection;
+mod worst;
+
+pub use analysis::{TimingAnalysis, TimingReport};
+pub use blocks::{Block, Buckets};
+pub use charts::{Bin, Shape};
+pub use cores::CoreUse;
+pub use group::{ActorTiming, GroupTiming, TickBin};
+pub use haptics::{DeviceTiming, ForceBin, ResyncBin};
+pub use over_time::OverTime;
+pub use recent::{ForcePoint, Moment};
+pub use selection::Selection;
+pub use worst::WorstTick;

@@ -1,0 +1,100 @@
+//! What happened lately: so that a moment can be looked at from both sides once it turns out to matter.
+
+use std::collections::VecDeque;
+
+use crate::log::{CommandSample, ForceSample};
+use crate::runtime::record::{ActorTimes, TickTiming};
+use crate::time::Nanos;
+
+/// How far back it remembers. A slow group's release begins long before it ends, and a moment is looked at later still.
+const SPAN: Nanos = Nanos(1_000_000_000);
+/// A command is in the log close behind its force.
+const CLOSE: usize = 64;
+
+/// The force of one haptic tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ForcePoint {
+    /// End of the tick.
+    pub time: Nanos,
+    /// Whose: the number of the device.
+    pub device: u16,
+    /// Before the safety pipeline (N).
+    pub force_n: [f64; 3],
+    /// After it, if the log says (N).
+    pub commanded_n: Option<[f64; 3]>,
+    /// Age of the local model's last resync (s).
+    pub model_age_s: f64,
+}
+
+/// All groups and forces in a short span of time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Moment {
+    /// Where it begins.
+    pub from: Nanos,
+    /// Where it ends.
+    pub to: Nanos,
+    /// Releases that were due or at work in it, in the order of their groups and times.
+    pub ticks: Vec<TickTiming>,
+    /// What actors took of them, where the log says.
+    pub actors: Vec<ActorTimes>,
+    /// Forces.
+    pub forces: Vec<ForcePoint>,
+}
+
+/// The last second of a log.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Recent {
+    ticks: VecDeque<TickTiming>,
+    actors: VecDeque<ActorTimes>,
+    forces: VecDeque<ForcePoint>,
+}
+
+impl Recent {
+    pub(super) fn push_tick(&mut self, timing: &TickTiming) {
+        let too_old = |tick: &TickTiming| tick.end.max(tick.scheduled) + SPAN < timing.scheduled;
+        forget(&mut self.ticks, too_old);
+        self.ticks.push_back(*timing);
+    }
+
+    pub(super) fn push_actors(&mut self, times: &ActorTimes) {
+        forget(&mut self.actors, |old| old.scheduled + SPAN < times.scheduled);
+        self.actors.push_back(*times);
+    }
+
+    pub(super) fn push_force(&mut self, sample: &ForceSample) {
+        forget(&mut self.forces, |old| old.time + SPAN < sample.time);
+        let &ForceSample { time, device, force_n, model_age_s, .. } = sample;
+        self.forces.push_back(ForcePoint { time, device, force_n, commanded_n: None, model_age_s });
+    }
+
+    pub(super) fn push_command(&mut self, sample: &CommandSample) {
+        let latest = self.forces.iter_mut().rev().take(CLOSE);
+        let same = |point: &&mut ForcePoint| (point.time, point.device) == (sample.time, sample.device);
+        if let Some(point) = latest.into_iter().find(same) {
+            point.commanded_n = Some(sample.force_n);
+        }
+    }
+
+    /// All that is remembered between two times.
+    pub(super) fn between(&self, from: Nanos, to: Nanos) -> Moment {
+        let inside = |time: Nanos| (from..=to).contains(&time);
+        let touches = |tick: &&TickTiming| tick.scheduled <= to && tick.end.max(tick.scheduled) >= from;
+        let mut ticks: Vec<TickTiming> = self.ticks.iter().filter(touches).copied().collect();
+        ticks.sort_by_key(|tick| (tick.group, tick.tick));
+        let actors = self.actors.iter().filter(|times| ticks.iter().any(|tick| is_of(times, tick))).copied().collect();
+        let forces = self.forces.iter().filter(|point| inside(point.time)).copied().collect();
+        Moment { from, to, ticks, actors, forces }
+    }
+}
+
+/// True if `times` are those of the actors in the release `tick`.
+pub(super) fn is_of(times: &ActorTimes, tick: &TickTiming) -> bool {
+    (times.group, times.scheduled) == (tick.group, tick.scheduled)
+}
+
+/// Drops what is too old from the front.
+fn forget<T>(queue: &mut VecDeque<T>, too_old: impl Fn(&T) -> bool) {
+    while queue.front().is_some_and(&too_old) {
+        queue.pop_front();
+    }
+}
