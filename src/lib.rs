@@ -59,6 +59,7 @@ pub mod devices;
 pub mod error;
 pub mod log;
 pub mod model;
+mod random;
 pub mod report;
 pub mod runtime;
 pub mod safety;

@@ -4,15 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// What each module may name, besides itself.
-const ALLOWED: [(&str, &[&str]); 14] = [
+const ALLOWED: [(&str, &[&str]); 15] = [
     ("error", &[]),
+    ("random", &[]),
     ("time", &[]),
     ("model", &["error"]),
     ("runtime", &["error", "time"]),
     ("safety", &["time"]),
-    ("devices", &["error", "model", "time"]),
+    ("devices", &["error", "model", "random", "time"]),
     ("scene", &["devices", "error", "model", "time"]),
-    ("log", &["error", "runtime", "time"]),
+    ("log", &["error", "random", "runtime", "time"]),
     ("actors", &["devices", "error", "log", "model", "runtime", "safety", "time"]),
     ("report", &["error", "log", "runtime", "time"]),
     ("session", &["actors", "devices", "error", "log", "model", "runtime", "safety", "scene", "time"]),

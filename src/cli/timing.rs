@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use palpate::Error;
-use palpate::log::{Analysis, LogReader};
-use palpate::report::{to_json, to_text};
+use palpate::log::LogReader;
+use palpate::log::timing::{Selection, TimingAnalysis};
+use palpate::report::{timing_to_json, timing_to_text};
 
 use super::output::{print, warn_of_damage};
 
@@ -25,11 +26,11 @@ pub struct TimingArgs {
 /// is no MCAP.
 pub fn run(args: &TimingArgs) -> Result<(), Error> {
     let mut reader = LogReader::open(&args.log)?;
-    let mut analysis = Analysis::default();
+    let mut analysis = TimingAnalysis::new(Selection::default());
     reader.by_ref().for_each(|entry| analysis.push_entry(&entry));
     let mut report = analysis.report();
-    report.damage = reader.damage().map(str::to_owned);
-    report.messages = reader.topics().into_iter().map(|(topic, count)| (topic.to_owned(), count)).collect();
+    report.run.damage = reader.damage().map(str::to_owned);
+    report.run.messages = reader.topics().into_iter().map(|(topic, count)| (topic.to_owned(), count)).collect();
     warn_of_damage(reader.place(), reader.damage());
-    if args.json { print(&format!("{}\n", to_json(&report))) } else { print(&to_text(&report)) }
+    if args.json { print(&format!("{}\n", timing_to_json(&report))) } else { print(&timing_to_text(&report)) }
 }

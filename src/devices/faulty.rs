@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::random::uniform;
 use super::{Calibration, Capabilities, Device, DeviceFault, DeviceState, ForceCommand, SafetyStop};
 use crate::model::Vec3;
+use crate::random::uniform;
 use crate::time::Nanos;
 
 /// A way in which a device fails.
@@ -105,7 +105,7 @@ impl<D> Faulty<D> {
     }
 
     fn is_lost(&self, probability: f64, seed: u64) -> bool {
-        uniform(seed, self.now) < probability
+        uniform(seed, self.now.0) < probability
     }
 }
 

@@ -19,7 +19,6 @@ mod hand;
 #[cfg(feature = "haply")]
 pub mod haply;
 mod path_csv;
-mod random;
 mod replayed;
 mod scripted;
 mod state;

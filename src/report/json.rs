@@ -12,29 +12,101 @@
 //! | `damage` | what is wrong with the log and where, or `null` |
 //! | `messages` | number of messages read, by topic |
 //! | `environment` | versions, rates, in `model_reason` and `model_warning` why `model` was chosen (`null` if it was named), in `granted` what the system granted, `safety_off`, `stored_j` and `coupling`; `null` if unknown |
-//! | `groups[]` | `name`, `rate_hz`, `released`, `skipped`, `missed`, `elapsed_periods`, `in_degraded_mode`, `lost_records`, `skipped_by_cause`, `missed_by_cause`, `lateness_ns`, `execution_ns`, `period_error_ns` |
+//! | `groups[]` | `name`, `rate_hz`, `released`, `skipped`, `missed`, `elapsed_periods`, `in_degraded_mode`, `lost_records`, `skipped_by_cause`, `missed_by_cause`, `lateness_ns`, `execution_ns`, `period_error_ns`, `jitter_ns`, `busy_ns` |
 //! | `resyncs` | `count`, `jump_before_n`, `jump_after_n`, `age_ns` |
 //! | `force` | `ticks`, `peak_n`, `peak_commanded_n`, `not_finite`, `model_age_s`, `served` (share of ticks by local model) |
 //! | `contact` | haptic ticks `free`, `stick`, `slip`, `lost` |
 //! | `limits` | `ticks`, `limited`, `share` (0 to 1), `stages` by name, `energy_j` (`least` and `last` of the passivity ledger), `tank_j` (`least`) |
 //! | `devices[]` | of each of several devices `name`, `resyncs`, `force`, `contact` and `limits`; without it these are the only device's, with it they are also the first's |
 //! | `lost_records` | of all groups |
+//! | `figures` | every figure by its name, see [`crate::log::timing`]: times of releases in ns, all else as in the name's unit |
+//! | `cores[]` | `cpu` (`null`: any), `share`, `groups` by name: share of the time (0 to 1) at work |
+//! | `worst[]` | the worst ticks: `group`, `tick`, `t_s`, `overdue_ns`, `deadlines` (overdue in deadlines), `lateness_ns`, `execution_ns`, `slips`, `cause` (`null`: in time), `actors_ns` by name, `meanwhile`, `force_step_n`, `why`, `neighbours[]` with `group`, `tick`, `scheduled_ns`, `woke_ns`, `start_ns`, `end_ns`, `deadline_ns`, `slips`, `cause` |
+//! | `span_s` | time of the first and of the last record that was looked at |
 //! | `events` | `count`, `worst`, `first[]` with `t_s`, `level`, `message` |
+//!
+//! `figures`, `cores`, `worst` and `span_s` are of [`timing_to_json`] alone, which `palpate timing --json` prints.
 //!
 //! Distributions are `{count, p50, p90, p99, p999, max}`, nearest-rank, all zero if `count` is zero. Causes are
 //! `late_wake`, `long_tick`, `stalled_peer`, `policy` and `unattributed`.
 
 use serde_json::{Map, Value, json};
 
+use super::text::in_words;
 use super::verdict::verdict;
+use crate::log::timing::{CoreUse, Figure, TimingReport, Value as FigureValue, WorstTick, cause_name};
 use crate::log::{
     CauseCounts, DeviceReport, Environment, Execution, ForceReport, GroupReport, Level, Percentiles, RunReport,
     TextEvent,
 };
-use crate::runtime::record::SlipCause;
+use crate::runtime::record::TickTiming;
 
 /// The report as one JSON document.
 pub fn to_json(report: &RunReport) -> String {
+    document(report).to_string()
+}
+
+/// The timing of a run in detail as one JSON document.
+pub fn timing_to_json(report: &TimingReport) -> String {
+    let mut document = document(&report.run);
+    let figure = |figure: Figure| (figure.name, number(figure.value));
+    document["figures"] = Value::Object(report.figures().into_iter().map(figure).collect());
+    document["cores"] = report.cores.iter().map(core).collect();
+    document["worst"] = report.worst.iter().map(|worst| worst_tick(worst, report)).collect();
+    document["span_s"] = report.span.iter().map(|time| time.as_secs_f64()).collect();
+    document.to_string()
+}
+
+/// A value as it is; `null` if it is not finite.
+fn number(value: FigureValue) -> Value {
+    match value {
+        FigureValue::Integer(value) => json!(value),
+        FigureValue::Real(value) => json!(value),
+    }
+}
+
+fn core(core: &CoreUse) -> Value {
+    let groups: Map<_, _> = core.groups.iter().map(|(name, share)| (name.clone(), json!(share))).collect();
+    json!({ "cpu": core.cpu, "share": core.share(), "groups": groups })
+}
+
+fn worst_tick(worst: &WorstTick, report: &TimingReport) -> Value {
+    let timing = &worst.timing;
+    let unknown = Environment::default();
+    let environment = report.run.environment.as_ref().unwrap_or(&unknown);
+    let cause = |timing: &TickTiming| (timing.missed() || timing.slips > 0).then(|| cause_name(timing.cause));
+    let neighbour = |tick: &TickTiming| {
+        json!({
+            "group": environment.group_name(tick.group),
+            "tick": tick.tick,
+            "scheduled_ns": tick.scheduled.0,
+            "woke_ns": tick.woke.0,
+            "start_ns": tick.start.0,
+            "end_ns": tick.end.0,
+            "deadline_ns": tick.deadline.0,
+            "slips": tick.slips,
+            "cause": cause(tick),
+        })
+    };
+    json!({
+        "group": worst.group,
+        "tick": timing.tick,
+        "t_s": timing.scheduled.as_secs_f64(),
+        "overdue_ns": worst.overdue.0,
+        "deadlines": worst.severity,
+        "lateness_ns": timing.woke.saturating_sub(timing.scheduled).0,
+        "execution_ns": timing.end.saturating_sub(timing.start).0,
+        "slips": timing.slips,
+        "cause": cause(timing),
+        "actors_ns": worst.actors.iter().map(|(name, spent)| (name.clone(), json!(spent.0))).collect::<Map<_, _>>(),
+        "meanwhile": worst.meanwhile,
+        "force_step_n": worst.force_step_n,
+        "why": in_words(worst),
+        "neighbours": worst.moment.ticks.iter().map(neighbour).collect::<Vec<_>>(),
+    })
+}
+
+fn document(report: &RunReport) -> Value {
     let (verdict, reason) = verdict(report);
     let mut document = json!({
         "schema_version": 1,
@@ -65,7 +137,7 @@ pub fn to_json(report: &RunReport) -> String {
             document.insert("devices".to_owned(), report.devices.iter().map(named).collect());
         }
     }
-    document.to_string()
+    document
 }
 
 fn device(DeviceReport { resyncs, force, contact, limits, .. }: &DeviceReport) -> Map<String, Value> {
@@ -154,19 +226,13 @@ fn group(group: &GroupReport) -> Value {
         "lateness_ns": percentiles(group.lateness),
         "execution_ns": percentiles(group.execution),
         "period_error_ns": percentiles(group.period_error),
+        "jitter_ns": percentiles(group.jitter),
+        "busy_ns": group.busy.0,
     })
 }
 
 fn causes(counts: CauseCounts) -> Value {
-    let name = |cause| match cause {
-        SlipCause::None => "unattributed",
-        SlipCause::LateWake => "late_wake",
-        SlipCause::LongTick => "long_tick",
-        SlipCause::StalledPeer => "stalled_peer",
-        SlipCause::Policy => "policy",
-        SlipCause::Fault => "fault",
-    };
-    Value::Object(counts.iter().map(|(cause, count)| (name(cause).to_owned(), json!(count))).collect())
+    Value::Object(counts.iter().map(|(cause, count)| (cause_name(cause).to_owned(), json!(count))).collect())
 }
 
 fn percentiles<T: Into<Value>>(p: Percentiles<T>) -> Value {

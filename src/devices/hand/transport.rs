@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::devices::ForceCommand;
-use crate::devices::random::uniform;
+use crate::random::uniform;
 use crate::time::Nanos;
 
 /// Commands on their way at most: a delay of 100 ms at 10 kHz.
@@ -26,7 +26,7 @@ impl Transport {
 
     /// Sends `command` at `now`.
     pub(super) fn send(&mut self, now: Nanos, command: ForceCommand) {
-        let jitter = Nanos::from_secs_f64(self.jitter_s * uniform(self.seed, now));
+        let jitter = Nanos::from_secs_f64(self.jitter_s * uniform(self.seed, now.0));
         let earliest = self.pending.back().map_or(Nanos::ZERO, |(arrival, _)| *arrival);
         let arrival = (now + self.delay + jitter).max(earliest);
         if self.pending.len() == ROOM {

@@ -2,14 +2,20 @@
 //!
 //! It fits a screen of 80 columns and 40 lines for a run of up to four rate groups.
 
+mod haptics;
+mod page;
+mod worst;
+
 use std::fmt;
 
-use super::units::{duration, force, seconds};
+use self::haptics::haptics;
+use self::page::Page;
+pub(super) use self::worst::in_words;
+use super::units::duration;
 use super::verdict::verdict;
-use crate::log::{CauseCounts, DeviceReport, Environment, Execution, GroupReport, Percentiles, RunReport};
+use crate::log::timing::{CoreUse, TimingReport};
+use crate::log::{CauseCounts, Environment, Execution, GroupReport, Percentiles, RunReport};
 
-const WIDTH: usize = 80;
-const NAME_WIDTH: usize = 11;
 const EVENTS_SHOWN: usize = 4;
 /// Lines for what the system granted.
 const GRANT_LINES: usize = 6;
@@ -22,62 +28,36 @@ impl fmt::Display for RunReport {
 
 /// The report as text, every line ended by a newline.
 pub fn to_text(report: &RunReport) -> String {
+    text(report, None)
+}
+
+/// The timing of a run in detail as text: the same, with processor cores and the worst ticks.
+pub fn timing_to_text(report: &TimingReport) -> String {
+    text(&report.run, Some(report))
+}
+
+fn text(report: &RunReport, timing: Option<&TimingReport>) -> String {
     let (verdict, reason) = verdict(report);
     let mut page = Page::default();
     page.line(format!("{}: {reason}", verdict.name()));
+    timing.iter().for_each(|timing| worst::sentence(&mut page, timing));
     if let Some(environment) = &report.environment {
         page.line(String::new());
         about(&mut page, environment);
     }
     page.line(String::new());
     groups(&mut page, report);
+    timing.iter().for_each(|timing| cores(&mut page, &timing.cores));
     page.line(String::new());
-    for device in &report.devices {
+    for device in report.devices.iter().filter(|device| device.force.ticks > 0 || timing.is_none()) {
         if report.devices.len() > 1 {
             page.named("DEVICE", device.name.clone());
         }
         haptics(&mut page, device);
     }
     events(&mut page, report);
+    timing.iter().for_each(|timing| worst::table(&mut page, timing));
     page.text
-}
-
-#[derive(Default)]
-struct Page {
-    text: String,
-}
-
-impl Page {
-    /// Adds a line, cut to the width of the page.
-    fn line(&mut self, line: String) {
-        let mut kept: String = line.chars().take(WIDTH).collect();
-        if kept.len() < line.len() {
-            kept.truncate(kept.char_indices().nth(WIDTH - 3).map_or(kept.len(), |(at, _)| at));
-            kept.push_str("...");
-        }
-        self.text.push_str(kept.trim_end());
-        self.text.push('\n');
-    }
-
-    /// Adds text with a name in front, on as many lines as it needs.
-    fn wrapped(&mut self, name: &str, text: &str) {
-        let (mut name, mut line) = (name, String::new());
-        for word in text.split(' ') {
-            if !line.is_empty() && NAME_WIDTH + line.len() + 1 + word.len() > WIDTH {
-                self.named(name, std::mem::replace(&mut line, "  ".to_owned()));
-                name = "";
-            } else if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-        self.named(name, line);
-    }
-
-    /// Adds a line with a name in front.
-    fn named(&mut self, name: &str, text: String) {
-        self.line(format!("{name:<NAME_WIDTH$}{text}"));
-    }
 }
 
 fn about(page: &mut Page, environment: &Environment) {
@@ -131,66 +111,35 @@ fn groups(page: &mut Page, report: &RunReport) {
         }
     }
     page.line(String::new());
-    page.line(format!("{:<25}{:>11}{:>11}{:>11}{:>11}{:>11}", "", "p50", "p90", "p99", "p99.9", "max"));
+    page.line(format!(
+        "{:<11}{:<13}{:>8}{:>9}{:>10}{:>10}{:>10}{:>9}",
+        "", "", "samples", "p50", "p90", "p99", "p99.9", "max"
+    ));
     for group in &report.groups {
         percentiles(page, short(&group.name), "lateness", group.lateness);
         percentiles(page, "", "execution", group.execution);
         percentiles(page, "", "period error", group.period_error);
+        percentiles(page, "", "jitter", group.jitter);
     }
     if report.is_virtual() {
-        page.line("virtual time: lateness, execution and period error are declared, not measured: zero".to_owned());
+        page.line("virtual time: lateness, execution and period error are declared, not measured".to_owned());
+    }
+}
+
+/// How much of each core the groups used.
+fn cores(page: &mut Page, cores: &[CoreUse]) {
+    for (i, core) in cores.iter().enumerate() {
+        let on = core.cpu.map_or("any".to_owned(), |cpu| format!("cpu {cpu}"));
+        let groups: Vec<String> =
+            core.groups.iter().map(|(group, share)| format!("{group} {:.1} %", 100.0 * share)).collect();
+        page.wrapped(if i == 0 { "cores" } else { "" }, &format!("{on}: {}", groups.join(", ")));
     }
 }
 
 fn percentiles(page: &mut Page, group: &str, what: &str, p: Percentiles<u64>) {
     let cell = |ns: u64| if p.count == 0 { "-".to_owned() } else { duration(ns) };
     let [p50, p90, p99, p999, max] = [p.p50, p.p90, p.p99, p.p999, p.max].map(cell);
-    page.line(format!("{group:<11}{what:<14}{p50:>11}{p90:>11}{p99:>11}{p999:>11}{max:>11}"));
-}
-
-fn haptics(page: &mut Page, report: &DeviceReport) {
-    let resyncs = &report.resyncs;
-    page.named("resyncs", resyncs.jump_before_n.count.to_string());
-    if resyncs.jump_before_n.count > 0 {
-        let of = |p: Percentiles<f64>, show: fn(f64) -> String| {
-            format!("p50 {:>9}   p99 {:>9}   max {:>9}", show(p.p50), show(p.p99), show(p.max))
-        };
-        page.named("  jump", format!("before blending  {}", of(resyncs.jump_before_n, force)));
-        page.named("", format!("after blending   {}", of(resyncs.jump_after_n, force)));
-        page.named("  age", format!("on arrival       {}", of(resyncs.age_ns.map(|ns| ns as f64 / 1e9), seconds)));
-        page.named("", format!("at each tick     {}", of(report.force.model_age_s, seconds)));
-    }
-    let shares: Vec<String> =
-        report.force.shares().map(|(model, share)| format!("{} {:.2} %", model.name(), 100.0 * share)).collect();
-    if !shares.is_empty() {
-        page.named("served by", shares.join(", "));
-    }
-    let contact = report.contact;
-    page.named(
-        "contact",
-        format!(
-            "free {}, stick {}, slip {}, lost {} (haptic ticks)",
-            contact.free, contact.stick, contact.slip, contact.lost
-        ),
-    );
-    let not_finite = match report.force.not_finite {
-        0 => String::new(),
-        count => format!(", {count} not finite"),
-    };
-    page.named(
-        "force",
-        format!("peak {}, commanded {}{not_finite}", force(report.force.peak_n), force(report.force.peak_commanded_n)),
-    );
-    if report.limits.ticks > 0 {
-        let energy = report.limits.energy;
-        let [least, last, tank] = [energy.least_j, energy.last_j, energy.least_tank_j].map(|j| 1e3 * j);
-        page.named("energy", format!("ledger least {least:.3} mJ, end {last:.3} mJ; tank least {tank:.3} mJ"));
-    }
-    if report.limits.limited > 0 {
-        let stages = report.limits.stages.iter().map(|(name, count)| format!("{name} {count}"));
-        let share = 100.0 * report.limits.share();
-        page.wrapped("limits", &format!("{} ({share:.2} % of ticks)", stages.collect::<Vec<_>>().join(", ")));
-    }
+    page.line(format!("{group:<11}{what:<13}{:>8}{p50:>9}{p90:>10}{p99:>10}{p999:>10}{max:>9}", p.count));
 }
 
 fn events(page: &mut Page, report: &RunReport) {
@@ -219,6 +168,7 @@ fn short(name: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
+    use super::page::WIDTH;
     use super::*;
     use crate::log::{Analysis, GroupInfo, Level, LogRecord, Resync, TextEvent};
     use crate::runtime::record::{SlipCause, TickTiming};
