@@ -23,6 +23,8 @@ pub enum ErrorKind {
     Device,
     /// An actor failed while running (a panic, or numbers that are not finite). The run is over; the log up to then is good.
     Fault,
+    /// A condition that a log must not fulfil holds (`palpate timing --fail-if`). The message names the figure.
+    Condition,
     /// The user ended the run before its time. Nothing is wrong; the log is complete up to there.
     Interrupted,
 }

@@ -1,8 +1,13 @@
 //! A progress bar for a run and a line for each of its rate groups, on a terminal only.
 
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
 use std::time::Duration;
 
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressBarIter, ProgressDrawTarget, ProgressStyle};
+use palpate::Error;
+use palpate::log::LogReader;
 use palpate::runtime::GroupLive;
 use palpate::session::Running;
 use palpate::time::Nanos;
@@ -74,6 +79,41 @@ impl RunBar {
     /// Takes the bar from the screen.
     pub fn clear(self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// Bytes that are read at once.
+const READ_BUFFER_BYTES: usize = 1 << 18;
+
+/// How much of a log has been read.
+pub struct ReadBar(ProgressBar);
+
+/// A log whose reading is shown.
+pub type ShownLog = LogReader<BufReader<ProgressBarIter<File>>>;
+
+impl ReadBar {
+    /// Opens the log at `path`.
+    ///
+    /// # Errors
+    /// As [`LogReader::open`].
+    pub fn open(path: &Path) -> Result<(Self, ShownLog), Error> {
+        let file = File::open(path).map_err(|error| Error::io(path, error))?;
+        let bytes = file.metadata().map_or(0, |metadata| metadata.len());
+        let bar = ProgressBar::with_draw_target(Some(bytes), ProgressDrawTarget::stderr_with_hz(10));
+        let style = ProgressStyle::with_template("{msg} [{bar:40}] {bytes} of {total_bytes}, {eta} left");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+        bar.set_message(format!("reading {}", path.display()));
+        let source = BufReader::with_capacity(READ_BUFFER_BYTES, bar.wrap_read(file));
+        let reader = LogReader::new(source, &path.display().to_string());
+        if reader.is_err() {
+            bar.finish_and_clear();
+        }
+        Ok((Self(bar), reader?))
+    }
+
+    /// Takes the bar from the screen.
+    pub fn clear(self) {
+        self.0.finish_and_clear();
     }
 }
 

@@ -1,36 +1,102 @@
 //! `palpate timing LOG`: who was late, why, and what it did to the force.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use palpate::Error;
-use palpate::log::LogReader;
-use palpate::log::timing::{Selection, TimingAnalysis};
-use palpate::report::{timing_to_json, timing_to_text};
+use palpate::log::timing::{Against, Condition, Selection, TimingAnalysis, TimingReport};
+use palpate::report::{against_to_json, against_to_text, figure_to_text, timing_to_json, timing_to_text};
+use palpate::time::Nanos;
+use palpate::{Error, ErrorKind};
 
 use super::output::{print, warn_of_damage};
+use super::progress::ReadBar;
 
 /// The arguments of `palpate timing`.
 #[derive(Debug, clap::Args)]
 pub struct TimingArgs {
-    /// The log to analyse.
+    /// The log to analyse
     pub log: PathBuf,
-    /// Print one JSON document instead of the report.
+    /// Print one JSON document instead of the report
     #[arg(long)]
     pub json: bool,
+    /// Hold the log against this one: figures side by side, ratios and how sure they are
+    #[arg(long, value_name = "OTHER")]
+    pub against: Option<PathBuf>,
+    /// Exit with 1 if the condition holds, such as 'local.lateness.p99 > 200us'; may be given several times
+    #[arg(long, value_name = "CONDITION")]
+    pub fail_if: Vec<Condition>,
+    /// Look at what happened from this second on
+    #[arg(long, value_name = "S", value_parser = log_time)]
+    pub from: Option<Nanos>,
+    /// Look at what happened before this second
+    #[arg(long, value_name = "S", value_parser = log_time)]
+    pub to: Option<Nanos>,
+    /// Look at this rate group alone; may be given several times
+    #[arg(long, value_name = "NAME")]
+    pub group: Vec<String>,
 }
 
 /// Analyses a log and prints the report. A damaged log is analysed up to the damage, with one warning.
 ///
 /// # Errors
-/// [`ErrorKind::Io`](palpate::ErrorKind::Io) if the log cannot be read, [`ErrorKind::Log`](palpate::ErrorKind::Log) if it
-/// is no MCAP.
+/// [`ErrorKind::Io`] if a log cannot be read, [`ErrorKind::Log`] if it is none, [`ErrorKind::Usage`] if it has no such group
+/// or figure, [`ErrorKind::Condition`] if a condition holds.
 pub fn run(args: &TimingArgs) -> Result<(), Error> {
-    let mut reader = LogReader::open(&args.log)?;
-    let mut analysis = TimingAnalysis::new(Selection::default());
+    let report = read(&args.log, args)?;
+    match &args.against {
+        Some(other_log) => {
+            let other = read(other_log, args)?;
+            let against = Against::of(&report, &other);
+            let [this_name, other_name] = [&args.log, other_log].map(|log| log.display().to_string());
+            match args.json {
+                true => print(&format!("{}\n", against_to_json(&against, &report, (&other_name, &other)))),
+                false => print(&against_to_text(&against, [(&this_name, &report), (&other_name, &other)])),
+            }
+        }
+        None if args.json => print(&format!("{}\n", timing_to_json(&report))),
+        None => print(&timing_to_text(&report)),
+    }?;
+    check(args, &report)
+}
+
+/// Reads a log as far as it can be read.
+fn read(log: &Path, args: &TimingArgs) -> Result<TimingReport, Error> {
+    let selection = Selection { from: args.from, to: args.to, groups: args.group.clone() };
+    let mut analysis = TimingAnalysis::new(selection);
+    let (bar, mut reader) = ReadBar::open(log)?;
     reader.by_ref().for_each(|entry| analysis.push_entry(&entry));
+    bar.clear();
     let mut report = analysis.report();
     report.run.damage = reader.damage().map(str::to_owned);
     report.run.messages = reader.topics().into_iter().map(|(topic, count)| (topic.to_owned(), count)).collect();
     warn_of_damage(reader.place(), reader.damage());
-    if args.json { print(&format!("{}\n", timing_to_json(&report))) } else { print(&timing_to_text(&report)) }
+    let unknown = args.group.iter().find(|name| !report.groups.iter().any(|group| group.name == **name));
+    if let Some(unknown) = unknown {
+        let message = format!("has no rate group `{unknown}`; `palpate timing {}` lists its groups", log.display());
+        return Err(Error::new(ErrorKind::Usage, message).at(log.display().to_string()));
+    }
+    Ok(report)
+}
+
+/// Every condition that holds, in one line.
+fn check(args: &TimingArgs, report: &TimingReport) -> Result<(), Error> {
+    let figures = report.figures();
+    let mut broken = Vec::new();
+    for condition in &args.fail_if {
+        if let Some(figure) = condition.broken_by(&figures)? {
+            broken.push(format!("{} is {} (`{condition}`)", figure.name, figure_to_text(figure)));
+        }
+    }
+    match broken.is_empty() {
+        true => Ok(()),
+        false => Err(Error::new(ErrorKind::Condition, broken.join("; ")).at(args.log.display().to_string())),
+    }
+}
+
+/// A time in seconds on the command line.
+fn log_time(text: &str) -> Result<Nanos, String> {
+    let seconds: f64 = text.parse().map_err(|_| "is no number of seconds".to_owned())?;
+    match seconds.is_finite() && seconds >= 0.0 {
+        true => Ok(Nanos::from_secs_f64(seconds)),
+        false => Err("must be at least 0".to_owned()),
+    }
 }

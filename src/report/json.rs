@@ -34,7 +34,9 @@ use serde_json::{Map, Value, json};
 
 use super::text::in_words;
 use super::verdict::verdict;
-use crate::log::timing::{CoreUse, Figure, TimingReport, Value as FigureValue, WorstTick, cause_name};
+use crate::log::timing::{
+    Against, ComparedFigure, CoreUse, Figure, TimingReport, Value as FigureValue, WorstTick, cause_name,
+};
 use crate::log::{
     CauseCounts, DeviceReport, Environment, Execution, ForceReport, GroupReport, Level, Percentiles, RunReport,
     TextEvent,
@@ -48,12 +50,40 @@ pub fn to_json(report: &RunReport) -> String {
 
 /// The timing of a run in detail as one JSON document.
 pub fn timing_to_json(report: &TimingReport) -> String {
+    timing_document(report).to_string()
+}
+
+fn timing_document(report: &TimingReport) -> Value {
     let mut document = document(&report.run);
     let figure = |figure: Figure| (figure.name, number(figure.value));
     document["figures"] = Value::Object(report.figures().into_iter().map(figure).collect());
     document["cores"] = report.cores.iter().map(core).collect();
     document["worst"] = report.worst.iter().map(|worst| worst_tick(worst, report)).collect();
     document["span_s"] = report.span.iter().map(|time| time.as_secs_f64()).collect();
+    document
+}
+
+/// Two logs side by side as one JSON document: the report of this one, and in `against` the `log` that it is held against
+/// with its `verdict`, in `figures` by name `this`, `other`, `ratio` and `interval` (95 % of the ratios lie there; both `null`
+/// where there is nothing to say) and `differs`, and in `unmatched` the names that one of the two alone has.
+pub fn against_to_json(against: &Against, this: &TimingReport, other: (&str, &TimingReport)) -> String {
+    let compared = |compared: &ComparedFigure| {
+        let value = json!({
+            "this": number(compared.this.value),
+            "other": number(compared.other.value),
+            "ratio": compared.ratio,
+            "interval": compared.interval,
+            "differs": compared.differs(),
+        });
+        (compared.this.name.clone(), value)
+    };
+    let mut document = timing_document(this);
+    document["against"] = json!({
+        "log": other.0,
+        "verdict": verdict(&other.1.run).0.name(),
+        "figures": against.figures.iter().map(compared).collect::<Map<_, _>>(),
+        "unmatched": against.unmatched,
+    });
     document.to_string()
 }
 

@@ -18,7 +18,7 @@ mod text;
 #[cfg(feature = "log")]
 pub use export::{Format, export};
 #[cfg(feature = "cli")]
-pub use json::{timing_to_json, to_json};
+pub use json::{against_to_json, timing_to_json, to_json};
 pub use picture::{COLOURS, Picture, Series};
-pub use text::{timing_to_text, to_text};
+pub use text::{against_to_text, figure_to_text, timing_to_text, to_text};
 pub use verdict::{Verdict, verdict};

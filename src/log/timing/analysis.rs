@@ -109,6 +109,10 @@ impl TimingAnalysis {
     /// What has been found.
     pub fn report(self) -> TimingReport {
         let mut run = self.sums.report();
+        let span = self.span.unwrap_or_default();
+        if self.selection.from.is_some() {
+            run.duration = span[1].saturating_sub(span[0]);
+        }
         let unknown = Environment::default();
         let environment = self.sums.environment().unwrap_or(&unknown).clone();
         let name = |group: u16| environment.group_name(group);
@@ -132,7 +136,6 @@ impl TimingAnalysis {
                 .get(usize::from(group))
                 .map_or_else(|| format!("actor {actor}"), |info| info.actor_name(actor))
         };
-        let span = self.span.unwrap_or_default();
         TimingReport {
             cores: cores(&run, &environment, span),
             worst: self.worst.report(&self.recent, name, actor),

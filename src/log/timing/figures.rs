@@ -5,6 +5,7 @@
 //! | `GROUP.released`, `.skipped`, `.missed`, `.elapsed_periods`, `.in_degraded_mode`, `.lost_records` | counts |
 //! | `GROUP.skipped.CAUSE`, `GROUP.missed.CAUSE` | counts; the causes that occurred |
 //! | `GROUP.lateness.P`, `.execution.P`, `.period_error.P`, `.jitter.P`, `GROUP.ACTOR.execution.P` | ns |
+//! | `GROUP.skipped_share`, `.missed_share` | share of the periods, 0 to 1 |
 //! | `GROUP.utilisation`, `coreN.utilisation`, `anywhere.utilisation` | share of the time, 0 to 1 |
 //! | `resync.jump_before.P`, `resync.jump_after.P`; `resync.age.P` | N; ns |
 //! | `force.model_age.P`; `force.peak`, `force.peak_commanded`; `force.ticks`, `force.not_finite` | s; N; counts |
@@ -162,6 +163,11 @@ impl Figures {
             ("lost_records", group.lost_records),
         ] {
             self.count(&name(figure), count);
+        }
+        if group.elapsed_periods > 0 {
+            let share = |count: u64| count as f64 / group.elapsed_periods as f64;
+            self.real(&name("skipped_share"), Unit::Share, share(group.skipped.total()));
+            self.real(&name("missed_share"), Unit::Share, share(group.missed.total()));
         }
         for (figure, percentiles) in [
             ("lateness", group.lateness),

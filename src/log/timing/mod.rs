@@ -3,8 +3,10 @@
 //! [`TimingAnalysis`] reads entries in the order of the log and keeps what a report needs: memory grows with the number
 //! of distinct durations and not with the length of the run. [`TimingReport`] holds the result.
 
+mod against;
 mod analysis;
 mod blocks;
+mod bootstrap;
 mod charts;
 mod condition;
 mod cores;
@@ -16,6 +18,7 @@ mod recent;
 mod selection;
 mod worst;
 
+pub use against::{Against, ComparedFigure};
 pub use analysis::{TimingAnalysis, TimingReport};
 pub use blocks::{Block, Buckets};
 pub use charts::{Bin, Shape};

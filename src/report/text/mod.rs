@@ -2,12 +2,14 @@
 //!
 //! It fits a screen of 80 columns and 40 lines for a run of up to four rate groups.
 
+mod against;
 mod haptics;
 mod page;
 mod worst;
 
 use std::fmt;
 
+pub use self::against::{against_to_text, figure_to_text};
 use self::haptics::haptics;
 use self::page::Page;
 pub(super) use self::worst::in_words;

@@ -63,11 +63,11 @@ pub(super) fn table(page: &mut Page, report: &TimingReport) {
     }
     page.line(String::new());
     page.line(format!(
-        "{:<11}{:>9}{:>10}{:>10}{:>8}  {:<10}{:>9}  {}",
-        "worst", "t", "tick", "overdue", "of due", "around", "step", "cause"
+        "{:<10}{:>8}{:>9}{:>9}{:>7}  {:<9}{:>9}  {}",
+        "worst", "t (s)", "tick", "overdue", "of due", "around", "step", "cause"
     ));
     for worst in &report.worst {
-        let group: String = worst.group.chars().take(10).collect();
+        let group: String = worst.group.chars().take(9).collect();
         let step = worst.force_step_n.map_or("-".to_owned(), force);
         let skipped = match worst.timing.slips {
             0 => String::new(),
@@ -75,7 +75,7 @@ pub(super) fn table(page: &mut Page, report: &TimingReport) {
         };
         let cause = if worst.is_trouble() { worst.cause.name() } else { "in time" };
         page.line(format!(
-            "{group:<11}{:>7.3} s{:>10}{:>10}{:>7.2}x  {:<10}{step:>9}  {cause}{skipped}",
+            "{group:<10}{:>8.3}{:>9}{:>9}{:>6.2}x  {:<9}{step:>9}  {cause}{skipped}",
             worst.timing.scheduled.as_secs_f64(),
             worst.timing.tick,
             duration(worst.overdue.0),
