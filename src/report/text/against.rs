@@ -5,8 +5,10 @@ use crate::log::timing::{Against, ComparedFigure, Figure, TimingReport, Unit, Va
 use crate::report::units::{duration, force, seconds};
 use crate::report::verdict::verdict;
 
-/// Figures that a table leaves out unless they differ: the parts of others, and counts of what is in the log at all.
-const LEFT_OUT: [&str; 5] = [".count", ".released", ".elapsed_periods", ".ticks", ".p90"];
+/// Beside what differs without doubt, what a table shows: the ends of names.
+const SHOWN: [&str; 5] = ["skipped", "missed", "lost_records", "jump_after.p99", "force.model_age.p99"];
+/// Of the groups' lateness and execution.
+const PERCENTILES: [&str; 3] = ["p50", "p99", "max"];
 
 /// `this` and `other` are names of the logs.
 pub fn against_to_text(against: &Against, [this, other]: [(&str, &TimingReport); 2]) -> String {
@@ -29,18 +31,21 @@ pub fn against_to_text(against: &Against, [this, other]: [(&str, &TimingReport);
         ));
     }
     page.line(String::new());
-    page.line("* the interval leaves no doubt; intervals are of a block bootstrap, see docs/timing.md".to_owned());
+    page.line("* no doubt; intervals are of a block bootstrap; all figures: --json".to_owned());
     if !against.unmatched.is_empty() {
-        page.wrapped("only one has", &against.unmatched.join(", "));
+        page.wrapped("unmatched", &against.unmatched.join(", "));
     }
     page.text
 }
 
-/// Zero on both sides says nothing, and what is left out is in the JSON document.
+/// The rest is in the JSON document; zero on both sides says nothing.
 fn is_shown(figure: &ComparedFigure) -> bool {
-    let zero = |value: Value| value.as_f64() == 0.0;
-    let is_detail = LEFT_OUT.iter().any(|ending| figure.this.name.ends_with(ending));
-    figure.differs() || !is_detail && !(zero(figure.this.value) && zero(figure.other.value))
+    let name = figure.this.name.as_str();
+    let parts: Vec<&str> = name.split('.').collect();
+    let is_of_releases = matches!(parts[..], [_, "lateness" | "execution", which] if PERCENTILES.contains(&which));
+    let is_zero = figure.this.value.as_f64() == 0.0 && figure.other.value.as_f64() == 0.0;
+    figure.differs()
+        || !is_zero && (is_of_releases || SHOWN.iter().any(|end| name.ends_with(end)) || name.starts_with("core"))
 }
 
 /// The value of a figure with its unit.
