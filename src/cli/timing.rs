@@ -1,8 +1,10 @@
 //! `palpate timing LOG`: who was late, why, and what it did to the force.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use palpate::log::timing::{Against, Condition, Selection, TimingAnalysis, TimingReport};
+use palpate::log::timing::{Against, Condition, Selection, TimingAnalysis, TimingReport, read_cyclictest};
 use palpate::report::{against_to_json, against_to_text, figure_to_text, timing_to_json, timing_to_text};
 use palpate::time::Nanos;
 use palpate::{Error, ErrorKind};
@@ -13,7 +15,7 @@ use super::progress::ReadBar;
 /// The arguments of `palpate timing`.
 #[derive(Debug, clap::Args)]
 pub struct TimingArgs {
-    /// The log to analyse
+    /// The log to analyse: MCAP, of any program that writes tick timing, or what `cyclictest --json` wrote
     pub log: PathBuf,
     /// Print one JSON document instead of the report
     #[arg(long)]
@@ -60,6 +62,9 @@ pub fn run(args: &TimingArgs) -> Result<(), Error> {
 
 /// Reads a log as far as it can be read.
 fn read(log: &Path, args: &TimingArgs) -> Result<TimingReport, Error> {
+    if let Some(text) = other_than_mcap(log)? {
+        return read_cyclictest(&text, log);
+    }
     let selection = Selection { from: args.from, to: args.to, groups: args.group.clone() };
     let mut analysis = TimingAnalysis::new(selection);
     let (bar, mut reader) = ReadBar::open(log)?;
@@ -75,6 +80,15 @@ fn read(log: &Path, args: &TimingArgs) -> Result<TimingReport, Error> {
         return Err(Error::new(ErrorKind::Usage, message).at(log.display().to_string()));
     }
     Ok(report)
+}
+
+/// The text of a file that is JSON and not MCAP.
+fn other_than_mcap(log: &Path) -> Result<Option<String>, Error> {
+    let failed = |error| Error::io(log, error);
+    let mut first = [0; 1];
+    let mut file = File::open(log).map_err(failed)?;
+    let is_json = file.read(&mut first).map_err(failed)? == 1 && first == *b"{";
+    Ok(if is_json { Some(std::fs::read_to_string(log).map_err(failed)?) } else { None })
 }
 
 /// Every condition that holds, in one line.

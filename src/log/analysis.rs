@@ -159,6 +159,11 @@ impl Analysis {
         self.environment.as_ref()
     }
 
+    /// Counts releases of which the lateness alone is known (ns).
+    pub(super) fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
+        self.groups.entry(group).or_default().push_lateness(lateness, count);
+    }
+
     /// The figures of a release that is pushed next.
     pub(super) fn figures(&self, timing: &TickTiming) -> TickFigures {
         self.groups
@@ -182,7 +187,8 @@ impl Analysis {
         let groups = self.groups();
         let unknown = Environment::default();
         let environment = self.environment.as_ref().unwrap_or(&unknown);
-        let rate = |group: u16| environment.groups.get(usize::from(group)).map(|info| info.rate_hz);
+        let rate =
+            |group: u16| environment.groups.get(usize::from(group)).map(|info| info.rate_hz).filter(|hz| *hz > 0.0);
         let groups = groups.iter().map(|(&id, counter)| counter.report(environment.group_name(id), rate(id))).collect();
         let described = |event: &Event| TextEvent::describe(event, &environment.group_name(event.group));
         let mut events: Vec<TextEvent> =

@@ -118,6 +118,12 @@ impl GroupCounter {
         self.last = *timing;
     }
 
+    /// Counts releases of which the lateness alone is known (ns).
+    pub(super) fn push_lateness(&mut self, lateness: u64, count: u64) {
+        self.released += count;
+        self.lateness.push_many(lateness, count);
+    }
+
     /// The figures of the release that comes next.
     pub(crate) fn figures(&self, timing: &TickTiming) -> TickFigures {
         let between = |later: Nanos, earlier: Nanos| later.0.wrapping_sub(earlier.0).cast_signed();

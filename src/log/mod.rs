@@ -25,6 +25,8 @@ mod chunk;
 #[cfg(feature = "log")]
 mod convert;
 #[cfg(feature = "log")]
+mod foreign;
+#[cfg(feature = "log")]
 mod framing;
 #[cfg(feature = "log")]
 mod proto;

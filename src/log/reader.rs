@@ -8,7 +8,8 @@ use std::path::Path;
 use mcap::records::{Record, op};
 
 use super::entry::LogEntry;
-use super::environment::Environment;
+use super::environment::{Environment, Execution, GroupInfo};
+use super::foreign::ForeignChannel;
 use super::framing::RecordStream;
 use super::records::LogRecord;
 use super::schema;
@@ -26,16 +27,20 @@ const MESSAGE_HEADER_BYTES: usize = 22;
 pub struct LogReader<R> {
     records: RecordStream<R>,
     place: String,
-    schemas: HashMap<u16, String>,
+    schemas: HashMap<u16, (String, Vec<u8>)>,
     channels: HashMap<u16, Channel>,
     topic: String,
     messages: u64,
+    /// What other programs' channels together say of the run; `None` in a log of palpate's.
+    foreign: Option<Environment>,
+    foreign_base: Option<u64>,
 }
 
 struct Channel {
     topic: String,
     /// `None` for messages that are not palpate's.
     kind: Option<Kind>,
+    foreign: Option<ForeignChannel>,
     messages: u64,
 }
 
@@ -69,6 +74,8 @@ impl<R: Read> LogReader<R> {
             channels: HashMap::new(),
             topic: String::new(),
             messages: 0,
+            foreign: Some(foreign_environment()),
+            foreign_base: None,
         })
     }
 
@@ -114,16 +121,18 @@ impl<R: Read> LogReader<R> {
             return self.decode_message();
         }
         match mcap::parse_record(opcode, body).map_err(|e| e.to_string())? {
-            Record::Schema { header, .. } => {
-                self.schemas.insert(header.id, header.name);
+            Record::Schema { header, data } => {
+                self.schemas.insert(header.id, (header.name, data.into_owned()));
             }
             Record::Channel(channel) => {
-                let kind = self.schemas.get(&channel.schema_id).and_then(|name| Kind::from_schema(name));
                 // The index repeats every channel.
-                self.channels.entry(channel.id).or_insert(Channel { topic: channel.topic, kind, messages: 0 });
+                if !self.channels.contains_key(&channel.id) {
+                    return Ok(self.declare(channel));
+                }
             }
             Record::Metadata(metadata) if metadata.name == "environment" => {
                 self.topic.clear();
+                self.foreign = None;
                 return Ok(Some(LogEntry::Environment(Environment::from_map(&metadata.metadata))));
             }
             Record::Attachment { header, data, .. } => {
@@ -141,6 +150,24 @@ impl<R: Read> LogReader<R> {
         Ok(None)
     }
 
+    /// Takes in a channel; if it is one of another program's with tick timing, says which groups there are now.
+    fn declare(&mut self, channel: mcap::records::Channel) -> Option<LogEntry> {
+        let schema = self.schemas.get(&channel.schema_id).map(|(name, data)| (name.as_str(), data.as_slice()));
+        let kind = schema.and_then(|(name, _)| Kind::from_schema(name));
+        let mut foreign = None;
+        let mut known = None;
+        if let Some(environment) = self.foreign.as_mut() {
+            let group = u16::try_from(environment.groups.len()).unwrap_or(u16::MAX);
+            foreign = ForeignChannel::of(group, &channel.topic, &channel.message_encoding, schema, &channel.metadata);
+            if let Some(foreign) = &foreign {
+                environment.groups.push(GroupInfo::new(foreign.name(), foreign.rate_hz().unwrap_or(0.0)));
+                known = Some(LogEntry::Environment(environment.clone()));
+            }
+        }
+        self.channels.insert(channel.id, Channel { topic: channel.topic, kind, foreign, messages: 0 });
+        known
+    }
+
     fn decode_message(&mut self) -> Result<Option<LogEntry>, String> {
         let body = self.records.body();
         let Some((header, data)) = body.split_at_checked(MESSAGE_HEADER_BYTES) else {
@@ -152,10 +179,15 @@ impl<R: Read> LogReader<R> {
         };
         self.messages += 1;
         channel.messages += 1;
+        self.topic.clone_from(&channel.topic);
+        if let Some(foreign) = &mut channel.foreign {
+            let tick = foreign.tick(data, &mut self.foreign_base);
+            let tick = tick.map_err(|e| format!("a message on {} is no tick timing: {e}", channel.topic))?;
+            return Ok(Some(LogEntry::Record(LogRecord::Tick(tick))));
+        }
         let Some(kind) = channel.kind else {
             return Ok(None);
         };
-        self.topic.clone_from(&channel.topic);
         match decode_data(kind, data) {
             Ok(entry) => Ok(Some(entry)),
             Err(e) => Err(format!("a message on {} does not decode: {e}", channel.topic)),
@@ -184,6 +216,18 @@ impl<R> std::fmt::Debug for LogReader<R> {
             .field("place", &self.place)
             .field("messages", &self.messages)
             .finish_non_exhaustive()
+    }
+}
+
+/// What is known of a run of another program.
+fn foreign_environment() -> Environment {
+    let execution = Execution::Threaded { start_unix_ns: 0 };
+    Environment {
+        execution,
+        model: "unknown".into(),
+        palpate_version: "-".into(),
+        instruction_set: "-".into(),
+        ..Environment::default()
     }
 }
 

@@ -58,6 +58,11 @@ impl TimingAnalysis {
         }
     }
 
+    /// Counts a lateness of a group as often as it occurred, where nothing else is known of its releases (ns).
+    pub(super) fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
+        self.sums.push_lateness(group, lateness, count);
+    }
+
     fn push(&mut self, record: &LogRecord) {
         let time = record.time();
         if !self.selection.has_time(time) {

@@ -1,0 +1,287 @@
+//! Tick timing in logs of other programs: any MCAP channel whose messages have the fields below.
+//!
+//! | field | meaning |
+//! | --- | --- |
+//! | `scheduled_ns` | when the release was due; required |
+//! | `woke_ns` | when it ran; required, or `start_ns` in its place |
+//! | `start_ns`, `end_ns` | when its work began and was done; `woke_ns` and `start_ns` if left out |
+//! | `deadline_ns` | when it had to be done; one period after it was due if left out |
+//! | `tick` | the number of the release, counting skipped ones; by its time if left out |
+//! | `slips` | periods skipped before it; from the numbers if left out |
+//! | `cause` | why: a number of [`SlipCause`], or its name |
+//!
+//! All times are integers in nanoseconds of one clock. Messages are JSON (`message_encoding` `json`) or protobuf with their
+//! descriptors as the schema. A channel is read if its topic begins with `/timing/`, or if its schema's name ends in
+//! `TickTiming`; the rest of the topic names the group. Channel metadata `rate_hz` says the rate, which is otherwise
+//! taken from the first two releases.
+
+use std::collections::BTreeMap;
+
+use prost::Message;
+use prost::encoding::{WireType, decode_key, decode_varint};
+use prost_types::FileDescriptorSet;
+
+use crate::runtime::record::{SlipCause, TickTiming};
+use crate::time::Nanos;
+
+const SECOND: u64 = 1_000_000_000;
+/// Times from here on are of a calendar or of a machine's own clock and not of a run.
+const LONGEST_RUN: u64 = 86_400 * SECOND;
+
+const FIELDS: [&str; 8] = ["scheduled_ns", "woke_ns", "start_ns", "end_ns", "deadline_ns", "tick", "slips", "cause"];
+/// Places in [`FIELDS`].
+const SCHEDULED: usize = 0;
+const WOKE: usize = 1;
+const START: usize = 2;
+const END: usize = 3;
+const DEADLINE: usize = 4;
+const TICK: usize = 5;
+const SLIPS: usize = 6;
+const CAUSE: usize = 7;
+
+/// The values of a message, in the order of [`FIELDS`].
+type Values = [Option<u64>; FIELDS.len()];
+
+/// How the messages of a channel are written.
+#[derive(Clone, Debug, PartialEq)]
+enum Encoding {
+    Json,
+    /// The place in [`FIELDS`] by field number.
+    Protobuf(BTreeMap<u32, usize>),
+}
+
+/// A channel with tick timing.
+#[derive(Clone, Debug)]
+pub(super) struct ForeignChannel {
+    group: u16,
+    name: String,
+    rate_hz: Option<f64>,
+    encoding: Encoding,
+    last: Option<TickTiming>,
+    period: Option<u64>,
+}
+
+impl ForeignChannel {
+    /// The channel `topic` as rate group number `group`; `None` if it does not hold tick timing.
+    pub(super) fn of(
+        group: u16,
+        topic: &str,
+        message_encoding: &str,
+        schema: Option<(&str, &[u8])>,
+        metadata: &BTreeMap<String, String>,
+    ) -> Option<Self> {
+        let is_named = schema.is_some_and(|(name, _)| name.ends_with("TickTiming"));
+        let name = topic.strip_prefix("/timing/").or(is_named.then(|| topic.trim_start_matches('/')))?;
+        let encoding = match (message_encoding, schema) {
+            ("json", _) => Encoding::Json,
+            ("protobuf", Some((message, descriptors))) => Encoding::Protobuf(numbers(message, descriptors)?),
+            _ => return None,
+        };
+        let rate_hz = metadata.get("rate_hz").and_then(|rate| rate.parse().ok()).filter(|rate| *rate > 0.0);
+        let period = rate_hz.map(|rate: f64| (SECOND as f64 / rate).round() as u64).filter(|period| *period > 0);
+        Some(Self { group, name: name.to_owned(), rate_hz, encoding, last: None, period })
+    }
+
+    /// The name of its group.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The rate that it declares (Hz).
+    pub(super) fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
+    }
+
+    /// Reads one message; `base` is the time that counts as the start of the run, found by the first message of a log.
+    pub(super) fn tick(&mut self, data: &[u8], base: &mut Option<u64>) -> Result<TickTiming, String> {
+        let values = match &self.encoding {
+            Encoding::Json => of_json(data)?,
+            Encoding::Protobuf(numbers) => of_protobuf(data, numbers)?,
+        };
+        let scheduled = values[SCHEDULED].ok_or("it has no scheduled_ns")?;
+        let woke = values[WOKE].or(values[START]).ok_or("it has neither woke_ns nor start_ns")?;
+        let since_boot_or_1970 = scheduled > LONGEST_RUN;
+        let base = *base.get_or_insert(if since_boot_or_1970 { scheduled - scheduled % SECOND } else { 0 });
+        let since = |time: u64| Nanos(time.saturating_sub(base));
+        let start = values[START].unwrap_or(woke);
+        let end = values[END].unwrap_or(start);
+        if let Some(last) = self.last {
+            let step = since(scheduled).saturating_sub(last.scheduled).0;
+            self.period = self.period.or((step > 0).then_some(step));
+        }
+        let tick = values[TICK].unwrap_or_else(|| self.number(since(scheduled)));
+        let skipped = self.last.map_or(0, |last| tick.saturating_sub(last.tick).saturating_sub(1));
+        let slips = u32::try_from(values[SLIPS].unwrap_or(skipped)).unwrap_or(u32::MAX);
+        let deadline = values[DEADLINE].or(self.period.map(|period| scheduled.saturating_add(period)));
+        let cause = SlipCause::from_code(values[CAUSE].and_then(|cause| u8::try_from(cause).ok()).unwrap_or(0));
+        let timing = TickTiming {
+            group: self.group,
+            tick,
+            scheduled: since(scheduled),
+            woke: since(woke),
+            start: since(start),
+            end: since(end),
+            // Without a period nothing is known to be late.
+            deadline: since(deadline.unwrap_or(end)),
+            slips,
+            cause,
+            ..TickTiming::default()
+        };
+        self.last = Some(timing);
+        Ok(timing)
+    }
+
+    /// The number of a release by its time: as many periods after the one before as it is later.
+    fn number(&self, scheduled: Nanos) -> u64 {
+        let Some(last) = self.last else { return 0 };
+        let since = scheduled.saturating_sub(last.scheduled).0;
+        let periods = self.period.map_or(1, |period| (since + period / 2) / period);
+        last.tick.saturating_add(periods.max(1))
+    }
+}
+
+/// The field numbers of a protobuf message; `None` if it does not have what is required.
+fn numbers(message: &str, descriptors: &[u8]) -> Option<BTreeMap<u32, usize>> {
+    let set = FileDescriptorSet::decode(descriptors).ok()?;
+    let mut found = BTreeMap::new();
+    for file in &set.file {
+        let prefix = if file.package().is_empty() { String::new() } else { format!("{}.", file.package()) };
+        let described = file.message_type.iter().find(|described| format!("{prefix}{}", described.name()) == message);
+        for field in described.into_iter().flat_map(|described| &described.field) {
+            let place = FIELDS.iter().position(|name| *name == field.name());
+            found.extend(u32::try_from(field.number()).ok().zip(place));
+        }
+    }
+    let has = |place: usize| found.values().any(|found| *found == place);
+    (has(SCHEDULED) && (has(WOKE) || has(START))).then_some(found)
+}
+
+fn of_protobuf(mut data: &[u8], numbers: &BTreeMap<u32, usize>) -> Result<Values, String> {
+    let mut values = Values::default();
+    // What equals zero is left out.
+    numbers.values().for_each(|&place| values[place] = Some(0));
+    let wrong = |e: prost::DecodeError| e.to_string();
+    while !data.is_empty() {
+        let (number, wire) = decode_key(&mut data).map_err(wrong)?;
+        let value = match wire {
+            WireType::Varint => decode_varint(&mut data).map_err(wrong)?,
+            WireType::SixtyFourBit => u64::from_le_bytes(taken(&mut data)?),
+            WireType::ThirtyTwoBit => u32::from_le_bytes(taken(&mut data)?).into(),
+            WireType::LengthDelimited => {
+                let length = decode_varint(&mut data).map_err(wrong)?;
+                let length = usize::try_from(length).map_err(|_| "a field is too long")?;
+                let (text, rest) = data.split_at_checked(length).ok_or("it is cut off")?;
+                data = rest;
+                if numbers.get(&number) == Some(&CAUSE) {
+                    cause_by_name(&String::from_utf8_lossy(text))
+                } else {
+                    continue;
+                }
+            }
+            WireType::StartGroup | WireType::EndGroup => return Err("it has a group, which protobuf gave up".into()),
+        };
+        if let Some(&place) = numbers.get(&number) {
+            values[place] = Some(value);
+        }
+    }
+    // A field that the message may leave out and that is zero says nothing, but for times and numbers that may be zero.
+    for place in [WOKE, START, END, DEADLINE] {
+        if values[place] == Some(0) && values[SCHEDULED] != Some(0) {
+            values[place] = None;
+        }
+    }
+    Ok(values)
+}
+
+fn taken<const N: usize>(data: &mut &[u8]) -> Result<[u8; N], String> {
+    let (value, rest) = data.split_first_chunk().ok_or("it is cut off")?;
+    *data = rest;
+    Ok(*value)
+}
+
+fn of_json(data: &[u8]) -> Result<Values, String> {
+    let message: serde_json::Value = serde_json::from_slice(data).map_err(|e| e.to_string())?;
+    let mut values = Values::default();
+    for (value, name) in values.iter_mut().zip(FIELDS) {
+        *value = match &message[name] {
+            serde_json::Value::Null => None,
+            serde_json::Value::String(text) if name == FIELDS[CAUSE] => Some(cause_by_name(text)),
+            number => Some(number.as_u64().ok_or_else(|| format!("its {name} is no integer of at least 0"))?),
+        };
+    }
+    Ok(values)
+}
+
+/// The number of a cause: `late wake` or `late_wake`; an unknown one is none.
+fn cause_by_name(name: &str) -> u64 {
+    let name = name.replace('_', " ").to_lowercase();
+    SlipCause::ALL.into_iter().find(|cause| cause.name() == name).unwrap_or_default() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::schema;
+
+    fn json(text: &str) -> Values {
+        of_json(text.as_bytes()).unwrap()
+    }
+
+    fn channel(encoding: &str, schema: Option<(&str, &[u8])>, rate_hz: &str) -> Option<ForeignChannel> {
+        let metadata = [("rate_hz".to_owned(), rate_hz.to_owned())].into();
+        ForeignChannel::of(2, "/timing/servo", encoding, schema, &metadata)
+    }
+
+    #[test]
+    fn what_is_left_out_is_found_from_the_rest() {
+        let mut channel = channel("json", None, "1000").unwrap();
+        assert_eq!((channel.name(), channel.rate_hz()), ("servo", Some(1000.0)));
+        let mut base = None;
+        let start = 1_790_000_000_500_000_000_u64;
+        let mut tick = |late: u64, due: u64| {
+            let (scheduled, woke) = (start + due * 1_000_000, start + due * 1_000_000 + late);
+            let text = format!("{{\"scheduled_ns\": {scheduled}, \"woke_ns\": {woke}, \"cause\": \"late_wake\"}}");
+            channel.tick(text.as_bytes(), &mut base).unwrap()
+        };
+        let (first, second) = (tick(5, 0), tick(7, 4));
+        assert_eq!((first.tick, first.scheduled, first.woke), (0, Nanos(500_000_000), Nanos(500_000_005)));
+        assert_eq!((second.tick, second.slips, second.cause), (4, 3, SlipCause::LateWake));
+        assert_eq!((second.start, second.end, second.deadline), (second.woke, second.woke, Nanos(505_000_000)));
+        assert_eq!(second.group, 2);
+    }
+
+    // Check that palpate's own messages are read by their descriptors as by their types.
+    #[test]
+    fn protobuf_is_read_by_its_descriptors() {
+        let (name, descriptors) = ("palpate.TickTiming", schema::descriptor_set());
+        let mut channel = channel("protobuf", Some((name, &descriptors)), "").unwrap();
+        let timing = TickTiming {
+            group: 2,
+            tick: 7,
+            scheduled: Nanos(7_000_000),
+            woke: Nanos(7_000_100),
+            start: Nanos(7_000_200),
+            end: Nanos(7_900_000),
+            deadline: Nanos(8_000_000),
+            slips: 2,
+            cause: SlipCause::LongTick,
+            ..TickTiming::default()
+        };
+        let message = schema::TickTiming::from(&timing).encode_to_vec();
+        assert_eq!(channel.tick(&message, &mut None), Ok(timing));
+        for cut in 1..message.len() {
+            // Check that a cut message is an error or a message, never a panic
+            let _ = of_protobuf(&message[..cut], &numbers(name, &descriptors).unwrap());
+        }
+    }
+
+    #[test]
+    fn channels_without_the_fields_are_left_alone() {
+        let descriptors = schema::descriptor_set();
+        assert!(channel("protobuf", Some(("palpate.Force", &descriptors)), "").is_none());
+        assert!(channel("ros1", None, "").is_none());
+        assert!(ForeignChannel::of(0, "/pose", "json", None, &BTreeMap::new()).is_none());
+        assert_eq!(json("{\"scheduled_ns\": 3}")[SCHEDULED], Some(3));
+        assert!(of_json(b"{\"scheduled_ns\": -3}").is_err() && of_json(b"nonsense").is_err());
+    }
+}
