@@ -1,5 +1,6 @@
 //! A progress bar for a run and a line for each of its rate groups, on a terminal only.
 
+use std::path::Path;
 use std::time::Duration;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -74,6 +75,32 @@ impl RunBar {
     /// Takes the bar from the screen.
     pub fn clear(self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// How much of a file has been read.
+#[derive(Clone)]
+pub struct FileBar(ProgressBar);
+
+impl FileBar {
+    /// A bar for reading the file at `path`.
+    pub fn new(what: &str, path: &Path) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(15));
+        bar.set_length(path.metadata().map_or(0, |metadata| metadata.len()));
+        let style = ProgressStyle::with_template("{msg} [{bar:40}] {bytes} of {total_bytes}, {eta} left");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+        bar.set_message(format!("{what} {}", path.display()));
+        Self(bar)
+    }
+
+    /// Shows that `bytes` more have been read.
+    pub fn advance(&self, bytes: usize) {
+        self.0.inc(bytes as u64);
+    }
+
+    /// Takes the bar from the screen.
+    pub fn clear(self) {
+        self.0.finish_and_clear();
     }
 }
 

@@ -53,6 +53,11 @@ impl Distribution {
         self.total
     }
 
+    /// Every value with how often it occurred, smallest first.
+    pub fn iter(&self) -> impl Iterator<Item = (u64, u64)> + '_ {
+        self.counts.iter().map(|(&value, &count)| (value, count))
+    }
+
     /// Forgets all values.
     pub fn clear(&mut self) {
         self.counts.clear();
