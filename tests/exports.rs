@@ -91,20 +91,23 @@ fn each_line_of_a_percentile_file_is_a_nearest_rank_of_the_sorted_values() {
     for (figure, mut values) in expected {
         values.sort_unstable();
         let text = percentiles(&bytes, "haptic", figure, &ALL);
-        let lines: Vec<Vec<f64>> = text
+        let lines: Vec<Vec<&str>> = text
             .lines()
             .skip(2)
             .take_while(|line| !line.starts_with('#'))
-            .map(|line| line.split_whitespace().map(|cell| cell.parse().unwrap()).collect())
+            .map(|line| line.split_whitespace().collect())
             .collect();
         assert!(lines.len() > 20, "{figure:?}: {} lines", lines.len());
         for line in &lines {
-            let rank = ((line[1] * values.len() as f64).ceil() as usize).max(1);
+            // In whole numbers: 0.55 is no double, and 0.55 * 700 rounds up to the next rank.
+            let level: usize = line[1].replace('.', "").parse().unwrap();
+            let rank = (level * values.len()).div_ceil(1_000_000_000_000).max(1);
             let value = values[rank - 1];
             let count = values.iter().filter(|other| **other <= value).count();
-            assert_eq!((line[0], line[2]), (value as f64 / 1e3, count as f64), "{figure:?} at {}", line[1]);
+            let expected = (format!("{}.{:03}", value / 1000, value % 1000), count.to_string());
+            assert_eq!((line[0], line[2]), (&*expected.0, &*expected.1), "{figure:?} at {}", line[1]);
         }
-        assert_eq!(lines.last().unwrap()[1], 1.0);
+        assert_eq!(lines.last().unwrap()[1], "1.000000000000");
         assert!(text.contains(&format!("Total count    = {:>12}]", values.len())), "{text}");
     }
 }
@@ -140,8 +143,10 @@ fn a_trace_has_a_slice_for_each_release_and_an_instant_for_each_slip_and_miss() 
     assert!(track("haptic") < track("global"), "the fastest group is on top");
     for (group, name) in [(0, "haptic"), (1, "global")] {
         let timings = timings(&sent, group);
-        let slices: Vec<&Value> =
-            of_phase("X").into_iter().filter(|event| event["tid"].as_u64().unwrap() / 1000 == track(name) / 1000).collect();
+        let slices: Vec<&Value> = of_phase("X")
+            .into_iter()
+            .filter(|event| event["tid"].as_u64().unwrap() / 1000 == track(name) / 1000)
+            .collect();
         assert_eq!(slices.len(), timings.len());
         for (slice, timing) in slices.iter().zip(&timings) {
             assert_eq!((ns(&slice["ts"]), ns(&slice["dur"])), (timing.start.0, timing.end.0 - timing.start.0));
@@ -157,7 +162,8 @@ fn a_trace_has_a_slice_for_each_release_and_an_instant_for_each_slip_and_miss() 
     }
     let mut drawn: BTreeMap<String, u64> = BTreeMap::new();
     for event in of_phase("i").iter().filter(|event| event["cat"] == "slip") {
-        *drawn.entry(event["name"].as_str().unwrap().to_owned()).or_default() += event["args"]["slips"].as_u64().unwrap();
+        *drawn.entry(event["name"].as_str().unwrap().to_owned()).or_default() +=
+            event["args"]["slips"].as_u64().unwrap();
     }
     assert!(drawn.len() > 1 && drawn == slips, "{drawn:?}, not {slips:?}");
     let misses = of_phase("i").iter().filter(|event| event["cat"] == "miss").count();
@@ -189,7 +195,12 @@ fn each_resync_is_one_flow_from_the_last_sample_to_the_first_force() {
         assert_eq!(stations.insert(event["ph"].as_str().unwrap(), ns(&event["ts"])), None, "twice: {event}");
     }
     // The last release ends too late for any force to know of it.
-    assert!(built.len() > 10 && (built.len() - 1..=built.len()).contains(&flows.len()), "{} of {}", flows.len(), built.len());
+    assert!(
+        built.len() > 10 && (built.len() - 1..=built.len()).contains(&flows.len()),
+        "{} of {}",
+        flows.len(),
+        built.len()
+    );
     for (flow, built) in flows.values().zip(&built) {
         let [time, last_tick] = built[..] else { panic!("two numbers") };
         let served = (time + 5_000_000).next_multiple_of(1_000_000);
