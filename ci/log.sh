@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# Logs open with readers that palpate did not write, and their message counts are those that the run reports.
+# Logs open with readers that palpate did not write, and their message counts are those that the run reports. What is
+# exported from them is checked by such readers too.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 build_programs
 palpate="$CARGO_TARGET_DIR/debug/palpate"
 
 venv="$CARGO_TARGET_DIR/ci-venv"
-if [ ! -x "$venv/bin/python" ] || ! "$venv/bin/python" -c 'import mcap, mcap_protobuf' 2>/dev/null; then
+if [ ! -x "$venv/bin/python" ] || ! "$venv/bin/python" -c 'import mcap, mcap_protobuf, numpy, pyarrow' 2>/dev/null; then
     python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages "Python with venv" python3 python3-venv
     python3 -m venv --clear "$venv"
-    "$venv/bin/pip" install --quiet mcap mcap-protobuf-support
+    "$venv/bin/pip" install --quiet mcap mcap-protobuf-support numpy pyarrow
 fi
 
 folder=$(mktemp -d)
@@ -25,3 +26,36 @@ check virtual scenes/drag_friction.toml --virtual --duration 1
 check probe scenes/wave_probe.toml --virtual --duration 0.5
 check full scenes/hand.toml --virtual --model full --duration 0.3
 check real_time scenes/demo.toml --duration 2
+
+# Parquet is not among the default features; the parts that others build are not built again.
+cargo build --locked --profile test --features haply,parquet --bin palpate
+export_of() {
+    local name=$1
+    shift
+    "$palpate" export "$folder/$name.mcap" "$@"
+}
+check_export() { "$venv/bin/python" ci/check_exports.py "$@"; }
+check_exports() {
+    local name=$1 flows=$2 topic group figure
+    for topic in force contact resync global ports tool timing/local timing/global timing/logger; do
+        mkdir -p "$folder/$name/timing"
+        export_of "$name" --topic "/$topic" --out "$folder/$name/$topic.csv"
+        export_of "$name" --topic "/$topic" --format parquet --out "$folder/$name/$topic.parquet"
+        echo -n "$name /$topic: "
+        check_export parquet "$folder/$name/$topic.csv" "$folder/$name/$topic.parquet"
+    done
+    for group in local global; do
+        for figure in lateness execution period-error jitter; do
+            export_of "$name" --format hgrm --group $group --figure $figure --out "$folder/$name/$figure.hgrm"
+            echo -n "$name $group "
+            check_export hgrm "$folder/$name/timing/$group.csv" $figure "$folder/$name/$figure.hgrm"
+        done
+    done
+    export_of "$name" --format chrome-trace --out "$folder/$name/trace.json"
+    echo -n "$name trace: "
+    check_export trace "$folder/$name/trace.json" --force "$folder/$name/force.csv" --flows "$flows" \
+        --timing "local=$folder/$name/timing/local.csv" --timing "global=$folder/$name/timing/global.csv" \
+        --timing "logger=$folder/$name/timing/logger.csv"
+}
+check_exports virtual 28
+check_exports real_time 40

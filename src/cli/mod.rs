@@ -13,6 +13,7 @@ pub mod timing;
 mod interrupt;
 mod output;
 mod progress;
+mod window;
 
 use std::process::ExitCode;
 

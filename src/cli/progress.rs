@@ -92,17 +92,18 @@ pub struct ReadBar(ProgressBar);
 pub type ShownLog = LogReader<BufReader<ProgressBarIter<File>>>;
 
 impl ReadBar {
-    /// Opens the log at `path`.
+    /// Opens the log at `path`, to do `what` with it; a bar that is hidden shows nothing.
     ///
     /// # Errors
     /// As [`LogReader::open`].
-    pub fn open(path: &Path) -> Result<(Self, ShownLog), Error> {
+    pub fn open(what: &str, path: &Path, is_hidden: bool) -> Result<(Self, ShownLog), Error> {
         let file = File::open(path).map_err(|error| Error::io(path, error))?;
         let bytes = file.metadata().map_or(0, |metadata| metadata.len());
-        let bar = ProgressBar::with_draw_target(Some(bytes), ProgressDrawTarget::stderr_with_hz(10));
+        let target = if is_hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
+        let bar = ProgressBar::with_draw_target(Some(bytes), target);
         let style = ProgressStyle::with_template("{msg} [{bar:40}] {bytes} of {total_bytes}, {eta} left");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
-        bar.set_message(format!("reading {}", path.display()));
+        bar.set_message(format!("{what} {}", path.display()));
         let source = BufReader::with_capacity(READ_BUFFER_BYTES, bar.wrap_read(file));
         let reader = LogReader::new(source, &path.display().to_string());
         if reader.is_err() {

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use palpate::log::timing::{Against, Condition, Selection, TimingAnalysis, TimingReport, read_cyclictest};
 use palpate::report::{against_to_json, against_to_text, figure_to_text, timing_to_json, timing_to_text};
-use palpate::time::Nanos;
 use palpate::{Error, ErrorKind};
 
 use super::output::{print, warn_of_damage};
 use super::progress::ReadBar;
+use super::window::WindowArgs;
 
 /// The arguments of `palpate timing`.
 #[derive(Debug, clap::Args)]
@@ -26,12 +26,8 @@ pub struct TimingArgs {
     /// Exit with 1 if the condition holds, such as 'local.lateness.p99 > 200us'; may be given several times
     #[arg(long, value_name = "CONDITION")]
     pub fail_if: Vec<Condition>,
-    /// Look at what happened from this second on
-    #[arg(long, value_name = "S", value_parser = log_time)]
-    pub from: Option<Nanos>,
-    /// Look at what happened before this second
-    #[arg(long, value_name = "S", value_parser = log_time)]
-    pub to: Option<Nanos>,
+    #[command(flatten)]
+    pub window: WindowArgs,
     /// Look at this rate group alone; may be given several times
     #[arg(long, value_name = "NAME")]
     pub group: Vec<String>,
@@ -65,9 +61,9 @@ fn read(log: &Path, args: &TimingArgs) -> Result<TimingReport, Error> {
     if let Some(text) = other_than_mcap(log)? {
         return read_cyclictest(&text, log);
     }
-    let selection = Selection { from: args.from, to: args.to, groups: args.group.clone() };
+    let selection = Selection { window: args.window.window()?, groups: args.group.clone() };
     let mut analysis = TimingAnalysis::new(selection);
-    let (bar, mut reader) = ReadBar::open(log)?;
+    let (bar, mut reader) = ReadBar::open("reading", log, false)?;
     reader.by_ref().for_each(|entry| analysis.push_entry(&entry));
     bar.clear();
     let mut report = analysis.report();
@@ -103,14 +99,5 @@ fn check(args: &TimingArgs, report: &TimingReport) -> Result<(), Error> {
     match broken.is_empty() {
         true => Ok(()),
         false => Err(Error::new(ErrorKind::Condition, broken.join("; ")).at(args.log.display().to_string())),
-    }
-}
-
-/// A time in seconds on the command line.
-fn log_time(text: &str) -> Result<Nanos, String> {
-    let seconds: f64 = text.parse().map_err(|_| "is no number of seconds".to_owned())?;
-    match seconds.is_finite() && seconds >= 0.0 {
-        true => Ok(Nanos::from_secs_f64(seconds)),
-        false => Err("must be at least 0".to_owned()),
     }
 }

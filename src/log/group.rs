@@ -74,11 +74,43 @@ pub(crate) struct GroupCounter {
     last: TickTiming,
     lost_records: u64,
     busy: Nanos,
-    last_error: Option<i64>,
+    gauge: TickGauge,
     pub(super) lateness: Distribution,
     pub(super) execution: Distribution,
     pub(super) period_error: Distribution,
     pub(super) jitter: Distribution,
+}
+
+/// Measures a group release by release.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct TickGauge {
+    last: Option<TickTiming>,
+    last_error: Option<i64>,
+}
+
+impl TickGauge {
+    /// The figures of the release that comes next.
+    pub(crate) fn measure(&mut self, timing: &TickTiming) -> TickFigures {
+        let figures = self.figures(timing);
+        (self.last, self.last_error) = (Some(*timing), figures.period_error);
+        figures
+    }
+
+    /// The figures that a release would have if it came next.
+    fn figures(&self, timing: &TickTiming) -> TickFigures {
+        let between = |later: Nanos, earlier: Nanos| later.0.wrapping_sub(earlier.0).cast_signed();
+        let error = |last: TickTiming| {
+            let measured = between(timing.woke, last.woke);
+            measured.wrapping_sub(between(timing.scheduled, last.scheduled))
+        };
+        let period_error = self.last.map(error);
+        TickFigures {
+            lateness: timing.woke.saturating_sub(timing.scheduled).0,
+            execution: timing.end.saturating_sub(timing.start).0,
+            period_error,
+            jitter: period_error.zip(self.last_error).map(|(error, before)| error.abs_diff(before)),
+        }
+    }
 }
 
 /// The figures of one release (ns).
@@ -103,7 +135,7 @@ impl GroupCounter {
         if timing.missed() {
             self.missed.add(timing.cause, 1);
         }
-        let figures = self.figures(timing);
+        let figures = self.gauge.measure(timing);
         self.lateness.push(figures.lateness);
         self.execution.push(figures.execution);
         figures.period_error.into_iter().for_each(|error| self.period_error.push(error.unsigned_abs()));
@@ -113,7 +145,6 @@ impl GroupCounter {
             self.first_tick = timing.tick.saturating_sub(timing.slips.into());
         }
         self.busy = self.busy + Nanos(figures.execution);
-        self.last_error = figures.period_error;
         self.released += 1;
         self.last = *timing;
     }
@@ -124,20 +155,9 @@ impl GroupCounter {
         self.lateness.push_many(lateness, count);
     }
 
-    /// The figures of the release that comes next.
+    /// The figures that a release would have if it came next.
     pub(crate) fn figures(&self, timing: &TickTiming) -> TickFigures {
-        let between = |later: Nanos, earlier: Nanos| later.0.wrapping_sub(earlier.0).cast_signed();
-        let error = || {
-            let measured = between(timing.woke, self.last.woke);
-            measured.wrapping_sub(between(timing.scheduled, self.last.scheduled))
-        };
-        let period_error = (self.released > 0).then(error);
-        TickFigures {
-            lateness: timing.woke.saturating_sub(timing.scheduled).0,
-            execution: timing.end.saturating_sub(timing.start).0,
-            period_error,
-            jitter: period_error.zip(self.last_error).map(|(error, before)| error.abs_diff(before)),
-        }
+        self.gauge.figures(timing)
     }
 
     /// Notes that `total` records have been lost since the start.

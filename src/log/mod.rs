@@ -19,6 +19,7 @@ mod percentiles;
 mod records;
 mod stats;
 pub mod timing;
+mod window;
 
 #[cfg(feature = "log")]
 mod chunk;
@@ -44,6 +45,8 @@ pub use comparison::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, M
 pub use entry::LogEntry;
 pub use environment::{Environment, Execution, GroupInfo, ModelReason};
 pub use event::{Level, TextEvent};
+#[cfg(feature = "log")]
+pub(crate) use group::TickGauge;
 pub use group::{CauseCounts, GroupReport};
 pub use haptics::{ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport};
 pub use percentiles::{Distribution, Magnitudes, Percentiles};
@@ -53,6 +56,7 @@ pub use records::{
     ToolSample,
 };
 pub use stats::{EventSum, GroupStats, StatsCounter};
+pub use window::Window;
 
 #[cfg(feature = "log")]
 pub use reader::LogReader;

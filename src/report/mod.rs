@@ -8,15 +8,13 @@ mod units;
 mod verdict;
 
 #[cfg(feature = "log")]
-mod csv;
-#[cfg(feature = "log")]
 mod export;
 #[cfg(feature = "cli")]
 mod json;
 mod text;
 
 #[cfg(feature = "log")]
-pub use export::{Format, export};
+pub use export::{Figure, Format, export, export_percentiles, export_table, export_trace};
 #[cfg(feature = "cli")]
 pub use json::{against_to_json, timing_to_json, to_json};
 pub use picture::{COLOURS, Picture, Series};

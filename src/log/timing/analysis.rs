@@ -52,7 +52,7 @@ impl TimingAnalysis {
     pub fn push_entry(&mut self, entry: &LogEntry) {
         match entry {
             LogEntry::Record(record) => self.push(record),
-            LogEntry::Text(event) if !self.selection.has_time(event.time) => {}
+            LogEntry::Text(event) if !self.selection.window.contains(event.time) => {}
             // Sums since the start of the run say nothing about a part of it, but for what was lost.
             entry => self.sums.push_entry(entry),
         }
@@ -65,7 +65,7 @@ impl TimingAnalysis {
 
     fn push(&mut self, record: &LogRecord) {
         let time = record.time();
-        if !self.selection.has_time(time) {
+        if !self.selection.window.contains(time) {
             return;
         }
         let [first, last] = self.span.unwrap_or([time; 2]);
@@ -115,7 +115,7 @@ impl TimingAnalysis {
     pub fn report(self) -> TimingReport {
         let mut run = self.sums.report();
         let span = self.span.unwrap_or_default();
-        if self.selection.from.is_some() {
+        if self.selection.window.from > Nanos::ZERO {
             run.duration = span[1].saturating_sub(span[0]);
         }
         let unknown = Environment::default();

@@ -1,0 +1,32 @@
+//! A log in the formats of other programs: one file per format, and each reads the log once, a chunk at a time.
+
+mod columns;
+mod csv;
+mod figure;
+mod hgrm;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod table;
+mod trace;
+
+use std::io::Read;
+use std::path::Path;
+
+pub use figure::Figure;
+pub use hgrm::export_percentiles;
+pub use table::{Format, export, export_table};
+pub use trace::export_trace;
+
+use crate::error::{Error, ErrorKind};
+use crate::log::LogReader;
+
+/// The output could not be written.
+fn output_error(error: std::io::Error) -> Error {
+    Error::io(Path::new("output"), error)
+}
+
+/// The log has nothing of the name `name`; `known` is what it has of that sort.
+fn unknown<R: Read>(reader: &LogReader<R>, sort: &str, name: &str, known: &[&str]) -> Error {
+    let known = if known.is_empty() { "it has none".to_owned() } else { format!("it has {}", known.join(", ")) };
+    Error::new(ErrorKind::Log, format!("the log has no {sort} {name:?}; {known}")).at(reader.place())
+}
