@@ -26,6 +26,8 @@ mod convert;
 #[cfg(feature = "log")]
 mod framing;
 #[cfg(feature = "log")]
+mod proto;
+#[cfg(feature = "log")]
 mod reader;
 #[cfg(feature = "log")]
 mod schema;

@@ -1,104 +1,22 @@
-//! The protobuf messages of a log, defined once.
+//! The protobuf messages of a log that are palpate's own.
 //!
-//! [`proto_schema!`] makes the struct, its field numbers and its descriptor from one definition, so that they cannot
-//! disagree; every log embeds the descriptors and needs no plugin in a viewer.
-//!
-//! Fields are only ever added, with new numbers. Every field is always written (`required` to prost, plain proto3 to a
-//! reader): proto3 leaves out what equals zero, and -0.0 equals zero, so a force would not come back bit for bit.
+//! Fields are only ever added, with new numbers.
 
-use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{
-    DescriptorProto, EnumDescriptorProto, EnumValueDescriptorProto, FieldDescriptorProto, FileDescriptorProto,
-    FileDescriptorSet,
-};
+use prost_types::FileDescriptorSet;
 
 use super::event::Level;
+use super::proto::{proto_message, proto_schema, rust_type};
 use super::records::{ContactMode, ServedBy};
 use crate::runtime::record::SlipCause;
 use crate::runtime::{Mode, PortUseKind};
 
+pub(crate) use super::proto::LogMessage;
+
 /// The version of the schema that this build writes.
 pub(crate) const SCHEMA_VERSION: u32 = 1;
 
-/// A protobuf message of a log.
-pub(crate) trait LogMessage: prost::Message + Default {
-    /// Its full protobuf name, which is the name of its MCAP schema.
-    const NAME: &'static str;
-}
-
-macro_rules! rust_type {
-    (uint32) => {
-        u32
-    };
-    (uint64) => {
-        u64
-    };
-    (int32) => {
-        i32
-    };
-    (float) => {
-        f32
-    };
-    (double) => {
-        f64
-    };
-    (bool) => {
-        bool
-    };
-    (string) => {
-        String
-    };
-    (message $of:ident) => {
-        $of
-    };
-}
-
-macro_rules! proto_schema {
-    (
-        $(enum $enum:ident { $($variant:ident),+ $(,)? })*
-        $(
-            $(#[$doc:meta])*
-            message $message:ident {
-                $( $(#[$field_doc:meta])* $field:ident: $kind:ident $(of $of:ident)? $(as $as:ident)? = $tag:tt, )*
-            }
-        )*
-    ) => {
-        $(
-            $(#[$doc])*
-            #[derive(Clone, PartialEq, prost::Message)]
-            pub(crate) struct $message {
-                $( $(#[$field_doc])* #[prost($kind, required, tag = $tag)] pub $field: rust_type!($kind $($of)?), )*
-            }
-
-            impl LogMessage for $message {
-                const NAME: &'static str = concat!("palpate.", stringify!($message));
-            }
-        )*
-
-        fn enums() -> Vec<EnumDescriptorProto> {
-            // A new variant that is not listed in the schema fails to compile here.
-            $( const _: fn($enum) = |value| match value { $($enum::$variant => {})+ }; )*
-            vec![$( enum_descriptor(stringify!($enum), &[$((stringify!($variant), $enum::$variant as i32)),+]) ),*]
-        }
-
-        fn messages() -> Vec<DescriptorProto> {
-            vec![$( DescriptorProto {
-                name: Some(stringify!($message).into()),
-                field: vec![$(
-                    field_descriptor(
-                        stringify!($field),
-                        $tag,
-                        stringify!($kind),
-                        [$(stringify!($of),)? $(stringify!($as),)?].first().copied(),
-                    )
-                ),*],
-                ..Default::default()
-            } ),*]
-        }
-    };
-}
-
 proto_schema! {
+    package "palpate" in "palpate/log.proto" imports [];
     enum SlipCause { None, LateWake, LongTick, StalledPeer, Policy, Fault }
     enum PortUseKind { Took, Saw, Dropped }
     enum Mode { Normal, Degraded, Stopping }
@@ -253,67 +171,16 @@ proto_schema! {
     }
 }
 
-fn enum_descriptor(name: &str, variants: &[(&str, i32)]) -> EnumDescriptorProto {
-    // Protobuf scopes the names of values beside their enum, so each carries it as a prefix.
-    let value = |&(variant, number): &(&str, i32)| EnumValueDescriptorProto {
-        name: Some(format!("{}_{}", screaming(name), screaming(variant))),
-        number: Some(number),
-        ..Default::default()
-    };
-    EnumDescriptorProto { name: Some(name.into()), value: variants.iter().map(value).collect(), ..Default::default() }
-}
-
-fn field_descriptor(name: &str, number: i32, kind: &str, type_name: Option<&str>) -> FieldDescriptorProto {
-    let r#type = match (kind, type_name) {
-        ("message", _) => Type::Message,
-        (_, Some(_)) => Type::Enum,
-        ("uint32", _) => Type::Uint32,
-        ("uint64", _) => Type::Uint64,
-        ("int32", _) => Type::Int32,
-        ("float", _) => Type::Float,
-        ("double", _) => Type::Double,
-        ("bool", _) => Type::Bool,
-        (_, _) => Type::String,
-    };
-    FieldDescriptorProto {
-        name: Some(name.into()),
-        number: Some(number),
-        label: Some(Label::Optional as i32),
-        r#type: Some(r#type as i32),
-        type_name: type_name.map(|name| format!(".palpate.{name}")),
-        ..Default::default()
-    }
-}
-
-/// `LateWake` as `LATE_WAKE`.
-fn screaming(name: &str) -> String {
-    let mut out = String::with_capacity(name.len() + 4);
-    for (i, c) in name.chars().enumerate() {
-        if i > 0 && c.is_uppercase() {
-            out.push('_');
-        }
-        out.push(c.to_ascii_uppercase());
-    }
-    out
-}
-
 /// The descriptors of all messages, encoded: the data of every MCAP schema.
 pub(crate) fn descriptor_set() -> Vec<u8> {
-    let file = FileDescriptorProto {
-        name: Some("palpate/log.proto".into()),
-        package: Some("palpate".into()),
-        syntax: Some("proto3".into()),
-        message_type: messages(),
-        enum_type: enums(),
-        ..Default::default()
-    };
-    prost::Message::encode_to_vec(&FileDescriptorSet { file: vec![file] })
+    prost::Message::encode_to_vec(&FileDescriptorSet { file: vec![file()] })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use prost::Message;
+    use prost_types::field_descriptor_proto::Type;
 
     #[test]
     fn the_descriptor_names_every_field_with_the_number_on_the_wire() {
