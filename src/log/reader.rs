@@ -8,13 +8,16 @@ use std::path::Path;
 use mcap::records::{Record, op};
 
 use super::entry::LogEntry;
-use super::environment::Environment;
+use super::environment::{Environment, SCHEMA_VERSION_KEY};
+use super::foxglove;
 use super::framing::RecordStream;
 use super::records::LogRecord;
 use super::schema;
 use super::topic::Kind;
 use crate::error::{Error, ErrorKind};
 
+/// Logs before it have other messages on `/tool` and `/log`.
+const OLDEST_SCHEMA: u32 = 2;
 const READ_BUFFER_BYTES: usize = 1 << 18;
 /// Channel id, sequence number, log time and publish time in front of every message.
 const MESSAGE_HEADER_BYTES: usize = 22;
@@ -114,7 +117,7 @@ impl<R: Read> LogReader<R> {
             return self.decode_message();
         }
         match mcap::parse_record(opcode, body).map_err(|e| e.to_string())? {
-            Record::Schema { header, .. } => {
+            Record::Schema { header, data } if is_palpates(&header.name, &data) => {
                 self.schemas.insert(header.id, header.name);
             }
             Record::Channel(channel) => {
@@ -124,6 +127,11 @@ impl<R: Read> LogReader<R> {
             }
             Record::Metadata(metadata) if metadata.name == "environment" => {
                 self.topic.clear();
+                let version = metadata.metadata.get(SCHEMA_VERSION_KEY).and_then(|version| version.parse::<u32>().ok());
+                if let Some(version) = version.filter(|&version| version < OLDEST_SCHEMA) {
+                    self.records.stop(format!("the log has schema {version}, which this build does not read"));
+                    return Ok(None);
+                }
                 return Ok(Some(LogEntry::Environment(Environment::from_map(&metadata.metadata))));
             }
             Record::Attachment { header, data, .. } => {
@@ -157,7 +165,7 @@ impl<R: Read> LogReader<R> {
         };
         self.topic.clone_from(&channel.topic);
         match decode_data(kind, data) {
-            Ok(entry) => Ok(Some(entry)),
+            Ok(entry) => Ok(entry),
             Err(e) => Err(format!("a message on {} does not decode: {e}", channel.topic)),
         }
     }
@@ -187,27 +195,36 @@ impl<R> std::fmt::Debug for LogReader<R> {
     }
 }
 
-fn decode_data(kind: Kind, data: &[u8]) -> Result<LogEntry, prost::DecodeError> {
+/// True for messages that palpate has written. Those with well-known names may be another program's: they lack palpate's
+/// own fields, and so does their descriptor.
+fn is_palpates(name: &str, descriptor: &[u8]) -> bool {
+    const OWN_FIELD: &[u8] = b"time_ns";
+    !name.starts_with("foxglove.") || descriptor.windows(OWN_FIELD.len()).any(|window| window == OWN_FIELD)
+}
+
+/// `None` for what is there to be seen only.
+fn decode_data(kind: Kind, data: &[u8]) -> Result<Option<LogEntry>, prost::DecodeError> {
     fn parse<M: prost::Message + Default>(data: &[u8]) -> Result<M, prost::DecodeError> {
         M::decode(data)
     }
-    Ok(LogEntry::Record(match kind {
+    Ok(Some(LogEntry::Record(match kind {
         Kind::Timing => LogRecord::Tick(parse::<schema::TickTiming>(data)?.into()),
         Kind::Force => LogRecord::Force(parse::<schema::Force>(data)?.into()),
         Kind::ForceCommanded => LogRecord::Command(parse::<schema::CommandedForce>(data)?.into()),
-        Kind::Tool => LogRecord::Tool(parse::<schema::Tool>(data)?.into()),
+        Kind::Tool => LogRecord::Tool(parse::<foxglove::PoseInFrame>(data)?.into()),
         Kind::Contact => LogRecord::Contact(parse::<schema::Contact>(data)?.into()),
         Kind::Resync => LogRecord::Resync(parse::<schema::Resync>(data)?.into()),
         Kind::Global => LogRecord::Global(parse::<schema::GlobalTick>(data)?.into()),
         Kind::Ports => LogRecord::Port(parse::<schema::PortUse>(data)?.into()),
         Kind::Probe => LogRecord::Probe(parse::<schema::Probe>(data)?.into()),
-        Kind::Stats => return Ok(LogEntry::Stats(parse::<schema::Stats>(data)?.into())),
+        Kind::Stats => return Ok(Some(LogEntry::Stats(parse::<schema::Stats>(data)?.into()))),
+        Kind::Scene => return Ok(None),
         Kind::Log => {
-            let message = parse::<schema::Log>(data)?;
+            let message = parse::<foxglove::Log>(data)?;
             match message.event() {
                 Some(event) => LogRecord::Event(event),
-                None => return Ok(LogEntry::Text(message.into())),
+                None => return Ok(Some(LogEntry::Text(message.into()))),
             }
         }
-    }))
+    })))
 }

@@ -1,6 +1,7 @@
 //! The topics of a log: what each is called and which message it carries.
 
 use super::environment::Environment;
+use super::foxglove;
 use super::records::LogRecord;
 use super::schema::{self, LogMessage};
 
@@ -17,6 +18,7 @@ pub(crate) enum Topic {
     Global,
     Ports,
     Probe(u16),
+    Scene,
     Log,
 }
 
@@ -33,6 +35,7 @@ pub(crate) enum Kind {
     Global,
     Ports,
     Probe,
+    Scene,
     Log,
 }
 
@@ -44,6 +47,7 @@ impl Topic {
         of_groups.chain(number(environment.devices.len().max(1)).flat_map(Self::of_device)).chain(Self::SHARED)
     }
 
+    /// Declared by every log; `/scene` by those that have it.
     const SHARED: [Self; 3] = [Self::Global, Self::Ports, Self::Log];
 
     fn of_device(device: u16) -> [Self; 6] {
@@ -79,6 +83,7 @@ impl Topic {
             Self::Global => "/global".into(),
             Self::Ports => "/ports".into(),
             Self::Probe(device) => of_device(device, "probe"),
+            Self::Scene => "/scene".into(),
             Self::Log => "/log".into(),
         }
     }
@@ -95,13 +100,14 @@ impl Topic {
             Self::Global => Kind::Global,
             Self::Ports => Kind::Ports,
             Self::Probe(_) => Kind::Probe,
+            Self::Scene => Kind::Scene,
             Self::Log => Kind::Log,
         }
     }
 }
 
 impl Kind {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::Timing,
         Self::Stats,
         Self::Force,
@@ -112,6 +118,7 @@ impl Kind {
         Self::Global,
         Self::Ports,
         Self::Probe,
+        Self::Scene,
         Self::Log,
     ];
 
@@ -122,13 +129,14 @@ impl Kind {
             Self::Stats => schema::Stats::NAME,
             Self::Force => schema::Force::NAME,
             Self::ForceCommanded => schema::CommandedForce::NAME,
-            Self::Tool => schema::Tool::NAME,
+            Self::Tool => foxglove::PoseInFrame::NAME,
             Self::Contact => schema::Contact::NAME,
             Self::Resync => schema::Resync::NAME,
             Self::Global => schema::GlobalTick::NAME,
             Self::Ports => schema::PortUse::NAME,
             Self::Probe => schema::Probe::NAME,
-            Self::Log => schema::Log::NAME,
+            Self::Scene => foxglove::SceneUpdate::NAME,
+            Self::Log => foxglove::Log::NAME,
         }
     }
 

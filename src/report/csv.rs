@@ -23,6 +23,8 @@ pub(super) fn header(kind: Kind) -> &'static str {
         Kind::Global => "t_s,version,first_tick,last_tick\n",
         Kind::Ports => "t_s,group,port,kind,tick,count,sequence\n",
         Kind::Probe => "t_s,node,local_x_m,local_y_m,local_z_m,global_x_m,global_y_m,global_z_m\n",
+        // For viewers; refused before anything is asked of it.
+        Kind::Scene => "",
         Kind::Log => "t_s,level,message\n",
     }
 }

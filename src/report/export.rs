@@ -47,6 +47,10 @@ pub fn export<R: Read, W: Write>(
     }
     if header.is_none() {
         let kind = reader.kind(topic).or_else(|| lost_topic(reader, topic)).ok_or_else(|| unknown(reader, topic))?;
+        if kind == Kind::Scene {
+            let why = format!("{topic} is for viewers (3D), it makes no table");
+            return Err(Error::new(ErrorKind::Log, why).at(reader.place()));
+        }
         out.write_all(csv::header(kind).as_bytes()).map_err(output)?;
     }
     out.flush().map_err(output)
