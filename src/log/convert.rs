@@ -46,6 +46,8 @@ impl From<&TickTiming> for schema::TickTiming {
             cause: r.cause as i32,
             given_up: r.given_up.into(),
             mode: r.mode as i32,
+            lateness_ns: r.woke.saturating_sub(r.scheduled).0,
+            execution_ns: r.end.saturating_sub(r.start).0,
         }
     }
 }

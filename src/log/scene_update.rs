@@ -151,7 +151,7 @@ mod tests {
         assert_eq!(ids, ["surface", "a/tool", "a/force", "b/tool", "b/force"]);
         for entity in [&update.entities[2], &update.entities[4]] {
             let drawn = &entity.arrows[0];
-            assert_eq!((drawn.shaft_length, drawn.head_length, drawn.pose.orientation), (0.0, 0.0, UPRIGHT));
+            assert_eq!((drawn.shaft_length, drawn.head_length, &drawn.pose.orientation), (0.0, 0.0, &UPRIGHT));
         }
     }
 }

@@ -55,6 +55,10 @@ proto_schema! {
         cause: int32 as SlipCause = 9,
         given_up: uint32 = 10,
         mode: int32 as Mode = 11,
+        /// Woke less scheduled: for viewers that plot fields and do not compute. Not read back.
+        lateness_ns: uint64 = 1001,
+        /// End less start; the same.
+        execution_ns: uint64 = 1002,
     }
 
     /// `/force`: the force on the tool before the safety pipeline.
