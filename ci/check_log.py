@@ -50,7 +50,8 @@ def read(path):
 def compare(counts, report):
     """Gives what differs between the counts and a report of `palpate timing --json`."""
     figures = {"/log": report["events"]["count"]}
-    for device in report["devices"]:
+    # The one device of most logs is not listed by name.
+    for device in report.get("devices") or [report | {"name": ""}]:
         prefix = f"/{device['name']}" if device["name"] else ""
         figures[f"{prefix}/force"] = device["force"]["ticks"]
         figures[f"{prefix}/force_commanded"] = device["limits"]["ticks"]
