@@ -49,13 +49,14 @@ def read(path):
 
 def compare(counts, report):
     """Gives what differs between the counts and a report of `palpate timing --json`."""
-    figures = {
-        "/force": report["force"]["ticks"],
-        "/force_commanded": report["limits"]["ticks"],
-        "/contact": sum(report["contact"].values()),
-        "/resync": report["resyncs"]["count"],
-        "/log": report["events"]["count"],
-    }
+    figures = {"/log": report["events"]["count"]}
+    # The one device of most logs is not listed by name.
+    for device in report.get("devices") or [report | {"name": ""}]:
+        prefix = f"/{device['name']}" if device["name"] else ""
+        figures[f"{prefix}/force"] = device["force"]["ticks"]
+        figures[f"{prefix}/force_commanded"] = device["limits"]["ticks"]
+        figures[f"{prefix}/contact"] = sum(device["contact"].values())
+        figures[f"{prefix}/resync"] = device["resyncs"]["count"]
     figures.update({f"/timing/{group['name']}": group["released"] for group in report["groups"]})
     # What the analysis counted and what the reader counted are two figures; both must equal the file's.
     expected = list(figures.items()) + list(report["messages"].items())

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use log_sample::{entries, environment, log_of, time_of};
 use palpate::ErrorKind;
-use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter};
+use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter, SceneFrame};
 use palpate::runtime::record::Record;
 use palpate::time::Nanos;
 use proptest::prelude::*;
@@ -70,7 +70,9 @@ fn a_longer_log_cut_anywhere_reads_up_to_the_cut() {
 fn the_messages_before_the_cut_inside_a_large_chunk_are_read() {
     let sent = entries(3000);
     let bytes = log_of(&sent, usize::MAX);
-    let (got, damage) = read(&bytes[..bytes.len() / 2]);
+    // Opcode 6 is a chunk.
+    let (start, _, length) = frame(&bytes).into_iter().find(|&(_, opcode, _)| opcode == 6).unwrap();
+    let (got, damage) = read(&bytes[..start + length / 2]);
     let damage = damage.unwrap();
     assert!(damage.contains("cut off at byte") && damage.contains("in the chunk"), "{damage}");
     assert!(got.len() > sent.len() / 10, "{} of {}", got.len(), sent.len());
@@ -217,6 +219,44 @@ fn a_log_on_disk_is_read_through_its_path() {
     assert_eq!(reader.next(), None);
     assert_eq!(reader.damage(), None);
     assert_eq!(reader.topics().len(), 13);
+}
+
+#[test]
+fn a_picture_is_counted_and_gives_no_entry() {
+    let mut writer = McapWriter::new(Vec::new(), "memory", &environment()).unwrap();
+    writer.write_scene(&SceneFrame { time: Nanos(5), ..SceneFrame::default() }).unwrap();
+    let bytes = writer.finish().unwrap();
+    let mut reader = LogReader::new(bytes.as_slice(), "memory").unwrap();
+    assert_eq!((reader.by_ref().count(), reader.damage()), (1, None));
+    assert_eq!(reader.topics().get("/scene"), Some(&1));
+}
+
+// Check that another program's message of a well-known name is left alone: it has none of palpate's own fields.
+#[test]
+fn a_foreign_message_of_a_well_known_name_is_no_entry() {
+    let mut file = mcap::Writer::new(io::Cursor::new(Vec::new())).unwrap();
+    let schema = file.add_schema("foxglove.Log", "protobuf", b"without its fields").unwrap();
+    let channel = file.add_channel(schema, "/rosout", "protobuf", &std::collections::BTreeMap::new()).unwrap();
+    let header = mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 7, publish_time: 7 };
+    // Field 3, the message.
+    file.write_to_known_channel(&header, b"\x1a\x05hello").unwrap();
+    file.finish().unwrap();
+    let bytes = file.into_inner().into_inner();
+    let mut reader = LogReader::new(bytes.as_slice(), "memory").unwrap();
+    assert_eq!((reader.by_ref().count(), reader.damage()), (0, None));
+    assert_eq!(reader.topics().get("/rosout"), Some(&1));
+}
+
+// Check that a log from before the well-known messages is refused in words: its tool samples would silently be missing.
+#[test]
+fn a_log_of_an_older_schema_is_refused_in_words() {
+    let mut file = mcap::Writer::new(io::Cursor::new(Vec::new())).unwrap();
+    let metadata = environment().to_map(1);
+    file.write_metadata(&mcap::records::Metadata { name: "environment".into(), metadata }).unwrap();
+    file.finish().unwrap();
+    let (got, damage) = read(&file.into_inner().into_inner());
+    assert_eq!(got, []);
+    assert_eq!(damage.as_deref(), Some("the log has schema 1, which this build does not read"));
 }
 
 /// A small log with every type of record that a file can hold: attachments, two environments, two chunks.

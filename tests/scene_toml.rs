@@ -67,6 +67,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
         prop::option::of((prop::sample::select(vec![BlendKind::Crossfade, BlendKind::Offset]), number(1.0, 30.0))),
     );
     let rest = (
+        any::<bool>(),
         prop::option::of(1_u32..100),
         prop_oneof![Just(0.0), number(0.1, 100.0)],
         prop::option::of(number(0.1, 50.0)),
@@ -75,7 +76,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
         number(0.1, 100.0),
     );
     (prop::option::of(body()), contact, initial, local, rest).prop_map(|(body, contact, initial, local, rest)| {
-        let (substeps_per_ms, latency_ms, max_force_n, slew, probes, duration_s) = rest;
+        let (logs_scene, substeps_per_ms, latency_ms, max_force_n, slew, probes, duration_s) = rest;
         let (model, feedback, step, blend) = local;
         let mut scene = Scene::of_program();
         scene.contact.friction = contact.0;
@@ -103,6 +104,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
         scene.local.blend = blend.map_or(BlendSpec::default(), |(kind, ms)| BlendSpec { kind, ms });
         (scene.global.substeps_per_ms, scene.global.compute_latency_ms) = (substeps_per_ms, latency_ms);
         (scene.safety.max_force_n, scene.safety.max_slew_n_per_ms) = (max_force_n, slew);
+        scene.log.scene = logs_scene;
         scene.run.duration_s = duration_s;
         scene
     })

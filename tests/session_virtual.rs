@@ -358,7 +358,7 @@ impl ByHand {
         let ports = LocalPorts {
             samples: sample_reader,
             commands,
-            source: ModelSource::Alone(surface),
+            source: ModelSource::Alone(vec![surface]),
             view: view_writer,
             recorder: graph.recorder(256),
         };

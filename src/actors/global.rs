@@ -28,8 +28,8 @@ pub struct GlobalPorts {
 pub struct GlobalSharedPorts {
     /// To and from the basis actor, if the models use what it makes.
     pub surroundings: Option<SurroundingsPorts>,
-    /// The newest surface for a program that draws.
-    pub surface: OutletWriter<SurfaceView>,
+    /// The newest surface: for a program that draws, for the log.
+    pub surfaces: Vec<OutletWriter<SurfaceView>>,
     /// The newest good state, for a restart.
     pub checkpoint: OutletWriter<Checkpoint>,
     /// Records.
@@ -315,10 +315,12 @@ impl GlobalActor {
 
     fn publish_surface(&mut self, ctx: &TickContext) {
         let time = self.plan.haptic.release(self.now());
-        let view = self.ports.surface.buffer();
-        view.time = time;
-        view.positions.clone_from(&self.simulation.state().positions);
-        self.ports.surface.publish(ctx);
+        for surface in &mut self.ports.surfaces {
+            let view = surface.buffer();
+            view.time = time;
+            view.positions.clone_from(&self.simulation.state().positions);
+            surface.publish(ctx);
+        }
     }
 }
 

@@ -23,8 +23,8 @@ const MAX_TICKS_WHEN_DEGRADED: u64 = 2;
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one per session, and it does not move")]
 pub enum ModelSource {
-    /// One model that needs no other (`full`); it publishes the surface itself.
-    Alone(OutletWriter<SurfaceView>),
+    /// One model that needs no other (`full`); it publishes the surface itself, for a program that draws and for the log.
+    Alone(Vec<OutletWriter<SurfaceView>>),
     /// Newer ones from a global model.
     Global {
         /// They arrive here.
@@ -153,13 +153,15 @@ impl LocalActor {
             self.resync += 1;
         }
         match &mut self.ports.source {
-            ModelSource::Alone(surface) if is_resync => {
-                let view = surface.buffer();
-                view.time = self.haptic.release(tick);
-                for (node, position) in view.positions.iter_mut().enumerate() {
-                    *position = self.models.serving().position(node as u32).unwrap_or(*position);
+            ModelSource::Alone(surfaces) if is_resync => {
+                for surface in surfaces {
+                    let view = surface.buffer();
+                    view.time = self.haptic.release(tick);
+                    for (node, position) in view.positions.iter_mut().enumerate() {
+                        *position = self.models.serving().position(node as u32).unwrap_or(*position);
+                    }
+                    surface.publish(ctx);
                 }
-                surface.publish(ctx);
             }
             ModelSource::Alone(_) => {}
             ModelSource::Global { ticks, geometry, .. } => {

@@ -4,8 +4,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::cause::Cause;
 use super::granted::granted;
+use super::scene_watch::SceneWatch;
 use crate::error::Error;
-use crate::log::{Analysis, Environment, GroupStats, Level, LogRecord, RunReport, StatsCounter, TextEvent};
+use crate::log::{Analysis, Environment, GroupStats, Level, LogRecord, RunReport, SceneFrame, StatsCounter, TextEvent};
 use crate::runtime::record::Event;
 use crate::runtime::{Actor, GrantHandle, Outcome, Record, RecordDrain, TickContext};
 use crate::time::Nanos;
@@ -41,6 +42,14 @@ pub trait LogSink: Send {
     /// # Errors
     /// As [`record`](Self::record).
     fn stats(&mut self, stats: &GroupStats) -> Result<(), Error>;
+
+    /// Takes a picture of the run; without an own implementation, it is dropped.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    fn scene(&mut self, _: &SceneFrame) -> Result<(), Error> {
+        Ok(())
+    }
 
     /// Takes what became known of the run as a whole.
     fn environment(&mut self, environment: &Environment);
@@ -89,6 +98,7 @@ pub struct LoggerActor {
     /// Taken and not yet passed on.
     records: Vec<Record>,
     log_time: Nanos,
+    scene: Option<SceneWatch>,
 }
 
 impl std::fmt::Debug for LoggerActor {
@@ -121,6 +131,21 @@ impl LoggerActor {
             failure: None,
             records: Vec::new(),
             log_time: Nanos::ZERO,
+            scene: None,
+        }
+    }
+
+    /// Also takes pictures, one per release.
+    #[must_use]
+    pub fn watching(mut self, scene: Option<SceneWatch>) -> Self {
+        self.scene = scene;
+        self
+    }
+
+    /// Passes on the pictures from before `time`, once every record up to there has been.
+    fn take_pictures(&mut self, time: Nanos) {
+        while let Some(frame) = self.scene.as_mut().and_then(|scene| scene.due(time)) {
+            self.keep(|sink| sink.scene(&frame));
         }
     }
 
@@ -146,7 +171,11 @@ impl LoggerActor {
             first.set_lost(self.drain.lost());
         }
         for record in records.drain(..ready).filter_map(|record| LogRecord::from_record(&record)) {
+            self.take_pictures(record.time());
             self.log_time = self.log_time.max(record.time());
+            if let Some(scene) = &mut self.scene {
+                scene.see(&record, &self.environment);
+            }
             match &record {
                 LogRecord::Event(event) => {
                     let text = in_words(event, &self.environment.group_name(event.group));
@@ -177,6 +206,7 @@ impl LoggerActor {
             self.analysis.push(&record);
             self.keep(|sink| sink.record(&record));
         }
+        self.take_pictures(horizon);
         self.records = records;
     }
 
@@ -200,6 +230,9 @@ impl Actor for LoggerActor {
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        if let Some(scene) = &mut self.scene {
+            scene.take(ctx);
+        }
         self.learn_grants();
         self.take_records(ctx.scheduled.saturating_sub(HELD_BACK));
         let log_time = self.log_time;

@@ -18,6 +18,7 @@ mod granted;
 mod local;
 mod logger;
 mod messages;
+mod scene_watch;
 
 pub use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub use basis_store::BasisStore;
@@ -28,3 +29,4 @@ pub use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, Surrou
 pub use local::{LocalActor, LocalPorts, ModelSource};
 pub use logger::{LOG_FAILURE, LogSink, LoggerActor, LoggerOutcome};
 pub use messages::{Checkpoint, DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
+pub use scene_watch::SceneWatch;

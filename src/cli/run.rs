@@ -25,6 +25,9 @@ pub struct RunArgs {
     /// Use this local model instead of the scene's own
     #[arg(long, value_name = "NAME", value_parser = choice)]
     pub model: Option<ModelChoice>,
+    /// Also log the topic /scene for viewers: surface, tools and forces, 30 times a second
+    #[arg(long)]
+    pub log_scene: bool,
     /// Print the schedule and what this system would refuse, and run nothing
     #[arg(long)]
     pub plan: bool,
@@ -65,6 +68,9 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
     }
     if args.virtual_time {
         builder = builder.virtual_time();
+    }
+    if args.log_scene {
+        builder = builder.log_scene();
     }
     if args.plan { plan(builder, &name) } else { execute(builder, &args.out, &name) }
 }

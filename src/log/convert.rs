@@ -1,14 +1,13 @@
 //! Records to protobuf messages and back, bit for bit.
 
-use super::event::{Level, TextEvent};
 use super::percentiles::Percentiles;
 use super::records::{
-    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy, ToolSample,
+    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy,
 };
 use super::schema::{self, Vector3};
 use super::stats::{EventSum, GroupStats};
 use crate::runtime::Mode;
-use crate::runtime::record::{ActorTimes, Event, SlipCause, TickTiming};
+use crate::runtime::record::{ActorTimes, SlipCause, TickTiming};
 use crate::runtime::{PortUse, PortUseKind};
 use crate::time::Nanos;
 
@@ -47,6 +46,8 @@ impl From<&TickTiming> for schema::TickTiming {
             cause: r.cause as i32,
             given_up: r.given_up.into(),
             mode: r.mode as i32,
+            lateness_ns: r.woke.saturating_sub(r.scheduled).0,
+            execution_ns: r.end.saturating_sub(r.start).0,
         }
     }
 }
@@ -134,32 +135,6 @@ impl From<schema::CommandedForce> for CommandSample {
             limits: narrow(m.limits),
             energy_j: m.energy_j,
             tank_j: m.tank_j,
-            device: narrow(m.device),
-        }
-    }
-}
-
-impl From<&ToolSample> for schema::Tool {
-    fn from(r: &ToolSample) -> Self {
-        Self {
-            time_ns: r.time.0,
-            id: r.id,
-            position_m: r.position_m.into(),
-            velocity_m_s: r.velocity_m_s.into(),
-            buttons: r.buttons.into(),
-            device: r.device.into(),
-        }
-    }
-}
-
-impl From<schema::Tool> for ToolSample {
-    fn from(m: schema::Tool) -> Self {
-        Self {
-            time: Nanos(m.time_ns),
-            id: m.id,
-            position_m: m.position_m.into(),
-            velocity_m_s: m.velocity_m_s.into(),
-            buttons: narrow(m.buttons),
             device: narrow(m.device),
         }
     }
@@ -339,40 +314,5 @@ impl From<schema::Stats> for GroupStats {
             port_uses: m.port_uses,
             events: EventSum { count: m.events, digest: m.events_digest },
         }
-    }
-}
-
-impl From<&TextEvent> for schema::Log {
-    fn from(e: &TextEvent) -> Self {
-        Self { time_ns: e.time.0, level: e.level as i32, message: e.message.clone(), ..Self::default() }
-    }
-}
-
-impl From<schema::Log> for TextEvent {
-    fn from(m: schema::Log) -> Self {
-        Self { time: Nanos(m.time_ns), level: Level::from_code(code(m.level)), message: m.message }
-    }
-}
-
-impl schema::Log {
-    /// An event record, in words and as numbers.
-    pub(crate) fn coded(event: &Event, group: &str) -> Self {
-        Self {
-            coded: true,
-            group: event.group.into(),
-            code: event.code,
-            detail: event.detail,
-            ..Self::from(&TextEvent::describe(event, group))
-        }
-    }
-
-    /// The event record it came from; `None` if it never was one.
-    pub(crate) fn event(&self) -> Option<Event> {
-        self.coded.then(|| Event {
-            stamp: Nanos(self.time_ns),
-            group: narrow(self.group),
-            code: self.code,
-            detail: self.detail,
-        })
     }
 }

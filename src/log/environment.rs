@@ -152,7 +152,7 @@ impl Environment {
             Execution::Threaded { .. } => "threaded",
         };
         let mut map: BTreeMap<String, String> = [
-            ("schema_version", schema_version.to_string()),
+            (SCHEMA_VERSION_KEY, schema_version.to_string()),
             ("palpate_version", self.palpate_version.clone()),
             ("instruction_set", self.instruction_set.clone()),
             ("execution", execution.to_owned()),
@@ -248,6 +248,8 @@ impl Environment {
     }
 }
 
+/// The key of the schema's version.
+pub(super) const SCHEMA_VERSION_KEY: &str = "schema_version";
 /// The keys of a choice.
 const MODEL_REASON: &str = "model_reason";
 const MODEL_WARNING: &str = "model_warning";

@@ -253,7 +253,8 @@ mod tests {
     // Check that palpate's own messages are read by their descriptors as by their types.
     #[test]
     fn protobuf_is_read_by_its_descriptors() {
-        let (name, descriptors) = ("palpate.TickTiming", schema::descriptor_set());
+        let name = "palpate.TickTiming";
+        let descriptors = schema::descriptor_set(name);
         let mut channel = channel("protobuf", Some((name, &descriptors)), "").unwrap();
         let timing = TickTiming {
             group: 2,
@@ -277,7 +278,7 @@ mod tests {
 
     #[test]
     fn channels_without_the_fields_are_left_alone() {
-        let descriptors = schema::descriptor_set();
+        let descriptors = schema::descriptor_set("palpate.Force");
         assert!(channel("protobuf", Some(("palpate.Force", &descriptors)), "").is_none());
         assert!(channel("ros1", None, "").is_none());
         assert!(ForeignChannel::of(0, "/pose", "json", None, &BTreeMap::new()).is_none());

@@ -17,6 +17,7 @@ mod group;
 mod haptics;
 mod percentiles;
 mod records;
+mod scene_frame;
 mod stats;
 pub mod timing;
 mod window;
@@ -28,15 +29,21 @@ mod convert;
 #[cfg(feature = "log")]
 mod foreign;
 #[cfg(feature = "log")]
+mod foxglove;
+#[cfg(feature = "log")]
 mod framing;
 #[cfg(feature = "log")]
 mod proto;
 #[cfg(feature = "log")]
 mod reader;
 #[cfg(feature = "log")]
+mod scene_update;
+#[cfg(feature = "log")]
 mod schema;
 #[cfg(feature = "log")]
 pub(crate) mod topic;
+#[cfg(feature = "log")]
+mod viewer;
 #[cfg(feature = "log")]
 mod writer;
 
@@ -55,6 +62,7 @@ pub use records::{
     CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ServedBy,
     ToolSample,
 };
+pub use scene_frame::{SceneFrame, SceneTool};
 pub use stats::{EventSum, GroupStats, StatsCounter};
 pub use window::Window;
 

@@ -138,7 +138,7 @@ macro_rules! proto_schema {
         pub(crate) fn file() -> prost_types::FileDescriptorProto {
             // A new variant that is not listed in the schema fails to compile here.
             $( const _: fn($enum) = |value| match value { $($enum::$variant => {})+ }; )*
-            let mut file = prost_types::FileDescriptorProto {
+            let file = prost_types::FileDescriptorProto {
                 name: Some($path.into()),
                 package: Some($package.into()),
                 syntax: Some("proto3".into()),
@@ -146,8 +146,8 @@ macro_rules! proto_schema {
                 message_type: vec![$(<$message as $crate::log::proto::LogMessage>::descriptor()),*],
                 ..Default::default()
             };
-            $( $crate::log::proto::add_enum(
-                &mut file,
+            $( let file = $crate::log::proto::with_enum(
+                file,
                 None$(.or(Some(stringify!($owner))))?,
                 stringify!($enum),
                 &[$((stringify!($variant), $enum::$variant as i32)),+],
@@ -159,13 +159,13 @@ macro_rules! proto_schema {
 
 pub(crate) use {proto_message, proto_schema, rust_type};
 
-/// Adds an enum to `file`, or to the message `owner` in it.
-pub(crate) fn add_enum(
-    file: &mut prost_types::FileDescriptorProto,
+/// `file` with one more enum, in it or in its message `owner`.
+pub(crate) fn with_enum(
+    mut file: prost_types::FileDescriptorProto,
     owner: Option<&str>,
     name: &str,
     variants: &[(&str, i32)],
-) {
+) -> prost_types::FileDescriptorProto {
     // Protobuf scopes the names of values beside their enum: in a file each carries it as a prefix.
     let prefix = if owner.is_some() { String::new() } else { format!("{}_", screaming(name)) };
     let value = |&(variant, number): &(&str, i32)| EnumValueDescriptorProto {
@@ -182,6 +182,7 @@ pub(crate) fn add_enum(
             inside.into_iter().for_each(|message| message.enum_type.push(descriptor.clone()));
         }
     }
+    file
 }
 
 pub(crate) fn field_descriptor(
@@ -206,7 +207,7 @@ pub(crate) fn field_descriptor(
     };
     let label = if label == "repeated" { Label::Repeated } else { Label::Optional };
     FieldDescriptorProto {
-        name: Some(name.into()),
+        name: Some(name.trim_start_matches("r#").into()),
         number: Some(number),
         label: Some(label as i32),
         r#type: Some(r#type as i32),

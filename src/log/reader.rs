@@ -8,14 +8,17 @@ use std::path::Path;
 use mcap::records::{Record, op};
 
 use super::entry::LogEntry;
-use super::environment::{Environment, Execution, GroupInfo};
+use super::environment::{Environment, Execution, GroupInfo, SCHEMA_VERSION_KEY};
 use super::foreign::ForeignChannel;
+use super::foxglove;
 use super::framing::RecordStream;
 use super::records::LogRecord;
 use super::schema;
 use super::topic::Kind;
 use crate::error::{Error, ErrorKind};
 
+/// Logs before it have other messages on `/tool` and `/log`.
+const OLDEST_SCHEMA: u32 = 2;
 const READ_BUFFER_BYTES: usize = 1 << 18;
 /// Channel id, sequence number, log time and publish time in front of every message.
 const MESSAGE_HEADER_BYTES: usize = 22;
@@ -133,6 +136,11 @@ impl<R: Read> LogReader<R> {
             Record::Metadata(metadata) if metadata.name == "environment" => {
                 self.topic.clear();
                 self.foreign = None;
+                let version = metadata.metadata.get(SCHEMA_VERSION_KEY).and_then(|version| version.parse::<u32>().ok());
+                if let Some(version) = version.filter(|&version| version < OLDEST_SCHEMA) {
+                    self.records.stop(format!("the log has schema {version}, which this build does not read"));
+                    return Ok(None);
+                }
                 return Ok(Some(LogEntry::Environment(Environment::from_map(&metadata.metadata))));
             }
             Record::Attachment { header, data, .. } => {
@@ -153,7 +161,7 @@ impl<R: Read> LogReader<R> {
     /// Takes in a channel; if it is one of another program's with tick timing, says which groups there are now.
     fn declare(&mut self, channel: mcap::records::Channel) -> Option<LogEntry> {
         let schema = self.schemas.get(&channel.schema_id).map(|(name, data)| (name.as_str(), data.as_slice()));
-        let kind = schema.and_then(|(name, _)| Kind::from_schema(name));
+        let kind = schema.filter(|(name, data)| is_palpates(name, data)).and_then(|(name, _)| Kind::from_schema(name));
         let mut foreign = None;
         let mut known = None;
         if let Some(environment) = self.foreign.as_mut() {
@@ -189,7 +197,7 @@ impl<R: Read> LogReader<R> {
             return Ok(None);
         };
         match decode_data(kind, data) {
-            Ok(entry) => Ok(Some(entry)),
+            Ok(entry) => Ok(entry),
             Err(e) => Err(format!("a message on {} does not decode: {e}", channel.topic)),
         }
     }
@@ -231,28 +239,37 @@ fn foreign_environment() -> Environment {
     }
 }
 
-fn decode_data(kind: Kind, data: &[u8]) -> Result<LogEntry, prost::DecodeError> {
+/// True for messages that palpate has written. Those with well-known names may be another program's: they lack palpate's
+/// own fields, and so does their descriptor.
+fn is_palpates(name: &str, descriptor: &[u8]) -> bool {
+    const OWN_FIELD: &[u8] = b"time_ns";
+    !name.starts_with("foxglove.") || descriptor.windows(OWN_FIELD.len()).any(|window| window == OWN_FIELD)
+}
+
+/// `None` for what is there to be seen only.
+fn decode_data(kind: Kind, data: &[u8]) -> Result<Option<LogEntry>, prost::DecodeError> {
     fn parse<M: prost::Message + Default>(data: &[u8]) -> Result<M, prost::DecodeError> {
         M::decode(data)
     }
-    Ok(LogEntry::Record(match kind {
+    Ok(Some(LogEntry::Record(match kind {
         Kind::Timing => LogRecord::Tick(parse::<schema::TickTiming>(data)?.into()),
         Kind::Actors => LogRecord::Actors(parse::<schema::ActorTimes>(data)?.into()),
         Kind::Force => LogRecord::Force(parse::<schema::Force>(data)?.into()),
         Kind::ForceCommanded => LogRecord::Command(parse::<schema::CommandedForce>(data)?.into()),
-        Kind::Tool => LogRecord::Tool(parse::<schema::Tool>(data)?.into()),
+        Kind::Tool => LogRecord::Tool(parse::<foxglove::PoseInFrame>(data)?.into()),
         Kind::Contact => LogRecord::Contact(parse::<schema::Contact>(data)?.into()),
         Kind::Resync => LogRecord::Resync(parse::<schema::Resync>(data)?.into()),
         Kind::Global => LogRecord::Global(parse::<schema::GlobalTick>(data)?.into()),
         Kind::Ports => LogRecord::Port(parse::<schema::PortUse>(data)?.into()),
         Kind::Probe => LogRecord::Probe(parse::<schema::Probe>(data)?.into()),
-        Kind::Stats => return Ok(LogEntry::Stats(parse::<schema::Stats>(data)?.into())),
+        Kind::Stats => return Ok(Some(LogEntry::Stats(parse::<schema::Stats>(data)?.into()))),
+        Kind::Scene => return Ok(None),
         Kind::Log => {
-            let message = parse::<schema::Log>(data)?;
+            let message = parse::<foxglove::Log>(data)?;
             match message.event() {
                 Some(event) => LogRecord::Event(event),
-                None => return Ok(LogEntry::Text(message.into())),
+                None => return Ok(Some(LogEntry::Text(message.into()))),
             }
         }
-    }))
+    })))
 }

@@ -1,10 +1,10 @@
-//! The protobuf messages of a log that are palpate's own.
+//! The protobuf messages of a log that are palpate's own. Those that viewers know by name are in [`foxglove`](super::foxglove).
 //!
 //! Fields are only ever added, with new numbers.
 
 use prost_types::FileDescriptorSet;
 
-use super::event::Level;
+use super::foxglove;
 use super::proto::{proto_message, proto_schema, rust_type};
 use super::records::{ContactMode, ServedBy};
 use crate::runtime::record::SlipCause;
@@ -13,7 +13,7 @@ use crate::runtime::{Mode, PortUseKind};
 pub(crate) use super::proto::LogMessage;
 
 /// The version of the schema that this build writes.
-pub(crate) const SCHEMA_VERSION: u32 = 1;
+pub(crate) const SCHEMA_VERSION: u32 = 2;
 
 proto_schema! {
     package "palpate" in "palpate/log.proto" imports [];
@@ -24,7 +24,6 @@ proto_schema! {
     enum ServedBy {
         Unknown, Full, Hold, Patch, LinearBoundary, ScaledBoundary, Condensed, Predicted, Predictive
     }
-    enum Level { Info, Warning, Error }
 
     /// A vector in world coordinates.
     message Vector3 {
@@ -56,6 +55,10 @@ proto_schema! {
         cause: int32 as SlipCause = 9,
         given_up: uint32 = 10,
         mode: int32 as Mode = 11,
+        /// Woke less scheduled: for viewers that plot fields and do not compute. Not read back.
+        lateness_ns: uint64 = 1001,
+        /// End less start; the same.
+        execution_ns: uint64 = 1002,
     }
 
     /// `/actors/GROUP`: what each actor of a group took of one release.
@@ -83,16 +86,6 @@ proto_schema! {
         limits: uint32 = 3,
         energy_j: double = 4,
         tank_j: double = 5,
-        device: uint32 = 6,
-    }
-
-    /// `/tool`: the raw device sample.
-    message Tool {
-        time_ns: uint64 = 1,
-        id: uint32 = 2,
-        position_m: message of Vector3 = 3,
-        velocity_m_s: message of Vector3 = 4,
-        buttons: uint32 = 5,
         device: uint32 = 6,
     }
 
@@ -165,22 +158,12 @@ proto_schema! {
         events: uint64 = 12,
         events_digest: uint64 = 13,
     }
-
-    /// `/log`: something that happened once. `coded` ones came from a rate group as numbers.
-    message Log {
-        time_ns: uint64 = 1,
-        level: int32 as Level = 2,
-        message: string = 3,
-        coded: bool = 4,
-        group: uint32 = 5,
-        code: uint32 = 6,
-        detail: uint64 = 7,
-    }
 }
 
-/// The descriptors of all messages, encoded: the data of every MCAP schema.
-pub(crate) fn descriptor_set() -> Vec<u8> {
-    prost::Message::encode_to_vec(&FileDescriptorSet { file: vec![file()] })
+/// The descriptors of the message named `schema` and of all that it refers to, encoded: the data of its MCAP schema.
+pub(crate) fn descriptor_set(schema: &str) -> Vec<u8> {
+    let file = if schema.starts_with("palpate.") { vec![file()] } else { foxglove::files() };
+    prost::Message::encode_to_vec(&FileDescriptorSet { file })
 }
 
 #[cfg(test)]
@@ -191,7 +174,7 @@ mod tests {
 
     #[test]
     fn the_descriptor_names_every_field_with_the_number_on_the_wire() {
-        let set = FileDescriptorSet::decode(descriptor_set().as_slice()).unwrap();
+        let set = FileDescriptorSet::decode(descriptor_set(Contact::NAME).as_slice()).unwrap();
         let contact = set.file[0].message_type.iter().find(|m| m.name() == "Contact").unwrap();
         let fields: Vec<_> = contact.field.iter().map(|f| (f.name(), f.number(), f.r#type())).collect();
         assert_eq!(fields[1], ("mode", 2, Type::Enum));

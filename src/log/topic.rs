@@ -1,6 +1,7 @@
 //! The topics of a log: what each is called and which message it carries.
 
 use super::environment::Environment;
+use super::foxglove;
 use super::records::LogRecord;
 use super::schema::{self, LogMessage};
 
@@ -18,6 +19,7 @@ pub(crate) enum Topic {
     Global,
     Ports,
     Probe(u16),
+    Scene,
     Log,
 }
 
@@ -35,6 +37,7 @@ pub(crate) enum Kind {
     Global,
     Ports,
     Probe,
+    Scene,
     Log,
 }
 
@@ -50,6 +53,7 @@ impl Topic {
         of_groups.chain(number(environment.devices.len().max(1)).flat_map(Self::of_device)).chain(Self::SHARED)
     }
 
+    /// Declared by every log; `/scene` by those that have it.
     const SHARED: [Self; 3] = [Self::Global, Self::Ports, Self::Log];
 
     fn of_device(device: u16) -> [Self; 6] {
@@ -87,6 +91,7 @@ impl Topic {
             Self::Global => "/global".into(),
             Self::Ports => "/ports".into(),
             Self::Probe(device) => of_device(device, "probe"),
+            Self::Scene => "/scene".into(),
             Self::Log => "/log".into(),
         }
     }
@@ -104,13 +109,14 @@ impl Topic {
             Self::Global => Kind::Global,
             Self::Ports => Kind::Ports,
             Self::Probe(_) => Kind::Probe,
+            Self::Scene => Kind::Scene,
             Self::Log => Kind::Log,
         }
     }
 }
 
 impl Kind {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 13] = [
         Self::Timing,
         Self::Actors,
         Self::Stats,
@@ -122,6 +128,7 @@ impl Kind {
         Self::Global,
         Self::Ports,
         Self::Probe,
+        Self::Scene,
         Self::Log,
     ];
 
@@ -133,13 +140,14 @@ impl Kind {
             Self::Stats => schema::Stats::NAME,
             Self::Force => schema::Force::NAME,
             Self::ForceCommanded => schema::CommandedForce::NAME,
-            Self::Tool => schema::Tool::NAME,
+            Self::Tool => foxglove::PoseInFrame::NAME,
             Self::Contact => schema::Contact::NAME,
             Self::Resync => schema::Resync::NAME,
             Self::Global => schema::GlobalTick::NAME,
             Self::Ports => schema::PortUse::NAME,
             Self::Probe => schema::Probe::NAME,
-            Self::Log => schema::Log::NAME,
+            Self::Scene => foxglove::SceneUpdate::NAME,
+            Self::Log => foxglove::Log::NAME,
         }
     }
 

@@ -14,7 +14,9 @@ use mcap::{Attachment, Compression, WriteOptions};
 
 use super::environment::Environment;
 use super::event::TextEvent;
+use super::foxglove::{Log, PoseInFrame, SceneUpdate};
 use super::records::LogRecord;
+use super::scene_frame::SceneFrame;
 use super::schema::{self, SCHEMA_VERSION};
 use super::stats::GroupStats;
 use super::topic::Topic;
@@ -114,11 +116,11 @@ impl<W: Write> McapWriter<W> {
             LogRecord::Actors(r) => self.push(topic, time, &schema::ActorTimes::from(r)),
             LogRecord::Event(r) => {
                 let group = self.environment.group_name(r.group);
-                self.push(topic, time, &schema::Log::coded(r, &group))
+                self.push(topic, time, &Log::coded(r, &group, self.environment.epoch_ns()))
             }
             LogRecord::Force(r) => self.push(topic, time, &schema::Force::from(r)),
             LogRecord::Command(r) => self.push(topic, time, &schema::CommandedForce::from(r)),
-            LogRecord::Tool(r) => self.push(topic, time, &schema::Tool::from(r)),
+            LogRecord::Tool(r) => self.push(topic, time, &PoseInFrame::of(r, self.environment.epoch_ns())),
             LogRecord::Contact(r) => self.push(topic, time, &schema::Contact::from(r)),
             LogRecord::Resync(r) => self.push(topic, time, &schema::Resync::from(r)),
             LogRecord::Global(r) => self.push(topic, time, &schema::GlobalTick::from(r)),
@@ -132,7 +134,15 @@ impl<W: Write> McapWriter<W> {
     /// # Errors
     /// As [`write`](Self::write).
     pub fn write_text(&mut self, event: &TextEvent) -> Result<(), Error> {
-        self.push(Topic::Log, event.time, &schema::Log::from(event))
+        self.push(Topic::Log, event.time, &Log::text(event, self.environment.epoch_ns()))
+    }
+
+    /// Adds a picture of the run.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_scene(&mut self, frame: &SceneFrame) -> Result<(), Error> {
+        self.push(Topic::Scene, frame.time, &SceneUpdate::of(frame, self.environment.epoch_ns()))
     }
 
     /// Adds the statistics of a group.
@@ -251,7 +261,8 @@ impl<W: Write> McapWriter<W> {
             *sequence = sequence.wrapping_add(1);
             return Ok((*id, *sequence));
         }
-        let schema = output.add_schema(topic.kind().schema(), "protobuf", &schema::descriptor_set())?;
+        let name = topic.kind().schema();
+        let schema = output.add_schema(name, "protobuf", &schema::descriptor_set(name))?;
         let id = output.add_channel(schema, &topic.name(&self.environment), "protobuf", &BTreeMap::new())?;
         self.channels.insert(topic, (id, 0));
         Ok((id, 0))

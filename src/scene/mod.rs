@@ -74,6 +74,9 @@ pub struct Scene {
     /// Nodes whose position is logged every tick.
     #[cfg_attr(feature = "scene", serde(default, rename = "probe"))]
     pub probes: Vec<ProbeSpec>,
+    /// What the log has beside the records.
+    #[cfg_attr(feature = "scene", serde(default))]
+    pub log: LogSpec,
     /// How long.
     #[cfg_attr(feature = "scene", serde(default))]
     pub run: RunSpec,
@@ -111,6 +114,14 @@ pub struct ProbeSpec {
     pub node: [usize; 3],
 }
 
+/// What a log has beside the records of every tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+pub struct LogSpec {
+    /// The topic `/scene`: surface, tools and forces for viewers, 30 times a second.
+    pub scene: bool,
+}
+
 /// How long a run lasts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
@@ -142,6 +153,7 @@ impl Scene {
             safety: SafetySpec::default(),
             initial: None,
             probes: Vec::new(),
+            log: LogSpec::default(),
             run: RunSpec::default(),
             source: None,
         }

@@ -196,6 +196,13 @@ impl SessionBuilder {
         self
     }
 
+    /// The log also has the topic `/scene`: surface, tools and forces for viewers, 30 times a second.
+    #[must_use]
+    pub fn log_scene(mut self) -> Self {
+        self.parts.scene.log.scene = true;
+        self
+    }
+
     /// Keeps every record in memory, for [`Summary::records`](super::Summary::records).
     #[must_use]
     pub fn keep_records(mut self) -> Self {

@@ -32,7 +32,7 @@ impl ToolLink {
 pub(super) struct GlobalSide {
     pub(super) tools: Vec<ToolLink>,
     pub(super) surroundings: Option<(ExchangePort<Wishes>, ExchangePort<Bases>)>,
-    pub(super) surface: OutletPort<SurfaceView>,
+    pub(super) surfaces: Vec<OutletPort<SurfaceView>>,
     pub(super) checkpoint: OutletPort<Checkpoint>,
     pub(super) recorder: RecorderPort,
 }
@@ -45,7 +45,7 @@ impl GlobalSide {
             .map(|(wishes, bases)| SurroundingsPorts { wishes: wishes.writer(), bases: bases.reader() });
         let shared = GlobalSharedPorts {
             surroundings,
-            surface: self.surface.writer(),
+            surfaces: self.surfaces.iter().map(OutletPort::writer).collect(),
             checkpoint: self.checkpoint.writer(),
             recorder: self.recorder.recorder(),
             build_cost: None,

@@ -10,17 +10,17 @@ use super::sink::{Memory, Sinks};
 use super::tools::Tool;
 use crate::actors::{
     Checkpoint, DeviceActor, DeviceSample, ForceCommand, GlobalPlan, LocalActor, LocalPorts, LoggerActor,
-    LoggerOutcome, ModelSource, SurfaceView, ToolView, first_state,
+    LoggerOutcome, ModelSource, SceneWatch, SurfaceView, ToolView, first_state,
 };
 use crate::devices::DeviceState;
 use crate::error::Error;
-use crate::log::{Environment, Execution as LogExecution, GroupInfo, ToolSample};
+use crate::log::{Environment, Execution as LogExecution, GroupInfo, SceneFrame, ToolSample};
 use crate::model::Vec3;
 use crate::model::body::Block;
 use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
 use crate::runtime::{
-    Actor, ExchangePort, Execution, OutletReader, OutletWriter, RateGroup, Reader, Restart, Runtime, RuntimeBuilder,
-    Stopwatch, Writer,
+    Actor, ExchangePort, Execution, OutletPort, OutletReader, OutletWriter, RateGroup, Reader, Restart, Runtime,
+    RuntimeBuilder, Stopwatch, Writer,
 };
 use crate::safety::coupling::CoupledTool;
 use crate::safety::{Actions, Pipeline};
@@ -28,6 +28,8 @@ use crate::time::Rate;
 
 /// How often records are taken to the log.
 const LOGGER: Rate = Rate::hz(20);
+/// The same for a log with `/scene`: a picture per release.
+const LOGGER_WITH_SCENE: Rate = Rate::hz(SceneFrame::RATE_HZ);
 /// Records of one actor per haptic tick at most, besides one per probe.
 const RECORDS_PER_TICK: usize = 4;
 /// A logger or a global model that is stuck for this long loses nothing.
@@ -40,11 +42,15 @@ const MIN_TICKS_BUFFERED: usize = 64;
 pub(super) fn groups(prepared: &Prepared) -> Vec<RateGroup> {
     let global = (prepared.template.kind != Kind::Full).then(|| prepared.global.clone());
     let basis = prepared.reduces().then(|| basis::group(prepared));
-    [prepared.local.clone()].into_iter().chain(basis).chain(global).chain([logger_group()]).collect()
+    [prepared.local.clone()].into_iter().chain(basis).chain(global).chain([logger_group(prepared)]).collect()
 }
 
-fn logger_group() -> RateGroup {
-    RateGroup::new(LOGGER).name("logger").observer()
+fn logger_group(prepared: &Prepared) -> RateGroup {
+    RateGroup::new(logger_rate(prepared)).name("logger").observer()
+}
+
+fn logger_rate(prepared: &Prepared) -> Rate {
+    if prepared.logs_scene { LOGGER_WITH_SCENE } else { LOGGER }
 }
 
 /// Both ends of what a tool's device and local actor say to each other and to a program that draws.
@@ -70,6 +76,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let first: Vec<DeviceState> = prepared.tools.iter_mut().map(first_of).collect::<Result<_, _>>()?;
     let places: Vec<Vec3> = first.iter().map(|state| state.position).collect();
     let environment = environment(&prepared, &first)?;
+    let logger_group = logger_group(&prepared);
     let (sinks, memory) = sinks(&prepared, &environment)?;
     #[cfg(all(feature = "log", feature = "scene"))]
     let (mut graph, comparison) = match prepared.reexecuted.take() {
@@ -93,9 +100,18 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
     let nodes = positions.len();
     let triangles = prepared.simulation.body().surface().triangles.clone();
-    let surface_port =
-        graph.outlet_port(move || SurfaceView { positions: positions.clone(), ..SurfaceView::default() });
-    let surface = surface_port.reader();
+    let mut outlet = || {
+        let positions = positions.clone();
+        graph.outlet_port(move || SurfaceView { positions: positions.clone(), ..SurfaceView::default() })
+    };
+    let mut surface_ports = vec![outlet()];
+    let surface = surface_ports[0].reader();
+    let scene = prepared.logs_scene.then(|| {
+        let port = outlet();
+        let watch = SceneWatch::new(port.reader(), &triangles);
+        surface_ports.push(port);
+        watch
+    });
     let mut ends: Vec<ToolEnds> = prepared.tools.iter().map(|_| ToolEnds::new(&mut graph)).collect();
 
     let bases = BasisSide::new(&mut graph, &prepared, &places)?;
@@ -110,7 +126,8 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let (sources, global) = match prepared.template.empty() {
         None => {
             let full = watching(Box::new(Full::new(prepared.simulation)), &probes);
-            (vec![(ModelSource::Alone(surface_port.writer()), [full, spare(), spare()])], None)
+            let surfaces = surface_ports.iter().map(OutletPort::writer).collect();
+            (vec![(ModelSource::Alone(surfaces), [full, spare(), spare()])], None)
         }
         Some(_) => {
             let (surroundings, known) = match bases {
@@ -128,7 +145,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
             let side = GlobalSide {
                 tools: prepared.tools.iter().map(link).collect(),
                 surroundings,
-                surface: surface_port,
+                surfaces: surface_ports,
                 checkpoint: graph.outlet_port(Checkpoint::default),
                 recorder: graph.recorder_port(ticks_buffered),
             };
@@ -177,7 +194,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
 
     let outcome = LoggerOutcome::default();
     let logger = |drain| -> Box<dyn Actor> {
-        Box::new(LoggerActor::new(drain, sinks, environment, graph.grants(), outcome.clone()))
+        Box::new(LoggerActor::new(drain, sinks, environment, graph.grants(), outcome.clone()).watching(scene))
     };
     #[cfg(all(feature = "log", feature = "scene"))]
     let logger = match comparison {
@@ -198,7 +215,7 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
             graph.group(prepared.global, actors);
         }
     }
-    graph.group(logger_group(), vec![logger]);
+    graph.group(logger_group, vec![logger]);
     if let Some(until) = prepared.until {
         graph.until(until);
     }
@@ -223,7 +240,7 @@ fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment
         let budget = prepared.global.declared_budget();
         groups.push(GroupInfo { budget, ..group("global", prepared.global_rate) });
     }
-    groups.push(group("logger", LOGGER));
+    groups.push(group("logger", logger_rate(prepared)));
     #[cfg(feature = "scene")]
     let session = Some(prepared.as_run.to_toml()?);
     #[cfg(not(feature = "scene"))]

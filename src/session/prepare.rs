@@ -109,6 +109,8 @@ pub(super) struct Prepared {
     pub until: Option<Nanos>,
     #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
+    /// The log has the topic `/scene`.
+    pub logs_scene: bool,
     pub keep_records: bool,
     pub measures_cost: bool,
     pub disturbed: Disturbed,
@@ -253,6 +255,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
         #[cfg(feature = "log")]
         log: parts.log,
+        logs_scene: scene.log.scene,
         keep_records: parts.keep_records,
         measures_cost: parts.measures_cost,
         disturbed: parts.disturbed,

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::actors::LogSink;
 use crate::error::Error;
-use crate::log::{Environment, GroupStats, LogRecord, TextEvent};
+use crate::log::{Environment, GroupStats, LogRecord, SceneFrame, TextEvent};
 use crate::time::Nanos;
 
 /// Records kept in memory.
@@ -80,6 +80,13 @@ impl LogSink for Sinks {
     fn stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
         #[cfg(feature = "log")]
         self.on_file(|file| file.write_stats(stats))?;
+        Ok(())
+    }
+
+    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
+    fn scene(&mut self, frame: &SceneFrame) -> Result<(), Error> {
+        #[cfg(feature = "log")]
+        self.on_file(|file| file.write_scene(frame))?;
         Ok(())
     }
 

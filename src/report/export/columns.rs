@@ -116,6 +116,8 @@ pub(super) fn columns(kind: Kind) -> &'static [Column] {
             ("global_y_m", F64),
             ("global_z_m", F64),
         ],
+        // For viewers; refused before anything is asked of it.
+        Kind::Scene => &[],
         Kind::Log => &[("t_s", F64), ("level", Text), ("message", Text)],
     }
 }

@@ -4,7 +4,7 @@ use std::io::{self, Read, Write};
 
 use super::columns::{self, Cell, Column};
 use super::{csv, output_error, unknown};
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::log::topic::Kind;
 use crate::log::{LogEntry, LogReader, Window};
 
@@ -58,7 +58,7 @@ pub fn export_table<R: Read, W: Write + Send>(
         #[cfg(not(feature = "parquet"))]
         Format::Parquet => {
             let message = "this build writes no Parquet; build it with `--features parquet`, or export CSV";
-            return Err(Error::new(crate::error::ErrorKind::Usage, message));
+            return Err(Error::new(ErrorKind::Usage, message));
         }
     }
     out.flush().map_err(output_error)
@@ -84,6 +84,10 @@ fn write_table<R: Read, T: Table>(
         let topics: Vec<&str> = reader.topics().into_keys().collect();
         unknown(reader, "topic", topic, &topics)
     })?;
+    if kind == Kind::Scene {
+        let why = format!("{topic} is for viewers (3D), it makes no table");
+        return Err(Error::new(ErrorKind::Log, why).at(reader.place()));
+    }
     let columns = columns::columns(kind);
     let mut table = begin(columns)?;
     let (mut cells, mut row) = (Vec::new(), Vec::new());
