@@ -16,6 +16,8 @@ mod device;
 mod global;
 mod granted;
 mod local;
+#[cfg(feature = "log")]
+mod log_file;
 mod logger;
 mod messages;
 
@@ -26,5 +28,7 @@ pub(crate) use device::GAP_S;
 pub use device::{DeviceActor, first_state};
 pub use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
 pub use local::{LocalActor, LocalPorts, ModelSource};
-pub use logger::{LOG_FAILURE, LogSink, LoggerActor, LoggerOutcome};
+#[cfg(feature = "log")]
+pub use log_file::{LAST_WAIT, LogFile, MOST_WAITING};
+pub use logger::{LOG_FAILURE, LogSink, LoggerActor, LoggerOutcome, Loss};
 pub use messages::{Checkpoint, DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};

@@ -77,6 +77,31 @@ impl RunBar {
     }
 }
 
+/// How much of a file was read, on a terminal only.
+pub struct ReadBar(ProgressBar);
+
+impl ReadBar {
+    /// A bar for reading `what`.
+    pub fn new(what: &str) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(15));
+        let style = ProgressStyle::with_template("{msg} [{bar:40}] {bytes} of {total_bytes}, {eta} left");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+        bar.set_message(what.to_owned());
+        Self(bar)
+    }
+
+    /// Shows that `read` of `length` bytes were read.
+    pub fn show(&self, read: u64, length: u64) {
+        self.0.set_length(length);
+        self.0.set_position(read);
+    }
+
+    /// Takes the bar from the screen.
+    pub fn clear(self) {
+        self.0.finish_and_clear();
+    }
+}
+
 /// A group in one line.
 fn in_words(group: &GroupLive, elapsed: Nanos) -> String {
     let late = |q| short(group.lateness.percentile(q));

@@ -20,15 +20,29 @@ mod records;
 mod stats;
 
 #[cfg(feature = "log")]
+mod backlog;
+#[cfg(feature = "log")]
+mod check;
+#[cfg(feature = "log")]
 mod chunk;
 #[cfg(feature = "log")]
 mod convert;
 #[cfg(feature = "log")]
 mod framing;
 #[cfg(feature = "log")]
+mod info;
+#[cfg(feature = "log")]
+mod message;
+#[cfg(feature = "log")]
 mod reader;
 #[cfg(feature = "log")]
+mod recover;
+#[cfg(feature = "log")]
+mod salvage;
+#[cfg(feature = "log")]
 mod schema;
+#[cfg(feature = "log")]
+mod summary;
 #[cfg(feature = "log")]
 pub(crate) mod topic;
 #[cfg(feature = "log")]
@@ -50,6 +64,16 @@ pub use records::{
 pub use stats::{EventSum, GroupStats, StatsCounter};
 
 #[cfg(feature = "log")]
+pub use backlog::{Backlog, BacklogProgress};
+#[cfg(feature = "log")]
+pub use check::{CheckReport, check};
+#[cfg(feature = "log")]
+pub use info::{AttachmentInfo, ChunkInfo, LogInfo, TopicInfo};
+#[cfg(feature = "log")]
 pub use reader::LogReader;
+#[cfg(feature = "log")]
+pub use recover::{Lost, Recovered, recover};
+#[cfg(feature = "log")]
+pub use salvage::Damage;
 #[cfg(feature = "log")]
 pub use writer::McapWriter;

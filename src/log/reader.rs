@@ -17,7 +17,7 @@ use crate::error::{Error, ErrorKind};
 
 const READ_BUFFER_BYTES: usize = 1 << 18;
 /// Channel id, sequence number, log time and publish time in front of every message.
-const MESSAGE_HEADER_BYTES: usize = 22;
+pub(super) const MESSAGE_HEADER_BYTES: usize = 22;
 
 /// The entries of a log, as an iterator.
 ///
@@ -56,12 +56,7 @@ impl<R: Read> LogReader<R> {
     /// # Errors
     /// [`ErrorKind::Io`] if it cannot be read, [`ErrorKind::Log`] if it is no MCAP file.
     pub fn new(source: R, place: &str) -> Result<Self, Error> {
-        let records = RecordStream::new(source).map_err(|e| match e.kind() {
-            io::ErrorKind::InvalidData => {
-                Error::new(ErrorKind::Log, "no MCAP file: it does not begin with the MCAP magic").at(place)
-            }
-            _ => Error::io(Path::new(place), e),
-        })?;
+        let records = RecordStream::new(source).map_err(|e| cannot_open(place, e))?;
         Ok(Self {
             records,
             place: place.to_owned(),
@@ -187,7 +182,18 @@ impl<R> std::fmt::Debug for LogReader<R> {
     }
 }
 
-fn decode_data(kind: Kind, data: &[u8]) -> Result<LogEntry, prost::DecodeError> {
+/// Why a file cannot be read as a log.
+pub(super) fn cannot_open(place: &str, error: io::Error) -> Error {
+    match error.kind() {
+        io::ErrorKind::InvalidData => {
+            Error::new(ErrorKind::Log, "no MCAP file: it does not begin with the MCAP magic").at(place)
+        }
+        _ => Error::io(Path::new(place), error),
+    }
+}
+
+/// The entry in a message of this kind.
+pub(super) fn decode_data(kind: Kind, data: &[u8]) -> Result<LogEntry, prost::DecodeError> {
     fn parse<M: prost::Message + Default>(data: &[u8]) -> Result<M, prost::DecodeError> {
         M::decode(data)
     }
