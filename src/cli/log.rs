@@ -90,8 +90,9 @@ fn info(args: &InfoArgs) -> Result<(), Error> {
 
 fn run_check(args: &CheckArgs) -> Result<(), Error> {
     let place = args.log.display().to_string();
+    let source = BufReader::with_capacity(1 << 18, File::open(&args.log).map_err(|e| Error::io(&args.log, e))?);
     let bar = ReadBar::new(&place);
-    let report = check(&args.log, |read, length| bar.show(read, length));
+    let report = check(source, &place, |read, length| bar.show(read, length));
     bar.clear();
     let report = report?;
     print(&findings(&report, &place))?;

@@ -30,6 +30,8 @@ pub(super) struct ChunkHead {
     pub(super) compression: String,
     /// The whole record in the file, opcode and length included [bytes].
     pub(super) length: u64,
+    /// The file ends inside of it: its checksum cannot be verified.
+    pub(super) is_cut: bool,
 }
 
 impl ChunkRecords {
@@ -110,11 +112,12 @@ pub(super) fn read_header(body: &[u8], length: u64, cut: bool) -> Result<ChunkHe
             checksum: half(24)?,
             compression: String::from_utf8_lossy(name).into_owned(),
             length: length.checked_add(9)?,
+            is_cut: cut,
         };
         Some((head, word(size_at)?, (size_at as u64).checked_add(8)?))
     };
     match header() {
-        None if cut => Ok(ChunkHead::default()),
+        None if cut => Ok(ChunkHead { is_cut: true, ..ChunkHead::default() }),
         None => Err("its header is too short".into()),
         Some((head, _, _)) if head.unpacked > MAX_RECORD_BYTES => {
             Err(format!("it claims {} unpacked bytes", head.unpacked))
