@@ -20,7 +20,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use palpate::log::{CommandSample, ContactSample, ForceSample, LogRecord, ToolSample};
-use palpate::runtime::{Actor, Execution, Outcome, RateGroup, Recorder, Runtime, Running, TickContext, TickTiming, actor_fn};
+use palpate::runtime::{
+    Actor, Execution, Outcome, RateGroup, Recorder, Running, Runtime, TickContext, TickTiming, actor_fn,
+};
 use palpate::time::Nanos;
 
 const MS: u64 = 1_000_000;
@@ -91,7 +93,8 @@ fn virtual_pairs() -> (Vec<f64>, Vec<f64>) {
     with.group(RateGroup::hz(1000).name("local"), vec![haptic(Some(recorder))]);
     let mut without = Runtime::builder(Execution::Virtual);
     without.group(RateGroup::hz(1000).name("local"), vec![haptic(None)]);
-    let start = |graph: &mut palpate::runtime::RuntimeBuilder| graph.build().expect("valid").start().expect("it starts");
+    let start =
+        |graph: &mut palpate::runtime::RuntimeBuilder| graph.build().expect("valid").start().expect("it starts");
     let (with, without) = (start(&mut with), start(&mut without));
     let (mut differences, mut ticks, mut records) = (Vec::with_capacity(PAIRS), Vec::with_capacity(PAIRS), Vec::new());
     for pair in 0..PAIRS {
@@ -130,7 +133,8 @@ fn real_pairs(seconds: u64) -> Vec<f64> {
     let mut records = Vec::new();
     let logger = actor_fn("logger", move |_| {
         drain.drain(&mut records);
-        let own = records.drain(..).filter_map(|record| TickTiming::from_record(&record)).filter(|timing| timing.group == 0);
+        let own =
+            records.drain(..).filter_map(|record| TickTiming::from_record(&record)).filter(|timing| timing.group == 0);
         sink.lock().unwrap_or_else(PoisonError::into_inner).extend(own);
         Outcome::Continue
     });
@@ -141,7 +145,7 @@ fn real_pairs(seconds: u64) -> Vec<f64> {
     running.wait_for(Duration::MAX);
     assert_eq!(running.stop().fault, None);
     let timings = timings.lock().unwrap_or_else(PoisonError::into_inner);
-    let execution = |timing: &TickTiming| (timing.end - timing.start).0 as f64;
+    let execution = |timing: &TickTiming| timing.end.saturating_sub(timing.start).0 as f64;
     let pair = |pair: &[TickTiming]| {
         let [a, b] = pair else { return None };
         let difference = execution(a) - execution(b);

@@ -40,11 +40,16 @@ fn info_says_what_is_in_a_log_by_its_index_and_by_a_scan() {
     assert_eq!((&force["messages"], &force["schema"]), (&2000.into(), &"palpate.Force".into()));
     assert!((force["rate_hz"].as_f64().unwrap() - 1000.0).abs() < 1.0, "{force}");
     assert_eq!(topic(&info, "/timing/local")["messages"], 2001);
-    assert_eq!((&info["environment"]["execution"], &info["environment"]["model"]), (&"virtual".into(), &"patch".into()));
+    assert_eq!(
+        (&info["environment"]["execution"], &info["environment"]["model"]),
+        (&"virtual".into(), &"patch".into())
+    );
     assert_eq!(info["attachments"][0]["name"], "scene.toml");
     assert_eq!(info["chunks"][0]["compression"], "lz4");
     let text = folder.succeed(&["log", "info", "run.mcap"]);
-    for words in ["complete, by its index", "duration   2.000 s", "virtual, model patch", "/force_commanded", "scene.toml"] {
+    for words in
+        ["complete, by its index", "duration   2.000 s", "virtual, model patch", "/force_commanded", "scene.toml"]
+    {
         assert!(text.contains(words), "{words}: {text}");
     }
     // Check that a log without its index says the same, but for that
@@ -65,7 +70,7 @@ fn a_check_is_silent_on_a_sound_log_and_names_what_is_wrong() {
     for (name, wrong, words) in [
         ("cut.mcap", bytes[..bytes.len() / 2].to_vec(), "cut off at byte"),
         ("flip.mcap", flipped(&bytes, bytes.len() / 2), "is damaged"),
-        ("tail.mcap", flipped(&bytes, bytes.len() - 60), "index of the log is damaged"),
+        ("tail.mcap", flipped(&bytes, bytes.len() - 20), "index of the log is damaged"),
     ] {
         folder.write(name, wrong);
         let called = folder.call(&["log", "check", name]);
@@ -99,7 +104,8 @@ fn recover_makes_a_sound_log_of_every_cut() {
         assert_sound(&folder.call(&["log", "check", "new.mcap"]));
         assert_eq!(json(&folder, "new.mcap")["has_index"], true);
         let cut_log = folder.call(&["export", "cut.mcap", "--topic", "/force"]);
-        if cut_log.code == Some(0) {
+        // A cut before the first chunk leaves no topics.
+        if json(&folder, "new.mcap")["messages"] != 0 {
             let new = folder.succeed(&["export", "new.mcap", "--topic", "/force"]);
             assert!(new == cut_log.out && whole.starts_with(&new) && new.len() >= rows, "cut at {cut}");
             rows = new.len();

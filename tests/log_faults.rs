@@ -6,8 +6,8 @@ use std::io::{self, Cursor, Write};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use palpate::actors::{LAST_WAIT, LogFile, LogSink, LoggerActor, LoggerOutcome, MOST_WAITING};
 use palpate::Error;
+use palpate::actors::{LAST_WAIT, LogFile, LogSink, LoggerActor, LoggerOutcome, MOST_WAITING};
 use palpate::log::{
     Environment, Execution as LogExecution, ForceSample, GroupInfo, GroupStats, LogEntry, LogReader, LogRecord,
     RunReport, TextEvent, check,
@@ -130,7 +130,8 @@ fn run(execution: Execution, ms: u64, buffered_ms: u64, sink: Option<Box<dyn Log
         *seen.lock().unwrap() += 1;
         for i in 0..PER_TICK {
             // Digits that repeat nowhere, so that packing does not make a slow disk fast.
-            let noise = |k: u64| f64::from_bits((ctx.tick * 31 + i * 7 + k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 2);
+            let noise =
+                |k: u64| f64::from_bits((ctx.tick * 31 + i * 7 + k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 2);
             let force_n = [noise(1), noise(2), noise(3)];
             recorder.push(LogRecord::Force(ForceSample { time: ctx.scheduled, force_n, ..ForceSample::default() }));
         }
@@ -268,7 +269,11 @@ fn a_gap_is_told_in_the_log_with_its_times() {
     let mut file = LogFile::new(Gate(Arc::clone(&gate), disk.clone()), "disk", &environment).unwrap();
     let record = |n: u64| {
         let noise = |k: u64| f64::from_bits((n * 31 + k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 2);
-        LogRecord::Force(ForceSample { time: Nanos(n * MS), force_n: [noise(1), noise(2), noise(3)], ..Default::default() })
+        LogRecord::Force(ForceSample {
+            time: Nanos(n * MS),
+            force_n: [noise(1), noise(2), noise(3)],
+            ..Default::default()
+        })
     };
     let mut n = 0;
     // Until three times as much was given as may wait.

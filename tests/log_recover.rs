@@ -7,18 +7,19 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 
 use log_sample::log_of;
-use palpate::log::{LogEntry, LogInfo, LogReader, LogRecord, Recovered, check, recover};
+use palpate::log::{GroupStats, LogEntry, LogInfo, LogReader, LogRecord, Recovered, check, recover};
 use palpate::runtime::record::{Record, TickTiming};
 use proptest::prelude::*;
 
 const BOUNDARY: usize = 4096;
 
-/// The sample without its slips, which skip no tick: the books of a sound log add up.
+/// The sample without its slips, which skip no tick, and its losses: the books of a sound log add up.
 fn entries(ticks: u64) -> Vec<LogEntry> {
     let even = |entry| match entry {
         LogEntry::Record(LogRecord::Tick(timing)) => {
             LogEntry::Record(LogRecord::Tick(TickTiming { slips: 0, given_up: 0, ..timing }))
         }
+        LogEntry::Stats(stats) => LogEntry::Stats(GroupStats { lost_records: 0, ..stats }),
         other => other,
     };
     log_sample::entries(ticks).into_iter().map(even).collect()
@@ -137,6 +138,10 @@ fn behind_a_damaged_chunk_the_next_one_is_read() {
         assert!(is_subsequence(&raw(&new), &all), "{place}");
         let found = check(Cursor::new(&wrong), "wrong", |_, _| ()).unwrap();
         assert!(!found.is_sound() && found.messages == report.messages, "{place}: {found:?}");
+        if place.starts_with("byte 0 ") {
+            // A record of a kind that nobody knows is passed over, by the format; that something is wrong was noticed.
+            continue;
+        }
         let gap = &report.lost[0];
         let expected = (damaged != 0, damaged != chunks.len() - 1);
         assert_eq!((gap.after.is_some(), gap.before.is_some()), expected, "{place}");
@@ -174,7 +179,8 @@ fn logs_of_other_programs_are_recovered_too() {
         writer.add_channel_with_id(40, schema, "/thing", "json", &metadata).unwrap();
         for i in 0..1000_u32 {
             let (channel_id, time) = (40, u64::from(i) * 1000);
-            let header = mcap::records::MessageHeader { channel_id, sequence: i, log_time: time, publish_time: time + 7 };
+            let header =
+                mcap::records::MessageHeader { channel_id, sequence: i, log_time: time, publish_time: time + 7 };
             writer.write_to_known_channel(&header, format!("{{\"x\": {i}}}").as_bytes()).unwrap();
         }
         writer.finish().unwrap();

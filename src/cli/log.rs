@@ -105,7 +105,8 @@ fn run_check(args: &CheckArgs) -> Result<(), Error> {
 /// A line for each finding, then the verdict.
 fn findings(report: &CheckReport, place: &str) -> String {
     let mut text: String = report.findings.iter().map(|finding| format!("{place}: {finding}\n")).collect();
-    let of_all = if report.is_checksummed { "one of all data that fits" } else { "none of all data that could be verified" };
+    let of_all =
+        if report.is_checksummed { "one of all data that fits" } else { "none of all data that could be verified" };
     let checksums = format!("{} of {} chunks with a checksum, {of_all}", report.checksummed_chunks, report.chunks);
     let read = format!(
         "{} ({} of palpate's, decoded) {}; {checksums}",

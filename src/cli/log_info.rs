@@ -112,10 +112,8 @@ pub fn to_json(info: &LogInfo) -> Value {
             "encoding": topic.encoding,
         })
     });
-    let attachments = info
-        .attachments
-        .iter()
-        .map(|one| json!({"name": one.name, "media_type": one.media_type, "bytes": one.bytes}));
+    let attachments =
+        info.attachments.iter().map(|one| json!({"name": one.name, "media_type": one.media_type, "bytes": one.bytes}));
     json!({
         "schema_version": 1,
         "bytes": info.bytes,

@@ -66,7 +66,8 @@ impl Backlog {
     /// If the system gives no thread.
     pub fn new(output: impl Write + Send + 'static) -> io::Result<Self> {
         let shared = Arc::<Shared>::default();
-        let end = End { shared: Arc::clone(&shared), result: Err(io::Error::other("the thread that writes it panicked")) };
+        let end =
+            End { shared: Arc::clone(&shared), result: Err(io::Error::other("the thread that writes it panicked")) };
         let thread = std::thread::Builder::new().name("log-writer".to_owned()).stack_size(STACK_BYTES);
         thread.spawn(move || write_all(end, output))?;
         Ok(Self { shared, own: Vec::new() })

@@ -224,7 +224,8 @@ impl Checker {
             self.report.count += 1;
             if channel.findings <= PER_TOPIC && self.report.findings.len() < FINDINGS_KEPT {
                 let (topic, number) = (&channel.topic, channel.messages);
-                let more = if channel.findings == PER_TOPIC { " (further ones of this topic are only counted)" } else { "" };
+                let more =
+                    if channel.findings == PER_TOPIC { " (further ones of this topic are only counted)" } else { "" };
                 self.report.findings.push(format!("{topic}: message {number} {what}{more}"));
             }
         }
@@ -237,15 +238,17 @@ impl Checker {
             if let Some(&released) = self.released.get(&group)
                 && released > ticks
             {
-                self.report.find(format!("/timing/{name} holds {ticks} releases, but {released} were counted in the run"));
+                self.report
+                    .find(format!("/timing/{name} holds {ticks} releases, but {released} were counted in the run"));
             }
         }
         for group in self.analysis.report().groups {
             let (released, skipped, elapsed) = (group.released, group.skipped.total(), group.elapsed_periods);
             if released + skipped != elapsed {
                 let name = group.name;
-                self.report
-                    .find(format!("{name}: {released} released + {skipped} skipped are not the {elapsed} elapsed periods"));
+                self.report.find(format!(
+                    "{name}: {released} released + {skipped} skipped are not the {elapsed} elapsed periods"
+                ));
             }
         }
         if self.lost_records > 0 {

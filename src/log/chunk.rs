@@ -43,7 +43,10 @@ impl ChunkRecords {
         let cut = (body.len() as u64) < length;
         let head = read_header(&body, length, cut)?;
         if !["", "lz4"].contains(&head.compression.as_str()) {
-            return Err(format!("it is packed with `{}`, which palpate does not read", head.compression.escape_default()));
+            return Err(format!(
+                "it is packed with `{}`, which palpate does not read",
+                head.compression.escape_default()
+            ));
         }
         let mut options = LinearReaderOptions::default()
             .with_skip_start_magic(true)

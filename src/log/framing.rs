@@ -191,8 +191,17 @@ impl<R: Read> RecordStream<R> {
             op::CHUNK | op::MESSAGE | op::METADATA | op::ATTACHMENT if self.section != Section::Data => {
                 Err(format!("the log is damaged at byte {start}: a record of the data in the index"))
             }
-            op::HEADER | op::SCHEMA | op::CHANNEL | op::CHUNK | op::MESSAGE | op::METADATA | op::ATTACHMENT
-            | op::STATISTICS | op::CHUNK_INDEX | op::METADATA_INDEX | op::ATTACHMENT_INDEX => {
+            op::HEADER
+            | op::SCHEMA
+            | op::CHANNEL
+            | op::CHUNK
+            | op::MESSAGE
+            | op::METADATA
+            | op::ATTACHMENT
+            | op::STATISTICS
+            | op::CHUNK_INDEX
+            | op::METADATA_INDEX
+            | op::ATTACHMENT_INDEX => {
                 if length > MAX_RECORD_BYTES {
                     return Err(format!("the record at byte {start} is damaged: it claims {length} bytes"));
                 }

@@ -93,11 +93,7 @@ impl LogInfo {
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn of(
-        mut source: impl Read + Seek,
-        place: &str,
-        progress: impl FnMut(u64, u64),
-    ) -> Result<Self, Error> {
+    pub fn of(mut source: impl Read + Seek, place: &str, progress: impl FnMut(u64, u64)) -> Result<Self, Error> {
         if let Some(summary) = read_summary(&mut source)
             && let Some(info) = Self::of_index(&mut source, &summary)
         {

@@ -206,7 +206,8 @@ struct Copy {
 
 impl Copy {
     fn new(index: Summary) -> Self {
-        let report = Recovered { counted: index.stats.as_ref().map(|stats| stats.message_count), ..Recovered::default() };
+        let report =
+            Recovered { counted: index.stats.as_ref().map(|stats| stats.message_count), ..Recovered::default() };
         Self {
             report,
             index,
@@ -274,11 +275,7 @@ impl Copy {
     }
 
     /// Declares a channel under its own number; a second one of that number that differs is left out.
-    fn declare<W: Write>(
-        &mut self,
-        writer: &mut mcap::Writer<NoSeek<W>>,
-        channel: &Channel,
-    ) -> mcap::McapResult<()> {
+    fn declare<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>, channel: &Channel) -> mcap::McapResult<()> {
         let id = channel.schema_id;
         if !self.schemas.contains_key(&id)
             && let Some(schema) = self.index.schemas.get(&id)
@@ -290,8 +287,7 @@ impl Copy {
             None => Ok(0),
         };
         let Channel { topic, message_encoding, metadata, .. } = channel;
-        let added =
-            schema.and_then(|_| writer.add_channel_with_id(channel.id, id, topic, message_encoding, metadata));
+        let added = schema.and_then(|_| writer.add_channel_with_id(channel.id, id, topic, message_encoding, metadata));
         match added {
             Ok(id) => {
                 self.declared.insert(id);
@@ -302,11 +298,7 @@ impl Copy {
         }
     }
 
-    fn declare_from_index<W: Write>(
-        &mut self,
-        writer: &mut mcap::Writer<NoSeek<W>>,
-        id: u16,
-    ) -> mcap::McapResult<()> {
+    fn declare_from_index<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>, id: u16) -> mcap::McapResult<()> {
         let Some(channel) = self.index.channels.get(&id) else { return Ok(()) };
         let channel = Channel {
             id,

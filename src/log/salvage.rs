@@ -92,14 +92,7 @@ impl<R: Read + Seek> Salvage<R> {
     }
 
     /// Where to go on after a damage in the record at `start`, of which `end` is where reading stopped.
-    fn resume_at(
-        &self,
-        source: &mut R,
-        start: u64,
-        opcode: u8,
-        section: Section,
-        end: u64,
-    ) -> io::Result<Option<u64>> {
+    fn resume_at(&self, source: &mut R, start: u64, opcode: u8, section: Section, end: u64) -> io::Result<Option<u64>> {
         if section != Section::Data {
             // The data does not fit its checksum, but its end was read: the index follows. Within it, nothing does.
             return Ok((opcode == op::DATA_END).then_some(end));
