@@ -55,7 +55,10 @@ impl LogFile {
     /// Creates or overwrites the log at `path`.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] if the file cannot be created.
+    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if the file cannot be created.
+    ///
+    /// # Real-time
+    /// Not real-time safe: opens a file, starts a thread, allocates. Before a run.
     pub fn create(path: &Path, environment: &Environment) -> Result<Self, Error> {
         let file = File::create(path).map_err(|e| Error::io(path, e))?;
         Self::new(file, &path.display().to_string(), environment)
@@ -64,7 +67,10 @@ impl LogFile {
     /// Begins a log in `output`, which a thread of its own writes; `place` names it in errors.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] if there is no thread for it.
+    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if there is no thread for it.
+    ///
+    /// # Real-time
+    /// Not real-time safe: starts a thread, allocates. Before a run.
     pub fn new(output: impl Write + Send + 'static, place: &str, environment: &Environment) -> Result<Self, Error> {
         let backlog = Backlog::new(output).map_err(|e| Error::io(Path::new(place), e))?;
         let disk = backlog.progress();
