@@ -83,7 +83,7 @@ impl<R: Read + Seek> Salvage<R> {
         self.damaged = true;
         let (start, opcode) = stream.record_start();
         let (section, end) = (stream.section(), stream.offset());
-        let Some(mut source) = self.stream.take().map(RecordStream::into_source) else { return None };
+        let mut source = self.stream.take().map(RecordStream::into_source)?;
         // A source that cannot be read further has nothing more to give.
         let next = self.resume_at(&mut source, start, opcode, section, end).ok().flatten();
         let next = next.filter(|at| source.seek(SeekFrom::Start(*at)).is_ok());
