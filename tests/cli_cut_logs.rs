@@ -129,9 +129,9 @@ fn a_killed_run_leaves_a_readable_log_that_lacks_at_most_a_second() {
         // Between two records or in one: a kill waits for neither.
         assert!(called.err.contains("cut off"), "{called:?}");
         // The start of the run by the environment, and the last record of the haptic group, since then.
-        let mut reader = LogReader::open(&folder.path("killed.mcap")).unwrap();
+        let reader = LogReader::open(&folder.path("killed.mcap")).unwrap();
         let (mut start, mut last) = (0, palpate::time::Nanos::ZERO);
-        while let Some(entry) = reader.next() {
+        for entry in reader {
             match entry {
                 LogEntry::Environment(environment) => start = environment.epoch_ns(),
                 LogEntry::Record(record @ LogRecord::Force(_)) => last = record.time(),
