@@ -1,14 +1,16 @@
 //! The logger actor: takes the records of all threads, keeps statistics and writes the log.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::cause::Cause;
 use super::granted::granted;
+use super::log_sink::{LogSink, Loss};
 use super::scene_watch::SceneWatch;
-use crate::error::Error;
-use crate::log::{Analysis, Environment, GroupStats, Level, LogRecord, RunReport, SceneFrame, StatsCounter, TextEvent};
+use crate::error::{Error, ErrorKind};
+use crate::log::{Analysis, Environment, Level, LogRecord, RunReport, StatsCounter, TextEvent};
 use crate::runtime::record::Event;
-use crate::runtime::{Actor, GrantHandle, Outcome, Record, RecordDrain, TickContext};
+use crate::runtime::{Actor, GrantHandle, Outcome, Record, RecordDrain, RecordGap, TickContext};
 use crate::time::Nanos;
 
 /// The target of the event that says that a log could not be written, for programs that report the summary's
@@ -18,54 +20,6 @@ pub const LOG_FAILURE: &str = "palpate::log_failure";
 /// Records younger than this wait for the next drain: a slow group stamps its records with the start of a release and
 /// hands them over at its end, and the log is to be in the order of time.
 const HELD_BACK: Nanos = Nanos(100_000_000);
-
-/// Where log entries go, besides the statistics.
-///
-/// # Real-time
-/// Called by the logger alone: may allocate, block and write files. Records wait in their rings meanwhile.
-pub trait LogSink: Send {
-    /// Takes one record.
-    ///
-    /// # Errors
-    /// If it cannot be kept. The first error is reported when the run ends; what follows is still offered, because a
-    /// sink may have other places to keep it.
-    fn record(&mut self, record: &LogRecord) -> Result<(), Error>;
-
-    /// Takes an event in words.
-    ///
-    /// # Errors
-    /// As [`record`](Self::record).
-    fn text(&mut self, event: &TextEvent) -> Result<(), Error>;
-
-    /// Takes the statistics of a group, once per second.
-    ///
-    /// # Errors
-    /// As [`record`](Self::record).
-    fn stats(&mut self, stats: &GroupStats) -> Result<(), Error>;
-
-    /// Takes a picture of the run; without an own implementation, it is dropped.
-    ///
-    /// # Errors
-    /// As [`record`](Self::record).
-    fn scene(&mut self, _: &SceneFrame) -> Result<(), Error> {
-        Ok(())
-    }
-
-    /// Takes what became known of the run as a whole.
-    fn environment(&mut self, environment: &Environment);
-
-    /// Writes what is due at `log_time` and `now` (both since the start of the run).
-    ///
-    /// # Errors
-    /// As [`record`](Self::record).
-    fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error>;
-
-    /// Ends the log.
-    ///
-    /// # Errors
-    /// As [`record`](Self::record).
-    fn finish(&mut self) -> Result<(), Error>;
-}
 
 /// What a run left behind, filled in when the logger stops.
 #[derive(Clone, Debug, Default)]
@@ -95,8 +49,13 @@ pub struct LoggerActor {
     stats: Vec<StatsCounter>,
     outcome: LoggerOutcome,
     failure: Option<Error>,
-    /// Taken and not yet passed on.
+    /// Taken and not yet passed on, but for the first `passed`.
     records: Vec<Record>,
+    passed: usize,
+    /// Records that the sink could not keep.
+    lost_by_sink: u64,
+    /// The sink panicked: it is not called any more.
+    sink_failed: bool,
     log_time: Nanos,
     scene: Option<SceneWatch>,
 }
@@ -130,6 +89,9 @@ impl LoggerActor {
             outcome,
             failure: None,
             records: Vec::new(),
+            passed: 0,
+            lost_by_sink: 0,
+            sink_failed: false,
             log_time: Nanos::ZERO,
             scene: None,
         }
@@ -151,7 +113,17 @@ impl LoggerActor {
 
     /// A sink that fails does not end the run; its report says so.
     fn keep(&mut self, write: impl FnOnce(&mut dyn LogSink) -> Result<(), Error>) {
-        if let Err(error) = write(&mut *self.sink)
+        if self.sink_failed {
+            self.lost_by_sink += 1;
+            return;
+        }
+        // What was half-way done in a sink that panicked is not looked at again.
+        let result = catch_unwind(AssertUnwindSafe(|| write(&mut *self.sink))).unwrap_or_else(|_| {
+            self.sink_failed = true;
+            self.lost_by_sink += 1;
+            Err(Error::new(ErrorKind::Fault, "what writes the log panicked"))
+        });
+        if let Err(error) = result
             && self.failure.is_none()
         {
             tracing::error!(target: LOG_FAILURE, "the log ends here: {error}");
@@ -160,54 +132,95 @@ impl LoggerActor {
     }
 
     /// Takes what was recorded and passes on, in the order of time, what is older than `horizon`.
-    fn take_records(&mut self, horizon: Nanos) {
-        let mut records = std::mem::take(&mut self.records);
-        self.drain.drain(&mut records);
+    fn take_records(&mut self, horizon: Nanos, now: Nanos) {
+        // More than none only after a panic: what was passed on then is not passed on twice.
+        self.records.drain(..std::mem::take(&mut self.passed));
+        self.drain.drain(&mut self.records);
         // Stable: what a thread records at one time keeps its order.
-        records.sort_by_key(|record| record.stamp);
-        let ready = records.partition_point(|record| record.stamp < horizon);
-        // Which group a lost record was of is not known: the first one's statistics hold the sum, as the report does.
-        if let Some(first) = self.stats.first_mut() {
-            first.set_lost(self.drain.lost());
+        self.records.sort_by_key(|record| record.stamp);
+        if let Some(RecordGap { records, from }) = self.drain.take_gap() {
+            self.tell(&Loss { records, from, to: now.max(from), why: "the logger came late" });
         }
-        for record in records.drain(..ready).filter_map(|record| LogRecord::from_record(&record)) {
-            self.take_pictures(record.time());
-            self.log_time = self.log_time.max(record.time());
-            if let Some(scene) = &mut self.scene {
-                scene.see(&record, &self.environment);
+        let ready = self.records.partition_point(|record| record.stamp < horizon);
+        self.note_lost();
+        while self.passed < ready {
+            let record = self.records[self.passed];
+            self.passed += 1;
+            if let Some(record) = LogRecord::from_record(&record) {
+                self.pass_on(&record);
             }
-            match &record {
-                LogRecord::Event(event) => {
-                    let text = in_words(event, &self.environment.group_name(event.group));
-                    match text.level {
-                        Level::Info => tracing::info!(time = %text.time, "{}", text.message),
-                        Level::Warning => tracing::warn!(time = %text.time, "{}", text.message),
-                        Level::Error => tracing::error!(time = %text.time, "{}", text.message),
-                    }
-                    // The sum is one over all groups; an event of an unknown one counts for the first.
-                    let group = usize::from(event.group);
-                    let group = if group < self.stats.len() { group } else { 0 };
-                    self.stats.get_mut(group).into_iter().for_each(|counter| counter.push_event(&text));
-                    self.analysis.push_text(&text);
-                    self.keep(|sink| sink.text(&text));
-                    continue;
-                }
-                LogRecord::Tick(timing) => {
-                    let counter = self.stats.get_mut(usize::from(timing.group));
-                    if let Some(stats) = counter.and_then(|counter| counter.push(timing)) {
-                        self.keep(|sink| sink.stats(&stats));
-                    }
-                }
-                LogRecord::Port(used) => {
-                    self.stats.get_mut(usize::from(used.group)).into_iter().for_each(StatsCounter::push_port_use);
-                }
-                _ => {}
-            }
-            self.analysis.push(&record);
-            self.keep(|sink| sink.record(&record));
         }
         self.take_pictures(horizon);
-        self.records = records;
+        self.records.drain(..std::mem::take(&mut self.passed));
+        self.take_loss();
+    }
+
+    fn pass_on(&mut self, record: &LogRecord) {
+        self.take_pictures(record.time());
+        if let Some(scene) = &mut self.scene {
+            scene.see(record, &self.environment);
+        }
+        self.log_time = self.log_time.max(record.time());
+        match record {
+            LogRecord::Event(event) => {
+                let text = in_words(event, &self.environment.group_name(event.group));
+                match text.level {
+                    Level::Info => tracing::info!(time = %text.time, "{}", text.message),
+                    Level::Warning => tracing::warn!(time = %text.time, "{}", text.message),
+                    Level::Error => tracing::error!(time = %text.time, "{}", text.message),
+                }
+                self.text(event.group, &text);
+                return;
+            }
+            LogRecord::Tick(timing) => {
+                let counter = self.stats.get_mut(usize::from(timing.group));
+                if let Some(stats) = counter.and_then(|counter| counter.push(timing)) {
+                    self.keep(|sink| sink.stats(&stats));
+                }
+            }
+            LogRecord::Port(used) => {
+                self.stats.get_mut(usize::from(used.group)).into_iter().for_each(StatsCounter::push_port_use);
+            }
+            _ => {}
+        }
+        self.analysis.push(record);
+        self.keep(|sink| sink.record(record));
+    }
+
+    fn text(&mut self, group: u16, text: &TextEvent) {
+        // The sum is one over all groups; an event of an unknown one counts for the first.
+        let group = if usize::from(group) < self.stats.len() { usize::from(group) } else { 0 };
+        self.stats.get_mut(group).into_iter().for_each(|counter| counter.push_event(text));
+        self.analysis.push_text(text);
+        self.keep(|sink| sink.text(text));
+    }
+
+    /// Tells in the log and in the report what is missing.
+    fn tell(&mut self, loss: &Loss) {
+        let text = loss.in_words();
+        tracing::warn!(target: LOG_FAILURE, "{}", text.message);
+        self.text(0, &text);
+    }
+
+    fn take_loss(&mut self) {
+        if self.sink_failed {
+            return;
+        }
+        while let Some(loss) = self.sink.take_loss() {
+            self.lost_by_sink += loss.records;
+            self.note_lost();
+            self.tell(&loss);
+        }
+    }
+
+    /// Which group a lost record was of is not known: the first one's statistics hold the sum, as the report does.
+    fn note_lost(&mut self) {
+        let lost = self.lost();
+        self.stats.first_mut().into_iter().for_each(|first| first.set_lost(lost));
+    }
+
+    fn lost(&self) -> u64 {
+        self.drain.lost() + self.lost_by_sink
     }
 
     fn learn_grants(&mut self) {
@@ -234,21 +247,26 @@ impl Actor for LoggerActor {
             scene.take(ctx);
         }
         self.learn_grants();
-        self.take_records(ctx.scheduled.saturating_sub(HELD_BACK));
+        self.take_records(ctx.scheduled.saturating_sub(HELD_BACK), ctx.now);
         let log_time = self.log_time;
-        self.keep(|sink| sink.flush(log_time, ctx.now));
+        if !self.sink_failed {
+            self.keep(|sink| sink.flush(log_time, ctx.now));
+        }
         Outcome::Continue
     }
 
-    fn stop(&mut self, _: &TickContext) {
+    fn stop(&mut self, ctx: &TickContext) {
         self.learn_grants();
-        self.take_records(Nanos(u64::MAX));
+        self.take_records(Nanos(u64::MAX), ctx.now);
         for counter in std::mem::take(&mut self.stats) {
             let stats = counter.finish(self.log_time);
             self.keep(|sink| sink.stats(&stats));
         }
-        self.keep(|sink| sink.finish());
-        self.analysis.set_lost(0, self.drain.lost());
+        if !self.sink_failed {
+            self.keep(|sink| sink.finish());
+        }
+        self.take_loss();
+        self.analysis.set_lost(0, self.lost());
         let mut outcome = self.outcome.0.lock().unwrap_or_else(PoisonError::into_inner);
         *outcome = (self.analysis.report(), self.failure.take());
     }

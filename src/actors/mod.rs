@@ -16,6 +16,9 @@ mod device;
 mod global;
 mod granted;
 mod local;
+#[cfg(feature = "log")]
+mod log_file;
+mod log_sink;
 mod logger;
 mod messages;
 mod scene_watch;
@@ -27,6 +30,9 @@ pub(crate) use device::GAP_S;
 pub use device::{DeviceActor, first_state};
 pub use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
 pub use local::{LocalActor, LocalPorts, ModelSource};
-pub use logger::{LOG_FAILURE, LogSink, LoggerActor, LoggerOutcome};
+#[cfg(feature = "log")]
+pub use log_file::{LAST_WAIT, LogFile, MOST_WAITING};
+pub use log_sink::{LogSink, Loss};
+pub use logger::{LOG_FAILURE, LoggerActor, LoggerOutcome};
 pub use messages::{Checkpoint, DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
 pub use scene_watch::SceneWatch;

@@ -5,12 +5,14 @@
 
 pub mod compare;
 pub mod export;
+pub mod log;
 pub mod mock;
 pub mod replay;
 pub mod run;
 pub mod timing;
 
 mod interrupt;
+mod log_info;
 mod output;
 mod progress;
 mod window;
@@ -46,6 +48,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Write one topic of a log as a table
     Export(export::ExportArgs),
+    /// Look into a log, check it, or save what is readable of a damaged one
+    Log(log::LogArgs),
     /// Be a device's service without the device, to try a scene against it
     Mock(mock::MockArgs),
 }
@@ -70,6 +74,7 @@ pub fn main() -> ExitCode {
             Some(Command::Compare(args)) => compare::run(&args),
             Some(Command::Timing(args)) => timing::run(&args),
             Some(Command::Export(args)) => export::run(&args),
+            Some(Command::Log(args)) => log::run(&args),
             Some(Command::Replay(args)) => replay::run(&args),
             Some(Command::Mock(args)) => mock::run(&args),
         },

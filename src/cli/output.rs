@@ -15,11 +15,24 @@ pub fn print(text: &str) -> Result<(), Error> {
 /// Refuses to write `out` over `input`: opening it for writing would destroy what is being read.
 pub fn refuse_to_overwrite(input: &Path, out: &Path) -> Result<(), Error> {
     let real = |path: &Path| path.canonicalize().ok();
-    if real(input).is_some_and(|input| real(out) == Some(input)) {
+    if real(input).is_some_and(|input| real(out) == Some(input)) || is_one_file(input, out) {
         let message = "is the input itself, name another file for the output";
         return Err(Error::new(ErrorKind::Usage, message).at(out.display().to_string()));
     }
     Ok(())
+}
+
+/// True if the two are names of one file: hard links.
+#[cfg(unix)]
+fn is_one_file(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let of = |path: &Path| std::fs::metadata(path).map(|file| (file.dev(), file.ino())).ok();
+    of(a).is_some_and(|a| of(b) == Some(a))
+}
+
+#[cfg(not(unix))]
+fn is_one_file(_: &Path, _: &Path) -> bool {
+    false
 }
 
 /// Takes the error of a closed pipe for the end of the output.

@@ -92,6 +92,17 @@ pub struct ReadBar(ProgressBar);
 pub type ShownLog = LogReader<BufReader<ProgressBarIter<File>>>;
 
 impl ReadBar {
+    /// A bar for reading `what`.
+    pub fn new(what: &str) -> Self {
+        Self(bar(what, 0, false))
+    }
+
+    /// Shows that `read` of `length` bytes were read.
+    pub fn show(&self, read: u64, length: u64) {
+        self.0.set_length(length);
+        self.0.set_position(read);
+    }
+
     /// Opens the log at `path`, to do `what` with it; a bar that is hidden shows nothing.
     ///
     /// # Errors
@@ -99,11 +110,7 @@ impl ReadBar {
     pub fn open(what: &str, path: &Path, is_hidden: bool) -> Result<(Self, ShownLog), Error> {
         let file = File::open(path).map_err(|error| Error::io(path, error))?;
         let bytes = file.metadata().map_or(0, |metadata| metadata.len());
-        let target = if is_hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
-        let bar = ProgressBar::with_draw_target(Some(bytes), target);
-        let style = ProgressStyle::with_template("{msg} [{bar:40}] {bytes} of {total_bytes}, {eta} left");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
-        bar.set_message(format!("{what} {}", path.display()));
+        let bar = bar(&format!("{what} {}", path.display()), bytes, is_hidden);
         let source = BufReader::with_capacity(READ_BUFFER_BYTES, bar.wrap_read(file));
         let reader = LogReader::new(source, &path.display().to_string());
         if reader.is_err() {
@@ -116,6 +123,15 @@ impl ReadBar {
     pub fn clear(self) {
         self.0.finish_and_clear();
     }
+}
+
+fn bar(what: &str, bytes: u64, is_hidden: bool) -> ProgressBar {
+    let target = if is_hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
+    let bar = ProgressBar::with_draw_target(Some(bytes), target);
+    let style = ProgressStyle::with_template("{msg} [{bar:40}] {bytes} of {total_bytes}, {eta} left");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+    bar.set_message(what.to_owned());
+    bar
 }
 
 /// A group in one line.

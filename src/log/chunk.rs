@@ -14,6 +14,24 @@ pub(super) struct ChunkRecords {
     bytes: Vec<u8>,
     fed: usize,
     cut: bool,
+    head: ChunkHead,
+}
+
+/// What the header of a chunk says of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct ChunkHead {
+    pub(super) first_time: u64,
+    pub(super) last_time: u64,
+    /// Unpacked [bytes].
+    pub(super) unpacked: u64,
+    /// Of what is unpacked; 0 if the writer made none.
+    pub(super) checksum: u32,
+    /// `lz4`, `zstd`, or empty for none.
+    pub(super) compression: String,
+    /// The whole record in the file, opcode and length included [bytes].
+    pub(super) length: u64,
+    /// The file ends inside of it: its checksum cannot be verified.
+    pub(super) is_cut: bool,
 }
 
 impl ChunkRecords {
@@ -23,7 +41,13 @@ impl ChunkRecords {
     /// What is wrong with its header.
     pub(super) fn new(body: Vec<u8>, length: u64) -> Result<Self, String> {
         let cut = (body.len() as u64) < length;
-        check_header(&body, length, cut)?;
+        let head = read_header(&body, length, cut)?;
+        if !["", "lz4"].contains(&head.compression.as_str()) {
+            return Err(format!(
+                "it is packed with `{}`, which palpate does not read",
+                head.compression.escape_default()
+            ));
+        }
         let mut options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
@@ -33,7 +57,11 @@ impl ChunkRecords {
         let mut bytes = vec![mcap::records::op::CHUNK];
         bytes.extend_from_slice(&length.to_le_bytes());
         bytes.extend_from_slice(&body);
-        Ok(Self { reader: LinearReader::new_with_options(options), bytes, fed: 0, cut })
+        Ok(Self { reader: LinearReader::new_with_options(options), bytes, fed: 0, cut, head })
+    }
+
+    pub(super) fn head(&self) -> &ChunkHead {
+        &self.head
     }
 
     /// True if the file ends inside this chunk.
@@ -71,22 +99,35 @@ impl ChunkRecords {
     }
 }
 
-/// Refuses sizes that contradict each other: the decoder trusts them.
-fn check_header(body: &[u8], length: u64, cut: bool) -> Result<(), String> {
+/// The header, or an empty one if the file ends in it. Refuses sizes that contradict each other: the decoder trusts them.
+pub(super) fn read_header(body: &[u8], length: u64, cut: bool) -> Result<ChunkHead, String> {
     let bytes = |at: usize, count: usize| body.get(at..at.checked_add(count)?);
     let word = |at: usize| Some(u64::from_le_bytes(bytes(at, 8)?.try_into().ok()?));
+    let half = |at: usize| Some(u32::from_le_bytes(bytes(at, 4)?.try_into().ok()?));
     let header = || {
-        let name_length = u32::from_le_bytes(bytes(NAME_LENGTH_AT, 4)?.try_into().ok()?) as usize;
+        let name_length = half(NAME_LENGTH_AT)? as usize;
+        let name = bytes(NAME_LENGTH_AT + 4, name_length)?;
         let size_at = NAME_LENGTH_AT.checked_add(4)?.checked_add(name_length)?;
-        Some((word(16)?, word(size_at)?, (size_at as u64).checked_add(8)?))
+        let head = ChunkHead {
+            first_time: word(0)?,
+            last_time: word(8)?,
+            unpacked: word(16)?,
+            checksum: half(24)?,
+            compression: String::from_utf8_lossy(name).into_owned(),
+            length: length.checked_add(9)?,
+            is_cut: cut,
+        };
+        Some((head, word(size_at)?, (size_at as u64).checked_add(8)?))
     };
     match header() {
-        None if cut => Ok(()),
+        None if cut => Ok(ChunkHead { is_cut: true, ..ChunkHead::default() }),
         None => Err("its header is too short".into()),
-        Some((unpacked, _, _)) if unpacked > MAX_RECORD_BYTES => Err(format!("it claims {unpacked} unpacked bytes")),
+        Some((head, _, _)) if head.unpacked > MAX_RECORD_BYTES => {
+            Err(format!("it claims {} unpacked bytes", head.unpacked))
+        }
         Some((_, packed, header)) if header.checked_add(packed) != Some(length) => {
             Err("its sizes contradict each other".into())
         }
-        Some(_) => Ok(()),
+        Some((head, _, _)) => Ok(head),
     }
 }

@@ -11,7 +11,7 @@ use std::io::{self, Read};
 use crc32fast::Hasher;
 use mcap::records::op;
 
-use super::chunk::ChunkRecords;
+use super::chunk::{ChunkHead, ChunkRecords};
 
 /// The largest record or unpacked chunk that is read [bytes].
 pub(super) const MAX_RECORD_BYTES: u64 = 1 << 26;
@@ -28,13 +28,18 @@ pub(super) struct RecordStream<R> {
     /// Over all bytes of the section that is being read.
     checksum: Hasher,
     section: Section,
+    /// Where the record of the file begins that was read last, and what it is.
+    record_start: u64,
+    record_opcode: u8,
+    /// Begins behind a damage: what it reads of the data is not all that their checksum is of.
+    resumed: bool,
     damage: Option<String>,
     ended: bool,
 }
 
 /// The two parts of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Section {
+pub(super) enum Section {
     Data,
     /// The index; the data had a checksum that fits, or none.
     Index {
@@ -67,14 +72,59 @@ impl<R: Read> RecordStream<R> {
             has_chunks: false,
             checksum,
             section: Section::Data,
+            record_start: offset,
+            record_opcode: 0,
+            resumed: false,
             damage: None,
             ended: false,
         })
     }
 
+    /// Goes on behind a damage: `source` is at `offset`, where a record of `section` begins.
+    pub(super) fn resume(source: R, offset: u64, section: Section) -> Self {
+        Self {
+            source,
+            offset,
+            record: Vec::new(),
+            chunk: None,
+            has_chunks: true,
+            checksum: Hasher::new(),
+            section,
+            record_start: offset,
+            record_opcode: 0,
+            resumed: true,
+            damage: None,
+            ended: false,
+        }
+    }
+
+    /// The source, wherever it is now.
+    pub(super) fn into_source(self) -> R {
+        self.source
+    }
+
+    /// Bytes read so far.
+    pub(super) fn offset(&self) -> u64 {
+        self.offset
+    }
+
+    pub(super) fn section(&self) -> Section {
+        self.section
+    }
+
+    /// Where the record of the file begins that was read last, and its opcode: for records inside a chunk, the chunk.
+    pub(super) fn record_start(&self) -> (u64, u8) {
+        (self.record_start, self.record_opcode)
+    }
+
+    /// Where the chunk begins that the last record was in, and its header; `None` for one that was in none.
+    pub(super) fn chunk(&self) -> Option<(u64, &ChunkHead)> {
+        self.chunk.as_ref().map(|(chunk, start)| (*start, chunk.head()))
+    }
+
     /// True once the data section has been read and its checksum fits; a file of another writer may have none.
     pub(super) fn is_checksummed(&self) -> bool {
-        self.section == Section::Index { data_has_checksum: true }
+        self.damage.is_none() && self.section == Section::Index { data_has_checksum: true }
     }
 
     /// What is wrong with the file, as far as it has been read.
@@ -123,12 +173,14 @@ impl<R: Read> RecordStream<R> {
     fn read_record(&mut self) -> Result<Option<u8>, String> {
         let start = self.offset;
         let mut head = [0; 9];
+        (self.record_start, self.record_opcode) = (start, 0);
         match self.fill(&mut head)? {
             0 => return Err(format!("the log ends without its index at byte {start}: the run was cut off")),
             9 => {}
             _ => return Err(format!("the log is cut off at byte {}", self.offset)),
         }
         let opcode = head[0];
+        (self.record_start, self.record_opcode) = (start, opcode);
         let length = u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]]);
         let cut = |offset: u64| format!("the log is cut off at byte {offset}, in the record at byte {start}");
         if opcode == op::DATA_END && self.section == Section::Data {
@@ -139,7 +191,17 @@ impl<R: Read> RecordStream<R> {
             op::CHUNK | op::MESSAGE | op::METADATA | op::ATTACHMENT if self.section != Section::Data => {
                 Err(format!("the log is damaged at byte {start}: a record of the data in the index"))
             }
-            op::CHUNK | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::STATISTICS | op::ATTACHMENT => {
+            op::HEADER
+            | op::SCHEMA
+            | op::CHANNEL
+            | op::CHUNK
+            | op::MESSAGE
+            | op::METADATA
+            | op::ATTACHMENT
+            | op::STATISTICS
+            | op::CHUNK_INDEX
+            | op::METADATA_INDEX
+            | op::ATTACHMENT_INDEX => {
                 if length > MAX_RECORD_BYTES {
                     return Err(format!("the record at byte {start} is damaged: it claims {length} bytes"));
                 }
@@ -178,11 +240,11 @@ impl<R: Read> RecordStream<R> {
             return Err(format!("the end of the data is damaged at byte {start}"));
         };
         let stored = u32::from_le_bytes(stored);
+        self.section = Section::Index { data_has_checksum: stored != 0 && !self.resumed };
         // By the format, 0 says that the writer made none.
-        if stored != 0 && stored != computed {
+        if !self.resumed && stored != 0 && stored != computed {
             return Err(format!("the data before byte {start} does not fit its checksum: something in it is damaged"));
         }
-        self.section = Section::Index { data_has_checksum: stored != 0 };
         Ok(())
     }
 

@@ -23,6 +23,10 @@ pub mod timing;
 mod window;
 
 #[cfg(feature = "log")]
+mod backlog;
+#[cfg(feature = "log")]
+mod check;
+#[cfg(feature = "log")]
 mod chunk;
 #[cfg(feature = "log")]
 mod convert;
@@ -33,13 +37,23 @@ mod foxglove;
 #[cfg(feature = "log")]
 mod framing;
 #[cfg(feature = "log")]
+mod info;
+#[cfg(feature = "log")]
+mod message;
+#[cfg(feature = "log")]
 mod proto;
 #[cfg(feature = "log")]
 mod reader;
 #[cfg(feature = "log")]
+mod recover;
+#[cfg(feature = "log")]
+mod salvage;
+#[cfg(feature = "log")]
 mod scene_update;
 #[cfg(feature = "log")]
 mod schema;
+#[cfg(feature = "log")]
+mod summary;
 #[cfg(feature = "log")]
 pub(crate) mod topic;
 #[cfg(feature = "log")]
@@ -67,6 +81,16 @@ pub use stats::{EventSum, GroupStats, StatsCounter};
 pub use window::Window;
 
 #[cfg(feature = "log")]
+pub use backlog::{Backlog, BacklogProgress};
+#[cfg(feature = "log")]
+pub use check::{CheckReport, check};
+#[cfg(feature = "log")]
+pub use info::{AttachmentInfo, ChunkInfo, LogInfo, TopicInfo};
+#[cfg(feature = "log")]
 pub use reader::LogReader;
+#[cfg(feature = "log")]
+pub use recover::{Lost, Recovered, recover};
+#[cfg(feature = "log")]
+pub use salvage::Damage;
 #[cfg(feature = "log")]
 pub use writer::McapWriter;

@@ -21,7 +21,7 @@ use crate::error::{Error, ErrorKind};
 const OLDEST_SCHEMA: u32 = 2;
 const READ_BUFFER_BYTES: usize = 1 << 18;
 /// Channel id, sequence number, log time and publish time in front of every message.
-const MESSAGE_HEADER_BYTES: usize = 22;
+pub(super) const MESSAGE_HEADER_BYTES: usize = 22;
 
 /// The entries of a log, as an iterator.
 ///
@@ -64,12 +64,7 @@ impl<R: Read> LogReader<R> {
     /// # Errors
     /// [`ErrorKind::Io`] if it cannot be read, [`ErrorKind::Log`] if it is no MCAP file.
     pub fn new(source: R, place: &str) -> Result<Self, Error> {
-        let records = RecordStream::new(source).map_err(|e| match e.kind() {
-            io::ErrorKind::InvalidData => {
-                Error::new(ErrorKind::Log, "no MCAP file: it does not begin with the MCAP magic").at(place)
-            }
-            _ => Error::io(Path::new(place), e),
-        })?;
+        let records = RecordStream::new(source).map_err(|e| cannot_open(place, e))?;
         Ok(Self {
             records,
             place: place.to_owned(),
@@ -161,7 +156,7 @@ impl<R: Read> LogReader<R> {
     /// Takes in a channel; if it is one of another program's with tick timing, says which groups there are now.
     fn declare(&mut self, channel: mcap::records::Channel) -> Option<LogEntry> {
         let schema = self.schemas.get(&channel.schema_id).map(|(name, data)| (name.as_str(), data.as_slice()));
-        let kind = schema.filter(|(name, data)| is_palpates(name, data)).and_then(|(name, _)| Kind::from_schema(name));
+        let kind = schema.and_then(|(name, data)| kind_of(name, data));
         let mut foreign = None;
         let mut known = None;
         if let Some(environment) = self.foreign.as_mut() {
@@ -239,15 +234,27 @@ fn foreign_environment() -> Environment {
     }
 }
 
-/// True for messages that palpate has written. Those with well-known names may be another program's: they lack palpate's
-/// own fields, and so does their descriptor.
-fn is_palpates(name: &str, descriptor: &[u8]) -> bool {
+/// What messages with this schema carry, if palpate has written them. Those with well-known names may be another
+/// program's: they lack palpate's own fields, and so does their descriptor.
+pub(super) fn kind_of(schema: &str, descriptor: &[u8]) -> Option<Kind> {
     const OWN_FIELD: &[u8] = b"time_ns";
-    !name.starts_with("foxglove.") || descriptor.windows(OWN_FIELD.len()).any(|window| window == OWN_FIELD)
+    let is_ours =
+        !schema.starts_with("foxglove.") || descriptor.windows(OWN_FIELD.len()).any(|window| window == OWN_FIELD);
+    Kind::from_schema(schema).filter(|_| is_ours)
 }
 
-/// `None` for what is there to be seen only.
-fn decode_data(kind: Kind, data: &[u8]) -> Result<Option<LogEntry>, prost::DecodeError> {
+/// Why a file cannot be read as a log.
+pub(super) fn cannot_open(place: &str, error: io::Error) -> Error {
+    match error.kind() {
+        io::ErrorKind::InvalidData => {
+            Error::new(ErrorKind::Log, "no MCAP file: it does not begin with the MCAP magic").at(place)
+        }
+        _ => Error::io(Path::new(place), error),
+    }
+}
+
+/// The entry in a message of this kind; `None` for what is there to be seen only.
+pub(super) fn decode_data(kind: Kind, data: &[u8]) -> Result<Option<LogEntry>, prost::DecodeError> {
     fn parse<M: prost::Message + Default>(data: &[u8]) -> Result<M, prost::DecodeError> {
         M::decode(data)
     }

@@ -265,7 +265,7 @@ impl RuntimeBuilder {
 const SUPERVISOR_EVENTS: usize = 64;
 
 impl RuntimeBuilder {
-    /// An observer ends after all others: what fails in it ends the run, and there is nothing it could go on with.
+    /// An observer ends after all others: what fails in it is told when it ends, and there is nothing it could go on with.
     fn check_restartable(&self) -> Result<(), Error> {
         let wrong = |(group, cast): &&(RateGroup, Cast)| group.observer && matches!(cast, Cast::Restartable(..));
         self.groups.iter().find(wrong).map_or(Ok(()), |(group, _)| {

@@ -87,6 +87,11 @@ impl GroupThread {
             match group.after_fault(now(), self.restartable, control.stop_requested()) {
                 AfterFault::Restart => return Some(fault),
                 AfterFault::GoOn => post_fault(post, control, fault),
+                AfterFault::End if observer => {
+                    // It costs what it would have observed and nothing else.
+                    post.try_send(Message::Fault(fault));
+                    return None;
+                }
                 AfterFault::End => {
                     post_fault(post, control, fault);
                     return None;

@@ -130,7 +130,7 @@ pub use port_use::{PortUse, PortUseKind};
 pub use queue_port::{QueueReader, QueueWriter};
 pub use rate_group::{OverrunPolicy, RateGroup, Release, Wait};
 pub use record::{ActorTimes, Channel, Event, Record, SlipCause, TickTiming};
-pub use recorder::{RecordDrain, Recorder};
+pub use recorder::{RecordDrain, RecordGap, Recorder};
 pub use recording::Recording;
 pub use report::{GroupCost, GroupReport, RuntimeFault, RuntimeReport};
 pub use restart::Restart;

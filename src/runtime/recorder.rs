@@ -3,6 +3,7 @@
 use super::record::Record;
 use super::ring::{Consumer, Producer, Sums, ring};
 use super::sync::{AtomicBool, Ordering};
+use crate::time::Nanos;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// All rings of a graph. The lock is taken when a ring is added and by the logger, never by a real-time tick.
@@ -15,10 +16,61 @@ pub(crate) struct Registry {
 
 #[derive(Debug, Default)]
 struct Rings {
-    all: Vec<Consumer<Record>>,
+    all: Vec<Source>,
     /// What was left in rings that were replaced, and how many records those had lost.
     kept: Vec<Record>,
     lost: u64,
+    /// Not told yet.
+    gap: Option<RecordGap>,
+}
+
+/// A ring and what was learnt of it in the drains so far.
+#[derive(Debug)]
+struct Source {
+    ring: Consumer<Record>,
+    /// Lost records that are part of a gap.
+    told: u64,
+    /// The stamp of the last record taken.
+    newest: Nanos,
+}
+
+impl Source {
+    fn new(ring: Consumer<Record>) -> Self {
+        Self { ring, told: 0, newest: Nanos::ZERO }
+    }
+
+    /// Takes what there is, and says what was lost.
+    fn drain(&mut self, records: &mut Vec<Record>) -> Option<RecordGap> {
+        // No more than is there now: a fast producer cannot keep the logger here, and what follows a gap is left.
+        let count = self.ring.available();
+        let is_full = count == self.ring.capacity();
+        let before = self.newest;
+        records.extend(std::iter::from_fn(|| self.ring.pop()).take(count));
+        if let Some(last) = records.last().filter(|_| count > 0) {
+            self.newest = last.stamp;
+        }
+        let lost = self.ring.lost();
+        let gap = RecordGap { records: lost - self.told, from: if is_full { self.newest } else { before } };
+        self.told = lost;
+        (gap.records > 0).then_some(gap)
+    }
+}
+
+/// Records lost because a ring was full when they were pushed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RecordGap {
+    /// How many.
+    pub records: u64,
+    /// The stamp of the last record before them; they end at the drain that told of them at the latest.
+    pub from: Nanos,
+}
+
+impl Rings {
+    fn note(&mut self, gap: Option<RecordGap>) {
+        let Some(gap) = gap else { return };
+        let known = self.gap.get_or_insert(RecordGap { records: 0, from: gap.from });
+        *known = RecordGap { records: known.records + gap.records, from: known.from.min(gap.from) };
+    }
 }
 
 /// A ring in the place of another.
@@ -48,15 +100,17 @@ impl Registry {
         let index = old.unwrap_or(rings.all.len());
         let mut before = 0;
         if old.is_some() {
-            let mut replaced = std::mem::replace(&mut rings.all[index], consumer);
+            let mut replaced = std::mem::replace(&mut rings.all[index], Source::new(consumer));
             // At one moment: the recorder may be at work on a thread that was left behind.
-            let Sums { pushed, lost, left } = replaced.sums();
+            let Sums { pushed, lost, left } = replaced.ring.sums();
             let wanted = self.wanted();
-            rings.kept.extend(std::iter::from_fn(|| replaced.pop()).take(if wanted { left } else { 0 }));
+            rings.kept.extend(std::iter::from_fn(|| replaced.ring.pop()).take(if wanted { left } else { 0 }));
+            let untold = lost - replaced.told;
+            rings.note((wanted && untold > 0).then_some(RecordGap { records: untold, from: replaced.newest }));
             rings.lost += lost;
             before = pushed + lost;
         } else {
-            rings.all.push(consumer);
+            rings.all.push(Source::new(consumer));
         }
         NewRing { recorder: Recorder(producer), index, before }
     }
@@ -77,7 +131,7 @@ impl Registry {
             return 0;
         }
         let rings = self.rings();
-        rings.lost + rings.all.iter().map(Consumer::lost).sum::<u64>()
+        rings.lost + rings.all.iter().map(|source| source.ring.lost()).sum::<u64>()
     }
 
     fn rings(&self) -> MutexGuard<'_, Rings> {
@@ -113,12 +167,11 @@ impl RecordDrain {
     /// Takes a lock and allocates: for loggers.
     pub fn drain(&mut self, records: &mut Vec<Record>) {
         let first = records.len();
-        let mut rings = self.0.rings();
+        let rings = &mut *self.0.rings();
         records.append(&mut rings.kept);
-        for ring in &mut rings.all {
-            // At most one ring full, so that a fast producer cannot keep the logger here.
-            let capacity = ring.capacity();
-            records.extend(std::iter::from_fn(|| ring.pop()).take(capacity));
+        for index in 0..rings.all.len() {
+            let gap = rings.all[index].drain(records);
+            rings.note(gap);
         }
         records[first..].sort_by_key(|record| record.stamp);
     }
@@ -130,13 +183,20 @@ impl RecordDrain {
     pub fn lost(&self) -> u64 {
         self.0.lost()
     }
+
+    /// What was found lost in the drains since the last call, all recorders together.
+    ///
+    /// # Real-time
+    /// Takes a lock: for loggers.
+    pub fn take_gap(&mut self) -> Option<RecordGap> {
+        self.0.rings().gap.take()
+    }
 }
 
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
     use crate::runtime::record::Event;
-    use crate::time::Nanos;
 
     fn event(stamp: u64, code: u32) -> Event {
         Event { stamp: Nanos(stamp), group: 0, code, detail: 0 }
@@ -159,6 +219,23 @@ mod tests {
         let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|e| e.code).collect();
         assert_eq!(codes, [10, 20, 11, 12, 21]);
         assert_eq!(drain.lost(), 1);
+    }
+
+    // Check that a gap is told once, from the last record before it, and that what follows it is not taken for what came
+    // before.
+    #[test]
+    fn a_gap_begins_with_the_last_record_before_it() {
+        let registry = Registry::new();
+        let mut drain = registry.drain();
+        let (mut a, mut b) = (registry.recorder(2), registry.recorder(4));
+        (1..=4).for_each(|stamp| a.push(event(stamp, 0)));
+        (1..=3).for_each(|stamp| b.push(event(stamp, 0)));
+        let mut records = Vec::new();
+        drain.drain(&mut records);
+        assert_eq!(drain.take_gap(), Some(RecordGap { records: 2, from: Nanos(2) }));
+        a.push(event(5, 0));
+        drain.drain(&mut records);
+        assert_eq!((drain.take_gap(), drain.lost(), records.len()), (None, 2, 6));
     }
 
     #[test]

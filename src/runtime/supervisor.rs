@@ -104,7 +104,7 @@ impl StopHandle {
 /// What group threads tell the supervisor.
 #[derive(Debug)]
 pub(crate) enum Message {
-    /// Something fatal happened; a stop is already requested.
+    /// Something fatal happened; a stop is already requested, unless it was in an observer.
     Fault(RuntimeFault),
     /// The group with this number has ended, its actors are gone.
     Ended(usize, Box<GroupReport>),

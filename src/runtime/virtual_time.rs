@@ -169,10 +169,12 @@ impl VirtualRun {
                 self.note(Err(fault));
             }
             AfterFault::End => {
-                let observer = group.spec.observer;
-                self.note(Err(fault));
-                // An observer ends after the others, however it fares.
-                if !observer {
+                if group.spec.observer {
+                    // It costs what it would have observed and nothing else; it ends after the others, however it fares.
+                    self.paces[index].take();
+                    self.supervisor.note(Message::Fault(fault));
+                } else {
+                    self.note(Err(fault));
                     self.end(index);
                 }
             }

@@ -2,7 +2,9 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::actors::LogSink;
+#[cfg(feature = "log")]
+use crate::actors::LogFile;
+use crate::actors::{LogSink, Loss};
 use crate::error::Error;
 use crate::log::{Environment, GroupStats, LogRecord, SceneFrame, TextEvent};
 use crate::time::Nanos;
@@ -21,14 +23,11 @@ impl Memory {
     }
 }
 
-#[cfg(feature = "log")]
-type FileWriter = crate::log::McapWriter<std::io::BufWriter<std::fs::File>>;
-
 /// All sinks that a session asked for, one after the other.
 pub(super) struct Sinks {
     memory: Option<Memory>,
     #[cfg(feature = "log")]
-    file: Option<FileWriter>,
+    file: Option<LogFile>,
 }
 
 impl Sinks {
@@ -44,18 +43,14 @@ impl Sinks {
     /// Also writes a file.
     #[cfg(feature = "log")]
     pub(super) fn with_file(mut self, path: &std::path::Path, environment: &Environment) -> Result<Self, Error> {
-        self.file = Some(crate::log::McapWriter::create(path, environment)?);
+        self.file = Some(LogFile::create(path, environment)?);
         Ok(self)
     }
 
-    /// Writes to the file, if there is one. A file that failed is given up with what it has; memory goes on.
+    /// Writes to the file, if there is one. A file that failed counts what it loses; memory goes on.
     #[cfg(feature = "log")]
-    fn on_file(&mut self, write: impl FnOnce(&mut FileWriter) -> Result<(), Error>) -> Result<(), Error> {
-        let result = self.file.as_mut().map_or(Ok(()), write);
-        if result.is_err() {
-            self.file = None;
-        }
-        result
+    fn on_file(&mut self, write: impl FnOnce(&mut LogFile) -> Result<(), Error>) -> Result<(), Error> {
+        self.file.as_mut().map_or(Ok(()), write)
     }
 }
 
@@ -65,28 +60,28 @@ impl LogSink for Sinks {
             memory.push(*record);
         }
         #[cfg(feature = "log")]
-        self.on_file(|file| file.write(record))?;
+        self.on_file(|file| file.record(record))?;
         Ok(())
     }
 
     #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn text(&mut self, event: &TextEvent) -> Result<(), Error> {
         #[cfg(feature = "log")]
-        self.on_file(|file| file.write_text(event))?;
+        self.on_file(|file| file.text(event))?;
         Ok(())
     }
 
     #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
         #[cfg(feature = "log")]
-        self.on_file(|file| file.write_stats(stats))?;
+        self.on_file(|file| file.stats(stats))?;
         Ok(())
     }
 
     #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn scene(&mut self, frame: &SceneFrame) -> Result<(), Error> {
         #[cfg(feature = "log")]
-        self.on_file(|file| file.write_scene(frame))?;
+        self.on_file(|file| file.scene(frame))?;
         Ok(())
     }
 
@@ -94,22 +89,27 @@ impl LogSink for Sinks {
     fn environment(&mut self, environment: &Environment) {
         #[cfg(feature = "log")]
         if let Some(file) = &mut self.file {
-            file.set_environment(environment);
+            file.environment(environment);
         }
     }
 
     #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error> {
         #[cfg(feature = "log")]
-        self.on_file(|file| file.flush_if_due(log_time, now))?;
+        self.on_file(|file| file.flush(log_time, now))?;
         Ok(())
     }
 
     fn finish(&mut self) -> Result<(), Error> {
         #[cfg(feature = "log")]
-        if let Some(file) = self.file.take() {
-            file.finish()?;
-        }
+        self.on_file(LogFile::finish)?;
         Ok(())
+    }
+
+    fn take_loss(&mut self) -> Option<Loss> {
+        #[cfg(feature = "log")]
+        return self.file.as_mut().and_then(LogFile::take_loss);
+        #[cfg(not(feature = "log"))]
+        None
     }
 }

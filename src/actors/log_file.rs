@@ -1,0 +1,231 @@
+//! The log as a file: written by a thread of its own, within bounds of memory and of waiting.
+//!
+//! In real time nobody waits for the disk: while more than [`MOST_WAITING`] bytes wait for it, records are dropped and
+//! counted. In simulated time the run waits. In both a disk that takes nothing any more is given up.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use super::log_sink::{LogSink, Loss};
+use crate::error::Error;
+use crate::log::{
+    Backlog, BacklogProgress, Environment, Execution, GroupStats, LogRecord, McapWriter, SceneFrame, TextEvent,
+};
+use crate::time::Nanos;
+
+/// What may wait for a slow disk before records are dropped [bytes]: some ten seconds of a usual log.
+pub const MOST_WAITING: u64 = 2 << 20;
+/// How long the end of a run in real time waits for the disk. Less than the runtime waits for the logger.
+pub const LAST_WAIT: Duration = Duration::from_secs(3);
+/// In simulated time: how long a disk may take nothing.
+const STALLED: Duration = Duration::from_secs(10);
+
+/// A log file as a sink.
+///
+/// # Real-time
+/// For the logger alone. In real time no call blocks but [`finish`](LogSink::finish), for at most [`LAST_WAIT`].
+#[derive(Debug)]
+pub struct LogFile {
+    /// Gone after an error.
+    writer: Option<McapWriter<Backlog>>,
+    disk: BacklogProgress,
+    place: String,
+    waits: bool,
+    /// What each block that waits for the disk ends with.
+    marks: VecDeque<Mark>,
+    safe: Mark,
+    newest: Mark,
+    /// Records are dropped until the disk has caught up.
+    is_full: bool,
+    finished: bool,
+    gap: Option<Loss>,
+    closed_gap: Option<Loss>,
+}
+
+/// The end of a block: bytes and records up to there, and the time of the last one.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mark {
+    bytes: u64,
+    records: u64,
+    time: Nanos,
+}
+
+impl LogFile {
+    /// Creates or overwrites the log at `path`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if the file cannot be created.
+    ///
+    /// # Real-time
+    /// Not real-time safe: opens a file, starts a thread, allocates. Before a run.
+    pub fn create(path: &Path, environment: &Environment) -> Result<Self, Error> {
+        let file = File::create(path).map_err(|e| Error::io(path, e))?;
+        Self::new(file, &path.display().to_string(), environment)
+    }
+
+    /// Begins a log in `output`, which a thread of its own writes; `place` names it in errors.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if there is no thread for it.
+    ///
+    /// # Real-time
+    /// Not real-time safe: starts a thread, allocates. Before a run.
+    pub fn new(output: impl Write + Send + 'static, place: &str, environment: &Environment) -> Result<Self, Error> {
+        let backlog = Backlog::new(output).map_err(|e| Error::io(Path::new(place), e))?;
+        let disk = backlog.progress();
+        Ok(Self {
+            writer: Some(McapWriter::new(backlog, place, environment)?),
+            disk,
+            place: place.to_owned(),
+            waits: environment.execution == Execution::Virtual,
+            marks: VecDeque::new(),
+            safe: Mark::default(),
+            newest: Mark::default(),
+            is_full: false,
+            finished: false,
+            gap: None,
+            closed_gap: None,
+        })
+    }
+
+    /// Gives one message to the writer, or drops it.
+    fn give(
+        &mut self,
+        time: Nanos,
+        write: impl FnOnce(&mut McapWriter<Backlog>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let room = if self.writer.is_some() { self.has_room() } else { Ok(false) };
+        let Some(writer) = self.writer.as_mut().filter(|_| matches!(room, Ok(true))) else {
+            self.lose(1, time, time);
+            return room.map(drop);
+        };
+        let result = write(writer);
+        self.newest = Mark { records: self.newest.records + 1, time: self.newest.time.max(time), ..self.newest };
+        match result {
+            Ok(()) => self.mark(),
+            Err(error) => return Err(self.give_up(error)),
+        }
+        Ok(())
+    }
+
+    /// True unless records are to be dropped.
+    fn has_room(&mut self) -> Result<bool, Error> {
+        let waiting = self.disk.waiting();
+        if self.waits {
+            // One block at a time: nothing is lost here, however slow the disk is.
+            if waiting > MOST_WAITING && !self.disk.wait_for(MOST_WAITING / 2, STALLED, Duration::MAX) {
+                return Err(self.stalled(STALLED));
+            }
+            return Ok(true);
+        }
+        self.is_full = waiting > if self.is_full { MOST_WAITING / 2 } else { MOST_WAITING };
+        if !self.is_full {
+            self.closed_gap = self.gap.take().or(self.closed_gap.take());
+        }
+        Ok(!self.is_full)
+    }
+
+    /// Notes which records the bytes given so far hold, and which of them are safe.
+    fn mark(&mut self) {
+        let given = self.disk.given();
+        if given != self.newest.bytes {
+            self.newest.bytes = given;
+            self.marks.push_back(self.newest);
+        }
+        let written = self.disk.written();
+        while let Some(mark) = self.marks.pop_front_if(|mark| mark.bytes <= written) {
+            self.safe = mark;
+        }
+    }
+
+    /// Counts `records` as lost.
+    fn lose(&mut self, records: u64, from: Nanos, to: Nanos) {
+        if records > 0 && !self.finished {
+            let why = match self.writer {
+                Some(_) => "the disk does not keep up",
+                None => "the log was given up",
+            };
+            let gap = self.gap.get_or_insert(Loss { records: 0, from, to, why });
+            *gap = Loss { records: gap.records + records, from: gap.from.min(from), to: gap.to.max(to), why };
+        }
+    }
+
+    /// What the disk has not taken is lost, and so is all that follows.
+    fn give_up(&mut self, error: Error) -> Error {
+        self.writer = None;
+        self.mark();
+        let lost = self.newest.records - self.safe.records;
+        self.lose(lost, self.safe.time, self.newest.time);
+        self.safe = self.newest;
+        self.marks.clear();
+        error
+    }
+
+    fn stalled(&mut self, waited: Duration) -> Error {
+        let kib = self.disk.waiting() >> 10;
+        let message = format!("the disk did not take the last {kib} KiB of the log within {waited:?}");
+        self.give_up(Error::io(Path::new(&self.place), io::Error::other(message)))
+    }
+
+    fn close(&mut self, writer: McapWriter<Backlog>) -> Result<(), Error> {
+        // Dropped here: the thread ends when all is written.
+        writer.finish().map(drop)?;
+        let (stalled, total) = if self.waits { (STALLED, Duration::MAX) } else { (LAST_WAIT, LAST_WAIT) };
+        if !self.disk.wait_for_end(stalled, total) {
+            return Err(self.stalled(stalled));
+        }
+        self.disk.take_error().map_or(Ok(()), |error| Err(Error::io(Path::new(&self.place), error)))
+    }
+}
+
+impl LogSink for LogFile {
+    fn record(&mut self, record: &LogRecord) -> Result<(), Error> {
+        self.give(record.time(), |writer| writer.write(record))
+    }
+
+    fn text(&mut self, event: &TextEvent) -> Result<(), Error> {
+        self.give(event.time, |writer| writer.write_text(event))
+    }
+
+    fn scene(&mut self, frame: &SceneFrame) -> Result<(), Error> {
+        self.give(frame.time, |writer| writer.write_scene(frame))
+    }
+
+    fn stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
+        self.give(stats.time, |writer| writer.write_stats(stats))
+    }
+
+    fn environment(&mut self, environment: &Environment) {
+        if let Some(writer) = &mut self.writer {
+            writer.set_environment(environment);
+        }
+    }
+
+    fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error> {
+        let Some(writer) = &mut self.writer else { return Ok(()) };
+        let result = writer.flush_if_due(log_time, now);
+        let late = self.disk.take_error().map(|error| Error::io(Path::new(&self.place), error));
+        match result.err().or(late) {
+            None => self.mark(),
+            Some(error) => return Err(self.give_up(error)),
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), Error> {
+        let result = match self.writer.take() {
+            Some(writer) => self.close(writer).map_err(|error| self.give_up(error)),
+            None => Ok(()),
+        };
+        self.finished = true;
+        result
+    }
+
+    fn take_loss(&mut self) -> Option<Loss> {
+        // A gap is told when it is over, or when nothing more will come.
+        self.closed_gap.take().or_else(|| self.gap.take_if(|_| self.finished))
+    }
+}
