@@ -47,6 +47,16 @@ foxglove two_devices /left/tool /right/tool /scene
 echo -n "layouts: "
 "$venv/bin/python" ci/check_layouts.py "$folder/real_time_scene.mcap" examples/layouts/*
 
+# Percentiles equal those that are computed from all samples anew; another program's timing is read as well.
+for name in virtual real_time; do
+    echo -n "percentiles, $name: "
+    "$venv/bin/python" ci/check_timing.py exact "$folder/$name.mcap" "$folder/$name.json"
+done
+"$venv/bin/python" ci/check_timing.py write "$folder/robot.mcap"
+"$palpate" timing "$folder/robot.mcap" --json >"$folder/robot.json"
+echo -n "percentiles, another program's log: "
+"$venv/bin/python" ci/check_timing.py foreign "$folder/robot.mcap" "$folder/robot.json"
+
 # Parquet is not among the default features; the parts that others build are not built again.
 cargo build --locked --profile test --features haply,parquet --bin palpate
 export_of() {

@@ -211,6 +211,20 @@ fn a_check_names_what_a_sound_file_lacks() {
     assert!(report.is_checksummed);
 }
 
+// An index that does not fit its checksum names no channels: a wrong topic in it would be given to good messages.
+#[test]
+fn what_a_damaged_index_says_is_not_believed() {
+    let clean = log_of(&entries(60), 120);
+    let mut bytes = clean.clone();
+    bytes[chunks(&clean)[0].0 + 200] ^= 1;
+    let in_index = clean.windows(6).rposition(|window| window == b"/probe").unwrap();
+    assert!(in_index > chunks(&clean).last().unwrap().0, "the index repeats every channel");
+    bytes[in_index] ^= 1;
+    let (_, new) = recovered(&bytes);
+    let known = raw(&clean);
+    assert!(raw(&new).iter().all(|message| known.contains(message)));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 

@@ -216,7 +216,13 @@ fn a_group_that_is_quiet_delays_no_chunk() {
         running.wait_for(std::time::Duration::from_millis(130));
         let now = running.elapsed();
         let oldest = now.saturating_sub(Nanos(500_000_000 + 100_000_000 + 50_000_000));
-        assert!(reached(&log) >= oldest, "{} in the file at {now}", reached(&log));
+        // The file has a thread of its own, and the clock of the run stands still here: what is due comes.
+        let mut looks = 0;
+        while reached(&log) < oldest {
+            looks += 1;
+            assert!(looks < 500, "{} in the file at {now}", reached(&log));
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
     }
     running.stop();
 }

@@ -202,11 +202,17 @@ impl ActorTimes {
     pub const MAX: usize = 12;
 
     /// The times of the actors there are.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn spent(&self) -> &[Nanos] {
         &self.spent[..usize::from(self.actors).min(Self::MAX)]
     }
 
     /// Reads the times back; `None` if the record is about something else.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn from_record(record: &Record) -> Option<Self> {
         let spent = |i: usize| Nanos(record.words[i / 2] >> (32 * (i % 2)) & u64::from(u32::MAX));
         (record.channel == Channel::ACTORS).then(|| Self {
