@@ -5,10 +5,10 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use palpate::log::timing::{Against, Condition, Selection, TimingAnalysis, TimingReport, read_cyclictest};
-use palpate::report::{against_to_json, against_to_text, figure_to_text, timing_to_json, timing_to_text};
+use palpate::report::{against_to_json, against_to_text, figure_to_text, timing_html, timing_to_json, timing_to_text};
 use palpate::{Error, ErrorKind};
 
-use super::output::{print, warn_of_damage};
+use super::output::{print, refuse_to_overwrite, warn_of_damage};
 use super::progress::ReadBar;
 use super::window::WindowArgs;
 
@@ -20,6 +20,9 @@ pub struct TimingArgs {
     /// Print one JSON document instead of the report
     #[arg(long)]
     pub json: bool,
+    /// Write a page with charts and a timeline around the worst ticks to this file
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Hold the log against this one: figures side by side, ratios and how sure they are
     #[arg(long, value_name = "OTHER")]
     pub against: Option<PathBuf>,
@@ -39,7 +42,17 @@ pub struct TimingArgs {
 /// [`ErrorKind::Io`] if a log cannot be read, [`ErrorKind::Log`] if it is none, [`ErrorKind::Usage`] if it has no such group
 /// or figure, [`ErrorKind::Condition`] if a condition holds.
 pub fn run(args: &TimingArgs) -> Result<(), Error> {
+    if let Some(html) = &args.html {
+        [Some(&args.log), args.against.as_ref()]
+            .into_iter()
+            .flatten()
+            .try_for_each(|log| refuse_to_overwrite(log, html))?;
+    }
     let report = read(&args.log, args)?;
+    if let Some(html) = &args.html {
+        let name = args.log.file_name().unwrap_or_default().to_string_lossy();
+        std::fs::write(html, timing_html(&report, &name)).map_err(|error| Error::io(html, error))?;
+    }
     match &args.against {
         Some(other_log) => {
             let other = read(other_log, args)?;

@@ -4,6 +4,7 @@ pub mod compare;
 mod html;
 mod picture;
 mod svg;
+mod timing;
 mod units;
 mod verdict;
 
@@ -19,4 +20,5 @@ pub use export::{Figure, Format, export, export_percentiles, export_table, expor
 pub use json::{against_to_json, timing_to_json, to_json};
 pub use picture::{COLOURS, Picture, Series};
 pub use text::{against_to_text, figure_to_text, timing_to_text, to_text};
+pub use timing::timing_html;
 pub use verdict::{Verdict, verdict};

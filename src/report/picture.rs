@@ -94,6 +94,8 @@ impl Picture {
             marks: marks(&self.marks),
             levels: marks(&self.levels),
             lines: lines.collect(),
+            bars: Vec::new(),
+            signs: Vec::new(),
             points: discs.filter(|point| point.at.0.is_finite() && point.at.1.is_finite()).collect(),
         };
         chart.to_file(STYLE)

@@ -8,7 +8,7 @@ use crate::time::Nanos;
 
 /// How far back it remembers. A slow group's release begins long before it ends, and a moment is looked at later still.
 const SPAN: Nanos = Nanos(1_000_000_000);
-/// A command is in the log close behind its force.
+/// A command is in the log close to its force, before it or behind it.
 const CLOSE: usize = 64;
 
 /// The force of one haptic tick.
@@ -47,6 +47,8 @@ pub(super) struct Recent {
     ticks: VecDeque<TickTiming>,
     actors: VecDeque<ActorTimes>,
     forces: VecDeque<ForcePoint>,
+    /// The last ones whose force has not come yet.
+    commands: VecDeque<CommandSample>,
 }
 
 impl Recent {
@@ -64,7 +66,10 @@ impl Recent {
     pub(super) fn push_force(&mut self, sample: &ForceSample) {
         forget(&mut self.forces, |old| old.time + SPAN < sample.time);
         let &ForceSample { time, device, force_n, model_age_s, .. } = sample;
-        self.forces.push_back(ForcePoint { time, device, force_n, commanded_n: None, model_age_s });
+        let same = |command: &CommandSample| (command.time, command.device) == (time, device);
+        let place = self.commands.iter().position(same);
+        let commanded_n = place.and_then(|place| self.commands.remove(place)).map(|command| command.force_n);
+        self.forces.push_back(ForcePoint { time, device, force_n, commanded_n, model_age_s });
     }
 
     pub(super) fn push_command(&mut self, sample: &CommandSample) {
@@ -72,6 +77,11 @@ impl Recent {
         let same = |point: &&mut ForcePoint| (point.time, point.device) == (sample.time, sample.device);
         if let Some(point) = latest.into_iter().find(same) {
             point.commanded_n = Some(sample.force_n);
+        } else {
+            if self.commands.len() >= CLOSE {
+                self.commands.pop_front();
+            }
+            self.commands.push_back(*sample);
         }
     }
 
@@ -96,5 +106,26 @@ pub(super) fn is_of(times: &ActorTimes, tick: &TickTiming) -> bool {
 fn forget<T>(queue: &mut VecDeque<T>, too_old: impl Fn(&T) -> bool) {
     while queue.front().is_some_and(&too_old) {
         queue.pop_front();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_force_finds_its_command_on_either_side() {
+        let mut recent = Recent::default();
+        let force = |ms: u64| ForceSample { time: Nanos(ms), ..ForceSample::default() };
+        let command =
+            |ms: u64| CommandSample { time: Nanos(ms), force_n: [ms as f64, 0.0, 0.0], ..CommandSample::default() };
+        recent.push_command(&command(1));
+        recent.push_force(&force(1));
+        recent.push_force(&force(2));
+        recent.push_command(&command(2));
+        recent.push_force(&force(3));
+        let commanded: Vec<_> =
+            recent.between(Nanos(0), Nanos(9)).forces.iter().map(|point| point.commanded_n).collect();
+        assert_eq!(commanded, [Some([1.0, 0.0, 0.0]), Some([2.0, 0.0, 0.0]), None]);
     }
 }

@@ -125,6 +125,8 @@ impl<'a> Plots<'a> {
             levels: Vec::new(),
             lines: lines.clone(),
             points: Vec::new(),
+            bars: Vec::new(),
+            signs: Vec::new(),
         };
         let mut whole = chart(format!("Force, {}", in_words(latency)), self.whole(), y_whole);
         whole.band = Some(zoom);
@@ -157,6 +159,8 @@ impl<'a> Plots<'a> {
             levels: Vec::new(),
             lines,
             points: Vec::new(),
+            bars: Vec::new(),
+            signs: Vec::new(),
         }
         .to_svg()
     }
@@ -196,6 +200,8 @@ impl<'a> Plots<'a> {
             marks: vec![Mark { at: period_us, label: "haptic period".to_owned() }],
             levels: Vec::new(),
             lines: Vec::new(),
+            bars: Vec::new(),
+            signs: Vec::new(),
             points: [point("full", Nanos::ZERO, &self.comparison.full)].into_iter().chain(runs).collect(),
         }
         .to_svg()

@@ -6,6 +6,8 @@ pub(in crate::report) struct Axis {
     pub(super) label: String,
     pub(super) range: [f64; 2],
     is_log: bool,
+    /// How a value is written, if not as a plain number.
+    words: Option<fn(f64) -> String>,
 }
 
 /// A tick: where, and its label if it has one.
@@ -16,7 +18,7 @@ impl Axis {
     pub(in crate::report) fn linear(label: &str, range: [f64; 2]) -> Self {
         let [from, to] = range;
         let range = if to > from { range } else { [from, from + 1.0] };
-        Self { label: label.to_owned(), range, is_log: false }
+        Self { label: label.to_owned(), range, is_log: false, words: None }
     }
 
     /// From zero to a round value at or above `top`.
@@ -36,7 +38,12 @@ impl Axis {
     pub(in crate::report) fn log(label: &str, [from, to]: [f64; 2]) -> Self {
         let from = from.max(1e-12);
         let to = if to > from { to } else { 10.0 * from };
-        Self { label: label.to_owned(), range: [from, to], is_log: true }
+        Self { label: label.to_owned(), range: [from, to], is_log: true, words: None }
+    }
+
+    /// The same with values written by `words`, such as `10 us`.
+    pub(in crate::report) fn in_words(self, words: fn(f64) -> String) -> Self {
+        Self { words: Some(words), ..self }
     }
 
     /// Where a value is, from 0 to 1; below the range of a logarithmic axis at its end.
@@ -47,6 +54,12 @@ impl Axis {
     }
 
     pub(super) fn ticks(&self) -> Vec<Tick> {
+        let ticks = self.plain_ticks();
+        let Some(words) = self.words else { return ticks };
+        ticks.into_iter().map(|(value, label)| (value, label.map(|_| words(value)))).collect()
+    }
+
+    fn plain_ticks(&self) -> Vec<Tick> {
         let [from, to] = self.range;
         if !self.is_log {
             let step = round_step((to - from) / 5.0);

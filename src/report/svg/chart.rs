@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use super::super::html::escaped;
+use super::area::Area;
 use super::axis::Axis;
+use super::sign::Sign;
 use super::thin::thinned;
 
 /// Drawn size; the page scales it.
@@ -35,6 +37,26 @@ pub(in crate::report) struct Point {
     pub(in crate::report) is_hollow: bool,
 }
 
+/// Bars on the lower edge, drawn as one shape.
+#[derive(Clone, Debug)]
+pub(in crate::report) struct Bars<'a> {
+    pub(in crate::report) class: &'a str,
+    pub(in crate::report) name: &'a str,
+    /// From x to x, and how high.
+    pub(in crate::report) bars: Vec<(f64, f64, f64)>,
+}
+
+/// Marks of one kind along the upper edge.
+#[derive(Clone, Debug)]
+pub(in crate::report) struct Signs {
+    pub(in crate::report) class: String,
+    pub(in crate::report) name: String,
+    pub(in crate::report) sign: Sign,
+    /// Below the upper edge, in drawn units.
+    pub(in crate::report) row: f64,
+    pub(in crate::report) at: Vec<f64>,
+}
+
 /// A line across the plot.
 #[derive(Clone, Debug)]
 pub(in crate::report) struct Mark {
@@ -58,9 +80,29 @@ pub(in crate::report) struct Chart<'a> {
     pub(in crate::report) levels: Vec<Mark>,
     pub(in crate::report) lines: Vec<Line<'a>>,
     pub(in crate::report) points: Vec<Point>,
+    pub(in crate::report) bars: Vec<Bars<'a>>,
+    pub(in crate::report) signs: Vec<Signs>,
 }
 
 impl Chart<'_> {
+    /// An empty chart of this size.
+    pub(in crate::report) fn new(title: impl Into<String>, [width, height]: [f64; 2], x: Axis, y: Axis) -> Self {
+        Self {
+            title: title.into(),
+            width,
+            height,
+            x,
+            y,
+            band: None,
+            marks: Vec::new(),
+            levels: Vec::new(),
+            lines: Vec::new(),
+            points: Vec::new(),
+            bars: Vec::new(),
+            signs: Vec::new(),
+        }
+    }
+
     /// The chart as an SVG element of a page.
     pub(in crate::report) fn to_svg(&self) -> String {
         let (width, height) = (self.width, self.height);
@@ -121,7 +163,10 @@ impl Chart<'_> {
             let _ = writeln!(svg, "<path class=\"grid\" d=\"M{x:.1} {HEAD}v{down}\"/>");
             if let Some(label) = label {
                 let y = bottom + 14.0;
-                let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\">{label}</text>");
+                // A label at the very edge would leave the picture.
+                let half = 0.6 * LETTER * label.chars().count() as f64;
+                let (x, anchor) = if x + half > self.width { (self.width - 1.0, "end") } else { (x, "middle") };
+                let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{label}</text>");
             }
         }
         for (value, label) in self.y.ticks() {
@@ -133,24 +178,20 @@ impl Chart<'_> {
             }
         }
         for mark in &self.marks {
-            let x = LEFT + self.px(mark.at);
-            let _ = writeln!(svg, "<path class=\"mark\" d=\"M{x:.1} {HEAD}v{down}\"/>");
-            if !mark.label.is_empty() {
-                let (x, y, label) = (x - 4.0, HEAD + LINE, escaped(&mark.label));
-                let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"end\">{label}</text>");
-            }
+            let _ = writeln!(svg, "<path class=\"mark\" d=\"M{:.1} {HEAD}v{down}\"/>", LEFT + self.px(mark.at));
         }
         for level in &self.levels {
-            let (x, y, label) = (LEFT + 6.0, HEAD + self.py(level.at), escaped(&level.label));
-            let _ = writeln!(svg, "<path class=\"mark\" d=\"M{LEFT} {y:.1}h{across}\"/>");
-            let _ = writeln!(svg, "<text x=\"{x}\" y=\"{:.1}\">{label}</text>", y - 4.0);
+            let _ = writeln!(svg, "<path class=\"mark\" d=\"M{LEFT} {:.1}h{across}\"/>", HEAD + self.py(level.at));
         }
         // An inner svg cuts off what leaves the plot.
         let _ = writeln!(svg, "<svg x=\"{LEFT}\" y=\"{HEAD}\" width=\"{across}\" height=\"{down}\">");
+        self.bars.iter().for_each(|bars| self.draw_bars(svg, bars));
         self.lines.iter().for_each(|line| self.draw_line(svg, line));
+        self.signs.iter().for_each(|signs| self.draw_signs(svg, signs));
         svg.push_str("</svg>\n");
         let _ = writeln!(svg, "<rect class=\"frame\" x=\"{LEFT}\" y=\"{HEAD}\" width=\"{across}\" height=\"{down}\"/>");
         self.draw_points(svg);
+        self.name_marks(svg);
         let (x, y) = (LEFT + 0.5 * across, self.height - 6.0);
         let _ = writeln!(svg, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\">{}</text>", escaped(&self.x.label));
         let y_label = escaped(&self.y.label);
@@ -160,8 +201,46 @@ impl Chart<'_> {
         );
     }
 
+    /// The labels of marks and levels, above all that is drawn.
+    fn name_marks(&self, svg: &mut String) {
+        for mark in self.marks.iter().filter(|mark| !mark.label.is_empty()) {
+            let x = LEFT + self.px(mark.at);
+            let long = LETTER * mark.label.chars().count() as f64;
+            // On the side where there is room.
+            let (x, anchor) = if x - LEFT > long + 8.0 { (x - 4.0, "end") } else { (x + 4.0, "start") };
+            let (y, label) = (HEAD + LINE, escaped(&mark.label));
+            let _ =
+                writeln!(svg, "<text class=\"halo\" x=\"{x:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{label}</text>");
+        }
+        for level in &self.levels {
+            let (x, y, label) = (LEFT + 6.0, HEAD + self.py(level.at), escaped(&level.label));
+            let y = if y < HEAD + LINE + 4.0 { y + LINE } else { y - 4.0 };
+            let _ = writeln!(svg, "<text class=\"halo\" x=\"{x}\" y=\"{y:.1}\">{label}</text>");
+        }
+    }
+
+    fn draw_bars(&self, svg: &mut String, bars: &Bars<'_>) {
+        let bottom = self.down();
+        let _ = write!(svg, "<path class=\"bars {}\" d=\"", bars.class);
+        for &(from, to, top) in &bars.bars {
+            let (from, to, top) = (self.px(from), self.px(to), self.py(top).clamp(-9.0, bottom));
+            let _ = write!(svg, "M{from:.1} {bottom}V{top:.1}H{to:.1}V{bottom}z");
+        }
+        let _ = writeln!(svg, "\"><title>{}</title></path>", escaped(bars.name));
+    }
+
+    fn draw_signs(&self, svg: &mut String, signs: &Signs) {
+        let _ = write!(svg, "<path class=\"sign {}\" d=\"", signs.class);
+        for &x in &signs.at {
+            svg.push_str(&signs.sign.path(self.px(x), signs.row));
+        }
+        let _ = writeln!(svg, "\"><title>{}</title></path>", escaped(&signs.name));
+    }
+
     fn draw_line(&self, svg: &mut String, line: &Line<'_>) {
-        let points = thinned(line.points.iter().copied(), self.x.range, self.across() as usize);
+        // Where they are and not what they mean: columns are equally wide on a logarithmic axis too.
+        let placed = line.points.iter().map(|&(x, y)| (self.x.place(x), y));
+        let points = thinned(placed, [0.0, 1.0], self.across() as usize);
         if points.is_empty() {
             return;
         }
@@ -170,7 +249,7 @@ impl Chart<'_> {
             let step = if index == 0 { 'M' } else { 'L' };
             // Far outside is outside: a huge number would only take room.
             let y = self.py(y).clamp(-9.0, self.down() + 9.0);
-            let _ = write!(svg, "{step}{:.1} {y:.1}", self.px(x));
+            let _ = write!(svg, "{step}{:.1} {y:.1}", x * self.across());
         }
         let _ = writeln!(svg, "\"><title>{}</title></path>", escaped(line.name));
     }
@@ -202,28 +281,6 @@ impl Chart<'_> {
     }
 }
 
-/// A rectangle of the picture.
-struct Area {
-    left: f64,
-    right: f64,
-    top: f64,
-    bottom: f64,
-}
-
-impl Area {
-    fn around((x, y): (f64, f64), dx: f64, dy: f64) -> Self {
-        Self { left: x - dx, right: x + dx, top: y - dy, bottom: y + dy }
-    }
-
-    fn meets(&self, other: &Self) -> bool {
-        self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
-    }
-
-    fn holds(&self, other: &Self) -> bool {
-        self.left <= other.left && other.right <= self.right && self.top <= other.top && other.bottom <= self.bottom
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,7 +296,7 @@ mod tests {
             marks: vec![Mark { at: 0.5, label: "the period".to_owned() }],
             levels: vec![Mark { at: 1.0, label: "the level".to_owned() }],
             lines: vec![Line { class: "c1".to_owned(), name: "patch", points: vec![(0.0, 0.0), (1.0, 1e300)] }],
-            points: Vec::new(),
+            ..Chart::new("", [0.0; 2], Axis::linear("", [0.0; 2]), Axis::linear("", [0.0; 2]))
         }
     }
 

@@ -3,9 +3,12 @@
 //! Drawn by hand in place of a library: classes make one picture serve light, dark and print, and long series are thinned
 //! out to what a screen can show.
 
+mod area;
 mod axis;
 mod chart;
+mod sign;
 mod thin;
 
 pub(super) use axis::Axis;
-pub(super) use chart::{Chart, Line, Mark, Point};
+pub(super) use chart::{Bars, Chart, Line, Mark, Point, Signs};
+pub(super) use sign::Sign;

@@ -1,0 +1,105 @@
+//! Numbers with the name that the JSON report has for them: the page computes nothing of its own, and a program can check it.
+
+use std::collections::HashMap;
+
+use crate::log::timing::{TimingReport, Unit, Value};
+use crate::report::html::escaped;
+use crate::report::units::{duration, force, seconds};
+
+/// What stands for a figure that there is none of.
+const NONE: &str = "\u{2013}";
+/// Digits between the separators of thousands.
+const DIGITS: usize = 3;
+
+/// All figures of a report by name.
+pub(super) struct Numbers(HashMap<String, (Value, Unit)>);
+
+impl Numbers {
+    pub(super) fn of(report: &TimingReport) -> Self {
+        Self(report.figures().into_iter().map(|figure| (figure.name, (figure.value, figure.unit))).collect())
+    }
+
+    /// The figure as HTML, for people and, in attributes, for programs; a dash if there is no such figure.
+    pub(super) fn show(&self, name: &str) -> String {
+        let Some(&(value, unit)) = self.0.get(name) else { return NONE.to_owned() };
+        let (raw, words) = (raw(value), words(value, unit));
+        format!("<span data-figure=\"{}\" data-value=\"{raw}\">{words}</span>", escaped(name))
+    }
+
+    /// The value of a count; zero if there is no such figure.
+    pub(super) fn count(&self, name: &str) -> u64 {
+        match self.0.get(name) {
+            Some((Value::Integer(count), _)) => *count,
+            _ => 0,
+        }
+    }
+}
+
+/// As JSON has it; what is not finite is `null` there.
+fn raw(value: Value) -> String {
+    match value {
+        Value::Integer(value) => value.to_string(),
+        Value::Real(value) if value.is_finite() => value.to_string(),
+        Value::Real(_) => "null".to_owned(),
+    }
+}
+
+fn words(value: Value, unit: Unit) -> String {
+    let real = value.as_f64();
+    match (unit, value) {
+        (Unit::Count, Value::Integer(count)) => grouped(count),
+        (Unit::Nanoseconds, Value::Integer(ns)) => duration(ns),
+        (Unit::Count, _) => format!("{real}"),
+        (Unit::Nanoseconds, _) => duration(real as u64),
+        (Unit::Seconds, _) => seconds(real),
+        (Unit::Newtons, _) => force(real),
+        (Unit::Joules, _) => format!("{:.3} mJ", 1e3 * real),
+        (Unit::Share, _) => percent(real),
+    }
+}
+
+/// A share, 0 to 1.
+fn percent(share: f64) -> String {
+    match 100.0 * share {
+        percent if percent >= 10.0 => format!("{percent:.1} %"),
+        percent => format!("{percent:.2} %"),
+    }
+}
+
+/// A count with its thousands set apart by narrow spaces that do not break.
+pub(super) fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut out = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(DIGITS) {
+            out.push('\u{202f}');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_carries_its_name_and_its_raw_value() {
+        let numbers = Numbers([("a<b.p99".to_owned(), (Value::Integer(52_110), Unit::Nanoseconds))].into());
+        let shown = "<span data-figure=\"a&lt;b.p99\" data-value=\"52110\">52.1 us</span>";
+        assert_eq!((numbers.show("a<b.p99").as_str(), numbers.show("c").as_str()), (shown, NONE));
+        assert_eq!((numbers.count("a<b.p99"), numbers.count("c")), (52_110, 0));
+    }
+
+    #[test]
+    fn values_are_exact_for_programs_and_short_for_people() {
+        assert_eq!(raw(Value::Integer(u64::MAX)), "18446744073709551615");
+        assert_eq!(
+            (raw(Value::Real(0.1 + 0.2)), raw(Value::Real(f64::NAN))),
+            ("0.30000000000000004".into(), "null".into())
+        );
+        assert_eq!([7, 999, 1000, 3_600_000].map(grouped), ["7", "999", "1\u{202f}000", "3\u{202f}600\u{202f}000"]);
+        assert_eq!(words(Value::Real(0.5), Unit::Share), "50.0 %");
+        assert_eq!(words(Value::Real(0.0321), Unit::Seconds), "32.1 ms");
+    }
+}
