@@ -1,11 +1,22 @@
 //! The records inside one chunk, complete or cut.
 
+use std::io::Read;
+
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use ruzstd::decoding::StreamingDecoder;
 
 use super::framing::MAX_RECORD_BYTES;
 
 /// Bytes of the fixed part of a chunk's header before the name of its compression.
 const NAME_LENGTH_AT: usize = 28;
+
+/// Usual in logs of other programs; palpate's own are packed with lz4.
+const ZSTD: &str = "zstd";
+
+/// True for a compression that can be unpacked.
+pub(super) fn is_readable(compression: &str) -> bool {
+    matches!(compression, "" | "lz4" | ZSTD)
+}
 
 /// Unpacks one chunk record by record.
 pub(super) struct ChunkRecords {
@@ -42,12 +53,13 @@ impl ChunkRecords {
     pub(super) fn new(body: Vec<u8>, length: u64) -> Result<Self, String> {
         let cut = (body.len() as u64) < length;
         let head = read_header(&body, length, cut)?;
-        if !["", "lz4"].contains(&head.compression.as_str()) {
+        if !is_readable(&head.compression) {
             return Err(format!(
                 "it is packed with `{}`, which palpate does not read",
                 head.compression.escape_default()
             ));
         }
+        let (body, length) = if head.compression == ZSTD { unpacked_zstd(&body, &head)? } else { (body, length) };
         let mut options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
@@ -99,6 +111,27 @@ impl ChunkRecords {
     }
 }
 
+/// A chunk that is packed with zstd as one that is not, with the length it then has; of a cut one what the decoder lets go of
+/// before the end, often nothing.
+fn unpacked_zstd(body: &[u8], head: &ChunkHead) -> Result<(Vec<u8>, u64), String> {
+    let records_at = NAME_LENGTH_AT + 4 + head.compression.len() + 8;
+    let mut plain = body.get(..NAME_LENGTH_AT).map(<[u8]>::to_vec).unwrap_or_default();
+    plain.extend_from_slice(&0_u32.to_le_bytes());
+    plain.extend_from_slice(&head.unpacked.to_le_bytes());
+    let header = plain.len() as u64;
+    let packed = body.get(records_at..).unwrap_or_default();
+    let wrong = |error: &dyn std::fmt::Display| Err(format!("it does not unpack: {error}"));
+    let unpacked = match StreamingDecoder::new(packed) {
+        Ok(decoder) => decoder.take(head.unpacked).read_to_end(&mut plain).map(drop),
+        Err(_) if head.is_cut => Ok(()),
+        Err(error) => return wrong(&error),
+    };
+    match unpacked {
+        Err(error) if !head.is_cut => wrong(&error),
+        _ => Ok((plain, header + head.unpacked)),
+    }
+}
+
 /// The header, or an empty one if the file ends in it. Refuses sizes that contradict each other: the decoder trusts them.
 pub(super) fn read_header(body: &[u8], length: u64, cut: bool) -> Result<ChunkHead, String> {
     let bytes = |at: usize, count: usize| body.get(at..at.checked_add(count)?);
@@ -129,5 +162,51 @@ pub(super) fn read_header(body: &[u8], length: u64, cut: bool) -> Result<ChunkHe
             Err("its sizes contradict each other".into())
         }
         Some((head, _, _)) => Ok(head),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ruzstd::encoding::{CompressionLevel, compress_to_vec};
+
+    /// A chunk with these records, packed with zstd.
+    fn packed(records: &[u8], checksum: u32) -> Vec<u8> {
+        let packed = compress_to_vec(records, CompressionLevel::Fastest);
+        let mut body = vec![0; 16];
+        body.extend_from_slice(&(records.len() as u64).to_le_bytes());
+        body.extend_from_slice(&checksum.to_le_bytes());
+        body.extend_from_slice(&4_u32.to_le_bytes());
+        body.extend_from_slice(b"zstd");
+        body.extend_from_slice(&(packed.len() as u64).to_le_bytes());
+        body.extend_from_slice(&packed);
+        body
+    }
+
+    #[test]
+    fn what_is_packed_with_zstd_is_unpacked_and_checked() {
+        // Messages of eight bytes.
+        let one: Vec<u8> = [&[mcap::records::op::MESSAGE][..], &8_u64.to_le_bytes(), b"12345678"].concat();
+        let records = one.repeat(100);
+        let checksum = crc32fast::hash(&records);
+        let body = packed(&records, checksum);
+        let length = body.len() as u64;
+        let mut chunk = ChunkRecords::new(body.clone(), length).unwrap();
+        let mut record = Vec::new();
+        for _ in 0..100 {
+            assert_eq!(chunk.next(&mut record), Ok(Some(mcap::records::op::MESSAGE)));
+            assert_eq!(record, b"12345678");
+        }
+        assert_eq!(chunk.next(&mut record), Ok(None));
+        let mut wrong = ChunkRecords::new(packed(&records, checksum ^ 1), length).unwrap();
+        assert!(wrong.next(&mut record).is_err());
+        // Check that a wrong or missing byte is an error or the truth, never a panic
+        for at in 0..body.len() {
+            let mut wrong = body.clone();
+            wrong[at] ^= 4;
+            let read =
+                |body: Vec<u8>, length| ChunkRecords::new(body, length).and_then(|mut c| c.next(&mut Vec::new()));
+            let _ = (read(wrong, length), read(body[..at].to_vec(), length));
+        }
     }
 }

@@ -112,7 +112,8 @@ fn merge(a: &[(u64, u64)], b: &[(u64, u64)]) -> Vec<(u64, u64)> {
     loop {
         merged.push(match (a.peek().copied(), b.peek().copied()) {
             (Some((value, count)), Some((other, more))) if value == other => {
-                (a.next(), b.next());
+                a.next();
+                b.next();
                 (value, count + more)
             }
             (Some(first), Some(second)) if first.0 < second.0 => {

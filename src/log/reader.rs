@@ -122,12 +122,8 @@ impl<R: Read> LogReader<R> {
             Record::Schema { header, data } => {
                 self.schemas.insert(header.id, (header.name, data.into_owned()));
             }
-            Record::Channel(channel) => {
-                // The index repeats every channel.
-                if !self.channels.contains_key(&channel.id) {
-                    return Ok(self.declare(channel));
-                }
-            }
+            // The index repeats every channel.
+            Record::Channel(channel) if !self.channels.contains_key(&channel.id) => return Ok(self.declare(channel)),
             Record::Metadata(metadata) if metadata.name == "environment" => {
                 self.topic.clear();
                 self.foreign = None;

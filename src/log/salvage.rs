@@ -7,7 +7,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use mcap::records::op;
 
-use super::chunk::{ChunkRecords, read_header};
+use super::chunk::{ChunkRecords, is_readable, read_header};
 use super::framing::{MAX_RECORD_BYTES, RecordStream, Section};
 
 /// How much is looked at at once in the search for a chunk [bytes].
@@ -127,7 +127,7 @@ impl<R: Read + Seek> Salvage<R> {
         let head = &bytes[9..bytes.len().min(HEAD_BYTES)];
         length <= MAX_RECORD_BYTES
             && place + 9 + length <= self.length
-            && read_header(head, length, false).is_ok_and(|head| matches!(head.compression.as_str(), "" | "lz4"))
+            && read_header(head, length, false).is_ok_and(|head| is_readable(&head.compression))
     }
 
     /// True if there is a chunk at `place` that has a checksum and fits it.

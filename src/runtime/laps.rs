@@ -53,16 +53,15 @@ impl Laps {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicU64, Ordering};
+    use std::sync::{Arc, Mutex};
 
     // Check that device, model, model, device gives each its own, and that the parts add up to the whole.
     #[test]
     fn every_moment_belongs_to_one_actor() {
-        let time = Arc::new(AtomicU64::new(0));
+        let time = Arc::new(Mutex::new(0));
         let shown = Arc::clone(&time);
-        let mut laps = Laps::new(move || Nanos(shown.load(Ordering::Relaxed)));
-        let at = |ns| time.store(ns, Ordering::Relaxed);
+        let mut laps = Laps::new(move || Nanos(*shown.lock().unwrap()));
+        let at = |ns| *time.lock().unwrap() = ns;
         for start in [100, 1000] {
             laps.begin(Nanos(start));
             laps.pass_to(0);

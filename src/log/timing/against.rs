@@ -61,6 +61,8 @@ impl Against {
     }
 }
 
+/// A figure of a block.
+type FigureOf = fn(&Block) -> &Buckets;
 type Interval = (String, Option<[f64; 2]>);
 
 /// The intervals of this over other for the figures of a group.
@@ -68,7 +70,7 @@ fn group_intervals(this: &GroupTiming, other: &GroupTiming) -> Vec<Interval> {
     // The bootstrap gives second over first.
     let blocks = [other.blocks.bins(), this.blocks.bins()];
     let mut intervals = Vec::new();
-    let figures: [(&str, fn(&Block) -> &Buckets); 4] = [
+    let figures: [(&str, FigureOf); 4] = [
         ("lateness", |block| &block.lateness),
         ("execution", |block| &block.execution),
         ("period_error", |block| &block.period_error),

@@ -16,7 +16,7 @@ const TAIL: usize = 25;
 const LEAST_BLOCKS: usize = 8;
 /// Samples beyond a percentile that are too few to say anything about it.
 const LEAST_BEYOND: u64 = 10;
-const SEED: u64 = 0x7061_6c70_6174_65;
+const SEED: u64 = 0x0070_616c_7061_7465;
 
 /// The percentiles that are compared, in thousandths.
 pub(super) const PERMILLE: [u64; 4] = [500, 900, 990, 999];

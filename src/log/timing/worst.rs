@@ -3,7 +3,7 @@
 //! How bad a tick was is how long its work was overdue in periods of its deadline: from when the first of the periods that
 //! it stands for was due (its own, or the first that was skipped before it) until it was done. One is just in time.
 
-use super::recent::{Moment, Recent, is_of};
+use super::recent::{ForcePoint, Moment, Recent, is_of};
 use crate::runtime::record::{SlipCause, TickTiming};
 use crate::time::Nanos;
 
@@ -35,7 +35,8 @@ pub struct WorstTick {
     pub actors: Vec<(String, Nanos)>,
     /// Other groups that were at work while it was overdue and not yet running.
     pub meanwhile: Vec<String>,
-    /// The largest change of a force from one haptic tick to the next within the time it was overdue and two ticks (N).
+    /// The largest change of a force, after the safety pipeline where the log says, from one haptic tick to the next within the
+    /// time it was overdue and two ticks (N).
     pub force_step_n: Option<f64>,
     /// Its neighbours in all groups, and the force.
     pub moment: Moment,
@@ -200,8 +201,9 @@ fn describe(
 
 /// The largest change of a force from one sample to the next that ends between two times.
 fn force_step(moment: &Moment, from: Nanos, to: Nanos) -> Option<f64> {
-    let step = |pair: &[&super::recent::ForcePoint]| {
-        let [a, b] = [pair[0].force_n, pair[1].force_n];
+    let step = |pair: &[&ForcePoint]| {
+        // What the hand feels comes after the safety pipeline.
+        let [a, b] = [0, 1].map(|n| pair[n].commanded_n.unwrap_or(pair[n].force_n));
         let squares: f64 = a.iter().zip(b).map(|(a, b)| (b - a) * (b - a)).sum();
         (from..=to).contains(&pair[1].time).then(|| squares.sqrt())
     };
@@ -272,7 +274,7 @@ mod tests {
 
     #[test]
     fn the_step_of_the_force_is_that_at_the_tick() {
-        let point = |ms: u64, device, x| super::super::recent::ForcePoint {
+        let point = |ms: u64, device, x| ForcePoint {
             time: Nanos(ms * MS),
             device,
             force_n: [x, 0.0, 0.0],

@@ -28,6 +28,7 @@ pub(in crate::report) fn in_words(worst: &WorstTick) -> String {
     let mut text = format!("{} at {at:.3} s was overdue by {}", worst.group, duration(worst.overdue.0));
     let mut slowest = worst.actors.iter().max_by_key(|(_, spent)| *spent).into_iter();
     text += &match worst.cause {
+        SlipCause::None if worst.is_trouble() => ", the log does not say why".to_owned(),
         SlipCause::None => ", in time".to_owned(),
         SlipCause::LongTick if worst.timing.missed() => {
             let took = worst.timing.end.saturating_sub(worst.timing.start).0;
@@ -73,7 +74,11 @@ pub(super) fn table(page: &mut Page, report: &TimingReport) {
             0 => String::new(),
             slips => format!(", {slips}"),
         };
-        let cause = if worst.is_trouble() { worst.cause.name() } else { "in time" };
+        let cause = match worst.cause {
+            SlipCause::None if worst.is_trouble() => "not said",
+            SlipCause::None => "in time",
+            cause => cause.name(),
+        };
         page.line(format!(
             "{group:<10}{:>8.3}{:>9}{:>9}{:>6.2}x  {:<9}{step:>9}  {cause}{skipped}",
             worst.timing.scheduled.as_secs_f64(),
