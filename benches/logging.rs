@@ -9,8 +9,9 @@
 //! - *a tick in virtual time*: two graphs with the same actor, one with a drain and four pushes, the other with neither a
 //!   drain nor a recorder. Each is advanced by one release in turn, in an order that changes from pair to pair; the
 //!   difference of the two is one sample. The rings are emptied between pairs, not in them.
-//! - *a tick in real time*: one 1 kHz group on the last core; every second tick pushes its four records. The difference of
-//!   the execution times of two ticks in a row is one sample.
+//! - *a tick in real time*: one 1 kHz group on the last core; of every 32 ticks the first 16 push their four records. The
+//!   difference of the execution times of a tick with and the tick without 16 later is one sample.
+//! - *telling two actors apart*: the two clock readings and the record that a group of two actors has besides.
 //! - *one push*: the mean of each of many batches of 256 pushes in a row.
 //!
 //! The machine may be busy: the median of paired differences moves little with that, the 99th percentile is the machine's.
@@ -21,12 +22,15 @@ use std::time::{Duration, Instant};
 
 use palpate::log::{CommandSample, ContactSample, ForceSample, LogRecord, ToolSample};
 use palpate::runtime::{
-    Actor, Execution, Outcome, RateGroup, Recorder, Running, Runtime, TickContext, TickTiming, actor_fn,
+    Actor, ActorTimes, Execution, Outcome, RateGroup, Recorder, Running, Runtime, TickContext, TickTiming, actor_fn,
 };
 use palpate::time::Nanos;
 
 const MS: u64 = 1_000_000;
 const PAIRS: usize = 100_000;
+/// Ticks in a row with records, and without: a session records in every tick, and the first ones of a block are left out.
+const BLOCK: u64 = 16;
+const SETTLING: u64 = 4;
 /// As in a session at 1 kHz: four seconds.
 const RING: usize = 4 * 4000;
 
@@ -123,7 +127,7 @@ fn real_pairs(seconds: u64) -> Vec<f64> {
     let mut work = Work::new();
     let actor = actor_fn("haptic", move |ctx| {
         let sum = work.tick(ctx);
-        if ctx.tick % 2 == 0 {
+        if is_recorded(ctx.tick) {
             record(&mut recorder, ctx, sum);
         }
         Outcome::Continue
@@ -146,12 +150,41 @@ fn real_pairs(seconds: u64) -> Vec<f64> {
     assert_eq!(running.stop().fault, None);
     let timings = timings.lock().unwrap_or_else(PoisonError::into_inner);
     let execution = |timing: &TickTiming| timing.end.saturating_sub(timing.start).0 as f64;
+    // A tick of a block with records and the one at the same place of the block without that follows.
     let pair = |pair: &[TickTiming]| {
-        let [a, b] = pair else { return None };
-        let difference = execution(a) - execution(b);
-        (b.tick == a.tick + 1).then_some(if a.tick.is_multiple_of(2) { difference } else { -difference })
+        let (a, b) = (pair.first()?, pair.last()?);
+        let is_pair = b.tick == a.tick + BLOCK && is_recorded(a.tick) && a.tick % BLOCK >= SETTLING;
+        is_pair.then(|| execution(a) - execution(b))
     };
-    timings.windows(2).filter_map(pair).collect()
+    timings.windows(BLOCK as usize + 1).filter_map(pair).collect()
+}
+
+/// Every second block of ticks in real time pushes its records.
+fn is_recorded(tick: u64) -> bool {
+    (tick / BLOCK).is_multiple_of(2)
+}
+
+/// What telling actors apart costs a tick of two actors: the clock is read twice more, and one record is pushed.
+fn actor_times() -> Vec<f64> {
+    const BATCH: usize = 256;
+    let mut graph = Runtime::builder(Execution::Virtual);
+    let mut drain = graph.drain();
+    let mut recorder = graph.recorder(RING);
+    let mut records = Vec::new();
+    let mut batch = |_| {
+        let begun = Instant::now();
+        for i in 0..BATCH {
+            let mut spent = [Nanos::ZERO; ActorTimes::MAX];
+            spent[0] = Nanos::from_duration(black_box(begun.elapsed()));
+            spent[1] = Nanos::from_duration(black_box(begun.elapsed()));
+            recorder.push(ActorTimes { group: 0, scheduled: Nanos(i as u64), actors: 2, spent });
+        }
+        let took = begun.elapsed().as_secs_f64() * 1e9 / BATCH as f64;
+        drain.drain(&mut records);
+        records.clear();
+        took
+    };
+    (0..20_000).map(&mut batch).collect()
 }
 
 fn pushes() -> Vec<f64> {
@@ -181,5 +214,6 @@ fn main() {
     print("the tick without records, virtual time", ticks, 1e6);
     print("five records kept less none, virtual time", differences, 100.0);
     print("four records kept less none, real time", real_pairs(20), 100.0);
+    print("telling two actors apart, in a row", actor_times(), 100.0);
     print("one push", pushes(), 25.0);
 }

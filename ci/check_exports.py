@@ -67,7 +67,7 @@ def durations(path, figure):
         "lateness": of["woke_ns"] - of["scheduled_ns"],
         "execution": of["end_ns"] - of["start_ns"],
         "period-error": numpy.abs(periods - numpy.diff(of["scheduled_ns"])),
-        "jitter": numpy.abs(numpy.diff(periods)),
+        "jitter": numpy.abs(numpy.diff(periods - numpy.diff(of["scheduled_ns"]))),
     }[figure]
 
 
