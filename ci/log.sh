@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # Logs open with readers that palpate did not write, and their message counts are those that the run reports; what viewers know
 # by name is what its publisher says; the ready-made layouts name what is there. Rerun, which is large, has its own job: viewers.
-# What is exported from them is checked by such readers too.
+# What is exported from them is checked by such readers too; Parquet, which takes a minute to build, has its own job.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 build_programs
 palpate="$CARGO_TARGET_DIR/debug/palpate"
 
 venv="$CARGO_TARGET_DIR/ci-venv"
-if [ ! -x "$venv/bin/python" ] || ! "$venv/bin/python" -c 'import mcap, mcap_protobuf, foxglove_schemas_protobuf, numpy, pyarrow' 2>/dev/null; then
+if [ ! -x "$venv/bin/python" ] || ! "$venv/bin/python" -c 'import mcap, mcap_protobuf, foxglove_schemas_protobuf, numpy' 2>/dev/null; then
     python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages "Python with venv" python3 python3-venv
     python3 -m venv --clear "$venv"
-    "$venv/bin/pip" install --quiet mcap mcap-protobuf-support foxglove-schemas-protobuf numpy pyarrow
+    "$venv/bin/pip" install --quiet mcap mcap-protobuf-support foxglove-schemas-protobuf numpy
 fi
 
 folder=$(mktemp -d)
@@ -57,8 +57,6 @@ done
 echo -n "percentiles, another program's log: "
 "$venv/bin/python" ci/check_timing.py foreign "$folder/robot.mcap" "$folder/robot.json"
 
-# Parquet is not among the default features; the parts that others build are not built again.
-cargo build --locked --profile test --features haply,parquet --bin palpate
 export_of() {
     local name=$1
     shift
@@ -70,9 +68,6 @@ check_exports() {
     for topic in force contact resync global ports tool timing/local timing/global timing/logger; do
         mkdir -p "$folder/$name/timing"
         export_of "$name" --topic "/$topic" --out "$folder/$name/$topic.csv"
-        export_of "$name" --topic "/$topic" --format parquet --out "$folder/$name/$topic.parquet"
-        echo -n "$name /$topic: "
-        check_export parquet "$folder/$name/$topic.csv" "$folder/$name/$topic.parquet"
     done
     for group in local global; do
         for figure in lateness execution period-error jitter; do

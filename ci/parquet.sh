@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# Parquet files hold what the CSVs of the same topics hold, as pyarrow reads them.
+source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
+build_programs
+cargo build --locked --profile test --features haply,parquet --bin palpate
+palpate="$CARGO_TARGET_DIR/debug/palpate"
+
+venv="$CARGO_TARGET_DIR/parquet-venv"
+if [ ! -x "$venv/bin/python" ] || ! "$venv/bin/python" -c 'import numpy, pyarrow' 2>/dev/null; then
+    python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages "Python with venv" python3 python3-venv
+    python3 -m venv --clear "$venv"
+    "$venv/bin/pip" install --quiet numpy pyarrow
+fi
+
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+check() {
+    local name=$1 topic
+    shift
+    "$palpate" run "$@" --out "$folder/$name.mcap" >/dev/null
+    for topic in force contact resync global ports tool timing/local timing/global timing/logger; do
+        mkdir -p "$folder/$name/timing"
+        "$palpate" export "$folder/$name.mcap" --topic "/$topic" --out "$folder/$name/$topic.csv"
+        "$palpate" export "$folder/$name.mcap" --topic "/$topic" --format parquet --out "$folder/$name/$topic.parquet"
+        echo -n "$name /$topic: "
+        "$venv/bin/python" ci/check_exports.py parquet "$folder/$name/$topic.csv" "$folder/$name/$topic.parquet"
+    done
+}
+check virtual scenes/drag_friction.toml --virtual --duration 1
+check real_time scenes/demo.toml --duration 2
