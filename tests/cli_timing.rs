@@ -95,6 +95,12 @@ fn what_cyclictest_writes_stands_beside_a_log() {
     assert_eq!(document["figures"]["thread0.lateness.p99"], 10_000);
     assert!(folder.succeed(&["timing", "cyclic.json"]).contains("thread0"));
     assert!(folder.succeed(&["timing", "a.mcap", "--against", "cyclic.json"]).contains("unmatched"));
+    let matched = ["timing", "a.mcap", "--against", "cyclic.json", "--match", "local=thread0", "--json"];
+    let beside = json(&folder.succeed(&matched));
+    let p99 = &beside["against"]["figures"]["local.lateness.p99"];
+    assert_eq!((&p99["this"], &p99["other"]), (&Value::from(0), &Value::from(10_000)));
+    let called = folder.call(&["timing", "a.mcap", "--against", "cyclic.json", "--match", "local=thread7"]);
+    assert_eq!((called.code, called.err.lines().count()), (Some(2), 1), "{}", called.err);
     folder.write("other.json", "{}");
     let called = folder.call(&["timing", "other.json"]);
     assert_eq!((called.code, called.err.lines().count()), (Some(2), 1), "{}", called.err);

@@ -26,6 +26,9 @@ pub struct TimingArgs {
     /// Hold the log against this one: figures side by side, ratios and how sure they are
     #[arg(long, value_name = "OTHER")]
     pub against: Option<PathBuf>,
+    /// With --against: hold the group THIS of the log against the group OTHER of the other one; may be given several times
+    #[arg(long = "match", value_name = "THIS=OTHER", value_parser = pair, requires = "against")]
+    pub matches: Vec<(String, String)>,
     /// Exit with 1 if the condition holds, such as 'local.lateness.p99 > 200us'; may be given several times
     #[arg(long, value_name = "CONDITION")]
     pub fail_if: Vec<Condition>,
@@ -55,7 +58,7 @@ pub fn run(args: &TimingArgs) -> Result<(), Error> {
     }
     match &args.against {
         Some(other_log) => {
-            let other = read(other_log, args)?;
+            let other = matched(read(other_log, args)?, args, other_log)?;
             let against = Against::of(&report, &other);
             let [this_name, other_name] = [&args.log, other_log].map(|log| log.display().to_string());
             match args.json {
@@ -89,6 +92,25 @@ fn read(log: &Path, args: &TimingArgs) -> Result<TimingReport, Error> {
         return Err(Error::new(ErrorKind::Usage, message).at(log.display().to_string()));
     }
     Ok(report)
+}
+
+/// The other log with the names that its groups are to be compared by.
+fn matched(mut other: TimingReport, args: &TimingArgs, log: &Path) -> Result<TimingReport, Error> {
+    for (this, name) in &args.matches {
+        if this != name && !other.rename_group(name, this) {
+            let message = format!("has no rate group `{name}`; `palpate timing {}` lists its groups", log.display());
+            return Err(Error::new(ErrorKind::Usage, message).at(log.display().to_string()));
+        }
+    }
+    Ok(other)
+}
+
+/// `THIS=OTHER` on the command line.
+fn pair(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((this, other)) if !this.is_empty() && !other.is_empty() => Ok((this.to_owned(), other.to_owned())),
+        _ => Err("write it as THIS=OTHER, such as local=thread0".to_owned()),
+    }
 }
 
 /// The text of a file that is JSON and not MCAP.

@@ -160,6 +160,7 @@ impl Analysis {
     }
 
     /// Counts releases of which the lateness alone is known (ns).
+    #[cfg(feature = "log")]
     pub(super) fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
         self.groups.entry(group).or_default().push_lateness(lateness, count);
     }

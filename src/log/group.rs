@@ -150,6 +150,7 @@ impl GroupCounter {
     }
 
     /// Counts releases of which the lateness alone is known (ns).
+    #[cfg(feature = "log")]
     pub(super) fn push_lateness(&mut self, lateness: u64, count: u64) {
         self.released += count;
         self.lateness.push_many(lateness, count);

@@ -30,6 +30,22 @@ pub struct TimingReport {
     pub span: [Nanos; 2],
 }
 
+impl TimingReport {
+    /// Gives the group `from` the name `to`, so that it is compared with a group of that name; false if there is none.
+    pub fn rename_group(&mut self, from: &str, to: &str) -> bool {
+        let sums = self.run.groups.iter_mut().map(|group| &mut group.name);
+        let details = self.groups.iter_mut().map(|group| &mut group.name);
+        let on_cores = self.cores.iter_mut().flat_map(|core| &mut core.groups).map(|(name, _)| name);
+        let worst = self.worst.iter_mut().map(|worst| &mut worst.group);
+        let mut found = false;
+        for name in sums.chain(details).chain(on_cores).chain(worst).filter(|name| *name == from) {
+            to.clone_into(name);
+            found = true;
+        }
+        found
+    }
+}
+
 /// Gathers a [`TimingReport`] from the entries of a log, in their order. Allocates.
 #[derive(Clone, Debug, Default)]
 pub struct TimingAnalysis {
@@ -59,6 +75,7 @@ impl TimingAnalysis {
     }
 
     /// Counts a lateness of a group as often as it occurred, where nothing else is known of its releases (ns).
+    #[cfg(feature = "log")]
     pub(super) fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
         self.sums.push_lateness(group, lateness, count);
     }

@@ -12,6 +12,7 @@ use std::fmt;
 pub use self::against::{against_to_text, figure_to_text};
 use self::haptics::haptics;
 use self::page::Page;
+#[cfg(feature = "cli")]
 pub(super) use self::worst::in_words;
 use super::units::duration;
 use super::verdict::verdict;
@@ -119,9 +120,11 @@ fn groups(page: &mut Page, report: &RunReport) {
     ));
     for group in &report.groups {
         percentiles(page, short(&group.name), "lateness", group.lateness);
-        percentiles(page, "", "execution", group.execution);
-        percentiles(page, "", "period error", group.period_error);
-        percentiles(page, "", "jitter", group.jitter);
+        // Other programs' logs may know the lateness alone.
+        let others = [("execution", group.execution), ("period error", group.period_error), ("jitter", group.jitter)];
+        for (what, found) in others.into_iter().filter(|(_, found)| found.count > 0 || group.released == 0) {
+            percentiles(page, "", what, found);
+        }
     }
     if report.is_virtual() {
         page.line("virtual time: lateness, execution and period error are declared, not measured".to_owned());
