@@ -8,7 +8,7 @@ use std::io::{self, Write};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The largest piece that is written at once [bytes]: progress is seen by the piece.
+/// The largest piece that is written at once (bytes): progress is seen by the piece.
 const PIECE_BYTES: usize = 1 << 16;
 /// The writing thread needs little.
 const STACK_BYTES: usize = 1 << 18;

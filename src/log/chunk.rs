@@ -33,13 +33,13 @@ pub(super) struct ChunkRecords {
 pub(super) struct ChunkHead {
     pub(super) first_time: u64,
     pub(super) last_time: u64,
-    /// Unpacked [bytes].
+    /// Unpacked (bytes).
     pub(super) unpacked: u64,
     /// Of what is unpacked; 0 if the writer made none.
     pub(super) checksum: u32,
     /// `lz4`, `zstd`, or empty for none.
     pub(super) compression: String,
-    /// The whole record in the file, opcode and length included [bytes].
+    /// The whole record in the file, opcode and length included (bytes).
     pub(super) length: u64,
     /// The file ends inside of it: its checksum cannot be verified.
     pub(super) is_cut: bool,

@@ -13,7 +13,7 @@ use mcap::records::op;
 
 use super::chunk::{ChunkHead, ChunkRecords};
 
-/// The largest record or unpacked chunk that is read [bytes].
+/// The largest record or unpacked chunk that is read (bytes).
 pub(super) const MAX_RECORD_BYTES: u64 = 1 << 26;
 
 /// The records of a file one after the other, those inside chunks included.

@@ -18,7 +18,7 @@ use crate::error::Error;
 /// What is in a log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LogInfo {
-    /// Size of the file [bytes].
+    /// Size of the file (bytes).
     pub bytes: u64,
     /// True if there is an index; otherwise all of it was read.
     pub has_index: bool,
@@ -49,9 +49,9 @@ pub struct LogInfo {
 pub struct ChunkInfo {
     /// How many.
     pub count: u64,
-    /// As they are in the file [bytes].
+    /// As they are in the file (bytes).
     pub packed: u64,
-    /// Unpacked [bytes].
+    /// Unpacked (bytes).
     pub unpacked: u64,
 }
 
@@ -73,7 +73,7 @@ pub struct AttachmentInfo {
     pub name: String,
     /// Its media type.
     pub media_type: String,
-    /// Its size [bytes].
+    /// Its size (bytes).
     pub bytes: u64,
 }
 

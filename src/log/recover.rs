@@ -20,7 +20,7 @@ use crate::error::{Error, ErrorKind};
 /// What was saved and what was lost.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recovered {
-    /// Size of the damaged file [bytes].
+    /// Size of the damaged file (bytes).
     pub bytes: u64,
     /// Messages in the new log.
     pub messages: u64,

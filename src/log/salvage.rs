@@ -10,7 +10,7 @@ use mcap::records::op;
 use super::chunk::{ChunkRecords, is_readable, read_header};
 use super::framing::{MAX_RECORD_BYTES, RecordStream, Section};
 
-/// How much is looked at at once in the search for a chunk [bytes].
+/// How much is looked at at once in the search for a chunk (bytes).
 const WINDOW_BYTES: usize = 1 << 20;
 /// Opcode, length and the longest header of a chunk that is looked for.
 const HEAD_BYTES: usize = 9 + 28 + 4 + 4 + 8;
@@ -53,7 +53,7 @@ impl<R: Read + Seek> Salvage<R> {
         Ok(Self { stream: Some(RecordStream::new(source)?), length, damaged: false })
     }
 
-    /// The size of the file [bytes].
+    /// The size of the file (bytes).
     pub(super) fn length(&self) -> u64 {
         self.length
     }

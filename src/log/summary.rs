@@ -7,7 +7,7 @@ use mcap::sans_io::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 
 use super::framing::MAX_RECORD_BYTES;
 
-/// What follows the start of the index in the footer and is under its checksum, the checksum itself, and the magic [bytes].
+/// What follows the start of the index in the footer and is under its checksum, the checksum itself, and the magic (bytes).
 const FOOTER_END: u64 = 8 + 4 + mcap::MAGIC.len() as u64;
 
 /// The index of a file; `None` if there is none, if it cannot be read or if it does not fit its checksum.

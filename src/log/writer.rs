@@ -25,9 +25,9 @@ use crate::time::Nanos;
 
 /// Log time or wall time between two chunks.
 const FLUSH_INTERVAL: Nanos = Nanos(500_000_000);
-/// Collected messages that force a chunk earlier [bytes].
+/// Collected messages that force a chunk earlier (bytes).
 const CHUNK_BYTES: usize = 1 << 20;
-/// The file buffer [bytes]: a chunk goes to the file in few large writes.
+/// The file buffer (bytes): a chunk goes to the file in few large writes.
 const FILE_BUFFER_BYTES: usize = 1 << 18;
 
 /// A message that waits for the next chunk.

@@ -8,7 +8,7 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// The body of a control frame has no more [bytes].
+/// The body of a control frame has no more (bytes).
 const MAX_CONTROL: usize = 125;
 /// A receiver that has taken so many frames and has no message is being kept busy.
 const MOST_FRAMES: u32 = 64;
