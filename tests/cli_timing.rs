@@ -85,6 +85,23 @@ fn a_log_against_itself_differs_in_nothing() {
 }
 
 #[test]
+fn groups_are_matched_all_at_once() {
+    let folder = Folder::new();
+    run(&folder, "a.mcap");
+    let matched =
+        ["timing", "a.mcap", "--against", "a.mcap", "--match", "local=global", "--match", "global=local", "--json"];
+    let swapped = json(&folder.succeed(&matched));
+    let figure =
+        |name: &str| (&swapped["against"]["figures"][name]["this"], &swapped["against"]["figures"][name]["other"]);
+    assert_eq!(figure("local.released"), (&Value::from(201), &Value::from(7)));
+    assert_eq!(figure("global.released"), (&Value::from(7), &Value::from(201)));
+    // Check that a group whose name is taken is not compared in place of the one that was named
+    let one = ["timing", "a.mcap", "--against", "a.mcap", "--match", "local=global", "--group", "local", "--json"];
+    let one = json(&folder.succeed(&one));
+    assert_eq!(one["against"]["figures"]["local.released"]["other"], 7);
+}
+
+#[test]
 fn what_cyclictest_writes_stands_beside_a_log() {
     let folder = Folder::new();
     run(&folder, "a.mcap");

@@ -232,7 +232,13 @@ impl LoggerActor {
             self.environment.granted = granted(&grant);
             self.environment.pin_groups(&grant.groups);
             self.analysis.set_environment(&self.environment);
-            self.sink.environment(&self.environment);
+            let environment = self.environment.clone();
+            if !self.sink_failed {
+                self.keep(|sink| {
+                    sink.environment(&environment);
+                    Ok(())
+                });
+            }
         }
     }
 }

@@ -51,14 +51,14 @@ pub fn run(args: &TimingArgs) -> Result<(), Error> {
             .flatten()
             .try_for_each(|log| refuse_to_overwrite(log, html))?;
     }
-    let report = read(&args.log, args)?;
+    let report = read(&args.log, args, &args.group)?;
     if let Some(html) = &args.html {
         let name = args.log.file_name().unwrap_or_default().to_string_lossy();
         std::fs::write(html, timing_html(&report, &name)).map_err(|error| Error::io(html, error))?;
     }
     match &args.against {
         Some(other_log) => {
-            let other = matched(read(other_log, args)?, args, other_log)?;
+            let other = matched(other_log, args)?;
             let against = Against::of(&report, &other);
             let [this_name, other_name] = [&args.log, other_log].map(|log| log.display().to_string());
             match args.json {
@@ -73,11 +73,14 @@ pub fn run(args: &TimingArgs) -> Result<(), Error> {
 }
 
 /// Reads a log as far as it can be read.
-fn read(log: &Path, args: &TimingArgs) -> Result<TimingReport, Error> {
+fn read(log: &Path, args: &TimingArgs, groups: &[String]) -> Result<TimingReport, Error> {
+    let selection = Selection { window: args.window.window()?, groups: groups.to_vec() };
+    let wanted: Vec<&str> = groups.iter().map(String::as_str).collect();
     if let Some(text) = other_than_mcap(log)? {
-        return read_cyclictest(&text, log);
+        let report = read_cyclictest(&text, log, selection)?;
+        check_groups(&report, log, &wanted)?;
+        return Ok(report);
     }
-    let selection = Selection { window: args.window.window()?, groups: args.group.clone() };
     let mut analysis = TimingAnalysis::new(selection);
     let (bar, mut reader) = ReadBar::open("reading", log, false)?;
     reader.by_ref().for_each(|entry| analysis.push_entry(&entry));
@@ -86,22 +89,33 @@ fn read(log: &Path, args: &TimingArgs) -> Result<TimingReport, Error> {
     report.run.damage = reader.damage().map(str::to_owned);
     report.run.messages = reader.topics().into_iter().map(|(topic, count)| (topic.to_owned(), count)).collect();
     warn_of_damage(reader.place(), reader.damage());
-    let unknown = args.group.iter().find(|name| !report.groups.iter().any(|group| group.name == **name));
-    if let Some(unknown) = unknown {
-        let message = format!("has no rate group `{unknown}`; `palpate timing {}` lists its groups", log.display());
-        return Err(Error::new(ErrorKind::Usage, message).at(log.display().to_string()));
-    }
+    check_groups(&report, log, &wanted)?;
     Ok(report)
 }
 
-/// The other log with the names that its groups are to be compared by.
-fn matched(mut other: TimingReport, args: &TimingArgs, log: &Path) -> Result<TimingReport, Error> {
-    for (this, name) in &args.matches {
-        if this != name && !other.rename_group(name, this) {
-            let message = format!("has no rate group `{name}`; `palpate timing {}` lists its groups", log.display());
-            return Err(Error::new(ErrorKind::Usage, message).at(log.display().to_string()));
+/// Refuses a name that no group of the log has.
+fn check_groups(report: &TimingReport, log: &Path, names: &[&str]) -> Result<(), Error> {
+    let unknown = names.iter().find(|name| !report.groups.iter().any(|group| group.name == **name));
+    match unknown {
+        None => Ok(()),
+        Some(unknown) => {
+            let message = format!("has no rate group `{unknown}`; `palpate timing {}` lists its groups", log.display());
+            Err(Error::new(ErrorKind::Usage, message).at(log.display().to_string()))
         }
     }
+}
+
+/// The other log with the names that its groups are to be compared by.
+fn matched(log: &Path, args: &TimingArgs) -> Result<TimingReport, Error> {
+    let own_name = |group: &String| {
+        let found = args.matches.iter().find(|(this, _)| this == group);
+        found.map_or_else(|| group.clone(), |(_, other)| other.clone())
+    };
+    let mut other = read(log, args, &args.group.iter().map(own_name).collect::<Vec<_>>())?;
+    let names: Vec<&str> = args.matches.iter().map(|(_, name)| name.as_str()).collect();
+    check_groups(&other, log, &names)?;
+    let renamed: Vec<(String, String)> = args.matches.iter().map(|(this, name)| (name.clone(), this.clone())).collect();
+    other.rename_groups(&renamed);
     Ok(other)
 }
 

@@ -10,7 +10,8 @@
 //! | `slips` | periods skipped before it; from the numbers if left out |
 //! | `cause` | why: a number of [`SlipCause`], or its name |
 //!
-//! All times are integers in nanoseconds of one clock. Messages are JSON (`message_encoding` `json`) or protobuf with their
+//! All times are integers in nanoseconds of one clock, from 0 to 2^63; in the report they count from the whole second in which
+//! the first release of the log was due. Messages are JSON (`message_encoding` `json`) or protobuf with their
 //! descriptors as the schema. A channel is read if its topic begins with `/timing/`, or if its schema's name ends in
 //! `TickTiming`; the rest of the topic names the group. Channel metadata `rate_hz` says the rate, which is otherwise
 //! taken from the first two releases.
@@ -20,13 +21,12 @@ use std::collections::BTreeMap;
 use prost::Message;
 use prost::encoding::{WireType, decode_key, decode_varint};
 use prost_types::FileDescriptorSet;
+use prost_types::field_descriptor_proto::Type;
 
 use crate::runtime::record::{SlipCause, TickTiming};
 use crate::time::Nanos;
 
 const SECOND: u64 = 1_000_000_000;
-/// Times from here on are of a calendar or of a machine's own clock and not of a run.
-const LONGEST_RUN: u64 = 86_400 * SECOND;
 
 const FIELDS: [&str; 8] = ["scheduled_ns", "woke_ns", "start_ns", "end_ns", "deadline_ns", "tick", "slips", "cause"];
 /// Places in [`FIELDS`].
@@ -62,9 +62,8 @@ pub(super) struct ForeignChannel {
 }
 
 impl ForeignChannel {
-    /// The channel `topic` as rate group number `group`; `None` if it does not hold tick timing.
+    /// The channel `topic`, of group 0 so far; `None` if it does not hold tick timing.
     pub(super) fn of(
-        group: u16,
         topic: &str,
         message_encoding: &str,
         schema: Option<(&str, &[u8])>,
@@ -79,7 +78,12 @@ impl ForeignChannel {
         };
         let rate_hz = metadata.get("rate_hz").and_then(|rate| rate.parse().ok()).filter(|rate| *rate > 0.0);
         let period = rate_hz.map(|rate: f64| (SECOND as f64 / rate).round() as u64).filter(|period| *period > 0);
-        Some(Self { group, name: name.to_owned(), rate_hz, encoding, last: None, period })
+        Some(Self { group: 0, name: name.to_owned(), rate_hz, encoding, last: None, period })
+    }
+
+    /// Gives its group a number.
+    pub(super) fn set_group(&mut self, group: u16) {
+        self.group = group;
     }
 
     /// The name of its group.
@@ -98,10 +102,13 @@ impl ForeignChannel {
             Encoding::Json => of_json(data)?,
             Encoding::Protobuf(numbers) => of_protobuf(data, numbers)?,
         };
+        if let Some(place) = values.iter().position(|value| value.is_some_and(|value| value > i64::MAX as u64)) {
+            return Err(format!("its {} is negative or too large", FIELDS[place]));
+        }
         let scheduled = values[SCHEDULED].ok_or("it has no scheduled_ns")?;
         let woke = values[WOKE].or(values[START]).ok_or("it has neither woke_ns nor start_ns")?;
-        let since_boot_or_1970 = scheduled > LONGEST_RUN;
-        let base = *base.get_or_insert(if since_boot_or_1970 { scheduled - scheduled % SECOND } else { 0 });
+        // Since 1970, since the machine's start or since the run's: the first second of the log is the first one here.
+        let base = *base.get_or_insert(scheduled - scheduled % SECOND);
         let since = |time: u64| Nanos(time.saturating_sub(base));
         let start = values[START].unwrap_or(woke);
         let end = values[END].unwrap_or(start);
@@ -135,7 +142,7 @@ impl ForeignChannel {
     fn number(&self, scheduled: Nanos) -> u64 {
         let Some(last) = self.last else { return 0 };
         let since = scheduled.saturating_sub(last.scheduled).0;
-        let periods = self.period.map_or(1, |period| (since + period / 2) / period);
+        let periods = self.period.map_or(1, |period| (since.saturating_add(period / 2)) / period);
         last.tick.saturating_add(periods.max(1))
     }
 }
@@ -149,11 +156,21 @@ fn numbers(message: &str, descriptors: &[u8]) -> Option<BTreeMap<u32, usize>> {
         let described = file.message_type.iter().find(|described| format!("{prefix}{}", described.name()) == message);
         for field in described.into_iter().flat_map(|described| &described.field) {
             let place = FIELDS.iter().position(|name| *name == field.name());
+            if place.is_some_and(|place| !is_integer(field.r#type(), place)) {
+                return None;
+            }
             found.extend(u32::try_from(field.number()).ok().zip(place));
         }
     }
     let has = |place: usize| found.values().any(|found| *found == place);
     (has(SCHEDULED) && (has(WOKE) || has(START))).then_some(found)
+}
+
+/// True for the types whose bytes are read as a number here; a cause may be an enum or a name as well.
+fn is_integer(kind: Type, place: usize) -> bool {
+    use Type::{Enum, Fixed32, Fixed64, Int32, Int64, Sfixed32, Sfixed64, String, Uint32, Uint64};
+    matches!(kind, Uint64 | Uint32 | Int64 | Int32 | Fixed64 | Fixed32 | Sfixed64 | Sfixed32)
+        || place == CAUSE && matches!(kind, Enum | String)
 }
 
 fn of_protobuf(mut data: &[u8], numbers: &BTreeMap<u32, usize>) -> Result<Values, String> {
@@ -229,7 +246,9 @@ mod tests {
 
     fn channel(encoding: &str, schema: Option<(&str, &[u8])>, rate_hz: &str) -> Option<ForeignChannel> {
         let metadata = [("rate_hz".to_owned(), rate_hz.to_owned())].into();
-        ForeignChannel::of(2, "/timing/servo", encoding, schema, &metadata)
+        let mut channel = ForeignChannel::of("/timing/servo", encoding, schema, &metadata)?;
+        channel.set_group(2);
+        Some(channel)
     }
 
     #[test]
@@ -277,11 +296,33 @@ mod tests {
     }
 
     #[test]
+    fn times_that_are_no_integers_or_too_large_are_refused() {
+        let file = |kind: Type| {
+            let field = |name: &str, number, kind: Type| prost_types::FieldDescriptorProto {
+                name: Some(name.into()),
+                number: Some(number),
+                r#type: Some(kind.into()),
+                ..Default::default()
+            };
+            let field = vec![field("scheduled_ns", 1, kind), field("woke_ns", 2, Type::Uint64)];
+            let message =
+                prost_types::DescriptorProto { name: Some("LoopTickTiming".into()), field, ..Default::default() };
+            let file = prost_types::FileDescriptorProto { message_type: vec![message], ..Default::default() };
+            FileDescriptorSet { file: vec![file] }.encode_to_vec()
+        };
+        let reads = |kind| channel("protobuf", Some(("LoopTickTiming", &file(kind))), "").is_some();
+        assert!(reads(Type::Uint64) && reads(Type::Fixed64) && !reads(Type::Double) && !reads(Type::Sint64));
+        let mut channel = channel("json", None, "").unwrap();
+        let error = channel.tick(b"{\"scheduled_ns\": 18446744073709551615, \"woke_ns\": 1}", &mut None).unwrap_err();
+        assert!(error.contains("scheduled_ns is negative or too large"), "{error}");
+    }
+
+    #[test]
     fn channels_without_the_fields_are_left_alone() {
         let descriptors = schema::descriptor_set("palpate.Force");
         assert!(channel("protobuf", Some(("palpate.Force", &descriptors)), "").is_none());
         assert!(channel("ros1", None, "").is_none());
-        assert!(ForeignChannel::of(0, "/pose", "json", None, &BTreeMap::new()).is_none());
+        assert!(ForeignChannel::of("/pose", "json", None, &BTreeMap::new()).is_none());
         assert_eq!(json("{\"scheduled_ns\": 3}")[SCHEDULED], Some(3));
         assert!(of_json(b"{\"scheduled_ns\": -3}").is_err() && of_json(b"nonsense").is_err());
     }

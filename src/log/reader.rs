@@ -109,7 +109,8 @@ impl<R: Read> LogReader<R> {
 
     /// What `topic` carries, if the log has declared it and its messages are palpate's.
     pub(crate) fn kind(&self, topic: &str) -> Option<Kind> {
-        self.channels.values().find(|channel| channel.topic == topic)?.kind
+        let channel = self.channels.values().find(|channel| channel.topic == topic)?;
+        channel.kind.or(channel.foreign.as_ref().map(|_| Kind::Timing))
     }
 
     /// The entry in the record just read: `Ok(None)` if it holds none.
@@ -156,11 +157,15 @@ impl<R: Read> LogReader<R> {
         let mut foreign = None;
         let mut known = None;
         if let Some(environment) = self.foreign.as_mut() {
-            let group = u16::try_from(environment.groups.len()).unwrap_or(u16::MAX);
-            foreign = ForeignChannel::of(group, &channel.topic, &channel.message_encoding, schema, &channel.metadata);
-            if let Some(foreign) = &foreign {
-                environment.groups.push(GroupInfo::new(foreign.name(), foreign.rate_hz().unwrap_or(0.0)));
-                known = Some(LogEntry::Environment(environment.clone()));
+            foreign = ForeignChannel::of(&channel.topic, &channel.message_encoding, schema, &channel.metadata);
+            if let Some(foreign) = &mut foreign {
+                // A log that was merged or split may have several channels of one group.
+                let place = environment.groups.iter().position(|group| group.name == foreign.name());
+                foreign.set_group(u16::try_from(place.unwrap_or(environment.groups.len())).unwrap_or(u16::MAX));
+                if place.is_none() {
+                    environment.groups.push(GroupInfo::new(foreign.name(), foreign.rate_hz().unwrap_or(0.0)));
+                    known = Some(LogEntry::Environment(environment.clone()));
+                }
             }
         }
         self.channels.insert(channel.id, Channel { topic: channel.topic, kind, foreign, messages: 0 });

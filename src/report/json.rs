@@ -7,7 +7,7 @@
 //! | --- | --- |
 //! | `schema_version` | 1 |
 //! | `verdict`, `reason` | `OK`, `INCOMPLETE`, `LATE`, `RESTARTED` or `FAILED`, and why in one line |
-//! | `duration_s` | time of the last record |
+//! | `duration_s` | time of the last record; of a part that begins later (`--from`), from its first record to its last |
 //! | `virtual_time` | true if lateness is zero by construction |
 //! | `damage` | what is wrong with the log and where, or `null` |
 //! | `messages` | number of messages read, by topic |
@@ -28,7 +28,7 @@
 //! `figures`, `cores`, `worst` and `span_s` are of [`timing_to_json`] alone, which `palpate timing --json` prints.
 //!
 //! Distributions are `{count, p50, p90, p99, p999, max}`, nearest-rank, all zero if `count` is zero. Causes are
-//! `late_wake`, `long_tick`, `stalled_peer`, `policy` and `unattributed`.
+//! `late_wake`, `long_tick`, `stalled_peer`, `policy`, `fault` and `unattributed`.
 
 use serde_json::{Map, Value, json};
 

@@ -31,18 +31,20 @@ pub struct TimingReport {
 }
 
 impl TimingReport {
-    /// Gives the group `from` the name `to`, so that it is compared with a group of that name; false if there is none.
-    pub fn rename_group(&mut self, from: &str, to: &str) -> bool {
+    /// Gives groups other names, all at once, so that they are compared with groups of those names: `(old, new)` each. A
+    /// group that has one of the new names already is set aside.
+    pub fn rename_groups(&mut self, names: &[(String, String)]) {
         let sums = self.run.groups.iter_mut().map(|group| &mut group.name);
         let details = self.groups.iter_mut().map(|group| &mut group.name);
         let on_cores = self.cores.iter_mut().flat_map(|core| &mut core.groups).map(|(name, _)| name);
         let worst = self.worst.iter_mut().map(|worst| &mut worst.group);
-        let mut found = false;
-        for name in sums.chain(details).chain(on_cores).chain(worst).filter(|name| *name == from) {
-            to.clone_into(name);
-            found = true;
+        for name in sums.chain(details).chain(on_cores).chain(worst) {
+            match names.iter().find(|(old, _)| old == name) {
+                Some((_, new)) => new.clone_into(name),
+                None if names.iter().any(|(_, new)| new == name) => name.push_str(" (not compared)"),
+                None => {}
+            }
         }
-        found
     }
 }
 
@@ -116,7 +118,12 @@ impl TimingAnalysis {
             return;
         }
         let deadline = timing.deadline.saturating_sub(timing.scheduled);
-        let period = self.groups.get(&timing.group).and_then(GroupDetail::period).unwrap_or(deadline);
+        let period = self.groups.get(&timing.group).and_then(GroupDetail::period);
+        if period.is_none() && timing.deadline == timing.end {
+            // The first release of a group whose deadlines are not in the log.
+            return;
+        }
+        let period = period.unwrap_or(deadline);
         self.worst.push(timing, period, &self.recent);
     }
 
@@ -145,6 +152,8 @@ impl TimingAnalysis {
             let info = environment.groups.get(usize::from(number));
             groups.push(detail.report(name(number), counter, info));
         }
+        // A core is as busy as it is, whichever group is looked at.
+        let cores = cores(&run, &environment, span);
         run.groups.retain(|group| self.selection.has_group(&group.name));
         groups.retain(|group| self.selection.has_group(&group.name));
         let mut devices = Vec::new();
@@ -158,14 +167,7 @@ impl TimingAnalysis {
                 .get(usize::from(group))
                 .map_or_else(|| format!("actor {actor}"), |info| info.actor_name(actor))
         };
-        TimingReport {
-            cores: cores(&run, &environment, span),
-            worst: self.worst.report(&self.recent, name, actor),
-            run,
-            groups,
-            devices,
-            span,
-        }
+        TimingReport { cores, worst: self.worst.report(&self.recent, name, actor), run, groups, devices, span }
     }
 }
 

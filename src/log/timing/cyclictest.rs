@@ -5,7 +5,7 @@ use std::path::Path;
 use super::analysis::{TimingAnalysis, TimingReport};
 use super::selection::Selection;
 use crate::error::{Error, ErrorKind};
-use crate::log::{Environment, Execution, GroupInfo, LogEntry, TextEvent};
+use crate::log::{Environment, Execution, GroupInfo, LogEntry, TextEvent, Window};
 use crate::time::Nanos;
 use serde_json::Value;
 
@@ -14,14 +14,18 @@ use serde_json::Value;
 /// Values that lie beyond the histogram count as the largest, which cyclictest knows apart from it; a warning says how many.
 ///
 /// # Errors
-/// [`ErrorKind::Log`] if it is no such file or holds no histogram.
-pub fn read_cyclictest(text: &str, place: &Path) -> Result<TimingReport, Error> {
+/// [`ErrorKind::Log`] if it is no such file or holds no histogram; [`ErrorKind::Usage`] if a part of its time is asked for.
+pub fn read_cyclictest(text: &str, place: &Path, selection: Selection) -> Result<TimingReport, Error> {
     let refuse = |why: &str| Error::new(ErrorKind::Log, why).at(place.display().to_string());
     let neither = "no log: neither MCAP nor what `cyclictest --json` writes";
     let file: Value = serde_json::from_str(text).map_err(|_| refuse(neither))?;
     let threads = file["thread"].as_object().ok_or_else(|| refuse(neither))?;
     let unit = if file["resolution_in_ns"].as_u64().unwrap_or(0) > 0 { 1 } else { 1000 };
-    let mut analysis = TimingAnalysis::new(Selection::default());
+    if selection.window != Window::default() {
+        let message = "holds a histogram without times: leave --from and --to out";
+        return Err(Error::new(ErrorKind::Usage, message).at(place.display().to_string()));
+    }
+    let mut analysis = TimingAnalysis::new(selection);
     let groups = threads.iter().map(|(number, thread)| GroupInfo {
         cpu: thread["cpu"].as_u64().and_then(|cpu| usize::try_from(cpu).ok()),
         ..GroupInfo::new(format!("thread{number}"), 0.0)
@@ -44,12 +48,12 @@ pub fn read_cyclictest(text: &str, place: &Path) -> Result<TimingReport, Error> 
     for (group, (number, thread)) in (0..).zip(threads) {
         let bins = thread["histogram"].as_object().filter(|bins| !bins.is_empty());
         let bins = bins.ok_or_else(|| refuse("has no histogram: run cyclictest with -h 1000 (microseconds)"))?;
-        let mut counted = 0;
+        let mut counted = 0_u64;
         for (value, count) in bins {
             let value: u64 = value.parse().map_err(|_| refuse("has a histogram with a value that is no number"))?;
             let count = count.as_u64().ok_or_else(|| refuse("has a histogram with a count that is no number"))?;
             analysis.push_lateness(group, value.saturating_mul(unit), count);
-            counted += count;
+            counted = count.saturating_add(counted);
         }
         let beyond = thread["cycles"].as_u64().unwrap_or(counted).saturating_sub(counted);
         if beyond > 0 {
@@ -78,7 +82,7 @@ mod tests {
 
     #[test]
     fn a_histogram_is_a_group_with_its_lateness() {
-        let report = read_cyclictest(FILE, Path::new("c.json")).unwrap();
+        let report = read_cyclictest(FILE, Path::new("c.json"), Selection::default()).unwrap();
         let group = &report.run.groups[0];
         assert_eq!((group.name.as_str(), group.rate_hz, group.released), ("thread0", None, 1000));
         let late = group.lateness;
@@ -89,7 +93,8 @@ mod tests {
 
     #[test]
     fn other_files_are_refused_in_words() {
-        let error = |text: &str| read_cyclictest(text, Path::new("c.json")).unwrap_err().to_string();
+        let error =
+            |text: &str| read_cyclictest(text, Path::new("c.json"), Selection::default()).unwrap_err().to_string();
         assert!(error("hello").contains("neither MCAP nor"));
         assert!(error("{}").contains("neither MCAP nor"));
         assert!(error(&FILE.replace(r#""3": 900, "10": 98"#, "")).contains("-h 1000"));

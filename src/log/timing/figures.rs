@@ -89,7 +89,9 @@ impl TimingReport {
             }
         }
         for core in &self.cores {
-            for (group, share) in &core.groups {
+            // A core counts all of its groups, also those that are not looked at.
+            let is_looked_at = |name: &str| run.groups.iter().any(|group| group.name == name);
+            for (group, share) in core.groups.iter().filter(|(group, _)| is_looked_at(group)) {
                 figures.real(&format!("{group}.utilisation"), Unit::Share, *share);
             }
             let core_name = core.cpu.map_or("anywhere".to_owned(), |cpu| format!("core{cpu}"));
@@ -155,6 +157,11 @@ impl Figures {
     fn group(&mut self, group: &GroupReport) {
         let name = |figure: &str| format!("{}.{figure}", group.name);
         self.count(&name("released"), group.released);
+        if group.released > 0 && group.execution.count == 0 {
+            // Nothing else is known of it.
+            self.durations(&name("lateness"), group.lateness);
+            return;
+        }
         self.causes(&name("skipped"), group.skipped);
         self.causes(&name("missed"), group.missed);
         for (figure, count) in [

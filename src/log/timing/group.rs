@@ -38,7 +38,7 @@ pub struct TickBin {
 impl Absorb for TickBin {
     fn absorb(&mut self, later: Self) {
         self.released += later.released;
-        self.lateness_sum += later.lateness_sum;
+        self.lateness_sum = self.lateness_sum.saturating_add(later.lateness_sum);
         self.lateness_max = self.lateness_max.max(later.lateness_max);
         self.execution_max = self.execution_max.max(later.execution_max);
         self.response_max = self.response_max.max(later.response_max);

@@ -8,6 +8,10 @@ use crate::time::Nanos;
 
 /// How far back it remembers. A slow group's release begins long before it ends, and a moment is looked at later still.
 const SPAN: Nanos = Nanos(1_000_000_000);
+/// What it remembers at least: what was last before a stall of the whole machine is older.
+const LEAST: usize = 64;
+/// And at most, whatever times a log has: a second of a group at 16 kHz.
+const MOST: usize = 1 << 14;
 /// A command is in the log close to its force, before it or behind it.
 const CLOSE: usize = 64;
 
@@ -59,7 +63,8 @@ impl Recent {
     }
 
     pub(super) fn push_actors(&mut self, times: &ActorTimes) {
-        forget(&mut self.actors, |old| old.scheduled + SPAN < times.scheduled);
+        let end = |old: &ActorTimes| old.spent().iter().fold(old.scheduled, |end, spent| end + *spent);
+        forget(&mut self.actors, |old| end(old) + SPAN < times.scheduled);
         self.actors.push_back(*times);
     }
 
@@ -102,9 +107,9 @@ pub(super) fn is_of(times: &ActorTimes, tick: &TickTiming) -> bool {
     (times.group, times.scheduled) == (tick.group, tick.scheduled)
 }
 
-/// Drops what is too old from the front.
+/// Drops what is too old from the front, and what is too much.
 fn forget<T>(queue: &mut VecDeque<T>, too_old: impl Fn(&T) -> bool) {
-    while queue.front().is_some_and(&too_old) {
+    while queue.len() > LEAST && (queue.len() > MOST || queue.front().is_some_and(&too_old)) {
         queue.pop_front();
     }
 }
@@ -112,6 +117,19 @@ fn forget<T>(queue: &mut VecDeque<T>, too_old: impl Fn(&T) -> bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    // Check that what was last before a stall is still there after it, and that a clock that stands still fills no memory.
+    #[test]
+    fn a_stall_is_remembered_from_both_sides_and_memory_is_bounded() {
+        let mut recent = Recent::default();
+        let force = |ms: u64| ForceSample { time: Nanos(ms * 1_000_000), ..ForceSample::default() };
+        (0..2000).chain(9000..9003).for_each(|ms| recent.push_force(&force(ms)));
+        let around = recent.between(Nanos(1_998_000_000), Nanos(9_001_000_000));
+        let times: Vec<u64> = around.forces.iter().map(|point| point.time.0 / 1_000_000).collect();
+        assert_eq!(times, [1998, 1999, 9000, 9001]);
+        (0..100_000).for_each(|_| recent.push_tick(&TickTiming::default()));
+        assert!(recent.ticks.len() <= MOST + 1, "{}", recent.ticks.len());
+    }
 
     #[test]
     fn a_force_finds_its_command_on_either_side() {

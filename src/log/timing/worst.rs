@@ -9,6 +9,8 @@ use crate::time::Nanos;
 
 /// How many are kept.
 const KEPT: usize = 10;
+/// Candidates whose surroundings have not passed, at most.
+const MOST_WAITING: usize = 64;
 /// A group is out of trouble after so many good releases; good ones are compared in parcels of as many.
 const CALM: u64 = 4;
 /// Periods on each side that belong to a moment, and their limits.
@@ -107,6 +109,11 @@ impl Worst {
         }
         self.waiting.retain(|other| !other.is_of_the_same_episode(&candidate));
         self.waiting.push(candidate);
+        // Times that never pass, as a foreign log may have, must not pile up.
+        if self.waiting.len() > MOST_WAITING {
+            let first = self.waiting.remove(0);
+            self.keep(first, recent);
+        }
     }
 
     /// The worst first; `name` names groups and `actor` their actors.
@@ -160,13 +167,15 @@ impl Worst {
         let waiting = std::mem::take(&mut self.waiting);
         let (ready, waiting): (Vec<_>, Vec<_>) = waiting.into_iter().partition(|one| one.around()[1] < now);
         self.waiting = waiting;
-        for candidate in ready {
-            let [from, to] = candidate.around();
-            self.found.retain(|(other, _)| !other.is_of_the_same_episode(&candidate));
-            let place = self.found.partition_point(|(other, _)| other.severity >= candidate.severity);
-            self.found.insert(place, (candidate, recent.between(from, to)));
-            self.found.truncate(KEPT);
-        }
+        ready.into_iter().for_each(|candidate| self.keep(candidate, recent));
+    }
+
+    fn keep(&mut self, candidate: Candidate, recent: &Recent) {
+        let [from, to] = candidate.around();
+        self.found.retain(|(other, _)| !other.is_of_the_same_episode(&candidate));
+        let place = self.found.partition_point(|(other, _)| other.severity >= candidate.severity);
+        self.found.insert(place, (candidate, recent.between(from, to)));
+        self.found.truncate(KEPT);
     }
 }
 

@@ -14,6 +14,8 @@ pub(super) struct Page {
 impl Page {
     /// Adds a line, cut to the width of the page.
     pub(super) fn line(&mut self, line: String) {
+        // What other programs wrote into a log must not command a terminal.
+        let line: String = line.chars().map(|c| if c.is_control() { '?' } else { c }).collect();
         let mut kept: String = line.chars().take(WIDTH).collect();
         if kept.len() < line.len() {
             kept.truncate(kept.char_indices().nth(WIDTH - 3).map_or(kept.len(), |(at, _)| at));

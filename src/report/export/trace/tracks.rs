@@ -25,6 +25,8 @@ pub(super) struct Tracks {
 #[derive(Debug)]
 struct Lanes {
     name: String,
+    /// Among the groups as they are known now.
+    rank: usize,
     first: u32,
     /// When each is free again.
     free_from: Vec<Nanos>,
@@ -49,13 +51,18 @@ impl Tracks {
         let known = self.order.iter().position(|known| *known == group);
         // Groups that the environment does not know come after those that it does.
         let rank = known.unwrap_or(self.order.len() + usize::from(group));
+        // In the order in which they are met: more groups may become known later.
+        let met = self.groups.len() as u32 + 1;
         let lanes = self.groups.entry(group).or_insert_with(|| Lanes {
             name: name.to_owned(),
-            first: (rank as u32 + 1) * TRACKS_PER_GROUP,
+            rank,
+            first: met * TRACKS_PER_GROUP,
             free_from: Vec::new(),
         });
         let lane = match lanes.free_from.iter().position(|free| *free <= start) {
             Some(lane) => lane,
+            // Times that mean nothing overlap without end.
+            None if lanes.free_from.len() + 1 >= TRACKS_PER_GROUP as usize => lanes.free_from.len() - 1,
             None => {
                 lanes.free_from.push(Nanos::ZERO);
                 let lane = lanes.free_from.len() - 1;
@@ -65,7 +72,11 @@ impl Tracks {
                 };
                 let track = lanes.track(lane);
                 events.metadata("thread_name", track, format_args!("\"name\":{}", Text(&name)))?;
-                events.metadata("thread_sort_index", track, format_args!("\"sort_index\":{}", track.0))?;
+                events.metadata(
+                    "thread_sort_index",
+                    track,
+                    format_args!("\"sort_index\":{}", (lanes.rank + 1) * TRACKS_PER_GROUP as usize + lane),
+                )?;
                 lane
             }
         };

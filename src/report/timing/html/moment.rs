@@ -63,7 +63,7 @@ impl<'a> View<'a> {
     pub(super) fn of(report: &TimingReport, worst: &'a WorstTick) -> Self {
         let WorstTick { timing, moment, .. } = worst;
         let due = timing.end.saturating_sub(worst.overdue);
-        let around = Nanos(worst.overdue.0 * 3 / 5).max(LEAST_AROUND).max(Nanos(2 * worst.period.0));
+        let around = Nanos(worst.overdue.0 / 5 * 3).max(LEAST_AROUND).max(Nanos(worst.period.0.saturating_mul(2)));
         let focus = [due.saturating_sub(around).max(moment.from), (timing.end + around).min(moment.to)];
         let environment = report.run.environment.clone().unwrap_or_default();
         let mut lanes: Vec<Lane<'a>> = Vec::new();
