@@ -336,6 +336,22 @@ fn one_wrong_bit_anywhere_is_damage_and_never_forges_a_message() {
     }
 }
 
+// The name of the environment stands outside all chunks: without it the log looks like another program's.
+#[test]
+fn records_are_as_written_where_the_environment_is_lost() {
+    let sent = entries(60);
+    let mut bytes = log_of(&sent, 120);
+    let name = bytes.windows(11).position(|window| window == b"environment").unwrap();
+    bytes[name] ^= 1;
+    let (got, damage) = read(&bytes);
+    assert!(damage.is_some_and(|damage| damage.contains("checksum")));
+    let records = |entries: &[LogEntry]| {
+        bits(&entries.iter().filter(|entry| matches!(entry, LogEntry::Record(_))).cloned().collect::<Vec<_>>())
+    };
+    let (got, sent) = (records(&got), records(&sent));
+    assert!(got.len() > 400 && got.iter().all(|record| sent.contains(record)));
+}
+
 #[test]
 fn a_log_says_whether_it_has_a_checksum() {
     let checked = |bytes: &[u8]| {

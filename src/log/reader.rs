@@ -184,13 +184,15 @@ impl<R: Read> LogReader<R> {
         self.messages += 1;
         channel.messages += 1;
         self.topic.clone_from(&channel.topic);
-        if let Some(foreign) = &mut channel.foreign {
-            let tick = foreign.tick(data, &mut self.foreign_base);
-            let tick = tick.map_err(|e| format!("a message on {} is no tick timing: {e}", channel.topic))?;
-            return Ok(Some(LogEntry::Record(LogRecord::Tick(tick))));
-        }
-        let Some(kind) = channel.kind else {
-            return Ok(None);
+        let kind = match (channel.kind, &mut channel.foreign) {
+            // What palpate wrote says all of itself, whether or not the environment came through beside it.
+            (Some(kind), _) => kind,
+            (None, Some(foreign)) => {
+                let tick = foreign.tick(data, &mut self.foreign_base);
+                let tick = tick.map_err(|e| format!("a message on {} is no tick timing: {e}", channel.topic))?;
+                return Ok(Some(LogEntry::Record(LogRecord::Tick(tick))));
+            }
+            (None, None) => return Ok(None),
         };
         match decode_data(kind, data) {
             Ok(entry) => Ok(entry),
