@@ -3,5 +3,5 @@
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 # A folder of its own: the flag changes every dependency. None of them runs here, so none is optimised.
 CARGO_TARGET_DIR="$CARGO_TARGET_DIR/loom" RUSTFLAGS="--cfg loom" \
-    cargo test --locked --no-default-features --lib --config 'profile.dev.package."*".opt-level=0' \
-    --config 'profile.dev.debug=false' loom
+    cargo test --locked --no-default-features --lib --config 'profile.dev.opt-level=0' \
+    --config 'profile.dev.package.palpate.debug=false' loom
