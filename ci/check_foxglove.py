@@ -12,7 +12,6 @@ as /force and the stated scale say. Prints the number of messages of each checke
 import argparse
 import collections
 import importlib
-import json
 import math
 import sys
 
@@ -20,6 +19,8 @@ from google.protobuf import descriptor_pool, message_factory
 from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.reader import make_reader
+
+from verdict import verdict
 
 # From here on fields are palpate's own.
 FIRST_OWN = 1000
@@ -172,10 +173,7 @@ def main():
     arguments = parser.parse_args()
     counts, problems = check(arguments.log)
     problems += [f"{topic}: no message" for topic in arguments.expect if not counts[topic]]
-    print(json.dumps(dict(sorted(counts.items()))))
-    for problem in problems[:20]:
-        print(problem, file=sys.stderr)
-    return 1 if problems else 0
+    return verdict(dict(sorted(counts.items())), problems)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,8 @@ from google.protobuf import descriptor_pool
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.reader import make_reader
 
+from verdict import verdict
+
 # Of each type of panel: the keys of its settings that are a topic or a path.
 PANELS = {
     "3D": lambda panel: panel["topics"],
@@ -97,10 +99,8 @@ def main():
         problems += [f"{name}: {id} is arranged or set up, not both" for id in strays]
         found = [(topic, fields, problem(topic, fields, known)) for topic, fields in paths]
         problems += [f"{name}: {topic} {'.'.join(fields)}: {what}" for topic, fields, what in found if what]
-    print(json.dumps(counts))
-    for line in problems:
-        print(line, file=sys.stderr)
-    return 1 if problems or not all(counts.values()) else 0
+    problems += [f"{name}: no topic" for name, count in counts.items() if not count]
+    return verdict(counts, problems)
 
 
 if __name__ == "__main__":

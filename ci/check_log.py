@@ -16,6 +16,8 @@ import sys
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
+from verdict import verdict
+
 
 def read(path):
     """Decodes every message in file order; gives counts by topic and the problems found."""
@@ -77,10 +79,7 @@ def main():
     if arguments.counts:
         with open(arguments.counts, encoding="utf-8") as stream:
             problems += compare(counts, json.load(stream))
-    print(json.dumps(dict(sorted(counts.items()))))
-    for problem in problems[:20]:
-        print(problem, file=sys.stderr)
-    return 1 if problems else 0
+    return verdict(dict(sorted(counts.items())), problems)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ every entity with the messages of its topic. Prints rows and the components that
 
 import argparse
 import collections
-import json
 import os
 import re
 import subprocess
@@ -17,6 +16,8 @@ import sys
 import tempfile
 
 from mcap.reader import make_reader
+
+from verdict import verdict
 
 ANSI = re.compile(r"\x1b\[[0-9;]*m")
 COMPLAINT = re.compile(r"\b(WARN|ERROR)\b|^\s*(error|warning)\b")
@@ -72,10 +73,8 @@ def main():
         f"{topic}: {count} messages, {rows[topic]} rows" for topic, count in messages.items() if rows[topic] != count
     ]
     problems += [f"{topic}: no rows" for topic in arguments.expect if not rows[topic]]
-    print(json.dumps({topic: [rows[topic], *sorted(components[topic])] for topic in sorted(messages) if rows[topic]}))
-    for problem in problems[:20]:
-        print(problem, file=sys.stderr)
-    return 1 if problems else 0
+    shown = {topic: [rows[topic], *sorted(components[topic])] for topic in sorted(messages) if rows[topic]}
+    return verdict(shown, problems)
 
 
 if __name__ == "__main__":

@@ -6,12 +6,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 build_programs
 palpate="$CARGO_TARGET_DIR/debug/palpate"
 
-venv="$CARGO_TARGET_DIR/ci-venv"
-if [ ! -x "$venv/bin/python" ] || ! "$venv/bin/python" -c 'import mcap, mcap_protobuf, foxglove_schemas_protobuf, numpy' 2>/dev/null; then
-    python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages "Python with venv" python3 python3-venv
-    python3 -m venv --clear "$venv"
-    "$venv/bin/pip" install --quiet mcap mcap-protobuf-support foxglove-schemas-protobuf numpy
-fi
+python_venv ci "mcap, mcap_protobuf, foxglove_schemas_protobuf, numpy" mcap mcap-protobuf-support foxglove-schemas-protobuf numpy
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

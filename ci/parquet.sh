@@ -5,12 +5,7 @@ build_programs
 cargo build --locked --profile test --features haply,parquet --bin palpate
 palpate="$CARGO_TARGET_DIR/debug/palpate"
 
-venv="$CARGO_TARGET_DIR/parquet-venv"
-if [ ! -x "$venv/bin/python" ] || ! "$venv/bin/python" -c 'import numpy, pyarrow' 2>/dev/null; then
-    python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages "Python with venv" python3 python3-venv
-    python3 -m venv --clear "$venv"
-    "$venv/bin/pip" install --quiet numpy pyarrow
-fi
+python_venv parquet "numpy, pyarrow" numpy pyarrow
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

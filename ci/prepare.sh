@@ -6,6 +6,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
 # Everything is compiled once: what would make a second time quicker only costs.
 export CARGO_INCREMENTAL=0
+# The checks import each other: nothing is left behind in ci/.
+export PYTHONDONTWRITEBYTECODE=1
 
 # Installs Debian packages if that is possible here: install_packages REASON PACKAGE...
 install_packages() {
@@ -32,4 +34,17 @@ command -v cc >/dev/null || install_packages "a C compiler" gcc libc6-dev
 # jobs compile them once, in the folder `debug`.
 build_programs() {
     cargo build --locked --profile test --features haply --bins --examples
+}
+
+# A folder of Python packages: python_venv NAME MODULES PACKAGE... sets `venv` to its path. It is made again if MODULES, a list with
+# commas, cannot be imported.
+python_venv() {
+    local name=$1 modules=$2
+    shift 2
+    venv="$CARGO_TARGET_DIR/$name-venv"
+    if [ ! -x "$venv/bin/python" ] || ! "$venv/bin/python" -c "import $modules" 2>/dev/null; then
+        python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages "Python with venv" python3 python3-venv
+        python3 -m venv --clear "$venv"
+        "$venv/bin/pip" install --quiet "$@"
+    fi
 }

@@ -4,13 +4,8 @@ source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 build_programs
 palpate="$CARGO_TARGET_DIR/debug/palpate"
 
-venv="$CARGO_TARGET_DIR/viewers-venv"
-if [ ! -x "$venv/bin/rerun" ] || ! "$venv/bin/python" -c 'import mcap, rerun' 2>/dev/null; then
-    python3 -c 'import venv, ensurepip' 2>/dev/null || install_packages "Python with venv" python3 python3-venv
-    python3 -m venv --clear "$venv"
-    # Its commands and their output are read by name: another version may say it otherwise.
-    "$venv/bin/pip" install --quiet mcap rerun-sdk==0.41.0
-fi
+# Its commands and their output are read by name: another version may say it otherwise.
+python_venv viewers "mcap, rerun" mcap rerun-sdk==0.41.0
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
