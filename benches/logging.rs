@@ -166,29 +166,24 @@ fn is_recorded(tick: u64) -> bool {
 
 /// What telling actors apart costs a tick of two actors: the clock is read twice more, and one record is pushed.
 fn actor_times() -> Vec<f64> {
-    const BATCH: usize = 256;
-    let mut graph = Runtime::builder(Execution::Virtual);
-    let mut drain = graph.drain();
-    let mut recorder = graph.recorder(RING);
-    let mut records = Vec::new();
-    let mut batch = |_| {
-        let begun = Instant::now();
-        for i in 0..BATCH {
-            let mut spent = [Nanos::ZERO; ActorTimes::MAX];
-            spent[0] = Nanos::from_duration(black_box(begun.elapsed()));
-            spent[1] = Nanos::from_duration(black_box(begun.elapsed()));
-            recorder.push(ActorTimes { group: 0, scheduled: Nanos(i as u64), actors: 2, spent });
-        }
-        let took = begun.elapsed().as_secs_f64() * 1e9 / BATCH as f64;
-        drain.drain(&mut records);
-        records.clear();
-        took
-    };
-    (0..20_000).map(&mut batch).collect()
+    per_call(|recorder, i, begun| {
+        let mut spent = [Nanos::ZERO; ActorTimes::MAX];
+        spent[0] = Nanos::from_duration(black_box(begun.elapsed()));
+        spent[1] = Nanos::from_duration(black_box(begun.elapsed()));
+        recorder.push(ActorTimes { group: 0, scheduled: Nanos(i), actors: 2, spent });
+    })
 }
 
 fn pushes() -> Vec<f64> {
-    const BATCH: usize = 256;
+    per_call(|recorder, i, _| {
+        recorder.push(black_box(LogRecord::Force(ForceSample { time: Nanos(i), ..ForceSample::default() })));
+    })
+}
+
+/// What a call of `push` takes (ns), as means of batches after which the ring is emptied; it is told which of its batch it is
+/// and when that began.
+fn per_call(mut push: impl FnMut(&mut Recorder, u64, Instant)) -> Vec<f64> {
+    const BATCH: u64 = 256;
     let mut graph = Runtime::builder(Execution::Virtual);
     let mut drain = graph.drain();
     let mut recorder = graph.recorder(RING);
@@ -196,8 +191,7 @@ fn pushes() -> Vec<f64> {
     let mut batch = |_| {
         let begun = Instant::now();
         for i in 0..BATCH {
-            let time = Nanos(i as u64);
-            recorder.push(black_box(LogRecord::Force(ForceSample { time, ..ForceSample::default() })));
+            push(&mut recorder, i, begun);
         }
         let took = begun.elapsed().as_secs_f64() * 1e9 / BATCH as f64;
         drain.drain(&mut records);

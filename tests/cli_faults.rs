@@ -4,7 +4,7 @@
 mod cli_support;
 
 use cli_support::{Folder, rows};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// The scene's default ramp (s).
@@ -30,7 +30,11 @@ fn signal(child: &Child, signal: &str) {
 }
 
 fn finish(child: Child) -> (Option<i32>, String, String) {
-    let output = child.wait_with_output().unwrap();
+    taken_apart(child.wait_with_output().unwrap())
+}
+
+/// Status, standard output and standard error.
+fn taken_apart(output: Output) -> (Option<i32>, String, String) {
     let text = |bytes| String::from_utf8(bytes).unwrap();
     (output.status.code(), text(output.stdout), text(output.stderr))
 }
@@ -136,9 +140,8 @@ fn a_disk_that_becomes_full_keeps_what_fitted_and_the_run_goes_on() {
         .current_dir(folder.path("."))
         .output()
         .unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    let (out, err) = (text(output.stdout), text(output.stderr));
-    assert_eq!(output.status.code(), Some(1), "{out}{err}");
+    let (code, out, err) = taken_apart(output);
+    assert_eq!(code, Some(1), "{out}{err}");
     assert!(err.starts_with("error: the log is incomplete: disk/run.mcap: No space left on device"), "{err}");
     let [released, skipped, _, lost] = local(&out);
     assert_eq!(released + skipped, 8001, "{out}");
@@ -152,26 +155,35 @@ fn a_disk_that_becomes_full_keeps_what_fitted_and_the_run_goes_on() {
     folder.succeed(&["log", "check", "new.mcap"]);
 }
 
-// A pipe whose reader takes 20 kB/s.
-#[test]
-fn a_slow_disk_costs_records_and_not_the_run() {
-    let folder = Folder::new();
+/// A run of `seconds` into a pipe that the shell command `reader` has at its other end: standard output
+/// and standard error.
+fn run_into_pipe(folder: &Folder, seconds: u64, reader: &str) -> (String, String) {
     assert!(Command::new("mkfifo").arg(folder.path("log.mcap")).status().unwrap().success());
-    let slow = "while dd bs=2000 count=1 status=none; do sleep 0.1; done < log.mcap > taken.mcap";
-    let mut reader = Command::new("sh").args(["-c", slow]).current_dir(folder.path(".")).spawn().unwrap();
+    let mut reader = Command::new("sh").args(["-c", reader]).current_dir(folder.path(".")).spawn().unwrap();
     let begun = Instant::now();
-    let child = start(&folder, "12", "log.mcap");
+    let child = start(folder, &seconds.to_string(), "log.mcap");
     let (code, out, err) = finish(child);
     let took = begun.elapsed();
     reader.kill().unwrap();
     reader.wait().unwrap();
     assert_eq!(code, Some(1), "{out}{err}");
-    assert!(err.contains("the disk did not take the last "), "{err}");
+    // Check that the haptic group ran on to its end, and that the report has all its figures
     let [released, skipped, _, lost] = local(&out);
-    assert_eq!(released + skipped, 12_001, "{out}");
+    assert_eq!(released + skipped, 1000 * seconds + 1, "{out}");
+    // Check that it is told what was lost, and when
     assert!(lost > 10_000 && out.contains("records lost between"), "{out}");
-    // 12 s, the wait for the disk, and what a busy machine takes.
+    // The run, the wait for the disk, and what a busy machine takes.
     assert!(took < Duration::from_secs(40), "{took:?}");
+    (out, err)
+}
+
+#[test]
+fn a_slow_disk_costs_records_and_not_the_run() {
+    let folder = Folder::new();
+    // Takes 20 kB/s.
+    let slow = "while dd bs=2000 count=1 status=none; do sleep 0.1; done < log.mcap > taken.mcap";
+    let (out, err) = run_into_pipe(&folder, 12, slow);
+    assert!(err.contains("the disk did not take the last "), "{out}{err}");
     let taken = folder.call(&["export", "taken.mcap", "--topic", "/force"]);
     assert_eq!(taken.code, Some(0), "{taken:?}");
     assert!(rows(&taken.out).len() > 100);
@@ -180,22 +192,7 @@ fn a_slow_disk_costs_records_and_not_the_run() {
 #[test]
 fn a_log_that_nobody_takes_costs_records_and_not_the_run() {
     let folder = Folder::new();
-    assert!(Command::new("mkfifo").arg(folder.path("log.mcap")).status().unwrap().success());
-    // Opens it, which lets the run start, and reads nothing.
-    let mut reader =
-        Command::new("sh").args(["-c", "exec sleep 60 < log.mcap"]).current_dir(folder.path(".")).spawn().unwrap();
-    let begun = Instant::now();
-    let child = start(&folder, "3", "log.mcap");
-    let (code, out, err) = finish(child);
-    let took = begun.elapsed();
-    reader.kill().unwrap();
-    reader.wait().unwrap();
-    assert_eq!(code, Some(1), "{out}{err}");
-    assert!(err.starts_with("error: the log is incomplete: log.mcap: the disk did not take the last "), "{err}");
-    // Check that the haptic group ran on to its end, and that the report has all its figures
-    let [released, skipped, _, lost] = local(&out);
-    assert_eq!(released + skipped, 3001, "{out}");
-    // Check that nearly everything was lost, but for what fits into the pipe, and that it is told when
-    assert!(lost > 10_000 && out.contains("records lost between"), "{out}");
-    assert!(took < Duration::from_secs(40), "{took:?}");
+    // Opens it, which lets the run start, and reads nothing: nearly everything is lost, but for what fits into the pipe.
+    let (out, err) = run_into_pipe(&folder, 3, "exec sleep 60 < log.mcap");
+    assert!(err.starts_with("error: the log is incomplete: log.mcap: the disk did not take the last "), "{out}{err}");
 }

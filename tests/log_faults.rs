@@ -366,7 +366,8 @@ fn a_panicking_disk_or_sink_is_a_log_that_failed() {
         assert_haptic_is_whole(&ran, 500);
         assert_eq!(ran.runtime.fault, None);
         assert!(ran.error.unwrap().to_string().contains("what writes the log panicked"));
-        assert!(ran.report.lost_records() > 500 * PER_TICK);
+        let lost = ran.report.lost_records();
+        assert!(lost >= ran.ticks * PER_TICK, "{lost} of {}", ran.ticks * PER_TICK);
         assert_eq!(ran.report.groups[0].released, ran.ticks);
     }
 }
@@ -418,7 +419,9 @@ fn a_killed_logger_costs_records_and_no_tick() {
         let ran = finish(graph.until(Nanos(3000 * MS)).build().unwrap(), &outcome, &ticks);
         assert_haptic_is_whole(&ran, 3000);
         assert_eq!(ran.runtime.fault.as_ref().unwrap().group, "logger");
-        assert!(ran.runtime.lost_records > 1000, "{}", ran.runtime.lost_records);
+        // The ring holds a thousand and the logger took fewer before: the rest of what was given is lost. A busy machine gives less.
+        let lost = ran.runtime.lost_records;
+        assert!(lost > 0 && lost + 2000 > ran.ticks, "{lost} of {}", ran.ticks);
         let bound = Duration::from_secs(3) + 2 * STOP_BOUND;
         assert!(ran.took < bound, "{:?}", ran.took);
         if !hangs {
