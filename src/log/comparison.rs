@@ -2,6 +2,7 @@
 
 use super::percentiles::Magnitudes;
 use super::records::{LogRecord, Resync};
+use super::vector::magnitude;
 use crate::time::Nanos;
 
 /// What a comparison needs of one run: force and energy of every haptic tick, and the resyncs.
@@ -39,7 +40,7 @@ impl ForceTrace {
 
     /// The largest force (N).
     pub fn peak_n(&self) -> f64 {
-        self.forces_n.iter().map(|force| norm(*force)).fold(0.0, f64::max)
+        self.forces_n.iter().map(|force| magnitude(*force)).fold(0.0, f64::max)
     }
 
     /// The largest energy by magnitude (J).
@@ -49,7 +50,7 @@ impl ForceTrace {
 
     /// How far each tick's force is from that of `full` (N).
     pub fn differences_n(&self, full: &Self) -> impl Iterator<Item = f64> {
-        self.forces_n.iter().zip(&full.forces_n).map(|(force, exact)| norm(minus(*force, *exact)))
+        self.forces_n.iter().zip(&full.forces_n).map(|(force, exact)| magnitude(minus(*force, *exact)))
     }
 }
 
@@ -79,7 +80,7 @@ impl ModelError {
         let scale = percent_of(full.peak_n());
         let ticks = run.forces_n.len().max(1) as f64;
         let squares: f64 = run.differences_n(full).map(|error| error * error).sum();
-        let jump = run.forces_n.windows(2).map(|pair| norm(minus(pair[1], pair[0]))).fold(0.0, f64::max);
+        let jump = run.forces_n.windows(2).map(|pair| magnitude(minus(pair[1], pair[0]))).fold(0.0, f64::max);
         let p99 = |jump: fn(&Resync) -> f64| {
             let mut jumps = Magnitudes::default();
             run.resyncs.iter().for_each(|resync| jumps.push(jump(resync)));
@@ -220,10 +221,6 @@ impl Comparison {
         let scale = 100.0 / self.full.trace.peak_n();
         run.trace.differences_n(&self.full.trace).map(move |error| scale * error)
     }
-}
-
-fn norm([x, y, z]: [f64; 3]) -> f64 {
-    (x * x + y * y + z * z).sqrt()
 }
 
 fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

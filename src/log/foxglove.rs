@@ -2,7 +2,7 @@
 //!
 //! Where palpate has more to say than the schema holds, its own fields follow from number 1001 on in the same message (the
 //! schema's newer editions add fields from 100 on). A viewer that goes by the well-known numbers skips them; one that goes
-//! by the embedded descriptor shows them too. `ci/check_viewers.py` compares all of it with the published schemas.
+//! by the embedded descriptor shows them too. `ci/check_foxglove.py` compares all of it with the published schemas.
 
 use prost_types::FileDescriptorProto;
 

@@ -2,6 +2,7 @@
 
 use super::percentiles::{Distribution, Magnitudes, Percentiles};
 use super::records::{CommandSample, ContactMode, ContactSample, ForceSample, Resync, ServedBy};
+use super::vector::magnitude;
 
 /// The bits of [`CommandSample::limits`].
 const LIMIT_BITS: usize = 16;
@@ -118,7 +119,7 @@ impl HapticsCounter {
         self.force.ticks += 1;
         self.force.served[usize::from(sample.served_by as u16)] += 1;
         self.model_age.push(sample.model_age_s);
-        let magnitude = norm(sample.force_n);
+        let magnitude = magnitude(sample.force_n);
         if magnitude.is_finite() {
             self.force.peak_n = self.force.peak_n.max(magnitude);
         } else {
@@ -138,7 +139,7 @@ impl HapticsCounter {
         for (bit, count) in self.limits.iter_mut().enumerate() {
             *count += u64::from(sample.limits >> bit & 1);
         }
-        let magnitude = norm(sample.force_n);
+        let magnitude = magnitude(sample.force_n);
         if magnitude.is_finite() {
             self.force.peak_commanded_n = self.force.peak_commanded_n.max(magnitude);
         }
@@ -188,8 +189,4 @@ impl HapticsCounter {
             energy: self.energy,
         }
     }
-}
-
-fn norm([x, y, z]: [f64; 3]) -> f64 {
-    (x * x + y * y + z * z).sqrt()
 }

@@ -21,6 +21,7 @@ mod scene_frame;
 mod stats;
 pub mod timing;
 mod window;
+mod vector;
 
 #[cfg(feature = "log")]
 mod backlog;
@@ -79,6 +80,7 @@ pub use records::{
 pub use scene_frame::{SceneFrame, SceneTool};
 pub use stats::{EventSum, GroupStats, StatsCounter};
 pub use window::Window;
+pub(crate) use vector::magnitude;
 
 #[cfg(feature = "log")]
 pub use backlog::{Backlog, BacklogProgress};

@@ -105,6 +105,7 @@ fn from_x_to(v: [f64; 3], length: f64) -> Quaternion {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::magnitude;
 
     /// The x axis turned by `q`.
     fn x_axis(q: &Quaternion) -> [f64; 3] {
@@ -119,8 +120,7 @@ mod tests {
             let tool = SceneTool { force_n, position_m: [1.0, 2.0, 3.0], ..SceneTool::default() };
             let entity = arrow(&tool, force_n, 0.004, 0);
             let drawn = &entity.arrows[0];
-            let [x, y, z]: [f64; 3] = force_n;
-            let magnitude = (x * x + y * y + z * z).sqrt();
+            let magnitude = magnitude(force_n);
             let length = drawn.shaft_length + drawn.head_length;
             assert!((length - 0.02 * magnitude).abs() <= 1e-15, "{force_n:?}: {length}");
             let direction = x_axis(&drawn.pose.orientation);

@@ -2,6 +2,7 @@
 
 pub mod compare;
 mod html;
+mod json_string;
 mod picture;
 mod svg;
 mod timing;

@@ -1,5 +1,7 @@
 //! Numbers for people: three or four significant digits and the unit that keeps them short.
 
+use crate::log::timing::{Unit, Value};
+
 /// A duration in nanoseconds, as `850 ns`, `52.1 us`, `1.23 ms` or `2.50 s`.
 pub(super) fn duration(ns: u64) -> String {
     match ns {
@@ -22,6 +24,39 @@ pub(super) fn force(n: f64) -> String {
         ..1e-3 => scaled(n * 1e6, "uN"),
         ..1.0 => scaled(n * 1e3, "mN"),
         _ => scaled(n, "N"),
+    }
+}
+
+/// A share, 0 to 1, in percent.
+pub(super) fn share(share: f64) -> String {
+    match 100.0 * share {
+        percent if percent >= 10.0 => format!("{percent:.1} %"),
+        percent if percent >= 1.0 => format!("{percent:.2} %"),
+        percent => format!("{percent:.3} %"),
+    }
+}
+
+/// A figure of a report with its unit.
+pub(super) fn figure(value: Value, unit: Unit) -> String {
+    match (unit, value) {
+        (Unit::Nanoseconds, Value::Integer(ns)) => duration(ns),
+        (Unit::Nanoseconds, Value::Real(ns)) => seconds(ns / 1e9),
+        (Unit::Seconds, value) => seconds(value.as_f64()),
+        (Unit::Newtons, value) => force(value.as_f64()),
+        (Unit::Joules, value) => format!("{:.3} mJ", 1e3 * value.as_f64()),
+        (Unit::Share, value) => share(value.as_f64()),
+        (Unit::Count, Value::Integer(count)) => count.to_string(),
+        (Unit::Count, Value::Real(count)) => count.to_string(),
+    }
+}
+
+/// A number with its unit without zeros at the end, `10 us` in place of `10.0 us`, as axes are labelled.
+pub(super) fn trimmed(text: String) -> String {
+    match text.split_once(' ') {
+        Some((number, unit)) if number.contains('.') => {
+            format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
+        }
+        _ => text,
     }
 }
 
@@ -50,5 +85,8 @@ mod tests {
         );
         assert_eq!([0.0, 8.5e-4, 0.0123, 1.234].map(force), ["0 N", "850 uN", "12.3 mN", "1.23 N"]);
         assert_eq!(seconds(f64::NAN), "NaN s");
+        assert_eq!([0.5, 0.0321, 0.000_04].map(share), ["50.0 %", "3.21 %", "0.004 %"]);
+        assert_eq!(["10.0 us", "850 ns", "1.20 N"].map(|text| trimmed(text.to_owned())), ["10 us", "850 ns", "1.2 N"]);
+        assert_eq!(figure(Value::Real(0.0321), Unit::Seconds), "32.1 ms");
     }
 }

@@ -1,7 +1,7 @@
 //! One device over the time of a run: force, model age and resyncs.
 
 use super::over_time::{Absorb, OverTime};
-use crate::log::{CommandSample, ForceSample, Resync};
+use crate::log::{CommandSample, ForceSample, Resync, magnitude};
 use crate::time::Nanos;
 
 const BINS: usize = 600;
@@ -75,7 +75,7 @@ impl Default for DeviceTiming {
 
 impl DeviceTiming {
     pub(super) fn push_force(&mut self, sample: &ForceSample) {
-        let force = magnitude(sample.force_n);
+        let force = finite_magnitude(sample.force_n);
         self.force.at(sample.time).absorb(ForceBin {
             ticks: 1,
             force_n: [force; 2],
@@ -86,7 +86,7 @@ impl DeviceTiming {
 
     pub(super) fn push_command(&mut self, sample: &CommandSample) {
         let bin = self.force.at(sample.time);
-        bin.commanded_n = bin.commanded_n.max(magnitude(sample.force_n));
+        bin.commanded_n = bin.commanded_n.max(finite_magnitude(sample.force_n));
     }
 
     pub(super) fn push_resync(&mut self, resync: &Resync) {
@@ -100,7 +100,7 @@ impl DeviceTiming {
 }
 
 /// Of a force (N); zero for one that is not finite, which the report counts by itself.
-fn magnitude([x, y, z]: [f64; 3]) -> f64 {
-    let magnitude = (x * x + y * y + z * z).sqrt();
+fn finite_magnitude(force_n: [f64; 3]) -> f64 {
+    let magnitude = magnitude(force_n);
     if magnitude.is_finite() { magnitude } else { 0.0 }
 }

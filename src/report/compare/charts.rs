@@ -1,7 +1,7 @@
 //! The plots of a comparison: force and error over time, and speed against error.
 
 use super::milliseconds;
-use crate::log::{ComparedRun, Comparison, Measured};
+use crate::log::{ComparedRun, Comparison, Measured, magnitude};
 use crate::report::svg::{Axis, Chart, Line, Mark, Point};
 use crate::time::Nanos;
 
@@ -209,7 +209,7 @@ impl<'a> Plots<'a> {
 }
 
 fn magnitudes(run: &Measured) -> impl Iterator<Item = f64> {
-    run.trace.forces_n.iter().map(|[x, y, z]| (x * x + y * y + z * z).sqrt())
+    run.trace.forces_n.iter().copied().map(magnitude)
 }
 
 /// A latency as a plot's title says it.

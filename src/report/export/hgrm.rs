@@ -7,7 +7,7 @@ use std::io::{self, Read, Write};
 
 use super::figure::{Figure, Gauge};
 use super::table::lost_topic;
-use super::{output_error, unknown};
+use super::{Micros, output_error, unknown};
 use crate::error::Error;
 use crate::log::{Distribution, LogEntry, LogReader, LogRecord, Window};
 
@@ -64,7 +64,7 @@ fn write(values: &Distribution, title: &str, out: &mut impl Write) -> io::Result
         (max, distinct) = (value, distinct + 1);
         while before < total && part * total <= seen * whole {
             let (level, inverse) = (part as f64 / whole as f64, whole as f64 / (whole - part) as f64);
-            writeln!(out, "{:>12} {level:2.12} {seen:>10} {inverse:>14.2}", micros(value))?;
+            writeln!(out, "{:>12} {level:2.12} {seen:>10} {inverse:>14.2}", Micros(value).to_string())?;
             (part, tick) = (part + 1, tick + 1);
             if tick == TICKS_PER_HALF {
                 (part, whole, tick) = (2 * part, 2 * whole, 0);
@@ -75,7 +75,7 @@ fn write(values: &Distribution, title: &str, out: &mut impl Write) -> io::Result
         }
     }
     if total > 0 {
-        writeln!(out, "{:>12} {:2.12} {total:>10}", micros(max), 1.0)?;
+        writeln!(out, "{:>12} {:2.12} {total:>10}", Micros(max).to_string(), 1.0)?;
     }
     let mean = values.counts().into_iter().map(|(value, count)| u128::from(value) * u128::from(count)).sum::<u128>()
         as f64
@@ -85,15 +85,10 @@ fn write(values: &Distribution, title: &str, out: &mut impl Write) -> io::Result
         values.counts().into_iter().fold(0.0, |sum, (value, count)| sum + count as f64 * (value as f64 - mean).powi(2));
     let deviation = (squares / (total as f64).max(1.0)).sqrt();
     writeln!(out, "#[Mean    = {:>12.3}, StdDeviation   = {:>12.3}]", mean / 1e3, deviation / 1e3)?;
-    writeln!(out, "#[Max     = {:>12}, Total count    = {total:>12}]", micros(max))?;
+    writeln!(out, "#[Max     = {:>12}, Total count    = {total:>12}]", Micros(max).to_string())?;
     // Each value is a bucket of its own.
     writeln!(out, "#[Buckets = {distinct:>12}, SubBuckets     = {:>12}]", 1)?;
     writeln!(out, "# {title}")
-}
-
-/// Nanoseconds as microseconds, to the last digit.
-fn micros(ns: u64) -> String {
-    format!("{}.{:03}", ns / 1000, ns % 1000)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ mod parquet;
 mod table;
 mod trace;
 
+use std::fmt::{self, Display, Formatter};
 use std::io::Read;
 use std::path::Path;
 
@@ -20,6 +21,15 @@ pub use trace::export_trace;
 use crate::error::{Error, ErrorKind};
 use crate::log::LogReader;
 
+/// Nanoseconds as microseconds, to the last digit.
+struct Micros(u64);
+
+impl Display for Micros {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{:03}", self.0 / 1000, self.0 % 1000)
+    }
+}
+
 /// The output could not be written.
 fn output_error(error: std::io::Error) -> Error {
     Error::io(Path::new("output"), error)
@@ -29,4 +39,17 @@ fn output_error(error: std::io::Error) -> Error {
 fn unknown<R: Read>(reader: &LogReader<R>, sort: &str, name: &str, known: &[&str]) -> Error {
     let known = if known.is_empty() { "it has none".to_owned() } else { format!("it has {}", known.join(", ")) };
     Error::new(ErrorKind::Log, format!("the log has no {sort} {name:?}; {known}")).at(reader.place())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn microseconds_keep_every_nanosecond() {
+        assert_eq!(
+            [0, 7, 1_001, 3_600_000_000_001].map(|ns| Micros(ns).to_string()),
+            ["0.000", "0.007", "1.001", "3600000000.001"]
+        );
+    }
 }

@@ -89,7 +89,7 @@ fn plain(n: i32, exponent: i32) -> String {
 }
 
 /// The smallest of 1, 2 and 5 times a power of ten that is not below `step`.
-fn round_step(step: f64) -> f64 {
+pub(in crate::report) fn round_step(step: f64) -> f64 {
     let power = 10_f64.powf(step.log10().floor());
     [1.0, 2.0, 5.0].map(|n| n * power).into_iter().find(|round| *round >= step * (1.0 - 1e-9)).unwrap_or(10.0 * power)
 }

@@ -9,6 +9,6 @@ mod chart;
 mod sign;
 mod thin;
 
-pub(super) use axis::Axis;
+pub(super) use axis::{Axis, round_step};
 pub(super) use chart::{Bars, Chart, Line, Mark, Point, Signs};
 pub(super) use sign::Sign;

@@ -1,8 +1,8 @@
 //! Two logs side by side, for a terminal.
 
 use super::page::Page;
-use crate::log::timing::{Against, ComparedFigure, Figure, TimingReport, Unit, Value};
-use crate::report::units::{duration, force, seconds};
+use crate::log::timing::{Against, ComparedFigure, Figure, TimingReport};
+use crate::report::units;
 use crate::report::verdict::verdict;
 
 /// Beside what differs without doubt, what a table shows: the ends of names.
@@ -50,14 +50,5 @@ fn is_shown(figure: &ComparedFigure) -> bool {
 
 /// The value of a figure with its unit.
 pub fn figure_to_text(figure: &Figure) -> String {
-    match (figure.unit, figure.value) {
-        (Unit::Nanoseconds, Value::Integer(ns)) => duration(ns),
-        (Unit::Nanoseconds, Value::Real(ns)) => seconds(ns / 1e9),
-        (Unit::Seconds, value) => seconds(value.as_f64()),
-        (Unit::Newtons, value) => force(value.as_f64()),
-        (Unit::Joules, value) => format!("{:.3} mJ", 1e3 * value.as_f64()),
-        (Unit::Share, value) => format!("{:.3} %", 100.0 * value.as_f64()),
-        (Unit::Count, Value::Integer(count)) => count.to_string(),
-        (Unit::Count, Value::Real(count)) => count.to_string(),
-    }
+    units::figure(figure.value, figure.unit)
 }

@@ -3,9 +3,11 @@
 //! The format: "Trace Event Format" (Google, 2016), as Perfetto and chrome://tracing read it. Times are microseconds
 //! since the start of the run with three decimals, which are the log's nanoseconds.
 
-use std::fmt::{self, Display, Formatter};
+use std::fmt::Display;
 use std::io::{self, Write};
 
+use crate::report::export::Micros;
+use crate::report::json_string::JsonString;
 use crate::time::Nanos;
 
 /// The number of the one process that a run is.
@@ -75,7 +77,7 @@ impl<W: Write> Events<W> {
             self.out,
             "{separator}{{\"ph\":\"X\",\"pid\":{PROCESS},\"tid\":{tid},\"ts\":{ts},\"dur\":{dur},\"name\":{},\
              \"args\":{{{args}}}}}",
-            Text(name)
+            JsonString(name)
         )
     }
 
@@ -97,7 +99,7 @@ impl<W: Write> Events<W> {
             self.out,
             "{separator}{{\"ph\":\"i\",\"s\":\"{scope}\",\"pid\":{PROCESS},\"tid\":{tid},\"ts\":{ts},\
              \"cat\":\"{category}\",\"name\":{},\"args\":{{{args}}}}}",
-            Text(name)
+            JsonString(name)
         )
     }
 
@@ -107,7 +109,7 @@ impl<W: Write> Events<W> {
         write!(
             self.out,
             "{separator}{{\"ph\":\"C\",\"pid\":{PROCESS},\"tid\":0,\"ts\":{ts},\"name\":{},\"args\":{{\"{unit}\":{value}}}}}",
-            Text(name)
+            JsonString(name)
         )
     }
 
@@ -128,45 +130,5 @@ impl<W: Write> Events<W> {
 
     fn separator(&mut self) -> &'static str {
         if std::mem::take(&mut self.is_first) { "\n" } else { ",\n" }
-    }
-}
-
-/// Nanoseconds as microseconds, to the last digit.
-pub(super) struct Micros(pub(super) u64);
-
-impl Display for Micros {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{:03}", self.0 / 1000, self.0 % 1000)
-    }
-}
-
-/// A JSON string.
-pub(super) struct Text<'a>(pub(super) &'a str);
-
-impl Display for Text<'_> {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.write_str("\"")?;
-        for c in self.0.chars() {
-            match c {
-                '"' | '\\' => write!(f, "\\{c}")?,
-                c if c.is_control() => write!(f, "\\u{:04x}", u32::from(c))?,
-                c => write!(f, "{c}")?,
-            }
-        }
-        f.write_str("\"")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn strings_are_escaped_and_times_keep_every_nanosecond() {
-        assert_eq!(Text("a \"b\" \\ \n\u{7f}é\u{1f600}").to_string(), "\"a \\\"b\\\" \\\\ \\u000a\\u007fé\u{1f600}\"");
-        assert_eq!(
-            [0, 7, 1_001, 3_600_000_000_001].map(|ns| Micros(ns).to_string()),
-            ["0.000", "0.007", "1.001", "3600000000.001"]
-        );
     }
 }

@@ -8,12 +8,13 @@ mod tracks;
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 
-use self::events::{Events, Micros, Phase, Scope, Text, Track};
+use self::events::{Events, Phase, Scope, Track};
 use self::flows::{Flow, Flows, Placed};
 use self::tracks::Tracks;
-use super::output_error;
+use super::{Micros, output_error};
 use crate::error::Error;
-use crate::log::{Environment, ForceSample, LogEntry, LogReader, LogRecord, Resync, TextEvent, Window};
+use crate::log::{Environment, ForceSample, LogEntry, LogReader, LogRecord, Resync, TextEvent, Window, magnitude};
+use crate::report::json_string::JsonString;
 use crate::runtime::record::{ActorTimes, TickTiming};
 
 /// Writes what `window` holds of a log as one JSON document in the Trace Event Format.
@@ -159,8 +160,7 @@ impl<W: Write> Trace<W> {
 
     /// The counters of a device.
     fn force(&mut self, force: &ForceSample) -> io::Result<()> {
-        let [x, y, z] = force.force_n;
-        let magnitude = (x * x + y * y + z * z).sqrt();
+        let magnitude = magnitude(force.force_n);
         let named = |what: &str| match self.environment.device_prefix(force.device).strip_prefix('/') {
             Some(device) => format!("{device}: {what}"),
             None => what.to_owned(),
@@ -201,14 +201,14 @@ impl<W: Write> Trace<W> {
     fn finish(self, place: &str, damage: Option<&str>) -> io::Result<()> {
         let mut about = format!(
             "\"log\":{},\"palpate_version\":{},\"model\":{}",
-            Text(place),
-            Text(&self.environment.palpate_version),
-            Text(&self.environment.model)
+            JsonString(place),
+            JsonString(&self.environment.palpate_version),
+            JsonString(&self.environment.model)
         );
         for (key, value) in &self.environment.granted {
-            about += &format!(",{}:{}", Text(&format!("granted.{key}")), Text(value));
+            about += &format!(",{}:{}", JsonString(&format!("granted.{key}")), JsonString(value));
         }
-        about.extend(damage.map(|damage| format!(",\"damage\":{}", Text(damage))));
+        about.extend(damage.map(|damage| format!(",\"damage\":{}", JsonString(damage))));
         self.events.finish(about)
     }
 }

@@ -4,8 +4,9 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-use super::events::{Events, Text, Track};
+use super::events::{Events, Track};
 use crate::log::Environment;
+use crate::report::json_string::JsonString;
 use crate::time::Nanos;
 
 /// Track numbers from one rate group to the next.
@@ -71,7 +72,7 @@ impl Tracks {
                     overlapping => format!("{} (overlapping {overlapping})", lanes.name),
                 };
                 let track = lanes.track(lane);
-                events.metadata("thread_name", track, format_args!("\"name\":{}", Text(&name)))?;
+                events.metadata("thread_name", track, format_args!("\"name\":{}", JsonString(&name)))?;
                 events.metadata(
                     "thread_sort_index",
                     track,

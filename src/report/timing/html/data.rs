@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::causes::{CAUSES, name, sign};
 use super::moment::{Bar, Lane, Trace, View};
 use super::summary::{at, what_happened};
+use crate::report::json_string::JsonString;
 
 /// The moments as JSON that cannot end the script element around it.
 ///
@@ -12,7 +13,7 @@ use super::summary::{at, what_happened};
 /// cause, [[cause, from, to], ...] of what was skipped before it, [what each actor took]]`.
 pub(super) fn data(views: &[View<'_>]) -> String {
     let causes = list(CAUSES.iter(), |out, &cause| {
-        let (number, name, path) = (cause as u8, string(name(cause)), string(&sign(cause).path(0.0, 0.0)));
+        let (number, name, path) = (cause as u8, JsonString(name(cause)), JsonString(&sign(cause).path(0.0, 0.0)));
         let _ = write!(out, "{{\"number\":{number},\"name\":{name},\"sign\":{path}}}");
     });
     let moments = list(views.iter(), moment);
@@ -28,17 +29,19 @@ fn moment(out: &mut String, view: &View<'_>) {
         view.due.as_secs_f64(),
         span(view.range),
         span(view.focus),
-        string(&format!("{} at {}", view.worst.group, at(view.worst))),
-        string(&what_happened(view.worst).replace('`', "")),
+        JsonString(&format!("{} at {}", view.worst.group, at(view.worst))),
+        JsonString(&what_happened(view.worst).replace('`', "")),
         list(view.lanes.iter(), |out, one| lane(out, view, one)),
         list(view.traces.iter(), |out, trace| force(out, view, trace))
     );
 }
 
 fn lane(out: &mut String, view: &View<'_>, lane: &Lane<'_>) {
-    let actors = list(lane.actors.iter(), |out, actor| out.push_str(&string(actor)));
+    let actors = list(lane.actors.iter(), |out, actor| {
+        let _ = write!(out, "{}", JsonString(actor));
+    });
     let ticks = list(lane.bars.iter(), |out, bar| tick(out, view, lane, bar));
-    let _ = write!(out, "{{\"name\":{},\"actors\":{actors},\"ticks\":{ticks}}}", string(&lane.name));
+    let _ = write!(out, "{{\"name\":{},\"actors\":{actors},\"ticks\":{ticks}}}", JsonString(&lane.name));
 }
 
 fn tick(out: &mut String, view: &View<'_>, lane: &Lane<'_>, bar: &Bar<'_>) {
@@ -65,7 +68,7 @@ fn force(out: &mut String, view: &View<'_>, trace: &Trace) {
         let commanded = commanded.map_or("null".to_owned(), number);
         let _ = write!(out, "[{},{},{commanded}]", view.relative(time), number(force));
     });
-    let _ = write!(out, "{{\"name\":{},\"points\":{points}}}", string(&trace.name));
+    let _ = write!(out, "{{\"name\":{},\"points\":{points}}}", JsonString(&trace.name));
 }
 
 fn list<T>(items: impl Iterator<Item = T>, mut write: impl FnMut(&mut String, T)) -> String {
@@ -80,32 +83,12 @@ fn list<T>(items: impl Iterator<Item = T>, mut write: impl FnMut(&mut String, T)
     out
 }
 
-/// A JSON string; what could end a script element or begin a comment is escaped.
-fn string(text: &str) -> String {
-    let mut out = String::from("\"");
-    for c in text.chars() {
-        match c {
-            '"' | '\\' => out.extend(['\\', c]),
-            '<' | '>' | '&' | '\u{2028}' | '\u{2029}' => {
-                let _ = write!(out, "\\u{:04x}", c as u32);
-            }
-            c if c.is_control() => {
-                let _ = write!(out, "\\u{:04x}", c as u32);
-            }
-            c => out.push(c),
-        }
-    }
-    out.push('"');
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn no_text_ends_the_script_around_it() {
-        assert_eq!(string("</script>\"\\\n"), "\"\\u003c/script\\u003e\\\"\\\\\\u000a\"");
+    fn lists_are_json() {
         assert_eq!(list([1, 2].iter(), |out, n| out.push_str(&n.to_string())), "[1,2]");
         assert!(data(&[]).ends_with("\"moments\":[]}"));
     }

@@ -10,7 +10,7 @@ use crate::log::DeviceReport;
 use crate::log::timing::{DeviceTiming, ForceBin, ResyncBin, TimingReport};
 use crate::report::html::escaped;
 use crate::report::svg::{Axis, Chart, Line, Mark};
-use crate::report::units::{duration, force};
+use crate::report::units::{duration, force, trimmed};
 
 const PERCENTILES: [(&str, &str); 6] =
     [("p50", "p50"), ("p90", "p90"), ("p99", "p99"), ("p99.9", "p999"), ("max", "max"), ("samples", "count")];
@@ -183,11 +183,5 @@ fn resync_chart(device: &DeviceTiming, range: [f64; 2]) -> String {
 
 /// A force as a label of an axis.
 fn newtons(n: f64) -> String {
-    let text = force(n);
-    match text.split_once(' ') {
-        Some((number, unit)) if number.contains('.') => {
-            format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
-        }
-        _ => text,
-    }
+    trimmed(force(n))
 }

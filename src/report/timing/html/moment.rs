@@ -1,5 +1,6 @@
 //! One of the worst moments as both pictures of it show it, the drawn one and that of the script: lanes and forces.
 
+use crate::log::magnitude;
 use crate::log::timing::{ForcePoint, TimingReport, WorstTick};
 use crate::runtime::record::{SlipCause, TickTiming};
 use crate::time::Nanos;
@@ -118,10 +119,6 @@ fn traces(report: &TimingReport, worst: &WorstTick, due: Nanos) -> Vec<Trace> {
         traces.push(Trace { name: device.name.clone(), points: shown.into_iter().map(point).collect() });
     }
     traces
-}
-
-fn magnitude([x, y, z]: [f64; 3]) -> f64 {
-    (x * x + y * y + z * z).sqrt()
 }
 
 /// At most `most` of `all`, those nearest to a time, in their order.

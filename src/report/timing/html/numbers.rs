@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::log::timing::{TimingReport, Unit, Value};
 use crate::report::html::escaped;
-use crate::report::units::{duration, force, seconds};
+use crate::report::units::figure;
 
 /// What stands for a figure that there is none of.
 const NONE: &str = "\u{2013}";
@@ -44,25 +44,11 @@ fn raw(value: Value) -> String {
     }
 }
 
+/// As a terminal has it, but for counts, whose thousands are set apart here.
 fn words(value: Value, unit: Unit) -> String {
-    let real = value.as_f64();
     match (unit, value) {
         (Unit::Count, Value::Integer(count)) => grouped(count),
-        (Unit::Nanoseconds, Value::Integer(ns)) => duration(ns),
-        (Unit::Count, _) => format!("{real}"),
-        (Unit::Nanoseconds, _) => duration(real as u64),
-        (Unit::Seconds, _) => seconds(real),
-        (Unit::Newtons, _) => force(real),
-        (Unit::Joules, _) => format!("{:.3} mJ", 1e3 * real),
-        (Unit::Share, _) => percent(real),
-    }
-}
-
-/// A share, 0 to 1.
-fn percent(share: f64) -> String {
-    match 100.0 * share {
-        percent if percent >= 10.0 => format!("{percent:.1} %"),
-        percent => format!("{percent:.2} %"),
+        _ => figure(value, unit),
     }
 }
 
@@ -99,7 +85,7 @@ mod tests {
             ("0.30000000000000004".into(), "null".into())
         );
         assert_eq!([7, 999, 1000, 3_600_000].map(grouped), ["7", "999", "1\u{202f}000", "3\u{202f}600\u{202f}000"]);
-        assert_eq!(words(Value::Real(0.5), Unit::Share), "50.0 %");
-        assert_eq!(words(Value::Real(0.0321), Unit::Seconds), "32.1 ms");
+        assert_eq!(words(Value::Integer(1000), Unit::Count), "1\u{202f}000");
+        assert_eq!(words(Value::Integer(1000), Unit::Nanoseconds), "1.00 us");
     }
 }

@@ -3,7 +3,7 @@
 use super::{HALF, chart_figure};
 use crate::log::timing::{GroupTiming, Shape};
 use crate::report::svg::{Axis, Bars, Chart, Line, Mark};
-use crate::report::units::duration;
+use crate::report::units::{duration, trimmed};
 use crate::time::Nanos;
 
 /// A quarter of an octave: room on both sides of a logarithmic axis.
@@ -55,13 +55,7 @@ pub(super) fn is_measured(shape: &Shape) -> bool {
 
 /// A duration in ns as a label of an axis.
 pub(super) fn short(ns: f64) -> String {
-    let text = duration(ns.round() as u64);
-    match text.split_once(' ') {
-        Some((number, unit)) if number.contains('.') => {
-            format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
-        }
-        _ => text,
-    }
+    trimmed(duration(ns.round() as u64))
 }
 
 /// A count as a label of an axis.

@@ -6,6 +6,7 @@ use super::causes::{class, sign};
 use super::moment::{Lane, Trace, View};
 use super::shapes::short;
 use crate::report::html::escaped;
+use crate::report::svg::round_step;
 use crate::time::Nanos;
 
 const WIDTH: f64 = 920.0;
@@ -67,7 +68,7 @@ impl Picture<'_> {
 
     fn axis(&mut self, top: f64, down: f64) {
         let [from, to] = self.view.focus.map(|time| self.view.relative(time) as f64);
-        let step = round_step((to - from) / 6.0);
+        let step = round_step(((to - from) / 6.0).max(1.0));
         let (first, last) = ((from / step).ceil() as i64, (to / step).floor() as i64);
         for tick in first..=last {
             let at = tick as f64 * step;
@@ -188,10 +189,4 @@ impl Picture<'_> {
         self.text(LEFT - 8.0, top + 9.0, "end", &crate::report::units::force(high));
         self.text(LEFT - 8.0, top + FORCE, "end", &crate::report::units::force(low));
     }
-}
-
-/// The smallest of 1, 2 and 5 times a power of ten that is not below `step`.
-fn round_step(step: f64) -> f64 {
-    let power = 10_f64.powf(step.max(1.0).log10().floor());
-    [1.0, 2.0, 5.0].map(|n| n * power).into_iter().find(|round| *round >= step).unwrap_or(10.0 * power)
 }
