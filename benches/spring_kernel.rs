@@ -6,13 +6,29 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use palpate::model::Vec3;
-use palpate::model::body::{Block, Body, InstructionSet, Spring, SpringNetwork, State};
+use palpate::model::body::{Block, Body, InstructionSet, Region, Shape, Spring, SpringNetwork, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
 use palpate::model::mesh::{Face, Lattice};
 use palpate::model::simulation::{Simulation, Stepping};
 
 fn block(nodes: usize) -> Block {
     let builder = Block::builder([nodes; 3], [0.1; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
+    builder.fix(Face::ZMin).build().expect("a valid block")
+}
+
+/// The same of several materials: layers of tissue, or another material in every node.
+fn mixed(nodes: usize, is_layered: bool) -> Block {
+    let builder = Block::builder([nodes; 3], [0.1; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
+    let spacing = 0.1 / (nodes - 1) as f64;
+    let layer = |from, to, k| Region::new(Shape::Layer { axis: 2, from, to }).stiffness(k);
+    let regions: Vec<Region> = if is_layered {
+        vec![layer(0.0, 0.04, 60.0), layer(0.04, 0.085, 10.0), layer(0.085, 0.1, 120.0)]
+    } else {
+        let at = |n: usize| [n % nodes, n / nodes % nodes, n / (nodes * nodes)].map(|c| c as f64 * spacing);
+        let one = |n: usize| Shape::Sphere { centre: at(n), radius: 0.1 * spacing };
+        (0..nodes.pow(3)).map(|n| Region::new(one(n)).stiffness(30.0 + n as f64 * 1e-3)).collect()
+    };
+    let builder = regions.into_iter().fold(builder, |builder, region| builder.region(region));
     builder.fix(Face::ZMin).build().expect("a valid block")
 }
 
@@ -107,8 +123,10 @@ fn per_spring(nodes: usize) {
         let net = net.clone().with_instruction_set(set).expect("it is available");
         contestants.push((format!("network, {}", set.name()), forces(net, &state)));
     }
-    let (mixed, mixed_state) = shuffled(&whole, &state);
-    contestants.push(("network, shuffled nodes".into(), forces(mixed, &mixed_state)));
+    contestants.push(("lattice, layers of three materials".into(), forces(mixed(nodes, true), &state)));
+    contestants.push(("lattice, another material in each node".into(), forces(mixed(nodes, false), &state)));
+    let (shuffled, shuffled_state) = shuffled(&whole, &state);
+    contestants.push(("network, shuffled nodes".into(), forces(shuffled, &shuffled_state)));
     let times = least(&mut contestants, 40, 10);
     for ((name, _), time) in contestants.iter().zip(&times) {
         let share = times[0] / time;

@@ -13,15 +13,17 @@ const SPACING_M: f64 = 0.1 / 11.0;
 type Formula = fn(f64) -> [f64; 3];
 
 /// Name, length (s) and formula of every path file.
-const PATHS: [(&str, f64, Formula); 8] = [
+const PATHS: [(&str, f64, Formula); 10] = [
     ("demo.csv", 5.0, demo),
     ("drag.csv", 2.5, drag),
     ("hand.csv", 0.8, hand),
     ("hand_release.csv", 0.4, hand_release),
     ("hold_right.csv", 2.5, hold_right),
     ("hover.csv", 0.0, hover),
+    ("palpate.csv", 2.3, palpate),
     ("press.csv", 0.4, press),
     ("pull_release.csv", 1.0, pull_release),
+    ("slide.csv", 2.7, slide),
 ];
 
 /// The minimum-jerk step from 0 to 1: how a hand moves from one point to another.
@@ -73,6 +75,15 @@ fn hover(_: f64) -> [f64; 3] {
     [8.0 * SPACING_M, 5.0 * SPACING_M, 0.11]
 }
 
+/// Press 6 mm deep, then five times 3 mm deeper while 2 cm along x, lift: fingers that feel for what is below.
+fn palpate(t: f64) -> [f64; 3] {
+    let deeper = 0.003 * (3.0 * PI * (t - 0.3)).sin().powi(2);
+    let is_pressing = (0.3..0.3 + 5.0 / 3.0).contains(&t);
+    let x = 0.035 + 0.02 * min_jerk((t - 0.3) / 1.6);
+    let z = 0.101 - 0.007 * min_jerk(t / 0.3) + 0.009 * min_jerk((t - 2.0) / 0.3);
+    [x, 0.0512, if is_pressing { z - deeper } else { z }]
+}
+
 /// From 1 mm above node [3, 3, 5] of a block of 6 x 6 x 6 nodes to 10 mm below, where a hand wants to be that presses.
 fn press(t: f64) -> [f64; 3] {
     [0.0603, 0.0602, 0.101 - 0.011 * min_jerk(t / 0.4)]
@@ -82,6 +93,13 @@ fn press(t: f64) -> [f64; 3] {
 fn pull_release(t: f64) -> [f64; 3] {
     let z = 0.1 + 0.02 * min_jerk(t / 0.4) * (1.0 - min_jerk((t - 0.6) / 0.4));
     [5.0 * SPACING_M, 5.0 * SPACING_M, z]
+}
+
+/// Press 6 mm deep, slide 6 cm along x, lift.
+fn slide(t: f64) -> [f64; 3] {
+    let x = 0.02 + 0.06 * min_jerk((t - 0.4) / 1.8);
+    let z = 0.101 - 0.007 * min_jerk(t / 0.3) + 0.009 * min_jerk((t - 2.3) / 0.3);
+    [x, 0.0512, z]
 }
 
 /// File names and contents of all paths: a row per millisecond, without the rows inside a stretch of rest.

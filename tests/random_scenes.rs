@@ -187,6 +187,7 @@ fn scene(random: &mut Random, seconds: f64) -> Scene {
             damping_ratio: random.sized(0.01, 3.0),
         },
         kind: Default::default(),
+        regions: Vec::new(),
     });
     scene.contact.friction =
         if random.chance(0.1) { Friction::Stick } else { Friction::Coefficient(random.within(0.0, 1.5)) };

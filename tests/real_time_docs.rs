@@ -18,7 +18,7 @@ const USED_BY_TICKS: &str = "
 /// Types whose own section speaks for all of their methods: plain values, actors, what is gone before a run.
 const SPEAK_FOR_ALL: &str = "
     Nanos Rate TickContext Record TickTiming Event PortUse PortUseKind SlipCause SlipCounts Snapshot
-    LogRecord ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice
+    LogRecord ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice Region Shape
     DeviceActor LocalActor GlobalActor LoggerActor LogSink
     Scripted Replayed
     Block BlockBuilder SpringNetwork SpringNetworkBuilder InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";

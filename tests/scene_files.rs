@@ -40,7 +40,10 @@ fn every_scene_loads_and_says_what_it_shows() {
             "hand",
             "hand_release",
             "haply",
+            "layers",
+            "nodule",
             "pull_release",
+            "soft_deep",
             "two_hands",
             "wave",
             "wave_probe",
@@ -52,7 +55,9 @@ fn every_scene_loads_and_says_what_it_shows() {
         let source = scene.source.as_deref().unwrap();
         assert!(source.starts_with("# ") && source.contains("Look for:"), "{}", file.display());
         assert_eq!(scene.validate().map_err(|error| error.to_string()), Ok(()), "{}", file.display());
-        let model = if scene.devices.len() > 1 { LocalModelKind::Predictive } else { LocalModelKind::Patch };
+        let is_layered = !scene.body.as_ref().unwrap().regions.is_empty();
+        let is_predictive = is_layered || scene.devices.len() > 1;
+        let model = if is_predictive { LocalModelKind::Predictive } else { LocalModelKind::Patch };
         assert_eq!(scene.local.model, model.into(), "{}", file.display());
     }
 }
@@ -92,15 +97,18 @@ fn the_demo_file_reads_as_it_is_written() {
 #[test]
 fn the_demo_file_documents_every_key() {
     let everything = "[body]\n[body.block]\nnodes = [2, 2, 2]\nsize_m = [1, 1, 1]\n[body.material]\nnode_mass_kg = 1\n\
-        stiffness_n_per_m = 1\ndamping_ratio = 1\n[contact]\n[global]\n[local]\n[device]\n[device.plant]\n[device.hand]\n[device.haply]\nmax_force_n = 1\n[[device.fault]]\nkind = \"late\"\nfrom_s = 1\nto_s = 2\n[safety]\n[log]\n[run]\n[initial]\n\
+        stiffness_n_per_m = 1\ndamping_ratio = 1\n[[body.region]]\n\
+        shape = { layer = { axis = \"z\", from_m = 0, to_m = 1 } }\n[contact]\n[global]\n[local]\n[device]\n[device.plant]\n[device.hand]\n[device.haply]\nmax_force_n = 1\n[[device.fault]]\nkind = \"late\"\nfrom_s = 1\nto_s = 2\n[safety]\n[log]\n[run]\n[initial]\n\
         pull = { node = [0, 0, 1], offset_m = [0, 0, 0] }\n[[probe]]\nnode = [0, 0, 0]\n";
     let demo = Scene::demo().source.unwrap();
     let words: Vec<&str> = demo.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).collect();
+    let mut texts = Vec::new();
     for table in [
         "",
         "[body]",
         "[body.block]",
         "[body.material]",
+        "[[body.region]]",
         "[contact]",
         "[global]",
         "[local]",
@@ -120,6 +128,19 @@ fn the_demo_file_documents_every_key() {
         } else {
             everything.replacen(table, &format!("{table}\nqqq = 0"), 1)
         };
+        texts.push((table.to_owned(), text));
+    }
+    let shape = "shape = { layer = { axis = \"z\", from_m = 0, to_m = 1 } }";
+    assert!(everything.contains(shape));
+    for kind in ["", "sphere", "box", "ellipsoid", "layer"] {
+        let spoilt = if kind.is_empty() {
+            "shape = { qqq = 0 }".to_owned()
+        } else {
+            format!("shape = {{ {kind} = {{ qqq = 0 }} }}")
+        };
+        texts.push((spoilt.clone(), everything.replacen(shape, &spoilt, 1)));
+    }
+    for (table, text) in texts {
         let message = Scene::from_toml(&text, "s", None).unwrap_err().to_string();
         let keys = message.split_once("the keys here are ").unwrap_or_else(|| panic!("{table}: {message}")).1;
         for key in keys.split(", ") {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use palpate::scene::{
     BlendKind, BlendSpec, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, InitialSpec, MaterialSpec,
-    ModelChoice, Normals, ProbeSpec, PullSpec, Scene, StepKind,
+    ModelChoice, Normals, ProbeSpec, PullSpec, RegionSpec, Scene, Shape, StepKind,
 };
 use proptest::prelude::*;
 
@@ -40,15 +40,40 @@ fn number(lowest: f64, highest: f64) -> impl Strategy<Value = f64> {
         .prop_map(move |(log, bits)| f64::from_bits(log.exp().to_bits() ^ u64::from(bits)).clamp(lowest, highest))
 }
 
+/// A region of any kind that holds node [0, 0, 0], and so is somewhere in every body.
+fn region() -> impl Strategy<Value = RegionSpec> {
+    let lengths = || [number(0.01, 1.0), number(0.01, 1.0), number(0.01, 1.0)];
+    let shape = prop_oneof![
+        (lengths(), number(2.0, 9.0)).prop_map(|(centre, radius)| Shape::Sphere { centre, radius }),
+        (lengths(), number(2.0, 9.0)).prop_map(|(centre, r)| Shape::Ellipsoid { centre, radii: [r, 2.0 * r, 3.0 * r] }),
+        (lengths(), lengths()).prop_map(|(low, max)| Shape::Box { min: low.map(|x| -x), max }),
+        (0_usize..3, number(0.01, 1.0)).prop_map(|(axis, to)| Shape::Layer { axis, from: -to, to }),
+    ];
+    let value = |least, most| prop::option::of(number(least, most));
+    (shape, any::<bool>(), number(0.1, 1e4), value(0.01, 5.0), value(1e-6, 1.0)).prop_map(
+        |(shape, is_named, stiffness, damping_ratio, node_mass_kg)| RegionSpec {
+            name: is_named.then(|| "a \"hard\" part".to_owned()),
+            shape,
+            stiffness_n_per_m: Some(stiffness),
+            damping_ratio,
+            node_mass_kg,
+        },
+    )
+}
+
 fn body() -> impl Strategy<Value = BodySpec> {
     let size = [number(0.05, 5.0), number(0.05, 5.0), number(0.05, 5.0)];
     let fixed = prop::sample::subsequence(vec![Face::XMin, Face::YMax, Face::ZMin], 0..=3);
-    ([6_usize..20, 6_usize..20, 6_usize..20], size, fixed, number(1e-6, 1.0), number(0.1, 1e4), number(0.01, 5.0))
-        .prop_map(|(nodes, size_m, fixed, node_mass_kg, stiffness_n_per_m, damping_ratio)| BodySpec {
+    let nodes = [6_usize..20, 6_usize..20, 6_usize..20];
+    let material = (number(1e-6, 1.0), number(0.1, 1e4), number(0.01, 5.0));
+    (nodes, size, fixed, material, prop::collection::vec(region(), 0..4)).prop_map(
+        |(nodes, size_m, fixed, (node_mass_kg, stiffness_n_per_m, damping_ratio), regions)| BodySpec {
             block: BlockSpec { nodes, size_m, fixed },
             material: MaterialSpec { node_mass_kg, stiffness_n_per_m, damping_ratio },
             kind: Default::default(),
-        })
+            regions,
+        },
+    )
 }
 
 fn scenes() -> impl Strategy<Value = Scene> {

@@ -1,7 +1,10 @@
 //! The spring kernels against [`Spring::force`], spring by spring: every instruction set of this machine, any state.
 
+mod kernel_support;
+
+use kernel_support::*;
 use palpate::model::Vec3;
-use palpate::model::body::{Block, Body, InstructionSet, Spring, SpringNetwork, State};
+use palpate::model::body::{Block, Body, Spring, SpringNetwork, State};
 use palpate::model::mesh::Lattice;
 use proptest::prelude::*;
 
@@ -20,48 +23,10 @@ fn springs(block: &Block) -> Vec<(u32, u32, Spring)> {
     springs
 }
 
-/// The forces of `springs` one by one, and for each node the sum of the magnitudes that went into it: rounding is a
-/// share of those.
-fn one_by_one(springs: &[(u32, u32, Spring)], state: &State) -> (Vec<Vec3>, Vec<f64>) {
-    let nodes = state.positions.len();
-    let (mut forces, mut sizes) = (vec![Vec3::zeros(); nodes], vec![0.0; nodes]);
-    for &(i, j, spring) in springs {
-        let (i, j) = (i as usize, j as usize);
-        let along = state.positions[j] - state.positions[i];
-        let closing = state.velocities[j] - state.velocities[i];
-        let force = spring.force(along, closing);
-        forces[i] += force;
-        forces[j] -= force;
-        // k L and k L0 cancel, and so may the terms of u . closing.
-        let terms = spring.stiffness * (along.norm() + spring.rest_length) + spring.damping * closing.norm();
-        sizes[i] += terms;
-        sizes[j] += terms;
-    }
-    (forces, sizes)
-}
-
-fn forces(body: &mut dyn Body, state: &State) -> Vec<Vec3> {
-    let mut forces = vec![Vec3::from_element(f64::NAN); state.positions.len()];
-    body.forces(state, &mut forces);
-    forces
-}
-
-fn sets() -> impl Iterator<Item = InstructionSet> {
-    InstructionSet::ALL.into_iter().filter(|set| set.is_available())
-}
-
 /// A network of `rest`.
 fn network(rest: &[Vec3], springs: &[(u32, u32, Spring)]) -> SpringNetwork {
     let builder = SpringNetwork::builder(rest.to_vec()).masses(vec![0.5e-3; rest.len()]);
     builder.springs(springs.iter().copied()).build().unwrap()
-}
-
-fn agree(what: &str, got: &[Vec3], expected: &(Vec<Vec3>, Vec<f64>)) -> Result<(), TestCaseError> {
-    for (n, (got, (expected, size))) in got.iter().zip(expected.0.iter().zip(&expected.1)).enumerate() {
-        let off = (got - expected).norm();
-        prop_assert!(off <= 2e-14 * size, "{what}, node {n}: {got:?} and {expected:?}, {off:e} of {size:e}");
-    }
-    Ok(())
 }
 
 fn vectors(nodes: usize, size: f64) -> impl Strategy<Value = Vec<Vec3>> {

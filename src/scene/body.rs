@@ -1,5 +1,6 @@
 //! The body's part of a scene: shape, fixed faces, material.
 
+use super::RegionSpec;
 use crate::model::mesh::Face;
 
 /// A block of nodes joined by springs to all 26 neighbours.
@@ -13,6 +14,9 @@ pub struct BodySpec {
     pub block: BlockSpec,
     /// What it is made of.
     pub material: MaterialSpec,
+    /// Parts that differ from that, in order: later ones win.
+    #[cfg_attr(feature = "scene", serde(default, rename = "region", skip_serializing_if = "Vec::is_empty"))]
+    pub regions: Vec<RegionSpec>,
 }
 
 /// The kinds of body that a scene file can name.
@@ -42,13 +46,13 @@ fn default_fixed() -> Vec<Face> {
     vec![Face::ZMin]
 }
 
-/// One material for all springs and nodes.
+/// The material of all springs and nodes that are in no region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
 pub struct MaterialSpec {
-    /// Mass of every node (kg).
+    /// Mass of a node (kg).
     pub node_mass_kg: f64,
-    /// Stiffness k of every spring (N/m).
+    /// Stiffness k of a spring (N/m).
     pub stiffness_n_per_m: f64,
     /// zeta in b = zeta sqrt(2 m k), the paper's definition.
     pub damping_ratio: f64,

@@ -14,6 +14,7 @@ mod device_fault;
 mod devices;
 mod haply;
 mod models;
+mod region;
 mod safety;
 mod validate;
 mod validate_device;
@@ -38,6 +39,7 @@ pub use choice::ModelChoice;
 pub use contact::{ContactSpec, Friction};
 
 pub use crate::devices::{Axis, HandSpec, PlantSpec, SafetyStop, ToolPath};
+pub use crate::model::body::Shape;
 pub use crate::model::contact::{Equations, Normals};
 pub use crate::model::mesh::Face;
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
@@ -45,6 +47,7 @@ pub use device_fault::{FaultKind, FaultSpec};
 pub(crate) use devices::{MAX_DEVICES, field as device_field, numbered};
 pub use haply::HaplySpec;
 pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
+pub use region::RegionSpec;
 pub use safety::{SafetySpec, SafetyStage};
 
 /// Everything a run needs to know.

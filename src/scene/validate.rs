@@ -3,7 +3,7 @@
 use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 use super::{
     BlendKind, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec, LocalModelKind,
-    LocalSpec, ModelChoice, Scene, StepKind, devices, safety,
+    LocalSpec, ModelChoice, Scene, StepKind, devices, region, safety,
 };
 use crate::error::Error;
 use crate::time::Rate;
@@ -102,7 +102,7 @@ fn body(body: &BodySpec) -> Result<(), Error> {
         let message = "stiffness or damping over mass is beyond all numbers, check the units (kg, N/m)";
         return Err(Error::scene("body.material", message));
     }
-    Ok(())
+    region::validate(body)
 }
 
 fn lattice(block: &BlockSpec) -> Result<(), Error> {

@@ -292,11 +292,12 @@ fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
     Rate::from_hz(hz).ok_or_else(|| Error::scene(field, format!("is {hz}, which is no rate")))
 }
 
-fn block(spec: &BodySpec) -> Result<Block, Error> {
+pub(super) fn block(spec: &BodySpec) -> Result<Block, Error> {
     let builder = Block::builder(spec.block.nodes, spec.block.size_m)
         .node_mass(spec.material.node_mass_kg)
         .stiffness(spec.material.stiffness_n_per_m)
         .damping_ratio(spec.material.damping_ratio);
+    let builder = spec.regions.iter().fold(builder, |builder, spec| builder.region(spec.region()));
     spec.block.fixed.iter().fold(builder, |builder, &face| builder.fix(face)).build().map_err(|error| error.at("body"))
 }
 

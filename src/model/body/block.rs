@@ -4,6 +4,7 @@ use super::super::Vec3;
 use super::super::mesh::{Face, Lattice, Surface};
 use super::kernel::{InstructionSet, LatticeKernel};
 use super::lattice_springs::LatticeSprings;
+use super::region::{Material, Region, materials, region_field};
 use super::{Body, Link, State, TangentBlock};
 use crate::error::Error;
 
@@ -29,9 +30,8 @@ pub struct Block {
 pub struct BlockBuilder {
     nodes: [usize; 3],
     size: [f64; 3],
-    stiffness: f64,
-    damping_ratio: f64,
-    node_mass: f64,
+    material: Material,
+    regions: Vec<Region>,
     fixed: Vec<Face>,
 }
 
@@ -39,21 +39,32 @@ impl BlockBuilder {
     /// Stiffness of every spring (N/m).
     #[must_use]
     pub fn stiffness(mut self, n_per_m: f64) -> Self {
-        self.stiffness = n_per_m;
+        self.material.stiffness = n_per_m;
         self
     }
 
     /// zeta in b = zeta sqrt(2 m k), the paper's definition.
     #[must_use]
     pub fn damping_ratio(mut self, zeta: f64) -> Self {
-        self.damping_ratio = zeta;
+        self.material.damping_ratio = zeta;
         self
     }
 
     /// Mass of every node (kg).
     #[must_use]
     pub fn node_mass(mut self, kg: f64) -> Self {
-        self.node_mass = kg;
+        self.material.node_mass = kg;
+        self
+    }
+
+    /// Makes a part of it of something else; a later region wins where several give the same.
+    ///
+    /// A node has the material of the regions that hold its rest position. A spring between two materials is half a
+    /// spring of each in series: k = 2 k1 k2 / (k1 + k2), as a rod that changes halfway, and b likewise from each node's
+    /// own b = zeta sqrt(2 m k), so 0 if one of them is.
+    #[must_use]
+    pub fn region(mut self, region: Region) -> Self {
+        self.regions.push(region);
         self
     }
 
@@ -67,29 +78,33 @@ impl BlockBuilder {
     /// Makes the block.
     ///
     /// # Errors
-    /// If a number is not finite, a mass, stiffness or size is not positive, or an axis has less than two nodes.
+    /// If a number is not finite, a mass, stiffness or size is not positive, an axis has less than two nodes, or a region
+    /// holds no node or differs in nothing.
     pub fn build(self) -> Result<Block, Error> {
         let positive = |value: f64| value.is_finite() && value > 0.0;
+        let Material { stiffness, damping_ratio, node_mass } = self.material;
         if self.nodes.iter().any(|&n| n < 2) {
             return Err(Error::scene("nodes", format!("{:?}: at least 2 per axis are needed", self.nodes)));
         }
         if !self.size.iter().all(|&length| positive(length)) {
             return Err(Error::scene("size_m", format!("{:?}: three lengths above 0 are needed", self.size)));
         }
-        for (field, value) in [("node_mass_kg", self.node_mass), ("stiffness_n_per_m", self.stiffness)] {
+        for (field, value) in [("node_mass_kg", node_mass), ("stiffness_n_per_m", stiffness)] {
             if !positive(value) {
                 return Err(Error::scene(field, format!("{value}: a finite value above 0 is needed")));
             }
         }
-        if !(self.damping_ratio.is_finite() && self.damping_ratio >= 0.0) {
-            return Err(Error::scene("damping_ratio", format!("{}: 0 or more is needed", self.damping_ratio)));
+        if !(damping_ratio.is_finite() && damping_ratio >= 0.0) {
+            return Err(Error::scene("damping_ratio", format!("{damping_ratio}: 0 or more is needed")));
         }
         let lattice = Lattice { nodes: self.nodes };
         let spacing: [f64; 3] = std::array::from_fn(|axis| self.size[axis] / (self.nodes[axis] - 1) as f64);
         let at = |id: usize| lattice.coordinates(id as u32);
         let held = |id: usize| self.fixed.iter().any(|&face| face.holds(at(id), self.nodes));
-        let damping = self.damping_ratio * (2.0 * self.node_mass * self.stiffness).sqrt();
-        let springs = LatticeSprings::uniform(&lattice, spacing, self.stiffness, damping);
+        let materials = materials(lattice, self.size, self.material, &self.regions)
+            .map_err(|(index, (key, message))| Error::scene(&region_field("region", index, key), message))?;
+        let springs = LatticeSprings::new(&lattice, spacing, &materials);
+        let inverse_mass = |id: usize| if held(id) { 0.0 } else { 1.0 / materials[id].node_mass };
         Ok(Block {
             lattice,
             rest: (0..lattice.len())
@@ -98,7 +113,7 @@ impl BlockBuilder {
                     Vec3::from_fn(|axis, _| at[axis] as f64 * spacing[axis])
                 })
                 .collect(),
-            inverse_masses: (0..lattice.len()).map(|id| if held(id) { 0.0 } else { 1.0 / self.node_mass }).collect(),
+            inverse_masses: (0..lattice.len()).map(inverse_mass).collect(),
             surface: Surface::new(lattice.len(), lattice.surface_triangles())?,
             kernel: LatticeKernel::new(&springs),
             springs,
@@ -109,7 +124,8 @@ impl BlockBuilder {
 impl Block {
     /// Starts a block of `nodes` per axis and `size` (m).
     pub fn builder(nodes: [usize; 3], size: [f64; 3]) -> BlockBuilder {
-        BlockBuilder { nodes, size, stiffness: 30.0, damping_ratio: 0.3, node_mass: 0.5e-3, fixed: Vec::new() }
+        let material = Material { stiffness: 30.0, damping_ratio: 0.3, node_mass: 0.5e-3 };
+        BlockBuilder { nodes, size, material, regions: Vec::new(), fixed: Vec::new() }
     }
 
     /// The lattice: numbering and neighbours.

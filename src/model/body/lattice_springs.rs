@@ -1,7 +1,10 @@
 //! The springs of a lattice, by forward offset and lower node.
 
+use std::collections::HashMap;
+
 use super::super::mesh::Lattice;
-use super::kernel::LANES;
+use super::kernel::{LANES, Lane};
+use super::region::{Material, in_series};
 use super::spring::Spring;
 
 /// All springs in one direction: from node p to p + `delta`.
@@ -11,12 +14,32 @@ pub(super) struct Offset {
     pub(super) rest_length: f64,
 }
 
-/// Springs of one stiffness and damping to all 26 neighbours of every node.
+/// Stiffness k (N/m) and damping b (N s/m) of the springs that begin at eight nodes, by offset.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Coefficients {
+    pub(super) stiffness: [Lane; 13],
+    pub(super) damping: [Lane; 13],
+}
+
+/// Stiffness and damping of every spring.
+#[derive(Clone, Debug)]
+pub(super) enum Elasticity {
+    /// The same for all.
+    Uniform { stiffness: f64, damping: f64 },
+    /// Of several materials.
+    Varied {
+        /// Each different set once: a body of few materials has few, which stay in the cache.
+        sets: Vec<Coefficients>,
+        /// For every eight nodes the number of its set.
+        set_of: Vec<u32>,
+    },
+}
+
+/// Springs to all 26 neighbours of every node.
 #[derive(Clone, Debug)]
 pub(super) struct LatticeSprings {
     nodes: usize,
-    stiffness: f64,
-    damping: f64,
+    elasticity: Elasticity,
     offsets: [Offset; 13],
     /// For every eight nodes p and every offset, whose bit n says that the spring from p + n is there: where the
     /// lattice ends there is none.
@@ -24,8 +47,8 @@ pub(super) struct LatticeSprings {
 }
 
 impl LatticeSprings {
-    /// Equal springs everywhere; `spacing` between nodes (m), `stiffness` (N/m), `damping` (N s/m).
-    pub(super) fn uniform(lattice: &Lattice, spacing: [f64; 3], stiffness: f64, damping: f64) -> Self {
+    /// Springs of the `materials` of their nodes, half of each; `spacing` between nodes (m).
+    pub(super) fn new(lattice: &Lattice, spacing: [f64; 3], materials: &[Material]) -> Self {
         let nodes = lattice.len();
         let [nx, ny, _] = lattice.nodes.map(|n| n as isize);
         let offsets = Lattice::FORWARD.map(|offset| {
@@ -42,7 +65,8 @@ impl LatticeSprings {
                 *bits |= u8::from(lattice.neighbour(at, offset).is_some()) << (p % LANES);
             }
         }
-        Self { nodes, stiffness, damping, offsets, exist }
+        let elasticity = Elasticity::new(lattice, materials, &exist);
+        Self { nodes, elasticity, offsets, exist }
     }
 
     /// Number of nodes.
@@ -55,14 +79,9 @@ impl LatticeSprings {
         self.offsets.iter().map(|offset| offset.delta).max().unwrap_or(0)
     }
 
-    /// Stiffness k (N/m) of every spring.
-    pub(super) fn stiffness(&self) -> f64 {
-        self.stiffness
-    }
-
-    /// Damping b (N s/m) of every spring.
-    pub(super) fn damping(&self) -> f64 {
-        self.damping
+    /// Stiffness and damping of the springs.
+    pub(super) fn elasticity(&self) -> &Elasticity {
+        &self.elasticity
     }
 
     pub(super) fn offsets(&self) -> &[Offset; 13] {
@@ -82,12 +101,67 @@ impl LatticeSprings {
     /// The neighbours of `node` and the springs that lead to them.
     pub(super) fn neighbours(&self, lattice: &Lattice, node: u32) -> impl Iterator<Item = (u32, Spring)> {
         let at = lattice.coordinates(node);
-        let (lattice, stiffness, damping) = (*lattice, self.stiffness, self.damping);
-        Lattice::FORWARD.iter().zip(&self.offsets).flat_map(move |(&direction, offset)| {
-            let spring = Spring { stiffness, damping, rest_length: offset.rest_length };
-            let forward = lattice.neighbour(at, direction);
-            let backward = lattice.neighbour(at, direction.map(|c| -c));
-            [forward, backward].into_iter().flatten().map(move |to| (lattice.id(to), spring))
+        let lattice = *lattice;
+        Lattice::FORWARD.iter().zip(&self.offsets).enumerate().flat_map(move |(direction, (&step, offset))| {
+            let forward = lattice.neighbour(at, step).map(|to| (node, to));
+            let backward = lattice.neighbour(at, step.map(|c| -c)).map(|to| (lattice.id(to), to));
+            [forward, backward].into_iter().flatten().map(move |(first, to)| {
+                let (stiffness, damping) = self.elasticity.of(first, direction);
+                (lattice.id(to), Spring { stiffness, damping, rest_length: offset.rest_length })
+            })
         })
+    }
+}
+
+impl Elasticity {
+    fn new(lattice: &Lattice, materials: &[Material], exist: &[[u8; 13]]) -> Self {
+        let uniform = Self::Uniform { stiffness: materials[0].stiffness, damping: materials[0].damping() };
+        if materials.windows(2).all(|pair| pair[0] == pair[1]) {
+            return uniform;
+        }
+        let (mut sets, mut set_of) = (Vec::new(), Vec::with_capacity(exist.len()));
+        let mut known: HashMap<Vec<u64>, u32> = HashMap::new();
+        for (eight, exist) in exist.iter().enumerate() {
+            let set = Coefficients::new(lattice, materials, eight * LANES, exist);
+            let bits = set.stiffness.iter().chain(&set.damping).flatten().map(|value| value.to_bits()).collect();
+            set_of.push(*known.entry(bits).or_insert_with(|| {
+                sets.push(set);
+                sets.len() as u32 - 1
+            }));
+        }
+        Self::Varied { sets, set_of }
+    }
+
+    /// Stiffness and damping of the spring from node `first` in forward `direction`.
+    fn of(&self, first: u32, direction: usize) -> (f64, f64) {
+        match self {
+            Self::Uniform { stiffness, damping } => (*stiffness, *damping),
+            Self::Varied { sets, set_of } => {
+                let (eight, lane) = (first as usize / LANES, first as usize % LANES);
+                let set = &sets[set_of[eight] as usize];
+                (set.stiffness[direction][lane], set.damping[direction][lane])
+            }
+        }
+    }
+}
+
+impl Coefficients {
+    /// Those of the springs that begin at the eight nodes from `first` on.
+    fn new(lattice: &Lattice, materials: &[Material], first: usize, exist: &[u8; 13]) -> Self {
+        let mut new = Self { stiffness: [[0.0; LANES]; 13], damping: [[0.0; LANES]; 13] };
+        for (direction, &offset) in Lattice::FORWARD.iter().enumerate() {
+            // A lane without a spring has what the lane before has: fewer sets differ. Whatever it is, it is masked.
+            let mut last = (materials[first].stiffness, materials[first].damping());
+            for lane in 0..LANES {
+                if exist[direction] >> lane & 1 == 1 {
+                    let here = (first + lane) as u32;
+                    let to = lattice.neighbour(lattice.coordinates(here), offset).map_or(here, |to| lattice.id(to));
+                    let [a, b] = [here, to].map(|node| materials[node as usize]);
+                    last = (in_series(a.stiffness, b.stiffness), in_series(a.damping(), b.damping()));
+                }
+                (new.stiffness[direction][lane], new.damping[direction][lane]) = last;
+            }
+        }
+        new
     }
 }

@@ -4,11 +4,16 @@ mod block;
 pub(in crate::model) mod kernel;
 mod lattice_springs;
 mod network;
+mod region;
+mod shape;
 mod spring;
 
 pub use block::{Block, BlockBuilder};
 pub use kernel::InstructionSet;
 pub use network::{SpringNetwork, SpringNetworkBuilder};
+pub use region::Region;
+pub(crate) use region::{Material, materials, region_field};
+pub use shape::Shape;
 pub use spring::{Spring, SpringTangent};
 
 use super::mesh::Surface;

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::super::super::Vec3;
-use super::super::lattice_springs::LatticeSprings;
+use super::super::lattice_springs::{Coefficients, Elasticity, LatticeSprings};
 use super::cores::Cores;
 use super::nodes::Arrays;
 use super::pull::{Springs, scale, shortest};
@@ -134,7 +134,16 @@ impl Work for Evaluation<'_> {
         fx.fill(0.0);
         fy.fill(0.0);
         fz.fill(0.0);
-        accumulate(s, springs, eights, [x, y, z, u, v, w], [&mut *fx, &mut *fy, &mut *fz]);
+        let (motion, forces) = ([&*x, &*y, &*z, &*u, &*v, &*w], [&mut *fx, &mut *fy, &mut *fz]);
+        match springs.elasticity() {
+            &Elasticity::Uniform { stiffness, damping } => {
+                let same = Uniform { number: stiffness, stiffness: s.splat(stiffness), damping: s.splat(damping) };
+                accumulate(s, springs, eights, same, motion, forces);
+            }
+            Elasticity::Varied { sets, set_of } => {
+                accumulate(s, springs, eights, Varied { sets, set_of }, motion, forces);
+            }
+        }
         store(s, [fx, fy, fz], out);
     }
 }
@@ -180,21 +189,74 @@ fn store<S: Simd>(s: S, [x, y, z]: [&[f64]; 3], vectors: &mut [Vec3]) {
     }
 }
 
+/// Where the coefficients of eight springs come from.
+trait Source<S: Simd>: Copy {
+    /// What belongs to eight nodes.
+    type Eight: Copy;
+
+    fn eight(self, eight: usize) -> Self::Eight;
+    /// Stiffness, damping and k L0 of the springs from there in `direction`.
+    fn springs(self, s: S, eight: Self::Eight, direction: usize, rest_length: f64) -> [S::V; 3];
+}
+
+/// The same for all springs: kept in registers.
+#[derive(Clone, Copy)]
+struct Uniform<S: Simd> {
+    number: f64,
+    stiffness: S::V,
+    damping: S::V,
+}
+
+impl<S: Simd> Source<S> for Uniform<S> {
+    type Eight = ();
+
+    #[inline(always)]
+    fn eight(self, _: usize) {}
+
+    #[inline(always)]
+    fn springs(self, s: S, (): (), _: usize, rest_length: f64) -> [S::V; 3] {
+        [self.stiffness, self.damping, s.splat(self.number * rest_length)]
+    }
+}
+
+/// Those of several materials.
+#[derive(Clone, Copy)]
+struct Varied<'a> {
+    sets: &'a [Coefficients],
+    set_of: &'a [u32],
+}
+
+impl<'a, S: Simd> Source<S> for Varied<'a> {
+    type Eight = &'a Coefficients;
+
+    #[inline(always)]
+    fn eight(self, eight: usize) -> &'a Coefficients {
+        &self.sets[self.set_of[eight] as usize]
+    }
+
+    #[inline(always)]
+    fn springs(self, s: S, eight: &'a Coefficients, direction: usize, rest_length: f64) -> [S::V; 3] {
+        let stiffness = s.load(&eight.stiffness[direction]);
+        [stiffness, s.load(&eight.damping[direction]), s.mul(stiffness, s.splat(rest_length))]
+    }
+}
+
 #[inline(always)]
-fn accumulate<S: Simd>(
+fn accumulate<S: Simd, C: Source<S>>(
     s: S,
     springs: &LatticeSprings,
     eights: Range<usize>,
+    source: C,
     [x, y, z, u, v, w]: [&[f64]; 6],
     [fx, fy, fz]: [&mut [f64]; 3],
 ) {
-    let (stiffness, damping) = (s.splat(springs.stiffness()), s.splat(springs.damping()));
-    for (n, exist) in springs.exist()[eights].iter().enumerate() {
+    for (n, eight) in eights.enumerate() {
         let first = n * LANES;
+        let coefficients = source.eight(eight);
         let here = [s.load(lane(x, first)), s.load(lane(y, first)), s.load(lane(z, first))];
         let speed = [s.load(lane(u, first)), s.load(lane(v, first)), s.load(lane(w, first))];
         let mut own = [s.splat(0.0); 3];
-        for (bits, offset) in exist.iter().zip(springs.offsets()) {
+        for (direction, (bits, offset)) in springs.exist()[eight].iter().zip(springs.offsets()).enumerate() {
             let other = first + offset.delta;
             let along = [
                 s.sub(s.load(lane(x, other)), here[0]),
@@ -206,14 +268,10 @@ fn accumulate<S: Simd>(
                 s.sub(s.load(lane(v, other)), speed[1]),
                 s.sub(s.load(lane(w, other)), speed[2]),
             ];
-            let eight = Springs {
-                exist: s.mask(*bits),
-                stiffness,
-                damping,
-                preload: s.splat(springs.stiffness() * offset.rest_length),
-                shortest: s.splat(shortest(offset.rest_length)),
-            };
-            let scale = scale(s, &along, &closing, &eight);
+            let [stiffness, damping, preload] = source.springs(s, coefficients, direction, offset.rest_length);
+            let shortest = s.splat(shortest(offset.rest_length));
+            let joined = Springs { exist: s.mask(*bits), stiffness, damping, preload, shortest };
+            let scale = scale(s, &along, &closing, &joined);
             for axis in 0..3 {
                 own[axis] = s.mul_add(scale, along[axis], own[axis]);
             }
