@@ -15,3 +15,6 @@ if chrt -f 80 true 2>/dev/null; then
 else
     echo "wakeup: left out, no right to priority 80 here"
 fi
+cd ../..
+python_venv balance numpy,slycot numpy slycot
+"$venv/bin/python" benches/rivals/balance.py 8 1

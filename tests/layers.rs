@@ -37,7 +37,7 @@ const QUARANTINE: [(&str, &[&str]); 6] = [
         ],
     ),
     ("parry3d_f64", &["model/geometry.rs"]),
-    ("faer", &["model/dense.rs", "model/sparse.rs"]),
+    ("faer", &["model/dense.rs", "model/reduction/linalg.rs", "model/sparse.rs"]),
     ("rayon", &["model/body/kernel/cores.rs"]),
     // However the path to them is cut up into braces.
     ("atomic", &["runtime/sync.rs"]),

@@ -19,6 +19,7 @@ const USED_BY_TICKS: &str = "
 const SPEAK_FOR_ALL: &str = "
     Nanos Rate TickContext Record TickTiming Event PortUse PortUseKind SlipCause SlipCounts Snapshot
     LogRecord ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice Region Shape
+    Ports Projection SecondOrder Congruence Modal Balanced StateSpace ErrorBound LinearBody LocalityCheck ContactStiffness StiffnessError PaperMesh Response
     DeviceActor LocalActor GlobalActor LoggerActor LogSink
     Scripted Replayed
     Block BlockBuilder SpringNetwork SpringNetworkBuilder InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";

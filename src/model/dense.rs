@@ -3,8 +3,9 @@
 //! A matrix is a slice, column after column.
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::solvers::SelfAdjointEigen;
-use faer::{Accum, Mat, MatRef, Par, Side};
+use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 
 /// Singular values below this share of the largest are rounding: the Gram matrix squares them.
 const NUMERICAL_RANK: f64 = 1e-7;
@@ -12,7 +13,7 @@ const NUMERICAL_RANK: f64 = 1e-7;
 /// The left singular vectors of the largest singular values of `matrix` (columns of `rows` numbers), at most `count`.
 pub(super) fn leading_left_singular_vectors(matrix: &[f64], rows: usize, count: usize) -> Vec<f64> {
     let columns = matrix.len() / rows.max(1);
-    let Some((values, vectors)) = eigen(&product(matrix, matrix, rows)) else { return Vec::new() };
+    let Some((values, vectors)) = eigen(&gram(matrix, rows)) else { return Vec::new() };
     let sigma = |n: usize| values[columns - 1 - n].max(0.0).sqrt();
     let count = (0..count.min(columns)).take_while(|&n| sigma(n) > NUMERICAL_RANK * sigma(0)).count();
     let mut scaled = Vec::with_capacity(columns * count);
@@ -26,7 +27,7 @@ pub(super) fn leading_left_singular_vectors(matrix: &[f64], rows: usize, count: 
 /// `count`: what is left out is the smallest part that `count` columns can leave out.
 pub(super) fn leading_combinations(matrix: &[f64], rows: usize, count: usize) -> Vec<f64> {
     let columns = matrix.len() / rows.max(1);
-    let Some((_, vectors)) = eigen(&product(matrix, matrix, rows)) else { return matrix.to_vec() };
+    let Some((_, vectors)) = eigen(&gram(matrix, rows)) else { return matrix.to_vec() };
     combinations(matrix, &vectors[columns.saturating_sub(count) * columns..], rows, columns)
 }
 
@@ -58,6 +59,25 @@ pub(super) fn product(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
     slice_of(&out)
 }
 
+/// The lower triangle of A^T A for a matrix with columns of `rows` numbers; zeros above it.
+pub(super) fn gram(a: &[f64], rows: usize) -> Vec<f64> {
+    let a = MatRef::from_column_major_slice(a, rows, a.len() / rows.max(1));
+    let mut out = Mat::<f64>::zeros(a.ncols(), a.ncols());
+    let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    triangular::matmul(out.as_mut(), lower, Accum::Replace, a.transpose(), whole, a, whole, 1.0, Par::Seq);
+    slice_of(&out)
+}
+
+/// A^T A for a matrix with columns of `rows` numbers.
+pub(super) fn symmetric_product(a: &[f64], rows: usize) -> Vec<f64> {
+    let mut out = gram(a, rows);
+    let n = out.len().isqrt();
+    for row in 0..n {
+        (row + 1..n).for_each(|column| out[column * n + row] = out[row * n + column]);
+    }
+    out
+}
+
 /// A B for A with columns of `rows` numbers and B with columns of `inner` numbers.
 pub(super) fn combinations(a: &[f64], b: &[f64], rows: usize, inner: usize) -> Vec<f64> {
     let a = MatRef::from_column_major_slice(a, rows, inner);
@@ -67,7 +87,45 @@ pub(super) fn combinations(a: &[f64], b: &[f64], rows: usize, inner: usize) -> V
     slice_of(&out)
 }
 
-/// Eigenvalues in increasing order and eigenvectors of a symmetric matrix; `None` if a number is not finite.
+/// Columns that are eliminated at once.
+const BLOCK: usize = 32;
+
+/// Eliminates the unknowns of the symmetric positive definite A from the first to the last: A = L D L^T. `matrix` has
+/// `rows` numbers in each of its columns: the lower triangle of A, then B^T. Afterwards D is on the diagonal, L below it, and
+/// (D^-1 L^-1 B)^T in the place of B^T. `None` if a pivot is not above zero.
+pub(super) fn eliminate(matrix: &mut [f64], rows: usize) -> Option<()> {
+    let columns = matrix.len() / rows.max(1);
+    for begin in (0..columns).step_by(BLOCK) {
+        let end = (begin + BLOCK).min(columns);
+        for j in begin..end {
+            let (done, open) = matrix.split_at_mut((j + 1) * rows);
+            let pivoted = &mut done[j * rows..];
+            let pivot = pivoted[j];
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return None;
+            }
+            let inverse = 1.0 / pivot;
+            pivoted[j + 1..].iter_mut().for_each(|x| *x *= inverse);
+            for (column, open) in open.chunks_exact_mut(rows).take(end - j - 1).enumerate() {
+                let from = j + 1 + column;
+                let factor = pivoted[from] * pivot;
+                open[from..].iter_mut().zip(&pivoted[from..]).for_each(|(x, l)| *x -= l * factor);
+            }
+        }
+        let (done, open) = matrix.split_at_mut(end * rows);
+        let panel = MatRef::from_column_major_slice(&done[begin * rows..], rows, end - begin);
+        let open = MatMut::from_column_major_slice_mut(open, rows, columns - end);
+        let (square, below) = open.subrows_mut(end, rows - end).split_at_row_mut(columns - end);
+        let (of_square, of_below) = panel.subrows(end, rows - end).split_at_row(columns - end);
+        let scaled = Mat::from_fn(end - begin, columns - end, |j, i| of_square[(i, j)] * panel[(begin + j, j)]);
+        let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+        triangular::matmul(square, lower, Accum::Add, of_square, whole, scaled.as_ref(), whole, -1.0, Par::Seq);
+        matmul(below, Accum::Add, of_below, scaled.as_ref(), -1.0, Par::Seq);
+    }
+    Some(())
+}
+
+/// Eigenvalues in increasing order and eigenvectors of a symmetric matrix, of which the lower triangle is read; `None` if a number is not finite.
 fn eigen(matrix: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
     let n = matrix.len().isqrt();
     if n == 0 || !matrix.iter().all(|x| x.is_finite()) {

@@ -1,5 +1,7 @@
 //! The part of a body that no spring of a patch touches, linear around its rest state.
 
+use super::super::dissection::{Adjacency, dissection};
+use super::super::sparse::SparseFactor;
 use super::super::{Mat3, Vec3, dense};
 use super::SpringGraph;
 
@@ -9,6 +11,7 @@ const NOT_FAR: u32 = u32::MAX;
 const PROPORTIONAL: f64 = 1e-9;
 
 /// A spring in the direction that it has at rest, between places in [`Far::nodes`] or [`NOT_FAR`].
+#[derive(Debug)]
 struct FarSpring {
     places: [u32; 2],
     direction: Vec3,
@@ -17,6 +20,7 @@ struct FarSpring {
 }
 
 /// The movable nodes outside a patch, and the springs between them.
+#[derive(Debug)]
 pub(super) struct Far {
     /// Ids, in increasing order.
     pub(super) nodes: Vec<u32>,
@@ -66,7 +70,7 @@ impl Far {
     }
 
     /// Entries (row, column, value) of the lower triangle of s^2 M - s C - K.
-    pub(super) fn shifted(&self, s: f64) -> Vec<(usize, usize, f64)> {
+    fn shifted(&self, s: f64) -> Vec<(usize, usize, f64)> {
         let mut entries = Vec::with_capacity(self.springs.len() * 21 + self.unknowns());
         for (place, mass) in self.masses.iter().enumerate() {
             entries.extend((0..3).map(|axis| (3 * place + axis, 3 * place + axis, s * s * mass)));
@@ -89,6 +93,23 @@ impl Far {
             }
         }
         entries
+    }
+
+    /// s^2 M - s C - K, factorised. `None` if nothing holds the body.
+    pub(super) fn factorised(&self, graph: &SpringGraph, s: f64) -> Option<SparseFactor> {
+        let (n, entries) = (self.unknowns(), self.shifted(s));
+        match self.order(graph) {
+            Some(order) => SparseFactor::new_ordered(n, &entries, &order),
+            None => SparseFactor::new(n, &entries),
+        }
+    }
+
+    /// The unknowns in an order of elimination with little fill, if their places give one.
+    fn order(&self, graph: &SpringGraph) -> Option<Vec<usize>> {
+        let points: Vec<Vec3> = self.nodes.iter().map(|&node| graph.rest()[node as usize]).collect();
+        let pairs = self.springs.iter().map(|spring| spring.places).filter(|places| !places.contains(&NOT_FAR));
+        let order = dissection(&points, &Adjacency::new(points.len(), pairs))?;
+        Some(order.into_iter().flat_map(|place| (0..3).map(move |axis| 3 * place as usize + axis)).collect())
     }
 
     /// Multiplies each column of `columns` by M.
@@ -123,7 +144,7 @@ impl Far {
                 };
                 stretches.extend(self.springs.iter().map(stretch));
             }
-            let mut matrix = dense::product(&stretches, &stretches, self.springs.len());
+            let mut matrix = dense::symmetric_product(&stretches, self.springs.len());
             matrix.iter_mut().for_each(|x| *x = -*x);
             matrix
         };

@@ -99,7 +99,7 @@ impl Reduction {
         let (far, ring) = (&self.far, &self.ring);
         match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Factorise => {
-                let factor = SparseFactor::new(far.unknowns(), &far.shifted(EXPANSION)).ok_or_else(indefinite)?;
+                let factor = far.factorised(graph, EXPANSION).ok_or_else(indefinite)?;
                 let last = unit_forces(far, ring);
                 self.stage = Stage::Moments { factor, count: 0, last, all: Vec::new() };
             }

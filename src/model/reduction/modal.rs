@@ -1,0 +1,127 @@
+//! Modes of a proportionally damped system: its responses and Gramians in closed form.
+
+use nalgebra::Complex;
+
+use super::congruence::Congruence;
+use super::linalg::{CMatrix, Matrix, complex, pencil_eigen, product, symmetric_eigen};
+use super::response::Response;
+use super::system::{Ports, SecondOrder};
+
+/// q'' + c q' + w^2 q = Phi^T B u for each mode, with x = Phi q.
+///
+/// # Real-time
+/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
+#[derive(Clone, Debug)]
+pub struct Modal {
+    /// w of each mode (rad/s), in increasing order.
+    pub frequencies: Vec<f64>,
+    /// c of each mode (1/s).
+    pub dampings: Vec<f64>,
+    /// Phi^T B and what comes out.
+    pub ports: Ports,
+    /// Phi, n x n (1/sqrt(kg)).
+    pub shapes: Matrix,
+}
+
+impl Modal {
+    /// The modes of `system`; `None` if its damping is not proportional, its mass not positive definite or nothing holds it.
+    pub fn new(system: &SecondOrder) -> Option<Self> {
+        let rayleigh = system.rayleigh()?;
+        match system.lumped_mass() {
+            Some(masses) => {
+                let roots: Vec<f64> = masses.iter().map(|m| 1.0 / m.sqrt()).collect();
+                let mut stiffness = system.stiffness();
+                let n = stiffness.nrows();
+                for column in 0..n {
+                    for row in 0..n {
+                        stiffness[(row, column)] *= roots[row] * roots[column];
+                    }
+                }
+                let (values, mut shapes) = symmetric_eigen(&stiffness)?;
+                for mut column in shapes.column_iter_mut() {
+                    column.iter_mut().zip(&roots).for_each(|(x, root)| *x *= root);
+                }
+                Self::from_eigen(values, shapes, rayleigh, &system.ports)
+            }
+            None => Self::of(&Congruence::whole(system)),
+        }
+    }
+
+    /// As [`new`](Self::new), of a small system.
+    pub(super) fn of(small: &Congruence) -> Option<Self> {
+        let rayleigh = small.rayleigh()?;
+        let (values, shapes) = pencil_eigen(&small.stiffness, &small.mass)?;
+        Self::from_eigen(values, shapes, rayleigh, &small.ports)
+    }
+
+    fn from_eigen(values: Vec<f64>, shapes: Matrix, rayleigh: super::system::Rayleigh, ports: &Ports) -> Option<Self> {
+        if values.iter().any(|&value| value <= 0.0) {
+            return None;
+        }
+        let dampings = values.iter().map(|value| rayleigh.mass + rayleigh.stiffness * value).collect();
+        let frequencies = values.iter().map(|value| value.sqrt()).collect();
+        Some(Self { frequencies, dampings, ports: ports.project(&shapes), shapes })
+    }
+
+    /// Number of modes.
+    pub fn modes(&self) -> usize {
+        self.frequencies.len()
+    }
+
+    /// A X for the first-order states (w q, q'), one block of two rows per mode: A = [0, w; -w, -c].
+    pub(super) fn times_a(&self, states: &Matrix) -> Matrix {
+        let mut out = Matrix::zeros(states.nrows(), states.ncols());
+        for (from, mut to) in states.column_iter().zip(out.column_iter_mut()) {
+            for (mode, (&w, &c)) in self.frequencies.iter().zip(&self.dampings).enumerate() {
+                let (position, velocity) = (from[2 * mode], from[2 * mode + 1]);
+                to[2 * mode] = w * velocity;
+                to[2 * mode + 1] = -w * position - c * velocity;
+            }
+        }
+        out
+    }
+
+    /// B of the first-order states (w q, q'), 2n x m.
+    pub(super) fn input(&self) -> Matrix {
+        let b = &self.ports.input;
+        Matrix::from_fn(
+            2 * self.modes(),
+            b.ncols(),
+            |row, column| if row % 2 == 1 { b[(row / 2, column)] } else { 0.0 },
+        )
+    }
+
+    /// C^T of the first-order states (w q, q'), 2n x p.
+    pub(super) fn output(&self) -> Matrix {
+        let Ports { position, velocity, .. } = &self.ports;
+        Matrix::from_fn(2 * self.modes(), position.ncols(), |row, column| match row % 2 {
+            0 => position[(row / 2, column)] / self.frequencies[row / 2],
+            _ => velocity[(row / 2, column)],
+        })
+    }
+
+    /// The displacements x = Phi q (n x columns) in first-order states (w q, q').
+    pub(super) fn displacements(&self, states: &Matrix) -> Matrix {
+        let q = Matrix::from_fn(self.modes(), states.ncols(), |mode, column| {
+            states[(2 * mode, column)] / self.frequencies[mode]
+        });
+        product(&self.shapes, &q)
+    }
+}
+
+impl Response for Modal {
+    fn at(&self, s: Complex<f64>) -> Option<CMatrix> {
+        let Ports { input, position, velocity, direct } = &self.ports;
+        let mut out = complex(direct);
+        for (mode, (&w, &c)) in self.frequencies.iter().zip(&self.dampings).enumerate() {
+            let answer = (s * s + s * c + w * w).inv();
+            for i in 0..position.ncols() {
+                let left = (s * velocity[(mode, i)] + position[(mode, i)]) * answer;
+                for j in 0..input.ncols() {
+                    out[(i, j)] += left * input[(mode, j)];
+                }
+            }
+        }
+        out.iter().all(|z| z.is_finite()).then_some(out)
+    }
+}
