@@ -202,8 +202,8 @@ fn scene(random: &mut Random, seconds: f64) -> Scene {
         let kind = random.one_of(&[BlendKind::Crossfade, BlendKind::Offset]);
         scene.local.blend = BlendSpec { kind, ms: random.within(1.0, 15.0) };
     }
-    scene.local.patch = random.one_of(&[[3, 3, 2], [4, 4, 2], [3, 3, 3]]);
-    scene.local.basis = random.one_of(&[0, 20, 60]);
+    scene.local.patch = Some(random.one_of(&[[3, 3, 2], [4, 4, 2], [3, 3, 3]]));
+    scene.local.basis = Some(random.one_of(&[0, 20, 60]));
     scene.local.coupling = random.chance(0.15);
     scene.safety = safety(random);
     scene.run.duration_s = seconds;

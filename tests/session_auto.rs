@@ -32,7 +32,7 @@ fn choice(session: SessionBuilder) -> Choice {
 #[test]
 fn auto_is_the_default_of_programs_and_a_named_model_is_not_questioned() {
     let scene = Scene::of_program();
-    assert_eq!((scene.local.model, scene.local.error_pct), (ModelChoice::Auto, 1.0));
+    assert_eq!((scene.local.model, scene.local.chosen_within_pct()), (ModelChoice::Auto, 1.0));
     let named = session(block()).model(LocalModelKind::Hold).virtual_time().build().unwrap();
     assert_eq!(named.choice(), None);
     assert_eq!(choice(session(block()).model(ModelChoice::Auto).virtual_time()).model, LocalModelKind::Full);
@@ -46,7 +46,7 @@ fn auto_is_the_default_of_scenes() {
     let scene = |more: &str| Scene::from_toml(&format!("{text}{more}"), "scene.toml", None).unwrap();
     assert_eq!(scene("").local.model, ModelChoice::Auto);
     let loose = scene("[local]\nmodel = \"auto\"\nerror_pct = 30\n");
-    assert_eq!((loose.local.model, loose.local.error_pct), (ModelChoice::Auto, 30.0));
+    assert_eq!((loose.local.model, loose.local.error_pct), (ModelChoice::Auto, Some(30.0)));
 }
 
 #[test]

@@ -27,9 +27,14 @@ fn variants() -> Vec<Variant> {
     let variant = |name: String, is_for_all, change: Box<dyn Fn(&mut Scene)>| Variant { name, change, is_for_all };
     let patch = |size: [usize; 3]| {
         let [a, b, c] = size;
-        variant(format!("patch {a} x {b} x {c}"), true, Box::new(move |scene: &mut Scene| scene.local.patch = size))
+        variant(
+            format!("patch {a} x {b} x {c}"),
+            true,
+            Box::new(move |scene: &mut Scene| scene.local.patch = Some(size)),
+        )
     };
-    let basis = |states| variant(format!("basis {states}"), false, Box::new(move |scene| scene.local.basis = states));
+    let basis =
+        |states| variant(format!("basis {states}"), false, Box::new(move |scene| scene.local.basis = Some(states)));
     let substeps = |count| {
         let change = move |scene: &mut Scene| scene.global.substeps_per_ms = Some(count);
         variant(format!("{count} substeps per ms"), true, Box::new(change))

@@ -72,7 +72,7 @@ impl BasisActor {
         if let Some(basis) = self.store.read(&self.springs, patch) {
             return Ok(Some(basis));
         }
-        self.begun = Reduction::new(&self.springs, patch, self.store.states);
+        self.begun = Reduction::new(&self.springs, patch, self.store.size);
         if self.begun.is_none() {
             self.hopeless.push(patch.to_vec());
         }

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use crate::error::Error;
-use crate::model::surroundings::{Basis, SpringGraph};
+use crate::model::surroundings::{Basis, Size, SpringGraph};
 
 /// Makes the bases of one body, or reads those that it has made before.
 #[derive(Clone, Debug)]
 pub struct BasisStore {
-    /// States of a basis.
-    pub states: usize,
+    /// How large a basis is to be.
+    pub size: Size,
     /// Bases are kept in this folder, if there is one.
     pub folder: Option<PathBuf>,
 }
@@ -27,7 +27,7 @@ impl BasisStore {
         if let Some(basis) = self.read(springs, patch) {
             return Ok(Some(basis));
         }
-        let basis = Basis::compute(springs, patch, self.states)?;
+        let basis = Basis::compute(springs, patch, self.size)?;
         if let Some(basis) = &basis {
             self.keep(springs, basis);
         }
@@ -65,10 +65,15 @@ impl BasisStore {
         self.folder.as_ref().map(|folder| folder.join(format!("{key:016x}.basis")))
     }
 
-    /// Of body, patch and states.
+    /// Of body, patch and size.
     fn key(&self, springs: &SpringGraph, patch: &[u32]) -> u64 {
         let mix = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31);
-        patch.iter().fold(mix(springs.digest(), self.states as u64), |hash, &node| mix(hash, node.into()))
+        let (kind, size) = match self.size {
+            Size::States(states) => (0, states as u64),
+            Size::ErrorPct(error_pct) => (1, error_pct.to_bits()),
+        };
+        let of_size = mix(mix(springs.digest(), size), kind);
+        patch.iter().fold(of_size, |hash, &node| mix(hash, node.into()))
     }
 }
 
@@ -85,7 +90,7 @@ mod tests {
         let mut patch = Vec::new();
         block.patch(&[block.surface().triangles.len() as u32 - 5], [2, 2, 1], &mut patch);
         let folder = tempfile::tempdir().unwrap();
-        let store = BasisStore { states: 10, folder: Some(folder.path().join("bases")) };
+        let store = BasisStore { size: Size::States(10), folder: Some(folder.path().join("bases")) };
         let first = store.get(&springs, &patch).unwrap();
         let files = || std::fs::read_dir(folder.path().join("bases")).unwrap().map(|file| file.unwrap().path());
         assert_eq!(files().count(), 1);
@@ -94,8 +99,10 @@ mod tests {
             std::fs::write(file, b"no basis").unwrap();
         }
         assert_eq!(store.get(&springs, &patch).unwrap(), first);
-        let other = BasisStore { states: 11, ..store.clone() };
-        assert_ne!(other.get(&springs, &patch).unwrap(), first);
-        assert_eq!(files().count(), 2, "other states, another file");
+        for (count, size) in [Size::States(11), Size::ErrorPct(1.0), Size::ErrorPct(2.0)].into_iter().enumerate() {
+            let other = BasisStore { size, ..store.clone() };
+            assert_ne!(other.get(&springs, &patch).unwrap(), first);
+            assert_eq!(files().count(), count + 2, "another size, another file");
+        }
     }
 }

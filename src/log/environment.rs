@@ -68,7 +68,7 @@ pub struct Environment {
     pub execution: Execution,
     /// The local model.
     pub model: String,
-    /// Why it is that one, if it was chosen; `None` if it was named.
+    /// Why it is that one, if it was chosen, and why its patch and basis are that large, if a budget said so; else `None`.
     pub model_reason: Option<ModelReason>,
     /// The haptic rate (Hz).
     pub haptic_hz: f64,

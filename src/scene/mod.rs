@@ -46,9 +46,12 @@ pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub use device_fault::{FaultKind, FaultSpec};
 pub(crate) use devices::{MAX_DEVICES, field as device_field, numbered};
 pub use haply::HaplySpec;
-pub use models::{BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind};
+pub use models::{
+    BasisSize, BlendKind, BlendSpec, Feedback, GlobalSpec, LocalModelKind, LocalSpec, Prediction, StepKind,
+};
 pub use region::RegionSpec;
 pub use safety::{SafetySpec, SafetyStage};
+pub(crate) use validate::patch_fits;
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,6 +6,8 @@ pub use crate::model::blend::BlendKind;
 pub use crate::model::local::{Feedback, Kind as LocalModelKind};
 
 pub use crate::model::local::Prediction;
+use crate::model::surroundings::LEAST_PCT;
+pub use crate::model::surroundings::Size as BasisSize;
 
 use super::ModelChoice;
 
@@ -37,12 +39,15 @@ pub struct LocalSpec {
     pub rate_hz: f64,
     /// Which local model.
     pub model: ModelChoice,
-    /// The largest expected error of a model that `auto` may choose (rms, % of the peak force, see DESIGN.md).
-    pub error_pct: f64,
-    /// Patch window: nodes along the surface, along it, into depth.
-    pub patch: [usize; 3],
-    /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted.
-    pub basis: usize,
+    /// The largest expected error (rms, % of the peak force, see DESIGN.md): of a model that `auto` may choose, 1 if absent;
+    /// and of `predictive`, whose `patch` and `basis` become that large if they are absent. It sizes no other model.
+    pub error_pct: Option<f64>,
+    /// Patch window: nodes along the surface, along it, into depth. If absent, what `error_pct` needs with `predictive`, or
+    /// 4 x 4 x 2.
+    pub patch: Option<[usize; 3]>,
+    /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted. If absent, what
+    /// `error_pct` needs, or 50 without that.
+    pub basis: Option<usize>,
     /// Bases are kept in this folder from run to run; relative to the current one.
     pub basis_folder: Option<PathBuf>,
     /// How `predictive` looks ahead.
@@ -62,15 +67,46 @@ impl Default for LocalSpec {
         Self {
             rate_hz: 1000.0,
             model: ModelChoice::default(),
-            error_pct: 1.0,
-            patch: [4, 4, 2],
-            basis: 50,
+            error_pct: None,
+            patch: None,
+            basis: None,
             basis_folder: None,
             prediction: Prediction::default(),
             feedback: None,
             step: StepKind::default(),
             blend: BlendSpec::default(),
             coupling: false,
+        }
+    }
+}
+
+impl LocalSpec {
+    /// The largest expected error of a model that `auto` may choose (%).
+    pub fn chosen_within_pct(&self) -> f64 {
+        self.error_pct.unwrap_or(1.0)
+    }
+
+    /// The patch window that was asked for, or 4 x 4 x 2: what a session takes unless it sizes it by `error_pct`.
+    pub fn patch_size(&self) -> [usize; 3] {
+        self.patch.unwrap_or([4, 4, 2])
+    }
+
+    /// Names the model that `auto` chose: a budget below what `predictive` keeps was met with a warning, and what it keeps is
+    /// asked of it.
+    pub(crate) fn name_chosen(&mut self, kind: LocalModelKind) {
+        self.model = kind.into();
+        if kind == LocalModelKind::Predictive {
+            self.error_pct = self.error_pct.map(|error_pct| error_pct.max(LEAST_PCT));
+        }
+    }
+
+    /// How large a basis is to be: a number of states that is given counts, then the budget.
+    pub fn basis_size(&self) -> BasisSize {
+        match (self.basis, self.error_pct) {
+            (Some(states), _) => BasisSize::States(states),
+            // `auto` may choose a model that does not meet less, and says so.
+            (None, Some(error_pct)) => BasisSize::ErrorPct(error_pct.max(LEAST_PCT)),
+            (None, None) => BasisSize::States(50),
         }
     }
 }

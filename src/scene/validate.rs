@@ -6,6 +6,7 @@ use super::{
     LocalSpec, ModelChoice, Scene, StepKind, devices, region, safety,
 };
 use crate::error::Error;
+use crate::model::surroundings::LEAST_PCT;
 use crate::time::Rate;
 
 /// Largest body; a million nodes have 13 million springs, minutes of work for a second of simulation.
@@ -59,9 +60,9 @@ fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
     // A body too small for the default patch is fine for the models that have none, and for the choice among them; a patch
     // that was asked for is not.
     if scene.local.model.named().is_some_and(LocalModelKind::has_patch)
-        || scene.local.patch != LocalSpec::default().patch
+        || scene.local.patch_size() != LocalSpec::default().patch_size()
     {
-        patch(scene.local.patch, block)?;
+        patch(scene.local.patch_size(), block)?;
     }
     for (index, device) in scene.devices.iter().enumerate() {
         if let Some(node) = device.attach_node {
@@ -190,9 +191,9 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
             format!("\"implicit\" needs a linear patch and the model is {:?}, leave it out", local.model.name());
         return Err(Error::scene("local.step", message));
     }
-    positive("local.error_pct", local.error_pct)?;
-    if local.basis > MAX_BASIS {
-        let message = format!("is {}, must be at most {MAX_BASIS}: more cost time and add nothing", local.basis);
+    error_budget(local)?;
+    if let Some(basis) = local.basis.filter(|&basis| basis > MAX_BASIS) {
+        let message = format!("is {basis}, must be at most {MAX_BASIS}: more cost time and add nothing");
         return Err(Error::scene("local.basis", message));
     }
     not_negative("local.blend.ms", local.blend.ms)?;
@@ -203,6 +204,21 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
     };
     if local.blend.ms == 0.0 {
         return Err(Error::scene("local.blend.ms", format!("is 0 or missing, {name} needs a time above 0 such as 10")));
+    }
+    Ok(())
+}
+
+fn error_budget(local: &LocalSpec) -> Result<(), Error> {
+    let Some(error_pct) = local.error_pct else { return Ok(()) };
+    positive("local.error_pct", error_pct)?;
+    // Without a basis there is nothing to size a patch by.
+    let sizes = local.basis.is_none() || local.patch.is_none() && local.basis != Some(0);
+    if sizes && local.model.named() == Some(LocalModelKind::Predictive) && error_pct < LEAST_PCT {
+        let message = format!(
+            "is {error_pct}, and \"predictive\" keeps {LEAST_PCT} % at best: use that or more, numbers (local.patch and \
+             local.basis), or model = \"full\""
+        );
+        return Err(Error::scene("local.error_pct", message));
     }
     Ok(())
 }
@@ -218,17 +234,24 @@ fn misfit(feedback: Feedback, model: ModelChoice) -> String {
 }
 
 /// The window is clamped at thin faces, so it has to fit one of the faces that can be touched: those that are not fixed.
-fn patch(patch: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
-    let limits = |face: &Face| {
+pub(crate) fn patch_fits(patch: [usize; 3], block: &BlockSpec) -> bool {
+    free_faces(block).any(|(_, limits)| (0..3).all(|part| (2..=limits[part]).contains(&patch[part])))
+}
+
+/// The faces that can be touched, and the largest patch on each.
+fn free_faces(block: &BlockSpec) -> impl Iterator<Item = (&'static Face, [usize; 3])> {
+    let limits = |face: &'static Face| {
         let across = face.axis();
         let [first, second] = [[1, 2], [0, 2], [0, 1]][across];
-        [first, second, across].map(|axis| block.nodes[axis])
+        (face, [first, second, across].map(|axis| block.nodes[axis]))
     };
-    let free = || Face::ALL.iter().filter(|face| !block.fixed.contains(face));
-    let fits = |face: &Face| (0..3).all(|part| (2..=limits(face)[part]).contains(&patch[part]));
-    if !free().any(fits) {
-        let largest =
-            free().map(|face| format!("{:?} on {}", limits(face), face.name())).collect::<Vec<_>>().join(", ");
+    Face::ALL.iter().filter(|face| !block.fixed.contains(face)).map(limits)
+}
+
+fn patch(patch: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
+    if !patch_fits(patch, block) {
+        let on = |(face, limits): (&Face, [usize; 3])| format!("{limits:?} on {}", face.name());
+        let largest = free_faces(block).map(on).collect::<Vec<_>>().join(", ");
         let message = format!("is {patch:?}, must be at least [2, 2, 2] and fit a free face: at most {largest}");
         return Err(Error::scene("local.patch", message));
     }

@@ -2,14 +2,17 @@
 
 use std::sync::Arc;
 
+use super::choice::extended;
 use super::prepare::Prepared;
 use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
+use crate::log::ModelReason;
 use crate::model::Vec3;
 use crate::model::forecast::ToolForecast;
 use crate::model::local::{Aim, wider};
 use crate::model::surroundings::{Bases, SpringGraph};
 use crate::runtime::{Actor, ExchangePort, RateGroup, RuntimeBuilder};
+use crate::scene::BasisSize;
 
 /// The name of the group.
 pub(super) const GROUP: &str = "basis";
@@ -34,7 +37,7 @@ impl BasisSide {
         let Some(springs) = prepared.template.springs.clone().filter(|_| prepared.reduces()) else {
             return Ok(None);
         };
-        let store = BasisStore { states: prepared.basis_states, folder: prepared.basis_folder.clone() };
+        let store = BasisStore { size: prepared.basis_size, folder: prepared.basis_folder.clone() };
         let pace = if prepared.prefetches { BasisPace::OneByOne } else { BasisPace::All };
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
@@ -44,6 +47,20 @@ impl BasisSide {
             springs,
             pace,
         }))
+    }
+
+    /// The reason for the model, with what the first basis came to if its states were chosen by a budget.
+    pub(super) fn reason(&self, of_model: Option<ModelReason>) -> Option<ModelReason> {
+        let BasisSize::ErrorPct(budget) = self.store.size else { return of_model };
+        let Some(basis) = self.known.iter().max_by_key(|basis| basis.states()) else { return of_model };
+        let (states, Some(estimate)) = (basis.states(), basis.estimate()) else { return of_model };
+        let (linear, expected) = (estimate.linear_pct, estimate.expected_pct());
+        let sized = format!(
+            "error_pct = {budget} takes {states} states at the start, {expected:.2} % expected (linear force {linear:.2} %)"
+        );
+        let missed =
+            (expected > budget).then(|| format!("error_pct = {budget} is not met, {expected:.2} % is expected"));
+        Some(extended(of_model, sized, missed))
     }
 
     pub(super) fn actor(&self) -> Box<dyn Actor> {

@@ -85,17 +85,27 @@ impl SessionBuilder {
         self
     }
 
-    /// The largest expected error of a model that may be chosen (rms, % of the peak force); 1 without.
+    /// The largest expected error (rms, % of the peak force): of a model that may be chosen, 1 without; and of `predictive`,
+    /// whose patch and basis become as large as it needs, unless [`patch`](Self::patch) and [`basis`](Self::basis) say how large.
+    /// Sizing a patch takes a few factorisations of the body when the session is built.
     #[must_use]
     pub fn error_pct(mut self, error_pct: f64) -> Self {
-        self.parts.scene.local.error_pct = error_pct;
+        self.parts.scene.local.error_pct = Some(error_pct);
         self
     }
 
-    /// Nodes of a patch: along the surface, along it, into depth.
+    /// States of the reduced surroundings of `predictive`; without, what the [`error_pct`](Self::error_pct) needs or 50.
+    #[must_use]
+    pub fn basis(mut self, states: usize) -> Self {
+        self.parts.scene.local.basis = Some(states);
+        self
+    }
+
+    /// Nodes of a patch: along the surface, along it, into depth; without, what the [`error_pct`](Self::error_pct) needs with
+    /// `predictive`, or 4 x 4 x 2.
     #[must_use]
     pub fn patch(mut self, size: [usize; 3]) -> Self {
-        self.parts.scene.local.patch = size;
+        self.parts.scene.local.patch = Some(size);
         self
     }
 

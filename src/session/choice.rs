@@ -23,6 +23,16 @@ impl fmt::Display for Choice {
     }
 }
 
+/// `reason` with what else was decided, and what that misses.
+pub(super) fn extended(reason: Option<ModelReason>, why: String, missed: Option<String>) -> ModelReason {
+    match reason {
+        Some(ModelReason { why: first, warning }) => {
+            ModelReason { why: format!("{first}; {why}"), warning: warning.or(missed) }
+        }
+        None => ModelReason { why, warning: missed },
+    }
+}
+
 /// What is to be expected of a model one global period late: force error rms in % of the peak, the worst of the scenes `hand`,
 /// `wave`, `drag_friction` and `drag_slip` (`palpate compare scenes/NAME.toml`).
 pub(super) fn expected_error_pct(kind: Kind) -> f64 {
@@ -102,6 +112,7 @@ mod tests {
             nodes: 8000,
             cores: 2,
             error_pct: 1.0,
+            states: 50,
             devices: 1,
             possible: Kind::ALL.to_vec(),
         }

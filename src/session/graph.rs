@@ -14,7 +14,7 @@ use crate::actors::{
 };
 use crate::devices::DeviceState;
 use crate::error::Error;
-use crate::log::{Environment, Execution as LogExecution, GroupInfo, SceneFrame, ToolSample};
+use crate::log::{Environment, Execution as LogExecution, GroupInfo, ModelReason, SceneFrame, ToolSample};
 use crate::model::Vec3;
 use crate::model::body::Block;
 use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
@@ -75,7 +75,7 @@ impl ToolEnds {
 pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let first: Vec<DeviceState> = prepared.tools.iter_mut().map(first_of).collect::<Result<_, _>>()?;
     let places: Vec<Vec3> = first.iter().map(|state| state.position).collect();
-    let environment = environment(&prepared, &first)?;
+    let mut environment = environment(&prepared, &first)?;
     let logger_group = logger_group(&prepared);
     let (sinks, memory) = sinks(&prepared, &environment)?;
     #[cfg(all(feature = "log", feature = "scene"))]
@@ -115,6 +115,9 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let mut ends: Vec<ToolEnds> = prepared.tools.iter().map(|_| ToolEnds::new(&mut graph)).collect();
 
     let bases = BasisSide::new(&mut graph, &prepared, &places)?;
+    if let Some(bases) = &bases {
+        environment.model_reason = bases.reason(environment.model_reason.take());
+    }
     let reducing = bases.as_ref().map(|bases| (basis::group(&prepared), bases.actor()));
 
     let probes = prepared.probes;
@@ -253,7 +256,7 @@ fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment
             Execution::Threaded => LogExecution::Threaded { start_unix_ns: unix_now_ns() },
         },
         model: prepared.template.kind.name().to_owned(),
-        model_reason: prepared.choice.as_ref().map(|choice| choice.reason.clone()),
+        model_reason: model_reason(prepared),
         haptic_hz: prepared.haptic.as_hz(),
         global_hz: if is_multi_rate { prepared.global_rate.as_hz() } else { 0.0 },
         groups,
@@ -271,6 +274,15 @@ fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment
         scene: prepared.source.clone(),
         session,
     })
+}
+
+/// Why model and patch are what they are, if that was left to the session.
+fn model_reason(prepared: &Prepared) -> Option<ModelReason> {
+    let of_model = prepared.choice.as_ref().map(|choice| choice.reason.clone());
+    match &prepared.sized_patch {
+        Some(patch) => Some(patch.reason(of_model)),
+        None => of_model,
+    }
 }
 
 /// The two actors that each tool has, in the order of their ticks; `tool` is empty for the only one.

@@ -24,6 +24,7 @@ mod global;
 mod graph;
 mod hardware;
 mod horizon;
+mod patch;
 mod prepare;
 mod rate_groups;
 #[cfg(all(feature = "log", feature = "scene"))]
@@ -35,6 +36,7 @@ mod situation;
 mod substeps;
 mod tools;
 
+mod touched;
 pub use builder::SessionBuilder;
 pub use choice::Choice;
 pub use compare::{CompareOptions, CompareProgress, compare, one_period};

@@ -9,6 +9,7 @@ use super::disturbed::Disturbed;
 use super::graph::groups;
 use super::hardware::paced;
 use super::horizon::{horizon, lateness};
+use super::patch::{self, PatchChoice};
 use super::rate_groups::{check_group, global_group, local_group};
 use super::situation::Situation;
 use super::substeps::substeps;
@@ -20,13 +21,15 @@ use crate::model::blend::Blend;
 use crate::model::body::{Block, Body, State};
 use crate::model::contact::Law;
 use crate::model::equilibrium::static_equilibrium;
-use crate::model::local::{MOST_EXPLICIT_STEPS, Template};
+use crate::model::local::{Kind, MOST_EXPLICIT_STEPS, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, RateGroup, admit_here};
 #[cfg(feature = "scene")]
 use crate::scene::ProbeSpec;
-use crate::scene::{BodySpec, DeviceSpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind};
+use crate::scene::{
+    BasisSize, BodySpec, DeviceSpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind,
+};
 use crate::time::{Nanos, Rate};
 
 /// What a builder has collected.
@@ -85,8 +88,10 @@ pub(super) struct Prepared {
     pub template: Template,
     /// Why its model, if none was named.
     pub choice: Option<Choice>,
-    /// States of reduced surroundings.
-    pub basis_states: usize,
+    /// The patch, if an error budget chose it.
+    pub sized_patch: Option<PatchChoice>,
+    /// How large reduced surroundings are to be.
+    pub basis_size: BasisSize,
     /// Where bases are kept from run to run.
     pub basis_folder: Option<PathBuf>,
     /// Virtual time: how long after its release a basis becomes visible.
@@ -127,7 +132,7 @@ pub(super) struct Prepared {
 impl Prepared {
     /// True if the local models use reduced surroundings.
     pub(super) fn reduces(&self) -> bool {
-        self.template.kind == crate::model::local::Kind::Predictive && self.basis_states > 0
+        self.template.kind == Kind::Predictive && self.basis_size != BasisSize::States(0)
     }
 }
 
@@ -185,8 +190,15 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
             (choice.model, Some(choice), Some(situation.evaluation))
         }
     };
-    scene.local.model = kind.into();
+    if choice.is_some() {
+        // The log's scene names the model and what was asked of it.
+        scene.local.name_chosen(kind);
+    }
     check_model(kind, &scene)?;
+    let sized_patch = patch::choose(&scene, &*body, &attached);
+    let patch = sized_patch.as_ref().map_or(scene.local.patch_size(), |choice| choice.size);
+    // Named in the log's scene, so that a replay does not choose again.
+    scene.local.patch = Some(patch);
     #[cfg(feature = "scene")]
     let mut as_run = as_run(&scene, Some((&attached, &probes)));
     let law = Law {
@@ -218,7 +230,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     };
     // The longer one where periods alternate, 33 and 34 ticks at 30 Hz.
     let period_ticks = (haptic.as_hz() / global_rate.as_hz() - 1e-6).ceil().min(f64::from(u32::MAX)) as u32;
-    let template = Template::new(kind, scene.local.patch, &*body)?
+    let template = Template::new(kind, patch, &*body)?
         .with_feedback(scene.local.feedback.unwrap_or(Feedback::of(kind)))
         .with_prediction(scene.local.prediction)
         .with_period(period_ticks);
@@ -237,7 +249,8 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let prepared = Prepared {
         template,
         choice,
-        basis_states: scene.local.basis,
+        sized_patch,
+        basis_size: scene.local.basis_size(),
         basis_folder: scene.local.basis_folder.clone(),
         basis_latency: Nanos::from_secs_f64(scene.global.basis_latency_ms * 1e-3),
         horizon,

@@ -4,8 +4,9 @@ use super::budget::{force_evaluation, nominal_evaluation};
 use super::prepare::Timing;
 use crate::model::body::{Body, State};
 use crate::model::local::MOST_EXPLICIT_STEPS;
+use crate::model::surroundings::MOST_STATES;
 use crate::runtime::Execution;
-use crate::scene::{LocalModelKind as Kind, Scene};
+use crate::scene::{BasisSize, LocalModelKind as Kind, Scene};
 use crate::time::Nanos;
 
 /// Contact, integration, device and records of a tick of the whole body, as a factor on its force evaluations.
@@ -43,6 +44,8 @@ pub(super) struct Situation {
     pub(super) nodes: usize,
     pub(super) cores: usize,
     pub(super) error_pct: f64,
+    /// States of the reduced surroundings; the most there may be where an error budget decides.
+    pub(super) states: usize,
     /// Devices, with a local model each.
     pub(super) devices: usize,
     /// The models that scene and body allow.
@@ -61,6 +64,11 @@ fn local_substep_s(kind: Kind) -> f64 {
     }
 }
 
+/// The states that [`local_substep_s`] was measured with, and what each one more costs (s): two products with a ring of 76
+/// nodes (`cargo bench --bench speed_vs_error`).
+const NOMINAL_STATES: usize = 50;
+const STATE_S: f64 = 0.06e-6;
+
 impl Situation {
     /// Of `scene` with `body` as it is at the start. On threads the forces are evaluated and timed; in virtual time all costs
     /// are nominal, so that a run is the same everywhere.
@@ -74,9 +82,11 @@ impl Situation {
                 Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
                 Kind::Condensed => has_springs && is_held,
                 Kind::Predicted => has_springs,
-                Kind::Predictive => has_springs && scene.local.basis > 0,
+                Kind::Predictive => has_springs && scene.local.basis_size() != BasisSize::States(0),
             };
-            suits_body && scene.clone().with_model(*kind).validate().is_ok()
+            let mut named = scene.clone().with_model(*kind);
+            named.local.name_chosen(*kind);
+            suits_body && named.validate().is_ok()
         };
         let possible = Kind::ALL.into_iter().filter(is_possible).collect();
         let (evaluation, origin, cores) = match execution {
@@ -97,7 +107,11 @@ impl Situation {
             ahead_ticks: horizon,
             nodes: body.rest().len(),
             cores,
-            error_pct: scene.local.error_pct,
+            error_pct: scene.local.chosen_within_pct(),
+            states: match scene.local.basis_size() {
+                BasisSize::States(states) => states,
+                BasisSize::ErrorPct(_) => MOST_STATES,
+            },
             devices: scene.devices.len(),
             possible,
         }
@@ -118,6 +132,10 @@ impl Situation {
         let substeps = if kind.is_linear() { self.substeps.min(MOST_EXPLICIT_STEPS) } else { self.substeps };
         match kind {
             Kind::Full => self.full_tick_s(),
+            Kind::Predictive => {
+                let more = self.states.saturating_sub(NOMINAL_STATES) as f64 * STATE_S;
+                f64::from(substeps) * (local_substep_s(kind) + more)
+            }
             kind => f64::from(substeps) * local_substep_s(kind),
         }
     }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::super::Vec3;
 use super::super::body::State;
 use super::SpringGraph;
+use super::accuracy::{Estimate, Size};
 use super::products::Columns;
 use super::reduced::{Reduced, ReducedMotion};
 use super::reduction::Reduction;
@@ -25,11 +26,11 @@ pub struct Basis {
     pub(super) patch: Vec<u32>,
     pub(super) answers: Reduced,
     pub(super) forecast: Forecast,
+    pub(super) estimate: Option<Estimate>,
 }
 
 impl Basis {
-    /// The basis of the surroundings of `patch` (ids in increasing order), whose ring answers in at most `states` states.
-    /// `None` if nothing around the patch can move.
+    /// The basis of the surroundings of `patch` (ids in increasing order), of the given size. `None` if nothing around the patch can move.
     ///
     /// # Errors
     /// If nothing holds the surroundings together, so that they have no finite answer.
@@ -37,8 +38,8 @@ impl Basis {
     /// # Real-time
     /// Not real-time safe: factorises a matrix of the whole body's size, seconds of work for a large one. [`Reduction`] does
     /// the same in parts.
-    pub fn compute(graph: &SpringGraph, patch: &[u32], states: usize) -> Result<Option<Self>, Error> {
-        let Some(mut reduction) = Reduction::new(graph, patch, states) else { return Ok(None) };
+    pub fn compute(graph: &SpringGraph, patch: &[u32], size: impl Into<Size>) -> Result<Option<Self>, Error> {
+        let Some(mut reduction) = Reduction::new(graph, patch, size) else { return Ok(None) };
         loop {
             if let Some(basis) = reduction.advance(graph)? {
                 return Ok(Some(basis));
@@ -52,6 +53,22 @@ impl Basis {
     /// Wait-free, real-time safe.
     pub fn patch(&self) -> &[u32] {
         &self.patch
+    }
+
+    /// States in which the ring answers.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn states(&self) -> usize {
+        self.answers.states()
+    }
+
+    /// How far the force is off in so many states, if they were chosen by that.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn estimate(&self) -> Option<Estimate> {
+        self.estimate
     }
 
     pub(crate) fn answers(&self) -> &Reduced {
@@ -149,6 +166,14 @@ impl Bases {
         let holds = |basis: &&Arc<Basis>| nodes().all(|node| basis.patch.binary_search(&node).is_ok());
         let common = |patch: &&[u32]| wanted.iter().filter(|&node| patch.binary_search(node).is_ok()).count();
         self.of.values().filter(holds).map(|basis| &basis.patch[..]).max_by_key(common)
+    }
+
+    /// All of them.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn iter(&self) -> impl Iterator<Item = &Basis> {
+        self.of.values().map(|basis| &**basis)
     }
 
     /// Adds one.

@@ -3,7 +3,9 @@
 use super::super::dense;
 use super::super::sparse::SparseFactor;
 use super::SpringGraph;
+use super::accuracy::{Estimate, MOST_STATES, Size, states_within};
 use super::basis::{Basis, Forecast};
+use super::estimate::Contacts;
 use super::far::Far;
 use super::products::Columns;
 use super::reduced::Reduced;
@@ -26,9 +28,10 @@ const LARGE: usize = 20_000;
 pub struct Reduction {
     patch: Vec<u32>,
     ring: Vec<u32>,
-    states: usize,
+    size: Size,
     far: Far,
     stage: Stage,
+    errors: Option<Vec<f64>>,
 }
 
 enum Stage {
@@ -40,9 +43,16 @@ enum Stage {
         last: Vec<f64>,
         all: Vec<f64>,
     },
+    /// How many are enough?
+    Compare {
+        factor: SparseFactor,
+        wide: Vec<f64>,
+        contacts: Box<Contacts>,
+    },
     Project {
         factor: SparseFactor,
-        moments: Vec<f64>,
+        /// Columns that span what the states are taken from, the most important first.
+        wide: Vec<f64>,
     },
     Done,
 }
@@ -54,19 +64,21 @@ impl std::fmt::Debug for Reduction {
 }
 
 impl Reduction {
-    /// Of the surroundings of `patch` (ids in increasing order) in at most `states` states; `None` if nothing around the
-    /// patch can move.
+    /// Of the surroundings of `patch` (ids in increasing order), with at most so many states or as many as an error budget
+    /// needs; `None` if nothing around the patch can move.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(graph: &SpringGraph, patch: &[u32], states: usize) -> Option<Self> {
+    pub fn new(graph: &SpringGraph, patch: &[u32], size: impl Into<Size>) -> Option<Self> {
+        let size = size.into();
         let (mut ring, mut held) = (Vec::new(), Vec::new());
         graph.neighbours(patch, &mut ring, &mut held);
-        let can_move = !ring.is_empty() && states > 0;
+        let can_move = !ring.is_empty() && size != Size::States(0);
         can_move.then(|| Self {
             patch: patch.to_vec(),
             ring,
-            states,
+            size,
+            errors: None,
             far: Far::new(graph, patch),
             stage: Stage::Factorise,
         })
@@ -107,28 +119,64 @@ impl Reduction {
                 factor.solve(&mut last);
                 append_moment(far, &mut last, &mut all, count);
                 self.stage = match count + 1 {
-                    MOMENTS => Stage::Project { factor, moments: all },
+                    MOMENTS => self.span(graph, factor, &all),
                     count => Stage::Moments { factor, count, last, all },
                 };
             }
-            Stage::Project { factor, moments } => return self.project(graph, &factor, &moments).map(Some),
+            Stage::Compare { factor, wide, mut contacts } => {
+                self.stage = if contacts.advance(graph).ok_or_else(indefinite)? {
+                    self.errors = Some(contacts.errors());
+                    Stage::Project { factor, wide }
+                } else {
+                    Stage::Compare { factor, wide, contacts }
+                };
+            }
+            Stage::Project { factor, wide } => return self.project(graph, &factor, &wide).map(Some),
             Stage::Done => {}
         }
         Ok(None)
     }
 
-    fn project(&self, graph: &SpringGraph, factor: &SparseFactor, moments: &[f64]) -> Result<Basis, Error> {
-        let Self { far, ring, states, .. } = self;
-        let wide = dense::leading_left_singular_vectors(moments, far.unknowns(), FORECAST_STATES.max(*states));
-        let narrow = &wide[..wide.len().min(states * far.unknowns())];
+    /// The relative errors by the number of states, from 1 on, once they are there.
+    pub(super) fn errors(&self) -> Option<&[f64]> {
+        self.errors.as_deref()
+    }
+
+    /// The states, the most important first.
+    fn span(&self, graph: &SpringGraph, factor: SparseFactor, moments: &[f64]) -> Stage {
+        let Self { far, ring, patch, size, .. } = self;
+        let most = match size {
+            Size::States(states) => *states,
+            Size::ErrorPct(_) => MOST_STATES,
+        };
+        let wide = dense::leading_left_singular_vectors(moments, far.unknowns(), FORECAST_STATES.max(most));
+        match size {
+            Size::States(_) => Stage::Project { factor, wide },
+            Size::ErrorPct(_) => {
+                let contacts = Box::new(Contacts::new(graph, [patch, ring], far, &wide));
+                Stage::Compare { factor, wide, contacts }
+            }
+        }
+    }
+
+    fn project(&self, graph: &SpringGraph, factor: &SparseFactor, wide: &[f64]) -> Result<Basis, Error> {
+        let Self { far, ring, size, errors, .. } = self;
+        let states = match *size {
+            Size::States(states) => states,
+            Size::ErrorPct(budget) => states_within(budget, errors.as_deref().unwrap_or_default()),
+        };
+        let linear = errors.as_ref().and_then(|errors| errors.get(states.checked_sub(1)?));
+        let estimate = linear.map(|error| Estimate { linear_pct: 100.0 * error });
+        let columns = |count: usize| &wide[..wide.len().min(count * far.unknowns())];
+        let (narrow, wide) = (columns(states), columns(states.max(FORECAST_STATES)));
         let (answers, _) = Reduced::new(far, ring, narrow).ok_or_else(indefinite)?;
         let mut smooth = far.smooth_fields(graph, SMOOTH_DEGREE);
         factor.solve(&mut smooth);
-        let shapes = [normalised(&wide, far.unknowns()), normalised(&smooth, far.unknowns())].concat();
+        let shapes = [normalised(wide, far.unknowns()), normalised(&smooth, far.unknowns())].concat();
         let (model, modes) = Reduced::new(far, ring, &shapes).ok_or_else(indefinite)?;
         let modes = Columns::new(&modes, far.unknowns());
         let forecast = Forecast { nodes: far.nodes.clone(), masses: far.masses.clone(), modes, model };
-        Ok(Basis { patch: self.patch.clone(), answers, forecast })
+        Ok(Basis { patch: self.patch.clone(), answers, forecast, estimate })
     }
 }
 

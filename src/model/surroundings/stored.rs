@@ -1,11 +1,12 @@
 //! A basis as bytes, to be kept from run to run.
 
+use super::accuracy::Estimate;
 use super::basis::{Basis, Forecast};
 use super::products::Columns;
 use super::reduced::{Damping, Reduced};
 
 /// What the bytes begin with; its number changes with what follows.
-const MAGIC: &[u8; 16] = b"palpate-basis-1\n";
+const MAGIC: &[u8; 16] = b"palpate-basis-2\n";
 const WORD: usize = size_of::<u64>();
 
 impl Basis {
@@ -22,6 +23,7 @@ impl Basis {
         out.numbers(&self.forecast.masses);
         out.columns(&self.forecast.modes);
         out.reduced(&self.forecast.model);
+        out.numbers(&self.estimate.map(|estimate| estimate.linear_pct).into_iter().collect::<Vec<_>>());
         let sum = digest(&out.0);
         out.word(sum);
         out.0
@@ -42,7 +44,9 @@ impl Basis {
         }
         let (patch, answers) = (from.ids()?, from.reduced()?);
         let (nodes, masses, modes) = (from.ids()?, from.numbers()?, from.columns()?);
-        Some(Self { patch, answers, forecast: Forecast { nodes, masses, modes, model: from.reduced()? } })
+        let forecast = Forecast { nodes, masses, modes, model: from.reduced()? };
+        let estimate = from.numbers()?.first().map(|&linear_pct| Estimate { linear_pct });
+        Some(Self { patch, answers, forecast, estimate })
     }
 }
 
@@ -143,7 +147,7 @@ impl Reader<'_> {
 mod tests {
     use super::super::super::body::{Block, Body};
     use super::super::super::mesh::Face;
-    use super::super::SpringGraph;
+    use super::super::{Size, SpringGraph};
     use super::*;
 
     #[test]
@@ -152,7 +156,8 @@ mod tests {
         let graph = SpringGraph::new(&block).unwrap();
         let mut patch = Vec::new();
         block.patch(&[block.surface().triangles.len() as u32 - 5], [2, 2, 1], &mut patch);
-        let basis = Basis::compute(&graph, &patch, 12).unwrap().unwrap();
+        let basis = Basis::compute(&graph, &patch, Size::ErrorPct(2.0)).unwrap().unwrap();
+        assert!(basis.estimate().is_some());
         let bytes = basis.to_bytes(7);
         assert_eq!(Basis::from_bytes(&bytes, 7).as_ref(), Some(&basis));
         assert_eq!(Basis::from_bytes(&bytes, 8), None, "another key");

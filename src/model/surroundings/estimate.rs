@@ -1,0 +1,267 @@
+//! How far the force at a contact is off when the surroundings of a patch answer in few states: an estimate for every
+//! number of states, in one pass.
+
+use nalgebra::{DMatrix, Matrix3};
+
+use super::super::dense;
+use super::SpringGraph;
+use super::far::Far;
+use super::near::Near;
+
+/// Real frequencies (1/s) at which the force is compared, evenly on a logarithmic scale. What the tool does differently from
+/// its forecast grows from nothing within one to three periods of the global model, as e^(s t) does at the first; at the last
+/// the masses of the patch alone resist, and nothing around it matters.
+pub(super) const FREQUENCIES: [f64; 4] = [60.0, 129.3, 278.5, 600.0];
+
+/// The linear body at rest: the patch with its near springs, and surroundings in nested spaces of states.
+///
+/// Against an imposed motion q e^(s t) of a touched node the tool feels Z(s) q, Z = (G D(s)^-1 G^T)^-1, D = s^2 M + s C + K and G
+/// the node's rows. Surroundings in the first r of R states are a Galerkin projection of the same body, so that their D_r is
+/// the leading part of D_R: one elimination of D_R with G^T beside it gives every G D_r^-1 G^T as a partial sum. For a real s
+/// they grow with r towards that of the body itself, which one factorisation of it gives: the error is exact, not bounded,
+/// and falls with r.
+#[derive(Debug)]
+pub(super) struct Contacts {
+    near: Near,
+    /// Patch and surroundings as one.
+    body: Far,
+    mass: DMatrix<f64>,
+    damping: DMatrix<f64>,
+    stiffness: DMatrix<f64>,
+    states: usize,
+    /// Of each pressed node by states: the sum of squares of relative errors so far.
+    squares: Vec<Vec<f64>>,
+    done: usize,
+}
+
+impl Contacts {
+    /// Of `patch` in its `ring`, with surroundings `far` in the span of the columns of `states`.
+    pub(super) fn new(graph: &SpringGraph, [patch, ring]: [&[u32]; 2], far: &Far, states: &[f64]) -> Self {
+        let (near, rows) = (Near::new(graph, patch, ring), far.unknowns());
+        let count = states.len() / rows.max(1);
+        let unknown = |at: usize| far.unknown(ring[at / 3], at % 3);
+        let on_ring = DMatrix::from_fn(3 * ring.len(), count, |at, state| states[state * rows + unknown(at)]);
+        let (k, c) = far.stiffness_and_damping(states);
+        Self {
+            mass: near.beside(&near.mass, &on_ring, &far.mass(states), 1.0),
+            damping: near.beside(&near.damping, &on_ring, &c, -1.0),
+            stiffness: near.beside(&near.stiffness, &on_ring, &k, -1.0),
+            states: count,
+            squares: vec![vec![0.0; count]; near.pressed.len()],
+            done: 0,
+            body: Far::new(graph, &[]),
+            near,
+        }
+    }
+
+    /// Compares at the next frequency; true after the last. `None` if the numbers do not allow it.
+    pub(super) fn advance(&mut self, graph: &SpringGraph) -> Option<bool> {
+        let s = FREQUENCIES[self.done];
+        let exact = self.exact(graph, s)?;
+        let compliances = self.compliances(s)?;
+        for ((squares, of_node), exact) in self.squares.iter_mut().zip(compliances).zip(exact) {
+            let exact = exact.try_inverse()?;
+            for (square, compliance) in squares.iter_mut().zip(of_node) {
+                *square += ((compliance.try_inverse()? - exact).norm() / exact.norm()).powi(2);
+            }
+        }
+        self.done += 1;
+        Some(self.done == FREQUENCIES.len())
+    }
+
+    /// The relative error of Z by the number of states, from 1 on: the root of its mean square over the frequencies, at the
+    /// worst of the pressed nodes.
+    pub(super) fn errors(&self) -> Vec<f64> {
+        let worst = |r: usize| self.squares.iter().map(|squares| squares[r]).fold(0.0, f64::max);
+        (0..self.states).map(|r| (worst(r) / self.done.max(1) as f64).sqrt()).collect()
+    }
+
+    /// G D(s)^-1 G^T of the body itself, for each pressed node.
+    fn exact(&self, graph: &SpringGraph, s: f64) -> Option<Vec<Matrix3<f64>>> {
+        let (body, rows) = (&self.body, self.body.unknowns());
+        let factor = body.factorised(graph, s)?;
+        let pressed = &self.near.pressed;
+        let mut columns = vec![0.0; 3 * rows * pressed.len()];
+        let unknown = |at: usize| body.unknown(pressed[at / 3].node, at % 3);
+        columns.chunks_exact_mut(rows).enumerate().for_each(|(at, column)| column[unknown(at)] = 1.0);
+        factor.solve(&mut columns);
+        let entry =
+            |node: usize, row: usize, column: usize| columns[(3 * node + column) * rows + unknown(3 * node + row)];
+        Some((0..pressed.len()).map(|node| Matrix3::from_fn(|row, column| entry(node, row, column))).collect())
+    }
+
+    /// G D_r(s)^-1 G^T for each pressed node, by r from 1 on.
+    fn compliances(&self, s: f64) -> Option<Vec<Vec<Matrix3<f64>>>> {
+        let (columns, patch, pressed) = (self.mass.ncols(), self.near.patch, &self.near.pressed);
+        let rows = columns + 3 * pressed.len();
+        let mut bordered = vec![0.0; rows * columns];
+        for (column, bordered) in bordered.chunks_exact_mut(rows).enumerate() {
+            for (row, entry) in bordered.iter_mut().enumerate().take(columns).skip(column) {
+                let at = (row, column);
+                *entry = s * (s * self.mass[at] + self.damping[at]) + self.stiffness[at];
+            }
+        }
+        for at in 0..3 * pressed.len() {
+            bordered[(pressed[at / 3].coordinate + at % 3) * rows + columns + at] = 1.0;
+        }
+        dense::eliminate(&mut bordered, rows)?;
+        let of_node = |node: usize| {
+            let (mut sum, mut sums) = (Matrix3::zeros(), Vec::with_capacity(self.states));
+            for (column, bordered) in bordered.chunks_exact(rows).enumerate() {
+                let part = &bordered[columns + 3 * node..][..3];
+                sum += Matrix3::from_fn(|i, j| part[i] * part[j] * bordered[column]);
+                if column >= patch {
+                    sums.push(sum);
+                }
+            }
+            sums
+        };
+        Some((0..pressed.len()).map(of_node).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, Matrix3};
+
+    use super::super::super::Vec3;
+    use super::super::super::body::{Block, Body, Spring, SpringNetwork};
+    use super::super::super::mesh::Face;
+    use super::super::accuracy::{FLOOR_PCT, Size, errors_by_states};
+    use super::super::reduced::Damping;
+    use super::super::{Basis, SpringGraph};
+    use super::FREQUENCIES;
+
+    /// A number from 0 to 1.
+    fn random(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*seed >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// A block whose springs and masses differ by up to ten times, damped out of all proportion; and its patch.
+    fn uneven(seed: &mut u64) -> (SpringGraph, Vec<u32>) {
+        let block = Block::builder([6, 5, 5], [0.05, 0.04, 0.04]).fix(Face::ZMin).build().unwrap();
+        let mut patch = Vec::new();
+        block.patch(&[block.surface().triangles.len() as u32 - 9], [3, 3, 2], &mut patch);
+        let mut builder = SpringNetwork::builder(block.rest().to_vec());
+        builder = builder.masses(block.rest().iter().map(|_| 1e-4 * (1.0 + 9.0 * random(seed))).collect());
+        for link in block.springs().unwrap() {
+            let (stiffness, damping) = (10.0 + 90.0 * random(seed), 0.3 * random(seed));
+            let rest_length = link.spring.rest_length;
+            builder = builder.spring(link.nodes[0], link.nodes[1], Spring { stiffness, damping, rest_length });
+        }
+        let held = (0..block.rest().len() as u32).filter(|&node| block.inverse_masses()[node as usize] == 0.0);
+        let builder = held.fold(builder, |builder, node| builder.fix(node));
+        let body = builder.surface(block.surface().triangles.clone()).build().unwrap();
+        (SpringGraph::new(&body).unwrap(), patch)
+    }
+
+    /// Adds the springs that `is_one_of` picks to s^2 M + s C + K over all coordinates.
+    fn add_springs(d: &mut DMatrix<f64>, graph: &SpringGraph, s: f64, is_one_of: impl Fn([u32; 2]) -> bool) {
+        for link in graph.links().iter().filter(|link| is_one_of(link.nodes)) {
+            let along: Vec3 = graph.rest()[link.nodes[1] as usize] - graph.rest()[link.nodes[0] as usize];
+            let u = along.normalize();
+            let block = u * u.transpose() * (link.spring.stiffness + s * link.spring.damping);
+            for (a, b, sign) in [(0, 0, 1.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)] {
+                let [a, b] = [a, b].map(|end: usize| 3 * link.nodes[end] as usize);
+                let mut part = d.fixed_view_mut::<3, 3>(a, b);
+                part += block * sign;
+            }
+        }
+    }
+
+    /// The stiffness of `node` against being moved as e^(s t), by a dense inverse over the coordinates of `kept`.
+    fn impedance(d: &DMatrix<f64>, kept: &[usize], node: u32) -> Matrix3<f64> {
+        let inverse = d.select_rows(kept).select_columns(kept).try_inverse().unwrap();
+        let at = kept.iter().position(|&row| row == 3 * node as usize).unwrap();
+        inverse.fixed_view::<3, 3>(at, at).try_inverse().unwrap()
+    }
+
+    /// The relative error at `node` of the patch in the states of `basis`, by dense matrices of all coordinates and states.
+    fn dense_error(graph: &SpringGraph, patch: &[u32], basis: &Basis, node: u32) -> f64 {
+        let nodes = graph.rest().len();
+        let (mut ring, mut held) = (Vec::new(), Vec::new());
+        graph.neighbours(patch, &mut ring, &mut held);
+        let movable = |node: &u32| graph.inverse_masses()[*node as usize] > 0.0;
+        let coordinates = |node: u32| (0..3).map(move |axis| 3 * node as usize + axis);
+        let is_near = |nodes: [u32; 2]| nodes.iter().any(|node| patch.contains(node));
+        let mut square = 0.0;
+        for s in FREQUENCIES {
+            let mut whole = DMatrix::zeros(3 * nodes, 3 * nodes);
+            add_springs(&mut whole, graph, s, |_| true);
+            for node in (0..nodes as u32).filter(movable) {
+                coordinates(node).for_each(|at| whole[(at, at)] += s * s / graph.inverse_masses()[node as usize]);
+            }
+            let free: Vec<usize> = (0..nodes as u32).filter(movable).flat_map(coordinates).collect();
+            let exact = impedance(&whole, &free, node);
+
+            // Near springs and the patch's masses; the ring's coordinates are then replaced by those of the states.
+            let mut near = DMatrix::zeros(3 * nodes, 3 * nodes);
+            add_springs(&mut near, graph, s, is_near);
+            for &node in patch.iter().filter(|node| movable(node)) {
+                coordinates(node).for_each(|at| near[(at, at)] += s * s / graph.inverse_masses()[node as usize]);
+            }
+            let on_patch: Vec<usize> = patch.iter().copied().filter(movable).flat_map(coordinates).collect();
+            let on_ring: Vec<usize> = ring.iter().copied().flat_map(coordinates).collect();
+            let (p, r) = (on_patch.len(), basis.states());
+            let shapes = DMatrix::from_column_slice(on_ring.len(), r, &basis.answers.shapes.to_matrix());
+            let mut to_all = DMatrix::zeros(3 * nodes, p + r);
+            on_patch.iter().enumerate().for_each(|(column, &at)| to_all[(at, column)] = 1.0);
+            for (row, &at) in on_ring.iter().enumerate() {
+                (0..r).for_each(|state| to_all[(at, p + state)] = shapes[(row, state)]);
+            }
+            let mut reduced = to_all.transpose() * near * to_all;
+            for state in 0..r {
+                reduced[(p + state, p + state)] += s * s - basis.answers.stiffness[state];
+                match &basis.answers.damping {
+                    Damping::Diagonal(damping) => reduced[(p + state, p + state)] -= s * damping[state],
+                    Damping::Full(rows) => {
+                        (0..r).for_each(|other| reduced[(p + state, p + other)] -= s * rows[state * r + other]);
+                    }
+                }
+            }
+            let inverse = reduced.try_inverse().unwrap();
+            let at = on_patch.iter().position(|&row| row == 3 * node as usize).unwrap();
+            let ours = inverse.fixed_view::<3, 3>(at, at).try_inverse().unwrap();
+            square += ((ours - exact).norm() / exact.norm()).powi(2);
+        }
+        (square / FREQUENCIES.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn the_estimate_is_the_error_that_dense_matrices_give_for_uneven_bodies() {
+        let mut seed = 7;
+        for _ in 0..3 {
+            let (graph, patch) = uneven(&mut seed);
+            let estimates = errors_by_states(&graph, &patch).unwrap();
+            for states in [3, 10, 25] {
+                let basis = Basis::compute(&graph, &patch, states).unwrap().unwrap();
+                let pressed = super::Near::new(&graph, &patch, &[]).pressed;
+                let errors = pressed.iter().map(|pressed| dense_error(&graph, &patch, &basis, pressed.node));
+                let worst = errors.fold(0.0, f64::max);
+                let estimate = 0.01 * estimates[states - 1].1.linear_pct;
+                assert!((estimate / worst - 1.0).abs() < 1e-4, "{states} states: {estimate} against {worst}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_smaller_budget_takes_more_states_and_is_kept() {
+        let mut seed = 3;
+        let (graph, patch) = uneven(&mut seed);
+        let estimates = errors_by_states(&graph, &patch).unwrap();
+        assert!(estimates.windows(2).all(|pair| pair[0].1.linear_pct >= pair[1].1.linear_pct * (1.0 - 1e-6)));
+        let mut last = 0;
+        for budget in [5.0, 2.0, 1.0, 0.5] {
+            let basis = Basis::compute(&graph, &patch, Size::ErrorPct(budget)).unwrap().unwrap();
+            let estimate = basis.estimate().unwrap();
+            assert!(basis.states() > last && estimate.expected_pct() <= budget, "{budget}: {estimate:?}");
+            assert_eq!(estimate, estimates[basis.states() - 1].1);
+            assert!(estimates[basis.states() - 2].1.expected_pct() > budget, "one state less would do");
+            last = basis.states();
+        }
+        // What cannot be kept takes all there are, and says what that comes to.
+        let all = Basis::compute(&graph, &patch, Size::ErrorPct(0.1)).unwrap().unwrap();
+        assert!(all.states() >= last && all.estimate().unwrap().expected_pct() >= FLOOR_PCT);
+    }
+}
