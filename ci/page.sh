@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Pages of `palpate timing --html` work in a browser: wide and narrow, light and dark, in print, without scripts; their numbers
-# are those of `--json`.
+# are those of `--json`. Pages of `palpate reduce --html` fit the screen, and no words of their drawings lie on each other.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 build_programs
 palpate="$CARGO_TARGET_DIR/debug/palpate"
@@ -30,3 +30,8 @@ for log in real_time stopped virtual two_devices cut; do
 done
 grep -q 'class="skipped' "$folder/stopped.html" || { echo "skipped periods are not drawn" >&2; exit 1; }
 python3 ci/check_page.py "$folder"/{real_time,stopped,virtual,two_devices,cut}.html
+
+"$palpate" reduce --paper all --html "$folder/paper.html" >/dev/null
+"$palpate" reduce --cells 5,5,5 --html "$folder/mesh.html" >/dev/null
+"$palpate" reduce scenes/drag_friction.toml --error-pct 0.5 --html "$folder/scene.html" >/dev/null
+python3 ci/check_drawings.py "$folder"/{paper,mesh,scene}.html

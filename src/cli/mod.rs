@@ -7,6 +7,7 @@ pub mod compare;
 pub mod export;
 pub mod log;
 pub mod mock;
+pub mod reduce;
 pub mod replay;
 pub mod run;
 pub mod timing;
@@ -44,6 +45,8 @@ enum Command {
     Timing(timing::TimingArgs),
     /// Run every local model on a scene in virtual time: how far each is from `full`, and what it costs
     Compare(compare::CompareArgs),
+    /// Reduce a body's model: the paper's tables and figures, and when a scene's local model may be trusted
+    Reduce(reduce::ReduceArgs),
     /// Execute a log again in simulated time and compare every force with the logged one, bit for bit
     Replay(replay::ReplayArgs),
     /// Write one topic of a log as a table
@@ -72,6 +75,7 @@ pub fn main() -> ExitCode {
             None => run::demo(),
             Some(Command::Run(args)) => run::run(&args),
             Some(Command::Compare(args)) => compare::run(&args),
+            Some(Command::Reduce(args)) => reduce::run(&args),
             Some(Command::Timing(args)) => timing::run(&args),
             Some(Command::Export(args)) => export::run(&args),
             Some(Command::Log(args)) => log::run(&args),

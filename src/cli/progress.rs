@@ -82,6 +82,33 @@ impl RunBar {
     }
 }
 
+/// How far work of several steps is.
+#[derive(Default)]
+pub struct StepBar(Option<ProgressBar>);
+
+impl StepBar {
+    /// Shows that `done` of `of` steps of `what` are done.
+    pub fn show(&mut self, what: &str, done: usize, of: usize) {
+        let bar = self.0.get_or_insert_with(|| {
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
+            let style = ProgressStyle::with_template("{msg} [{bar:40}] {pos} of {len}, {elapsed}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+            bar.enable_steady_tick(STEP);
+            bar
+        });
+        bar.set_length(of as u64);
+        bar.set_position(done as u64);
+        bar.set_message(what.to_owned());
+    }
+
+    /// Takes the bar from the screen.
+    pub fn clear(self) {
+        if let Some(bar) = self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}
+
 /// Bytes that are read at once.
 const READ_BUFFER_BYTES: usize = 1 << 18;
 

@@ -17,11 +17,12 @@ mod group;
 mod haptics;
 mod percentiles;
 mod records;
+pub mod reduction;
 mod scene_frame;
 mod stats;
 pub mod timing;
-mod window;
 mod vector;
+mod window;
 
 #[cfg(feature = "log")]
 mod backlog;
@@ -79,8 +80,8 @@ pub use records::{
 };
 pub use scene_frame::{SceneFrame, SceneTool};
 pub use stats::{EventSum, GroupStats, StatsCounter};
-pub use window::Window;
 pub(crate) use vector::magnitude;
+pub use window::Window;
 
 #[cfg(feature = "log")]
 pub use backlog::{Backlog, BacklogProgress};

@@ -4,6 +4,7 @@ pub mod compare;
 mod html;
 mod json_string;
 mod picture;
+pub mod reduce;
 mod svg;
 mod timing;
 mod units;

@@ -27,6 +27,7 @@ mod horizon;
 mod patch;
 mod prepare;
 mod rate_groups;
+mod reduce;
 #[cfg(all(feature = "log", feature = "scene"))]
 mod replay;
 mod running;
@@ -35,11 +36,12 @@ mod sink;
 mod situation;
 mod substeps;
 mod tools;
-
 mod touched;
+
 pub use builder::SessionBuilder;
 pub use choice::Choice;
 pub use compare::{CompareOptions, CompareProgress, compare, one_period};
+pub use reduce::{MeshStudy, PaperStudy, ReduceOptions, ReduceProgress, reduce_mesh, reduce_paper, reduce_scene};
 #[cfg(all(feature = "log", feature = "scene"))]
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};
 pub use running::{Running, Summary, Viewer};

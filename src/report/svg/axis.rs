@@ -1,5 +1,7 @@
 //! An axis: its range, linear or logarithmic, and where its ticks are.
 
+use super::decades::decades;
+
 /// An axis of a chart.
 #[derive(Clone, Debug)]
 pub(in crate::report) struct Axis {
@@ -36,7 +38,11 @@ impl Axis {
 
     /// Shows exactly `range`, which is above zero.
     pub(in crate::report) fn log(label: &str, [from, to]: [f64; 2]) -> Self {
-        let from = from.max(1e-12);
+        Self::log_down_to(label, [from.max(1e-12), to])
+    }
+
+    /// The same however small it is.
+    pub(super) fn log_down_to(label: &str, [from, to]: [f64; 2]) -> Self {
         let to = if to > from { to } else { 10.0 * from };
         Self { label: label.to_owned(), range: [from, to], is_log: true, words: None }
     }
@@ -69,6 +75,9 @@ impl Axis {
                 .map(|n| n as f64 * step)
                 .map(|value| (value, Some(format!("{value:.decimals$}"))))
                 .collect();
+        }
+        if let Some(ticks) = decades(self.range) {
+            return ticks;
         }
         let is_short = to / from < 100.0;
         let decades = from.log10().floor() as i32..=to.log10().ceil() as i32;

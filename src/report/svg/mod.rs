@@ -6,9 +6,15 @@
 mod area;
 mod axis;
 mod chart;
+mod decades;
+mod heat;
+mod heat_map;
 mod sign;
 mod thin;
 
 pub(super) use axis::{Axis, round_step};
 pub(super) use chart::{Bars, Chart, Line, Mark, Point, Signs};
+pub(super) use decades::power;
+pub(super) use heat::{HeatScale, heat_style};
+pub(super) use heat_map::{HeatCell, HeatMap};
 pub(super) use sign::Sign;
