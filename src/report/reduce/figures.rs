@@ -1,7 +1,10 @@
 //! Numbers of a reduction for people: three digits, however small.
 
+use crate::log::reduction::ReductionRow;
 use crate::report::units::seconds;
 
+/// Published errors below this (%) are rounding, to which nothing can be held.
+const ROUNDING_PCT: f64 = 1e-10;
 /// What stands where there is no figure.
 pub(super) const NONE: &str = "-";
 
@@ -39,6 +42,11 @@ pub(super) fn time(s: f64) -> String {
 /// Computed over published, where both are there.
 pub(super) fn ratio(computed: f64, published: f64) -> Option<f64> {
     (is_there(published) && computed.is_finite()).then(|| computed / published)
+}
+
+/// The same of a row, but for published errors that are rounding.
+pub(super) fn published_ratio(row: &ReductionRow) -> Option<f64> {
+    ratio(row.error_pct, row.published_error_pct).filter(|_| row.published_error_pct > ROUNDING_PCT)
 }
 
 /// A published figure is above zero.

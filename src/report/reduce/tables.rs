@@ -1,6 +1,6 @@
 //! The tables of a reduction, the same for a terminal and for a page.
 
-use super::figures::{NONE, by, decibel_cell, figure, hertz, is_there, optional, percentile, ratio, time};
+use super::figures::{NONE, by, decibel_cell, figure, hertz, is_there, optional, percentile, published_ratio, time};
 use super::table::{Column, Table};
 use crate::log::reduction::{
     HankelDecay, Locality, PatchError, ReductionRow, ReductionTable, ResponseFigure, StateShapes,
@@ -8,8 +8,6 @@ use crate::log::reduction::{
 
 /// Frequencies of a response that are written out.
 const FREQUENCIES: usize = 10;
-/// Published errors below this (%) are rounding, to which nothing can be held.
-const ROUNDING_PCT: f64 = 1e-10;
 /// States that are written out.
 const STATES: usize = 12;
 
@@ -31,7 +29,7 @@ pub(super) fn published(table: &ReductionTable) -> Table {
             format!("{}{kept}{asked}", row.states),
             figure(row.error_pct),
             if is_there(row.published_error_pct) { figure(row.published_error_pct) } else { NONE.to_owned() },
-            optional(ratio(row.error_pct, row.published_error_pct).filter(|_| row.published_error_pct > ROUNDING_PCT)),
+            optional(published_ratio(row)),
             figure(row.hinf_pct),
             time(row.seconds),
             row.published_s.map_or(NONE.to_owned(), time),

@@ -10,7 +10,8 @@ pub fn to_text(study: &ReductionStudy) -> String {
     if let Some(found) = &study.locality {
         locality(&mut text, found);
     }
-    if !study.tables.is_empty() {
+    if let Some(verdict) = words::tables_verdict(study) {
+        block(&mut text, &wrapped(&verdict));
         for table in &study.tables {
             block(&mut text, &tables::published(table).to_text());
         }

@@ -1,7 +1,8 @@
 //! What a reduction comes to, in sentences.
 
-use super::figures::{by, figure, hertz, percent, ratio};
-use crate::log::reduction::{Locality, MeasuredLocality, ReductionStudy};
+use super::figures::{by, figure, hertz, percent, published_ratio, ratio, time};
+use crate::log::reduction::{Locality, MeasuredLocality, ReductionRow, ReductionStudy};
+use crate::report::units::plural;
 
 /// How the errors of the tables are to be read.
 pub(super) const MEASURES: &str = "The paper does not define its % error. `error %` is 2 (sum of the Hankel singular values left out) / \
@@ -29,6 +30,32 @@ pub(super) fn debug_note() -> Option<&'static str> {
 pub fn locality_verdict(locality: &Locality) -> String {
     let verdict = if locality.is_local { "Local at this contact" } else { "Not local" };
     format!("{verdict}. {}", what_is_left_out(locality))
+}
+
+/// What the tables come to, in a sentence; `None` without tables.
+pub(super) fn tables_verdict(study: &ReductionStudy) -> Option<String> {
+    let rows: Vec<&ReductionRow> = study.tables.iter().flat_map(|table| &table.rows).collect();
+    let count = rows.len();
+    let stable = match rows.iter().filter(|row| !row.is_stable).count() {
+        _ if count == 0 => return None,
+        0 => "all of them stable".to_owned(),
+        unstable => format!("{unstable} of them not stable"),
+    };
+    let ratios = rows.iter().copied().filter_map(published_ratio);
+    let [low, high] = ratios.fold([f64::INFINITY, 0.0], |[low, high], ratio| [ratio.min(low), ratio.max(high)]);
+    let errors = if low <= high {
+        format!(", with {} to {} times the published errors", figure(low), figure(high))
+    } else {
+        String::new()
+    };
+    let timed = rows.iter().filter(|row| row.published_s.is_some());
+    let [ours, theirs] = timed.fold([0.0, 0.0], |[a, b], row| [a + row.seconds, b + row.published_s.unwrap_or(0.0)]);
+    let times = if theirs > 0.0 {
+        format!("; {} for those that took the paper {}", time(ours), time(theirs))
+    } else {
+        String::new()
+    };
+    Some(format!("{}, {stable}{errors}{times}.", plural(count as u64, "reduced model", "reduced models")))
 }
 
 /// What the patch leaves out, in a sentence.
@@ -131,6 +158,22 @@ mod tests {
             verdict.starts_with("Local at this contact. ") && verdict.contains("64.0 % at rest. Local is"),
             "{verdict}"
         );
+    }
+
+    #[test]
+    fn the_tables_have_a_sentence_without_ratios_to_rounding() {
+        let mut study = sample();
+        assert_eq!(
+            tables_verdict(&study).unwrap(),
+            "13 reduced models, 1 of them not stable, with 0.400 to 2.10 times the published errors; 37.8 ms for those that \
+             took the paper 779 s."
+        );
+        study.tables.truncate(2);
+        study.tables.remove(0);
+        study.tables[0].rows.iter_mut().for_each(|row| row.published_s = None);
+        assert_eq!(tables_verdict(&study).unwrap(), "2 reduced models, all of them stable.");
+        study.tables.clear();
+        assert_eq!(tables_verdict(&study), None);
     }
 
     #[test]

@@ -285,24 +285,34 @@ fn judge(out: &mut Locality, block: &Block) {
             BAND_HZ[1]
         ));
     }
+    // Faces that are alike make one line.
+    let mut alike: Vec<(usize, usize, Vec<&str>, &ContactLocality)> = Vec::new();
     for face in &out.faces {
-        let all: Vec<&ContactLocality> = face.contacts.iter().flatten().collect();
-        let Some(worst) =
-            all.iter().copied().filter(|contact| over(contact)).max_by(|a, b| a.band_pct.total_cmp(&b.band_pct))
-        else {
+        let all = || face.contacts.iter().flatten();
+        let (count, of) = (all().filter(|contact| over(contact)).count(), all().count());
+        let Some(worst) = all().filter(|contact| over(contact)).max_by(|a, b| a.band_pct.total_cmp(&b.band_pct)) else {
             continue;
         };
-        let count = all.iter().filter(|contact| over(contact)).count();
-        if count as f64 > SHARE_LIMIT * all.len() as f64 {
-            out.warnings.push(format!(
-                "on {} the patch is not enough at {count} of {} contacts, worst at node {}: {:.0} % in the band, {:.0} % at rest",
-                face.face,
-                all.len(),
-                place(worst),
-                worst.band_pct,
-                worst.at_rest_pct
-            ));
+        if count as f64 <= SHARE_LIMIT * of as f64 {
+            continue;
         }
+        match alike.iter_mut().find(|known| (known.0, known.1) == (count, of)) {
+            Some((_, _, names, most)) => {
+                names.push(&face.face);
+                *most = if worst.band_pct > most.band_pct { worst } else { most };
+            }
+            None => alike.push((count, of, vec![&face.face], worst)),
+        }
+    }
+    for (count, of, names, worst) in alike {
+        out.warnings.push(format!(
+            "on {} the patch is not enough at {count} of {of} contacts{}, worst at node {}: {:.0} % in the band, {:.0} % at rest",
+            names.join(", "),
+            if names.len() > 1 { " each" } else { "" },
+            place(worst),
+            worst.band_pct,
+            worst.at_rest_pct
+        ));
     }
     if out.reference_pct > REFERENCE_LIMIT_PCT {
         out.warnings.push(format!(

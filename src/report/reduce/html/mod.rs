@@ -24,6 +24,9 @@ pub fn to_html(study: &ReductionStudy) -> String {
     if let Some(found) = &study.locality {
         body.push_str(&locality::verdict(found));
     }
+    if let Some(verdict) = words::tables_verdict(study) {
+        let _ = writeln!(body, "<p class=\"lead\">{}</p>", escaped(&verdict));
+    }
     let _ = writeln!(body, "<p class=\"faint\">{}</p>", escaped(&words::facts(study)));
     if let Some(note) = words::debug_note() {
         let _ = writeln!(body, "<p class=\"note\">{}</p>", escaped(note));
