@@ -14,9 +14,12 @@ pub(super) fn legend() -> String {
     format!("Digits: 0 below {}, {} %; . held; the contact in [ ].", STEPS[0], steps.join(", "))
 }
 
-/// The face that is shown: the top, or the first that there is.
-pub(super) fn top(locality: &Locality) -> Option<&FaceMap> {
-    locality.faces.iter().find(|face| face.face == "z_max").or(locality.faces.first())
+/// The faces with the contact first, and the top before others.
+pub(super) fn faces(locality: &Locality) -> Vec<&FaceMap> {
+    let has_contact = |face: &FaceMap| face.contacts.iter().flatten().any(|c| c.node == locality.contact.node);
+    let mut faces: Vec<&FaceMap> = locality.faces.iter().collect();
+    faces.sort_by_key(|face| (!has_contact(face), face.face != "z_max"));
+    faces
 }
 
 /// Errors in the band on `face`, the second axis upwards, every line ended by a newline.
@@ -86,11 +89,26 @@ mod tests {
     #[test]
     fn the_map_has_a_digit_for_each_contact_and_shows_where_the_tool_is() {
         let locality = sample().locality.unwrap();
-        let map = map(top(&locality).unwrap(), locality.contact.node);
+        let map = map(faces(&locality)[0], locality.contact.node);
         let lines: Vec<&str> = map.lines().collect();
         assert_eq!((lines.len(), lines[12]), (13, "    2 2 2 2 2 2 2 2 2 2 2 2"), "{map}");
         // Node 66 is the seventh of the sixth row from below; the nodule is one to the right and one above.
         assert_eq!((lines[7], lines[6]), ("    2 2 2 3 5 6[7]7 7 6 5 3", "    2 2 2 3 5 6 7 8 7 6 5 3"), "{map}");
+    }
+
+    #[test]
+    fn the_face_of_the_contact_comes_first_and_then_the_top() {
+        let mut locality = sample().locality.unwrap();
+        let names = |locality: &Locality| faces(locality).iter().map(|face| face.face.clone()).collect::<Vec<_>>();
+        locality.faces.reverse();
+        let top_first = names(&locality);
+        assert_eq!(top_first[0], "z_max");
+        locality.contact.node = u32::MAX;
+        assert_eq!(names(&locality), top_first, "a contact that is on none of them");
+        let side = locality.faces.iter_mut().find(|face| face.face != "z_max").unwrap();
+        side.contacts.iter_mut().flatten().for_each(|contact| contact.node = u32::MAX);
+        let side = side.face.clone();
+        assert_eq!(names(&locality)[0], side);
     }
 
     #[test]

@@ -50,7 +50,7 @@ fn locality(text: &mut String, locality: &Locality) {
     lines.extend(locality.measured.iter().map(|measured| wrapped(&words::measured(measured))));
     block(text, &lines.concat());
     with_rows(text, &tables::percentiles(locality));
-    if let Some(face) = map::top(locality) {
+    if let Some(face) = map::faces(locality).first() {
         block(text, &(map::map(face, locality.contact.node) + &wrapped(&map::legend())));
     }
     with_rows(text, &tables::sizes(locality));

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::super::figures::{by, figure as number, hertz, percent};
 use super::super::table::prose;
-use super::super::{tables, words};
+use super::super::{map, tables, words};
 use super::{Curve, SIZE, figure, heights, with_points};
 use crate::log::reduction::{ContactLocality, FaceMap, Locality};
 use crate::report::html::escaped;
@@ -70,7 +70,7 @@ fn chapter(locality: &Locality, label: &str, of: fn(&ContactLocality) -> f64) ->
     let scale =
         HeatScale::new(Axis::log(label, [least.clamp(most / MOST_SPREAD, most / SPREAD), most]).in_words(power));
     let mut out = format!("<section>\n<h3>{}</h3>\n<div class=\"charts\">\n", escaped(label));
-    for face in locality.faces.iter().filter(|face| !face.first_m.is_empty() && !face.second_m.is_empty()) {
+    for face in map::faces(locality).into_iter().filter(|face| !face.first_m.is_empty() && !face.second_m.is_empty()) {
         out.push_str(&figure(&face_map(locality, face, &scale, of), ""));
     }
     let _ = writeln!(out, "</div>\n<figure class=\"bar\">{}</figure>\n</section>", scale.to_svg());
