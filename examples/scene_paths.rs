@@ -124,7 +124,11 @@ fn csv(length_s: f64, position: Formula) -> String {
 fn main() -> std::io::Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paths");
     for (name, text) in files() {
-        std::fs::write(folder.join(name), &text)?;
+        let path = folder.join(name);
+        // The demo's path is compiled into the program: a file that is the same is left alone, or all of it is built anew.
+        if std::fs::read_to_string(&path).ok().as_ref() != Some(&text) {
+            std::fs::write(&path, &text)?;
+        }
         println!("scenes/paths/{name}: {} rows", text.lines().count() - 1);
     }
     Ok(())
