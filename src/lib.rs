@@ -58,14 +58,14 @@ pub mod actors;
 pub mod devices;
 pub mod error;
 pub mod log;
-pub mod model;
 mod random;
 pub mod report;
-pub mod runtime;
 pub mod safety;
 pub mod scene;
 pub mod session;
-pub mod time;
+
+pub use palpate_model as model;
+pub use palpate_runtime as runtime;
 
 pub use devices::{Device, DeviceFault, DeviceState, ForceCommand};
 pub use error::{Error, ErrorKind};
@@ -80,9 +80,9 @@ pub mod prelude {
     // For its methods; who implements it names it.
     pub use crate::model::body::Body as _;
     pub use crate::model::mesh::Face;
-    pub use crate::runtime::RateGroup;
+    pub use crate::runtime::{Nanos, RateGroup};
     pub use crate::session::Session;
-    pub use crate::time::Nanos;
+    
 }
 
 /// The README's program must compile.

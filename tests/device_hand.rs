@@ -1,6 +1,7 @@
 //! Simulated device and hand in a session: against an independent implementation, repeated, replayed, and failing.
 #![cfg(feature = "scene")]
 
+#[path = "../src/model/tests/common/mod.rs"]
 mod common;
 
 use std::path::Path;

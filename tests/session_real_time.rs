@@ -1,6 +1,7 @@
 //! Sessions on real threads: identities and limits that hold however busy the machine is, and whatever devices and
 //! bodies do. No test here asserts an absolute time.
 
+#[path = "../src/runtime/tests/device_clock/mod.rs"]
 mod device_clock;
 mod session_support;
 

@@ -1,6 +1,7 @@
 //! Two devices on one body: each with its own contact and its own local model, its own topics, its own limits.
 #![cfg(all(feature = "log", feature = "scene"))]
 
+#[path = "../src/model/tests/common/mod.rs"]
 mod common;
 
 use std::path::Path;

@@ -11,7 +11,7 @@ use crate::log::{CommandSample, ToolSample};
 use crate::model::Vec3;
 use crate::runtime::{Actor, Mode, Outcome, Reader, Recorder, TickContext, Writer};
 use crate::safety::{Input, Output, Pipeline, Request};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Releases without a new command after which the force goes to rest.
 const COMMAND_EXPIRES: u32 = 2;

@@ -12,7 +12,7 @@ use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, wider};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{Actor, Outcome, OutletWriter, QueueReader, Reader, Recorder, Stopwatch, TickContext, Writer};
-use crate::time::{Nanos, Rate};
+use crate::runtime::{Nanos, Rate};
 
 /// The ports of a [`GlobalActor`].
 #[derive(Debug)]

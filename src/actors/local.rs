@@ -10,7 +10,7 @@ use crate::runtime::{
     Actor, Mode as RunMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
 };
 use crate::safety::coupling::CoupledTool;
-use crate::time::{Nanos, Rate};
+use crate::runtime::{Nanos, Rate};
 
 /// Haptic ticks that one release advances at most. After a long stall the rest is made up by the releases that follow:
 /// simulated time never stretches, and no release takes longer than this many ticks.

@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::log::{
     Backlog, BacklogProgress, Environment, Execution, GroupStats, LogRecord, McapWriter, SceneFrame, TextEvent,
 };
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// What may wait for a slow disk before records are dropped (bytes): some six seconds of a usual log, two of one with pictures.
 pub const MOST_WAITING: u64 = 2 << 20;

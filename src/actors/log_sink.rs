@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::log::{Environment, GroupStats, Level, LogRecord, SceneFrame, TextEvent};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Where log entries go, besides the statistics.
 ///

@@ -4,7 +4,7 @@ use crate::devices::DeviceState;
 use crate::model::Vec3;
 use crate::model::body::State;
 use crate::model::contact::{Contact, Mode};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// The device's newest state, numbered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -16,7 +16,6 @@ mod device;
 mod global;
 mod granted;
 mod local;
-#[cfg(feature = "log")]
 mod log_file;
 mod log_sink;
 mod logger;
@@ -30,7 +29,6 @@ pub(crate) use device::GAP_S;
 pub use device::{DeviceActor, first_state};
 pub use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
 pub use local::{LocalActor, LocalPorts, ModelSource};
-#[cfg(feature = "log")]
 pub use log_file::{LAST_WAIT, LogFile, MOST_WAITING};
 pub use log_sink::{LogSink, Loss};
 pub use logger::{LOG_FAILURE, LoggerActor, LoggerOutcome};

@@ -10,7 +10,7 @@ use super::messages::SurfaceView;
 use crate::log::{Environment, LogRecord, SceneFrame, SceneTool};
 use crate::model::Vec3;
 use crate::runtime::{OutletReader, TickContext};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Diameter of a drawn tool, in the largest extent of the body.
 const TOOL_SIZE: f64 = 0.04;

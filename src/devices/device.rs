@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{Calibration, Capabilities, DeviceFault, DeviceState, ForceCommand};
 use crate::model::Vec3;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// A force-feedback device, or anything that moves a tool.
 ///

@@ -25,8 +25,8 @@ pub enum DeviceFault {
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum SafetyStop {
     /// Its emergency brake was pulled.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{Calibration, Capabilities, Device, DeviceFault, DeviceState, ForceCommand, SafetyStop};
 use crate::model::Vec3;
 use crate::random::uniform;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// A way in which a device fails.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,6 @@
 //! | [`Hand`] | a simulated device held by a simulated hand, which lets go |
 //! | [`Replayed`] | the states of a log |
 //! | [`Faulty`] | any device, with faults put in |
-//! | `haply::Haply` | an Inverse3 behind the Haply Inverse service (feature `haply`) |
 //!
 //! A program's own device runs the same [conformance suite](conformance) as these.
 
@@ -16,8 +15,6 @@ mod device;
 mod fault;
 mod faulty;
 mod hand;
-#[cfg(feature = "haply")]
-pub mod haply;
 mod path_csv;
 mod replayed;
 mod scripted;

@@ -2,7 +2,7 @@
 
 use super::device::take_nothing;
 use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// A state that was read from a device once, with the number of the read.
 #[derive(Clone, Copy, Debug, PartialEq)]

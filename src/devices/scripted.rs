@@ -3,7 +3,7 @@
 use super::device::take_nothing;
 use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use crate::model::Vec3;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Follows a path; exerts nothing.
 ///

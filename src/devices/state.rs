@@ -1,7 +1,7 @@
 //! What goes to and fro between a run and a device: newest state, force with an expiry, calibration.
 
 use crate::model::Vec3;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// The newest state of a device.
 ///

@@ -9,7 +9,7 @@ use super::group::{GroupCounter, GroupReport, TickFigures};
 use super::haptics::{DeviceReport, HapticsCounter};
 use super::records::LogRecord;
 use crate::runtime::record::{Event, TickTiming};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Events that a report lists; the others are only counted.
 const EVENTS_KEPT: usize = 100;
@@ -160,7 +160,6 @@ impl Analysis {
     }
 
     /// Counts releases of which the lateness alone is known (ns).
-    #[cfg(feature = "log")]
     pub(super) fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
         self.groups.entry(group).or_default().push_lateness(lateness, count);
     }

@@ -3,7 +3,7 @@
 use super::percentiles::Magnitudes;
 use super::records::{LogRecord, Resync};
 use super::vector::magnitude;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// What a comparison needs of one run: force and energy of every haptic tick, and the resyncs.
 #[derive(Clone, Debug, Default, PartialEq)]

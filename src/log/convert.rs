@@ -9,7 +9,7 @@ use super::stats::{EventSum, GroupStats};
 use crate::runtime::Mode;
 use crate::runtime::record::{ActorTimes, SlipCause, TickTiming};
 use crate::runtime::{PortUse, PortUseKind};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 impl From<[f64; 3]> for Vector3 {
     fn from([x, y, z]: [f64; 3]) -> Self {

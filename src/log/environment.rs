@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::records::ToolSample;
 use crate::runtime::GroupGrant;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// How a run was executed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

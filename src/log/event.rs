@@ -1,7 +1,7 @@
 //! Text events: what a reader of the log should be told in words.
 
 use crate::runtime::record::Event;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// How grave an event is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -3,7 +3,7 @@
 use super::percentiles::{Distribution, Percentiles};
 use crate::runtime::Mode;
 use crate::runtime::record::{SlipCause, TickTiming};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// How often each cause of a slip or a missed deadline occurred.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -150,7 +150,6 @@ impl GroupCounter {
     }
 
     /// Counts releases of which the lateness alone is known (ns).
-    #[cfg(feature = "log")]
     pub(super) fn push_lateness(&mut self, lateness: u64, count: u64) {
         self.released += count;
         self.lateness.push_many(lateness, count);

@@ -24,43 +24,24 @@ pub mod timing;
 mod vector;
 mod window;
 
-#[cfg(feature = "log")]
 mod backlog;
-#[cfg(feature = "log")]
 mod check;
-#[cfg(feature = "log")]
 mod chunk;
-#[cfg(feature = "log")]
 mod convert;
-#[cfg(feature = "log")]
 mod foreign;
-#[cfg(feature = "log")]
 mod foxglove;
-#[cfg(feature = "log")]
 mod framing;
-#[cfg(feature = "log")]
 mod info;
-#[cfg(feature = "log")]
 mod message;
-#[cfg(feature = "log")]
 mod proto;
-#[cfg(feature = "log")]
 mod reader;
-#[cfg(feature = "log")]
 mod recover;
-#[cfg(feature = "log")]
 mod salvage;
-#[cfg(feature = "log")]
 mod scene_update;
-#[cfg(feature = "log")]
 mod schema;
-#[cfg(feature = "log")]
 mod summary;
-#[cfg(feature = "log")]
 pub(crate) mod topic;
-#[cfg(feature = "log")]
 mod viewer;
-#[cfg(feature = "log")]
 mod writer;
 
 pub use analysis::{Analysis, RunReport};
@@ -68,7 +49,6 @@ pub use comparison::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, M
 pub use entry::LogEntry;
 pub use environment::{Environment, Execution, GroupInfo, ModelReason};
 pub use event::{Level, TextEvent};
-#[cfg(feature = "log")]
 pub(crate) use group::TickGauge;
 pub use group::{CauseCounts, GroupReport};
 pub use haptics::{ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport};
@@ -83,17 +63,10 @@ pub use stats::{EventSum, GroupStats, StatsCounter};
 pub(crate) use vector::magnitude;
 pub use window::Window;
 
-#[cfg(feature = "log")]
 pub use backlog::{Backlog, BacklogProgress};
-#[cfg(feature = "log")]
 pub use check::{CheckReport, check};
-#[cfg(feature = "log")]
 pub use info::{AttachmentInfo, ChunkInfo, LogInfo, TopicInfo};
-#[cfg(feature = "log")]
 pub use reader::LogReader;
-#[cfg(feature = "log")]
 pub use recover::{Lost, Recovered, recover};
-#[cfg(feature = "log")]
 pub use salvage::Damage;
-#[cfg(feature = "log")]
 pub use writer::McapWriter;

@@ -2,7 +2,7 @@
 
 use crate::runtime::PortUse;
 use crate::runtime::record::{ActorTimes, Channel, Event, Record, TickTiming};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// What served a haptic tick: a local model, or what it fell back to.
 ///

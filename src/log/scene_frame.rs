@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// One picture of a run, for the topic `/scene`.
 #[derive(Clone, Debug, Default, PartialEq)]

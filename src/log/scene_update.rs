@@ -6,7 +6,7 @@ use super::foxglove::{
 };
 use super::scene_frame::{SceneFrame, SceneTool};
 use super::viewer::{FRAME, UPRIGHT, timestamp, vector};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 const FLESH: Color = Color { r: 0.85, g: 0.55, b: 0.48, a: 1.0 };
 const STEEL: Color = Color { r: 0.35, g: 0.4, b: 0.45, a: 1.0 };

@@ -3,7 +3,7 @@
 use super::event::TextEvent;
 use super::percentiles::{Distribution, Percentiles};
 use crate::runtime::record::TickTiming;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 const SECOND: u64 = 1_000_000_000;
 

@@ -4,7 +4,7 @@ use super::event::{Level, TextEvent};
 use super::foxglove::{self, Log, Pose, PoseInFrame, Quaternion, Timestamp, Vector3};
 use super::records::ToolSample;
 use crate::runtime::record::Event;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// The one frame of reference, world coordinates.
 pub(super) const FRAME: &str = "world";

@@ -1,7 +1,7 @@
 //! The part of a log that is asked for.
 
 use super::entry::LogEntry;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// A span of log time, counted from the start of the run. Two windows that meet share no record.
 ///

@@ -21,7 +21,7 @@ use super::schema::{self, SCHEMA_VERSION};
 use super::stats::GroupStats;
 use super::topic::Topic;
 use crate::error::{Error, ErrorKind};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Log time or wall time between two chunks.
 const FLUSH_INTERVAL: Nanos = Nanos(500_000_000);

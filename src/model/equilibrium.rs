@@ -3,7 +3,7 @@
 use super::Vec3;
 use super::body::{Body, State};
 use super::sparse::SparseCholesky;
-use crate::error::{Error, ErrorKind};
+use crate::error::ModelError;
 
 /// Residual force per node at which the equilibrium is reached, relative to the largest force in play.
 const TOLERANCE: f64 = 1e-12;
@@ -19,7 +19,7 @@ const MAX_ITERATIONS: usize = 200;
 ///
 /// # Real-time
 /// Not real-time safe: allocates, and solves a linear system per iteration.
-pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<State, Error> {
+pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<State, ModelError> {
     let mut state = State::at_rest(body.rest());
     for &(node, position) in held {
         state.positions[node as usize] = position;
@@ -70,7 +70,7 @@ pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<S
         "no static equilibrium found (residual {:.1e} N left): move the nodes less far, and hold the body somewhere",
         residual(&forces)
     );
-    Err(Error::new(ErrorKind::Scene, message).at("initial"))
+    Err(ModelError::new(message).at("initial"))
 }
 
 /// dx of K dx = f on the free nodes, K = -df/dx.

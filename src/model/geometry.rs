@@ -6,7 +6,7 @@ use parry3d_f64::shape::TriMesh;
 
 use super::Vec3;
 use super::mesh::Surface;
-use crate::error::{Error, ErrorKind};
+use crate::error::ModelError;
 
 /// A surface with a bounding volume tree that follows its nodes.
 #[derive(Clone)]
@@ -31,13 +31,13 @@ impl NearestTriangle {
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(surface: &Surface, positions: &[Vec3]) -> Result<Self, Error> {
+    pub fn new(surface: &Surface, positions: &[Vec3]) -> Result<Self, ModelError> {
         let nodes: Vec<u32> = (0..positions.len() as u32).filter(|&node| surface.has_node(node)).collect();
         let vertices: Vec<Vector> = nodes.iter().map(|&node| Vector::from(positions[node as usize])).collect();
         let vertex = |node: u32| nodes.binary_search(&node).unwrap_or(0) as u32;
         let triangles = surface.triangles.iter().map(|triangle| triangle.map(vertex)).collect();
         let mesh = TriMesh::new(vertices.clone(), triangles).map_err(|error| {
-            Error::new(ErrorKind::Scene, format!("the surface cannot be searched: {error}")).at("body")
+            ModelError::new(format!("the surface cannot be searched: {error}")).at("body")
         })?;
         Ok(Self { mesh, nodes, vertices })
     }

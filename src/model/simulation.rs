@@ -4,7 +4,7 @@ use super::Vec3;
 use super::body::{Body, State};
 use super::contact::{Contact, Deformable, Law, ToolMotion, Touch, step_all};
 use super::integrator::Spectrum;
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// How time is divided: ticks of the haptic rate, each of several explicit substeps.
 ///
@@ -65,15 +65,15 @@ impl Simulation {
         contact: Contact,
         law: Law,
         stepping: Stepping,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ModelError> {
         let nodes = body.rest().len();
         if state.positions.len() != nodes || state.velocities.len() != nodes || body.inverse_masses().len() != nodes {
             let lengths = (state.positions.len(), state.velocities.len(), body.inverse_masses().len());
             let message = format!("{nodes} nodes, but {lengths:?} positions, velocities and inverse masses");
-            return Err(Error::scene("body", message));
+            return Err(ModelError::of("body", message));
         }
         if !state.is_finite() {
-            return Err(Error::scene("initial", "the initial state has numbers that are not finite"));
+            return Err(ModelError::of("initial", "the initial state has numbers that are not finite"));
         }
         let candidates = (0..body.surface().triangles.len() as u32).collect();
         let inverse_masses = body.inverse_masses().to_vec();

@@ -279,7 +279,7 @@ mod tests {
     use super::*;
     use crate::log::{Analysis, LogRecord};
     use crate::runtime::record::TickTiming;
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     #[test]
     fn integers_survive_beyond_the_precision_of_doubles() {

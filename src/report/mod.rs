@@ -10,15 +10,11 @@ mod timing;
 mod units;
 mod verdict;
 
-#[cfg(feature = "log")]
 mod export;
-#[cfg(feature = "cli")]
 mod json;
 mod text;
 
-#[cfg(feature = "log")]
 pub use export::{Figure, Format, export, export_percentiles, export_table, export_trace};
-#[cfg(feature = "cli")]
 pub use json::{against_to_json, timing_to_json, to_json};
 pub use picture::{COLOURS, Picture, Series};
 pub use text::{against_to_text, figure_to_text, timing_to_text, to_text};

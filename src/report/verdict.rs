@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use crate::log::{Analysis, Environment, LogRecord};
     use crate::runtime::record::{SlipCause, TickTiming};
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     fn report(slips: u32) -> RunReport {
         let mut analysis = Analysis::default();

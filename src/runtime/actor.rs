@@ -1,6 +1,6 @@
 //! What a program writes: actors, and what they are told and answer at each release.
 
-use crate::error::Error;
+use crate::error::ActorError;
 use crate::time::{Nanos, Rate};
 
 /// A part of a program that is called once per release of its rate group.
@@ -27,7 +27,7 @@ pub trait Actor: Send {
     ///
     /// # Real-time
     /// Not called in a tick: may allocate and block. Where a group is started again, the others tick meanwhile.
-    fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
+    fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
         let _ = ctx;
         Ok(())
     }

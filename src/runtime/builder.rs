@@ -20,7 +20,7 @@ use super::schedule::admit_here;
 use super::script::{Script, ScriptedPort};
 use super::virtual_port::flight;
 use super::virtual_queue::VirtualQueue;
-use crate::error::{Error, ErrorKind};
+use crate::error::{ActorError, GraphError, GraphErrorKind};
 use crate::time::{Nanos, Rate};
 use std::fmt;
 use std::sync::Arc;
@@ -170,7 +170,7 @@ impl RuntimeBuilder {
         &mut self,
         group: RateGroup,
         restart: Restart,
-        factory: impl FnMut() -> Result<Vec<Box<dyn Actor>>, Error> + Send + 'static,
+        factory: impl FnMut() -> Result<Vec<Box<dyn Actor>>, ActorError> + Send + 'static,
     ) -> &mut Self {
         self.groups.push((group, Cast::Restartable(restart, Box::new(factory))));
         self
@@ -208,14 +208,14 @@ impl RuntimeBuilder {
     /// Checks the graph and makes it ready to start; the builder is empty afterwards.
     ///
     /// # Errors
-    /// [`ErrorKind::Runtime`](crate::ErrorKind::Runtime), naming the group and the values, for a graph that cannot work:
+    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused), naming the group and the values, for a graph that cannot work:
     /// a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all cores together, on
     /// threads a latency beyond the period, equal real-time priorities pinned to one core, a priority outside 1 to 99, a
     /// name used twice, no group that is not an observer; an overrun policy that says nothing or contradicts the release
     /// mode, a watchdog below a period, a device-paced group without an actor; a disturbance of threads, of no group, or a
     /// second one of the same; a [measurement](Self::measure_cost) of threads. Or what a [factory](Self::restartable) says. For a re-execution also if the recording is one
-    /// of another graph, and [`ErrorKind::Log`](crate::ErrorKind::Log) if it has gaps.
-    pub fn build(&mut self) -> Result<Runtime, Error> {
+    /// of another graph, and [`GraphErrorKind::Recording`](crate::GraphErrorKind::Recording) if it has gaps.
+    pub fn build(&mut self) -> Result<Runtime, GraphError> {
         for (index, (group, _)) in self.groups.iter_mut().enumerate() {
             if group.name.is_empty() {
                 group.name = format!("group-{index}");
@@ -266,24 +266,24 @@ const SUPERVISOR_EVENTS: usize = 64;
 
 impl RuntimeBuilder {
     /// An observer ends after all others: what fails in it is told when it ends, and there is nothing it could go on with.
-    fn check_restartable(&self) -> Result<(), Error> {
+    fn check_restartable(&self) -> Result<(), GraphError> {
         let wrong = |(group, cast): &&(RateGroup, Cast)| group.observer && matches!(cast, Cast::Restartable(..));
         self.groups.iter().find(wrong).map_or(Ok(()), |(group, _)| {
-            Err(Error::new(ErrorKind::Runtime, "an observer cannot be restartable; add it with `group`")
+            Err(GraphError::new(GraphErrorKind::Refused, "an observer cannot be restartable; add it with `group`")
                 .at(format!("rate group `{}`", group.name)))
         })
     }
 
-    fn check_measurement(&self) -> Result<(), Error> {
+    fn check_measurement(&self) -> Result<(), GraphError> {
         if self.measures_cost && self.execution == Execution::Threaded {
             let wrong =
                 "the cost of threads is not measured: it takes system calls; their execution times are in every report";
-            return Err(Error::new(ErrorKind::Runtime, wrong));
+            return Err(GraphError::new(GraphErrorKind::Refused, wrong));
         }
         Ok(())
     }
 
-    fn check_disturbances(&self) -> Result<(), Error> {
+    fn check_disturbances(&self) -> Result<(), GraphError> {
         for (index, (name, _)) in self.disturbed.iter().enumerate() {
             let wrong = if self.execution == Execution::Threaded {
                 "threads cannot be disturbed: real time brings its own; use Execution::Virtual"
@@ -296,7 +296,7 @@ impl RuntimeBuilder {
             } else {
                 continue;
             };
-            return Err(Error::new(ErrorKind::Runtime, wrong).at(format!("rate group `{name}`")));
+            return Err(GraphError::new(GraphErrorKind::Refused, wrong).at(format!("rate group `{name}`")));
         }
         Ok(())
     }

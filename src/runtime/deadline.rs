@@ -284,7 +284,7 @@ impl Ledger {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::runtime::overrun::tests::policies;
+    use crate::overrun::tests::policies;
     use crate::time::Rate;
     use proptest::prelude::*;
 

@@ -130,8 +130,8 @@ impl VirtualPace {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::runtime::RateGroup;
-    use crate::runtime::deadline::Ledger;
+    use crate::RateGroup;
+    use crate::deadline::Ledger;
 
     const MS: u64 = 1_000_000;
 

@@ -12,8 +12,8 @@
 //! publications in virtual time. On its own:
 //!
 //! ```
-//! use palpate::runtime::exchange::exchange;
-//! use palpate::time::Nanos;
+//! use palpate_runtime::exchange::exchange;
+//! use palpate_runtime::Nanos;
 //!
 //! let (mut writer, mut reader) = exchange(|| [0.0; 1000]);
 //! writer.buffer()[0] = 1.5;
@@ -142,7 +142,7 @@ impl<T> fmt::Debug for ExchangeWriter<T> {
 /// ```compile_fail,E0277
 /// fn share_between_threads<T: Sync>(_: &T) {}
 ///
-/// let (_, reader) = palpate::runtime::exchange::exchange(|| std::cell::Cell::new(0));
+/// let (_, reader) = palpate_runtime::exchange::exchange(|| std::cell::Cell::new(0));
 /// share_between_threads(&reader);
 /// ```
 pub struct ExchangeReader<T> {

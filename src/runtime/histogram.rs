@@ -8,8 +8,8 @@
 //! it nothing but the cache line that they read. A reader may see a time in the buckets that is not in the sum yet.
 //!
 //! ```
-//! use palpate::runtime::histogram::histogram;
-//! use palpate::time::Nanos;
+//! use palpate_runtime::histogram::histogram;
+//! use palpate_runtime::Nanos;
 //!
 //! let (mut writer, reader) = histogram();
 //! for us in 1..=1000 {

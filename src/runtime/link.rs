@@ -139,7 +139,7 @@ impl<H> Relink<H> {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::runtime::ring::ring;
+    use crate::ring::ring;
     use std::sync::Arc;
 
     #[test]

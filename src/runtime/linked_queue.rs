@@ -65,8 +65,8 @@ impl<T: Copy> LinkedConsumer<T> {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::runtime::link::linked;
-    use crate::runtime::ring::{Producer, ring};
+    use crate::link::linked;
+    use crate::ring::{Producer, ring};
 
     fn send(producer: &mut Producer<Numbered<u64>>, numbers: impl IntoIterator<Item = u64>) {
         for number in numbers {

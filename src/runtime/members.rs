@@ -3,7 +3,7 @@
 use super::actor::{Actor, Outcome, TickContext};
 use super::laps::Laps;
 use super::panic_hook::{quietly, text_of};
-use crate::error::{Error, ErrorKind};
+use crate::error::{GraphError, GraphErrorKind};
 use crate::time::Nanos;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -57,16 +57,16 @@ impl Members {
     }
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
-    pub(super) fn start(&mut self, ctx: &TickContext, group: &str) -> Result<(), Error> {
+    pub(super) fn start(&mut self, ctx: &TickContext, group: &str) -> Result<(), GraphError> {
         for Member { actor, name, started, .. } in &mut self.0 {
             let place = || format!("rate group `{group}`, actor `{name}`");
             // Noted first: an actor that fails half-way may hold something to give back.
             *started = true;
             match catch_unwind(AssertUnwindSafe(|| actor.start(ctx))) {
-                Ok(result) => result.map_err(|error| error.at(place()))?,
+                Ok(result) => result.map_err(|error| GraphError::from_actor(error).at(place()))?,
                 Err(panic) => {
                     let message = format!("panicked in start: {}", text_of(&*panic));
-                    return Err(Error::new(ErrorKind::Fault, message).at(place()));
+                    return Err(GraphError::new(GraphErrorKind::Actor, message).at(place()));
                 }
             }
         }

@@ -17,7 +17,7 @@ pub struct OutletWriter<T>(Linked<ExchangeWriter<T>>, Numbers);
 /// ```compile_fail,E0277
 /// fn share_between_threads<T: Sync>(_: &T) {}
 ///
-/// let mut graph = palpate::runtime::Runtime::builder(palpate::runtime::Execution::Virtual);
+/// let mut graph = palpate_runtime::Runtime::builder(palpate_runtime::Execution::Virtual);
 /// let (_, reader) = graph.outlet(|| std::cell::Cell::new(0));
 /// share_between_threads(&reader);
 /// ```

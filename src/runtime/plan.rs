@@ -7,7 +7,7 @@ use super::os;
 use super::rate_group::RateGroup;
 use super::schedule::admit;
 use super::wait::Waiter;
-use crate::error::Error;
+use crate::error::GraphError;
 use crate::time::{Nanos, Rate};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -106,7 +106,7 @@ impl Plan {
     ///
     /// # Errors
     /// As [`RuntimeBuilder::build`](super::RuntimeBuilder::build): a graph that cannot work has no plan.
-    pub fn of(execution: Execution, groups: &[RateGroup]) -> Result<Self, Error> {
+    pub fn of(execution: Execution, groups: &[RateGroup]) -> Result<Self, GraphError> {
         let cores = os::cores();
         admit(groups, execution, cores)?;
         let plans: Vec<_> = groups.iter().map(|group| GroupPlan::of(group, execution)).collect();

@@ -121,7 +121,7 @@ impl UseRecorder {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::runtime::Recording;
+    use crate::Recording;
     use crate::time::{Nanos, Rate};
 
     fn at(tick: u64) -> TickContext {

@@ -87,7 +87,7 @@ impl PortUse {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::Event;
+    use crate::Event;
 
     #[test]
     fn a_use_survives_the_trip_through_a_record() {

@@ -167,7 +167,7 @@ impl RateGroup {
     }
 
     /// The latency that it declares.
-    pub(crate) fn declared_latency(&self) -> Nanos {
+    pub fn declared_latency(&self) -> Nanos {
         self.latency
     }
 
@@ -245,7 +245,7 @@ impl RateGroup {
     }
 
     /// The budget that was given.
-    pub(crate) fn declared_budget(&self) -> Option<Nanos> {
+    pub fn declared_budget(&self) -> Option<Nanos> {
         self.budget
     }
 
@@ -255,7 +255,7 @@ impl RateGroup {
     }
 
     /// The longest time that it makes up release by release instead of skipping it.
-    pub(crate) fn catches_up(&self) -> Nanos {
+    pub fn catches_up(&self) -> Nanos {
         match self.overrun {
             OverrunPolicy::CatchUp { max } => self.rate.release(max.into()),
             _ => Nanos::ZERO,

@@ -196,7 +196,7 @@ impl RecordDrain {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::runtime::record::Event;
+    use crate::record::Event;
 
     fn event(stamp: u64, code: u32) -> Event {
         Event { stamp: Nanos(stamp), group: 0, code, detail: 0 }

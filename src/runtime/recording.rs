@@ -4,7 +4,7 @@ use super::actor::Mode;
 use super::port_use::{PortUse, PortUseKind};
 use super::record::{Record, SlipCause, TickTiming};
 use super::script::{PortScript, Script};
-use crate::error::{Error, ErrorKind};
+use crate::error::{GraphError, GraphErrorKind};
 use crate::time::Nanos;
 use std::collections::{BTreeMap, VecDeque};
 
@@ -47,8 +47,8 @@ impl From<&TickTiming> for RecordedRelease {
 /// - groups that are no observers take nothing from observers, which are not repeated.
 ///
 /// ```
-/// use palpate::runtime::{Execution, Outcome, RateGroup, Recording, Runtime, RuntimeBuilder, actor_fn};
-/// use palpate::time::Nanos;
+/// use palpate_runtime::{Execution, Outcome, RateGroup, Recording, Runtime, RuntimeBuilder, actor_fn};
+/// use palpate_runtime::Nanos;
 /// use std::sync::{Arc, Mutex};
 /// use std::time::Duration;
 ///
@@ -150,8 +150,8 @@ impl Recording {
     /// Refuses a recording from which a record is missing; `name` gives groups their names.
     ///
     /// # Errors
-    /// [`ErrorKind::Log`], naming the first gap.
-    pub fn check(&self, name: impl Fn(u16) -> String) -> Result<(), Error> {
+    /// [`GraphErrorKind::Recording`], naming the first gap.
+    pub fn check(&self, name: impl Fn(u16) -> String) -> Result<(), GraphError> {
         for (&group, releases) in &self.releases {
             let mut next = 0;
             for release in releases {
@@ -197,7 +197,7 @@ impl Recording {
     }
 }
 
-fn check_uses(port: u32, kind: PortUseKind, uses: &[PortUse], name: impl Fn(u16) -> String) -> Result<(), Error> {
+fn check_uses(port: u32, kind: PortUseKind, uses: &[PortUse], name: impl Fn(u16) -> String) -> Result<(), GraphError> {
     for (index, used) in uses.iter().enumerate() {
         let place = || format!("port {port} of rate group `{}`, release {}", name(used.group), used.tick);
         if used.sequence != index as u64 {
@@ -212,8 +212,8 @@ fn check_uses(port: u32, kind: PortUseKind, uses: &[PortUse], name: impl Fn(u16)
     Ok(())
 }
 
-fn incomplete(message: String) -> Error {
-    Error::new(ErrorKind::Log, format!("the recording is not complete: {message}"))
+fn incomplete(message: String) -> GraphError {
+    GraphError::new(GraphErrorKind::Recording, format!("the recording is not complete: {message}"))
 }
 
 #[cfg(test)]

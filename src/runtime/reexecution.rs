@@ -7,7 +7,7 @@ use super::recording::{RecordedRelease, Recording};
 use super::release::GroupRun;
 use super::report::RuntimeFault;
 use super::script::Script;
-use crate::error::{Error, ErrorKind};
+use crate::error::{GraphError, GraphErrorKind};
 use std::collections::VecDeque;
 
 /// A recording that is being re-executed.
@@ -32,8 +32,8 @@ impl Reexecution {
     /// The re-execution of `recording` by a graph of `groups` with `ports` ports that follow `script`.
     ///
     /// # Errors
-    /// [`ErrorKind::Log`] for a recording with gaps, [`ErrorKind::Runtime`] for one of another graph.
-    pub(super) fn new(recording: Recording, script: Script, groups: &[GroupRun], ports: u32) -> Result<Self, Error> {
+    /// [`GraphErrorKind::Recording`] for a recording with gaps, [`GraphErrorKind::Refused`] for one of another graph.
+    pub(super) fn new(recording: Recording, script: Script, groups: &[GroupRun], ports: u32) -> Result<Self, GraphError> {
         let name =
             |group: u16| groups.get(usize::from(group)).map_or(format!("group-{group}"), |g| g.spec.name.clone());
         recording.check(name)?;
@@ -44,7 +44,7 @@ impl Reexecution {
                 recording.ports(),
                 groups.len()
             );
-            return Err(Error::new(ErrorKind::Runtime, message));
+            return Err(GraphError::new(GraphErrorKind::Refused, message));
         }
         let mut releases = recording.into_releases(groups.len());
         // Observers follow their own schedule.

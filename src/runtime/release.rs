@@ -17,7 +17,7 @@ use super::report::{GroupReport, RuntimeFault};
 use super::restart::start_context;
 use super::tenure::Tenure;
 use super::wake::Wake;
-use crate::error::{Error, ErrorKind};
+use crate::error::{GraphError, GraphErrorKind};
 use crate::time::Nanos;
 use std::sync::Arc;
 
@@ -98,10 +98,10 @@ impl GroupRun {
     }
 
     /// Refuses a device-paced group that has nobody to wait for its device.
-    pub(crate) fn check_listener(&self) -> Result<(), Error> {
+    pub(crate) fn check_listener(&self) -> Result<(), GraphError> {
         if self.spec.watchdog().is_some() && self.members.is_empty() {
-            return Err(Error::new(
-                ErrorKind::Runtime,
+            return Err(GraphError::new(
+                GraphErrorKind::Refused,
                 "is paced by a device and has no actor to wait for it; add one",
             )
             .at(format!("rate group `{}`", self.spec.name)));
@@ -121,7 +121,7 @@ impl GroupRun {
     }
 
     /// Starts the actors between two releases, in the place of ones that failed.
-    pub(super) fn start_at(&mut self, now: Nanos) -> Result<(), Error> {
+    pub(super) fn start_at(&mut self, now: Nanos) -> Result<(), GraphError> {
         self.last = start_context(self.index, &self.spec, &self.ledger, now);
         self.start()
     }
@@ -150,7 +150,7 @@ impl GroupRun {
     }
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
-    pub(crate) fn start(&mut self) -> Result<(), Error> {
+    pub(crate) fn start(&mut self) -> Result<(), GraphError> {
         self.members.start(&self.last, &self.spec.name)
     }
 

@@ -11,14 +11,14 @@ use super::recorder::Recorder;
 use super::release::GroupRun;
 use super::report::{GroupReport, RuntimeFault};
 use super::rewire::RecorderPort;
-use crate::error::{Error, ErrorKind};
+use crate::error::{ActorError, GraphError, GraphErrorKind};
 use crate::time::Nanos;
 use std::any::Any;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Makes the actors of a group anew, with fresh halves of their ports.
-pub(super) type Factory = Box<dyn FnMut() -> Result<Vec<Box<dyn Actor>>, Error> + Send>;
+pub(super) type Factory = Box<dyn FnMut() -> Result<Vec<Box<dyn Actor>>, ActorError> + Send>;
 
 /// When and how often a group is started again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +67,7 @@ impl Restarter {
     }
 
     /// The group as it is when the run starts.
-    pub(super) fn first(&mut self) -> Result<(GroupRun, ExchangeReader<Ledger>), Error> {
+    pub(super) fn first(&mut self) -> Result<(GroupRun, ExchangeReader<Ledger>), GraphError> {
         let ledger = Ledger::new(self.index, &self.spec, self.until);
         self.make(ledger)
     }
@@ -85,7 +85,7 @@ impl Restarter {
         fault: &RuntimeFault,
         mut ledger: Ledger,
         now: Nanos,
-    ) -> Result<(GroupRun, ExchangeReader<Ledger>), Error> {
+    ) -> Result<(GroupRun, ExchangeReader<Ledger>), GraphError> {
         ledger.resume();
         let (mut group, books) = self.make(ledger).map_err(|error| error.at(format!("restart after {fault}")))?;
         group.start_at(now).inspect_err(|_| group.undo_start())?;
@@ -113,14 +113,14 @@ impl Restarter {
         self.event(at, Event::ABANDONED, self.policy.hung_after.0);
     }
 
-    fn make(&mut self, ledger: Ledger) -> Result<(GroupRun, ExchangeReader<Ledger>), Error> {
+    fn make(&mut self, ledger: Ledger) -> Result<(GroupRun, ExchangeReader<Ledger>), GraphError> {
         // Unwind safe: a factory that panicked is not asked again in this restart, and says itself what it can do after.
         let made = quietly(|| catch_unwind(AssertUnwindSafe(&mut self.factory)));
         let place = || format!("rate group `{}`, factory", self.spec.name);
         let panicked = |panic: Box<dyn Any + Send>| {
-            Error::new(ErrorKind::Fault, format!("panicked{}: {}", panicked_at(), text_of(&*panic))).at(place())
+            GraphError::new(GraphErrorKind::Actor, format!("panicked{}: {}", panicked_at(), text_of(&*panic))).at(place())
         };
-        let actors = made.map_err(panicked)??;
+        let actors = made.map_err(panicked)?.map_err(GraphError::from_actor)?;
         let recorder = self.records.as_ref().map(RecorderPort::recorder);
         let (writer, reader) = exchange(|| ledger);
         let mut group = GroupRun::new(self.index, self.spec.clone(), actors, recorder, ledger);

@@ -5,7 +5,7 @@
 //! (as in Rigtorp's SPSCQueue and in rtrb).
 //!
 //! ```
-//! let (mut producer, mut consumer) = palpate::runtime::ring::ring(3);
+//! let (mut producer, mut consumer) = palpate_runtime::ring::ring(3);
 //! assert_eq!(producer.capacity(), 4);
 //! assert!(producer.push(7));
 //! assert_eq!((consumer.peek(), consumer.pop(), consumer.pop()), (Some(7), Some(7), None));

@@ -15,7 +15,7 @@ use super::restart::Restarter;
 use super::supervisor::{Control, StopHandle};
 use super::threaded::{Threads, start_actors};
 use super::virtual_time::VirtualRun;
-use crate::error::{Error, ErrorKind};
+use crate::error::{GraphError, GraphErrorKind};
 use crate::time::Nanos;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -77,8 +77,8 @@ impl Runtime {
     /// refuse now. Nothing is started.
     ///
     /// # Errors
-    /// [`ErrorKind::Runtime`] if the process has been moved to fewer cores since the graph was built and no longer fits.
-    pub fn plan(&self) -> Result<Plan, Error> {
+    /// [`GraphErrorKind::Refused`] if the process has been moved to fewer cores since the graph was built and no longer fits.
+    pub fn plan(&self) -> Result<Plan, GraphError> {
         Plan::of(self.execution, &self.groups.iter().map(|group| group.spec.clone()).collect::<Vec<_>>())
     }
 
@@ -88,8 +88,8 @@ impl Runtime {
     ///
     /// # Errors
     /// The error of the first actor whose start failed, after those already started were stopped; or
-    /// [`ErrorKind::Runtime`] if the system gives no thread.
-    pub fn start(self) -> Result<Running, Error> {
+    /// [`GraphErrorKind::Refused`] if the system gives no thread.
+    pub fn start(self) -> Result<Running, GraphError> {
         let Self { execution, mut groups, restarters, reexecution, registry, grants, measures_cost } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names: Vec<String> = groups.iter().map(|group| group.spec.name.clone()).collect();
@@ -121,7 +121,7 @@ impl Runtime {
 
 /// Starts a thread that answers faults while the program does not look, if there is a group that can be started again.
 /// It ends with the run.
-fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), Error> {
+fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), GraphError> {
     let needed = matches!(&*lock(executor), Executor::Threaded(threads) if threads.need_watching());
     if !needed {
         return Ok(());
@@ -137,7 +137,7 @@ fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), Error> {
         }
     };
     let thread = std::thread::Builder::new().name("supervisor".to_owned()).spawn(watch);
-    thread.map(drop).map_err(|error| Error::new(ErrorKind::Runtime, format!("no thread for the supervisor: {error}")))
+    thread.map(drop).map_err(|error| GraphError::new(GraphErrorKind::Refused, format!("no thread for the supervisor: {error}")))
 }
 
 fn lock(executor: &Mutex<Executor>) -> MutexGuard<'_, Executor> {
@@ -295,7 +295,7 @@ impl fmt::Debug for Running {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::runtime::{Outcome, RateGroup, actor_fn};
+    use crate::{Outcome, RateGroup, actor_fn};
 
     #[test]
     fn a_run_can_be_shared_between_threads() {

@@ -3,21 +3,21 @@
 use super::builder::Execution;
 use super::os;
 use super::rate_group::{OverrunPolicy, RateGroup};
-use crate::error::{Error, ErrorKind};
+use crate::error::{GraphError, GraphErrorKind};
 use std::collections::BTreeMap;
 
 /// Records carry the group's number in 16 bits; far fewer make sense.
 const MAX_GROUPS: usize = 256;
 
 /// Checks the groups of a graph for this machine.
-pub(crate) fn admit_here(groups: &[RateGroup], execution: Execution) -> Result<(), Error> {
+pub fn admit_here(groups: &[RateGroup], execution: Execution) -> Result<(), GraphError> {
     admit(groups, execution, os::cores())
 }
 
 /// Checks the groups of a graph against themselves, each other and `cores` processor cores.
 ///
 /// Virtual time may stand for any machine: how many cores this one has and how long a result takes are no matter there.
-pub(super) fn admit(groups: &[RateGroup], execution: Execution, cores: usize) -> Result<(), Error> {
+pub(super) fn admit(groups: &[RateGroup], execution: Execution, cores: usize) -> Result<(), GraphError> {
     if groups.iter().all(|group| group.observer) {
         return Err(refuse("the graph has no group that is not an observer: it would end at once; add one"));
     }
@@ -37,7 +37,7 @@ pub(super) fn admit(groups: &[RateGroup], execution: Execution, cores: usize) ->
     }
 }
 
-fn check_group(group: &RateGroup) -> Result<(), Error> {
+fn check_group(group: &RateGroup) -> Result<(), GraphError> {
     let refuse = |message: String| Err(refuse(message).at(place(group)));
     let period = group.rate.period();
     if let Some(deadline) = group.deadline
@@ -67,7 +67,7 @@ fn check_group(group: &RateGroup) -> Result<(), Error> {
 }
 
 /// Policies that say nothing, and release modes that contradict them.
-fn check_policy(group: &RateGroup) -> Result<(), Error> {
+fn check_policy(group: &RateGroup) -> Result<(), GraphError> {
     let refuse = |message: String| Err(refuse(message).at(place(group)));
     if group.overrun == (OverrunPolicy::Degrade { recover_after: 0 }) {
         return refuse(
@@ -92,7 +92,7 @@ fn check_policy(group: &RateGroup) -> Result<(), Error> {
     }
 }
 
-fn check_pair(a: &RateGroup, b: &RateGroup) -> Result<(), Error> {
+fn check_pair(a: &RateGroup, b: &RateGroup) -> Result<(), GraphError> {
     if a.name == b.name {
         return Err(refuse(format!("two rate groups are called `{}`; give each its own name", a.name)));
     }
@@ -109,7 +109,7 @@ fn check_pair(a: &RateGroup, b: &RateGroup) -> Result<(), Error> {
 }
 
 /// A thread whose results take longer than its period would fall behind for ever.
-fn check_latency(group: &RateGroup) -> Result<(), Error> {
+fn check_latency(group: &RateGroup) -> Result<(), GraphError> {
     let period = group.rate.period();
     if group.latency <= period {
         return Ok(());
@@ -148,7 +148,7 @@ impl Load {
 }
 
 /// The budgets of the groups pinned to one core must fit into its time.
-fn check_cores(groups: &[RateGroup]) -> Result<(), Error> {
+fn check_cores(groups: &[RateGroup]) -> Result<(), GraphError> {
     let mut cores = BTreeMap::<usize, Load>::new();
     for group in groups {
         group.cpu.into_iter().for_each(|cpu| cores.entry(cpu).or_default().add(group));
@@ -163,7 +163,7 @@ fn check_cores(groups: &[RateGroup]) -> Result<(), Error> {
 }
 
 /// All budgets must fit into the time of all cores.
-fn check_all(groups: &[RateGroup], cores: usize) -> Result<(), Error> {
+fn check_all(groups: &[RateGroup], cores: usize) -> Result<(), GraphError> {
     let mut load = Load::default();
     groups.iter().for_each(|group| load.add(group));
     if !load.exceeds(cores) {
@@ -177,8 +177,8 @@ fn place(group: &RateGroup) -> String {
     format!("rate group `{}`", group.name)
 }
 
-fn refuse(message: impl Into<String>) -> Error {
-    Error::new(ErrorKind::Runtime, message)
+fn refuse(message: impl Into<String>) -> GraphError {
+    GraphError::new(GraphErrorKind::Refused, message)
 }
 
 #[cfg(all(test, not(loom)))]
@@ -191,14 +191,14 @@ mod tests {
     }
 
     /// On threads, on a machine of two cores.
-    fn admit(groups: &[RateGroup]) -> Result<(), Error> {
+    fn admit(groups: &[RateGroup]) -> Result<(), GraphError> {
         super::admit(groups, Execution::Threaded, 2)
     }
 
     #[track_caller]
     fn refused(groups: &[RateGroup], words: &[&str]) {
         let error = admit(groups).unwrap_err();
-        assert_eq!(error.kind(), ErrorKind::Runtime);
+        assert_eq!(error.kind(), GraphErrorKind::Refused);
         for word in words {
             assert!(error.to_string().contains(word), "`{word}` is not in: {error}");
         }

@@ -16,7 +16,7 @@ use super::running::STOP_BOUND;
 use super::successor::{Restarted, Successor};
 use super::supervisor::{Control, Failure, Message, Supervisor};
 use super::tenure::Tenure;
-use crate::error::{Error, ErrorKind};
+use crate::error::{GraphError, GraphErrorKind};
 use crate::time::Nanos;
 use crossbeam_channel::{Sender, bounded};
 use std::fs::File;
@@ -73,7 +73,7 @@ impl Threads {
         restarters: Vec<Option<(Restarter, ExchangeReader<Ledger>)>>,
         control: Arc<Control>,
         grants: &GrantHandle,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, GraphError> {
         panic_hook::install();
         let mut grant = SystemGrant::of_machine();
         if groups.iter().any(|group| group.spec.priority.is_some()) {
@@ -313,7 +313,7 @@ fn worse(a: String, b: String) -> String {
 }
 
 /// Starts all actors in group order; if one fails, stops those already started.
-pub(crate) fn start_actors(groups: &mut [GroupRun]) -> Result<(), Error> {
+pub(crate) fn start_actors(groups: &mut [GroupRun]) -> Result<(), GraphError> {
     for index in 0..groups.len() {
         if let Err(error) = groups[index].start() {
             groups[..=index].iter_mut().for_each(GroupRun::undo_start);
@@ -324,7 +324,7 @@ pub(crate) fn start_actors(groups: &mut [GroupRun]) -> Result<(), Error> {
 }
 
 /// Starts a thread for a group and waits until it has set itself up; it then waits for its group.
-fn spawn(spec: &RateGroup) -> Result<(JoinHandle<()>, Sender<GroupThread>, ThreadGrant), Error> {
+fn spawn(spec: &RateGroup) -> Result<(JoinHandle<()>, Sender<GroupThread>, ThreadGrant), GraphError> {
     let (gate, go) = bounded::<GroupThread>(1);
     let (set_up, granted) = bounded(1);
     let own = spec.clone();
@@ -339,7 +339,7 @@ fn spawn(spec: &RateGroup) -> Result<(JoinHandle<()>, Sender<GroupThread>, Threa
         }
     };
     let failed =
-        |reason: String| Error::new(ErrorKind::Runtime, format!("no thread for rate group `{}`: {reason}", spec.name));
+        |reason: String| GraphError::new(GraphErrorKind::Refused, format!("no thread for rate group `{}`: {reason}", spec.name));
     let thread = std::thread::Builder::new().name(spec.name.clone()).spawn(body);
     let thread = thread.map_err(|error| failed(error.to_string()))?;
     let granted = granted.recv().map_err(|_| failed("it ended during its set-up".to_owned()))?;

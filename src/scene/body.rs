@@ -4,24 +4,24 @@ use super::RegionSpec;
 use crate::model::mesh::Face;
 
 /// A block of nodes joined by springs to all 26 neighbours.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct BodySpec {
     /// The kind of body; `mass_spring` is the only one in scene files.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub kind: BodyKind,
     /// Its shape.
     pub block: BlockSpec,
     /// What it is made of.
     pub material: MaterialSpec,
     /// Parts that differ from that, in order: later ones win.
-    #[cfg_attr(feature = "scene", serde(default, rename = "region", skip_serializing_if = "Vec::is_empty"))]
+    #[serde(default, rename = "region", skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<RegionSpec>,
 }
 
 /// The kinds of body that a scene file can name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum BodyKind {
     /// Point masses and springs.
     #[default]
@@ -29,26 +29,25 @@ pub enum BodyKind {
 }
 
 /// A block's lattice.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct BlockSpec {
     /// Nodes per axis, at least 2 each; node id = i + nx (j + ny k).
     pub nodes: [usize; 3],
     /// Edge lengths (m).
     pub size_m: [f64; 3],
     /// Faces held stationary.
-    #[cfg_attr(feature = "scene", serde(default = "default_fixed"))]
+    #[serde(default = "default_fixed")]
     pub fixed: Vec<Face>,
 }
 
-#[cfg(feature = "scene")]
 fn default_fixed() -> Vec<Face> {
     vec![Face::ZMin]
 }
 
 /// The material of all springs and nodes that are in no region.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct MaterialSpec {
     /// Mass of a node (kg).
     pub node_mass_kg: f64,

@@ -66,14 +66,12 @@ impl From<LocalModelKind> for ModelChoice {
     }
 }
 
-#[cfg(feature = "scene")]
 impl serde::Serialize for ModelChoice {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
     }
 }
 
-#[cfg(feature = "scene")]
 impl<'de> serde::Deserialize<'de> for ModelChoice {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Name;

@@ -3,8 +3,8 @@
 use crate::model::contact::{Equations, Normals};
 
 /// How the tool touches the body.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct ContactSpec {
     /// Coulomb friction.
     pub friction: Friction,

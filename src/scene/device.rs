@@ -6,8 +6,8 @@ use super::{FaultSpec, HaplySpec, ToolPath};
 use crate::devices::{Capabilities, HandSpec, PlantSpec};
 
 /// What moves the tool.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+#[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct DeviceSpec {
     /// Its name: each of several devices has one.
     pub name: Option<String>,
@@ -20,34 +20,33 @@ pub struct DeviceSpec {
     /// The tool is glued to this node.
     pub attach_node: Option<[usize; 3]>,
     /// Whose limits it has.
-    #[cfg_attr(feature = "scene", serde(skip_serializing_if = "is_default"))]
+    #[serde(skip_serializing_if = "is_default")]
     pub profile: DeviceProfile,
     /// The simulated device (`hand`).
-    #[cfg_attr(feature = "scene", serde(skip_serializing_if = "is_default"))]
+    #[serde(skip_serializing_if = "is_default")]
     pub plant: PlantSpec,
     /// The simulated hand (`hand`).
-    #[cfg_attr(feature = "scene", serde(skip_serializing_if = "is_default"))]
+    #[serde(skip_serializing_if = "is_default")]
     pub hand: HandSpec,
     /// How it fails, and when.
-    #[cfg_attr(feature = "scene", serde(rename = "fault", skip_serializing_if = "is_default"))]
+    #[serde(rename = "fault", skip_serializing_if = "is_default")]
     pub faults: Vec<FaultSpec>,
     /// The service of a `haply` device.
-    #[cfg_attr(feature = "scene", serde(skip_serializing_if = "Option::is_none"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub haply: Option<HaplySpec>,
     /// The path itself: read from `path_csv`, or given by a program.
-    #[cfg_attr(feature = "scene", serde(skip))]
+    #[serde(skip)]
     pub path: Option<ToolPath>,
 }
 
 /// What a scene leaves as it is need not be in its log.
-#[cfg(feature = "scene")]
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
 /// The devices that a scene file can name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum DeviceKind {
     /// A tool that follows a path and ignores the force.
     #[default]
@@ -61,8 +60,8 @@ pub enum DeviceKind {
 }
 
 /// The devices whose limits are known; see [`Capabilities`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum DeviceProfile {
     /// The paper's.
     #[default]
@@ -74,7 +73,7 @@ pub enum DeviceProfile {
     /// Novint Falcon.
     Falcon,
     /// Force Dimension omega.3.
-    #[cfg_attr(feature = "scene", serde(rename = "omega_3"))]
+    #[serde(rename = "omega_3")]
     Omega3,
 }
 

@@ -2,11 +2,11 @@
 
 use crate::devices::{FaultWindow, InjectedFault, SafetyStop};
 use crate::error::Error;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// A way in which the device fails, from one time to another.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct FaultSpec {
     /// What fails.
     pub kind: FaultKind,
@@ -15,37 +15,34 @@ pub struct FaultSpec {
     /// The first at which it does not any more (s).
     pub to_s: f64,
     /// How many reads a state is behind (`late`).
-    #[cfg_attr(feature = "scene", serde(default = "one_read"))]
+    #[serde(default = "one_read")]
     pub reads: u32,
     /// How probable a loss is (`lost`).
-    #[cfg_attr(feature = "scene", serde(default = "certain"))]
+    #[serde(default = "certain")]
     pub probability: f64,
     /// Which frames: the same seed loses the same (`lost`).
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub seed: u64,
     /// Why the device stopped (`safety_stop`).
-    #[cfg_attr(feature = "scene", serde(default = "unknown"))]
+    #[serde(default = "unknown")]
     pub stop: SafetyStop,
 }
 
-#[cfg(feature = "scene")]
 fn one_read() -> u32 {
     1
 }
 
-#[cfg(feature = "scene")]
 fn certain() -> f64 {
     1.0
 }
 
-#[cfg(feature = "scene")]
 fn unknown() -> SafetyStop {
     SafetyStop::Other
 }
 
 /// The faults that a scene file can name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum FaultKind {
     /// States come late.
     Late,

@@ -60,7 +60,6 @@ pub(crate) fn field(index: usize, count: usize) -> String {
 }
 
 /// One table `[device]`, or several `[[device]]`.
-#[cfg(feature = "scene")]
 pub(super) mod one_or_many {
     use serde::de::value::MapAccessDeserializer;
     use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};

@@ -5,31 +5,31 @@ use super::{DeviceKind, DeviceProfile, DeviceSpec};
 use crate::error::Error;
 
 /// How to reach a Haply Inverse service, and what its device may do.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct HaplySpec {
     /// Largest force (N): what the device may exert, which no page of the vendor's says.
     pub max_force_n: f64,
     /// The simulation channel, `host:port`.
-    #[cfg_attr(feature = "scene", serde(default = "HaplySpec::address"))]
+    #[serde(default = "HaplySpec::address")]
     pub address: String,
     /// The events channel; `""` for a service without one.
-    #[cfg_attr(feature = "scene", serde(default = "HaplySpec::events_address"))]
+    #[serde(default = "HaplySpec::events_address")]
     pub events_address: String,
     /// The device; the first that the service lists if absent.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub device_id: Option<String>,
     /// The name of the session's profile.
-    #[cfg_attr(feature = "scene", serde(default = "HaplySpec::profile"))]
+    #[serde(default = "HaplySpec::profile")]
     pub profile: String,
     /// Order and signs of the axes, as the service takes it.
-    #[cfg_attr(feature = "scene", serde(default = "HaplySpec::basis"))]
+    #[serde(default = "HaplySpec::basis")]
     pub basis: String,
     /// Where the device's base is in the scene (m).
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub origin_m: [f64; 3],
     /// Without a reply for this long the clock releases the haptic group in place of the device (ms).
-    #[cfg_attr(feature = "scene", serde(default = "HaplySpec::watchdog_ms"))]
+    #[serde(default = "HaplySpec::watchdog_ms")]
     pub watchdog_ms: f64,
 }
 

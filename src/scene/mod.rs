@@ -19,19 +19,12 @@ mod safety;
 mod validate;
 mod validate_device;
 
-#[cfg(feature = "scene")]
 mod demo;
-#[cfg(feature = "scene")]
 mod fault;
-#[cfg(feature = "scene")]
 mod file;
-#[cfg(feature = "scene")]
 mod friction;
-#[cfg(feature = "scene")]
 mod locate;
-#[cfg(feature = "scene")]
 mod reader;
-#[cfg(feature = "scene")]
 mod suggest;
 
 pub use body::{BlockSpec, BodyKind, BodySpec, MaterialSpec};
@@ -54,57 +47,57 @@ pub use safety::{SafetySpec, SafetyStage};
 pub(crate) use validate::patch_fits;
 
 /// Everything a run needs to know.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct Scene {
     /// The soft body; a scene file must have one, `None` stands for a program's own.
     pub body: Option<BodySpec>,
     /// How the tool touches it.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub contact: ContactSpec,
     /// The slow, detailed simulation.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub global: GlobalSpec,
     /// The fast, small one.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub local: LocalSpec,
     /// What moves a tool and feels its force: one device, or several with names.
-    #[cfg_attr(feature = "scene", serde(rename = "device", with = "devices::one_or_many", default = "one_device"))]
+    #[serde(rename = "device", with = "devices::one_or_many", default = "one_device")]
     pub devices: Vec<DeviceSpec>,
     /// Limits on what reaches the device.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub safety: SafetySpec,
     /// A deformed state to start from; at rest if absent.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub initial: Option<InitialSpec>,
     /// Nodes whose position is logged every tick.
-    #[cfg_attr(feature = "scene", serde(default, rename = "probe"))]
+    #[serde(default, rename = "probe")]
     pub probes: Vec<ProbeSpec>,
     /// What the log has beside the records.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub log: LogSpec,
     /// How long.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub run: RunSpec,
     /// The file that the scene was read from, as text; it is attached to the log.
-    #[cfg_attr(feature = "scene", serde(skip))]
+    #[serde(skip)]
     pub source: Option<String>,
 }
 
 /// A static equilibrium to start from, at rest, released at t = 0.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct InitialSpec {
     /// The node that is pulled.
     pub pull: PullSpec,
     /// Nodes held at their rest position while the equilibrium is found.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub hold: Vec<[usize; 3]>,
 }
 
 /// One pulled node.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct PullSpec {
     /// Which.
     pub node: [usize; 3],
@@ -113,24 +106,24 @@ pub struct PullSpec {
 }
 
 /// One probed node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct ProbeSpec {
     /// Which.
     pub node: [usize; 3],
 }
 
 /// What a log has beside the records of every tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct LogSpec {
     /// The topic `/scene`: surface, tools and forces for viewers, 30 times a second.
     pub scene: bool,
 }
 
 /// How long a run lasts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct RunSpec {
     /// Simulated time (s).
     pub duration_s: f64,

@@ -12,8 +12,8 @@ pub use crate::model::surroundings::Size as BasisSize;
 use super::ModelChoice;
 
 /// The slow, detailed simulation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct GlobalSpec {
     /// Releases per second.
     pub rate_hz: f64,
@@ -32,8 +32,8 @@ impl Default for GlobalSpec {
 }
 
 /// The fast, small simulation.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct LocalSpec {
     /// Releases per second.
     pub rate_hz: f64,
@@ -112,8 +112,8 @@ impl LocalSpec {
 }
 
 /// How a linear patch is stepped through a haptic tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum StepKind {
     /// Explicit while the stability limit asks for few steps per tick, implicit beyond.
     #[default]
@@ -125,12 +125,12 @@ pub enum StepKind {
 }
 
 /// How a resync's discontinuity is spread over time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct BlendSpec {
     /// The way.
     pub kind: BlendKind,
     /// How long (ms); not used by `none`.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub ms: f64,
 }

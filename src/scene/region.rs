@@ -10,23 +10,23 @@ use crate::model::mesh::Lattice;
 /// A node belongs to every region whose closed shape holds its rest position; of several that give the same value the
 /// last one counts. [`BlockBuilder::region`](crate::model::body::BlockBuilder::region) says what becomes of springs
 /// between two materials.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct RegionSpec {
     /// What it stands for, for the reader.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub name: Option<String>,
     /// Where it is.
-    #[cfg_attr(feature = "scene", serde(with = "shape"))]
+    #[serde(with = "shape")]
     pub shape: Shape,
     /// Stiffness k of its springs (N/m); as it was if absent.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub stiffness_n_per_m: Option<f64>,
     /// zeta in b = zeta sqrt(2 m k), with the region's m and k; as it was if absent.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub damping_ratio: Option<f64>,
     /// Mass of each of its nodes (kg); as it was if absent.
-    #[cfg_attr(feature = "scene", serde(default))]
+    #[serde(default)]
     pub node_mass_kg: Option<f64>,
 }
 
@@ -61,7 +61,6 @@ pub(super) fn validate(body: &BodySpec) -> Result<(), Error> {
 }
 
 /// A shape as a table of one key, its kind.
-#[cfg(feature = "scene")]
 mod shape {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::{Serialize, Serializer};

@@ -4,8 +4,8 @@ use super::check::{not_negative, positive};
 use crate::error::Error;
 
 /// Limits on what reaches the device. What is left out follows from the device and the rates.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct SafetySpec {
     /// Largest force (N); the device's own limit if absent.
     pub max_force_n: Option<f64>,
@@ -149,8 +149,8 @@ pub(super) fn validate(safety: &SafetySpec) -> Result<(), Error> {
 }
 
 /// A stage of the safety pipeline, in its order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SafetyStage {
     /// Numbers that are not finite become zero. Cannot be switched off.
     Finite,

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::error::Error;
 use crate::model::surroundings::LEAST_PCT;
-use crate::time::Rate;
+use crate::runtime::Rate;
 
 /// Largest body; a million nodes have 13 million springs, minutes of work for a second of simulation.
 const MAX_NODES: usize = 1_000_000;

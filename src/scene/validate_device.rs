@@ -36,7 +36,6 @@ pub(super) fn device(device: &DeviceSpec) -> Result<(), Error> {
 }
 
 /// A scene file must move its tool itself; a program may bring a device of its own.
-#[cfg(feature = "scene")]
 pub(super) fn tool(device: &DeviceSpec) -> Result<(), Error> {
     let message = match device.kind {
         DeviceKind::Scripted if device.path.is_none() && device.attach_node.is_none() => {

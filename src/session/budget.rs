@@ -8,7 +8,7 @@ use crate::model::Vec3;
 use crate::model::body::{Body, State};
 use crate::model::local::Kind;
 use crate::runtime::RateGroup;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Evaluations at most, and the time after which no other is begun: the least of several is what the machine can do when
 /// nothing else disturbs it.
@@ -107,7 +107,7 @@ impl Cost {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Rate;
+    use crate::runtime::Rate;
 
     fn cost(evaluation_us: u64, kind: Kind) -> Cost {
         let timing = Timing { haptic: Rate::hz(1000), global: Rate::hz(40), substeps: 2, horizon: 32 };

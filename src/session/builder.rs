@@ -199,7 +199,6 @@ impl SessionBuilder {
     }
 
     /// Writes a log to `path`, overwriting what is there.
-    #[cfg(feature = "log")]
     #[must_use]
     pub fn log(mut self, path: impl Into<std::path::PathBuf>) -> Self {
         self.parts.log = Some(path.into());
@@ -235,7 +234,6 @@ impl SessionBuilder {
     ///
     /// # Errors
     /// As [`Session::replay`]; also [`ErrorKind::Log`](crate::ErrorKind::Log) if the log is one of another session.
-    #[cfg(all(feature = "log", feature = "scene"))]
     pub fn replay(self, log: &std::path::Path) -> Result<super::Replay, Error> {
         super::Replay::of_parts(self.parts, log)
     }

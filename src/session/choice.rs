@@ -98,7 +98,7 @@ pub(super) fn choose(situation: &Situation) -> Choice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     /// Two substeps at 1 kHz and 30 Hz on two cores, 42 ticks ahead, 20^3 nodes, 1 % wanted, every model possible.
     fn situation(evaluation_us: u64) -> Situation {

@@ -9,7 +9,7 @@ use crate::model::body::Block;
 use crate::runtime::Stopwatch;
 use crate::runtime::histogram::Snapshot;
 use crate::scene::{LocalModelKind, Scene};
-use crate::time::{Nanos, Rate};
+use crate::runtime::{Nanos, Rate};
 
 /// How much of a run passes between two calls of the progress callback.
 const STEP: Duration = Duration::from_millis(50);

@@ -1,14 +1,11 @@
 //! Makes the device that a scene describes.
 
-#[cfg(feature = "log")]
 use std::path::Path;
 
 use super::hardware::haply;
 use crate::devices::{Device, Faulty, Hand, Scripted, ToolPath};
-#[cfg(feature = "log")]
 use crate::devices::{DeviceState, Replayed, ReplayedSample};
 use crate::error::{Error, ErrorKind};
-#[cfg(feature = "log")]
 use crate::log::{LogEntry, LogReader, LogRecord, ToolSample};
 use crate::model::Vec3;
 use crate::runtime::Execution;
@@ -78,7 +75,6 @@ fn replayed(_: &DeviceSpec, _: Option<Vec3>) -> Result<Box<dyn Device>, Error> {
     Err(Error::scene("device.kind", "is \"replay\", and this program was built without feature `log`"))
 }
 
-#[cfg(feature = "log")]
 fn replayed(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dyn Device>, Error> {
     let Some(log) = &spec.log else {
         return Err(Error::scene("device.log", "is missing, name the log whose device is replayed"));
@@ -90,7 +86,6 @@ fn replayed(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dyn Device>
 
 /// The first state and the samples of the tool in a log, as far as it is whole: of the device called `name` if the log has
 /// several, where no name means the first.
-#[cfg(feature = "log")]
 fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<ReplayedSample>), Error> {
     let mut reader = LogReader::open(log)?;
     let reader_place = reader.place().to_owned();
@@ -121,7 +116,6 @@ fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<Replayed
     }
 }
 
-#[cfg(feature = "log")]
 fn state(sample: &ToolSample) -> DeviceState {
     DeviceState { position: sample.position_m.into(), velocity: sample.velocity_m_s.into(), buttons: sample.buttons }
 }

@@ -3,7 +3,6 @@
 use super::basis::{self, BasisSide};
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
 use super::prepare::Prepared;
-#[cfg(all(feature = "log", feature = "scene"))]
 use super::replay::{Comparer, Reexecuted};
 use super::running::{Running, Viewer};
 use super::sink::{Memory, Sinks};
@@ -24,7 +23,7 @@ use crate::runtime::{
 };
 use crate::safety::coupling::CoupledTool;
 use crate::safety::{Actions, Pipeline};
-use crate::time::Rate;
+use crate::runtime::Rate;
 
 /// How often records are taken to the log.
 const LOGGER: Rate = Rate::hz(20);
@@ -78,7 +77,6 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let mut environment = environment(&prepared, &first)?;
     let logger_group = logger_group(&prepared);
     let (sinks, memory) = sinks(&prepared, &environment)?;
-    #[cfg(all(feature = "log", feature = "scene"))]
     let (mut graph, comparison) = match prepared.reexecuted.take() {
         Some(Reexecuted { recording, comparison }) => (Runtime::reexecution(recording), Some(comparison)),
         None => (Runtime::builder(prepared.execution), None),
@@ -199,7 +197,6 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
     let logger = |drain| -> Box<dyn Actor> {
         Box::new(LoggerActor::new(drain, sinks, environment, graph.grants(), outcome.clone()).watching(scene))
     };
-    #[cfg(all(feature = "log", feature = "scene"))]
     let logger = match comparison {
         Some(comparison) => Box::new(Comparer::new(drain, comparison)),
         None => logger(drain),
@@ -244,7 +241,6 @@ fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment
         groups.push(GroupInfo { budget, ..group("global", prepared.global_rate) });
     }
     groups.push(group("logger", logger_rate(prepared)));
-    #[cfg(feature = "scene")]
     let session = Some(prepared.as_run.to_toml()?);
     #[cfg(not(feature = "scene"))]
     let session = None;
@@ -321,11 +317,9 @@ fn unix_now_ns() -> u64 {
     u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX)
 }
 
-#[cfg_attr(not(feature = "log"), allow(unused_mut, unused_variables))]
 fn sinks(prepared: &Prepared, environment: &Environment) -> Result<(Sinks, Option<Memory>), Error> {
     let memory = prepared.keep_records.then(Memory::default);
     let mut sinks = Sinks::new(memory.clone());
-    #[cfg(feature = "log")]
     if let Some(path) = &prepared.log {
         sinks = sinks.with_file(path, environment)?;
     }

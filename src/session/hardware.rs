@@ -4,7 +4,7 @@ use crate::devices::Device;
 use crate::error::Error;
 use crate::runtime::{Execution, RateGroup};
 use crate::scene::{DeviceKind, DeviceSpec};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Connects to the service of a Haply device that is driven every `tick` seconds.
 #[cfg(feature = "haply")]

@@ -1,7 +1,7 @@
 //! How far ahead of the global model's state a local model has to reach.
 
 use crate::runtime::RateGroup;
-use crate::time::{Nanos, Rate};
+use crate::runtime::{Nanos, Rate};
 
 /// One period of service, and what catching up takes.
 const PERIODS_AHEAD: f64 = 1.25;

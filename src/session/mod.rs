@@ -28,7 +28,6 @@ mod patch;
 mod prepare;
 mod rate_groups;
 mod reduce;
-#[cfg(all(feature = "log", feature = "scene"))]
 mod replay;
 mod running;
 mod safety;
@@ -42,7 +41,6 @@ pub use builder::SessionBuilder;
 pub use choice::Choice;
 pub use compare::{CompareOptions, CompareProgress, compare, one_period};
 pub use reduce::{MeshStudy, PaperStudy, ReduceOptions, ReduceProgress, reduce_mesh, reduce_paper, reduce_scene};
-#[cfg(all(feature = "log", feature = "scene"))]
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};
 pub use running::{Running, Summary, Viewer};
 
@@ -91,7 +89,6 @@ impl Session {
     /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read; [`ErrorKind::Log`](crate::ErrorKind::Log) if it is
     /// damaged, if a record is missing, if it holds no force before its first fault, if it was made with another
     /// instruction set, or if the body was a program's own.
-    #[cfg(all(feature = "log", feature = "scene"))]
     pub fn replay(log: &std::path::Path) -> Result<Replay, Error> {
         Replay::of_scene(log)
     }

@@ -25,12 +25,11 @@ use crate::model::local::{Kind, MOST_EXPLICIT_STEPS, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, RateGroup, admit_here};
-#[cfg(feature = "scene")]
 use crate::scene::ProbeSpec;
 use crate::scene::{
     BasisSize, BodySpec, DeviceSpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind,
 };
-use crate::time::{Nanos, Rate};
+use crate::runtime::{Nanos, Rate};
 
 /// What a builder has collected.
 #[derive(Debug)]
@@ -48,7 +47,6 @@ pub(super) struct Parts {
     pub execution: Execution,
     /// On threads, or executing a log of such a run.
     pub in_real_time: bool,
-    #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     pub keep_records: bool,
     pub measures_cost: bool,
@@ -71,7 +69,6 @@ impl Parts {
             local: None,
             execution: Execution::Threaded,
             in_real_time: true,
-            #[cfg(feature = "log")]
             log: None,
             keep_records: false,
             measures_cost: false,
@@ -112,7 +109,6 @@ pub(super) struct Prepared {
     /// A basis takes its time here: bases are asked for ahead of the tool.
     pub prefetches: bool,
     pub until: Option<Nanos>,
-    #[cfg(feature = "log")]
     pub log: Option<PathBuf>,
     /// The log has the topic `/scene`.
     pub logs_scene: bool,
@@ -122,10 +118,8 @@ pub(super) struct Prepared {
     /// The scene file's text, for the log.
     pub source: Option<String>,
     /// The scene as it is run, with everything that a program or the command line changed.
-    #[cfg(feature = "scene")]
     pub as_run: Scene,
     /// The recording that is executed again in place of a run of its own.
-    #[cfg(all(feature = "log", feature = "scene"))]
     pub reexecuted: Option<super::replay::Reexecuted>,
 }
 
@@ -199,7 +193,6 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let patch = sized_patch.as_ref().map_or(scene.local.patch_size(), |choice| choice.size);
     // Named in the log's scene, so that a replay does not choose again.
     scene.local.patch = Some(patch);
-    #[cfg(feature = "scene")]
     let mut as_run = as_run(&scene, Some((&attached, &probes)));
     let law = Law {
         friction: scene.contact.friction.coefficient(),
@@ -218,7 +211,6 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     };
     let (tools, resolved) = tools(parts.devices, making)?;
     let safety_off = resolved.off.clone();
-    #[cfg(feature = "scene")]
     {
         // With what it left to the device.
         as_run.safety = resolved;
@@ -266,16 +258,13 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         execution: parts.execution,
         prefetches: parts.in_real_time,
         until: (!parts.endless).then(|| Nanos::from_secs_f64(scene.run.duration_s)),
-        #[cfg(feature = "log")]
         log: parts.log,
         logs_scene: scene.log.scene,
         keep_records: parts.keep_records,
         measures_cost: parts.measures_cost,
         disturbed: parts.disturbed,
         source: scene.source,
-        #[cfg(feature = "scene")]
         as_run,
-        #[cfg(all(feature = "log", feature = "scene"))]
         reexecuted: None,
     };
     // Before anything is started or written.
@@ -284,7 +273,6 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
 }
 
 /// The scene without what a log holds in other places, and with the nodes that a program named, if it has a lattice.
-#[cfg(feature = "scene")]
 pub(super) fn as_run(scene: &Scene, named: Option<(&[Option<u32>], &[u32])>) -> Scene {
     let mut scene = scene.clone();
     scene.source = None;

@@ -4,7 +4,7 @@ use crate::actors::GAP_S;
 use crate::error::{Error, ErrorKind};
 use crate::runtime::{Execution, OverrunPolicy, RateGroup, Release};
 use crate::scene::GlobalSpec;
-use crate::time::{Nanos, Rate};
+use crate::runtime::{Nanos, Rate};
 
 /// The priority of the haptic thread: above everything but the kernel's own.
 const HAPTIC_PRIORITY: u8 = 80;

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
 use crate::runtime::histogram::{HistogramReader, Snapshot};
 use crate::runtime::{GroupLive, OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// A session that runs. Dropping it commands zero force and joins its threads, within
 /// [`STOP_BOUND`](crate::runtime::STOP_BOUND) per group.

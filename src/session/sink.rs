@@ -2,12 +2,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-#[cfg(feature = "log")]
 use crate::actors::LogFile;
 use crate::actors::{LogSink, Loss};
 use crate::error::Error;
 use crate::log::{Environment, GroupStats, LogRecord, SceneFrame, TextEvent};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Records kept in memory.
 #[derive(Clone, Debug, Default)]
@@ -26,7 +25,6 @@ impl Memory {
 /// All sinks that a session asked for, one after the other.
 pub(super) struct Sinks {
     memory: Option<Memory>,
-    #[cfg(feature = "log")]
     file: Option<LogFile>,
 }
 
@@ -35,20 +33,17 @@ impl Sinks {
     pub(super) fn new(memory: Option<Memory>) -> Self {
         Self {
             memory,
-            #[cfg(feature = "log")]
             file: None,
         }
     }
 
     /// Also writes a file.
-    #[cfg(feature = "log")]
     pub(super) fn with_file(mut self, path: &std::path::Path, environment: &Environment) -> Result<Self, Error> {
         self.file = Some(LogFile::create(path, environment)?);
         Ok(self)
     }
 
     /// Writes to the file, if there is one. A file that failed counts what it loses; memory goes on.
-    #[cfg(feature = "log")]
     fn on_file(&mut self, write: impl FnOnce(&mut LogFile) -> Result<(), Error>) -> Result<(), Error> {
         self.file.as_mut().map_or(Ok(()), write)
     }
@@ -59,55 +54,42 @@ impl LogSink for Sinks {
         if let Some(memory) = &self.memory {
             memory.push(*record);
         }
-        #[cfg(feature = "log")]
         self.on_file(|file| file.record(record))?;
         Ok(())
     }
 
-    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn text(&mut self, event: &TextEvent) -> Result<(), Error> {
-        #[cfg(feature = "log")]
         self.on_file(|file| file.text(event))?;
         Ok(())
     }
 
-    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
-        #[cfg(feature = "log")]
         self.on_file(|file| file.stats(stats))?;
         Ok(())
     }
 
-    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn scene(&mut self, frame: &SceneFrame) -> Result<(), Error> {
-        #[cfg(feature = "log")]
         self.on_file(|file| file.scene(frame))?;
         Ok(())
     }
 
-    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn environment(&mut self, environment: &Environment) {
-        #[cfg(feature = "log")]
         if let Some(file) = &mut self.file {
             file.environment(environment);
         }
     }
 
-    #[cfg_attr(not(feature = "log"), allow(unused_variables))]
     fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error> {
-        #[cfg(feature = "log")]
         self.on_file(|file| file.flush(log_time, now))?;
         Ok(())
     }
 
     fn finish(&mut self) -> Result<(), Error> {
-        #[cfg(feature = "log")]
         self.on_file(LogFile::finish)?;
         Ok(())
     }
 
     fn take_loss(&mut self) -> Option<Loss> {
-        #[cfg(feature = "log")]
         return self.file.as_mut().and_then(LogFile::take_loss);
         #[cfg(not(feature = "log"))]
         None

@@ -7,7 +7,7 @@ use crate::model::local::MOST_EXPLICIT_STEPS;
 use crate::model::surroundings::MOST_STATES;
 use crate::runtime::Execution;
 use crate::scene::{BasisSize, LocalModelKind as Kind, Scene};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Contact, integration, device and records of a tick of the whole body, as a factor on its force evaluations.
 const OVERHEAD: f64 = 1.25;

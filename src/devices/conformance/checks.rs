@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::devices::{Calibration, Device, DeviceFault, ForceCommand};
 use crate::model::Vec3;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Why a check did not pass.
 #[derive(Clone, Debug)]

@@ -16,7 +16,7 @@ pub use spec::{Axis, HandSpec, PlantSpec};
 use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use crate::error::Error;
 use crate::model::Vec3;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 use plant::{Load, Motion};
 use transport::Transport;
 

@@ -6,8 +6,8 @@ use super::super::Capabilities;
 pub(crate) type SpecFault = (&'static str, String);
 
 /// An axis of space.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Axis {
     /// The first.
     X,
@@ -18,8 +18,8 @@ pub enum Axis {
 }
 
 /// A simulated device: a mass with friction along each axis, and what lies between its motors and sensors and the program.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct PlantSpec {
     /// Moving mass m (kg).
     pub mass_kg: f64,
@@ -131,8 +131,8 @@ impl PlantSpec {
 }
 
 /// A hand that holds the device: its mass moves with the device, and a spring draws both to where it wants to be.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields, default))]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct HandSpec {
     /// Mass of hand and arm that moves with the device (kg).
     pub mass_kg: f64,

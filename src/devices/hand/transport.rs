@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::devices::ForceCommand;
 use crate::random::uniform;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Commands on their way at most: a delay of 100 ms at 10 kHz.
 const ROOM: usize = 1024;

@@ -11,7 +11,7 @@ use super::worst::{Worst, WorstTick};
 use crate::log::environment::Environment;
 use crate::log::{Analysis, LogEntry, LogRecord, RunReport};
 use crate::runtime::record::TickTiming;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// What a log says about the timing of its run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -77,7 +77,6 @@ impl TimingAnalysis {
     }
 
     /// Counts a lateness of a group as often as it occurred, where nothing else is known of its releases (ns).
-    #[cfg(feature = "log")]
     pub(super) fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
         self.sums.push_lateness(group, lateness, count);
     }

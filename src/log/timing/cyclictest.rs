@@ -6,7 +6,7 @@ use super::analysis::{TimingAnalysis, TimingReport};
 use super::selection::Selection;
 use crate::error::{Error, ErrorKind};
 use crate::log::{Environment, Execution, GroupInfo, LogEntry, TextEvent, Window};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 use serde_json::Value;
 
 /// The threads of `text`, which was read from `place`, as rate groups `thread0`, `thread1`, ... with their lateness.

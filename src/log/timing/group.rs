@@ -7,7 +7,7 @@ use crate::log::environment::GroupInfo;
 use crate::log::group::{GroupCounter, TickFigures};
 use crate::log::percentiles::Distribution;
 use crate::runtime::record::{ActorTimes, SlipCause, TickTiming};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Bins of a chart over time, at most.
 const BINS: usize = 600;

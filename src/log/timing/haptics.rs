@@ -2,7 +2,7 @@
 
 use super::over_time::{Absorb, OverTime};
 use crate::log::{CommandSample, ForceSample, Resync, magnitude};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 const BINS: usize = 600;
 const LEAST_BIN: Nanos = Nanos(1_000_000);

@@ -10,7 +10,6 @@ mod bootstrap;
 mod charts;
 mod condition;
 mod cores;
-#[cfg(feature = "log")]
 mod cyclictest;
 mod figures;
 mod group;
@@ -26,7 +25,6 @@ pub use blocks::{Block, Buckets};
 pub use charts::{Bin, Shape};
 pub use condition::Condition;
 pub use cores::CoreUse;
-#[cfg(feature = "log")]
 pub use cyclictest::read_cyclictest;
 pub(crate) use figures::cause_name;
 pub use figures::{Figure, Unit, Value};

@@ -1,6 +1,6 @@
 //! Values over the time of a run, in a bounded number of bins however long it lasts.
 
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// What a bin can do: take in the bin that follows it.
 pub trait Absorb: Default {

@@ -5,7 +5,7 @@
 
 use super::recent::{ForcePoint, Moment, Recent, is_of};
 use crate::runtime::record::{SlipCause, TickTiming};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// How many are kept.
 const KEPT: usize = 10;

@@ -6,7 +6,7 @@ use super::kernel::{InstructionSet, LatticeKernel};
 use super::lattice_springs::LatticeSprings;
 use super::region::{Material, Region, materials, region_field};
 use super::{Body, Link, State, TangentBlock};
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// A block of nodes and springs; made by [`Block::builder`].
 ///
@@ -80,29 +80,29 @@ impl BlockBuilder {
     /// # Errors
     /// If a number is not finite, a mass, stiffness or size is not positive, an axis has less than two nodes, or a region
     /// holds no node or differs in nothing.
-    pub fn build(self) -> Result<Block, Error> {
+    pub fn build(self) -> Result<Block, ModelError> {
         let positive = |value: f64| value.is_finite() && value > 0.0;
         let Material { stiffness, damping_ratio, node_mass } = self.material;
         if self.nodes.iter().any(|&n| n < 2) {
-            return Err(Error::scene("nodes", format!("{:?}: at least 2 per axis are needed", self.nodes)));
+            return Err(ModelError::of("nodes", format!("{:?}: at least 2 per axis are needed", self.nodes)));
         }
         if !self.size.iter().all(|&length| positive(length)) {
-            return Err(Error::scene("size_m", format!("{:?}: three lengths above 0 are needed", self.size)));
+            return Err(ModelError::of("size_m", format!("{:?}: three lengths above 0 are needed", self.size)));
         }
         for (field, value) in [("node_mass_kg", node_mass), ("stiffness_n_per_m", stiffness)] {
             if !positive(value) {
-                return Err(Error::scene(field, format!("{value}: a finite value above 0 is needed")));
+                return Err(ModelError::of(field, format!("{value}: a finite value above 0 is needed")));
             }
         }
         if !(damping_ratio.is_finite() && damping_ratio >= 0.0) {
-            return Err(Error::scene("damping_ratio", format!("{damping_ratio}: 0 or more is needed")));
+            return Err(ModelError::of("damping_ratio", format!("{damping_ratio}: 0 or more is needed")));
         }
         let lattice = Lattice { nodes: self.nodes };
         let spacing: [f64; 3] = std::array::from_fn(|axis| self.size[axis] / (self.nodes[axis] - 1) as f64);
         let at = |id: usize| lattice.coordinates(id as u32);
         let held = |id: usize| self.fixed.iter().any(|&face| face.holds(at(id), self.nodes));
         let materials = materials(lattice, self.size, self.material, &self.regions)
-            .map_err(|(index, (key, message))| Error::scene(&region_field("region", index, key), message))?;
+            .map_err(|(index, (key, message))| ModelError::of(&region_field("region", index, key), message))?;
         let springs = LatticeSprings::new(&lattice, spacing, &materials);
         let inverse_mass = |id: usize| if held(id) { 0.0 } else { 1.0 / materials[id].node_mass };
         Ok(Block {
@@ -147,7 +147,7 @@ impl Block {
     ///
     /// # Errors
     /// If this machine does not have it.
-    pub fn with_instruction_set(mut self, set: InstructionSet) -> Result<Self, Error> {
+    pub fn with_instruction_set(mut self, set: InstructionSet) -> Result<Self, ModelError> {
         self.kernel.set_instruction_set(set.available()?);
         Ok(self)
     }
@@ -159,7 +159,7 @@ impl Block {
     /// # Errors
     /// If `cores` is 0 or the system refuses a thread.
     #[cfg(feature = "parallel")]
-    pub fn on_cores(mut self, cores: usize) -> Result<Self, Error> {
+    pub fn on_cores(mut self, cores: usize) -> Result<Self, ModelError> {
         self.kernel.set_cores(&self.springs, cores)?;
         Ok(self)
     }

@@ -1,7 +1,7 @@
 //! Deformable bodies: what a simulation needs to know of one, the block of springs, and networks of any springs.
 
 mod block;
-pub(in crate::model) mod kernel;
+pub(crate) mod kernel;
 mod lattice_springs;
 mod network;
 mod region;

@@ -4,7 +4,7 @@ use super::super::Vec3;
 use super::super::mesh::Surface;
 use super::kernel::{InstructionSet, NetworkKernel};
 use super::{Body, Link, Spring, State, TangentBlock};
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// Point masses joined by an arbitrary list of springs; made by [`SpringNetwork::builder`].
 ///
@@ -82,27 +82,27 @@ impl SpringNetworkBuilder {
     /// If there are no nodes, a number is not finite, a mass or rest length is not positive, a stiffness or damping is
     /// negative, a spring joins a node to itself, something names a node that is not there, or the surface is not a
     /// manifold.
-    pub fn build(self) -> Result<SpringNetwork, Error> {
+    pub fn build(self) -> Result<SpringNetwork, ModelError> {
         let nodes = self.rest.len();
         if nodes == 0 || nodes >= u32::MAX as usize {
-            return Err(Error::scene("nodes", format!("{nodes}: at least 1 and less than 2^32 - 1 are needed")));
+            return Err(ModelError::of("nodes", format!("{nodes}: at least 1 and less than 2^32 - 1 are needed")));
         }
         if let Some((n, x)) = self.rest.iter().enumerate().find(|(_, x)| !x.iter().all(|c| c.is_finite())) {
             let message = format!("node {n} is at {:?}: finite positions are needed", x.as_slice());
-            return Err(Error::scene("nodes", message));
+            return Err(ModelError::of("nodes", message));
         }
         if self.masses.len() != nodes {
-            return Err(Error::scene("masses", format!("{} for {nodes} nodes: one each is needed", self.masses.len())));
+            return Err(ModelError::of("masses", format!("{} for {nodes} nodes: one each is needed", self.masses.len())));
         }
         if let Some((n, m)) = self.masses.iter().enumerate().find(|(_, m)| !(m.is_finite() && **m > 0.0)) {
             let message = format!("node {n} has {m} kg: a finite value above 0 is needed");
-            return Err(Error::scene("masses", message));
+            return Err(ModelError::of("masses", message));
         }
         if let Some(node) = self.held.iter().find(|&&node| node as usize >= nodes) {
-            return Err(Error::scene("fix", format!("node {node}: there are only {nodes}")));
+            return Err(ModelError::of("fix", format!("node {node}: there are only {nodes}")));
         }
         for (n, spring) in self.springs.iter().enumerate() {
-            check(spring, nodes).map_err(|what| Error::scene("springs", format!("spring {n}: {what}")))?;
+            check(spring, nodes).map_err(|what| ModelError::of("springs", format!("spring {n}: {what}")))?;
         }
         let mut inverse_masses: Vec<f64> = self.masses.iter().map(|m| 1.0 / m).collect();
         for node in self.held {
@@ -168,7 +168,7 @@ impl SpringNetwork {
     ///
     /// # Errors
     /// If this machine does not have it.
-    pub fn with_instruction_set(mut self, set: InstructionSet) -> Result<Self, Error> {
+    pub fn with_instruction_set(mut self, set: InstructionSet) -> Result<Self, ModelError> {
         self.kernel.set_instruction_set(set.available()?);
         Ok(self)
     }
@@ -180,7 +180,7 @@ impl SpringNetwork {
     /// # Errors
     /// If `cores` is 0 or the system refuses a thread.
     #[cfg(feature = "parallel")]
-    pub fn on_cores(mut self, cores: usize) -> Result<Self, Error> {
+    pub fn on_cores(mut self, cores: usize) -> Result<Self, ModelError> {
         self.kernel.set_cores(&self.springs, cores)?;
         Ok(self)
     }

@@ -44,7 +44,7 @@ pub enum Mode {
 
 /// Which normal a contact uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Normals {
     /// Unit vertex normals interpolated over the triangle: continuous along the surface.
     #[default]
@@ -55,7 +55,7 @@ pub enum Normals {
 
 /// Which equations resolve a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Equations {
     /// Velocity level, mass-weighted; the default.
     #[default]

@@ -6,7 +6,7 @@ use super::super::contact::Contact;
 use super::super::forecast::ToolForecast;
 use super::super::geometry::NearestTriangle;
 use super::super::mesh::Surface;
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// Slower tools have no direction (m/s).
 const AT_REST: f64 = 1e-3;
@@ -35,7 +35,7 @@ impl Aim {
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(surface: &Surface, positions: &[Vec3]) -> Result<Self, Error> {
+    pub fn new(surface: &Surface, positions: &[Vec3]) -> Result<Self, ModelError> {
         Ok(Self { nearest: NearestTriangle::new(surface, positions)? })
     }
 

@@ -8,7 +8,7 @@ use super::Kind;
 
 /// What the global model learns from the local one, besides the tool's trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Feedback {
     /// Nothing: it resolves the contact along the tool's trajectory itself.
     Trajectory,

@@ -2,7 +2,7 @@
 
 /// The local models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Kind {
     /// [`Full`](super::Full): the whole body at the haptic rate, the reference that the others are measured against.
     Full,

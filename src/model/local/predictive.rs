@@ -15,7 +15,7 @@ use super::{Kind, LocalModel, PatchGeometry, ResyncView, Watched};
 
 /// How `predictive` finds where its ring will go.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "scene", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Prediction {
     /// By a reduced model of the surroundings, where that holds the present motion; else as [`Full`](Self::Full).
     #[default]

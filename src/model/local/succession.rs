@@ -186,8 +186,8 @@ impl Succession {
 mod tests {
     use super::super::{Kind, PatchGeometry, ResyncView};
     use super::*;
-    use crate::model::blend::BlendKind;
-    use crate::model::contact::Contact;
+    use crate::blend::BlendKind;
+    use crate::contact::Contact;
 
     /// Adds up the motion that it was given; its force is its base plus that.
     #[derive(Debug)]

@@ -8,7 +8,7 @@ use super::{
     Condensed, Feedback, Hold, Kind, Layered, LinearBoundary, LinearSpec, LocalModel, Patch, Prediction, Predictive,
     ScaledBoundary, Yielding,
 };
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// What the local models of a session are made from.
 #[derive(Clone, Debug)]
@@ -43,11 +43,11 @@ impl Template {
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(kind: Kind, patch: [usize; 3], body: &dyn Body) -> Result<Self, Error> {
+    pub fn new(kind: Kind, patch: [usize; 3], body: &dyn Body) -> Result<Self, ModelError> {
         let springs = || {
             SpringGraph::new(body).ok_or_else(|| {
                 let message = format!("{:?} needs a body of springs, use another model", kind.name());
-                Error::scene("local.model", message)
+                ModelError::of("local.model", message)
             })
         };
         let surroundings = match kind {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::error::{Error, ErrorKind};
+use crate::error::ModelError;
 
 /// No triangle, or no neighbour across an edge.
 pub const NONE: u32 = u32::MAX;
@@ -28,7 +28,7 @@ impl Surface {
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(nodes: usize, triangles: Vec<[u32; 3]>) -> Result<Self, Error> {
+    pub fn new(nodes: usize, triangles: Vec<[u32; 3]>) -> Result<Self, ModelError> {
         let mut edges: HashMap<(u32, u32), (u32, usize)> = HashMap::with_capacity(triangles.len() * 2);
         let mut neighbours = vec![[NONE; 3]; triangles.len()];
         for (t, triangle) in triangles.iter().enumerate() {
@@ -36,7 +36,7 @@ impl Surface {
             if triangle.iter().any(|&node| node as usize >= nodes) || a == b || b == c || c == a {
                 let message =
                     format!("triangle {t} has nodes {triangle:?}: three different ones below {nodes} are needed");
-                return Err(Error::new(ErrorKind::Scene, message));
+                return Err(ModelError::new(message));
             }
             for opposite in 0..3 {
                 let (p, q) = (triangle[(opposite + 1) % 3], triangle[(opposite + 2) % 3]);
@@ -52,7 +52,7 @@ impl Surface {
                     Some(_) => {
                         let message =
                             format!("edge {edge:?} has more than two triangles: the surface must be a manifold");
-                        return Err(Error::new(ErrorKind::Scene, message));
+                        return Err(ModelError::new(message));
                     }
                 }
             }

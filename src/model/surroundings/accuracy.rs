@@ -2,7 +2,7 @@
 
 use super::SpringGraph;
 use super::reduction::Reduction;
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// How large a basis is to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +57,7 @@ impl Estimate {
 ///
 /// # Real-time
 /// Not real-time safe: factorises the body several times.
-pub fn errors_by_states(graph: &SpringGraph, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, Error> {
+pub fn errors_by_states(graph: &SpringGraph, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, ModelError> {
     // No number of states keeps this budget, so that all are looked at.
     let Some(mut reduction) = Reduction::new(graph, patch, Size::ErrorPct(0.0)) else { return Ok(Vec::new()) };
     loop {

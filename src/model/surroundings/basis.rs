@@ -10,7 +10,7 @@ use super::accuracy::{Estimate, Size};
 use super::products::Columns;
 use super::reduced::{Reduced, ReducedMotion};
 use super::reduction::Reduction;
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// A forecast is used where what it leaves out moves less than this share of what there is.
 const LEFT_OUT: f64 = 0.02;
@@ -38,7 +38,7 @@ impl Basis {
     /// # Real-time
     /// Not real-time safe: factorises a matrix of the whole body's size, seconds of work for a large one. [`Reduction`] does
     /// the same in parts.
-    pub fn compute(graph: &SpringGraph, patch: &[u32], size: impl Into<Size>) -> Result<Option<Self>, Error> {
+    pub fn compute(graph: &SpringGraph, patch: &[u32], size: impl Into<Size>) -> Result<Option<Self>, ModelError> {
         let Some(mut reduction) = Reduction::new(graph, patch, size) else { return Ok(None) };
         loop {
             if let Some(basis) = reduction.advance(graph)? {

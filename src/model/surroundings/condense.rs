@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::super::sparse::SparseFactor;
 use super::graph::SpringGraph;
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// The stiffness of a whole body at rest, factorised once for every patch.
 ///
@@ -32,7 +32,7 @@ impl Condensation {
     ///
     /// # Real-time
     /// Not real-time safe: allocates, and factorises a sparse matrix of three rows per node.
-    pub fn new(springs: SpringGraph) -> Result<Self, Error> {
+    pub fn new(springs: SpringGraph) -> Result<Self, ModelError> {
         let mut movable = 0;
         let places: Vec<Option<usize>> = springs
             .inverse_masses()
@@ -68,7 +68,7 @@ impl Condensation {
             Some(factor) => Ok(Self { factor, places, movable, springs }),
             None => {
                 let message = "\"condensed\" needs a body that is held, set body.block.fixed or use another model";
-                Err(Error::scene("local.model", message))
+                Err(ModelError::of("local.model", message))
             }
         }
     }

@@ -9,7 +9,7 @@ use super::estimate::Contacts;
 use super::far::Far;
 use super::products::Columns;
 use super::reduced::Reduced;
-use crate::error::{Error, ErrorKind};
+use crate::error::ModelError;
 
 /// The real frequency that the answers are expanded at (rad/s): between rest and the fastest that a hand does.
 const EXPANSION: f64 = 2.0 * std::f64::consts::PI * 30.0;
@@ -107,7 +107,7 @@ impl Reduction {
     ///
     /// # Real-time
     /// Not real-time safe: allocates, and takes a second for a large body.
-    pub fn advance(&mut self, graph: &SpringGraph) -> Result<Option<Basis>, Error> {
+    pub fn advance(&mut self, graph: &SpringGraph) -> Result<Option<Basis>, ModelError> {
         let (far, ring) = (&self.far, &self.ring);
         match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Factorise => {
@@ -159,7 +159,7 @@ impl Reduction {
         }
     }
 
-    fn project(&self, graph: &SpringGraph, factor: &SparseFactor, wide: &[f64]) -> Result<Basis, Error> {
+    fn project(&self, graph: &SpringGraph, factor: &SparseFactor, wide: &[f64]) -> Result<Basis, ModelError> {
         let Self { far, ring, size, errors, .. } = self;
         let states = match *size {
             Size::States(states) => states,
@@ -180,8 +180,8 @@ impl Reduction {
     }
 }
 
-fn indefinite() -> Error {
-    Error::new(ErrorKind::Scene, "the surroundings of a patch are not held together").at("local.patch")
+fn indefinite() -> ModelError {
+    ModelError::new("the surroundings of a patch are not held together").at("local.patch")
 }
 
 /// A unit force on each node of the ring along each axis, as columns.

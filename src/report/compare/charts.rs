@@ -3,7 +3,7 @@
 use super::milliseconds;
 use crate::log::{ComparedRun, Comparison, Measured, magnitude};
 use crate::report::svg::{Axis, Chart, Line, Mark, Point};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 const WIDE: f64 = 960.0;
 /// A force below this part of the peak is no contact to look at.

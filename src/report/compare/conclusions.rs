@@ -4,7 +4,7 @@ use super::table::figure;
 use super::{milliseconds, name};
 use crate::log::{ComparedRun, Comparison, Measured};
 use crate::report::units::duration;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Costs that differ by less are called the same: they are measured, and differ from run to run.
 const MARGIN: f64 = 0.1;

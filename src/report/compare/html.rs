@@ -110,7 +110,7 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
 mod tests {
     use super::*;
     use crate::log::{ComparedRun, RunOutcome};
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     #[test]
     fn a_scene_without_any_force_and_a_refused_model_still_make_a_page() {

@@ -80,7 +80,7 @@ fn model(name: &str, latency_ns: u64, run: Option<&Measured>, why_not: Option<&s
 mod tests {
     use super::*;
     use crate::log::{ComparedRun, RunOutcome};
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     #[test]
     fn a_failed_run_has_its_reason_and_no_figures() {

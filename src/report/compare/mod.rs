@@ -3,18 +3,16 @@
 mod charts;
 mod conclusions;
 mod html;
-#[cfg(feature = "cli")]
 mod json;
 mod table;
 
 pub use conclusions::{NEAR, conclusions};
 pub use html::to_html;
-#[cfg(feature = "cli")]
 pub use json::to_json;
 pub use table::to_text;
 
 use crate::log::ComparedRun;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// A latency in milliseconds, as short as it can be written: `0`, `33.34`.
 fn milliseconds(latency: Nanos) -> String {

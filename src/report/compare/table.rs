@@ -142,7 +142,7 @@ fn wrapped(line: &str) -> String {
 
 /// What was compared, in one line.
 pub(super) fn facts(comparison: &Comparison) -> String {
-    let hz = |period: crate::time::Nanos| format!("{:.0} Hz", 1.0 / period.as_secs_f64());
+    let hz = |period: crate::runtime::Nanos| format!("{:.0} Hz", 1.0 / period.as_secs_f64());
     format!(
         "{}: {} nodes, {:.3} s simulated at {} and {}, largest force of full {}",
         comparison.scene,
@@ -188,7 +188,7 @@ pub(super) fn figure(value: f64) -> String {
 mod tests {
     use super::*;
     use crate::log::{ComparedRun, RunOutcome};
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     #[test]
     fn figures_are_short_and_keep_three_digits() {

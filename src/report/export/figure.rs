@@ -58,7 +58,7 @@ impl Gauge {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     #[test]
     fn each_figure_of_four_releases_is_what_its_definition_gives() {

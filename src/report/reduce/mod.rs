@@ -2,7 +2,6 @@
 
 mod figures;
 mod html;
-#[cfg(feature = "cli")]
 mod json;
 mod map;
 mod table;
@@ -14,7 +13,6 @@ mod words;
 mod sample;
 
 pub use html::to_html;
-#[cfg(feature = "cli")]
 pub use json::to_json;
 pub use text::to_text;
 pub use words::locality_verdict;

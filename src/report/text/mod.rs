@@ -12,7 +12,6 @@ use std::fmt;
 pub use self::against::{against_to_text, figure_to_text};
 use self::haptics::haptics;
 use self::page::Page;
-#[cfg(feature = "cli")]
 pub(super) use self::worst::in_words;
 use super::units::duration;
 use super::verdict::verdict;
@@ -177,7 +176,7 @@ mod tests {
     use super::*;
     use crate::log::{Analysis, GroupInfo, Level, LogRecord, Resync, TextEvent};
     use crate::runtime::record::{SlipCause, TickTiming};
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     fn busy_report() -> RunReport {
         let mut analysis = Analysis::default();

@@ -118,7 +118,7 @@ mod tests {
     use super::*;
     use crate::log::timing::Moment;
     use crate::runtime::record::TickTiming;
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     const MS: u64 = 1_000_000;
 

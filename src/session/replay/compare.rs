@@ -7,7 +7,7 @@ use super::report::{Compared, Difference};
 use crate::log::LogRecord;
 use crate::runtime::{Actor, Outcome, Record, RecordDrain, TickContext};
 use crate::scene::MAX_DEVICES;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// The topics whose samples are computed, and whether the local group makes them.
 const TOPICS: [(&str, bool); 6] = [

@@ -7,7 +7,7 @@
 
 use super::report::{LoggedFault, Unrepeated, UnrepeatedRelease};
 use crate::runtime::{RuntimeFault, RuntimeReport, TickTiming};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// The end of what can be repeated.
 #[derive(Debug)]
@@ -81,7 +81,7 @@ impl Cut {
 mod tests {
     use super::*;
     use crate::runtime::GroupReport;
-    use crate::time::Rate;
+    use crate::runtime::Rate;
 
     /// Due every 10 ns; each with the times at which it woke and ended.
     fn group(ran: &[[u64; 2]]) -> Vec<TickTiming> {

@@ -104,7 +104,7 @@ mod tests {
             }
             for bit in 0..32 {
                 let index = Record { index: clean.index ^ 1 << bit, ..clean };
-                let stamp = Record { stamp: crate::time::Nanos(clean.stamp.0 ^ 1 << bit), ..clean };
+                let stamp = Record { stamp: crate::runtime::Nanos(clean.stamp.0 ^ 1 << bit), ..clean };
                 let code = Record { code: clean.code ^ 1 << (bit % 16), ..clean };
                 names.extend([index, stamp, code].iter().filter_map(|flipped| changed(&sample, flipped)));
             }

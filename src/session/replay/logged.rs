@@ -14,7 +14,7 @@ use crate::log::{
 use crate::model::body::Block;
 use crate::runtime::{Recording, TickTiming};
 use crate::scene::{MAX_DEVICES, Scene};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// The rate group that is no part of what is repeated.
 const LOGGER: &str = "logger";

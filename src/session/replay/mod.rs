@@ -18,7 +18,7 @@ use crate::devices::{Capabilities, Device, DeviceState, Replayed, ReplayedSample
 use crate::error::{Error, ErrorKind};
 use crate::runtime::{Execution, Recording, RuntimeReport};
 use crate::scene::{DeviceKind, DeviceSpec, ModelChoice};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 use compare::End;
 use cut::Cut;
 use logged::Logged;

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::runtime::RuntimeFault;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// How the samples of one topic compare.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

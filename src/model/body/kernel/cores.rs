@@ -1,7 +1,7 @@
 //! The parts of one evaluation, each on a core of its own.
 
 #[cfg(feature = "parallel")]
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// Looks at whether the helpers are done before the calling thread sleeps: some 100 us.
 #[cfg(feature = "parallel")]
@@ -17,15 +17,15 @@ pub(super) struct Cores {
 impl Cores {
     /// The calling thread and `cores` - 1 helpers.
     #[cfg(feature = "parallel")]
-    pub(super) fn new(cores: usize) -> Result<Self, Error> {
+    pub(super) fn new(cores: usize) -> Result<Self, ModelError> {
         let helpers = match cores {
-            0 => return Err(Error::scene("cores", "0: at least 1 is needed")),
+            0 => return Err(ModelError::of("cores", "0: at least 1 is needed")),
             1 => None,
             _ => {
                 let threads = rayon::ThreadPoolBuilder::new().num_threads(cores - 1);
                 let name = |n| format!("palpate-springs-{n}");
                 let pool = threads.thread_name(name).build();
-                Some(std::sync::Arc::new(pool.map_err(|e| Error::scene("cores", format!("{cores}: {e}")))?))
+                Some(std::sync::Arc::new(pool.map_err(|e| ModelError::of("cores", format!("{cores}: {e}")))?))
             }
         };
         Ok(Self { helpers })

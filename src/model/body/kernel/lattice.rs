@@ -13,29 +13,29 @@ use super::nodes::Arrays;
 use super::pull::{Springs, scale, shortest};
 use super::simd::{InstructionSet, LANES, Lane, Simd, Work};
 #[cfg(feature = "parallel")]
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// Evaluates the springs of a lattice.
 #[derive(Clone, Debug)]
-pub(in super::super) struct LatticeKernel {
+pub(crate) struct LatticeKernel {
     parts: Vec<LatticePart>,
     set: InstructionSet,
     cores: Cores,
 }
 
 impl LatticeKernel {
-    pub(in super::super) fn new(springs: &LatticeSprings) -> Self {
+    pub(crate) fn new(springs: &LatticeSprings) -> Self {
         let mut new = Self { parts: Vec::new(), set: InstructionSet::detect(), cores: Cores::default() };
         new.divide(springs, 1);
         new
     }
 
-    pub(in super::super) fn set_instruction_set(&mut self, set: InstructionSet) {
+    pub(crate) fn set_instruction_set(&mut self, set: InstructionSet) {
         self.set = set;
     }
 
     #[cfg(feature = "parallel")]
-    pub(in super::super) fn set_cores(&mut self, springs: &LatticeSprings, cores: usize) -> Result<(), Error> {
+    pub(crate) fn set_cores(&mut self, springs: &LatticeSprings, cores: usize) -> Result<(), ModelError> {
         self.cores = Cores::new(cores)?;
         self.divide(springs, cores);
         Ok(())
@@ -49,7 +49,7 @@ impl LatticeKernel {
     }
 
     /// Writes the spring force on every node to `out`.
-    pub(in super::super) fn forces(
+    pub(crate) fn forces(
         &mut self,
         springs: &LatticeSprings,
         positions: &[Vec3],

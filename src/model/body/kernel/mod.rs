@@ -19,6 +19,6 @@ mod pull;
 mod simd;
 
 pub(super) use lattice::LatticeKernel;
-pub(in crate::model) use network::NetworkKernel;
+pub(crate) use network::NetworkKernel;
 pub use simd::InstructionSet;
-pub(in crate::model) use simd::{LANES, Lane, Simd, Work};
+pub(crate) use simd::{LANES, Lane, Simd, Work};

@@ -14,14 +14,14 @@ use super::numbering::near_first;
 use super::pull::{Springs, scale};
 use super::simd::{InstructionSet, LANES, Lane, Numbers, Simd, Work};
 #[cfg(feature = "parallel")]
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// Springs that a batch is chosen from: enough to find eight without a common node, few enough to stay near.
 const WINDOW: usize = 512;
 
 /// Evaluates a list of springs.
 #[derive(Clone, Debug)]
-pub(in crate::model) struct NetworkKernel {
+pub(crate) struct NetworkKernel {
     /// The caller's numbers of the nodes, in the order of the kernel.
     order: Vec<u32>,
     /// The kernel's numbers of the nodes, in the caller's order.
@@ -32,7 +32,7 @@ pub(in crate::model) struct NetworkKernel {
 }
 
 impl NetworkKernel {
-    pub(in crate::model) fn new(nodes: usize, springs: &[(u32, u32, Spring)]) -> Self {
+    pub(crate) fn new(nodes: usize, springs: &[(u32, u32, Spring)]) -> Self {
         let order = near_first(nodes, springs);
         let mut place = vec![0; nodes];
         for (new, &old) in order.iter().enumerate() {
@@ -44,12 +44,12 @@ impl NetworkKernel {
         new
     }
 
-    pub(in super::super) fn set_instruction_set(&mut self, set: InstructionSet) {
+    pub(crate) fn set_instruction_set(&mut self, set: InstructionSet) {
         self.set = set;
     }
 
     #[cfg(feature = "parallel")]
-    pub(in super::super) fn set_cores(&mut self, springs: &[(u32, u32, Spring)], cores: usize) -> Result<(), Error> {
+    pub(crate) fn set_cores(&mut self, springs: &[(u32, u32, Spring)], cores: usize) -> Result<(), ModelError> {
         self.cores = Cores::new(cores)?;
         self.divide(springs, cores);
         Ok(())
@@ -82,7 +82,7 @@ impl NetworkKernel {
     }
 
     /// Writes the spring force on every node to `out`.
-    pub(in crate::model) fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], out: &mut [Vec3]) {
+    pub(crate) fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], out: &mut [Vec3]) {
         let Self { order, place, parts, set, cores } = self;
         let order = &order[..];
         cores.each(parts.iter_mut(), |part| part.evaluate(*set, order, positions, velocities));

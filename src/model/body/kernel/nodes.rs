@@ -5,12 +5,12 @@ use super::simd::{LANES, Lane};
 /// Position and velocity of one node: x, y, z, unused, and again. One cache line, one AVX-512 register.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
-pub(in crate::model) struct Motion(pub(super) Lane);
+pub(crate) struct Motion(pub(super) Lane);
 
 /// The force on one node: x, y, z, unused.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(32))]
-pub(in crate::model) struct Push(pub(super) [f64; 4]);
+pub(crate) struct Push(pub(super) [f64; 4]);
 
 /// Doubles in a cache line and in a page.
 const LINE: usize = 8;

@@ -5,13 +5,13 @@ use super::nodes::{Motion, Push};
 use super::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::{avx2::Avx2, avx512::Avx512};
-use crate::error::Error;
+use crate::error::ModelError;
 
 /// Springs, or nodes, that a kernel takes at once.
-pub(in crate::model) const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Eight doubles in memory.
-pub(in crate::model) type Lane = [f64; LANES];
+pub(crate) type Lane = [f64; LANES];
 
 /// Eight node numbers.
 pub(super) type Numbers = [u32; LANES];
@@ -20,7 +20,7 @@ pub(super) type Numbers = [u32; LANES];
 /// instruction set, so the methods are safe to call.
 ///
 /// All of them are to be inlined into one function that is compiled for the set: no closures on the way.
-pub(in crate::model) trait Simd: Copy {
+pub(crate) trait Simd: Copy {
     /// Eight doubles in registers.
     type V: Copy;
     /// A yes or no for each of them.
@@ -72,7 +72,7 @@ pub(in crate::model) trait Simd: Copy {
 }
 
 /// Work that is compiled for each instruction set.
-pub(in crate::model) trait Work {
+pub(crate) trait Work {
     fn run<S: Simd>(self, simd: S);
 }
 
@@ -114,8 +114,8 @@ impl InstructionSet {
     }
 
     /// Itself, if this machine has it.
-    pub(in super::super) fn available(self) -> Result<Self, Error> {
-        let error = || Error::scene("instruction_set", format!("this machine has no {}", self.name()));
+    pub(crate) fn available(self) -> Result<Self, ModelError> {
+        let error = || ModelError::of("instruction_set", format!("this machine has no {}", self.name()));
         self.is_available().then_some(self).ok_or_else(error)
     }
 
@@ -130,7 +130,7 @@ impl InstructionSet {
 
     /// Does `work` with this set; with the portable one where the machine lacks it.
     #[inline]
-    pub(in crate::model) fn run(self, work: impl Work) {
+    pub(crate) fn run(self, work: impl Work) {
         #[cfg(target_arch = "x86_64")]
         match self {
             Self::Avx512 => {

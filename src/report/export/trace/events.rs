@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 use crate::report::export::Micros;
 use crate::report::json_string::JsonString;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// The number of the one process that a run is.
 const PROCESS: u32 = 1;

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 use super::events::{Events, Track};
 use crate::log::Environment;
 use crate::report::json_string::JsonString;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// Track numbers from one rate group to the next.
 const TRACKS_PER_GROUP: u32 = 1000;

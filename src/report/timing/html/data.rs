@@ -21,7 +21,7 @@ pub(super) fn data(views: &[View<'_>]) -> String {
 }
 
 fn moment(out: &mut String, view: &View<'_>) {
-    let span = |[from, to]: [crate::time::Nanos; 2]| format!("[{},{}]", view.relative(from), view.relative(to));
+    let span = |[from, to]: [crate::runtime::Nanos; 2]| format!("[{},{}]", view.relative(from), view.relative(to));
     let place = view.place().map_or("null".to_owned(), |(lane, tick)| format!("[{lane},{tick}]"));
     let _ = write!(
         out,

@@ -4,7 +4,7 @@ use super::{HALF, chart_figure};
 use crate::log::timing::{GroupTiming, Shape};
 use crate::report::svg::{Axis, Bars, Chart, Line, Mark};
 use crate::report::units::{duration, trimmed};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 /// A quarter of an octave: room on both sides of a logarithmic axis.
 const ROOM: f64 = 1.19;

@@ -7,7 +7,7 @@ use super::moment::{Lane, Trace, View};
 use super::shapes::short;
 use crate::report::html::escaped;
 use crate::report::svg::round_step;
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 const WIDTH: f64 = 920.0;
 const LEFT: f64 = 84.0;

@@ -154,7 +154,7 @@ fn cards(report: &TimingReport, numbers: &Numbers) -> String {
 mod tests {
     use super::*;
     use crate::runtime::record::{SlipCause, TickTiming};
-    use crate::time::Nanos;
+    use crate::runtime::Nanos;
 
     #[test]
     fn the_worst_is_told_with_its_cause_and_what_it_did() {

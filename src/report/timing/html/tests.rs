@@ -2,7 +2,7 @@ use super::timing_html;
 use crate::log::timing::{Selection, TimingAnalysis, TimingReport};
 use crate::log::{CommandSample, Environment, Execution, ForceSample, GroupInfo, LogEntry, LogRecord, Resync};
 use crate::runtime::record::{ActorTimes, SlipCause, TickTiming};
-use crate::time::Nanos;
+use crate::runtime::Nanos;
 
 const MS: u64 = 1_000_000;
 

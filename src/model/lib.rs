@@ -1,0 +1,31 @@
+//! Physics and numerics: bodies, contact, local models. No threads (but those of a body's forces, with the feature
+//! `parallel`), clocks, channels or logging.
+//!
+//! The equations are those of the paper (Jacobs, Moore, Cavusoglu, IJRR 2010) with the corrections that DESIGN.md
+//! lists. One step of any model, whole body or patch, is [`contact::step`].
+
+pub mod blend;
+pub mod body;
+pub mod contact;
+mod dense;
+mod dissection;
+pub mod equilibrium;
+mod error;
+pub mod forecast;
+pub mod geometry;
+pub mod implicit;
+pub mod integrator;
+pub mod local;
+pub mod mesh;
+pub mod simulation;
+mod sparse;
+pub mod surroundings;
+pub mod tangent;
+
+pub use error::ModelError;
+
+/// A point, direction or force in space.
+pub type Vec3 = nalgebra::Vector3<f64>;
+
+/// A 3 x 3 block of a tangent.
+pub type Mat3 = nalgebra::Matrix3<f64>;

@@ -1,0 +1,80 @@
+//! What several test programs share: the reference series and the scenes they were made with.
+#![allow(dead_code)]
+
+use palpate_model::Vec3;
+use palpate_model::body::{Block, Body, State};
+use palpate_model::contact::{Contact, Law, ToolMotion};
+use palpate_model::mesh::Face;
+use palpate_model::simulation::{Simulation, Stepping};
+
+/// Parameter sets of the reference data.
+pub const STD: (f64, f64, f64) = (0.5e-3, 30.0, 0.3);
+pub const SLOW: (f64, f64, f64) = (1e-3, 6.0, 1.0);
+
+/// The reference block: 12^3 nodes, side 0.1 m, bottom held.
+pub fn block((mass, stiffness, zeta): (f64, f64, f64)) -> Block {
+    cube(12, (mass, stiffness, zeta))
+}
+
+pub fn cube(nodes: usize, (mass, stiffness, zeta): (f64, f64, f64)) -> Block {
+    let builder = Block::builder([nodes; 3], [0.1; 3]).node_mass(mass).stiffness(stiffness).damping_ratio(zeta);
+    builder.fix(Face::ZMin).build().expect("a valid block")
+}
+
+pub const STEPPING: Stepping = Stepping { tick: 1e-3, substeps: 2 };
+
+/// The contact that glues a tool to `node`.
+pub fn glued(body: &dyn Body, node: u32) -> Contact {
+    let triangle = body.surface().at_node(node)[0];
+    let weights = body.surface().triangles[triangle as usize].map(|n| if n == node { 1.0 } else { 0.0 });
+    Contact::glued(triangle, weights)
+}
+
+pub fn simulation(body: Block, contact: Contact, friction: f64) -> Simulation {
+    let state = State::at_rest(body.rest());
+    Simulation::new(Box::new(body), state, contact, Law { friction, ..Law::default() }, STEPPING).expect("it fits")
+}
+
+/// Columns of a reference series, without the header.
+pub fn reference(name: &str) -> Vec<Vec<f64>> {
+    // Programs of several crates share this file.
+    let here = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = here.ancestors().map(|folder| folder.join("tests/reference")).find(|folder| folder.is_dir());
+    let path = folder.expect("the reference series are in the repository").join(format!("{name}.csv"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    let parse = |line: &str| line.split(',').map(|cell| cell.parse().expect("a number")).collect();
+    text.lines().skip(1).map(parse).collect()
+}
+
+pub fn minjerk(u: f64) -> f64 {
+    let u = u.clamp(0.0, 1.0);
+    u.powi(3) * (10.0 + u * (6.0 * u - 15.0))
+}
+
+/// The reference's drag path at time t (s).
+pub fn drag_path(t: f64) -> Vec3 {
+    let x = 0.025 + 0.025 * minjerk((t - 0.5) / 1.5);
+    let z = 0.101 - 0.009 * minjerk(t / 0.3) + 0.011 * minjerk((t - 2.2) / 0.3);
+    Vec3::new(x, 0.0512, z)
+}
+
+/// The reference's hand path, from the rest position of the attached node.
+pub fn hand_path(rest: Vec3, t: f64) -> Vec3 {
+    use std::f64::consts::TAU;
+    let e = minjerk(t / 0.2);
+    let z = -0.008 * (TAU * 2.0 * t).sin() - 0.004 * (TAU * 5.0 * t).sin();
+    rest + Vec3::new(0.004 * (TAU * 3.0 * t).sin(), 0.0, z) * e
+}
+
+/// Forces of every tick along `path` (a position per tick, tick 0 first).
+pub fn forces(simulation: &mut Simulation, path: &[Vec3]) -> Vec<Vec3> {
+    path.windows(2).map(|q| simulation.tick(ToolMotion { from: q[0], to: q[1] })).collect()
+}
+
+/// Root mean square of the difference, in percent of the reference's peak.
+pub fn rms_percent(forces: &[Vec3], reference: &[Vec3]) -> f64 {
+    assert_eq!(forces.len(), reference.len());
+    let peak = reference.iter().map(|f| f.norm()).fold(0.0, f64::max);
+    let sum: f64 = forces.iter().zip(reference).map(|(a, b)| (a - b).norm_squared()).sum();
+    100.0 * (sum / forces.len() as f64).sqrt() / peak
+}

@@ -1,0 +1,174 @@
+//! A real run's log cut at any byte: `export` and `timing` work up to the damage, and say so.
+#![cfg(all(feature = "cli", feature = "log"))]
+
+mod support;
+
+use support::Folder;
+use palpate::log::{Analysis, LogEntry, LogReader, LogRecord};
+use palpate::report::{Format, export, to_json, to_text};
+
+const MAGIC: usize = 8;
+/// A prime, so that cuts fall on every kind of boundary in turn.
+const STEP: usize = 199;
+const SPAWNED: usize = 40;
+
+/// The log of a short run in virtual time: several chunks, every topic in use.
+fn log(folder: &Folder) -> Vec<u8> {
+    folder.succeed(&["run", "scene.toml", "--virtual", "--duration", "1.2", "--out", "whole.mcap"]);
+    std::fs::read(folder.path("whole.mcap")).unwrap()
+}
+
+fn exported(bytes: &[u8], topic: &str) -> (String, Option<String>) {
+    let mut reader = LogReader::new(bytes, "cut.mcap").expect("it begins with the magic");
+    let mut out = Vec::new();
+    export(&mut reader, topic, Format::Csv, &mut out).unwrap_or_else(|error| panic!("{topic}: {error}"));
+    (String::from_utf8(out).unwrap(), reader.damage().map(str::to_owned))
+}
+
+fn analysed(bytes: &[u8]) -> (Analysis, Option<String>) {
+    let mut reader = LogReader::new(bytes, "cut.mcap").expect("it begins with the magic");
+    let mut analysis = Analysis::default();
+    reader.by_ref().for_each(|entry| analysis.push_entry(&entry));
+    (analysis, reader.damage().map(str::to_owned))
+}
+
+#[test]
+fn every_cut_exports_a_prefix_and_is_called_damaged() {
+    let bytes = log(&Folder::new());
+    for topic in ["/force", "/timing/local", "/resync"] {
+        let (whole, damage) = exported(&bytes, topic);
+        assert_eq!(damage, None);
+        let (mut longest, mut lengths) = (0, std::collections::BTreeSet::new());
+        // The last bytes one by one: the index and the closing magic.
+        for cut in (MAGIC..bytes.len()).step_by(STEP).chain(bytes.len() - 64..bytes.len()) {
+            let (text, damage) = exported(&bytes[..cut], topic);
+            assert!(damage.is_some_and(|line| line.lines().count() == 1), "{topic} cut at {cut}");
+            assert!(whole.starts_with(&text) && text.ends_with('\n'), "{topic} cut at {cut}");
+            assert!(text.len() >= longest, "{topic} cut at {cut}: less than from a shorter log");
+            longest = text.len();
+            lengths.insert(longest);
+        }
+        assert_eq!(longest, whole.len(), "{topic}: cut off its index alone, a log still has every row");
+        assert!(lengths.len() > 2, "{topic}: {lengths:?}");
+    }
+}
+
+#[test]
+fn every_cut_can_be_analysed() {
+    let bytes = log(&Folder::new());
+    let mut last = 0;
+    for cut in (MAGIC..bytes.len()).step_by(STEP) {
+        let (analysis, damage) = analysed(&bytes[..cut]);
+        assert!(damage.is_some(), "cut at {cut}");
+        let report = analysis.report();
+        assert!(report.devices[0].force.ticks >= last, "cut at {cut}");
+        last = report.devices[0].force.ticks;
+        let json: serde_json::Value = serde_json::from_str(&to_json(&report)).expect("one JSON document");
+        assert!(!to_text(&report).is_empty() && json.is_object(), "cut at {cut}");
+    }
+    assert_eq!(last, 1200);
+}
+
+/// Check that the command does what the library does, at cuts spread over the whole file.
+#[test]
+fn the_command_exits_with_0_and_one_warning() {
+    let folder = Folder::new();
+    let bytes = log(&folder);
+    for i in 0..SPAWNED {
+        let cut = MAGIC + i * (bytes.len() - MAGIC) / SPAWNED;
+        folder.write("cut.mcap", &bytes[..cut]);
+        let is_export = i % 2 == 0;
+        let args: &[&str] =
+            if is_export { &["export", "cut.mcap", "--topic", "/force"] } else { &["timing", "cut.mcap"] };
+        let called = folder.call(args);
+        assert_eq!((called.code, called.err.lines().count()), (Some(0), 1), "cut at {cut}: {called:?}");
+        assert!(called.err.starts_with("warning: cut.mcap: "), "cut at {cut}: {called:?}");
+        if is_export {
+            assert!(called.out == exported(&bytes[..cut], "/force").0, "cut at {cut}");
+        } else {
+            assert!(called.out.contains("DAMAGED") || called.out.contains("damage"), "cut at {cut}: {called:?}");
+        }
+    }
+}
+
+/// Nanoseconds since 1970.
+fn unix_ns() -> u64 {
+    std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_nanos() as u64
+}
+
+// Check what a process leaves behind that has no chance to close anything: everything up to the last second, by the clock
+// that both the log and this test read.
+#[test]
+fn a_killed_run_leaves_a_readable_log_that_lacks_at_most_a_second() {
+    use std::process::{Command, Stdio};
+    for extra_ms in [0, 137, 421] {
+        let folder = Folder::new();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+            .args(["run", "scene.toml", "--duration", "1000", "--out", "killed.mcap"])
+            .current_dir(folder.path(""))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // Until the first chunk is there, then some while: how long that takes is the machine's affair.
+        let size = || std::fs::metadata(folder.path("killed.mcap")).map_or(0, |file| file.len());
+        while size() < 10_000 {
+            assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        // Some moment that nothing in the run is in step with.
+        let random_ms = unix_ns() / 1000 % 500;
+        std::thread::sleep(std::time::Duration::from_millis(2000 + extra_ms + random_ms));
+        assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
+        let killed_at = unix_ns();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let called = folder.call(&["export", "killed.mcap", "--topic", "/force"]);
+        assert_eq!((called.code, called.err.lines().count()), (Some(0), 1), "{called:?}");
+        // Between two records or in one: a kill waits for neither.
+        assert!(called.err.contains("cut off"), "{called:?}");
+        // The start of the run by the environment, and the last record of the haptic group, since then.
+        let reader = LogReader::open(&folder.path("killed.mcap")).unwrap();
+        let (mut start, mut last) = (0, palpate::time::Nanos::ZERO);
+        for entry in reader {
+            match entry {
+                LogEntry::Environment(environment) => start = environment.epoch_ns(),
+                LogEntry::Record(record @ LogRecord::Force(_)) => last = record.time(),
+                _ => {}
+            }
+        }
+        let missing_s = killed_at.saturating_sub(start + last.0) as f64 * 1e-9;
+        assert!(last.as_secs_f64() > 2.0 && start > 0);
+        assert!(missing_s <= 1.0, "{missing_s} s are missing");
+        println!("killed after {:.3} s: {missing_s:.3} s are missing", (killed_at - start) as f64 * 1e-9);
+        // Check that nothing is missing in between either, and that a sound log can be made of it
+        let rows = support::rows(&called.out);
+        assert!(rows.len() as u64 <= last.0 / 1_000_000);
+        folder.succeed(&["log", "recover", "killed.mcap", "--out", "new.mcap"]);
+        folder.succeed(&["log", "check", "new.mcap"]);
+    }
+}
+
+#[test]
+fn a_cut_below_the_magic_is_no_log() {
+    let folder = Folder::new();
+    let bytes = log(&folder);
+    for cut in 0..MAGIC {
+        folder.write("cut.mcap", &bytes[..cut]);
+        for args in [&["export", "cut.mcap", "--topic", "/force"][..], &["timing", "cut.mcap"]] {
+            let called = folder.call(args);
+            assert_eq!((called.code, &*called.out), (Some(2), ""), "cut at {cut}: {called:?}");
+            assert_eq!(called.err, "error: cut.mcap: no MCAP file: it does not begin with the MCAP magic\n");
+        }
+    }
+}
+
+/// Check that what follows a log is neither trusted nor a reason to lose what is in it.
+#[test]
+fn bytes_that_follow_a_log_do_not_hide_it() {
+    let mut bytes = log(&Folder::new());
+    let whole = exported(&bytes, "/force").0;
+    bytes.extend_from_slice(&[0xa5; 1000]);
+    assert!(exported(&bytes, "/force").0 == whole);
+}
