@@ -24,7 +24,7 @@ use palpate::log::{CommandSample, ContactSample, ForceSample, LogRecord, ToolSam
 use palpate::runtime::{
     Actor, ActorTimes, Execution, Outcome, RateGroup, Recorder, Running, Runtime, TickContext, TickTiming, actor_fn,
 };
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 const MS: u64 = 1_000_000;
 const PAIRS: usize = 100_000;

@@ -20,7 +20,7 @@
 use palpate::runtime::{Execution, Outcome, OverrunPolicy, RateGroup, Runtime, RuntimeBuilder, TickTiming, actor_fn};
 use palpate::scene::{LocalModelKind, Scene};
 use palpate::session::Session;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use std::hint::black_box;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};

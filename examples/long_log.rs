@@ -16,7 +16,7 @@ use palpate::log::{
     CommandSample, Environment, Execution, ForceSample, GlobalTick, GroupInfo, LogRecord, McapWriter, Resync, ServedBy,
 };
 use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
-use palpate::time::{Nanos, Rate};
+use palpate::runtime::{Nanos, Rate};
 
 const GROUPS: [(&str, u32); 3] = [("local", 1000), ("global", 30), ("logger", 20)];
 /// What the groups take of each release (ns), at the median.

@@ -5,6 +5,9 @@
 
 use std::fmt;
 
+use palpate_model::ModelError;
+use palpate_runtime::{GraphError, GraphErrorKind};
+
 /// What went wrong, as far as a program can act on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -91,6 +94,33 @@ impl Error {
     /// Where it happened; may be empty.
     pub fn place(&self) -> &str {
         &self.place
+    }
+}
+
+impl From<ModelError> for Error {
+    fn from(error: ModelError) -> Self {
+        let own = Self::new(ErrorKind::Scene, error.message());
+        if error.place().is_empty() { own } else { own.at(error.place()) }
+    }
+}
+
+impl From<GraphError> for Error {
+    /// An error that an actor's start returned stays what it is.
+    fn from(error: GraphError) -> Self {
+        let place = error.place().to_owned();
+        let kind = match error.kind() {
+            GraphErrorKind::Refused => ErrorKind::Runtime,
+            GraphErrorKind::Recording => ErrorKind::Log,
+            _ => ErrorKind::Fault,
+        };
+        let own = match error.into_actor_error() {
+            Ok(source) => match source.downcast::<Self>() {
+                Ok(own) => *own,
+                Err(other) => Self::new(ErrorKind::Fault, other.to_string()),
+            },
+            Err(error) => Self::new(kind, error.message()),
+        };
+        if place.is_empty() { own } else { own.at(place) }
     }
 }
 

@@ -58,7 +58,7 @@ pub mod actors;
 pub mod devices;
 pub mod error;
 pub mod log;
-mod random;
+pub mod random;
 pub mod report;
 pub mod safety;
 pub mod scene;
@@ -86,6 +86,6 @@ pub mod prelude {
 }
 
 /// The README's program must compile.
-#[cfg(all(doctest, feature = "log"))]
+#[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,7 +1,7 @@
 //! Random numbers that depend on a seed and a place only: what is repeated meets the same ones.
 
 /// A number in [0, 1) for this place, such as a time: splitmix64 (Steele, Lea and Flood 2014) of seed and place.
-pub(crate) fn uniform(seed: u64, place: u64) -> f64 {
+pub fn uniform(seed: u64, place: u64) -> f64 {
     let mut z = seed.wrapping_add(place.wrapping_mul(0x9e37_79b9_7f4a_7c15)).wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -10,7 +10,7 @@ use palpate::devices::{
     Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
 };
 use palpate::model::Vec3;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 #[global_allocator]
 static ALLOCATOR: allocator::Guarded = allocator::Guarded;

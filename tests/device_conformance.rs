@@ -7,7 +7,7 @@ use palpate::devices::{
     HandSpec, InjectedFault, PlantSpec, Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
 };
 use palpate::model::Vec3;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 const MS: u64 = 1_000_000;
 

@@ -15,7 +15,7 @@ use palpate::log::{
 use palpate::runtime::{
     Actor, Execution, Outcome, RateGroup, Runtime, RuntimeReport, STOP_BOUND, TickContext, actor_fn,
 };
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 const MS: u64 = 1_000_000;
 /// Records of each tick: more than a session of one device makes, of values that do not pack well.

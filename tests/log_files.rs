@@ -9,7 +9,7 @@ use log_sample::{entries, environment, log_of, time_of};
 use palpate::ErrorKind;
 use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter, SceneFrame};
 use palpate::runtime::record::Record;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use proptest::prelude::*;
 
 fn read(bytes: &[u8]) -> (Vec<LogEntry>, Option<String>) {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use palpate::log::{LogEntry, LogReader, LogRecord};
 use palpate::scene::{LocalModelKind, Scene};
 use palpate::session::{Session, SessionBuilder};
-use palpate::time::{Nanos, Rate};
+use palpate::runtime::{Nanos, Rate};
 use prost::Message;
 
 /// `foxglove.Vector3` and `foxglove.Point3`.

@@ -24,7 +24,7 @@ use palpate::scene::{
     BlendKind, BlendSpec, BlockSpec, BodySpec, DeviceProfile, Face, Friction, MaterialSpec, ModelChoice, SafetySpec,
     SafetyStage, Scene,
 };
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use random::Random;
 
 /// After so long nobody knows what the device did, and the force starts from zero (s).

@@ -11,7 +11,7 @@ use palpate::model::body::{Block, Body, State};
 use palpate::runtime::{PortUseKind, RateGroup};
 use palpate::scene::{Feedback, LocalModelKind, Scene};
 use palpate::session::{Compared, ReplayReport, Session, SessionBuilder, Summary};
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use palpate::{Error, ErrorKind};
 use session_support::{AlteredBlock, block, pressing, top, wiggling};
 use std::path::{Path, PathBuf};

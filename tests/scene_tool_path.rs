@@ -1,7 +1,7 @@
 //! Tool paths: interpolation and the CSV form.
 
 use palpate::scene::ToolPath;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use proptest::prelude::*;
 
 const HEADER: &str = "t_s,x_m,y_m,z_m\n";

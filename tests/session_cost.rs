@@ -6,7 +6,7 @@ use palpate::ErrorKind;
 use palpate::runtime::{Execution, Outcome, RateGroup, Runtime, actor_fn};
 use palpate::scene::LocalModelKind;
 use palpate::session::{Session, SessionBuilder};
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use session_support::*;
 use std::time::Duration;
 

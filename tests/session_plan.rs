@@ -8,7 +8,7 @@ use palpate::model::body::{Block, Body, State};
 use palpate::runtime::{Execution, RateGroup};
 use palpate::scene::LocalModelKind;
 use palpate::session::{Session, SessionBuilder};
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use session_support::*;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};

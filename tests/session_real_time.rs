@@ -12,7 +12,7 @@ use palpate::model::body::{Block, Body, State};
 use palpate::runtime::{OverrunPolicy, RateGroup, SlipCause};
 use palpate::scene::LocalModelKind;
 use palpate::session::{Session, SessionBuilder, Summary};
-use palpate::time::{Nanos, Rate};
+use palpate::runtime::{Nanos, Rate};
 use session_support::*;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};

@@ -9,7 +9,7 @@ use palpate::runtime::Disturbance;
 use palpate::safety::Actions;
 use palpate::scene::{LocalModelKind, SafetyStage};
 use palpate::session::{Session, SessionBuilder, Summary};
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use session_support::*;
 
 fn session() -> SessionBuilder {

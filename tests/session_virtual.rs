@@ -15,7 +15,7 @@ use palpate::model::simulation::{Simulation, Stepping};
 use palpate::runtime::{Actor, Execution, Outcome, OverrunPolicy, RateGroup, Runtime, TickContext};
 use palpate::scene::{Feedback, LocalModelKind};
 use palpate::session::{Session, SessionBuilder, Summary};
-use palpate::time::{Nanos, Rate};
+use palpate::runtime::{Nanos, Rate};
 use session_support::*;
 
 const HAPTIC: Rate = Rate::hz(1000);

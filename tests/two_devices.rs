@@ -14,7 +14,7 @@ use palpate::model::Vec3;
 use palpate::model::contact::{Contact, ToolMotion};
 use palpate::scene::{DeviceKind, DeviceSpec, LocalModelKind, Scene};
 use palpate::session::{SessionBuilder, Summary};
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 const TICKS: u32 = 2500;
 

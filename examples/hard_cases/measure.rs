@@ -10,7 +10,7 @@ use palpate::model::mesh::Face;
 use palpate::runtime::{Disturbance, RateGroup};
 use palpate::scene::{LocalModelKind, Scene};
 use palpate::session::{Session, SessionBuilder};
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 use super::cases::{Case, Run, Setup, Upset};
 

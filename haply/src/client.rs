@@ -9,10 +9,10 @@ use super::protocol::{self, Commands, Reply};
 use super::pulse::Pulse;
 use super::watch::Watch;
 use super::websocket::WebSocket;
-use crate::devices::{Calibration, Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
-use crate::error::{Error, ErrorKind};
-use crate::model::Vec3;
-use crate::runtime::Nanos;
+use palpate::devices::{Calibration, Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
+use palpate::{Error, ErrorKind};
+use palpate::model::Vec3;
+use palpate::runtime::Nanos;
 use std::time::{Duration, Instant};
 
 /// Replies that one look takes: the service sends one for each command, and few are under way.

@@ -15,7 +15,7 @@
 //! release. One of them alone says nothing about the brake.
 
 use super::protocol::Notice;
-use crate::devices::{DeviceFault, SafetyStop};
+use palpate::devices::{DeviceFault, SafetyStop};
 use std::time::{Duration, Instant};
 
 /// How long the force stays away after an event that nothing takes back.

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use crate::devices::ForceCommand;
-use crate::runtime::Nanos;
+use palpate::devices::ForceCommand;
+use palpate::runtime::Nanos;
 
 /// One command between two writes.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +48,7 @@ impl Hold {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Vec3;
+    use palpate::model::Vec3;
 
     const MS: Nanos = Nanos(1_000_000);
 

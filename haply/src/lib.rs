@@ -23,6 +23,7 @@ mod handshake;
 mod hold;
 mod json;
 mod link;
+#[cfg(feature = "mock")]
 pub mod mock;
 mod options;
 mod protocol;
@@ -32,3 +33,6 @@ mod websocket;
 
 pub use client::{Haply, HaplyCounts};
 pub use options::HaplyOptions;
+
+/// stub
+pub fn open(_: &palpate::scene::HaplySpec, _: f64) -> Result<Box<dyn palpate::devices::Device>, palpate::Error> { unimplemented!() }

@@ -1,8 +1,8 @@
 //! What a connection to the service needs to know.
 
 use super::protocol::is_plain;
-use crate::error::{Error, ErrorKind};
-use crate::model::Vec3;
+use palpate::{Error, ErrorKind};
+use palpate::model::Vec3;
 use std::time::Duration;
 
 /// How to reach the service, which device, and what it may do.
@@ -23,7 +23,7 @@ pub struct HaplyOptions {
     pub basis: String,
     /// Where the device's base is in the scene (m).
     pub origin_m: Vec3,
-    /// The time of one tick: how long a reply may take, and the pace of [`wait`](crate::devices::Device::wait).
+    /// The time of one tick: how long a reply may take, and the pace of [`wait`](palpate::devices::Device::wait).
     pub period: Duration,
 }
 

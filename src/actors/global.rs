@@ -11,8 +11,9 @@ use crate::model::forecast::{ToolForecast, ToolHistory};
 use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, wider};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
-use crate::runtime::{Actor, Outcome, OutletWriter, QueueReader, Reader, Recorder, Stopwatch, TickContext, Writer};
-use crate::runtime::{Nanos, Rate};
+use crate::runtime::{
+    Actor, ActorError, Nanos, Outcome, OutletWriter, QueueReader, Rate, Reader, Recorder, Stopwatch, TickContext, Writer,
+};
 
 /// The ports of a [`GlobalActor`].
 #[derive(Debug)]
@@ -356,7 +357,7 @@ impl Actor for GlobalActor {
         "global"
     }
 
-    fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
+    fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
         self.publish_models(ctx);
         self.publish_surface(ctx);
         Ok(())

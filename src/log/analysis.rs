@@ -155,17 +155,17 @@ impl Analysis {
     }
 
     /// What the run is about, if it is known.
-    pub(super) fn environment(&self) -> Option<&Environment> {
+    pub fn environment(&self) -> Option<&Environment> {
         self.environment.as_ref()
     }
 
     /// Counts releases of which the lateness alone is known (ns).
-    pub(super) fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
+    pub fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
         self.groups.entry(group).or_default().push_lateness(lateness, count);
     }
 
     /// The figures of a release that is pushed next.
-    pub(super) fn figures(&self, timing: &TickTiming) -> TickFigures {
+    pub fn figures(&self, timing: &TickTiming) -> TickFigures {
         self.groups
             .get(&timing.group)
             .map_or_else(|| GroupCounter::default().figures(timing), |group| group.figures(timing))
@@ -173,7 +173,7 @@ impl Analysis {
 
     /// The groups that have records and those that the environment promised: they are part of a report though they never
     /// ran.
-    pub(super) fn groups(&self) -> BTreeMap<u16, GroupCounter> {
+    pub fn groups(&self) -> BTreeMap<u16, GroupCounter> {
         let promised = self.environment.as_ref().map_or(0, |environment| environment.groups.len());
         let mut groups = self.groups.clone();
         for group in 0..u16::try_from(promised).unwrap_or(u16::MAX) {

@@ -14,12 +14,12 @@ const NAME_LENGTH_AT: usize = 28;
 const ZSTD: &str = "zstd";
 
 /// True for a compression that can be unpacked.
-pub(super) fn is_readable(compression: &str) -> bool {
+pub fn is_readable(compression: &str) -> bool {
     matches!(compression, "" | "lz4" | ZSTD)
 }
 
 /// Unpacks one chunk record by record.
-pub(super) struct ChunkRecords {
+pub struct ChunkRecords {
     reader: LinearReader,
     /// The chunk as it would stand alone in a file, opcode and length included.
     bytes: Vec<u8>,
@@ -30,19 +30,19 @@ pub(super) struct ChunkRecords {
 
 /// What the header of a chunk says of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct ChunkHead {
-    pub(super) first_time: u64,
-    pub(super) last_time: u64,
+pub struct ChunkHead {
+    pub first_time: u64,
+    pub last_time: u64,
     /// Unpacked (bytes).
-    pub(super) unpacked: u64,
+    pub unpacked: u64,
     /// Of what is unpacked; 0 if the writer made none.
-    pub(super) checksum: u32,
+    pub checksum: u32,
     /// `lz4`, `zstd`, or empty for none.
-    pub(super) compression: String,
+    pub compression: String,
     /// The whole record in the file, opcode and length included (bytes).
-    pub(super) length: u64,
+    pub length: u64,
     /// The file ends inside of it: its checksum cannot be verified.
-    pub(super) is_cut: bool,
+    pub is_cut: bool,
 }
 
 impl ChunkRecords {
@@ -50,7 +50,7 @@ impl ChunkRecords {
     ///
     /// # Errors
     /// What is wrong with its header.
-    pub(super) fn new(body: Vec<u8>, length: u64) -> Result<Self, String> {
+    pub fn new(body: Vec<u8>, length: u64) -> Result<Self, String> {
         let cut = (body.len() as u64) < length;
         let head = read_header(&body, length, cut)?;
         if !is_readable(&head.compression) {
@@ -72,12 +72,12 @@ impl ChunkRecords {
         Ok(Self { reader: LinearReader::new_with_options(options), bytes, fed: 0, cut, head })
     }
 
-    pub(super) fn head(&self) -> &ChunkHead {
+    pub fn head(&self) -> &ChunkHead {
         &self.head
     }
 
     /// True if the file ends inside this chunk.
-    pub(super) fn is_cut(&self) -> bool {
+    pub fn is_cut(&self) -> bool {
         self.cut
     }
 
@@ -85,7 +85,7 @@ impl ChunkRecords {
     ///
     /// # Errors
     /// What is wrong, or that a cut chunk goes no further.
-    pub(super) fn next(&mut self, record: &mut Vec<u8>) -> Result<Option<u8>, String> {
+    pub fn next(&mut self, record: &mut Vec<u8>) -> Result<Option<u8>, String> {
         loop {
             match self.reader.next_event() {
                 None => return Ok(None),
@@ -133,7 +133,7 @@ fn unpacked_zstd(body: &[u8], head: &ChunkHead) -> Result<(Vec<u8>, u64), String
 }
 
 /// The header, or an empty one if the file ends in it. Refuses sizes that contradict each other: the decoder trusts them.
-pub(super) fn read_header(body: &[u8], length: u64, cut: bool) -> Result<ChunkHead, String> {
+pub fn read_header(body: &[u8], length: u64, cut: bool) -> Result<ChunkHead, String> {
     let bytes = |at: usize, count: usize| body.get(at..at.checked_add(count)?);
     let word = |at: usize| Some(u64::from_le_bytes(bytes(at, 8)?.try_into().ok()?));
     let half = |at: usize| Some(u32::from_le_bytes(bytes(at, 4)?.try_into().ok()?));

@@ -14,10 +14,10 @@ use mcap::records::op;
 use super::chunk::{ChunkHead, ChunkRecords};
 
 /// The largest record or unpacked chunk that is read (bytes).
-pub(super) const MAX_RECORD_BYTES: u64 = 1 << 26;
+pub const MAX_RECORD_BYTES: u64 = 1 << 26;
 
 /// The records of a file one after the other, those inside chunks included.
-pub(super) struct RecordStream<R> {
+pub struct RecordStream<R> {
     source: R,
     /// Bytes read so far.
     offset: u64,
@@ -39,7 +39,7 @@ pub(super) struct RecordStream<R> {
 
 /// The two parts of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Section {
+pub enum Section {
     Data,
     /// The index; the data had a checksum that fits, or none.
     Index {
@@ -52,7 +52,7 @@ impl<R: Read> RecordStream<R> {
     ///
     /// # Errors
     /// If the source cannot be read; [`io::ErrorKind::InvalidData`] if it is no MCAP.
-    pub(super) fn new(mut source: R) -> io::Result<Self> {
+    pub fn new(mut source: R) -> io::Result<Self> {
         let mut magic = [0; mcap::MAGIC.len()];
         source.read_exact(&mut magic).map_err(|e| match e.kind() {
             io::ErrorKind::UnexpectedEof => io::ErrorKind::InvalidData.into(),
@@ -81,7 +81,7 @@ impl<R: Read> RecordStream<R> {
     }
 
     /// Goes on behind a damage: `source` is at `offset`, where a record of `section` begins.
-    pub(super) fn resume(source: R, offset: u64, section: Section) -> Self {
+    pub fn resume(source: R, offset: u64, section: Section) -> Self {
         Self {
             source,
             offset,
@@ -99,53 +99,53 @@ impl<R: Read> RecordStream<R> {
     }
 
     /// The source, wherever it is now.
-    pub(super) fn into_source(self) -> R {
+    pub fn into_source(self) -> R {
         self.source
     }
 
     /// Bytes read so far.
-    pub(super) fn offset(&self) -> u64 {
+    pub fn offset(&self) -> u64 {
         self.offset
     }
 
-    pub(super) fn section(&self) -> Section {
+    pub fn section(&self) -> Section {
         self.section
     }
 
     /// Where the record of the file begins that was read last, and its opcode: for records inside a chunk, the chunk.
-    pub(super) fn record_start(&self) -> (u64, u8) {
+    pub fn record_start(&self) -> (u64, u8) {
         (self.record_start, self.record_opcode)
     }
 
     /// Where the chunk begins that the last record was in, and its header; `None` for one that was in none.
-    pub(super) fn chunk(&self) -> Option<(u64, &ChunkHead)> {
+    pub fn chunk(&self) -> Option<(u64, &ChunkHead)> {
         self.chunk.as_ref().map(|(chunk, start)| (*start, chunk.head()))
     }
 
     /// True once the data section has been read and its checksum fits; a file of another writer may have none.
-    pub(super) fn is_checksummed(&self) -> bool {
+    pub fn is_checksummed(&self) -> bool {
         self.damage.is_none() && self.section == Section::Index { data_has_checksum: true }
     }
 
     /// What is wrong with the file, as far as it has been read.
-    pub(super) fn damage(&self) -> Option<&str> {
+    pub fn damage(&self) -> Option<&str> {
         self.damage.as_deref()
     }
 
     /// Ends the stream because of `what`. The first damage counts.
-    pub(super) fn stop(&mut self, what: String) {
+    pub fn stop(&mut self, what: String) {
         self.ended = true;
         self.chunk = None;
         self.damage.get_or_insert(what);
     }
 
     /// The body of the record that [`next`](Self::next) found.
-    pub(super) fn body(&self) -> &[u8] {
+    pub fn body(&self) -> &[u8] {
         &self.record
     }
 
     /// Reads the next record and gives its opcode; `None` at the end of the file or of what is readable.
-    pub(super) fn next(&mut self) -> Option<u8> {
+    pub fn next(&mut self) -> Option<u8> {
         loop {
             if let Some((chunk, start)) = &mut self.chunk {
                 let start = *start;

@@ -65,7 +65,7 @@ pub struct GroupReport {
 
 /// Gathers a [`GroupReport`].
 #[derive(Clone, Debug, Default)]
-pub(crate) struct GroupCounter {
+pub struct GroupCounter {
     released: u64,
     skipped: CauseCounts,
     missed: CauseCounts,
@@ -75,22 +75,22 @@ pub(crate) struct GroupCounter {
     lost_records: u64,
     busy: Nanos,
     gauge: TickGauge,
-    pub(super) lateness: Distribution,
-    pub(super) execution: Distribution,
-    pub(super) period_error: Distribution,
-    pub(super) jitter: Distribution,
+    pub lateness: Distribution,
+    pub execution: Distribution,
+    pub period_error: Distribution,
+    pub jitter: Distribution,
 }
 
 /// Measures a group release by release.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct TickGauge {
+pub struct TickGauge {
     last: Option<TickTiming>,
     last_error: Option<i64>,
 }
 
 impl TickGauge {
     /// The figures of the release that comes next.
-    pub(crate) fn measure(&mut self, timing: &TickTiming) -> TickFigures {
+    pub fn measure(&mut self, timing: &TickTiming) -> TickFigures {
         let figures = self.figures(timing);
         (self.last, self.last_error) = (Some(*timing), figures.period_error);
         figures
@@ -115,19 +115,19 @@ impl TickGauge {
 
 /// The figures of one release (ns).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct TickFigures {
+pub struct TickFigures {
     /// Woke - scheduled.
-    pub(crate) lateness: u64,
+    pub lateness: u64,
     /// End - start.
-    pub(crate) execution: u64,
+    pub execution: u64,
     /// Time since the wake-up before less the time that was scheduled; `None` for the first release.
-    pub(crate) period_error: Option<i64>,
+    pub period_error: Option<i64>,
     /// Change of the period error; `None` for the first two.
-    pub(crate) jitter: Option<u64>,
+    pub jitter: Option<u64>,
 }
 
 impl GroupCounter {
-    pub(super) fn push(&mut self, timing: &TickTiming) {
+    pub fn push(&mut self, timing: &TickTiming) {
         for (cause, slips) in timing.slips_by_cause() {
             self.skipped.add(cause, slips.into());
         }
@@ -150,22 +150,22 @@ impl GroupCounter {
     }
 
     /// Counts releases of which the lateness alone is known (ns).
-    pub(super) fn push_lateness(&mut self, lateness: u64, count: u64) {
+    pub fn push_lateness(&mut self, lateness: u64, count: u64) {
         self.released += count;
         self.lateness.push_many(lateness, count);
     }
 
     /// The figures that a release would have if it came next.
-    pub(crate) fn figures(&self, timing: &TickTiming) -> TickFigures {
+    pub fn figures(&self, timing: &TickTiming) -> TickFigures {
         self.gauge.figures(timing)
     }
 
     /// Notes that `total` records have been lost since the start.
-    pub(super) fn set_lost(&mut self, total: u64) {
+    pub fn set_lost(&mut self, total: u64) {
         self.lost_records = self.lost_records.max(total);
     }
 
-    pub(super) fn report(&self, name: String, rate_hz: Option<f64>) -> GroupReport {
+    pub fn report(&self, name: String, rate_hz: Option<f64>) -> GroupReport {
         let elapsed = self.last.tick.wrapping_sub(self.first_tick).wrapping_add(1);
         GroupReport {
             name,

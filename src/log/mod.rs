@@ -9,48 +9,38 @@
 //! allocates: it is for the logger, and for the time after a run.
 
 mod analysis;
-mod comparison;
 mod entry;
 mod environment;
 mod event;
-mod group;
+pub mod group;
 mod haptics;
 mod percentiles;
 mod records;
-pub mod reduction;
 mod scene_frame;
 mod stats;
-pub mod timing;
 mod vector;
+pub use vector::magnitude;
 mod window;
 
 mod backlog;
-mod check;
-mod chunk;
+pub mod chunk;
 mod convert;
 mod foreign;
 mod foxglove;
-mod framing;
-mod info;
-mod message;
+pub mod framing;
 mod proto;
-mod reader;
-mod recover;
-mod salvage;
+pub mod reader;
 mod scene_update;
 mod schema;
-mod summary;
-pub(crate) mod topic;
+pub mod topic;
 mod viewer;
 mod writer;
 
 pub use analysis::{Analysis, RunReport};
-pub use comparison::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, ModelError, RunOutcome};
 pub use entry::LogEntry;
 pub use environment::{Environment, Execution, GroupInfo, ModelReason};
 pub use event::{Level, TextEvent};
-pub(crate) use group::TickGauge;
-pub use group::{CauseCounts, GroupReport};
+pub use group::{CauseCounts, GroupCounter, GroupReport, TickFigures, TickGauge};
 pub use haptics::{ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport};
 pub use percentiles::{Distribution, Magnitudes, Percentiles};
 pub(crate) use records::MAX_DEVICES;
@@ -60,13 +50,8 @@ pub use records::{
 };
 pub use scene_frame::{SceneFrame, SceneTool};
 pub use stats::{EventSum, GroupStats, StatsCounter};
-pub(crate) use vector::magnitude;
 pub use window::Window;
 
 pub use backlog::{Backlog, BacklogProgress};
-pub use check::{CheckReport, check};
-pub use info::{AttachmentInfo, ChunkInfo, LogInfo, TopicInfo};
 pub use reader::LogReader;
-pub use recover::{Lost, Recovered, recover};
-pub use salvage::Damage;
 pub use writer::McapWriter;

@@ -21,7 +21,7 @@ use crate::error::{Error, ErrorKind};
 const OLDEST_SCHEMA: u32 = 2;
 const READ_BUFFER_BYTES: usize = 1 << 18;
 /// Channel id, sequence number, log time and publish time in front of every message.
-pub(super) const MESSAGE_HEADER_BYTES: usize = 22;
+pub const MESSAGE_HEADER_BYTES: usize = 22;
 
 /// The entries of a log, as an iterator.
 ///
@@ -108,7 +108,7 @@ impl<R: Read> LogReader<R> {
     }
 
     /// What `topic` carries, if the log has declared it and its messages are palpate's.
-    pub(crate) fn kind(&self, topic: &str) -> Option<Kind> {
+    pub fn kind(&self, topic: &str) -> Option<Kind> {
         let channel = self.channels.values().find(|channel| channel.topic == topic)?;
         channel.kind.or(channel.foreign.as_ref().map(|_| Kind::Timing))
     }
@@ -239,7 +239,7 @@ fn foreign_environment() -> Environment {
 
 /// What messages with this schema carry, if palpate has written them. Those with well-known names may be another
 /// program's: they lack palpate's own fields, and so does their descriptor.
-pub(super) fn kind_of(schema: &str, descriptor: &[u8]) -> Option<Kind> {
+pub fn kind_of(schema: &str, descriptor: &[u8]) -> Option<Kind> {
     const OWN_FIELD: &[u8] = b"time_ns";
     let is_ours =
         !schema.starts_with("foxglove.") || descriptor.windows(OWN_FIELD.len()).any(|window| window == OWN_FIELD);
@@ -247,7 +247,7 @@ pub(super) fn kind_of(schema: &str, descriptor: &[u8]) -> Option<Kind> {
 }
 
 /// Why a file cannot be read as a log.
-pub(super) fn cannot_open(place: &str, error: io::Error) -> Error {
+pub fn cannot_open(place: &str, error: io::Error) -> Error {
     match error.kind() {
         io::ErrorKind::InvalidData => {
             Error::new(ErrorKind::Log, "no MCAP file: it does not begin with the MCAP magic").at(place)
@@ -257,7 +257,7 @@ pub(super) fn cannot_open(place: &str, error: io::Error) -> Error {
 }
 
 /// The entry in a message of this kind; `None` for what is there to be seen only.
-pub(super) fn decode_data(kind: Kind, data: &[u8]) -> Result<Option<LogEntry>, prost::DecodeError> {
+pub fn decode_data(kind: Kind, data: &[u8]) -> Result<Option<LogEntry>, prost::DecodeError> {
     fn parse<M: prost::Message + Default>(data: &[u8]) -> Result<M, prost::DecodeError> {
         M::decode(data)
     }

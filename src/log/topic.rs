@@ -7,7 +7,7 @@ use super::schema::{self, LogMessage};
 
 /// One topic; groups by their number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) enum Topic {
+pub enum Topic {
     Timing(u16),
     Actors(u16),
     Stats(u16),
@@ -25,7 +25,7 @@ pub(crate) enum Topic {
 
 /// Which message a topic carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub enum Kind {
     Timing,
     Actors,
     Stats,
@@ -44,7 +44,7 @@ pub(crate) enum Kind {
 impl Topic {
     /// The topics that the log of `environment` declares, whether or not anything is written there; `/actors` only where
     /// there are several.
-    pub(crate) fn declared(environment: &Environment) -> impl Iterator<Item = Self> {
+    pub fn declared(environment: &Environment) -> impl Iterator<Item = Self> {
         let number = |count: usize| 0..u16::try_from(count).unwrap_or(u16::MAX);
         let has_actors =
             |group: &u16| environment.groups.get(usize::from(*group)).is_some_and(|g| !g.actors.is_empty());
@@ -61,7 +61,7 @@ impl Topic {
     }
 
     /// Where `record` belongs.
-    pub(crate) fn of(record: &LogRecord) -> Self {
+    pub fn of(record: &LogRecord) -> Self {
         match record {
             LogRecord::Tick(r) => Self::Timing(r.group),
             LogRecord::Actors(r) => Self::Actors(r.group),
@@ -77,7 +77,7 @@ impl Topic {
         }
     }
 
-    pub(crate) fn name(self, environment: &Environment) -> String {
+    pub fn name(self, environment: &Environment) -> String {
         let of_device = |device, what| format!("{}/{what}", environment.device_prefix(device));
         match self {
             Self::Timing(group) => format!("/timing/{}", environment.group_name(group)),
@@ -96,7 +96,7 @@ impl Topic {
         }
     }
 
-    pub(crate) fn kind(self) -> Kind {
+    pub fn kind(self) -> Kind {
         match self {
             Self::Timing(_) => Kind::Timing,
             Self::Actors(_) => Kind::Actors,
@@ -133,7 +133,7 @@ impl Kind {
     ];
 
     /// The name of the message.
-    pub(crate) fn schema(self) -> &'static str {
+    pub fn schema(self) -> &'static str {
         match self {
             Self::Timing => schema::TickTiming::NAME,
             Self::Actors => schema::ActorTimes::NAME,
@@ -152,12 +152,12 @@ impl Kind {
     }
 
     /// The kind whose message has this name.
-    pub(crate) fn from_schema(name: &str) -> Option<Self> {
+    pub fn from_schema(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.schema() == name)
     }
 
     /// What a topic of this name carries in any log of palpate's.
-    pub(crate) fn of_topic(name: &str) -> Option<Self> {
+    pub fn of_topic(name: &str) -> Option<Self> {
         let environment = Environment::default();
         let shared = || Topic::declared(&environment).find(|topic| topic.name(&environment) == name).map(Topic::kind);
         let of_one = || {

@@ -8,14 +8,14 @@ const SMALL: usize = 24;
 const WIDEST_CUT: f64 = 0.4;
 
 /// The neighbours of each node: those of n are `nodes[first[n]..first[n + 1]]`.
-pub(super) struct Adjacency {
+pub struct Adjacency {
     first: Vec<u32>,
     nodes: Vec<u32>,
 }
 
 impl Adjacency {
     /// Of `count` nodes that `pairs` join.
-    pub(super) fn new(count: usize, pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
+    pub fn new(count: usize, pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
         let mut first = vec![0_u32; count + 1];
         pairs.clone().flatten().for_each(|node| first[node as usize + 1] += 1);
         (0..count).for_each(|node| first[node + 1] += first[node]);
@@ -36,7 +36,7 @@ impl Adjacency {
 
 /// Nested dissection (George 1973) by planes: the nodes at `points` in the order of their elimination. `None` if no plane
 /// divides them well, so that an order which does not look at places is better.
-pub(super) fn dissection(points: &[Vec3], adjacency: &Adjacency) -> Option<Vec<u32>> {
+pub fn dissection(points: &[Vec3], adjacency: &Adjacency) -> Option<Vec<u32>> {
     let mut order = Vec::with_capacity(points.len());
     let mut side = vec![0_u8; points.len()];
     let all = (0..points.len() as u32).collect();

@@ -8,7 +8,8 @@ pub mod blend;
 pub mod body;
 pub mod contact;
 mod dense;
-mod dissection;
+#[allow(missing_docs, missing_debug_implementations)]
+pub mod dissection;
 pub mod equilibrium;
 mod error;
 pub mod forecast;
@@ -18,7 +19,8 @@ pub mod integrator;
 pub mod local;
 pub mod mesh;
 pub mod simulation;
-mod sparse;
+#[allow(missing_docs, missing_debug_implementations)]
+pub mod sparse;
 pub mod surroundings;
 pub mod tangent;
 

@@ -11,7 +11,7 @@ use faer::{Conj, Mat, MatMut, Par, Side};
 
 /// A Cholesky solver for matrices of one sparsity pattern.
 #[derive(Debug, Default)]
-pub(super) struct SparseCholesky {
+pub struct SparseCholesky {
     symbolic: Option<SymbolicLlt<usize>>,
 }
 
@@ -19,7 +19,7 @@ impl SparseCholesky {
     /// Solves A x = b for the symmetric A given by the sum of `entries` (row, column, value), lower triangle and all;
     /// `x` holds b on entry. `None` if A is not positive definite. The ordering is found once and kept: every call
     /// must give entries at the same places.
-    pub(super) fn solve(&mut self, entries: &[(usize, usize, f64)], x: &mut [f64]) -> Option<()> {
+    pub fn solve(&mut self, entries: &[(usize, usize, f64)], x: &mut [f64]) -> Option<()> {
         let n = x.len();
         let lower: Vec<_> = entries
             .iter()
@@ -43,7 +43,7 @@ impl SparseCholesky {
 const GROUP: usize = 48;
 
 /// A factorised symmetric positive definite matrix, for many right-hand sides.
-pub(super) struct SparseFactor {
+pub struct SparseFactor {
     symbolic: SymbolicCholesky<usize>,
     values: Vec<f64>,
     n: usize,
@@ -52,12 +52,12 @@ pub(super) struct SparseFactor {
 impl SparseFactor {
     /// Factorises the n x n matrix given by the sum of `entries` (row, column, value) of its lower triangle, in an order of
     /// approximate minimum degree (Amestoy, Davis, Duff 1996). `None` if it is not positive definite.
-    pub(super) fn new(n: usize, entries: &[(usize, usize, f64)]) -> Option<Self> {
+    pub fn new(n: usize, entries: &[(usize, usize, f64)]) -> Option<Self> {
         Self::factorise(n, entries, SymmetricOrdering::Amd)
     }
 
     /// The same with the unknowns eliminated in the given order, each of 0 .. n once.
-    pub(super) fn new_ordered(n: usize, entries: &[(usize, usize, f64)], order: &[usize]) -> Option<Self> {
+    pub fn new_ordered(n: usize, entries: &[(usize, usize, f64)], order: &[usize]) -> Option<Self> {
         let mut places = vec![n; n];
         order.iter().enumerate().for_each(|(place, &unknown)| places[unknown] = place);
         let is_order = order.len() == n && places.iter().all(|&place| place < n);
@@ -82,7 +82,7 @@ impl SparseFactor {
     }
 
     /// Replaces each column of `columns` (n numbers, one column after the other) by its solution.
-    pub(super) fn solve(&self, columns: &mut [f64]) {
+    pub fn solve(&self, columns: &mut [f64]) {
         let factor = LltRef::new(&self.symbolic, &self.values);
         let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(GROUP, Par::Seq));
         for group in columns.chunks_mut(GROUP * self.n.max(1)) {

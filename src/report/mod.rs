@@ -1,22 +1,8 @@
-//! Reports about a run: for a terminal, for programs, and its records as tables.
+//! What a run has to say when it is over, as text for a terminal.
 
-pub mod compare;
-mod html;
-mod json_string;
-mod picture;
-pub mod reduce;
-mod svg;
-mod timing;
-mod units;
+pub mod text;
+pub mod units;
 mod verdict;
 
-mod export;
-mod json;
-mod text;
-
-pub use export::{Figure, Format, export, export_percentiles, export_table, export_trace};
-pub use json::{against_to_json, timing_to_json, to_json};
-pub use picture::{COLOURS, Picture, Series};
-pub use text::{against_to_text, figure_to_text, timing_to_text, to_text};
-pub use timing::timing_html;
+pub use text::to_text;
 pub use verdict::{Verdict, verdict};

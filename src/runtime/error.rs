@@ -55,6 +55,11 @@ impl GraphError {
         &self.place
     }
 
+    /// What is wrong and what would be right, without the place; empty where an actor's own error says it.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
     /// The error that an actor or a factory returned; the graph's own errors have none and come back as they are.
     ///
     /// # Errors

@@ -1,6 +1,8 @@
 //! The body's part of a scene: shape, fixed faces, material.
 
 use super::RegionSpec;
+use crate::error::Error;
+use crate::model::body::{Block, BlockBuilder};
 use crate::model::mesh::Face;
 
 /// A block of nodes joined by springs to all 26 neighbours.
@@ -17,6 +19,26 @@ pub struct BodySpec {
     /// Parts that differ from that, in order: later ones win.
     #[serde(default, rename = "region", skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<RegionSpec>,
+}
+
+impl BodySpec {
+    /// Makes this body.
+    ///
+    /// # Errors
+    /// If a number of it is impossible, or a region is nowhere.
+    pub fn build(&self) -> Result<Block, Error> {
+        Ok(self.builder().build().map_err(|error| error.at("body"))?)
+    }
+
+    /// The builder of this body.
+    pub(super) fn builder(&self) -> BlockBuilder {
+        let builder = Block::builder(self.block.nodes, self.block.size_m)
+            .node_mass(self.material.node_mass_kg)
+            .stiffness(self.material.stiffness_n_per_m)
+            .damping_ratio(self.material.damping_ratio);
+        let builder = self.regions.iter().fold(builder, |builder, spec| builder.region(spec.region()));
+        self.block.fixed.iter().fold(builder, |builder, &face| builder.fix(face))
+    }
 }
 
 /// The kinds of body that a scene file can name.

@@ -16,6 +16,7 @@ mod haply;
 mod models;
 mod region;
 mod safety;
+mod touched;
 mod validate;
 mod validate_device;
 

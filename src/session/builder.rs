@@ -1,5 +1,6 @@
 //! Collects what a session is made of.
 
+use super::hardware::OpenHaply;
 use super::Session;
 use super::prepare::{Parts, prepare};
 use crate::devices::{Device, ToolPath};
@@ -59,6 +60,13 @@ impl SessionBuilder {
     #[must_use]
     pub fn probe(mut self, node: u32) -> Self {
         self.parts.probes.push(node);
+        self
+    }
+
+    /// How the device of a scene with `kind = "haply"` is opened: `palpate_haply::open`, of the crate that drives it.
+    #[must_use]
+    pub fn open_haply_with(mut self, open: OpenHaply) -> Self {
+        self.parts.open_haply = Some(open);
         self
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::hardware::haply;
+use super::hardware::{OpenHaply, haply};
 use crate::devices::{Device, Faulty, Hand, Scripted, ToolPath};
 use crate::devices::{DeviceState, Replayed, ReplayedSample};
 use crate::error::{Error, ErrorKind};
@@ -20,6 +20,7 @@ pub(super) fn device(
     tick: f64,
     glued_at: Option<Vec3>,
     execution: Execution,
+    open_haply: Option<OpenHaply>,
 ) -> Result<Box<dyn Device>, Error> {
     let capabilities = spec.profile.capabilities();
     match spec.kind {
@@ -35,7 +36,7 @@ pub(super) fn device(
             Ok(Box::new(Hand::new(path, spec.plant.clone(), spec.hand.clone(), capabilities)?))
         }
         DeviceKind::Replay => replayed(spec, glued_at),
-        DeviceKind::Haply => haply(spec, tick, execution),
+        DeviceKind::Haply => haply(spec, tick, execution, open_haply),
     }
 }
 
@@ -68,11 +69,6 @@ fn check_start(field: &str, start: Vec3, glued_at: Option<Vec3>) -> Result<(), E
     let place: [f64; 3] = node.into();
     let message = format!("starts {gap} m away from the node that the tool is glued to, must start at {place:?}");
     Err(Error::scene(field, message))
-}
-
-#[cfg(not(feature = "log"))]
-fn replayed(_: &DeviceSpec, _: Option<Vec3>) -> Result<Box<dyn Device>, Error> {
-    Err(Error::scene("device.kind", "is \"replay\", and this program was built without feature `log`"))
 }
 
 fn replayed(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dyn Device>, Error> {

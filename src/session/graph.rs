@@ -81,8 +81,6 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
         Some(Reexecuted { recording, comparison }) => (Runtime::reexecution(recording), Some(comparison)),
         None => (Runtime::builder(prepared.execution), None),
     };
-    #[cfg(not(all(feature = "log", feature = "scene")))]
-    let mut graph = Runtime::builder(prepared.execution);
     if prepared.measures_cost {
         graph.measure_cost();
     }
@@ -201,15 +199,13 @@ pub(super) fn start(mut prepared: Prepared) -> Result<Running, Error> {
         Some(comparison) => Box::new(Comparer::new(drain, comparison)),
         None => logger(drain),
     };
-    #[cfg(not(all(feature = "log", feature = "scene")))]
-    let logger = logger(drain);
     graph.group(prepared.local, haptic_actors);
     if let Some((group, actor)) = reducing {
         graph.group(group, vec![actor]);
     }
     if let Some(mut maker) = global {
         if maker.can_restart() {
-            graph.restartable(prepared.global, Restart::default(), move || maker.make());
+            graph.restartable(prepared.global, Restart::default(), move || Ok(maker.make()?));
         } else {
             let actors = maker.make()?;
             graph.group(prepared.global, actors);
@@ -242,8 +238,6 @@ fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment
     }
     groups.push(group("logger", logger_rate(prepared)));
     let session = Some(prepared.as_run.to_toml()?);
-    #[cfg(not(feature = "scene"))]
-    let session = None;
     Ok(Environment {
         palpate_version: env!("CARGO_PKG_VERSION").to_owned(),
         instruction_set: Block::instruction_set().to_owned(),

@@ -2,37 +2,23 @@
 
 use crate::devices::Device;
 use crate::error::Error;
-use crate::runtime::{Execution, RateGroup};
-use crate::scene::{DeviceKind, DeviceSpec};
-use crate::runtime::Nanos;
+use crate::runtime::{Execution, Nanos, RateGroup};
+use crate::scene::{DeviceKind, DeviceSpec, HaplySpec};
+
+/// Opens the Haply device that a scene describes, for ticks of so many seconds: `palpate_haply::open`.
+pub type OpenHaply = fn(&HaplySpec, f64) -> Result<Box<dyn Device>, Error>;
 
 /// Connects to the service of a Haply device that is driven every `tick` seconds.
-#[cfg(feature = "haply")]
-pub(super) fn haply(device: &DeviceSpec, tick: f64, execution: Execution) -> Result<Box<dyn Device>, Error> {
-    use crate::devices::haply::{Haply, HaplyOptions};
+pub(super) fn haply(
+    device: &DeviceSpec,
+    tick: f64,
+    execution: Execution,
+    open: Option<OpenHaply>,
+) -> Result<Box<dyn Device>, Error> {
     in_real_time(execution)?;
-    let Some(spec) = &device.haply else {
-        return Err(Error::scene("device.haply", "is missing"));
-    };
-    let device = Haply::connect(HaplyOptions {
-        address: spec.address.clone(),
-        events_address: (!spec.events_address.is_empty()).then(|| spec.events_address.clone()),
-        device_id: spec.device_id.clone(),
-        max_force_n: spec.max_force_n,
-        profile: spec.profile.clone(),
-        basis: spec.basis.clone(),
-        origin_m: spec.origin_m.into(),
-        period: std::time::Duration::from_secs_f64(tick),
-    })?;
-    Ok(Box::new(device))
-}
-
-/// Says that it cannot.
-#[cfg(not(feature = "haply"))]
-pub(super) fn haply(_: &DeviceSpec, _: f64, execution: Execution) -> Result<Box<dyn Device>, Error> {
-    in_real_time(execution)?;
-    let message = "is \"haply\", which this build does not have: build it with `--features haply`";
-    Err(Error::scene("device.kind", message))
+    let spec = device.haply.as_ref().ok_or_else(|| Error::scene("device.haply", "is missing"))?;
+    let message = "is \"haply\", which this program does not open: give `palpate_haply::open` to its session";
+    open.ok_or_else(|| Error::scene("device.kind", message))?(spec, tick)
 }
 
 fn in_real_time(execution: Execution) -> Result<(), Error> {

@@ -17,7 +17,6 @@ mod budget;
 mod builder;
 mod checks;
 mod choice;
-mod compare;
 mod device;
 mod disturbed;
 mod global;
@@ -27,7 +26,6 @@ mod horizon;
 mod patch;
 mod prepare;
 mod rate_groups;
-mod reduce;
 mod replay;
 mod running;
 mod safety;
@@ -35,12 +33,10 @@ mod sink;
 mod situation;
 mod substeps;
 mod tools;
-mod touched;
 
 pub use builder::SessionBuilder;
+pub use hardware::OpenHaply;
 pub use choice::Choice;
-pub use compare::{CompareOptions, CompareProgress, compare, one_period};
-pub use reduce::{MeshStudy, PaperStudy, ReduceOptions, ReduceProgress, reduce_mesh, reduce_paper, reduce_scene};
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};
 pub use running::{Running, Summary, Viewer};
 
@@ -78,7 +74,7 @@ impl Session {
     /// # Errors
     /// If the process has been moved to fewer cores since the session was built and no longer fits.
     pub fn plan(&self) -> Result<Plan, Error> {
-        Plan::of(self.prepared.execution, &graph::groups(&self.prepared))
+        Ok(Plan::of(self.prepared.execution, &graph::groups(&self.prepared))?)
     }
 
     /// Reads the log of a scene's run, in real or in simulated time, to execute it again in simulated time from what was

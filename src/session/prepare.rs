@@ -7,7 +7,7 @@ use super::checks::{check_body, check_model, check_nodes};
 use super::choice::{Choice, choose};
 use super::disturbed::Disturbed;
 use super::graph::groups;
-use super::hardware::paced;
+use super::hardware::{OpenHaply, paced};
 use super::horizon::{horizon, lateness};
 use super::patch::{self, PatchChoice};
 use super::rate_groups::{check_group, global_group, local_group};
@@ -18,7 +18,7 @@ use crate::devices::Device;
 use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::blend::Blend;
-use crate::model::body::{Block, Body, State};
+use crate::model::body::{Body, State};
 use crate::model::contact::Law;
 use crate::model::equilibrium::static_equilibrium;
 use crate::model::local::{Kind, MOST_EXPLICIT_STEPS, Template};
@@ -27,7 +27,7 @@ use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, RateGroup, admit_here};
 use crate::scene::ProbeSpec;
 use crate::scene::{
-    BasisSize, BodySpec, DeviceSpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind,
+    BasisSize, DeviceSpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind,
 };
 use crate::runtime::{Nanos, Rate};
 
@@ -45,6 +45,7 @@ pub(super) struct Parts {
     pub global: Option<RateGroup>,
     pub local: Option<RateGroup>,
     pub execution: Execution,
+    pub open_haply: Option<OpenHaply>,
     /// On threads, or executing a log of such a run.
     pub in_real_time: bool,
     pub log: Option<PathBuf>,
@@ -68,6 +69,7 @@ impl Parts {
             global: None,
             local: None,
             execution: Execution::Threaded,
+            open_haply: None,
             in_real_time: true,
             log: None,
             keep_records: false,
@@ -151,7 +153,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let global_rate = rate("global.rate_hz", scene.global.rate_hz)?;
     let mut body = match (parts.body, &scene.body) {
         (Some(own), _) => own,
-        (None, Some(spec)) => Box::new(block(spec)?) as Box<dyn Body>,
+        (None, Some(spec)) => Box::new(spec.build()?) as Box<dyn Body>,
         (None, None) => return Err(Error::scene("body", "is missing")),
     };
     check_body(&*body)?;
@@ -207,6 +209,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         tick,
         attached: &attached,
         execution: parts.execution,
+        open_haply: parts.open_haply,
         is_replay,
     };
     let (tools, resolved) = tools(parts.devices, making)?;
@@ -293,21 +296,12 @@ fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
     Rate::from_hz(hz).ok_or_else(|| Error::scene(field, format!("is {hz}, which is no rate")))
 }
 
-pub(super) fn block(spec: &BodySpec) -> Result<Block, Error> {
-    let builder = Block::builder(spec.block.nodes, spec.block.size_m)
-        .node_mass(spec.material.node_mass_kg)
-        .stiffness(spec.material.stiffness_n_per_m)
-        .damping_ratio(spec.material.damping_ratio);
-    let builder = spec.regions.iter().fold(builder, |builder, spec| builder.region(spec.region()));
-    spec.block.fixed.iter().fold(builder, |builder, &face| builder.fix(face)).build().map_err(|error| error.at("body"))
-}
-
 fn pulled(body: &mut dyn Body, initial: &InitialSpec, id: impl Fn([usize; 3]) -> u32) -> Result<State, Error> {
     let rest = |node: u32, body: &dyn Body| body.rest()[node as usize];
     let pulled = id(initial.pull.node);
     let mut held = vec![(pulled, rest(pulled, body) + Vec3::from(initial.pull.offset_m))];
     held.extend(initial.hold.iter().map(|&node| (id(node), rest(id(node), body))));
-    static_equilibrium(body, &held)
+    Ok(static_equilibrium(body, &held)?)
 }
 
 fn simulation(

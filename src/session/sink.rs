@@ -90,8 +90,6 @@ impl LogSink for Sinks {
     }
 
     fn take_loss(&mut self) -> Option<Loss> {
-        return self.file.as_mut().and_then(LogFile::take_loss);
-        #[cfg(not(feature = "log"))]
-        None
+        self.file.as_mut().and_then(LogFile::take_loss)
     }
 }

@@ -1,6 +1,7 @@
 //! The tools of a session: each with its device, its contact, its limits.
 
 use super::checks::{check_capabilities, check_ramp};
+use super::hardware::OpenHaply;
 use super::prepare::Parts;
 use super::{device, safety};
 use crate::devices::Device;
@@ -37,6 +38,7 @@ pub(super) struct Making<'a> {
     /// The nodes that tools are glued to, one for each device.
     pub(super) attached: &'a [Option<u32>],
     pub(super) execution: Execution,
+    pub(super) open_haply: Option<OpenHaply>,
     pub(super) is_replay: bool,
 }
 
@@ -61,7 +63,7 @@ pub(super) fn tools(
     brought: Vec<(Option<String>, Box<dyn Device>)>,
     making: Making<'_>,
 ) -> Result<(Vec<Tool>, SafetySpec), Error> {
-    let Making { scene, body, state, tick, attached, execution, is_replay } = making;
+    let Making { scene, body, state, tick, attached, execution, open_haply, is_replay } = making;
     // Both ledgers begin with a share of what is stored: together they give out no more than all of it.
     let stored_j = safety::stored_energy(body, state) / scene.devices.len() as f64;
     let mut brought = brought.into_iter();
@@ -72,7 +74,7 @@ pub(super) fn tools(
             Some((_, device)) => device,
             None => {
                 let glued_at = node.map(|node| state.positions[node as usize]);
-                device::device(spec, tick, glued_at, execution).map_err(of_this)?
+                device::device(spec, tick, glued_at, execution, open_haply).map_err(of_this)?
             }
         };
         // What is executed again has met them already.

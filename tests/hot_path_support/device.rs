@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
 use palpate::model::Vec3;
 use palpate::runtime::exchange::ExchangeWriter;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 use super::{Guard, Offence, allocator, kernel};
 

@@ -18,7 +18,7 @@ use palpate::runtime::RateGroup;
 use palpate::runtime::exchange::exchange;
 use palpate::scene::{LocalModelKind, StepKind};
 use palpate::session::Session;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 pub use device::GUARDED;
 use device::{GuardedDevice, Progress};

@@ -6,7 +6,7 @@ use palpate::log::{
 };
 use palpate::runtime::record::{Event, SlipCause, TickTiming};
 use palpate::runtime::{Mode, PortUse};
-use palpate::time::{Nanos, Rate};
+use palpate::runtime::{Nanos, Rate};
 
 /// An environment with two groups.
 pub fn environment() -> Environment {

@@ -1,1 +1,23 @@
+//! What studies a run, a log or a body with palpate: the command `palpate`, and the parts it is made of.
+//!
+//! | module | what it does |
+//! | --- | --- |
+//! | [`timing`] | says who was late in a log, why, and what it did to the force: text, JSON, a page |
+//! | [`compare`] | runs every local model on a scene and measures error and cost against `full` |
+//! | [`reduce`] | reduces a body's model and says where a local model may be trusted |
+//! | [`reduction`] | the numerics of that: balanced truncation, Krylov spaces, condensation |
+//! | [`export`] | writes topics of a log as CSV, Parquet, percentile files and Chrome traces |
+//! | [`log_file`] | looks into a log file, checks it, and saves what is readable of a damaged one |
+//! | [`drawing`] | charts as SVG, pages as HTML |
 
+mod commands;
+pub mod compare;
+pub mod drawing;
+pub mod export;
+pub mod log_file;
+pub mod reduce;
+pub mod reduction;
+pub mod timing;
+mod units;
+
+pub use commands::main;

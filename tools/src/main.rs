@@ -1,9 +1,7 @@
-//! The `palpate` command: runs scenes and reads their logs.
-
-mod cli;
+//! The command `palpate`.
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::main()
+    palpate_cli::main()
 }

@@ -12,7 +12,7 @@ use palpate::ErrorKind;
 use palpate::log::{LogEntry, LogReader, LogRecord, Window};
 use palpate::report::{Figure, Format, export_percentiles, export_table, export_trace};
 use palpate::runtime::record::TickTiming;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use serde_json::Value;
 
 const ALL: Window = Window { from: Nanos::ZERO, to: Nanos(u64::MAX) };

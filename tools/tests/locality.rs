@@ -2,7 +2,7 @@
 #![cfg(feature = "scene")]
 
 use palpate::ErrorKind;
-use palpate::log::reduction::{Locality, ReductionStudy};
+use palpate_cli::reduce::findings::{Locality, ReductionStudy};
 use palpate::scene::{Scene, Shape};
 use palpate::session::{ReduceOptions, reduce_scene};
 

@@ -8,7 +8,7 @@ use nalgebra::Complex;
 use palpate::model::Vec3;
 use palpate::model::body::{Body, State};
 use palpate::model::contact::Contact;
-use palpate::model::reduction::{
+use palpate_cli::reduction::{
     Balanced, Congruence, ErrorBound, LinearBody, LocalityCheck, Modal, PaperMesh, Ports, Projection, Response,
     SecondOrder, StiffnessError, condensed, craig_bampton, gain_error, guyan, largest_gain, log_spaced, low_rank,
     many_shifts, one_shift, patch, spread_shifts,

@@ -5,7 +5,7 @@ mod support;
 
 use support::{Folder, SCENE};
 use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter};
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 /// Records a run and gives the number of its forces.
 fn recorded(folder: &Folder, more: &[&str]) -> usize {

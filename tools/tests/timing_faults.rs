@@ -4,13 +4,13 @@
 use std::path::Path;
 
 use palpate::log::LogReader;
-use palpate::log::timing::{Selection, TimingAnalysis, TimingReport, WorstTick};
-use palpate::report::timing_to_text;
+use palpate_cli::timing::{Selection, TimingAnalysis, TimingReport, WorstTick};
+use palpate_cli::timing::timing_to_text;
 use palpate::runtime::record::SlipCause;
 use palpate::runtime::{Disturbance, RateGroup};
 use palpate::scene::Scene;
 use palpate::session::{Session, SessionBuilder};
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 const MS: u64 = 1_000_000;
 

@@ -13,7 +13,7 @@ pub use fault::MockFaultKind;
 
 use super::protocol::is_plain;
 use super::websocket::WebSocket;
-use crate::error::{Error, ErrorKind};
+use palpate::{Error, ErrorKind};
 use crossbeam_channel::bounded;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -106,7 +106,7 @@ impl MockService {
             let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(fail)?;
             listener.set_nonblocking(true).map_err(fail)?;
             let address = listener.local_addr().map_err(fail)?;
-            Ok((listener, address))
+            Ok::<_, Error>((listener, address))
         };
         let ((simulation, address), (events, events_address)) = (listen(options.port)?, listen(options.events_port)?);
         let world = Arc::new(Mutex::new(World::new(options)));

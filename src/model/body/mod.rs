@@ -12,7 +12,6 @@ pub use block::{Block, BlockBuilder};
 pub use kernel::InstructionSet;
 pub use network::{SpringNetwork, SpringNetworkBuilder};
 pub use region::Region;
-pub(crate) use region::{Material, materials, region_field};
 pub use shape::Shape;
 pub use spring::{Spring, SpringTangent};
 

@@ -56,10 +56,10 @@ pub struct Region {
 /// What is wrong with a region: the key in scene files, and what would be right.
 pub(crate) type RegionFault = (&'static str, String);
 
-/// The dotted place of `key` in the region of number `index` of the list `regions`.
-pub(crate) fn region_field(regions: &str, index: usize, key: &str) -> String {
+/// The dotted place of `key` in the region of number `index`.
+pub(crate) fn region_field(index: usize, key: &str) -> String {
     let dot = if key.is_empty() { "" } else { "." };
-    format!("{regions}[{index}]{dot}{key}")
+    format!("region[{index}]{dot}{key}")
 }
 
 impl Region {

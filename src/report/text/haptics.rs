@@ -1,11 +1,14 @@
 //! What a run did to the force.
 
 use super::page::Page;
-use crate::log::{DeviceReport, Percentiles};
+use crate::log::{DeviceReport, Percentiles, RunReport};
 use crate::report::units::{force, seconds};
 
 /// Resyncs, model age, contact, force, energy and limits of one device.
-pub(super) fn haptics(page: &mut Page, report: &DeviceReport) {
+pub fn haptics(page: &mut Page, run: &RunReport, report: &DeviceReport) {
+    if run.devices.len() > 1 {
+        page.named("DEVICE", report.name.clone());
+    }
     let resyncs = &report.resyncs;
     page.named("resyncs", resyncs.jump_before_n.count.to_string());
     if resyncs.jump_before_n.count > 0 {

@@ -2,21 +2,16 @@
 //!
 //! It fits a screen of 80 columns and 40 lines for a run of up to four rate groups.
 
-mod against;
 mod haptics;
 mod page;
-mod worst;
 
 use std::fmt;
 
-pub use self::against::{against_to_text, figure_to_text};
-use self::haptics::haptics;
-use self::page::Page;
-pub(super) use self::worst::in_words;
+pub use self::haptics::haptics;
+pub use self::page::Page;
 use super::units::duration;
 use super::verdict::verdict;
-use crate::log::timing::{CoreUse, TimingReport};
-use crate::log::{CauseCounts, Environment, Execution, GroupReport, Percentiles, RunReport};
+use crate::log::{CauseCounts, Execution, GroupReport, Percentiles, RunReport};
 
 const EVENTS_SHOWN: usize = 4;
 /// Lines for what the system granted.
@@ -30,39 +25,27 @@ impl fmt::Display for RunReport {
 
 /// The report as text, every line ended by a newline.
 pub fn to_text(report: &RunReport) -> String {
-    text(report, None)
-}
-
-/// The timing of a run in detail as text: the same, with processor cores and the worst ticks.
-pub fn timing_to_text(report: &TimingReport) -> String {
-    text(&report.run, Some(report))
-}
-
-fn text(report: &RunReport, timing: Option<&TimingReport>) -> String {
-    let (verdict, reason) = verdict(report);
     let mut page = Page::default();
-    page.line(format!("{}: {reason}", verdict.name()));
-    timing.iter().for_each(|timing| worst::sentence(&mut page, timing));
-    if let Some(environment) = &report.environment {
-        page.line(String::new());
-        about(&mut page, environment);
-    }
+    head(&mut page, report);
+    about(&mut page, report);
     page.line(String::new());
     groups(&mut page, report);
-    timing.iter().for_each(|timing| cores(&mut page, &timing.cores));
     page.line(String::new());
-    for device in report.devices.iter().filter(|device| device.force.ticks > 0 || timing.is_none()) {
-        if report.devices.len() > 1 {
-            page.named("DEVICE", device.name.clone());
-        }
-        haptics(&mut page, device);
-    }
+    report.devices.iter().for_each(|device| haptics(&mut page, report, device));
     events(&mut page, report);
-    timing.iter().for_each(|timing| worst::table(&mut page, timing));
     page.text
 }
 
-fn about(page: &mut Page, environment: &Environment) {
+/// Adds what a report begins with: the verdict in a line.
+pub fn head(page: &mut Page, report: &RunReport) {
+    let (verdict, reason) = verdict(report);
+    page.line(format!("{}: {reason}", verdict.name()));
+}
+
+/// Adds what the run was: execution, model and why, what is switched off, what the system granted.
+pub fn about(page: &mut Page, report: &RunReport) {
+    let Some(environment) = &report.environment else { return };
+    page.line(String::new());
     let execution = match environment.execution {
         Execution::Virtual => "virtual",
         Execution::Threaded { .. } => "threaded",
@@ -90,7 +73,8 @@ fn about(page: &mut Page, environment: &Environment) {
     }
 }
 
-fn groups(page: &mut Page, report: &RunReport) {
+/// Adds the rate groups: periods, causes of slips and misses, percentiles.
+pub fn groups(page: &mut Page, report: &RunReport) {
     page.line(format!(
         "{:<11}{:>10}{:>11}{:>11}{:>11}{:>13}",
         "group", "rate", "released", "skipped", "missed", "lost records"
@@ -130,23 +114,14 @@ fn groups(page: &mut Page, report: &RunReport) {
     }
 }
 
-/// How much of each core the groups used.
-fn cores(page: &mut Page, cores: &[CoreUse]) {
-    for (i, core) in cores.iter().enumerate() {
-        let on = core.cpu.map_or("any".to_owned(), |cpu| format!("cpu {cpu}"));
-        let groups: Vec<String> =
-            core.groups.iter().map(|(group, share)| format!("{group} {:.1} %", 100.0 * share)).collect();
-        page.wrapped(if i == 0 { "cores" } else { "" }, &format!("{on}: {}", groups.join(", ")));
-    }
-}
-
 fn percentiles(page: &mut Page, group: &str, what: &str, p: Percentiles<u64>) {
     let cell = |ns: u64| if p.count == 0 { "-".to_owned() } else { duration(ns) };
     let [p50, p90, p99, p999, max] = [p.p50, p.p90, p.p99, p.p999, p.max].map(cell);
     page.line(format!("{group:<11}{what:<13}{:>8}{p50:>9}{p90:>10}{p99:>10}{p999:>10}{max:>9}", p.count));
 }
 
-fn events(page: &mut Page, report: &RunReport) {
+/// Adds the first events, and what is wrong with the log.
+pub fn events(page: &mut Page, report: &RunReport) {
     for (i, event) in report.events.iter().take(EVENTS_SHOWN).enumerate() {
         let name = if i == 0 { "events" } else { "" };
         page.named(name, format!("{:.3} s {}: {}", event.time.as_secs_f64(), event.level.name(), event.message));

@@ -1,19 +1,20 @@
 //! Lines of a terminal's width, with a name in front where one helps.
 
 /// Columns of a line.
-pub(super) const WIDTH: usize = 80;
+pub const WIDTH: usize = 80;
 /// Columns of a name in front.
 const NAME_WIDTH: usize = 11;
 
 /// The text so far.
-#[derive(Default)]
-pub(super) struct Page {
-    pub(super) text: String,
+#[derive(Clone, Debug, Default)]
+pub struct Page {
+    /// What has been added, every line ended by a newline.
+    pub text: String,
 }
 
 impl Page {
     /// Adds a line, cut to the width of the page.
-    pub(super) fn line(&mut self, line: String) {
+    pub fn line(&mut self, line: String) {
         // What other programs wrote into a log must not command a terminal.
         let line: String = line.chars().map(|c| if c.is_control() { '?' } else { c }).collect();
         let mut kept: String = line.chars().take(WIDTH).collect();
@@ -26,7 +27,7 @@ impl Page {
     }
 
     /// Adds text with a name in front, on as many lines as it needs.
-    pub(super) fn wrapped(&mut self, name: &str, text: &str) {
+    pub fn wrapped(&mut self, name: &str, text: &str) {
         let (mut name, mut line) = (name, String::new());
         for word in text.split(' ') {
             if !line.is_empty() && NAME_WIDTH + line.len() + 1 + word.len() > WIDTH {
@@ -41,7 +42,7 @@ impl Page {
     }
 
     /// Adds a line with a name in front.
-    pub(super) fn named(&mut self, name: &str, text: String) {
+    pub fn named(&mut self, name: &str, text: String) {
         self.line(format!("{name:<NAME_WIDTH$}{text}"));
     }
 }

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use palpate::report::compare::{to_html, to_json, to_text};
+use crate::compare::{to_html, to_json, to_text};
 use palpate::scene::{LocalModelKind, Scene};
-use palpate::session::{CompareOptions, CompareProgress, compare};
+use crate::compare::{CompareOptions, CompareProgress, compare};
 use palpate::{Error, ErrorKind};
 
 use super::{output, progress, run};

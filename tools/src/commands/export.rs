@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
 
 use palpate::log::{LogReader, Window};
-use palpate::report::{Figure, Format, export_percentiles, export_table, export_trace};
+use crate::export::{Figure, Format, export_percentiles, export_table, export_trace};
 use palpate::{Error, ErrorKind};
 
 use super::output::{forgive_closed_pipe, refuse_to_overwrite, warn_of_damage};
@@ -17,7 +17,7 @@ use super::window::WindowArgs;
 pub enum ExportFormat {
     /// One topic as comma-separated values
     Csv,
-    /// One topic as an Apache Parquet table (feature `parquet`)
+    /// One topic as an Apache Parquet table
     Parquet,
     /// One figure of a rate group as HdrHistogram's percentile text
     Hgrm,

@@ -33,7 +33,6 @@ pub fn stops(running: &Running) -> Result<Interrupt, Error> {
 ///
 /// # Errors
 /// If the system refuses the handler.
-#[cfg(feature = "haply")]
 pub fn waits() -> Result<Interrupt, Error> {
     on_interrupt(|| {})
 }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter};
 use std::path::PathBuf;
 
-use palpate::log::{CheckReport, LogInfo, Lost, Recovered, check, recover};
+use crate::log_file::{CheckReport, LogInfo, Lost, Recovered, check, recover};
 use palpate::{Error, ErrorKind};
 
 use super::log_info::{bytes, count, seconds, span, to_json, to_text};

@@ -1,6 +1,7 @@
 //! What `palpate log` prints: a log's contents as text and as JSON.
 
-use palpate::log::{Environment, Execution, LogInfo};
+use crate::log_file::LogInfo;
+use palpate::log::{Environment, Execution};
 use serde_json::{Value, json};
 
 /// A number of bytes in words.

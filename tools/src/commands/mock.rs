@@ -1,6 +1,11 @@
 //! `palpate mock haply`: a service without hardware, to try the device path.
 
-use palpate::Error;
+use std::time::{Duration, Instant};
+
+use palpate::{Error, ErrorKind};
+use palpate_haply::mock::{MockFault, MockFaultKind, MockOptions, MockService};
+
+use super::{interrupt, output};
 
 /// The arguments of `palpate mock`.
 #[derive(Debug, clap::Args)]
@@ -16,7 +21,6 @@ enum Service {
 }
 
 #[derive(Debug, clap::Args)]
-#[cfg_attr(not(feature = "haply"), allow(dead_code, reason = "parsed, so that the command can say what it lacks"))]
 struct HaplyArgs {
     /// Port of the simulation channel; 0 for any free one
     #[arg(long, default_value_t = 10001)]
@@ -42,25 +46,9 @@ struct HaplyArgs {
 /// Runs a mock service until it is told to end.
 ///
 /// # Errors
-/// If a port is taken, or this build has no such service.
+/// If a port is taken, or there is no such fault.
 pub fn run(args: &MockArgs) -> Result<(), Error> {
     let Service::Haply(args) = &args.service;
-    haply(args)
-}
-
-#[cfg(not(feature = "haply"))]
-fn haply(_: &HaplyArgs) -> Result<(), Error> {
-    let message = "this build has no Haply mock: build it with `--features haply`";
-    Err(Error::new(palpate::ErrorKind::Usage, message))
-}
-
-#[cfg(feature = "haply")]
-fn haply(args: &HaplyArgs) -> Result<(), Error> {
-    use super::{interrupt, output};
-    use palpate::ErrorKind;
-    use palpate::devices::haply::mock::{MockFault, MockFaultKind, MockOptions, MockService};
-    use std::time::{Duration, Instant};
-
     let kind = |name: &String| {
         let names = MockFaultKind::ALL.map(MockFaultKind::name).join(", ");
         let unknown = || Error::new(ErrorKind::Usage, format!("--fault is {name:?}, must be one of {names}"));

@@ -10,7 +10,7 @@ use palpate::Error;
 use palpate::log::LogReader;
 use palpate::runtime::GroupLive;
 use palpate::session::Running;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 
 /// How much of the run passes between two drawings.
 const STEP: Duration = Duration::from_millis(50);

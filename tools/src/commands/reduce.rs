@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use palpate::log::reduction::ReductionStudy;
-use palpate::report::reduce::{locality_verdict, to_html, to_json, to_text};
+use crate::reduce::findings::ReductionStudy;
+use crate::reduce::{locality_verdict, to_html, to_json, to_text};
 use palpate::scene::Scene;
-use palpate::session::{MeshStudy, PaperStudy, ReduceOptions, reduce_mesh, reduce_paper, reduce_scene};
+use crate::reduce::{MeshStudy, PaperStudy, ReduceOptions, reduce_mesh, reduce_paper, reduce_scene};
 use palpate::{Error, ErrorKind};
 
 use super::output;

@@ -76,7 +76,7 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
 }
 
 fn plan(builder: SessionBuilder, name: &str) -> Result<(), Error> {
-    let planned = builder.build().and_then(|session| Ok((session.plan()?, session.choice().cloned())));
+    let planned = builder.open_haply_with(palpate_haply::open).build().and_then(|session| Ok((session.plan()?, session.choice().cloned())));
     let (plan, choice) = planned.map_err(|error| error.at(name))?;
     let choice = choice.map_or(String::new(), |choice| format!("model      {choice}\n"));
     output::print(&format!("{name}: {plan}{choice}"))
@@ -84,7 +84,7 @@ fn plan(builder: SessionBuilder, name: &str) -> Result<(), Error> {
 
 fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error> {
     let preparing = progress::preparing(name);
-    let session = builder.log(log).build().map_err(|error| error.at(name));
+    let session = builder.open_haply_with(palpate_haply::open).log(log).build().map_err(|error| error.at(name));
     preparing.finish_and_clear();
     let running = session?.start()?;
     let interrupt = interrupt::stops(&running)?;

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use palpate::log::timing::{Against, Condition, Selection, TimingAnalysis, TimingReport, read_cyclictest};
-use palpate::report::{against_to_json, against_to_text, figure_to_text, timing_html, timing_to_json, timing_to_text};
+use crate::timing::{Against, Condition, Selection, TimingAnalysis, TimingReport, read_cyclictest};
+use crate::timing::{against_to_json, against_to_text, figure_to_text, timing_html, timing_to_json, timing_to_text};
 use palpate::{Error, ErrorKind};
 
 use super::output::{print, refuse_to_overwrite, warn_of_damage};

@@ -1,7 +1,7 @@
 //! `--from` and `--to`: a part of a log.
 
 use palpate::log::Window;
-use palpate::time::Nanos;
+use palpate::runtime::Nanos;
 use palpate::{Error, ErrorKind};
 
 /// Which part of a log is asked for.

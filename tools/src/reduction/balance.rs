@@ -6,7 +6,7 @@ use super::linalg::{Matrix, product, product_t, scaled_columns, svd};
 use super::lyapunov;
 use super::modal::Modal;
 use super::state_space::StateSpace;
-use crate::error::{Error, ErrorKind};
+use palpate::{Error, ErrorKind};
 
 /// Hankel singular values below this share of the largest are rounding: cut before balancing.
 pub const NUMERICAL_RANK: f64 = 1e-14;

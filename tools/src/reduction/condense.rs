@@ -5,7 +5,7 @@ use super::krylov::Projection;
 use super::linalg::Matrix;
 use super::slow_modes::slow_modes;
 use super::system::SecondOrder;
-use crate::error::Error;
+use palpate::Error;
 
 /// Guyan's reduction (1965, AIAA J. 3): the coordinates in `kept` (in increasing order) stay, all others follow as they do at rest. Exact
 /// at rest for ports at the kept coordinates; mass and damping go along.

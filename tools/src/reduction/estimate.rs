@@ -7,7 +7,7 @@ use super::krylov::Projection;
 use super::linalg::{CMatrix, Matrix, complex, product_t, side_by_side, solve_complex};
 use super::slow_modes::slow_modes;
 use super::system::{Rayleigh, SecondOrder};
-use crate::error::Error;
+use palpate::Error;
 
 /// The slowest mode is found up to this share of its frequency squared.
 const CLOSE: f64 = 0.99;

@@ -4,7 +4,7 @@ use super::balance::Balanced;
 use super::congruence::Congruence;
 use super::linalg::{Matrix, append_orthonormal};
 use super::system::{SecondOrder, solved};
-use crate::error::Error;
+use palpate::Error;
 
 /// Directions of which this share of their length is new are combinations of those that are there.
 const DEPENDENT: f64 = 1e-11;

@@ -1,11 +1,11 @@
 //! A deformable body, linear around a state, with a port wherever a tool may touch it.
 
-use super::super::Vec3;
-use super::super::body::{Body, State};
-use super::super::dissection::{Adjacency, dissection};
+use palpate::model::Vec3;
+use palpate::model::body::{Body, State};
+use palpate::model::dissection::{Adjacency, dissection};
 use super::linalg::Matrix;
 use super::system::{Assembly, Ports, SecondOrder};
-use crate::error::{Error, ErrorKind};
+use palpate::{Error, ErrorKind};
 
 /// The movable nodes of a body around a state, three coordinates each.
 ///

@@ -2,14 +2,14 @@
 
 use nalgebra::Complex;
 
-use super::super::sparse::SparseFactor;
+use palpate::model::sparse::SparseFactor;
 use super::congruence::Congruence;
 use super::linalg::{CMatrix, Matrix, append_orthonormal, complex, product_t, side_by_side};
 use super::linear_body::LinearBody;
 use super::modal::Modal;
 use super::response::{Response, log_spaced};
 use super::system::{Ports, Rayleigh, SecondOrder, solved};
-use crate::error::Error;
+use palpate::Error;
 
 /// Frequencies (Hz) at which the response of a contact is matched, rest among them: each costs a factorisation, and three solutions a
 /// contact. They are dense where the slow modes of a body of tissue ring.

@@ -13,7 +13,7 @@
 //! in rad/s.
 //!
 //! ```
-//! use palpate::model::reduction::{Balanced, Modal, PaperMesh, Response};
+//! use palpate_cli::reduction::{Balanced, Modal, PaperMesh, Response};
 //!
 //! # fn main() -> Result<(), palpate::Error> {
 //! let system = PaperMesh::square(5).system()?;

@@ -2,7 +2,7 @@
 
 use super::linalg::Matrix;
 use super::system::{Assembly, Ports, SecondOrder};
-use crate::error::Error;
+use palpate::Error;
 
 /// A 2D or 3D lattice of cells with springs and dampers to all neighbours, every edge or face but the top held. Its input is
 /// the displacement of the top's middle node, its output the force that moves it.

@@ -3,7 +3,7 @@
 use super::congruence::Congruence;
 use super::linalg::{Matrix, append_orthonormal, pencil_eigen, product};
 use super::system::{SecondOrder, solved};
-use crate::error::Error;
+use palpate::Error;
 
 /// The largest number of steps of the iteration.
 const STEPS: usize = 60;

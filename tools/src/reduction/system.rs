@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use nalgebra::Complex;
 
-use super::super::sparse::SparseFactor;
+use palpate::model::sparse::SparseFactor;
 use super::linalg::{CMatrix, Matrix};
-use crate::error::{Error, ErrorKind};
+use palpate::{Error, ErrorKind};
 
 /// How far damping may be from alpha M + beta K, entry by entry and relative to its largest, to count as proportional.
 const PROPORTIONAL: f64 = 1e-9;

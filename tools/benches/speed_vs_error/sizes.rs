@@ -1,0 +1,147 @@
+//! Patch sizes, basis sizes, substeps and the two predictions, results one period late.
+
+use palpate::error::Error;
+use palpate::log::{Comparison, Measured};
+use palpate_cli::drawing::{Picture, Series};
+use palpate::scene::{LocalModelKind, Prediction, Scene};
+use palpate::session::{CompareOptions, one_period};
+use palpate::runtime::Rate;
+
+use crate::Part;
+use crate::common::{HEADS, cells, colour, compared, figure, scene, table, us};
+
+const SCENES: [&str; 2] = ["hand", "drag_friction"];
+const ROUNDS: usize = 1;
+/// Simulated time: the drags up to their middle (s).
+const DURATION_S: f64 = 1.2;
+
+/// One setting that differs from the default.
+struct Variant {
+    name: String,
+    change: Box<dyn Fn(&mut Scene)>,
+    /// Other models know of it too.
+    is_for_all: bool,
+}
+
+fn variants() -> Vec<Variant> {
+    let variant = |name: String, is_for_all, change: Box<dyn Fn(&mut Scene)>| Variant { name, change, is_for_all };
+    let patch = |size: [usize; 3]| {
+        let [a, b, c] = size;
+        variant(
+            format!("patch {a} x {b} x {c}"),
+            true,
+            Box::new(move |scene: &mut Scene| scene.local.patch = Some(size)),
+        )
+    };
+    let basis =
+        |states| variant(format!("basis {states}"), false, Box::new(move |scene| scene.local.basis = Some(states)));
+    let substeps = |count| {
+        let change = move |scene: &mut Scene| scene.global.substeps_per_ms = Some(count);
+        variant(format!("{count} substeps per ms"), true, Box::new(change))
+    };
+    let full = variant("prediction full".into(), false, Box::new(|scene| scene.local.prediction = Prediction::Full));
+    let default = variant("default".into(), true, Box::new(|_| ()));
+    let sizes = [patch([6, 6, 2]), patch([6, 6, 3]), basis(20), basis(100), full, substeps(4), substeps(8)];
+    [default].into_iter().chain(sizes).collect()
+}
+
+pub fn part(is_quick: bool) -> Result<Part, Error> {
+    let mut variants = variants();
+    let (names, rounds) = if is_quick { (&SCENES[..1], 1) } else { (&SCENES[..], ROUNDS) };
+    if is_quick {
+        variants.truncate(2);
+    }
+    let mut text = "## Sizes, substeps, prediction\n\n\
+        One setting at a time against the default: patch 4 x 4 x 2, basis 50, 2 substeps per ms, reduced prediction. Results of \
+        the global model are one period late; the drag is run to its middle (1.2 s); `full` has the same substeps as the model beside it.\n"
+        .to_owned();
+    let mut pictures = Vec::new();
+    for name in names {
+        let mut measured = Vec::new();
+        for variant in &variants {
+            eprintln!("{name}: {}", variant.name);
+            let mut varied = scene(name)?;
+            (variant.change)(&mut varied);
+            let late = one_period(Rate::from_hz(varied.global.rate_hz).expect("a scene has a rate"));
+            let linear = variant.is_for_all.then_some(LocalModelKind::Patch);
+            let models = [LocalModelKind::Predictive].into_iter().chain(linear).collect();
+            let duration_s = Some(if is_quick { 0.2 } else { varied.run.duration_s.min(DURATION_S) });
+            let options = CompareOptions { models, latencies: vec![late], duration_s };
+            measured.push((variant.name.as_str(), compared(&varied, &options, rounds)?));
+        }
+        let file = format!("speed_vs_error_sizes_{name}");
+        text.push_str(&format!("\n### Sizes on `{name}`\n\n![Sizes on {name}](img/{file}.svg)\n\n"));
+        text.push_str(&rows(&measured));
+        text.push_str(&format!("\n{}\n", told(&measured)));
+        pictures.push((file, picture(name, &measured).to_svg()));
+    }
+    Ok(Part { text, pictures })
+}
+
+fn rows(measured: &[(&str, Comparison)]) -> String {
+    let mut rows = Vec::new();
+    for (variant, comparison) in measured {
+        for run in &comparison.runs {
+            let figures = match run.measured() {
+                Some(measured) => cells(measured),
+                None => vec![run.missing().unwrap_or_default().to_owned()],
+            };
+            rows.push(
+                [format!("`{}`", run.model), (*variant).to_owned(), figure(us(comparison.full.cost.tick_p50))]
+                    .into_iter()
+                    .chain(figures)
+                    .collect(),
+            );
+        }
+    }
+    rows.sort_by_key(|row: &Vec<String>| row[0].clone());
+    let heads: Vec<&str> = ["model", "setting", "`full` p50 us"].into_iter().chain(HEADS).collect();
+    table(&heads, 2, &rows)
+}
+
+fn of<'a>(comparison: &'a Comparison, model: &str) -> Option<&'a Measured> {
+    comparison.runs.iter().find(|run| run.model == model).and_then(|run| run.measured())
+}
+
+/// Which settings of `predictive` are nearer than the default, and for what.
+fn told(measured: &[(&str, Comparison)]) -> String {
+    let predictive: Vec<(&str, &Measured)> =
+        measured.iter().filter_map(|(name, comparison)| Some((*name, of(comparison, "predictive")?))).collect();
+    let Some(((_, default), others)) = predictive.split_first() else { return String::new() };
+    let mut lines = Vec::new();
+    for (name, run) in others {
+        let change = |of: fn(&Measured) -> f64| figure(of(run) / of(default));
+        lines.push(format!(
+            "{name} {} times the rms error for {} times the tick and {} times the global load",
+            change(|run| run.error.rms),
+            change(|run| us(run.cost.tick_p50)),
+            change(|run| run.cost.global_load),
+        ));
+    }
+    format!("`predictive` against its default: {}.", lines.join("; "))
+}
+
+fn picture(scene: &str, measured: &[(&str, Comparison)]) -> Picture {
+    let series = ["patch", "predictive"].map(|model| Series {
+        name: model.to_owned(),
+        colour: colour(model),
+        is_joined: false,
+        is_hollow: false,
+        points: measured
+            .iter()
+            .filter_map(|(name, comparison)| {
+                let run = of(comparison, model)?;
+                let label = if *name == "default" { format!("{model}, default") } else { (*name).to_owned() };
+                Some((us(run.cost.tick_p50), run.error.rms, label))
+            })
+            .collect(),
+    });
+    Picture {
+        title: format!("{scene}: sizes of patch and predictive, results one period late"),
+        x: "CPU per haptic tick, p50 (us)".to_owned(),
+        y: "rms error (% of peak)".to_owned(),
+        marks: Vec::new(),
+        levels: Vec::new(),
+        series: series.into(),
+    }
+}

@@ -1,0 +1,193 @@
+//! What a comparison comes to, in sentences: where `full` is enough, where another model is worth it, and where none is.
+
+use super::table::figure;
+use super::{milliseconds, name};
+use super::figures::{ComparedRun, Comparison, Measured};
+use crate::units::duration;
+use palpate::runtime::Nanos;
+
+/// Costs that differ by less are called the same: they are measured, and differ from run to run.
+const MARGIN: f64 = 0.1;
+
+/// Errors (% rms) that a model is asked to stay within.
+pub const NEAR: [f64; 2] = [1.0, 5.0];
+
+/// The conclusions, one line each.
+///
+/// `full` has no error, so another model can only win by cost: per haptic tick, which decides whether a rate can be kept,
+/// or in total, haptic and global group together.
+pub fn conclusions(comparison: &Comparison) -> Vec<String> {
+    if comparison.full.trace.peak_n() == 0.0 {
+        return vec!["`full` gives no force on this scene: there is nothing to compare".to_owned()];
+    }
+    let mut lines = vec![fit(comparison)];
+    if comparison.runs.iter().any(|run| run.measured().is_some()) {
+        lines.extend(against_full(comparison));
+        lines.extend(NEAR.map(|limit| nearest(comparison, limit)));
+    }
+    let degraded = comparison.runs.iter().filter(|run| run.measured().is_some_and(|run| run.degraded > 0));
+    lines.extend(degraded.map(|run| {
+        let count = run.measured().map_or(0, |run| run.degraded);
+        format!("{}: {count} releases gave a degraded result, such as a force that was not finite", name(run))
+    }));
+    if comparison.is_debug_build {
+        lines.push("measured with a debug build: costs are several times those of `cargo run --release`".to_owned());
+    }
+    lines
+}
+
+/// Does `full` fit the haptic tick, and how large might the body be?
+fn fit(comparison: &Comparison) -> String {
+    let (p99, period) = (comparison.full.cost.tick_p99, comparison.haptic_period);
+    let nodes = comparison.nodes as f64 * period.0 as f64 / p99.0.max(1) as f64;
+    let times = format!("CPU p99 {} of {}", duration(p99.0), duration(period.0));
+    let line = format!("cost grows with the nodes, so the line is near {} nodes", two_digits(nodes));
+    match full_fits(comparison) {
+        true => format!("`full` fits the haptic tick here ({times}): no other model is needed on this scene; {line}"),
+        false => format!("`full` does not fit the haptic tick here ({times}): another model is needed; {line}"),
+    }
+}
+
+/// True if `full` can keep the haptic rate on this machine.
+pub(super) fn full_fits(comparison: &Comparison) -> bool {
+    comparison.full.cost.tick_p99 <= comparison.haptic_period
+}
+
+/// Who is cheaper than `full` in which way, and who in none.
+fn against_full(comparison: &Comparison) -> [String; 3] {
+    let full = &comparison.full;
+    let in_total = |run: &Measured| run.cost.total_load() < (1.0 - MARGIN) * full.cost.total_load();
+    let per_tick = |run: &Measured| (run.cost.tick_p50.0 as f64) < (1.0 - MARGIN) * full.cost.tick_p50.0 as f64;
+    let is_worse = |run: &Measured| run.error.rms > 0.0 && !in_total(run);
+    let those = |wins: &dyn Fn(&Measured) -> bool| list(comparison, wins);
+    let (load, margin) = (figure(1e3 * full.cost.total_load()), 100.0 * MARGIN);
+    [
+        format!("cheaper than `full` in total ({load} ms/s) by more than {margin} %: {}", those(&in_total)),
+        format!("worse than `full` in error and not cheaper in total: {}", those(&is_worse)),
+        format!(
+            "worse in error and cheaper in nothing, not even a haptic tick: {}",
+            those(&|run| is_worse(run) && !per_tick(run))
+        ),
+    ]
+}
+
+/// The cheapest per haptic tick within an error, for each latency.
+fn nearest(comparison: &Comparison, limit: f64) -> String {
+    let mut latencies: Vec<Nanos> = comparison.runs.iter().map(|run| run.latency).collect();
+    latencies.sort_unstable();
+    latencies.dedup();
+    let at = |latency: Nanos| {
+        let within =
+            |run: &&ComparedRun| run.latency == latency && run.measured().is_some_and(|run| run.error.rms <= limit);
+        let tick = |run: &&ComparedRun| run.measured().map(|run| run.cost.tick_p50);
+        let cheapest = comparison.runs.iter().filter(within).min_by_key(tick);
+        let found = cheapest.and_then(|run| Some((&run.model, run.measured()?))).map(|(model, run)| {
+            format!("{model} ({} %, {} per tick)", figure(run.error.rms), duration(run.cost.tick_p50.0))
+        });
+        format!("{} {}", in_words(latency), found.unwrap_or_else(|| "none".to_owned()))
+    };
+    let found: Vec<String> = latencies.into_iter().map(at).collect();
+    format!("cheapest tick within {limit} % rms of `full`: {}", found.join("; "))
+}
+
+/// The models of which runs are `asked` for; with the latency where that is not so for all latencies of the model.
+fn list(comparison: &Comparison, asked: &dyn Fn(&Measured) -> bool) -> String {
+    let runs = || comparison.runs.iter().filter_map(|run| Some((run, run.measured()?)));
+    let all = |model: &str| runs().filter(|(run, _)| run.model == model).all(|(_, measured)| asked(measured));
+    let names = runs().filter(|(_, measured)| asked(measured)).map(|(run, _)| match all(&run.model) {
+        true => run.model.clone(),
+        false => format!("{} ({})", run.model, in_words(run.latency)),
+    });
+    let mut names: Vec<String> = names.collect();
+    names.dedup();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+/// A latency in a sentence.
+fn in_words(latency: Nanos) -> String {
+    match latency {
+        Nanos::ZERO => "in time".to_owned(),
+        late => format!("{} ms late", milliseconds(late)),
+    }
+}
+
+/// A count with two digits that mean something.
+fn two_digits(count: f64) -> String {
+    let unit = 10_f64.powf((count.max(1.0).log10().floor() - 1.0).max(0.0));
+    format!("{}", (count / unit).round() * unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use super::figures::{ForceTrace, ModelCost, ModelError, RunOutcome};
+
+    fn measured(rms: f64, tick_us: u64, total: f64) -> Measured {
+        let tick = Nanos(tick_us * 1000);
+        let cost = ModelCost { tick_p50: tick, tick_p99: tick, haptic_load: total, ..ModelCost::default() };
+        let trace = ForceTrace { forces_n: vec![[0.0, 0.0, 1.0]], ..ForceTrace::default() };
+        Measured { error: ModelError { rms, ..ModelError::default() }, cost, trace, ..Measured::default() }
+    }
+
+    fn comparison(full_us: u64, runs: &[(&str, u64, Measured)]) -> Comparison {
+        let run = |(model, latency_ms, run): &(&str, u64, Measured)| ComparedRun {
+            model: (*model).to_owned(),
+            latency: Nanos(latency_ms * 1_000_000),
+            outcome: RunOutcome::Measured(Box::new(run.clone())),
+        };
+        Comparison {
+            nodes: 1000,
+            haptic_period: Nanos(1_000_000),
+            full: measured(0.0, full_us, full_us as f64 * 1e-3),
+            runs: runs.iter().map(run).collect(),
+            ..Comparison::default()
+        }
+    }
+
+    #[test]
+    fn full_is_said_to_fit_or_not_with_the_size_at_which_that_changes() {
+        let fits = conclusions(&comparison(100, &[])).concat();
+        assert!(fits.contains("fits the haptic tick here (CPU p99 100 us of 1.00 ms)"), "{fits}");
+        assert!(fits.contains("no other model is needed") && fits.contains("near 10000 nodes"), "{fits}");
+        let not = conclusions(&comparison(4100, &[])).concat();
+        assert!(not.contains("does not fit the haptic tick") && not.contains("near 240 nodes"), "{not}");
+    }
+
+    #[test]
+    fn models_are_named_where_they_win_and_where_they_never_do() {
+        let lines = conclusions(&comparison(
+            100,
+            &[
+                ("hold", 0, measured(0.5, 2, 0.2)),
+                ("hold", 33, measured(6.0, 1, 0.01)),
+                ("patch", 0, measured(4.0, 7, 0.05)),
+                ("patch", 33, measured(9.0, 200, 0.3)),
+            ],
+        ));
+        let ends = [
+            "in total (100 ms/s) by more than 10 %: hold (33 ms late), patch (in time)",
+            "not cheaper in total: hold (in time), patch (33 ms late)",
+            "not even a haptic tick: patch (33 ms late)",
+            "within 1 % rms of `full`: in time hold (0.500 %, 2.00 us per tick); 33 ms late none",
+            "within 5 % rms of `full`: in time hold (0.500 %, 2.00 us per tick); 33 ms late none",
+        ];
+        let same = conclusions(&comparison(
+            100,
+            &[("hold", 0, measured(0.5, 99, 0.099)), ("hold", 33, measured(0.5, 99, 0.101))],
+        ));
+        assert!(same[2].ends_with("total: hold") && same[3].ends_with("tick: hold"), "{same:?}");
+        assert_eq!(lines.len(), 1 + ends.len());
+        for (line, end) in lines[1..].iter().zip(ends) {
+            assert!(line.ends_with(end), "{line:?} does not end with {end:?}");
+        }
+    }
+
+    #[test]
+    fn a_scene_without_force_and_degraded_results_are_said() {
+        let mut without = comparison(100, &[]);
+        without.full.trace.forces_n = vec![[0.0; 3]];
+        assert!(conclusions(&without).concat().contains("nothing to compare"));
+        let run = Measured { degraded: 3, ..measured(1.0, 2, 0.2) };
+        assert!(conclusions(&comparison(100, &[("patch", 33, run)])).concat().contains("patch 33 ms late: 3 releases"));
+    }
+}

@@ -1,0 +1,284 @@
+//! What local models cost and how far their forces are from `full`'s: plain data, and the error of one run against another.
+
+use palpate::log::Magnitudes;
+use palpate::log::{LogRecord, Resync};
+use palpate::log::magnitude;
+use palpate::runtime::Nanos;
+
+/// What a comparison needs of one run: force and energy of every haptic tick, and the resyncs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ForceTrace {
+    /// Force on the tool, tick by tick: mean over the tick, after blending, before safety (N).
+    pub forces_n: Vec<[f64; 3]>,
+    /// Energy that the tool has given to the simulation since the start, tick by tick (J).
+    pub energy_j: Vec<f64>,
+    /// The resyncs in the order in which they ended.
+    pub resyncs: Vec<Resync>,
+}
+
+impl ForceTrace {
+    /// Takes it from the records of a run, of its first device.
+    pub fn of(records: &[LogRecord]) -> Self {
+        Self::of_device(records, 0)
+    }
+
+    /// Takes that of one of several devices from the records of a run.
+    pub fn of_device(records: &[LogRecord], device: u16) -> Self {
+        let mut trace = Self::default();
+        for record in records.iter().filter(|record| record.device() == device) {
+            match record {
+                LogRecord::Force(sample) => {
+                    trace.forces_n.push(sample.force_n);
+                    trace.energy_j.push(sample.energy_j);
+                }
+                LogRecord::Resync(resync) => trace.resyncs.push(*resync),
+                _ => {}
+            }
+        }
+        trace
+    }
+
+    /// The largest force (N).
+    pub fn peak_n(&self) -> f64 {
+        self.forces_n.iter().map(|force| magnitude(*force)).fold(0.0, f64::max)
+    }
+
+    /// The largest energy by magnitude (J).
+    pub fn largest_energy_j(&self) -> f64 {
+        self.energy_j.iter().fold(0.0, |largest, energy| energy.abs().max(largest))
+    }
+
+    /// How far each tick's force is from that of `full` (N).
+    pub fn differences_n(&self, full: &Self) -> impl Iterator<Item = f64> {
+        self.forces_n.iter().zip(&full.forces_n).map(|(force, exact)| magnitude(minus(*force, *exact)))
+    }
+}
+
+/// How far a run is from that of `full` on the same scene.
+///
+/// All but `energy` in percent of the largest force of `full`. Not a number where `full` has no force, or no energy.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ModelError {
+    /// Root of the mean square of the force's error over all ticks.
+    pub rms: f64,
+    /// Its largest error in one tick.
+    pub max: f64,
+    /// The largest change of the model's own force from one tick to the next; `full` has one too.
+    pub jump: f64,
+    /// 99 % of the resyncs change the force by less before blending.
+    pub resync_before_p99: f64,
+    /// 99 % of the resyncs change the force in one tick by less after blending.
+    pub resync_after_p99: f64,
+    /// Energy at the end of the run against that of `full`, in percent of the largest energy of `full`.
+    pub energy: f64,
+}
+
+impl ModelError {
+    /// The error of `run` against `full`; both have the same ticks.
+    pub fn between(run: &ForceTrace, full: &ForceTrace) -> Self {
+        let percent_of = |whole: f64| if whole > 0.0 { 100.0 / whole } else { f64::NAN };
+        let scale = percent_of(full.peak_n());
+        let ticks = run.forces_n.len().max(1) as f64;
+        let squares: f64 = run.differences_n(full).map(|error| error * error).sum();
+        let jump = run.forces_n.windows(2).map(|pair| magnitude(minus(pair[1], pair[0]))).fold(0.0, f64::max);
+        let p99 = |jump: fn(&Resync) -> f64| {
+            let mut jumps = Magnitudes::default();
+            run.resyncs.iter().for_each(|resync| jumps.push(jump(resync)));
+            jumps.percentiles().p99
+        };
+        let last = |trace: &ForceTrace| trace.energy_j.last().copied().unwrap_or_default();
+        Self {
+            rms: scale * (squares / ticks).sqrt(),
+            max: scale * run.differences_n(full).fold(0.0, f64::max),
+            jump: scale * jump,
+            resync_before_p99: scale * p99(|resync| resync.jump_before_n),
+            resync_after_p99: scale * p99(|resync| resync.jump_after_n),
+            energy: percent_of(full.largest_energy_j()) * (last(run) - last(full)).abs(),
+        }
+    }
+}
+
+/// What a run costs: CPU time of the thread, everything else on the machine left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ModelCost {
+    /// Half of the haptic ticks take no longer.
+    pub tick_p50: Nanos,
+    /// 99 % of the haptic ticks do not.
+    pub tick_p99: Nanos,
+    /// The longest haptic tick.
+    pub tick_max: Nanos,
+    /// The haptic group, per second of simulated time (s/s).
+    pub haptic_load: f64,
+    /// The global group, per second of simulated time (s/s); zero for `full`, which has none.
+    pub global_load: f64,
+    /// Local models that were built.
+    pub builds: u64,
+    /// Half of them took no longer to build.
+    pub build_p50: Nanos,
+    /// 99 % of them did not.
+    pub build_p99: Nanos,
+}
+
+impl ModelCost {
+    /// Haptic and global group together, per second of simulated time (s/s).
+    pub fn total_load(&self) -> f64 {
+        self.haptic_load + self.global_load
+    }
+}
+
+/// A run that came to its end.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// How far it is from `full`.
+    pub error: ModelError,
+    /// What it costs.
+    pub cost: ModelCost,
+    /// Haptic and global releases that reported a degraded result, such as a force that was not finite.
+    pub degraded: u64,
+    /// What it was measured on.
+    pub trace: ForceTrace,
+}
+
+/// How the run of one model went.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RunOutcome {
+    /// To its end.
+    Measured(Box<Measured>),
+    /// The model cannot run on this scene: why.
+    Refused(String),
+    /// It stopped before its end: the fault.
+    Failed(String),
+}
+
+/// One model with one compute latency.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComparedRun {
+    /// The model's name.
+    pub model: String,
+    /// How long after its release a result of the global model becomes visible.
+    pub latency: Nanos,
+    /// How it went.
+    pub outcome: RunOutcome,
+}
+
+impl ComparedRun {
+    /// What was measured, if the run came to its end.
+    pub fn measured(&self) -> Option<&Measured> {
+        match &self.outcome {
+            RunOutcome::Measured(measured) => Some(measured),
+            RunOutcome::Refused(_) | RunOutcome::Failed(_) => None,
+        }
+    }
+
+    /// Why nothing was measured.
+    pub fn missing(&self) -> Option<&str> {
+        match &self.outcome {
+            RunOutcome::Measured(_) => None,
+            RunOutcome::Refused(why) | RunOutcome::Failed(why) => Some(why),
+        }
+    }
+}
+
+/// Local models against `full` on one scene, in virtual time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Comparison {
+    /// What was compared, for titles.
+    pub scene: String,
+    /// Nodes of the body.
+    pub nodes: usize,
+    /// Time from one haptic tick to the next.
+    pub haptic_period: Nanos,
+    /// Time from one release of the global model to the next.
+    pub global_period: Nanos,
+    /// Simulated time.
+    pub duration: Nanos,
+    /// What the reading of the clock adds to each tick and each build.
+    pub clock: Nanos,
+    /// True if the program was built without optimisation or with debug assertions: costs are then several times those
+    /// of a release build.
+    pub is_debug_build: bool,
+    /// The crate's version.
+    pub palpate_version: String,
+    /// Instructions that the force kernel used.
+    pub instruction_set: String,
+    /// The reference.
+    pub full: Measured,
+    /// The other models, each with its latencies.
+    pub runs: Vec<ComparedRun>,
+}
+
+impl Comparison {
+    /// The runs that stopped before their end: the model and the fault.
+    pub fn faults(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.runs.iter().filter_map(|run| match &run.outcome {
+            RunOutcome::Failed(fault) => Some((&*run.model, &**fault)),
+            RunOutcome::Measured(_) | RunOutcome::Refused(_) => None,
+        })
+    }
+
+    /// The error of a run tick by tick, in percent of the largest force of `full`.
+    pub fn errors<'a>(&'a self, run: &'a Measured) -> impl Iterator<Item = f64> + 'a {
+        let scale = 100.0 / self.full.trace.peak_n();
+        run.trace.differences_n(&self.full.trace).map(move |error| scale * error)
+    }
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate::log::ForceSample;
+
+    fn trace(forces: &[f64], energy: &[f64]) -> ForceTrace {
+        let forces_n = forces.iter().map(|&force| [0.0, 0.0, force]).collect();
+        ForceTrace { forces_n, energy_j: energy.to_vec(), resyncs: Vec::new() }
+    }
+
+    #[test]
+    fn a_run_against_itself_has_its_own_jumps_and_no_error() {
+        let full = trace(&[0.0, 1.0, -4.0], &[0.0, 2.0, 1.0]);
+        let error = ModelError::between(&full, &full);
+        assert_eq!(error, ModelError { jump: 125.0, ..ModelError::default() });
+    }
+
+    #[test]
+    fn errors_are_in_percent_of_the_peak_and_of_the_largest_energy_of_full() {
+        let full = trace(&[0.0, 0.0, 5.0, -10.0], &[0.0, -8.0, -4.0, -2.0]);
+        let mut run = trace(&[0.0, 2.0, 5.0, -10.0], &[0.0, 0.0, 0.0, 2.0]);
+        run.forces_n[1] = [1.2, 0.0, 1.6];
+        let error = ModelError::between(&run, &full);
+        // One tick of four is wrong by 2 N of 10 N; the last change is 15 N.
+        assert_eq!((error.rms, error.max, error.jump), (10.0, 20.0, 150.0));
+        assert_eq!(error.energy, 50.0);
+        assert_eq!((error.resync_before_p99, error.resync_after_p99), (0.0, 0.0));
+    }
+
+    #[test]
+    fn the_jump_of_resyncs_is_that_of_the_hundredth_part() {
+        let full = trace(&[10.0], &[1.0]);
+        let mut run = full.clone();
+        let resync = |n: u32| Resync { jump_before_n: n.into(), jump_after_n: 0.1 * f64::from(n), ..Resync::default() };
+        run.resyncs = (1..=200).map(resync).collect();
+        let error = ModelError::between(&run, &full);
+        assert!((error.resync_before_p99 - 1980.0).abs() < 1e-9 && (error.resync_after_p99 - 198.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn without_a_force_of_full_there_is_no_percentage() {
+        let error = ModelError::between(&trace(&[1.0], &[1.0]), &trace(&[0.0], &[0.0]));
+        assert!(error.rms.is_nan() && error.max.is_nan() && error.jump.is_nan() && error.energy.is_nan());
+    }
+
+    #[test]
+    fn a_trace_is_taken_from_the_records_of_its_kind() {
+        let force =
+            |z| LogRecord::Force(ForceSample { force_n: [0.0, 0.0, z], energy_j: -z, ..ForceSample::default() });
+        let resync = Resync { version: 3, ..Resync::default() };
+        let trace = ForceTrace::of(&[force(1.0), LogRecord::Resync(resync), force(-3.0)]);
+        assert_eq!((trace.forces_n.len(), trace.resyncs.len()), (2, 1));
+        assert_eq!((trace.peak_n(), trace.largest_energy_j()), (3.0, 3.0));
+    }
+}

@@ -1,0 +1,126 @@
+//! A comparison as a page with plots, in one file.
+
+use std::fmt::Write;
+
+use super::charts::{Plots, colour, latencies, models};
+use super::conclusions::conclusions;
+use super::milliseconds;
+use super::table::{COLUMNS, cell, clock, facts};
+use super::figures::{Comparison, Measured};
+use crate::drawing::html::{escaped, page, sentence};
+
+/// The comparison as an HTML page that needs nothing else: no network, no script.
+pub fn to_html(comparison: &Comparison) -> String {
+    let mut body = String::new();
+    head(&mut body, comparison);
+    table(&mut body, comparison);
+    let style = plots(&mut body, comparison);
+    page(&format!("palpate compare: {}", comparison.scene), &style, &body)
+}
+
+// Writing to a string cannot fail.
+fn head(body: &mut String, comparison: &Comparison) {
+    let _ = writeln!(body, "<h1>Local models against <code>full</code></h1>\n<p>{}</p>", escaped(&facts(comparison)));
+    let _ = writeln!(
+        body,
+        "<p class=\"faint\">palpate {}, {}; virtual time; CPU time of one thread; {}</p>\n<h2>Conclusions</h2>\n<ul>",
+        escaped(&comparison.palpate_version),
+        escaped(&comparison.instruction_set),
+        escaped(&clock(comparison))
+    );
+    for line in conclusions(comparison) {
+        let _ = writeln!(body, "<li>{}</li>", sentence(&line));
+    }
+    body.push_str("</ul>\n");
+}
+
+fn table(body: &mut String, comparison: &Comparison) {
+    body.push_str("<h2>Error and cost</h2>\n<div class=\"wide\"><table>\n<thead><tr><th>model</th><th>late<br>ms</th>");
+    for column in &COLUMNS {
+        let _ = write!(body, "<th title=\"{}\">{}</th>", escaped(column.meaning), column.head.join("<br>"));
+    }
+    body.push_str("</tr></thead>\n<tbody>\n");
+    let mut row = |model: &str, late: &str, measured: Option<&Measured>, why: &str| {
+        let _ = write!(body, "<tr><td>{}</td><td>{late}</td>", escaped(model));
+        match measured {
+            Some(run) => COLUMNS.iter().for_each(|column| {
+                let _ = write!(body, "<td>{}</td>", cell(column, run));
+            }),
+            None => {
+                let _ = write!(body, "<td class=\"why\" colspan=\"{}\">{}</td>", COLUMNS.len(), escaped(why));
+            }
+        }
+        body.push_str("</tr>\n");
+    };
+    row("full", "", Some(&comparison.full), "");
+    for run in &comparison.runs {
+        row(&run.model, &milliseconds(run.latency), run.measured(), run.missing().unwrap_or_default());
+    }
+    body.push_str("</tbody>\n</table></div>\n<details><summary>What the columns mean</summary>\n<dl>\n");
+    for column in &COLUMNS {
+        let head = column.head.join(" ");
+        let _ = writeln!(body, "<dt>{}</dt><dd>{}</dd>", escaped(&head), escaped(column.meaning));
+    }
+    body.push_str("</dl></details>\n");
+}
+
+/// The plots; returns the style by which their keys hide and show the models.
+fn plots(body: &mut String, comparison: &Comparison) -> String {
+    let mut style = String::new();
+    let plots = Plots::new(comparison);
+    let _ = writeln!(body, "<h2 id=\"plots\">Plots</h2>\n<div class=\"keys\">");
+    for (number, model) in models(comparison).into_iter().enumerate() {
+        let _ = writeln!(
+            body,
+            "<label><input type=\"checkbox\" id=\"k{number}\" checked><span class=\"swatch c{}\"></span>{}</label>",
+            colour(number),
+            escaped(model)
+        );
+        let _ = writeln!(style, "body:has(#k{number}:not(:checked)) .m{number} {{ display: none; }}");
+    }
+    body.push_str("</div>\n");
+    let mut figure = |id: &str, svg: &str, caption: &str| {
+        let _ = writeln!(body, "<figure id=\"{id}\"><div class=\"wide\">\n{svg}</div>");
+        let _ = writeln!(body, "<figcaption>{}</figcaption></figure>", sentence(caption));
+    };
+    figure(
+        "speed",
+        &plots.speed_against_error(),
+        "Left is cheaper, down is nearer to `full`. Filled: results of the global model are there at once; hollow: late.",
+    );
+    for (number, latency) in latencies(comparison).into_iter().enumerate() {
+        let [whole, near] = plots.forces(latency);
+        figure(
+            &format!("force-{number}"),
+            &whole,
+            "Magnitude of the force on the tool. The shaded part is shown below.",
+        );
+        figure(
+            &format!("resync-{number}"),
+            &near,
+            "The same around two resyncs in the middle of the contact. Dashed: a result of the global model becomes visible.",
+        );
+        let caption = "Distance from the force of `full`; what is below the lowest line is drawn on it.";
+        figure(&format!("error-{number}"), &plots.errors(latency), caption);
+    }
+    style
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use super::figures::{ComparedRun, RunOutcome};
+    use palpate::runtime::Nanos;
+
+    #[test]
+    fn a_scene_without_any_force_and_a_refused_model_still_make_a_page() {
+        let outcome = RunOutcome::Refused("too <large>".into());
+        let runs = vec![
+            ComparedRun { model: "patch".into(), latency: Nanos(33_340_000), outcome },
+            ComparedRun { model: "hold".into(), latency: Nanos::ZERO, outcome: RunOutcome::Measured(Box::default()) },
+        ];
+        let page = to_html(&Comparison { scene: "a&b".into(), runs, ..Comparison::default() });
+        assert!(page.contains("<td class=\"why\" colspan=\"11\">too &lt;large&gt;</td>"), "{page}");
+        assert!(page.contains("nothing to compare") && page.contains("a&amp;b") && !page.contains("NaN"), "{page}");
+    }
+}

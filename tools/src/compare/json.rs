@@ -1,0 +1,101 @@
+//! A comparison for programs: one JSON document.
+//!
+//! Field names are stable; later versions only add fields. Units are in the names; nanoseconds are integers. A figure that
+//! is not there is `null`.
+//!
+//! | field | content |
+//! | --- | --- |
+//! | `schema_version` | 1 |
+//! | `scene`, `nodes`, `haptic_period_ns`, `global_period_ns`, `duration_s` | what was compared |
+//! | `palpate_version`, `instruction_set`, `debug_build`, `clock_ns` | what measured; `clock_ns` is in every tick and build |
+//! | `peak_n`, `largest_energy_j` | of `full`: the whole of all percentages |
+//! | `full_fits_tick` | whether the p99 of `full`'s tick is within the haptic period |
+//! | `models[]` | `full` first; `model`, `latency_ms`, `ok`, `why_not`, `error_percent`, `cost`, `resyncs`, `degraded` |
+//! | `models[].error_percent` | `rms`, `max`, `jump`, `resync_before_p99`, `resync_after_p99`, `energy` |
+//! | `models[].cost` | `tick_p50_ns`, `tick_p99_ns`, `tick_max_ns`, `haptic_s_per_s`, `global_s_per_s`, `total_s_per_s`, `builds`, `build_p50_ns`, `build_p99_ns` |
+//! | `conclusions[]` | sentences, not for programs |
+
+use serde_json::{Value, json};
+
+use super::conclusions::{conclusions, full_fits};
+use super::figures::{Comparison, Measured};
+
+/// The comparison as one JSON document.
+pub fn to_json(comparison: &Comparison) -> String {
+    let full = model("full", 0, Some(&comparison.full), None);
+    let models = comparison.runs.iter().map(|run| model(&run.model, run.latency.0, run.measured(), run.missing()));
+    let models: Vec<Value> = [full].into_iter().chain(models).collect();
+    json!({
+        "schema_version": 1,
+        "scene": comparison.scene,
+        "nodes": comparison.nodes,
+        "haptic_period_ns": comparison.haptic_period.0,
+        "global_period_ns": comparison.global_period.0,
+        "duration_s": comparison.duration.as_secs_f64(),
+        "debug_build": comparison.is_debug_build,
+        "palpate_version": comparison.palpate_version,
+        "instruction_set": comparison.instruction_set,
+        "clock_ns": comparison.clock.0,
+        "peak_n": comparison.full.trace.peak_n(),
+        "largest_energy_j": comparison.full.trace.largest_energy_j(),
+        "full_fits_tick": full_fits(comparison),
+        "models": models,
+        "conclusions": conclusions(comparison),
+    })
+    .to_string()
+}
+
+fn model(name: &str, latency_ns: u64, run: Option<&Measured>, why_not: Option<&str>) -> Value {
+    let resyncs = run.map_or(0, |run| run.trace.resyncs.len());
+    json!({
+        "model": name,
+        "latency_ms": latency_ns as f64 / 1e6,
+        "ok": run.is_some(),
+        "why_not": why_not,
+        "error_percent": run.map(|run| json!({
+            "rms": run.error.rms,
+            "max": run.error.max,
+            "jump": run.error.jump,
+            "resync_before_p99": (resyncs > 0).then_some(run.error.resync_before_p99),
+            "resync_after_p99": (resyncs > 0).then_some(run.error.resync_after_p99),
+            "energy": run.error.energy,
+        })),
+        "cost": run.map(|run| json!({
+            "tick_p50_ns": run.cost.tick_p50.0,
+            "tick_p99_ns": run.cost.tick_p99.0,
+            "tick_max_ns": run.cost.tick_max.0,
+            "haptic_s_per_s": run.cost.haptic_load,
+            "global_s_per_s": run.cost.global_load,
+            "total_s_per_s": run.cost.total_load(),
+            "builds": run.cost.builds,
+            "build_p50_ns": run.cost.build_p50.0,
+            "build_p99_ns": run.cost.build_p99.0,
+        })),
+        "resyncs": resyncs,
+        "degraded": run.map(|run| run.degraded),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use super::figures::{ComparedRun, RunOutcome};
+    use palpate::runtime::Nanos;
+
+    #[test]
+    fn a_failed_run_has_its_reason_and_no_figures() {
+        let outcome = RunOutcome::Failed("it diverged".into());
+        let runs = vec![ComparedRun { model: "patch".into(), latency: Nanos(33_340_000), outcome }];
+        let mut comparison = Comparison { runs, ..Comparison::default() };
+        comparison.full.error.rms = f64::NAN;
+        let document: Value = serde_json::from_str(&to_json(&comparison)).unwrap();
+        let row = &document["models"][1];
+        assert_eq!(
+            (&row["ok"], &row["why_not"], &row["latency_ms"]),
+            (&false.into(), &"it diverged".into(), &33.34.into())
+        );
+        assert!(row["error_percent"].is_null() && row["cost"].is_null() && row["degraded"].is_null(), "{row}");
+        // Without a force there is no percentage, and JSON has no NaN.
+        assert_eq!(document["models"][0]["error_percent"]["rms"], Value::Null);
+    }
+}

@@ -1,0 +1,7 @@
+//! Charts and pages.
+
+pub(crate) mod html;
+mod picture;
+pub(crate) mod svg;
+
+pub use picture::{COLOURS, Picture, Series};

@@ -1,0 +1,206 @@
+//! The columns of each topic, and its entries as cells: what every table format writes, each in its own way.
+
+use palpate::log::topic::Kind;
+use palpate::log::{ContactMode, ContactSample, GroupStats, LogEntry, LogRecord, TextEvent};
+
+/// The type of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Type {
+    U64,
+    U32,
+    /// A number that may be missing.
+    OptionalU32,
+    F64,
+    F32,
+    Text,
+}
+
+/// One cell of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Cell {
+    U64(u64),
+    U32(u32),
+    F64(f64),
+    F32(f32),
+    /// One of a few fixed words.
+    Word(&'static str),
+    /// Free text.
+    Text(String),
+    Missing,
+}
+
+/// A column: its name with the unit at its end, and its type.
+pub(super) type Column = (&'static str, Type);
+
+/// The columns of a topic of this kind.
+pub(super) fn columns(kind: Kind) -> &'static [Column] {
+    use Type::{F32, F64, OptionalU32, Text, U32, U64};
+    match kind {
+        Kind::Timing => &[
+            ("tick", U64),
+            ("scheduled_ns", U64),
+            ("woke_ns", U64),
+            ("start_ns", U64),
+            ("end_ns", U64),
+            ("deadline_ns", U64),
+            ("slips", U32),
+            ("cause", Text),
+            ("given_up", U32),
+            ("mode", Text),
+        ],
+        Kind::Actors => &[("scheduled_ns", U64), ("actor", U32), ("spent_ns", U64)],
+        Kind::Stats => &[
+            ("t_s", F64),
+            ("released", U64),
+            ("skipped", U64),
+            ("missed", U64),
+            ("lost_records", U64),
+            ("lateness_p50_ns", U64),
+            ("lateness_p99_ns", U64),
+            ("lateness_max_ns", U64),
+            ("execution_p50_ns", U64),
+            ("execution_p99_ns", U64),
+            ("execution_max_ns", U64),
+            ("port_uses", U64),
+        ],
+        Kind::Force | Kind::ForceCommanded => &[("t_s", F64), ("fx_n", F64), ("fy_n", F64), ("fz_n", F64)],
+        Kind::Tool => &[
+            ("t_s", F64),
+            ("x_m", F64),
+            ("y_m", F64),
+            ("z_m", F64),
+            ("vx_m_s", F64),
+            ("vy_m_s", F64),
+            ("vz_m_s", F64),
+            ("sample_id", U32),
+            ("buttons", U32),
+        ],
+        Kind::Contact => &[
+            ("t_s", F64),
+            ("mode", Text),
+            ("triangle", OptionalU32),
+            ("weight_a", F64),
+            ("weight_b", F64),
+            ("weight_c", F64),
+            ("nx", F64),
+            ("ny", F64),
+            ("nz", F64),
+            ("normal_force_n", F32),
+            ("tangential_force_n", F32),
+        ],
+        Kind::Resync => &[
+            ("t_s", F64),
+            ("version", U32),
+            ("age_s", F64),
+            ("jump_before_n", F64),
+            ("jump_after_n", F64),
+            ("energy_j", F64),
+        ],
+        Kind::Global => &[("t_s", F64), ("version", U32), ("first_tick", U64), ("last_tick", U64)],
+        Kind::Ports => &[
+            ("t_s", F64),
+            ("group", U32),
+            ("port", U32),
+            ("kind", Text),
+            ("tick", U64),
+            ("count", U64),
+            ("sequence", U64),
+        ],
+        Kind::Probe => &[
+            ("t_s", F64),
+            ("node", U32),
+            ("local_x_m", F64),
+            ("local_y_m", F64),
+            ("local_z_m", F64),
+            ("global_x_m", F64),
+            ("global_y_m", F64),
+            ("global_z_m", F64),
+        ],
+        // For viewers; refused before anything is asked of it.
+        Kind::Scene => &[],
+        Kind::Log => &[("t_s", F64), ("level", Text), ("message", Text)],
+    }
+}
+
+/// Puts the cells of one entry into `row`, one for each column of its kind, row behind row if it has several; leaves it empty
+/// for what belongs in no table.
+pub(super) fn cells(entry: &LogEntry, row: &mut Vec<Cell>) {
+    row.clear();
+    match entry {
+        LogEntry::Environment(_) | LogEntry::Attachment { .. } => {}
+        LogEntry::Record(record) => record_cells(record, row),
+        LogEntry::Stats(stats) => stats_cells(stats, row),
+        LogEntry::Text(event) => text_cells(event, row),
+    }
+}
+
+fn record_cells(record: &LogRecord, row: &mut Vec<Cell>) {
+    use Cell::{F64, U32, U64, Word};
+    let t_s = F64(record.time().as_secs_f64());
+    match record {
+        LogRecord::Tick(r) => {
+            row.extend([r.tick, r.scheduled.0, r.woke.0, r.start.0, r.end.0, r.deadline.0].map(U64));
+            row.extend([U32(r.slips), Word(r.cause.name()), U32(r.given_up.into()), Word(r.mode.name())]);
+        }
+        LogRecord::Actors(r) => {
+            let rows = (0..).zip(r.spent()).flat_map(|(actor, spent)| [U64(r.scheduled.0), U32(actor), U64(spent.0)]);
+            row.extend(rows);
+        }
+        LogRecord::Force(r) => floats(t_s, r.force_n, row),
+        LogRecord::Command(r) => floats(t_s, r.force_n, row),
+        LogRecord::Tool(r) => {
+            floats(t_s, r.position_m, row);
+            row.extend(r.velocity_m_s.map(F64));
+            row.extend([U32(r.id), U32(r.buttons.into())]);
+        }
+        LogRecord::Contact(r) => contact_cells(t_s, r, row),
+        LogRecord::Resync(r) => {
+            row.extend([t_s, U32(r.version), F64(r.age.as_secs_f64())]);
+            row.extend([r.jump_before_n, r.jump_after_n, r.energy_j].map(F64));
+        }
+        LogRecord::Global(r) => row.extend([t_s, U32(r.version), U64(r.first_tick), U64(r.last_tick)]),
+        LogRecord::Port(r) => {
+            row.extend([t_s, U32(r.group.into()), U32(r.port), Word(r.kind.name())]);
+            row.extend([r.tick, r.count, r.sequence].map(U64));
+        }
+        LogRecord::Probe(r) => {
+            row.extend([t_s, U32(r.node)]);
+            row.extend(r.local_m.into_iter().chain(r.global_m).map(F64));
+        }
+        LogRecord::Event(r) => text_cells(&TextEvent::describe(r, &format!("group {}", r.group)), row),
+    }
+}
+
+fn floats(t_s: Cell, vector: [f64; 3], row: &mut Vec<Cell>) {
+    row.push(t_s);
+    row.extend(vector.map(Cell::F64));
+}
+
+fn contact_cells(t_s: Cell, r: &ContactSample, row: &mut Vec<Cell>) {
+    let mode = match r.mode {
+        ContactMode::Free => "free",
+        ContactMode::Stick => "stick",
+        ContactMode::Slip => "slip",
+        ContactMode::Lost => "lost",
+    };
+    // No triangle is an empty cell, not the number that stands for it.
+    let triangle = if r.triangle == u32::MAX { Cell::Missing } else { Cell::U32(r.triangle) };
+    let ([b, c], [nx, ny, nz]) = (r.weights, r.normal);
+    row.extend([t_s, Cell::Word(mode), triangle]);
+    row.extend([1.0 - b - c, b, c, nx, ny, nz].map(Cell::F64));
+    row.extend([r.normal_force_n, r.tangential_force_n].map(Cell::F32));
+}
+
+fn stats_cells(s: &GroupStats, row: &mut Vec<Cell>) {
+    row.push(Cell::F64(s.time.as_secs_f64()));
+    row.extend([s.released, s.skipped, s.missed, s.lost_records].map(Cell::U64));
+    for p in [s.lateness, s.execution] {
+        row.extend([p.p50, p.p99, p.max].map(Cell::U64));
+    }
+    row.push(Cell::U64(s.port_uses));
+}
+
+fn text_cells(event: &TextEvent, row: &mut Vec<Cell>) {
+    row.push(Cell::F64(event.time.as_secs_f64()));
+    row.extend([Cell::Word(event.level.name()), Cell::Text(event.message.clone())]);
+}

@@ -1,0 +1,151 @@
+//! A distribution as HdrHistogram's percentile text (`.hgrm`), which its plotter and many other tools read.
+//!
+//! The layout is that of `AbstractHistogram.outputPercentileDistribution` of HdrHistogram with five ticks per half
+//! distance. The values are exact: nearest rank over all samples, with no buckets in between.
+
+use std::io::{self, Read, Write};
+
+use super::figure::{Figure, Gauge};
+use super::table::lost_topic;
+use super::{Micros, output_error, unknown};
+use palpate::Error;
+use palpate::log::{Distribution, LogEntry, LogReader, LogRecord, Window};
+
+/// Lines from one half of the rest to the next: 0 %, 10 %, ... 50 %, 55 %, ... 75 %, 77.5 % and so on.
+const TICKS_PER_HALF: u128 = 5;
+
+/// Writes the distribution of a figure of the rate group `group` within `window`, in microseconds with three decimals,
+/// which are the log's nanoseconds.
+///
+/// Memory grows with the number of distinct values, see [`Distribution`]. On a damaged log it writes what is readable; ask
+/// [`LogReader::damage`] afterwards.
+///
+/// # Errors
+/// [`ErrorKind::Log`](palpate::ErrorKind::Log) if the log has no such group, with the groups that it has;
+/// [`ErrorKind::Io`](palpate::ErrorKind::Io) if `out` cannot be written.
+pub fn export_percentiles<R: Read, W: Write>(
+    reader: &mut LogReader<R>,
+    group: &str,
+    figure: Figure,
+    window: &Window,
+    out: &mut W,
+) -> Result<(), Error> {
+    let topic = format!("/timing/{group}");
+    let mut gauge = Gauge::new(figure);
+    let mut values = Distribution::default();
+    while let Some(entry) = reader.next() {
+        if reader.topic() == topic
+            && let LogEntry::Record(LogRecord::Tick(timing)) = &entry
+            && window.contains_entry(&entry)
+            && let Some(value) = gauge.measure(timing)
+        {
+            values.push(value);
+        }
+    }
+    if reader.kind(&topic).or_else(|| lost_topic(reader, &topic)).is_none() {
+        let topics = reader.topics();
+        let groups: Vec<&str> = topics.keys().filter_map(|topic| topic.strip_prefix("/timing/")).collect();
+        return Err(unknown(reader, "rate group", group, &groups));
+    }
+    let title = format!("{} of rate group {group} in microseconds, exact percentiles (nearest rank)", figure.name());
+    write(&values, &title, out).and_then(|()| out.flush()).map_err(output_error)
+}
+
+/// Writes the lines of a distribution of nanoseconds.
+fn write(values: &Distribution, title: &str, out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "{:>12} {:>14} {:>10} {:>14}\n", "Value", "Percentile", "TotalCount", "1/(1-Percentile)")?;
+    let total = u128::from(values.count());
+    // The level is `part` out of `whole`, in whole numbers: no rounding can pick a neighbour.
+    let (mut part, mut whole, mut tick) = (0, 2 * TICKS_PER_HALF, 0);
+    let (mut seen, mut max, mut distinct) = (0_u128, 0, 0_u64);
+    for (value, count) in values.counts() {
+        let before = seen;
+        seen += u128::from(count);
+        (max, distinct) = (value, distinct + 1);
+        while before < total && part * total <= seen * whole {
+            let (level, inverse) = (part as f64 / whole as f64, whole as f64 / (whole - part) as f64);
+            writeln!(out, "{:>12} {level:2.12} {seen:>10} {inverse:>14.2}", Micros(value).to_string())?;
+            (part, tick) = (part + 1, tick + 1);
+            if tick == TICKS_PER_HALF {
+                (part, whole, tick) = (2 * part, 2 * whole, 0);
+            }
+            if seen == total {
+                break;
+            }
+        }
+    }
+    if total > 0 {
+        writeln!(out, "{:>12} {:2.12} {total:>10}", Micros(max).to_string(), 1.0)?;
+    }
+    let mean = values.counts().into_iter().map(|(value, count)| u128::from(value) * u128::from(count)).sum::<u128>()
+        as f64
+        / (total as f64).max(1.0);
+    // An empty sum of doubles would be -0.
+    let squares =
+        values.counts().into_iter().fold(0.0, |sum, (value, count)| sum + count as f64 * (value as f64 - mean).powi(2));
+    let deviation = (squares / (total as f64).max(1.0)).sqrt();
+    writeln!(out, "#[Mean    = {:>12.3}, StdDeviation   = {:>12.3}]", mean / 1e3, deviation / 1e3)?;
+    writeln!(out, "#[Max     = {:>12}, Total count    = {total:>12}]", Micros(max).to_string())?;
+    // Each value is a bucket of its own.
+    writeln!(out, "#[Buckets = {distinct:>12}, SubBuckets     = {:>12}]", 1)?;
+    writeln!(out, "# {title}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(values: impl IntoIterator<Item = u64>) -> String {
+        let mut distribution = Distribution::default();
+        values.into_iter().for_each(|value| distribution.push(value));
+        let mut out = Vec::new();
+        write(&distribution, "a title", &mut out).unwrap();
+        String::from_utf8(out).unwrap()
+    }
+
+    // All lines but those on buckets and title are those of hdr-histogram-js 3.0.1 for 1..=100 with three digits.
+    #[test]
+    fn a_hundred_values_have_the_lines_of_the_reference_implementation() {
+        let text = text((1..=100).map(|value| value * 1000));
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("       Value     Percentile TotalCount 1/(1-Percentile)"));
+        assert_eq!(lines.next(), Some(""));
+        let rows: Vec<Vec<&str>> = lines.clone().map(|line| line.split_whitespace().collect()).collect();
+        let column = |place: usize| rows[..20].iter().map(|row| row[place]).collect::<Vec<_>>();
+        let values = [1, 10, 20, 30, 40, 50, 55, 60, 65, 70, 75, 78, 80, 83, 85, 88, 89, 90, 92, 93];
+        assert_eq!(column(0), values.map(|value: u32| format!("{value}.000")));
+        assert_eq!(column(2), values.map(|value: u32| value.to_string()));
+        assert_eq!(
+            [lines.next(), lines.nth(4), lines.nth(5)],
+            [
+                Some("       1.000 0.000000000000          1           1.00"),
+                Some("      50.000 0.500000000000         50           2.00"),
+                Some("      78.000 0.775000000000         78           4.44"),
+            ]
+        );
+        let tail: Vec<&str> = text.lines().rev().take(6).collect();
+        assert_eq!(
+            tail,
+            [
+                "# a title",
+                "#[Buckets =          100, SubBuckets     =            1]",
+                "#[Max     =      100.000, Total count    =          100]",
+                "#[Mean    =       50.500, StdDeviation   =       28.866]",
+                "     100.000 1.000000000000        100",
+                "     100.000 0.990625000000        100         106.67",
+            ]
+        );
+    }
+
+    #[test]
+    fn one_value_and_none_are_distributions_too() {
+        let body = |text: String| text.lines().skip(2).take_while(|l| !l.starts_with('#')).map(str::to_owned).collect();
+        let rows: Vec<String> = body(text([7]));
+        assert_eq!(
+            rows,
+            ["       0.007 0.000000000000          1           1.00", "       0.007 1.000000000000          1"]
+        );
+        assert_eq!(body(text([])), [""; 0]);
+        assert!(text([]).contains("#[Mean    =        0.000, StdDeviation   =        0.000]"));
+    }
+}

@@ -1,0 +1,239 @@
+//! What is in a log, from its index where there is one.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use mcap::Summary;
+use mcap::records::{Record, op};
+
+use palpate::log::Environment;
+use super::message::{Span, message};
+use palpate::log::reader::cannot_open;
+use super::salvage::{Found, Salvage};
+use super::summary::{read_summary, record_at};
+use palpate::Error;
+
+/// What is in a log.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LogInfo {
+    /// Size of the file (bytes).
+    pub bytes: u64,
+    /// True if there is an index; otherwise all of it was read.
+    pub has_index: bool,
+    /// What is wrong, as far as it was noticed: only [`check`](super::check) reads everything.
+    pub damage: Vec<String>,
+    /// The program and the profile that the file names.
+    pub library: String,
+    /// Profile, often empty.
+    pub profile: String,
+    /// Log times of the first and the last message (ns).
+    pub span: Option<(u64, u64)>,
+    /// Number of messages.
+    pub messages: u64,
+    /// Chunks by their compression; `none` for chunks that are not packed.
+    pub chunks: BTreeMap<String, ChunkInfo>,
+    /// The topics by name.
+    pub topics: BTreeMap<String, TopicInfo>,
+    /// The last environment of a run of palpate's.
+    pub environment: Option<Environment>,
+    /// The attachments in their order.
+    pub attachments: Vec<AttachmentInfo>,
+    /// Names of the metadata records in their order.
+    pub metadata: Vec<String>,
+}
+
+/// Chunks of one kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ChunkInfo {
+    /// How many.
+    pub count: u64,
+    /// As they are in the file (bytes).
+    pub packed: u64,
+    /// Unpacked (bytes).
+    pub unpacked: u64,
+}
+
+/// One topic.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TopicInfo {
+    /// The name of the message type; empty without one.
+    pub schema: String,
+    /// How the messages are encoded, such as `protobuf`.
+    pub encoding: String,
+    /// How many.
+    pub messages: u64,
+}
+
+/// One attachment.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct AttachmentInfo {
+    /// Its name.
+    pub name: String,
+    /// Its media type.
+    pub media_type: String,
+    /// Its size (bytes).
+    pub bytes: u64,
+}
+
+impl LogInfo {
+    /// Looks into the log at `path`: its index if it has one, otherwise all of it. `progress` is told how many bytes of how
+    /// many were read.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`](palpate::ErrorKind::Io) if it cannot be read, [`ErrorKind::Log`](palpate::ErrorKind::Log) if it is no
+    /// MCAP file.
+    pub fn open(path: &Path, progress: impl FnMut(u64, u64)) -> Result<Self, Error> {
+        let file = File::open(path).map_err(|e| Error::io(path, e))?;
+        Self::of(BufReader::new(file), &path.display().to_string(), progress)
+    }
+
+    /// As [`open`](Self::open), for any source; `place` names it in errors.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn of(mut source: impl Read + Seek, place: &str, progress: impl FnMut(u64, u64)) -> Result<Self, Error> {
+        if let Some(summary) = read_summary(&mut source)
+            && let Some(info) = Self::of_index(&mut source, &summary)
+        {
+            return Ok(info);
+        }
+        source.seek(SeekFrom::Start(0)).map_err(|e| Error::io(Path::new(place), e))?;
+        let records = Salvage::new(source).map_err(|e| cannot_open(place, e))?;
+        Ok(Self::scanned(records, progress))
+    }
+
+    /// The time from the first to the last message (s).
+    pub fn duration_s(&self) -> f64 {
+        self.span.map_or(0.0, |(first, last)| last.saturating_sub(first) as f64 * 1e-9)
+    }
+
+    /// Messages of a topic per second: as many intervals as there are messages less one.
+    pub fn rate_hz(&self, topic: &TopicInfo) -> Option<f64> {
+        let duration_s = self.duration_s();
+        (topic.messages > 1 && duration_s > 0.0).then(|| (topic.messages - 1) as f64 / duration_s)
+    }
+
+    /// From the index, if it says enough.
+    fn of_index(source: &mut (impl Read + Seek), index: &Summary) -> Option<Self> {
+        let stats = index.stats.as_ref()?;
+        let bytes = source.seek(SeekFrom::End(0)).ok()?;
+        let mut info = Self {
+            bytes,
+            has_index: true,
+            messages: stats.message_count,
+            span: (stats.message_count > 0).then_some((stats.message_start_time, stats.message_end_time)),
+            ..Self::default()
+        };
+        info.header(&record_at(source, mcap::MAGIC.len() as u64, op::HEADER)?);
+        for channel in index.channels.values() {
+            let topic = info.topics.entry(channel.topic.clone()).or_default();
+            topic.schema = channel.schema.as_ref().map_or(String::new(), |schema| schema.name.clone());
+            topic.encoding.clone_from(&channel.message_encoding);
+            topic.messages += stats.channel_message_counts.get(&channel.id).copied().unwrap_or(0);
+        }
+        for chunk in &index.chunk_indexes {
+            info.chunk(&chunk.compression, chunk.compressed_size, chunk.uncompressed_size);
+        }
+        let mut attachments: Vec<_> = index.attachment_indexes.iter().collect();
+        attachments.sort_by_key(|entry| entry.offset);
+        info.attachments = attachments
+            .into_iter()
+            .map(|entry| AttachmentInfo {
+                name: entry.name.clone(),
+                media_type: entry.media_type.clone(),
+                bytes: entry.data_size,
+            })
+            .collect();
+        let mut metadata: Vec<_> = index.metadata_indexes.iter().collect();
+        metadata.sort_by_key(|entry| entry.offset);
+        for entry in metadata {
+            info.metadata(op::METADATA, &record_at(source, entry.offset, op::METADATA)?);
+        }
+        Some(info)
+    }
+
+    fn scanned<R: Read + Seek>(mut records: Salvage<R>, mut progress: impl FnMut(u64, u64)) -> Self {
+        let mut info = Self { bytes: records.length(), ..Self::default() };
+        let (mut schemas, mut channels) = (HashMap::new(), HashMap::<u16, (String, TopicInfo)>::new());
+        let (mut span, mut chunk) = (Span::default(), None);
+        while let Some(found) = records.next() {
+            let opcode = match found {
+                Found::Record(opcode) => opcode,
+                Found::Damage(damage) => {
+                    info.damage.push(damage.what);
+                    continue;
+                }
+            };
+            let (length, offset) = (records.length(), records.offset());
+            let Some(stream) = records.stream() else { break };
+            if let Some((start, head)) = stream.chunk().filter(|(start, _)| chunk != Some(*start)) {
+                chunk = Some(start);
+                info.chunk(&head.compression, head.length, head.unpacked);
+                progress(offset, length);
+            }
+            let body = stream.body();
+            match opcode {
+                op::HEADER => info.header(body),
+                op::METADATA | op::ATTACHMENT => info.metadata(opcode, body),
+                op::MESSAGE => {
+                    let Some((header, _)) = message(body) else { continue };
+                    info.messages += 1;
+                    span.push(header.log_time);
+                    channels.entry(header.channel_id).or_default().1.messages += 1;
+                }
+                _ => match mcap::parse_record(opcode, body) {
+                    Ok(Record::Schema { header, .. }) => {
+                        schemas.insert(header.id, header.name);
+                    }
+                    Ok(Record::Channel(channel)) => {
+                        let (name, topic) = channels.entry(channel.id).or_default();
+                        *name = channel.topic;
+                        topic.schema = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                        topic.encoding = channel.message_encoding;
+                    }
+                    _ => {}
+                },
+            }
+        }
+        info.span = span.0;
+        for (id, (name, topic)) in channels {
+            let name = if name.is_empty() { format!("channel {id}, not declared") } else { name };
+            let known = info.topics.entry(name).or_default();
+            *known = TopicInfo { messages: known.messages + topic.messages, ..topic };
+        }
+        info
+    }
+
+    fn header(&mut self, body: &[u8]) {
+        if let Ok(Record::Header(header)) = mcap::parse_record(op::HEADER, body) {
+            (self.library, self.profile) = (header.library, header.profile);
+        }
+    }
+
+    fn chunk(&mut self, compression: &str, packed: u64, unpacked: u64) {
+        let name = if compression.is_empty() { "none" } else { compression };
+        let of = self.chunks.entry(name.to_owned()).or_default();
+        *of = ChunkInfo { count: of.count + 1, packed: of.packed + packed, unpacked: of.unpacked + unpacked };
+    }
+
+    /// A metadata record or an attachment.
+    fn metadata(&mut self, opcode: u8, body: &[u8]) {
+        match mcap::parse_record(opcode, body) {
+            Ok(Record::Metadata(metadata)) => {
+                if metadata.name == "environment" {
+                    self.environment = Some(Environment::from_map(&metadata.metadata));
+                }
+                self.metadata.push(metadata.name);
+            }
+            Ok(Record::Attachment { header, data, .. }) => self.attachments.push(AttachmentInfo {
+                name: header.name,
+                media_type: header.media_type,
+                bytes: data.len() as u64,
+            }),
+            Ok(_) => {}
+            Err(error) => self.damage.push(error.to_string()),
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! A new, complete log of everything readable in a damaged one, of palpate's or of any other program.
+//!
+//! Messages are copied as they are: channel, times, sequence number and bytes. Channels that a damage took are taken from
+//! the index at the end of the file, if that is there.
+
+use std::collections::{HashMap, HashSet};
+use std::io::{Read, Seek, Write};
+use std::path::Path;
+
+use mcap::records::{AttachmentHeader, Channel, Record, op};
+use mcap::write::NoSeek;
+use mcap::{Attachment, Compression, McapError, Summary, WriteOptions};
+
+use super::message::{Span, message};
+use palpate::log::reader::cannot_open;
+use super::salvage::{Damage, Found, Salvage};
+use super::summary::{read_summary, record_at};
+use palpate::{Error, ErrorKind};
+
+/// What was saved and what was lost.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Recovered {
+    /// Size of the damaged file (bytes).
+    pub bytes: u64,
+    /// Messages in the new log.
+    pub messages: u64,
+    /// Chunks, attachments and metadata records in it.
+    pub chunks: u64,
+    /// Attachments.
+    pub attachments: u64,
+    /// Metadata records.
+    pub metadata: u64,
+    /// Log times of the first and the last message saved (ns).
+    pub span: Option<(u64, u64)>,
+    /// What was damaged, in the order of the file.
+    pub lost: Vec<Lost>,
+    /// Messages whose channel is not known any more.
+    pub without_channel: u64,
+    /// Messages that the index counts, if it is there: what is missing is lost.
+    pub counted: Option<u64>,
+}
+
+/// A stretch that is lost.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lost {
+    /// Where, and what is wrong.
+    pub damage: Damage,
+    /// Log time of the last message before it (ns).
+    pub after: Option<u64>,
+    /// Log time of the first message behind it (ns).
+    pub before: Option<u64>,
+    /// Messages saved from the damaged record itself: of the last chunk of a cut file.
+    pub saved: u64,
+}
+
+impl Recovered {
+    /// Bytes of the file that gave nothing.
+    pub fn lost_bytes(&self) -> u64 {
+        self.lost.iter().filter(|lost| lost.saved == 0).map(|lost| lost.damage.to - lost.damage.from).sum()
+    }
+}
+
+/// Copies everything readable of `source` into a new log in `output`. `place` and `new_place` name the two in errors;
+/// `progress` is told how many bytes of how many were read, once per chunk.
+///
+/// # Errors
+/// [`ErrorKind::Log`] if `source` is no MCAP, [`ErrorKind::Io`] if one cannot be read or the other not be written.
+pub fn recover<W: Write>(
+    mut source: impl Read + Seek,
+    place: &str,
+    output: W,
+    new_place: &str,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<(Recovered, W), Error> {
+    let index = read_summary(&mut source);
+    let mut late = Late::of(&mut source, index.as_ref());
+    let mut records = Salvage::new(source).map_err(|e| cannot_open(place, e))?;
+    let failed = |e| cannot_write(new_place, e);
+    let mut copy = Copy::new(index.unwrap_or_default());
+    copy.report.bytes = records.length();
+    let mut output = Output::Header(output);
+    let mut chunk = None;
+    while let Some(found) = records.next() {
+        let (length, offset) = (records.length(), records.offset());
+        let Found::Record(opcode) = found else {
+            if let Found::Damage(damage) = found {
+                copy.note(damage);
+            }
+            continue;
+        };
+        let Some(stream) = records.stream() else { break };
+        let start = stream.chunk().map(|(start, _)| start);
+        let (record_start, _) = stream.record_start();
+        if opcode == op::HEADER {
+            output.begin(stream.body()).map_err(failed)?;
+            continue;
+        }
+        let writer = output.begun().map_err(failed)?;
+        if start != chunk {
+            // The new log has the chunks of the old one.
+            writer.flush().map_err(failed)?;
+            copy.report.chunks += u64::from(start.is_some());
+            copy.since_chunk = 0;
+            chunk = start;
+            progress(offset, length);
+        }
+        late.forget(record_start);
+        copy.record(writer, opcode, stream.body()).map_err(failed)?;
+    }
+    let writer = output.begun().map_err(failed)?;
+    // What the index knows of and a damage hid.
+    for (opcode, body) in std::mem::take(&mut late.bodies).into_values() {
+        copy.record(writer, opcode, &body).map_err(failed)?;
+    }
+    copy.declare_all(writer).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    progress(copy.report.bytes, copy.report.bytes);
+    let mut inner = output.into_inner().map_err(failed)?;
+    inner.flush().map_err(|e| Error::io(Path::new(new_place), e))?;
+    Ok((copy.report, inner))
+}
+
+fn cannot_write(place: &str, error: McapError) -> Error {
+    match error {
+        McapError::Io(e) => Error::io(Path::new(place), e),
+        other => Error::new(ErrorKind::Io, format!("the new log cannot be written: {other}")).at(place),
+    }
+}
+
+/// The new log, which begins with what the header of the old one says.
+enum Output<W: Write> {
+    Header(W),
+    Body(Box<mcap::Writer<NoSeek<W>>>),
+    Gone,
+}
+
+impl<W: Write> Output<W> {
+    fn begin(&mut self, header: &[u8]) -> mcap::McapResult<()> {
+        let Self::Header(output) = std::mem::replace(self, Self::Gone) else { return Ok(()) };
+        let (profile, library) = match mcap::parse_record(op::HEADER, header) {
+            Ok(Record::Header(header)) => (header.profile, header.library),
+            _ => (String::new(), String::new()),
+        };
+        let options = WriteOptions::new()
+            .profile(profile)
+            .library(library)
+            .compression(Some(Compression::Lz4))
+            .calculate_data_section_crc(true)
+            .calculate_summary_section_crc(true)
+            .disable_seeking(true);
+        *self = Self::Body(Box::new(options.create(NoSeek::new(output))?));
+        Ok(())
+    }
+
+    fn begun(&mut self) -> mcap::McapResult<&mut mcap::Writer<NoSeek<W>>> {
+        if matches!(self, Self::Header(_)) {
+            self.begin(&[])?;
+        }
+        match self {
+            Self::Body(writer) => Ok(writer),
+            _ => Err(std::io::Error::other("the new log could not be begun").into()),
+        }
+    }
+
+    fn into_inner(self) -> mcap::McapResult<W> {
+        match self {
+            Self::Body(writer) => Ok(writer.into_inner().into_inner()),
+            Self::Header(output) => Ok(output),
+            Self::Gone => Err(std::io::Error::other("the new log could not be begun").into()),
+        }
+    }
+}
+
+/// Attachments and metadata that the index lists, until they are met in the file itself.
+#[derive(Default)]
+struct Late {
+    bodies: std::collections::BTreeMap<u64, (u8, Vec<u8>)>,
+}
+
+impl Late {
+    fn of(source: &mut (impl Read + Seek), index: Option<&Summary>) -> Self {
+        let Some(index) = index else { return Self::default() };
+        let attachments = index.attachment_indexes.iter().map(|entry| (entry.offset, op::ATTACHMENT));
+        let metadata = index.metadata_indexes.iter().map(|entry| (entry.offset, op::METADATA));
+        let read = |(offset, opcode)| Some((offset, (opcode, record_at(source, offset, opcode)?)));
+        Self { bodies: attachments.chain(metadata).filter_map(read).collect() }
+    }
+
+    fn forget(&mut self, start: u64) {
+        self.bodies.remove(&start);
+    }
+}
+
+/// What has been copied so far.
+struct Copy {
+    report: Recovered,
+    index: Summary,
+    /// As the file has them; the writer knows those that it was given.
+    schemas: HashMap<u16, (String, String, Vec<u8>)>,
+    declared: HashSet<u16>,
+    span: Span,
+    newest: Option<u64>,
+    /// Messages since the chunk began.
+    since_chunk: u64,
+}
+
+impl Copy {
+    fn new(index: Summary) -> Self {
+        let report =
+            Recovered { counted: index.stats.as_ref().map(|stats| stats.message_count), ..Recovered::default() };
+        Self {
+            report,
+            index,
+            schemas: HashMap::new(),
+            declared: HashSet::new(),
+            span: Span::default(),
+            newest: None,
+            since_chunk: 0,
+        }
+    }
+
+    fn note(&mut self, damage: Damage) {
+        let saved = if damage.what.contains("cut off") { self.since_chunk } else { 0 };
+        self.report.lost.push(Lost { damage, after: self.newest, before: None, saved });
+        self.since_chunk = 0;
+    }
+
+    fn record<W: Write>(
+        &mut self,
+        writer: &mut mcap::Writer<NoSeek<W>>,
+        opcode: u8,
+        body: &[u8],
+    ) -> mcap::McapResult<()> {
+        if opcode == op::MESSAGE {
+            return self.message(writer, body);
+        }
+        // What cannot be parsed is not there: where there is a checksum it has been looked at.
+        match mcap::parse_record(opcode, body) {
+            Ok(Record::Schema { header, data }) => {
+                self.schemas.insert(header.id, (header.name, header.encoding, data.into_owned()));
+            }
+            Ok(Record::Channel(channel)) => self.declare(writer, &channel)?,
+            Ok(Record::Metadata(metadata)) => {
+                writer.write_metadata(&metadata)?;
+                self.report.metadata += 1;
+            }
+            Ok(Record::Attachment { header, data, .. }) => {
+                let AttachmentHeader { log_time, create_time, name, media_type } = header;
+                writer.attach(&Attachment { log_time, create_time, name, media_type, data })?;
+                self.report.attachments += 1;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn message<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>, body: &[u8]) -> mcap::McapResult<()> {
+        let Some((header, data)) = message(body) else { return Ok(()) };
+        if !self.declared.contains(&header.channel_id) {
+            self.declare_from_index(writer, header.channel_id)?;
+        }
+        if !self.declared.contains(&header.channel_id) {
+            self.report.without_channel += 1;
+            return Ok(());
+        }
+        writer.write_to_known_channel(&header, data)?;
+        self.report.messages += 1;
+        self.since_chunk += 1;
+        self.span.push(header.log_time);
+        self.report.span = self.span.0;
+        self.newest = Some(header.log_time);
+        let open = self.report.lost.iter_mut().rev().take_while(|lost| lost.before.is_none());
+        open.for_each(|lost| lost.before = Some(header.log_time));
+        Ok(())
+    }
+
+    /// Declares a channel under its own number; a second one of that number that differs is left out.
+    fn declare<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>, channel: &Channel) -> mcap::McapResult<()> {
+        let id = channel.schema_id;
+        if !self.schemas.contains_key(&id)
+            && let Some(schema) = self.index.schemas.get(&id)
+        {
+            self.schemas.insert(id, (schema.name.clone(), schema.encoding.clone(), schema.data.to_vec()));
+        }
+        let schema = match self.schemas.get(&id) {
+            Some((name, encoding, data)) => writer.add_schema_with_id(id, name, encoding, data),
+            None => Ok(0),
+        };
+        let Channel { topic, message_encoding, metadata, .. } = channel;
+        let added = schema.and_then(|_| writer.add_channel_with_id(channel.id, id, topic, message_encoding, metadata));
+        match added {
+            Ok(id) => {
+                self.declared.insert(id);
+                Ok(())
+            }
+            Err(error @ McapError::Io(_)) => Err(error),
+            Err(_) => Ok(()),
+        }
+    }
+
+    fn declare_from_index<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>, id: u16) -> mcap::McapResult<()> {
+        let Some(channel) = self.index.channels.get(&id) else { return Ok(()) };
+        let channel = Channel {
+            id,
+            schema_id: channel.schema.as_ref().map_or(0, |schema| schema.id),
+            topic: channel.topic.clone(),
+            message_encoding: channel.message_encoding.clone(),
+            metadata: channel.metadata.clone(),
+        };
+        self.declare(writer, &channel)
+    }
+
+    /// Topics without a message are part of a log too.
+    fn declare_all<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>) -> mcap::McapResult<()> {
+        let mut ids: Vec<u16> = self.index.channels.keys().copied().filter(|id| !self.declared.contains(id)).collect();
+        ids.sort_unstable();
+        ids.into_iter().try_for_each(|id| self.declare_from_index(writer, id))
+    }
+}

@@ -1,0 +1,169 @@
+//! Every readable record of a damaged file: behind each damage it goes on with the next chunk whose checksum fits.
+//!
+//! Nothing is given out that could not be verified where the format has a checksum for it; only the last chunk of a cut
+//! file, which ends before its records do, cannot be checked.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+use mcap::records::op;
+
+use palpate::log::chunk::{ChunkRecords, is_readable, read_header};
+use palpate::log::framing::{MAX_RECORD_BYTES, RecordStream, Section};
+
+/// How much is looked at at once in the search for a chunk (bytes).
+const WINDOW_BYTES: usize = 1 << 20;
+/// Opcode, length and the longest header of a chunk that is looked for.
+const HEAD_BYTES: usize = 9 + 28 + 4 + 4 + 8;
+
+/// A stretch of the file that gave nothing more.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Damage {
+    /// Its first byte: the record that is damaged.
+    pub from: u64,
+    /// Where reading went on, or the end of the file.
+    pub to: u64,
+    /// What is wrong, in one line.
+    pub what: String,
+}
+
+/// The next thing that was found.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Found {
+    /// A record with this opcode; its body is in the stream.
+    Record(u8),
+    Damage(Damage),
+}
+
+/// Reads a file to its end, whatever lies between.
+pub(super) struct Salvage<R> {
+    /// Gone when nothing more can be read.
+    stream: Option<RecordStream<R>>,
+    length: u64,
+    damaged: bool,
+}
+
+impl<R: Read + Seek> Salvage<R> {
+    /// Reads the leading magic.
+    ///
+    /// # Errors
+    /// As [`RecordStream::new`].
+    pub(super) fn new(mut source: R) -> io::Result<Self> {
+        let length = source.seek(SeekFrom::End(0))?;
+        source.seek(SeekFrom::Start(0))?;
+        Ok(Self { stream: Some(RecordStream::new(source)?), length, damaged: false })
+    }
+
+    /// The size of the file (bytes).
+    pub(super) fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Bytes read so far.
+    pub(super) fn offset(&self) -> u64 {
+        self.stream.as_ref().map_or(self.length, RecordStream::offset)
+    }
+
+    /// The stream that the last record came from; `None` at the end.
+    pub(super) fn stream(&self) -> Option<&RecordStream<R>> {
+        self.stream.as_ref()
+    }
+
+    /// True if all of the data was read and fits its checksum.
+    pub(super) fn is_checksummed(&self) -> bool {
+        !self.damaged && self.stream.as_ref().is_some_and(RecordStream::is_checksummed)
+    }
+
+    /// The next record or damage; `None` at the end of the file.
+    pub(super) fn next(&mut self) -> Option<Found> {
+        let stream = self.stream.as_mut()?;
+        if let Some(opcode) = stream.next() {
+            return Some(Found::Record(opcode));
+        }
+        let what = stream.damage()?.to_owned();
+        self.damaged = true;
+        let (start, opcode) = stream.record_start();
+        let (section, end) = (stream.section(), stream.offset());
+        let mut source = self.stream.take().map(RecordStream::into_source)?;
+        // A source that cannot be read further has nothing more to give.
+        let next = self.resume_at(&mut source, start, opcode, section, end).ok().flatten();
+        let next = next.filter(|at| source.seek(SeekFrom::Start(*at)).is_ok());
+        self.stream = next.map(|at| RecordStream::resume(source, at, section));
+        Some(Found::Damage(Damage { from: start, to: next.unwrap_or(self.length), what }))
+    }
+
+    /// Where to go on after a damage in the record at `start`, of which `end` is where reading stopped.
+    fn resume_at(&self, source: &mut R, start: u64, opcode: u8, section: Section, end: u64) -> io::Result<Option<u64>> {
+        if section != Section::Data {
+            // The data does not fit its checksum, but its end was read: the index follows. Within it, nothing does.
+            return Ok((opcode == op::DATA_END).then_some(end));
+        }
+        if opcode == op::CHUNK && follow(source, end, self.length)? {
+            return Ok(Some(end));
+        }
+        self.search(source, start + 1)
+    }
+
+    /// The next chunk at `from` or later whose checksum fits.
+    fn search(&self, source: &mut R, mut from: u64) -> io::Result<Option<u64>> {
+        let mut window = Vec::new();
+        while from + (HEAD_BYTES as u64) < self.length {
+            source.seek(SeekFrom::Start(from))?;
+            window.clear();
+            source.by_ref().take((WINDOW_BYTES + HEAD_BYTES) as u64).read_to_end(&mut window)?;
+            for at in 0..window.len().min(WINDOW_BYTES) {
+                let place = from + at as u64;
+                if window[at] == op::CHUNK && self.may_begin(&window[at..], place) && self.fits(source, place)? {
+                    return Ok(Some(place));
+                }
+            }
+            from += WINDOW_BYTES as u64;
+        }
+        Ok(None)
+    }
+
+    /// True if `bytes`, from `place` on, may be the head of a whole chunk.
+    fn may_begin(&self, bytes: &[u8], place: u64) -> bool {
+        let Some(length) = length_in(bytes) else { return false };
+        let head = &bytes[9..bytes.len().min(HEAD_BYTES)];
+        length <= MAX_RECORD_BYTES
+            && place + 9 + length <= self.length
+            && read_header(head, length, false).is_ok_and(|head| is_readable(&head.compression))
+    }
+
+    /// True if there is a chunk at `place` that has a checksum and fits it.
+    fn fits(&self, source: &mut R, place: u64) -> io::Result<bool> {
+        source.seek(SeekFrom::Start(place))?;
+        let mut head = [0; 9];
+        source.read_exact(&mut head)?;
+        let Some(length) = length_in(&head) else { return Ok(false) };
+        let mut body = Vec::new();
+        source.by_ref().take(length).read_to_end(&mut body)?;
+        let Ok(mut chunk) = ChunkRecords::new(body, length) else { return Ok(false) };
+        let mut record = Vec::new();
+        Ok(chunk.head().checksum != 0 && matches!(chunk.next(&mut record), Ok(Some(_))))
+    }
+}
+
+fn length_in(head: &[u8]) -> Option<u64> {
+    Some(u64::from_le_bytes(head.get(1..9)?.try_into().ok()?))
+}
+
+/// True if what is at `at` looks like the records that follow a chunk: two in a row, or the end of the file.
+fn follow<R: Read + Seek>(source: &mut R, mut at: u64, length: u64) -> io::Result<bool> {
+    for record in 0..2 {
+        if at + 9 > length {
+            // A chunk that claims to be the last thing in the file may be wrong in that.
+            return Ok(record > 0);
+        }
+        source.seek(SeekFrom::Start(at))?;
+        let mut head = [0; 9];
+        source.read_exact(&mut head)?;
+        let body = length_in(&head).unwrap_or(u64::MAX);
+        let is_known = (op::SCHEMA..=op::DATA_END).contains(&head[0]);
+        if !is_known || body > MAX_RECORD_BYTES || at + 9 + body > length {
+            return Ok(false);
+        }
+        at += 9 + body;
+    }
+    Ok(true)
+}

@@ -1,0 +1,322 @@
+//! The locality check of a scene: what a patch between held surroundings captures, and what more would need.
+
+use std::time::Instant;
+
+use super::contact::{FaceGrid, contact_node, outward};
+use super::figures::{FigureOf, hankel_decay};
+use super::measure::measure;
+use super::{ReduceOptions, ReduceProgress, Steps};
+use palpate::Error;
+use crate::reduce::findings::{
+    BasisError, Budget, ContactLocality, HankelDecay, Locality, PatchError, ReductionStudy, ResponseFigure,
+};
+use palpate::model::body::{Block, Body, State};
+use crate::reduction::{
+    ContactStiffness, LinearBody, LocalityCheck, Matrix, StateSpace, StiffnessError, gain_error, log_spaced, low_rank,
+    one_shift, stiffness_along, typical_gain_error,
+};
+use palpate::model::surroundings::{SpringGraph, errors_by_states};
+use palpate::scene::Scene;
+
+/// What happens between two resyncs (Hz): 10 Hz is a third of the global model's rate, 1 kHz the haptic rate.
+const BAND_HZ: [f64; 2] = [10.0, 1000.0];
+/// The error in the band from which on the patch leaves out too much between resyncs: twice that of the paper's patch on a uniform body.
+const BAND_LIMIT_PCT: f64 = 20.0;
+/// The error at rest: a patch that is twice as stiff as the body does not stand for it.
+const REST_LIMIT_PCT: f64 = 100.0;
+/// The whole body's response in the band may be uncertain by this much before it is said.
+const REFERENCE_LIMIT_PCT: f64 = 10.0;
+/// Coordinates of the largest body that is checked: twelve factorisations are kept, some 4 GB.
+const MOST_COORDINATES: usize = 45_000;
+/// The share of contacts on the contact's face over a limit that is worth a warning.
+const SHARE_LIMIT: f64 = 0.1;
+/// Patches that are tried, along, along and into depth.
+const SIZES: [[usize; 3]; 7] = [[2, 2, 2], [4, 4, 2], [4, 4, 4], [6, 6, 3], [8, 8, 4], [10, 10, 6], [12, 12, 8]];
+/// Numbers of states of reduced surroundings that are shown.
+const SHOWN_STATES: [usize; 9] = [2, 5, 10, 20, 35, 50, 75, 100, 150];
+/// Frequencies that the body is reduced at for balancing.
+const SHIFTS: usize = 24;
+/// Moments and place of the one-shift model of the whole body.
+const MOMENTS: usize = 10;
+const SHIFT_HZ: f64 = 30.0;
+
+/// The locality check of a scene, and the reduction of its body at one contact.
+///
+/// # Errors
+/// If the scene cannot be built or its body is not held.
+pub fn reduce_scene(
+    scene: &Scene,
+    options: &ReduceOptions,
+    mut progress: impl FnMut(&ReduceProgress),
+) -> Result<ReductionStudy, Error> {
+    let started = Instant::now();
+    let mut scene = scene.clone();
+    scene.local.patch = options.patch.or(scene.local.patch);
+    scene.validate()?;
+    let scene = &scene;
+    let spec = scene.body.as_ref().ok_or_else(|| Error::scene("body", "is missing"))?;
+    let block = spec.build()?;
+    let node = contact_node(scene, &block, options.node)?;
+    let grids = FaceGrid::all(&block, options.every, node);
+    let mut steps = Steps::new(6 + grids.len() + usize::from(options.measure), &mut progress);
+    steps.begin("factorising the body");
+    let linear = LinearBody::new(&block, &State::at_rest(block.rest()))?;
+    if linear.system().coordinates() > MOST_COORDINATES {
+        let message = format!(
+            "{:?}: the check keeps factorisations of at most {MOST_COORDINATES} coordinates, three for each node that moves",
+            spec.block.nodes
+        );
+        return Err(Error::scene("body.block.nodes", message));
+    }
+    let study = Study {
+        patch: scene.local.patch_size(),
+        check: LocalityCheck::new(&linear, BAND_HZ)?,
+        linear: &linear,
+        block: &block,
+    };
+    let spacing_m = std::array::from_fn(|axis| spec.block.size_m[axis] / (spec.block.nodes[axis] - 1) as f64);
+    let mut out = Locality { patch: study.patch, spacing_m, band_hz: BAND_HZ, ..Locality::default() };
+    (out.band_limit_pct, out.at_rest_limit_pct) = (BAND_LIMIT_PCT, REST_LIMIT_PCT);
+    out.patch_bounds_m = study.bounds(node);
+    steps.begin("the scene's contact");
+    let coarse = study.whole(&[node]).remove(0);
+    let whole = study.check.finer(&study.direction(node))?;
+    out.reference_pct = 100.0 * StiffnessError::between(&coarse, &whole, study.check.frequencies()).band;
+    out.contact = study.locality(node, &whole, study.patch)?.0;
+    for grid in &grids {
+        steps.begin(format!("contacts on {}", grid.face.name()));
+        let mut map = grid.map(&block);
+        map.contacts = study.contacts(grid.nodes().collect())?;
+        out.faces.push(map);
+    }
+    steps.begin("other patches");
+    let contacts = || out.faces.iter().flat_map(|face| &face.contacts).flatten();
+    let worst = contacts().max_by(|a, b| a.band_pct.total_cmp(&b.band_pct)).map_or(node, |contact| contact.node);
+    let at_worst = study.whole(&[worst]).remove(0);
+    for size in SIZES.into_iter().filter(|size| size.iter().zip(block.lattice().nodes).all(|(&s, n)| s <= n)) {
+        let (contact, nodes) = study.locality(node, &whole, size)?;
+        out.sizes.push(PatchError { patch: size, nodes, contact, worst: study.locality(worst, &at_worst, size)?.0 });
+    }
+    steps.begin("responses");
+    let figure = study.responses(node, &whole)?;
+    steps.begin("balancing");
+    let hankel = study.decay(node, options.order)?;
+    if options.measure {
+        steps.begin("measuring in the time domain");
+        match measure(scene, &block, node, study.patch, (&whole, &study.patch_at(node, study.patch)?)) {
+            Ok(measured) => out.measured = Some(measured),
+            Err(error) => out.warnings.push(format!("the error could not be measured: {error}")),
+        }
+    }
+    steps.begin("reduced surroundings");
+    let bases = study.bases(node)?;
+    if let Some(error_pct) = options.error_pct {
+        let meets = |size: &&PatchError| size.contact.band_pct <= error_pct;
+        let patch = out.sizes.iter().find(meets).map(|size| size.patch);
+        let states = bases.iter().find(|basis| basis.error_pct <= error_pct).map(|basis| basis.states);
+        // Where nothing outside of the patch can move there is nothing to reduce.
+        let states = if bases.is_empty() { Some(0) } else { states };
+        out.budget = Some(Budget { error_pct, patch, states });
+    }
+    out.bases = bases.into_iter().filter(|basis| SHOWN_STATES.contains(&basis.states)).collect();
+    judge(&mut out, &block);
+    Ok(ReductionStudy {
+        subject: "scene".to_owned(),
+        responses: vec![figure],
+        hankel: vec![hankel],
+        locality: Some(out),
+        seconds: started.elapsed().as_secs_f64(),
+        ..ReductionStudy::default()
+    })
+}
+
+/// A body and what is asked about it.
+struct Study<'a> {
+    patch: [usize; 3],
+    block: &'a Block,
+    linear: &'a LinearBody,
+    check: LocalityCheck<'a>,
+}
+
+impl Study<'_> {
+    fn direction(&self, node: u32) -> Matrix {
+        self.linear.contact(&[(node, 1.0)])
+    }
+
+    fn whole(&self, nodes: &[u32]) -> Vec<ContactStiffness> {
+        let contacts: Vec<Matrix> = nodes.iter().map(|&node| self.direction(node)).collect();
+        self.check.whole(&contacts)
+    }
+
+    fn patch_nodes(&self, node: u32, size: [usize; 3]) -> Vec<u32> {
+        let mut nodes = Vec::new();
+        let triangles: Vec<u32> = self.block.surface().at_node(node).first().copied().into_iter().collect();
+        self.block.patch(&triangles, size, &mut nodes);
+        nodes
+    }
+
+    fn coordinates(&self, node: u32, size: [usize; 3]) -> Vec<usize> {
+        self.linear.coordinates(&self.patch_nodes(node, size))
+    }
+
+    /// The outermost places of the scene's patch at a contact (m).
+    fn bounds(&self, node: u32) -> [[f64; 3]; 2] {
+        let nodes = self.patch_nodes(node, self.patch);
+        let places = || nodes.iter().map(|&node| self.block.rest()[node as usize]);
+        let first = self.block.rest()[node as usize];
+        [places().fold(first, |low, x| low.inf(&x)).into(), places().fold(first, |high, x| high.sup(&x)).into()]
+    }
+
+    fn patch_at(&self, node: u32, size: [usize; 3]) -> Result<ContactStiffness, Error> {
+        self.check.patch(&self.coordinates(node, size), &self.direction(node))
+    }
+
+    /// What a patch of `size` captures at `node`, and how many nodes move in it.
+    fn locality(
+        &self,
+        node: u32,
+        whole: &ContactStiffness,
+        size: [usize; 3],
+    ) -> Result<(ContactLocality, usize), Error> {
+        let coordinates = self.coordinates(node, size);
+        let patch = self.check.patch(&coordinates, &self.direction(node))?;
+        let error = StiffnessError::between(&patch, whole, self.check.frequencies());
+        let locality = ContactLocality {
+            node,
+            position_m: self.block.rest()[node as usize].into(),
+            stiffness_n_per_m: stiffness_along(whole, outward(self.block, node)),
+            at_rest_pct: 100.0 * error.at_rest,
+            band_pct: 100.0 * error.band,
+            worst_pct: 100.0 * error.worst,
+        };
+        Ok((locality, coordinates.len() / 3))
+    }
+
+    fn contacts(&self, nodes: Vec<u32>) -> Result<Vec<Option<ContactLocality>>, Error> {
+        let is_movable = |node: &u32| self.block.inverse_masses()[*node as usize] > 0.0;
+        let movable: Vec<u32> = nodes.iter().copied().filter(is_movable).collect();
+        let mut wholes = self.whole(&movable).into_iter();
+        let of = |node: u32| match is_movable(&node).then(|| wholes.next()).flatten() {
+            Some(whole) => Ok(Some(self.locality(node, &whole, self.patch)?.0)),
+            None => Ok(None),
+        };
+        nodes.into_iter().map(of).collect()
+    }
+
+    /// The dynamic stiffness of the whole body, of patches and of one-shift Krylov at a contact.
+    fn responses(&self, node: u32, whole: &ContactStiffness) -> Result<ResponseFigure, Error> {
+        let place = self.block.lattice().coordinates(node);
+        let figure = ResponseFigure {
+            title: format!("Dynamic stiffness at node {place:?}"),
+            channels: ["x", "y", "z"].map(str::to_owned).to_vec(),
+            unit: "N/m".to_owned(),
+            hz: [vec![0.0], log_spaced(1.0, BAND_HZ[1], 61)].concat(),
+            models: Vec::new(),
+        };
+        let order = self.linear.system().order();
+        let mut figure = FigureOf::new(figure, whole, (order, 0.0));
+        for size in [self.patch, [8, 8, 4]] {
+            if size.iter().zip(self.block.lattice().nodes).any(|(&s, n)| s > n) {
+                continue;
+            }
+            let started = Instant::now();
+            let patch = self.patch_at(node, size)?;
+            let [a, b, c] = size;
+            let order = 2 * self.coordinates(node, size).len();
+            figure.add(&format!("patch {a} x {b} x {c}"), order, started.elapsed().as_secs_f64(), &patch, None);
+        }
+        let started = Instant::now();
+        let system = self.linear.compliance(&[(node, 1.0)])?;
+        let krylov = one_shift(&system, 2.0 * std::f64::consts::PI * SHIFT_HZ, MOMENTS)?;
+        let order = krylov.model.order();
+        let seconds = started.elapsed().as_secs_f64();
+        figure.add("Krylov, one shift", order, seconds, &ContactStiffness::of(krylov.model), None);
+        Ok(figure.done())
+    }
+
+    /// The expected error of `predictive` by the states of its reduced surroundings.
+    fn bases(&self, node: u32) -> Result<Vec<BasisError>, Error> {
+        let Some(graph) = SpringGraph::new(self.block) else { return Ok(Vec::new()) };
+        let errors = errors_by_states(&graph, &self.patch_nodes(node, self.patch))?.into_iter();
+        Ok(errors.map(|(states, estimate)| BasisError { states, error_pct: estimate.expected_pct() }).collect())
+    }
+
+    /// The body balanced for the displacement of the contact's node, the paper's way, through a Krylov space.
+    fn decay(&self, node: u32, order: Option<usize>) -> Result<HankelDecay, Error> {
+        let system = self.linear.held(&[node])?;
+        let reduced = low_rank(&system, SHIFTS)?;
+        let place = self.block.lattice().coordinates(node);
+        let mut orders = vec![2, 4, 6, 10, 15, 20, 30, 50];
+        orders.extend(order);
+        orders.sort_unstable();
+        orders.dedup();
+        let (model, modal) = (&reduced.projection.model, reduced.projection.model.modal());
+        let hinf_pct = |truncated: &StateSpace| match &modal {
+            Some(modal) => gain_error(modal, truncated),
+            None => typical_gain_error(&system, model, truncated),
+        };
+        let title = format!("force on node {place:?} by its displacement");
+        Ok(hankel_decay(title, system.order(), &reduced.balanced, &orders, &hinf_pct))
+    }
+}
+
+/// Says whether the paper's assumption holds, and where it does not.
+fn judge(out: &mut Locality, block: &Block) {
+    let contact = out.contact;
+    let over = |contact: &ContactLocality| contact.band_pct > BAND_LIMIT_PCT || contact.at_rest_pct > REST_LIMIT_PCT;
+    out.is_local = !over(&contact);
+    let place = |contact: &ContactLocality| format!("{:?}", block.lattice().coordinates(contact.node));
+    if contact.at_rest_pct > REST_LIMIT_PCT {
+        out.warnings.push(format!(
+            "at node {} the patch is some {:.0} times as stiff at rest as the body: what gives way lies outside of it, as soft deep tissue \
+             under a stiff skin does, or what is soft around a stiff nodule; use `predictive` or `full`",
+            place(&contact),
+            1.0 + contact.at_rest_pct / 100.0
+        ));
+    }
+    if contact.band_pct > BAND_LIMIT_PCT {
+        out.warnings.push(format!(
+            "at node {} the patch leaves out {:.0} % of the response between resyncs ({} to {} Hz): the force is made outside of it",
+            place(&contact),
+            contact.band_pct,
+            BAND_HZ[0],
+            BAND_HZ[1]
+        ));
+    }
+    // Faces that are alike make one line.
+    let mut alike: Vec<(usize, usize, Vec<&str>, &ContactLocality)> = Vec::new();
+    for face in &out.faces {
+        let all = || face.contacts.iter().flatten();
+        let (count, of) = (all().filter(|contact| over(contact)).count(), all().count());
+        let Some(worst) = all().filter(|contact| over(contact)).max_by(|a, b| a.band_pct.total_cmp(&b.band_pct)) else {
+            continue;
+        };
+        if count as f64 <= SHARE_LIMIT * of as f64 {
+            continue;
+        }
+        match alike.iter_mut().find(|known| (known.0, known.1) == (count, of)) {
+            Some((_, _, names, most)) => {
+                names.push(&face.face);
+                *most = if worst.band_pct > most.band_pct { worst } else { most };
+            }
+            None => alike.push((count, of, vec![&face.face], worst)),
+        }
+    }
+    for (count, of, names, worst) in alike {
+        out.warnings.push(format!(
+            "on {} the patch is not enough at {count} of {of} contacts{}, worst at node {}: {:.0} % in the band, {:.0} % at rest",
+            names.join(", "),
+            if names.len() > 1 { " each" } else { "" },
+            place(worst),
+            worst.band_pct,
+            worst.at_rest_pct
+        ));
+    }
+    if out.reference_pct > REFERENCE_LIMIT_PCT {
+        out.warnings.push(format!(
+            "this body rings: its response in the band is known to some {:.0} % only, at this contact, and all errors in the band are uncertain by as \
+             much; `--measure` and `palpate compare` are not",
+            out.reference_pct
+        ));
+    }
+}

@@ -1,0 +1,188 @@
+//! One pass over a log.
+
+use std::collections::BTreeMap;
+
+use super::cores::CoreUse;
+use super::group::{GroupDetail, GroupTiming};
+use super::haptics::DeviceTiming;
+use super::recent::Recent;
+use super::selection::Selection;
+use super::worst::{Worst, WorstTick};
+use palpate::log::Environment;
+use palpate::log::{Analysis, LogEntry, LogRecord, RunReport};
+use palpate::runtime::record::TickTiming;
+use palpate::runtime::Nanos;
+
+/// What a log says about the timing of its run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TimingReport {
+    /// The sums, as at the end of a run.
+    pub run: RunReport,
+    /// Each group in detail, in the order of [`RunReport::groups`].
+    pub groups: Vec<GroupTiming>,
+    /// Each device over time, in the order of [`RunReport::devices`].
+    pub devices: Vec<DeviceTiming>,
+    /// Processor cores with the groups on them; those that may run anywhere come last.
+    pub cores: Vec<CoreUse>,
+    /// The worst ticks, the worst first.
+    pub worst: Vec<WorstTick>,
+    /// The time of the first record and of the last.
+    pub span: [Nanos; 2],
+}
+
+impl TimingReport {
+    /// Gives groups other names, all at once, so that they are compared with groups of those names: `(old, new)` each. A
+    /// group that has one of the new names already is set aside.
+    pub fn rename_groups(&mut self, names: &[(String, String)]) {
+        let sums = self.run.groups.iter_mut().map(|group| &mut group.name);
+        let details = self.groups.iter_mut().map(|group| &mut group.name);
+        let on_cores = self.cores.iter_mut().flat_map(|core| &mut core.groups).map(|(name, _)| name);
+        let worst = self.worst.iter_mut().map(|worst| &mut worst.group);
+        for name in sums.chain(details).chain(on_cores).chain(worst) {
+            match names.iter().find(|(old, _)| old == name) {
+                Some((_, new)) => new.clone_into(name),
+                None if names.iter().any(|(_, new)| new == name) => name.push_str(" (not compared)"),
+                None => {}
+            }
+        }
+    }
+}
+
+/// Gathers a [`TimingReport`] from the entries of a log, in their order. Allocates.
+#[derive(Clone, Debug, Default)]
+pub struct TimingAnalysis {
+    selection: Selection,
+    sums: Analysis,
+    groups: BTreeMap<u16, GroupDetail>,
+    devices: BTreeMap<u16, DeviceTiming>,
+    recent: Recent,
+    worst: Worst,
+    span: Option<[Nanos; 2]>,
+}
+
+impl TimingAnalysis {
+    /// Looks at what `selection` leaves.
+    pub fn new(selection: Selection) -> Self {
+        Self { selection, ..Self::default() }
+    }
+
+    /// Reads one entry.
+    pub fn push_entry(&mut self, entry: &LogEntry) {
+        match entry {
+            LogEntry::Record(record) => self.push(record),
+            LogEntry::Text(event) if !self.selection.window.contains(event.time) => {}
+            // Sums since the start of the run say nothing about a part of it, but for what was lost.
+            entry => self.sums.push_entry(entry),
+        }
+    }
+
+    /// Counts a lateness of a group as often as it occurred, where nothing else is known of its releases (ns).
+    pub(super) fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
+        self.sums.push_lateness(group, lateness, count);
+    }
+
+    fn push(&mut self, record: &LogRecord) {
+        let time = record.time();
+        if !self.selection.window.contains(time) {
+            return;
+        }
+        let [first, last] = self.span.unwrap_or([time; 2]);
+        self.span = Some([first.min(time), last.max(time)]);
+        match record {
+            LogRecord::Tick(timing) => self.push_tick(timing),
+            LogRecord::Actors(times) => {
+                self.recent.push_actors(times);
+                self.groups.entry(times.group).or_default().push_actors(times);
+            }
+            LogRecord::Force(sample) => {
+                self.recent.push_force(sample);
+                self.devices.entry(sample.device).or_default().push_force(sample);
+            }
+            LogRecord::Command(sample) => {
+                self.recent.push_command(sample);
+                self.devices.entry(sample.device).or_default().push_command(sample);
+            }
+            LogRecord::Resync(resync) => self.devices.entry(resync.device).or_default().push_resync(resync),
+            _ => {}
+        }
+        self.sums.push(record);
+    }
+
+    fn push_tick(&mut self, timing: &TickTiming) {
+        let figures = self.sums.figures(timing);
+        let detail = self.groups.entry(timing.group).or_default();
+        detail.push(timing, &figures);
+        self.recent.push_tick(timing);
+        if !self.is_looked_at(timing.group) {
+            return;
+        }
+        let deadline = timing.deadline.saturating_sub(timing.scheduled);
+        let period = self.groups.get(&timing.group).and_then(GroupDetail::period);
+        if period.is_none() && timing.deadline == timing.end {
+            // The first release of a group whose deadlines are not in the log.
+            return;
+        }
+        let period = period.unwrap_or(deadline);
+        self.worst.push(timing, period, &self.recent);
+    }
+
+    /// Nobody waits for a group in the background: it is among the worst only if it was asked for.
+    fn is_looked_at(&self, group: u16) -> bool {
+        let Some(environment) = self.sums.environment() else { return true };
+        let info = environment.groups.get(usize::from(group));
+        let is_background = info.is_some_and(|info| info.background);
+        self.selection.has_group(&environment.group_name(group)) && !(is_background && self.selection.groups.is_empty())
+    }
+
+    /// What has been found.
+    pub fn report(self) -> TimingReport {
+        let mut run = self.sums.report();
+        let span = self.span.unwrap_or_default();
+        if self.selection.window.from > Nanos::ZERO {
+            run.duration = span[1].saturating_sub(span[0]);
+        }
+        let unknown = Environment::default();
+        let environment = self.sums.environment().unwrap_or(&unknown).clone();
+        let name = |group: u16| environment.group_name(group);
+        let empty = GroupDetail::default();
+        let mut groups = Vec::new();
+        for (&number, counter) in &self.sums.groups() {
+            let detail = self.groups.get(&number).unwrap_or(&empty);
+            let info = environment.groups.get(usize::from(number));
+            groups.push(detail.report(name(number), counter, info));
+        }
+        // A core is as busy as it is, whichever group is looked at.
+        let cores = cores(&run, &environment, span);
+        run.groups.retain(|group| self.selection.has_group(&group.name));
+        groups.retain(|group| self.selection.has_group(&group.name));
+        let mut devices = Vec::new();
+        for (number, device) in (0..).zip(&run.devices) {
+            let over_time = self.devices.get(&number).cloned().unwrap_or_default();
+            devices.push(DeviceTiming { name: device.name.clone(), ..over_time });
+        }
+        let actor = |group: u16, actor: usize| {
+            environment
+                .groups
+                .get(usize::from(group))
+                .map_or_else(|| format!("actor {actor}"), |info| info.actor_name(actor))
+        };
+        TimingReport { cores, worst: self.worst.report(&self.recent, name, actor), run, groups, devices, span }
+    }
+}
+
+/// The use of each core in the time between `from` and `to`.
+fn cores(run: &RunReport, environment: &Environment, [from, to]: [Nanos; 2]) -> Vec<CoreUse> {
+    let elapsed = to.saturating_sub(from).as_secs_f64();
+    let mut cores: BTreeMap<usize, CoreUse> = BTreeMap::new();
+    let mut anywhere = CoreUse::default();
+    for group in run.groups.iter().filter(|group| group.released > 0 && elapsed > 0.0) {
+        let cpu = environment.groups.iter().find(|info| info.name == group.name).and_then(|info| info.cpu);
+        let on = match cpu {
+            Some(cpu) => cores.entry(cpu).or_insert_with(|| CoreUse { cpu: Some(cpu), groups: Vec::new() }),
+            None => &mut anywhere,
+        };
+        on.groups.push((group.name.clone(), group.busy.as_secs_f64() / elapsed));
+    }
+    let anywhere = (!anywhere.groups.is_empty()).then_some(anywhere);
+    cores.into_values().chain(anywhere).collect()
+}
