@@ -6,7 +6,7 @@ use crate::time::{Nanos, Rate};
 /// A part of a program that is called once per release of its rate group.
 ///
 /// An actor never reads a clock and never makes a channel: time comes with the [`TickContext`], data through ports from
-/// the [builder](super::RuntimeBuilder). That is what lets the same actor run on a real thread and in virtual time.
+/// the [builder](crate::RuntimeBuilder). That is what lets the same actor run on a real thread and in virtual time.
 ///
 /// One release of a group: every actor's [`tick`](Self::tick) in the order given to the builder, then every actor's
 /// [`commit`](Self::commit) in reverse order. So a device that ticks first (to read) commits last (to write what the
@@ -19,7 +19,7 @@ pub trait Actor: Send {
     fn name(&self) -> &str;
 
     /// Prepares the actor. All starts run one after the other, in group order, on the thread that calls
-    /// [`Runtime::start`](super::Runtime::start), before release 0. What is published here is visible from release 0 on,
+    /// [`Runtime::start`](crate::Runtime::start), before release 0. What is published here is visible from release 0 on,
     /// whatever the group's latency. Actors that take the place of failed ones are started between two releases.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ pub trait Actor: Send {
 
     /// Blocks until the device that this actor reads has something new, at most `timeout`; true if it has.
     ///
-    /// Only the first actor of a [device-paced](super::Release::DevicePaced) group on threads is asked. New is what has come
+    /// Only the first actor of a [device-paced](crate::Release::DevicePaced) group on threads is asked. New is what has come
     /// since it last said so, also between two questions; everything up to the return counts as one frame. Asked with a
     /// timeout of zero it only looks. An actor that
     /// returns false before its time, as the default does, is waited for by the clock, and after a panic it is not asked
@@ -63,7 +63,7 @@ pub trait Actor: Send {
         Outcome::Continue
     }
 
-    /// Asked after a panic of this actor in a group that [winds down](super::RateGroup::wind_down): true if it can still
+    /// Asked after a panic of this actor in a group that [winds down](crate::RateGroup::wind_down): true if it can still
     /// bring to rest what it drives. It is then called on like the others; a second panic is its last. The others are
     /// stopped at once.
     ///
@@ -74,10 +74,10 @@ pub trait Actor: Send {
     }
 
     /// Ends the actor: on the group's own thread after its last release, also after a fault of this or another actor. An
-    /// actor that failed in a group that [winds down](super::RateGroup::wind_down) is stopped at once.
+    /// actor that failed in a group that [winds down](crate::RateGroup::wind_down) is stopped at once.
     ///
     /// # Real-time
-    /// May allocate and block for less than [`STOP_BOUND`](super::STOP_BOUND): nothing is released afterwards. Only the
+    /// May allocate and block for less than [`STOP_BOUND`](crate::STOP_BOUND): nothing is released afterwards. Only the
     /// stop of an actor that failed in a group that winds down is as [`tick`](Self::tick): the others are released on.
     fn stop(&mut self, ctx: &TickContext) {
         let _ = ctx;
@@ -91,31 +91,31 @@ pub enum Outcome {
     #[default]
     Continue,
     /// The release was done with less than full quality, for the program's cause with this code. The run goes on; the
-    /// report counts such releases, and a change of the code is recorded as [`Event::DEGRADED`](super::Event::DEGRADED).
+    /// report counts such releases, and a change of the code is recorded as [`Event::DEGRADED`](crate::Event::DEGRADED).
     Degraded(u32),
-    /// The actor cannot go on, for the program's cause with this code. A [restartable](super::RuntimeBuilder::restartable)
+    /// The actor cannot go on, for the program's cause with this code. A [restartable](crate::RuntimeBuilder::restartable)
     /// group is started again; otherwise the whole runtime stops in order. Nothing of the actor's group ticks or commits
-    /// any more, unless the group [winds down](super::RateGroup::wind_down): then the other actors do.
+    /// any more, unless the group [winds down](crate::RateGroup::wind_down): then the other actors do.
     Fault(u32),
 }
 
 /// How much an actor should do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
-pub enum Mode {
+pub enum GroupMode {
     /// All of it.
     #[default]
     Normal = 0,
-    /// The least that keeps the system useful. Set by [`OverrunPolicy::Degrade`](super::OverrunPolicy::Degrade) from its
+    /// The least that keeps the system useful. Set by [`OverrunPolicy::Degrade`](crate::OverrunPolicy::Degrade) from its
     /// books of slips and deadlines, and recorded with every release: an input of the release like any other.
     Degraded = 1,
     /// Bring what it drives to rest: the run is ending or another actor of the group has failed. The group has
-    /// [that long](super::RateGroup::wind_down).
+    /// [that long](crate::RateGroup::wind_down).
     Stopping = 2,
 }
 
-impl Mode {
-    /// The mode with this number; unknown numbers read as [`Mode::Normal`].
+impl GroupMode {
+    /// The mode with this number; unknown numbers read as [`GroupMode::Normal`].
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -142,7 +142,7 @@ impl Mode {
 
 /// The part of a group's life in which its actors are called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Phase {
+pub(crate) enum Phase {
     /// Starts run one after the other before anything is released: what they see is the same in every run.
     Start,
     /// A release, which a recording can repeat.
@@ -173,13 +173,13 @@ pub struct TickContext {
     /// Periods skipped between the release before and this one.
     pub slips: u32,
     /// How much to do.
-    pub mode: Mode,
+    pub mode: GroupMode,
     /// When publications made in this release become visible to other groups; only virtual time looks at it.
-    pub(super) visible_at: Nanos,
+    pub(crate) visible_at: Nanos,
     /// The rate group that is called: ports tell by it what comes from another group.
-    pub(super) group: u16,
+    pub(crate) group: u16,
     /// In which part of its life.
-    pub(super) phase: Phase,
+    pub(crate) phase: Phase,
 }
 
 impl TickContext {
@@ -193,7 +193,7 @@ impl TickContext {
             dt_nominal: rate.period_s(),
             dt_measured: rate.period_s(),
             slips: 0,
-            mode: Mode::Normal,
+            mode: GroupMode::Normal,
             visible_at: scheduled,
             group: 0,
             phase: Phase::Release,

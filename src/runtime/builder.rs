@@ -1,38 +1,30 @@
 //! The builder: it hands out ports, collects rate groups and refuses graphs that cannot work.
 
-use super::actor::Actor;
-use super::deadline::Ledger;
-use super::disturbance::{Disturb, Disturbance};
-use super::grant::GrantHandle;
-use super::outlet::{self, OutletReader, OutletWriter};
-use super::port::{Reader, Writer};
-use super::port_memory::PortPlan;
-use super::queue_port::{QueueReader, QueueWriter};
-use super::rate_group::RateGroup;
-use super::recorder::{RecordDrain, Recorder, Registry};
-use super::recording::Recording;
-use super::reexecution::Reexecution;
-use super::release::GroupRun;
-use super::restart::{Factory, Restart, Restarter};
-use super::rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};
-use super::running::Runtime;
-use super::schedule::admit_here;
-use super::script::{Script, ScriptedPort};
-use super::virtual_port::flight;
-use super::virtual_queue::VirtualQueue;
+use crate::accounting::ledger::Ledger;
+use crate::actor::Actor;
+use crate::admission::check::admit_here;
 use crate::error::{ActorError, GraphError, GraphErrorKind};
+use crate::executor::Execution;
+use crate::executor::disturbance::{Disturb, Disturbance};
+use crate::group::group_run::GroupRun;
+use crate::ports::exchange_port::{Reader, Writer};
+use crate::ports::outlet::{OutletReader, OutletWriter, outlet};
+use crate::ports::port_state::PortPlan;
+use crate::ports::queue_port::{QueueReader, QueueWriter};
+use crate::ports::restartable::{ExchangePort, OutletPort, QueuePort, RecorderPort};
+use crate::ports::virtual_exchange::flight;
+use crate::ports::virtual_queue::VirtualQueue;
+use crate::rate_group::RateGroup;
+use crate::records::recorder::{RecordDrain, Recorder, Registry};
+use crate::reexecution::recording::Recording;
+use crate::reexecution::replay::Reexecution;
+use crate::reexecution::script::{Script, ScriptedPort};
+use crate::runtime::Runtime;
+use crate::supervision::restart::{Factory, Restart, Restarter};
+use crate::system::grant::GrantHandle;
 use crate::time::{Nanos, Rate};
 use std::fmt;
 use std::sync::Arc;
-
-/// How a graph is executed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Execution {
-    /// One thread for everything, in the order of virtual time, as fast as the machine allows; bit-identical every time.
-    Virtual,
-    /// One thread per rate group, in real time.
-    Threaded,
-}
 
 /// Who plays in a group.
 enum Cast {
@@ -58,8 +50,24 @@ pub struct RuntimeBuilder {
     recording: Option<(Recording, Script)>,
 }
 
+impl Runtime {
+    /// A builder for a graph that runs in this execution.
+    pub fn builder(execution: Execution) -> RuntimeBuilder {
+        RuntimeBuilder::new(execution, None)
+    }
+
+    /// A builder for a graph that repeats `recording` in virtual time: it must be built as the recorded one was, with
+    /// the same groups and ports in the same order. Exactly the recorded releases run, whatever rates, policies and
+    /// [`until`](RuntimeBuilder::until) say, and every one of them sees through its ports what it saw then.
+    ///
+    /// A recording that lacks a record ends in a [fault](RuntimeReport::fault) that names what is missing.
+    pub fn reexecution(recording: Recording) -> RuntimeBuilder {
+        RuntimeBuilder::new(Execution::Virtual, Some(recording))
+    }
+}
+
 impl RuntimeBuilder {
-    pub(super) fn new(execution: Execution, recording: Option<Recording>) -> Self {
+    pub(crate) fn new(execution: Execution, recording: Option<Recording>) -> Self {
         Self {
             execution,
             groups: Vec::new(),
@@ -120,7 +128,7 @@ impl RuntimeBuilder {
 
     /// The newest value for a thread outside the graph, such as a renderer; visible at once in both executions.
     pub fn outlet<T: Send>(&mut self, init: impl FnMut() -> T) -> (OutletWriter<T>, OutletReader<T>) {
-        outlet::outlet(init)
+        outlet(init)
     }
 
     /// As [`outlet`](Self::outlet), with halves that a [restarted](Self::restartable) group can take again.
@@ -161,7 +169,7 @@ impl RuntimeBuilder {
     ///
     /// The factory takes the halves of the actors' ports from ports that can be taken again
     /// ([`exchange_port`](Self::exchange_port) and the like), which cuts the failed actors off. Periods that passed meanwhile
-    /// are skipped with the cause [`Fault`](super::SlipCause::Fault), under every overrun policy.
+    /// are skipped with the cause [`Fault`](crate::SlipCause::Fault), under every overrun policy.
     ///
     /// # Real-time
     /// On threads the factory runs, and the new actors are started, on the thread that then takes the group over, before it
@@ -192,7 +200,7 @@ impl RuntimeBuilder {
         self
     }
 
-    /// Virtual time: measures the CPU time of every release, for [`RuntimeReport::costs`](super::RuntimeReport::costs).
+    /// Virtual time: measures the CPU time of every release, for [`RuntimeReport::costs`](crate::RuntimeReport::costs).
     /// Nothing that an actor computes depends on it.
     pub fn measure_cost(&mut self) -> &mut Self {
         self.measures_cost = true;
@@ -229,6 +237,7 @@ impl RuntimeBuilder {
         let registry = built.registry;
         let mut groups = Vec::with_capacity(built.groups.len());
         let mut restarters = Vec::with_capacity(built.groups.len());
+        let mut disturbances = Vec::with_capacity(built.groups.len());
         for (index, (spec, cast)) in built.groups.into_iter().enumerate() {
             // The admission check keeps the number of groups far below this.
             let index = index as u16;
@@ -249,15 +258,16 @@ impl RuntimeBuilder {
                 }
             };
             group.check_listener()?;
-            groups.push(group.disturbed_by(disturb));
+            groups.push(group);
+            disturbances.push(disturb);
             restarters.push(restarter);
         }
         let reexecution = match built.recording {
             Some((recording, script)) => Some(Reexecution::new(recording, script, &groups, built.ports)?),
             None => None,
         };
-        let runtime = Runtime::new(built.execution, groups, restarters, reexecution, registry, built.grants);
-        Ok(if built.measures_cost { runtime.measuring_cost() } else { runtime })
+        let Self { execution, grants, measures_cost, .. } = built;
+        Ok(Runtime { execution, groups, restarters, disturbances, reexecution, registry, grants, measures_cost })
     }
 }
 

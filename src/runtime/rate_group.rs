@@ -19,10 +19,10 @@ pub enum OverrunPolicy {
     ///
     /// As `Skip`, but the group keeps its distance between releases instead of its place in time. Release n is the latest
     /// one that the nominal grid has at that time, so that tick numbers stay true to the clock. Where phases have added up
-    /// to a period, that period is skipped with the cause [`Policy`](super::SlipCause::Policy); so is the last one of a
+    /// to a period, that period is skipped with the cause [`Policy`](crate::SlipCause::Policy); so is the last one of a
     /// run whose shifted release would come after the end.
     Rephase,
-    /// As `Skip`, and from then on ask for less: [`Mode::Degraded`](super::Mode::Degraded) until `recover_after` releases
+    /// As `Skip`, and from then on ask for less: [`GroupMode::Degraded`](crate::GroupMode::Degraded) until `recover_after` releases
     /// in a row had no slips and met their deadlines. The mode of each release is recorded with its timing.
     Degrade {
         /// Releases in time that make the mode normal again.
@@ -39,16 +39,16 @@ pub enum Release {
     /// The clock.
     #[default]
     Periodic,
-    /// A device, by a blocking read: the first actor of the group is asked to [wait](super::Actor::wait) for it.
+    /// A device, by a blocking read: the first actor of the group is asked to [wait](crate::Actor::wait) for it.
     ///
     /// What it delivers runs the next release, up to seven eighths of a period before that is due; from half a period after
     /// it was due on, the release nearest in time, and the periods between are skipped with the cause
-    /// [`StalledPeer`](super::SlipCause::StalledPeer). An earlier frame, the second in the period of one release, is left
+    /// [`StalledPeer`](crate::SlipCause::StalledPeer). An earlier frame, the second in the period of one release, is left
     /// out. So the grid of ticks stays that of the nominal rate whatever the device's own clock does: a device 2 per mille
     /// slow skips 2 periods in a thousand. That a thread was woken late cannot be told from a late frame.
     DevicePaced {
         /// How long after a due time the device may stay silent. Then the group goes on at its nominal period by the
-        /// clock, until the device delivers again; both are recorded as [`Event::WATCHDOG`](super::Event::WATCHDOG).
+        /// clock, until the device delivers again; both are recorded as [`Event::WATCHDOG`](crate::Event::WATCHDOG).
         watchdog: Nanos,
     },
 }
@@ -76,28 +76,28 @@ pub enum Wait {
 ///
 /// What releases it is its [`Release`] mode: the clock, or a device that has one of its own. The third way, virtual time,
 /// is a property of the executor: there every group is released by the virtual clock, a device-paced one as if its device
-/// delivered on time, unless a [disturbance](super::Disturbance) delays it.
+/// delivered on time, unless a [disturbance](crate::Disturbance) delays it.
 ///
-/// Values that cannot work are refused by [`RuntimeBuilder::build`](super::RuntimeBuilder::build).
+/// Values that cannot work are refused by [`RuntimeBuilder::build`](crate::RuntimeBuilder::build).
 ///
 /// # Real-time
 /// Not real-time safe: its name allocates. Before the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RateGroup {
-    pub(super) name: String,
-    pub(super) rate: Rate,
-    pub(super) offset: Nanos,
-    pub(super) deadline: Option<Nanos>,
-    pub(super) budget: Option<Nanos>,
-    pub(super) latency: Nanos,
-    pub(super) cpu: Option<usize>,
-    pub(super) priority: Option<u8>,
-    pub(super) overrun: OverrunPolicy,
-    pub(super) release: Release,
-    pub(super) wait: Wait,
-    pub(super) observer: bool,
-    pub(super) wind_down: Nanos,
-    pub(super) wind_down_at_end: bool,
+    pub(crate) name: String,
+    pub(crate) rate: Rate,
+    pub(crate) offset: Nanos,
+    pub(crate) deadline: Option<Nanos>,
+    pub(crate) budget: Option<Nanos>,
+    pub(crate) latency: Nanos,
+    pub(crate) cpu: Option<usize>,
+    pub(crate) priority: Option<u8>,
+    pub(crate) overrun: OverrunPolicy,
+    pub(crate) release: Release,
+    pub(crate) wait: Wait,
+    pub(crate) observer: bool,
+    pub(crate) wind_down: Nanos,
+    pub(crate) wind_down_at_end: bool,
 }
 
 impl RateGroup {
@@ -222,9 +222,9 @@ impl RateGroup {
     }
 
     /// When a stop is requested or an actor of the group has failed, the group is released for this long in
-    /// [`Mode::Stopping`](super::Mode::Stopping), without the failed actor, so that it can bring what it drives to rest.
+    /// [`GroupMode::Stopping`](crate::GroupMode::Stopping), without the failed actor, so that it can bring what it drives to rest.
     /// Periods that are overdue by then are skipped and do not count; a device is not waited for. A fault that a
-    /// [restart](super::RuntimeBuilder::restartable) answers begins none.
+    /// [restart](crate::RuntimeBuilder::restartable) answers begins none.
     #[must_use]
     pub fn wind_down(mut self, time: Nanos) -> Self {
         self.wind_down = time;
@@ -232,7 +232,7 @@ impl RateGroup {
     }
 
     /// It also [winds down](Self::wind_down) after its last release when the run ends
-    /// [by itself](super::RuntimeBuilder::until).
+    /// [by itself](crate::RuntimeBuilder::until).
     #[must_use]
     pub fn wind_down_at_end(mut self) -> Self {
         self.wind_down_at_end = true;
@@ -263,7 +263,7 @@ impl RateGroup {
     }
 
     /// The watchdog of a device-paced group.
-    pub(super) fn watchdog(&self) -> Option<Nanos> {
+    pub(crate) fn watchdog(&self) -> Option<Nanos> {
         match self.release {
             Release::Periodic => None,
             Release::DevicePaced { watchdog } => Some(watchdog),
@@ -271,7 +271,7 @@ impl RateGroup {
     }
 
     /// The deadline in force, counted from the release.
-    pub(super) fn relative_deadline(&self) -> Nanos {
+    pub(crate) fn relative_deadline(&self) -> Nanos {
         self.deadline.unwrap_or(self.rate.period())
     }
 }

@@ -4,10 +4,9 @@ mod device_clock;
 
 use device_clock::DeviceClock;
 use palpate_runtime::{
-    Actor, Event, Execution, Outcome, OverrunPolicy, RateGroup, Record, Restart, Runtime, RuntimeReport, SlipCause,
-    TickContext, TickTiming, actor_fn,
+    Actor, Event, Execution, Nanos, Outcome, OverrunPolicy, RateGroup, Record, Restart, Runtime, RuntimeReport,
+    SlipCause, TickContext, TickTiming, actor_fn,
 };
-use palpate_runtime::Nanos;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
