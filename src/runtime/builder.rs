@@ -2,7 +2,7 @@
 
 use crate::accounting::ledger::Ledger;
 use crate::actor::Actor;
-use crate::admission::check::admit_here;
+use crate::admission::plan::Plan;
 use crate::error::{ActorError, GraphError, GraphErrorKind};
 use crate::executor::Execution;
 use crate::executor::disturbance::{Disturb, Disturbance};
@@ -12,8 +12,6 @@ use crate::ports::outlet::{OutletReader, OutletWriter, outlet};
 use crate::ports::port_state::PortPlan;
 use crate::ports::queue_port::{QueueReader, QueueWriter};
 use crate::ports::restartable::{ExchangePort, OutletPort, QueuePort, RecorderPort};
-use crate::ports::virtual_exchange::flight;
-use crate::ports::virtual_queue::VirtualQueue;
 use crate::rate_group::RateGroup;
 use crate::records::recorder::{RecordDrain, Recorder, Registry};
 use crate::reexecution::recording::Recording;
@@ -23,7 +21,6 @@ use crate::runtime::Runtime;
 use crate::supervision::restart::{Factory, Restart, Restarter};
 use crate::system::grant::GrantHandle;
 use crate::time::{Nanos, Rate};
-use std::fmt;
 use std::sync::Arc;
 
 /// Who plays in a group.
@@ -103,10 +100,7 @@ impl RuntimeBuilder {
     /// As [`exchange`](Self::exchange), with halves that a [restarted](Self::restartable) group can take again.
     pub fn exchange_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> ExchangePort<T> {
         let (plan, script) = self.plan_port();
-        match self.execution {
-            Execution::Virtual => ExchangePort::in_virtual_time(plan, flight(script, init)),
-            Execution::Threaded => ExchangePort::threaded(plan, init),
-        }
+        ExchangePort::new(self.execution, plan, script, init)
     }
 
     /// A port for ordered samples that holds at least `capacity` of them, rounded up to a power of two.
@@ -120,10 +114,7 @@ impl RuntimeBuilder {
     /// As [`queue`](Self::queue), with halves that a [restarted](Self::restartable) group can take again.
     pub fn queue_port<T: Copy + Send + 'static>(&mut self, capacity: usize) -> QueuePort<T> {
         let (plan, script) = self.plan_port();
-        match self.execution {
-            Execution::Virtual => QueuePort::in_virtual_time(plan, VirtualQueue::new(script, capacity)),
-            Execution::Threaded => QueuePort::threaded(plan, capacity),
-        }
+        QueuePort::new(self.execution, plan, script, capacity)
     }
 
     /// The newest value for a thread outside the graph, such as a renderer; visible at once in both executions.
@@ -229,7 +220,7 @@ impl RuntimeBuilder {
                 group.name = format!("group-{index}");
             }
         }
-        admit_here(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>(), self.execution)?;
+        Plan::check(self.execution, &self.specs())?;
         self.check_restartable()?;
         self.check_disturbances()?;
         self.check_measurement()?;
@@ -275,6 +266,10 @@ impl RuntimeBuilder {
 const SUPERVISOR_EVENTS: usize = 64;
 
 impl RuntimeBuilder {
+    fn specs(&self) -> Vec<RateGroup> {
+        self.groups.iter().map(|(group, _)| group.clone()).collect()
+    }
+
     /// An observer ends after all others: what fails in it is told when it ends, and there is nothing it could go on with.
     fn check_restartable(&self) -> Result<(), GraphError> {
         let wrong = |(group, cast): &&(RateGroup, Cast)| group.observer && matches!(cast, Cast::Restartable(..));
@@ -317,12 +312,4 @@ fn ring_capacity(rate: Rate) -> usize {
     ((8.0 * rate.as_hz()) as usize).clamp(256, 65_536)
 }
 
-impl fmt::Debug for RuntimeBuilder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let groups: Vec<_> = self.groups.iter().map(|(group, _)| group).collect();
-        f.debug_struct("RuntimeBuilder")
-            .field("execution", &self.execution)
-            .field("groups", &groups)
-            .finish_non_exhaustive()
-    }
-}
+impl_debug!(RuntimeBuilder, "execution": |own| own.execution, "groups": |own| own.specs());

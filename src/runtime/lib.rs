@@ -65,6 +65,19 @@
 //! # Ok::<(), palpate_runtime::GraphError>(())
 //! ```
 
+/// `Debug` for types of which only a part can be shown: these fields, and that there are more.
+macro_rules! impl_debug {
+    ($type:ident $(<$param:ident>)? $(, $field:literal: |$own:ident| $shown:expr)*) => {
+        impl $(<$param>)? std::fmt::Debug for $type $(<$param>)? {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.debug_struct(stringify!($type))
+                    $(.field($field, &(|$own: &Self| $shown)(self)))*
+                    .finish_non_exhaustive()
+            }
+        }
+    };
+}
+
 mod accounting;
 mod actor;
 mod admission;

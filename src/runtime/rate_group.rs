@@ -239,11 +239,6 @@ impl RateGroup {
         self
     }
 
-    /// True if a [budget](Self::budget) was given.
-    pub fn has_budget(&self) -> bool {
-        self.budget.is_some()
-    }
-
     /// The budget that was given.
     pub fn declared_budget(&self) -> Option<Nanos> {
         self.budget

@@ -9,6 +9,8 @@ use crate::executor::threaded::Threads;
 use crate::executor::virtual_time::VirtualRun;
 use crate::group::group_run::{GroupRun, start_actors};
 use crate::primitives::exchange::ExchangeReader;
+use crate::primitives::sync::lock;
+use crate::rate_group::RateGroup;
 use crate::records::recorder::Registry;
 use crate::reexecution::replay::Reexecution;
 use crate::reports::live::{GroupLive, LiveReader};
@@ -17,8 +19,7 @@ use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND, StopHandle};
 use crate::system::grant::{GrantHandle, SystemGrant};
 use crate::time::Nanos;
-use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// How often a waiting program looks at the supervisor's mailbox.
@@ -48,7 +49,11 @@ impl Runtime {
     /// # Errors
     /// [`GraphErrorKind::Refused`] if the process has been moved to fewer cores since the graph was built and no longer fits.
     pub fn plan(&self) -> Result<Plan, GraphError> {
-        Plan::of(self.execution, &self.groups.iter().map(|group| group.spec.clone()).collect::<Vec<_>>())
+        Plan::of(self.execution, &self.specs())
+    }
+
+    fn specs(&self) -> Vec<RateGroup> {
+        self.groups.iter().map(|group| group.spec.clone()).collect()
     }
 
     /// Sets the threads up, then starts all actors one after the other on this thread, then releases the groups.
@@ -112,17 +117,7 @@ fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), GraphError> {
         .map_err(|error| GraphError::new(GraphErrorKind::Refused, format!("no thread for the supervisor: {error}")))
 }
 
-fn lock(executor: &Mutex<Executor>) -> MutexGuard<'_, Executor> {
-    // Actors' panics are caught before they get here; the executor's own state stays whole.
-    executor.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-impl fmt::Debug for Runtime {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let groups: Vec<_> = self.groups.iter().map(|group| &group.spec).collect();
-        f.debug_struct("Runtime").field("execution", &self.execution).field("groups", &groups).finish_non_exhaustive()
-    }
-}
+impl_debug!(Runtime, "execution": |own| own.execution, "groups": |own| own.specs());
 
 enum Executor {
     Threaded(Threads),
@@ -147,7 +142,7 @@ impl RunningGraph {
     /// # Real-time
     /// Not real-time safe: sleeps, or executes the run. Never from an actor: in virtual time it would wait for itself.
     pub fn wait_for(&self, span: Duration) {
-        if let Executor::Virtual(run) = &mut *self.lock() {
+        if let Executor::Virtual(run) = &mut *lock(&self.executor) {
             return run.advance(Nanos::from_duration(span));
         }
         let start = Instant::now();
@@ -162,7 +157,7 @@ impl RunningGraph {
     /// # Real-time
     /// Not real-time safe: takes a lock. Never from an actor: in virtual time [`wait_for`](Self::wait_for) holds it.
     pub fn elapsed(&self) -> Nanos {
-        match &*self.lock() {
+        match &*lock(&self.executor) {
             Executor::Threaded(threads) => threads.elapsed(),
             Executor::Virtual(run) => run.now(),
         }
@@ -173,7 +168,7 @@ impl RunningGraph {
     /// # Real-time
     /// Not real-time safe: takes a lock, may start a group again. Never from an actor, as [`elapsed`](Self::elapsed).
     pub fn finished(&self) -> bool {
-        match &mut *self.lock() {
+        match &mut *lock(&self.executor) {
             Executor::Threaded(threads) => threads.poll(),
             Executor::Virtual(run) => run.supervisor.all_ended(),
         }
@@ -210,7 +205,7 @@ impl RunningGraph {
     /// Not real-time safe: waits for every group. Never from an actor: its own group is one of them.
     pub fn stop(self) -> RuntimeReport {
         let given_up = self.end();
-        let executor = self.lock();
+        let executor = lock(&self.executor);
         let (groups, fault) = match &*executor {
             Executor::Threaded(threads) => threads.supervisor.results(),
             Executor::Virtual(run) => run.supervisor.results(),
@@ -238,17 +233,13 @@ impl RunningGraph {
 
     /// Ends the run if it has not ended; returns the groups that had to be given up.
     fn end(&self) -> Vec<String> {
-        match &mut *self.lock() {
+        match &mut *lock(&self.executor) {
             Executor::Threaded(threads) => threads.join(&self.names, STOP_BOUND),
             Executor::Virtual(run) => {
                 run.end_all();
                 Vec::new()
             }
         }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Executor> {
-        lock(&self.executor)
     }
 }
 
@@ -258,11 +249,7 @@ impl Drop for RunningGraph {
     }
 }
 
-impl fmt::Debug for RunningGraph {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("RunningGraph").field("groups", &self.names).finish_non_exhaustive()
-    }
-}
+impl_debug!(RunningGraph, "groups": |own| own.names.clone());
 
 #[cfg(all(test, not(loom)))]
 mod tests {
@@ -289,7 +276,7 @@ mod tests {
         graph.group(RateGroup::hz(100).name("log").observer(), vec![]);
         let running = graph.build().unwrap().start().unwrap();
         running.wait_for(Duration::from_millis(30));
-        let given_up = |bound| match &mut *running.lock() {
+        let given_up = |bound| match &mut *lock(&running.executor) {
             Executor::Threaded(threads) => threads.join(&running.names, bound),
             Executor::Virtual(_) => unreachable!("the graph is threaded"),
         };

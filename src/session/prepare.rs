@@ -24,7 +24,7 @@ use crate::model::equilibrium::static_equilibrium;
 use crate::model::local::{Kind, MOST_EXPLICIT_STEPS, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
-use crate::runtime::{Execution, RateGroup, admit_here};
+use crate::runtime::{Execution, Plan, RateGroup};
 use crate::scene::ProbeSpec;
 use crate::scene::{
     BasisSize, BodySpec, DeviceSpec, Equations, Feedback, InitialSpec, ModelChoice, SafetyStage, Scene, StepKind,
@@ -268,7 +268,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         reexecuted: None,
     };
     // Before anything is started or written.
-    admit_here(&groups(&prepared), prepared.execution)?;
+    Plan::check(prepared.execution, &groups(&prepared))?;
     Ok(prepared)
 }
 

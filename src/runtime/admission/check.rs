@@ -3,16 +3,10 @@
 use crate::error::{GraphError, GraphErrorKind};
 use crate::executor::Execution;
 use crate::rate_group::{OverrunPolicy, RateGroup};
-use crate::system::os;
 use std::collections::BTreeMap;
 
 /// Records carry the group's number in 16 bits; far fewer make sense.
 const MAX_GROUPS: usize = 256;
-
-/// Checks the groups of a graph for this machine.
-pub fn admit_here(groups: &[RateGroup], execution: Execution) -> Result<(), GraphError> {
-    admit(groups, execution, os::cores())
-}
 
 /// Checks the groups of a graph against themselves, each other and `cores` processor cores.
 ///

@@ -101,14 +101,22 @@ pub struct Coincidence {
 }
 
 impl Plan {
+    /// Refuses a graph of these groups that cannot work: what [`of`](Self::of) does first. The system is asked for nothing.
+    ///
+    /// # Errors
+    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused), naming the group and the values; see
+    /// [`RuntimeBuilder::build`](crate::RuntimeBuilder::build).
+    pub fn check(execution: Execution, groups: &[RateGroup]) -> Result<(), GraphError> {
+        admit(groups, execution, os::cores())
+    }
+
     /// The plan of a graph of these groups. The system is asked, on short-lived threads, for what a threaded run would
     /// ask it for; nothing else is touched.
     ///
     /// # Errors
     /// As [`RuntimeBuilder::build`](crate::RuntimeBuilder::build): a graph that cannot work has no plan.
     pub fn of(execution: Execution, groups: &[RateGroup]) -> Result<Self, GraphError> {
-        let cores = os::cores();
-        admit(groups, execution, cores)?;
+        Self::check(execution, groups)?;
         let plans: Vec<_> = groups.iter().map(|group| GroupPlan::of(group, execution)).collect();
         let mut core_load = BTreeMap::new();
         for (cpu, load) in plans.iter().filter_map(|plan| Some((plan.cpu?, plan.utilisation()?))) {
@@ -116,7 +124,7 @@ impl Plan {
         }
         Ok(Self {
             execution,
-            cores,
+            cores: os::cores(),
             total_load: plans.iter().filter_map(GroupPlan::utilisation).sum(),
             core_load,
             coincidences: coincidences(groups, execution),

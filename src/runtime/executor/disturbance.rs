@@ -3,7 +3,6 @@
 use crate::accounting::timeline::{Wake, WokenBy};
 use crate::group::group_run::GroupRun;
 use crate::time::Nanos;
-use std::fmt;
 
 /// What goes wrong with one release in virtual time; nothing by default. See
 /// [`RuntimeBuilder::disturb`](crate::RuntimeBuilder::disturb).
@@ -34,11 +33,7 @@ impl Disturb {
     }
 }
 
-impl fmt::Debug for Disturb {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Disturb").finish_non_exhaustive()
-    }
-}
+impl_debug!(Disturb);
 
 /// Plans when a group of virtual time wakes next. Without a disturbance that is when its release is due.
 #[derive(Debug)]

@@ -12,19 +12,18 @@
 use crate::actor::{Phase, TickContext};
 use crate::ports::hot_swap::Swappable;
 use crate::ports::port_state::{Looks, PortPlan, UseRecorder, WriterGroup};
-use crate::ports::virtual_exchange::{SharedFlight, VirtualReader, VirtualWriter};
-use crate::primitives::exchange::{ExchangeReader, ExchangeWriter};
+use crate::ports::virtual_exchange::{VirtualReader, VirtualWriter};
+use crate::primitives::exchange::{ExchangeReader, ExchangeWriter, Stamped};
 use crate::primitives::fenced_counter::FencedCounter;
 use crate::records::port_use::PortUseKind;
 use crate::time::Nanos;
-use std::fmt;
 
-enum WriterKind<T> {
+pub(crate) enum WriterKind<T> {
     Threaded(Swappable<ExchangeWriter<T>>),
     Virtual(VirtualWriter<T>),
 }
 
-enum ReaderKind<T> {
+pub(crate) enum ReaderKind<T> {
     Threaded(Swappable<ExchangeReader<T>>),
     Virtual(VirtualReader<T>),
 }
@@ -45,14 +44,8 @@ pub struct Reader<T> {
 }
 
 impl<T> Writer<T> {
-    pub(crate) fn threaded(plan: &PortPlan, half: Swappable<ExchangeWriter<T>>, versions: FencedCounter) -> Self {
-        Self { kind: WriterKind::Threaded(half), versions, group: plan.group.clone() }
-    }
-
-    /// Fences the writer that had these versions.
-    pub(crate) fn in_virtual_time(plan: &PortPlan, flight: &SharedFlight<T>, versions: &mut FencedCounter) -> Self {
-        let kind = WriterKind::Virtual(VirtualWriter::new(flight));
-        Self { kind, versions: versions.succeed(), group: plan.group.clone() }
+    pub(crate) fn new(plan: &PortPlan, kind: WriterKind<T>, versions: FencedCounter) -> Self {
+        Self { kind, versions, group: plan.group.clone() }
     }
 
     /// The buffer to write the next value into; it holds an old value, of no particular age.
@@ -83,15 +76,7 @@ impl<T> Writer<T> {
 }
 
 impl<T> Reader<T> {
-    pub(crate) fn threaded(plan: &PortPlan, half: Swappable<ExchangeReader<T>>) -> Self {
-        Self::of(plan, ReaderKind::Threaded(half))
-    }
-
-    pub(crate) fn in_virtual_time(plan: &PortPlan, flight: &SharedFlight<T>) -> Self {
-        Self::of(plan, ReaderKind::Virtual(VirtualReader::new(flight)))
-    }
-
-    fn of(plan: &PortPlan, kind: ReaderKind<T>) -> Self {
+    pub(crate) fn new(plan: &PortPlan, kind: ReaderKind<T>) -> Self {
         let took = plan.recorder(PortUseKind::Took);
         Self { kind, group: plan.group.clone(), looks: Looks::default(), took }
     }
@@ -121,20 +106,17 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn get(&self) -> &T {
-        match &self.kind {
-            ReaderKind::Threaded(reader) => reader.half().get(),
-            ReaderKind::Virtual(reader) => reader.get(),
-        }
+        &self.held().value
     }
 
-    /// The same to change or to swap out: the reader owns the buffer until the next refresh.
+    /// The value of the last refresh, to change or to swap out: the reader owns the buffer until the next refresh.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn get_mut(&mut self) -> &mut T {
         match &mut self.kind {
             ReaderKind::Threaded(reader) => reader.half_mut().get_mut(),
-            ReaderKind::Virtual(reader) => reader.get_mut(),
+            ReaderKind::Virtual(reader) => &mut reader.held_mut().value,
         }
     }
 
@@ -143,10 +125,7 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn version(&self) -> u64 {
-        match &self.kind {
-            ReaderKind::Threaded(reader) => reader.half().version(),
-            ReaderKind::Virtual(reader) => reader.version(),
-        }
+        self.held().version
     }
 
     /// The scheduled time of the release that published the value; zero before the first.
@@ -154,21 +133,17 @@ impl<T> Reader<T> {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn published(&self) -> Nanos {
+        self.held().published
+    }
+
+    fn held(&self) -> &Stamped<T> {
         match &self.kind {
-            ReaderKind::Threaded(reader) => reader.half().published(),
-            ReaderKind::Virtual(reader) => reader.published(),
+            ReaderKind::Threaded(reader) => reader.half().held(),
+            ReaderKind::Virtual(reader) => reader.held(),
         }
     }
 }
 
-impl<T> fmt::Debug for Writer<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Writer").finish_non_exhaustive()
-    }
-}
+impl_debug!(Writer<T>);
 
-impl<T> fmt::Debug for Reader<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Reader").field("version", &self.version()).finish_non_exhaustive()
-    }
-}
+impl_debug!(Reader<T>, "version": |own| own.version());

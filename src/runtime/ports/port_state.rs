@@ -2,10 +2,10 @@
 //! what has been recorded.
 
 use crate::actor::{Phase, TickContext};
-use crate::primitives::sync::{AtomicUsize, Ordering};
+use crate::primitives::sync::{AtomicUsize, Ordering, lock};
 use crate::records::port_use::{PortUse, PortUseKind};
 use crate::records::recorder::{Recorder, Registry};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// A port, whoever holds its halves: its number and who wants to know what it shows.
 #[derive(Debug)]
@@ -40,8 +40,7 @@ impl PortPlan {
         if !self.recorded {
             return UseRecorder { port: self.port, kind, sequence: 0, recorder: None };
         }
-        // Nothing that can panic half-way runs under the lock.
-        let mut uses = self.uses.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut uses = lock(&self.uses);
         let at = uses.iter().position(|ring| ring.kind == kind);
         let new = self.registry.replace(at.map(|at| uses[at].index), RECORDS);
         let sequence = at.map_or(0, |at| uses[at].before) + new.before;

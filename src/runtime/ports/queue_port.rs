@@ -10,16 +10,15 @@ use crate::ports::hot_swap_queue::{Numbered, SwappableConsumer};
 use crate::ports::port_state::{Looks, PortPlan, UseRecorder, WriterGroup};
 use crate::ports::virtual_queue::{VirtualQueue, VirtualReceiver};
 use crate::primitives::fenced_counter::FencedCounter;
-use crate::primitives::ring::{Consumer, Producer};
+use crate::primitives::ring::Producer;
 use crate::records::port_use::PortUseKind;
-use std::fmt;
 
-enum WriterKind<T> {
+pub(crate) enum WriterKind<T> {
     Threaded(Swappable<Producer<Numbered<T>>>),
     Virtual(VirtualQueue<T>),
 }
 
-enum ReaderKind<T> {
+pub(crate) enum ReaderKind<T> {
     Threaded(SwappableConsumer<T>),
     Virtual(VirtualReceiver<T>),
 }
@@ -46,25 +45,7 @@ pub struct QueueReader<T> {
 }
 
 impl<T: Copy> QueueWriter<T> {
-    pub(crate) fn threaded(
-        plan: &PortPlan,
-        half: Swappable<Producer<Numbered<T>>>,
-        attempts: FencedCounter,
-        drops: FencedCounter,
-    ) -> Self {
-        Self::of(plan, WriterKind::Threaded(half), attempts, drops)
-    }
-
-    pub(crate) fn in_virtual_time(
-        plan: &PortPlan,
-        queue: &VirtualQueue<T>,
-        attempts: FencedCounter,
-        drops: FencedCounter,
-    ) -> Self {
-        Self::of(plan, WriterKind::Virtual(queue.clone()), attempts, drops)
-    }
-
-    fn of(plan: &PortPlan, kind: WriterKind<T>, attempts: FencedCounter, drops: FencedCounter) -> Self {
+    pub(crate) fn new(plan: &PortPlan, kind: WriterKind<T>, attempts: FencedCounter, drops: FencedCounter) -> Self {
         let dropped = plan.recorder(PortUseKind::Dropped);
         Self { kind, group: plan.group.clone(), attempts, drops, dropped }
     }
@@ -101,15 +82,7 @@ impl<T: Copy> QueueWriter<T> {
 }
 
 impl<T: Copy> QueueReader<T> {
-    pub(crate) fn threaded(plan: &PortPlan, half: Swappable<Consumer<Numbered<T>>>) -> Self {
-        Self::of(plan, ReaderKind::Threaded(SwappableConsumer::new(half)))
-    }
-
-    pub(crate) fn in_virtual_time(plan: &PortPlan, queue: &VirtualQueue<T>) -> Self {
-        Self::of(plan, ReaderKind::Virtual(queue.receiver()))
-    }
-
-    fn of(plan: &PortPlan, kind: ReaderKind<T>) -> Self {
+    pub(crate) fn new(plan: &PortPlan, kind: ReaderKind<T>) -> Self {
         let saw = plan.recorder(PortUseKind::Saw);
         Self { kind, group: plan.group.clone(), looks: Looks::default(), visible: 0, recorded: 0, saw }
     }
@@ -155,14 +128,6 @@ impl<T: Copy> QueueReader<T> {
     }
 }
 
-impl<T> fmt::Debug for QueueWriter<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("QueueWriter").field("attempts", &self.attempts.last()).finish_non_exhaustive()
-    }
-}
+impl_debug!(QueueWriter<T>, "attempts": |own| own.attempts.last());
 
-impl<T> fmt::Debug for QueueReader<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("QueueReader").field("visible", &self.visible).finish_non_exhaustive()
-    }
-}
+impl_debug!(QueueReader<T>, "visible": |own| own.visible);

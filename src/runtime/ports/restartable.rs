@@ -4,20 +4,22 @@
 //! still publishes, sends or records is seen by nobody and counted nowhere. So a thread that never returns can be left
 //! behind with its ports.
 
-use crate::ports::exchange_port::{Reader, Writer};
+use crate::executor::Execution;
+use crate::ports::exchange_port::{self, Reader, Writer};
 use crate::ports::hot_swap::{Swappable, Swapper, swappable};
-use crate::ports::hot_swap_queue::Numbered;
+use crate::ports::hot_swap_queue::{Numbered, SwappableConsumer};
 use crate::ports::outlet::{OutletReader, OutletWriter};
 use crate::ports::port_state::PortPlan;
-use crate::ports::queue_port::{QueueReader, QueueWriter};
-use crate::ports::virtual_exchange::SharedFlight;
+use crate::ports::queue_port::{self, QueueReader, QueueWriter};
+use crate::ports::virtual_exchange::{SharedFlight, VirtualReader, VirtualWriter, flight};
 use crate::ports::virtual_queue::VirtualQueue;
 use crate::primitives::exchange::{ExchangeReader, ExchangeWriter, exchange};
 use crate::primitives::fenced_counter::FencedCounter;
 use crate::primitives::ring::{Consumer, Producer, ring};
+use crate::primitives::sync::lock;
 use crate::records::recorder::{Recorder, Registry};
-use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use crate::reexecution::script::ScriptedPort;
+use std::sync::{Arc, Mutex};
 
 /// Two connected halves of which each can be made anew.
 pub(crate) struct Pair<W, R> {
@@ -115,15 +117,16 @@ struct Exchange<T> {
 pub struct ExchangePort<T>(Arc<Mutex<Exchange<T>>>);
 
 impl<T: Send + 'static> ExchangePort<T> {
-    pub(crate) fn threaded(plan: PortPlan, init: impl FnMut() -> T + Send + 'static) -> Self {
-        Self::of(plan, ExchangeParts::Threaded(Box::new(exchange_pair(init))))
-    }
-
-    pub(crate) fn in_virtual_time(plan: PortPlan, flight: SharedFlight<T>) -> Self {
-        Self::of(plan, ExchangeParts::Virtual(flight))
-    }
-
-    fn of(plan: PortPlan, parts: ExchangeParts<T>) -> Self {
+    pub(crate) fn new(
+        execution: Execution,
+        plan: PortPlan,
+        script: Option<ScriptedPort>,
+        init: impl FnMut() -> T + Send + 'static,
+    ) -> Self {
+        let parts = match execution {
+            Execution::Virtual => ExchangeParts::Virtual(flight(script, init)),
+            Execution::Threaded => ExchangeParts::Threaded(Box::new(exchange_pair(init))),
+        };
         Self(Arc::new(Mutex::new(Exchange { plan, parts, versions: FencedCounter::default() })))
     }
 
@@ -136,9 +139,12 @@ impl<T: Send + 'static> ExchangePort<T> {
         match parts {
             ExchangeParts::Threaded(pair) => {
                 let (half, versions) = pair.writer(versions);
-                Writer::threaded(plan, half, versions)
+                Writer::new(plan, exchange_port::WriterKind::Threaded(half), versions)
             }
-            ExchangeParts::Virtual(flight) => Writer::in_virtual_time(plan, flight, versions),
+            ExchangeParts::Virtual(flight) => {
+                let half = exchange_port::WriterKind::Virtual(VirtualWriter::new(flight));
+                Writer::new(plan, half, versions.succeed())
+            }
         }
     }
 
@@ -148,10 +154,11 @@ impl<T: Send + 'static> ExchangePort<T> {
     /// Takes a lock and allocates: for [factories](crate::RuntimeBuilder::restartable).
     pub fn reader(&self) -> Reader<T> {
         let Exchange { plan, parts, .. } = &mut *lock(&self.0);
-        match parts {
-            ExchangeParts::Threaded(pair) => Reader::threaded(plan, pair.reader()),
-            ExchangeParts::Virtual(flight) => Reader::in_virtual_time(plan, flight),
-        }
+        let half = match parts {
+            ExchangeParts::Threaded(pair) => exchange_port::ReaderKind::Threaded(pair.reader()),
+            ExchangeParts::Virtual(flight) => exchange_port::ReaderKind::Virtual(VirtualReader::new(flight)),
+        };
+        Reader::new(plan, half)
     }
 }
 
@@ -179,15 +186,11 @@ struct Queue<T> {
 pub struct QueuePort<T>(Arc<Mutex<Queue<T>>>);
 
 impl<T: Copy + Send + 'static> QueuePort<T> {
-    pub(crate) fn threaded(plan: PortPlan, capacity: usize) -> Self {
-        Self::of(plan, QueueParts::Threaded(Box::new(ring_pair(capacity))))
-    }
-
-    pub(crate) fn in_virtual_time(plan: PortPlan, queue: VirtualQueue<T>) -> Self {
-        Self::of(plan, QueueParts::Virtual(queue))
-    }
-
-    fn of(plan: PortPlan, parts: QueueParts<T>) -> Self {
+    pub(crate) fn new(execution: Execution, plan: PortPlan, script: Option<ScriptedPort>, capacity: usize) -> Self {
+        let parts = match execution {
+            Execution::Virtual => QueueParts::Virtual(VirtualQueue::new(script, capacity)),
+            Execution::Threaded => QueueParts::Threaded(Box::new(ring_pair(capacity))),
+        };
         let queue = Queue { plan, parts, attempts: FencedCounter::default(), drops: FencedCounter::default() };
         Self(Arc::new(Mutex::new(queue)))
     }
@@ -198,15 +201,14 @@ impl<T: Copy + Send + 'static> QueuePort<T> {
     /// Takes a lock and allocates: for [factories](crate::RuntimeBuilder::restartable).
     pub fn writer(&self) -> QueueWriter<T> {
         let Queue { plan, parts, attempts, drops } = &mut *lock(&self.0);
-        match parts {
+        let (half, attempts) = match parts {
             QueueParts::Threaded(pair) => {
                 let (half, attempts) = pair.writer(attempts);
-                QueueWriter::threaded(plan, half, attempts, drops.succeed())
+                (queue_port::WriterKind::Threaded(half), attempts)
             }
-            QueueParts::Virtual(queue) => {
-                QueueWriter::in_virtual_time(plan, queue, attempts.succeed(), drops.succeed())
-            }
-        }
+            QueueParts::Virtual(queue) => (queue_port::WriterKind::Virtual(queue.clone()), attempts.succeed()),
+        };
+        QueueWriter::new(plan, half, attempts, drops.succeed())
     }
 
     /// The receiving half; fences the one taken before. Samples that it had not taken are lost.
@@ -215,10 +217,11 @@ impl<T: Copy + Send + 'static> QueuePort<T> {
     /// Takes a lock and allocates: for [factories](crate::RuntimeBuilder::restartable).
     pub fn reader(&self) -> QueueReader<T> {
         let Queue { plan, parts, .. } = &mut *lock(&self.0);
-        match parts {
-            QueueParts::Threaded(pair) => QueueReader::threaded(plan, pair.reader()),
-            QueueParts::Virtual(queue) => QueueReader::in_virtual_time(plan, queue),
-        }
+        let half = match parts {
+            QueueParts::Threaded(pair) => queue_port::ReaderKind::Threaded(SwappableConsumer::new(pair.reader())),
+            QueueParts::Virtual(queue) => queue_port::ReaderKind::Virtual(queue.receiver()),
+        };
+        QueueReader::new(plan, half)
     }
 }
 
@@ -284,43 +287,19 @@ impl RecorderPort {
     }
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // A panic under the lock can only come from a user's `init`, which leaves the port as it was.
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+/// Clones of a port are the same port, whatever it carries.
+macro_rules! shared_port {
+    ($port:ident) => {
+        impl<T> Clone for $port<T> {
+            fn clone(&self) -> Self {
+                Self(Arc::clone(&self.0))
+            }
+        }
+
+        impl_debug!($port<T>);
+    };
 }
 
-impl<T> Clone for ExchangePort<T> {
-    fn clone(&self) -> Self {
-        Self(Arc::clone(&self.0))
-    }
-}
-
-impl<T> Clone for QueuePort<T> {
-    fn clone(&self) -> Self {
-        Self(Arc::clone(&self.0))
-    }
-}
-
-impl<T> Clone for OutletPort<T> {
-    fn clone(&self) -> Self {
-        Self(Arc::clone(&self.0))
-    }
-}
-
-impl<T> fmt::Debug for ExchangePort<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("ExchangePort").finish_non_exhaustive()
-    }
-}
-
-impl<T> fmt::Debug for QueuePort<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("QueuePort").finish_non_exhaustive()
-    }
-}
-
-impl<T> fmt::Debug for OutletPort<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("OutletPort").finish_non_exhaustive()
-    }
-}
+shared_port!(ExchangePort);
+shared_port!(QueuePort);
+shared_port!(OutletPort);

@@ -3,27 +3,23 @@
 //! One thread runs everything, in time order, so the locks here are never contended; they only make the halves `Send`.
 
 use crate::actor::{Phase, TickContext};
+use crate::primitives::exchange::Stamped;
+use crate::primitives::sync::lock;
 use crate::reexecution::script::ScriptedPort;
 use crate::time::Nanos;
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-struct Versioned<T> {
-    value: T,
-    version: u64,
-    published: Nanos,
-}
+use std::sync::{Arc, Mutex};
 
 struct Publication<T> {
     visible_at: Nanos,
-    buffer: Box<Versioned<T>>,
+    buffer: Box<Stamped<T>>,
 }
 
 pub(crate) struct Flight<T> {
     /// In order of publication and of visibility.
     waiting: VecDeque<Publication<T>>,
     /// Buffers that nobody needs, kept for the writer: once warm, nothing is allocated.
-    free: Vec<Box<Versioned<T>>>,
+    free: Vec<Box<Stamped<T>>>,
     /// Readers that the port has had; the last one is in force.
     readers: u64,
     init: Box<dyn FnMut() -> T + Send>,
@@ -32,11 +28,11 @@ pub(crate) struct Flight<T> {
 }
 
 impl<T> Flight<T> {
-    fn initial(&mut self) -> Box<Versioned<T>> {
-        Box::new(Versioned { value: (self.init)(), version: 0, published: Nanos::ZERO })
+    fn initial(&mut self) -> Box<Stamped<T>> {
+        Box::new(Stamped::initial((self.init)()))
     }
 
-    fn fresh(&mut self) -> Box<Versioned<T>> {
+    fn fresh(&mut self) -> Box<Stamped<T>> {
         self.free.pop().unwrap_or_else(|| self.initial())
     }
 
@@ -65,25 +61,20 @@ impl<T> Flight<T> {
     }
 
     /// The newest publication for which `is_visible` holds; it holds for older ones too.
-    fn newest(&mut self, is_visible: impl Fn(&Publication<T>) -> bool) -> Option<Box<Versioned<T>>> {
+    fn newest(&mut self, is_visible: impl Fn(&Publication<T>) -> bool) -> Option<Box<Stamped<T>>> {
         let visible = self.waiting.partition_point(is_visible);
         self.recycle(visible.checked_sub(1)?);
         self.waiting.pop_front().map(|newest| newest.buffer)
     }
 
     /// The publication of this version; older ones are overtaken.
-    fn version(&mut self, version: u64) -> Option<Box<Versioned<T>>> {
+    fn version(&mut self, version: u64) -> Option<Box<Stamped<T>>> {
         self.recycle(self.waiting.partition_point(|old| old.buffer.version < version));
         self.waiting.pop_front_if(|first| first.buffer.version == version).map(|found| found.buffer)
     }
 }
 
 pub(crate) type SharedFlight<T> = Arc<Mutex<Flight<T>>>;
-
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // A panic while the lock is held can only come from a user's `init`, which leaves the queues whole.
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 pub(crate) fn flight<T: Send>(
     script: Option<ScriptedPort>,
@@ -95,7 +86,7 @@ pub(crate) fn flight<T: Send>(
 
 pub(crate) struct VirtualWriter<T> {
     shared: SharedFlight<T>,
-    buffer: Box<Versioned<T>>,
+    buffer: Box<Stamped<T>>,
 }
 
 impl<T> VirtualWriter<T> {
@@ -124,7 +115,7 @@ impl<T> VirtualWriter<T> {
 
 pub(crate) struct VirtualReader<T> {
     shared: SharedFlight<T>,
-    buffer: Box<Versioned<T>>,
+    buffer: Box<Stamped<T>>,
     /// Its number among the readers of the port.
     number: u64,
 }
@@ -162,20 +153,14 @@ impl<T> VirtualReader<T> {
         true
     }
 
-    pub(crate) fn get(&self) -> &T {
-        &self.buffer.value
+    /// The value of the last refresh.
+    pub(crate) fn held(&self) -> &Stamped<T> {
+        &self.buffer
     }
 
-    pub(crate) fn get_mut(&mut self) -> &mut T {
-        &mut self.buffer.value
-    }
-
-    pub(crate) fn version(&self) -> u64 {
-        self.buffer.version
-    }
-
-    pub(crate) fn published(&self) -> Nanos {
-        self.buffer.published
+    /// The value of the last refresh, to change.
+    pub(crate) fn held_mut(&mut self) -> &mut Stamped<T> {
+        &mut self.buffer
     }
 }
 
@@ -203,11 +188,11 @@ mod tests {
         writer.publish_as(5, &at(5, 5));
         let mut reader = VirtualReader::new(&shared);
         assert!(!reader.refresh(&at(5, 5), false));
-        assert_eq!((*reader.get(), reader.version(), reader.published()), (5, 0, Nanos::ZERO));
+        assert_eq!((reader.held().value, reader.held().version, reader.held().published), (5, 0, Nanos::ZERO));
         *writer.buffer() = 60;
         writer.publish_as(6, &at(6, 6));
         assert!(!old.refresh(&at(6, 6), false) && reader.refresh(&at(6, 6), false));
-        assert_eq!((*reader.get(), reader.version()), (60, 6));
+        assert_eq!((reader.held().value, reader.held().version), (60, 6));
     }
 
     proptest! {
@@ -222,10 +207,10 @@ mod tests {
                 now += pause;
                 if looks {
                     let visible = published.iter().filter(|(_, at)| *at <= now).map(|(version, _)| *version).max();
-                    let before = reader.version();
+                    let before = reader.held().version;
                     let expected = visible.unwrap_or(0).max(before);
                     prop_assert_eq!(reader.refresh(&at(now, now), false), expected > before);
-                    prop_assert_eq!((reader.version(), *reader.get()), (expected, expected));
+                    prop_assert_eq!((reader.held().version, reader.held().value), (expected, expected));
                 } else {
                     let version = published.len() as u64 + 1;
                     *writer.buffer() = version;

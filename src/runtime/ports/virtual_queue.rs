@@ -4,8 +4,8 @@
 
 use crate::actor::{Phase, TickContext};
 use crate::ports::hot_swap_queue::Numbered;
-use crate::ports::virtual_exchange::lock;
 use crate::primitives::ring::rounded;
+use crate::primitives::sync::lock;
 use crate::reexecution::script::ScriptedPort;
 use crate::time::Nanos;
 use std::collections::VecDeque;

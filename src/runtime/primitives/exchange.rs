@@ -25,7 +25,6 @@
 
 use crate::primitives::sync::{AtomicUsize, CachePadded, Ordering, UnsafeCell};
 use crate::time::Nanos;
-use std::fmt;
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -33,14 +32,22 @@ use std::sync::Arc;
 const NEW: usize = 4;
 const INDEX: usize = 3;
 
-struct Slot<T> {
-    value: T,
-    version: u64,
-    published: Nanos,
+/// A value with its version, counting from 1, and the time that it was published at.
+pub(crate) struct Stamped<T> {
+    pub(crate) value: T,
+    pub(crate) version: u64,
+    pub(crate) published: Nanos,
+}
+
+impl<T> Stamped<T> {
+    /// What is there before the first publication.
+    pub(crate) fn initial(value: T) -> Self {
+        Self { value, version: 0, published: Nanos::ZERO }
+    }
 }
 
 struct Shared<T> {
-    slots: [CachePadded<UnsafeCell<Slot<T>>>; 3],
+    slots: [CachePadded<UnsafeCell<Stamped<T>>>; 3],
     /// The index of the slot that neither side owns, and [`NEW`].
     in_flight: CachePadded<AtomicUsize>,
     #[cfg(all(test, loom))]
@@ -70,7 +77,7 @@ impl<T> Shared<T> {
 /// # Real-time
 /// Not real-time safe: allocates.
 pub fn exchange<T: Send>(mut init: impl FnMut() -> T) -> (ExchangeWriter<T>, ExchangeReader<T>) {
-    let mut slot = || CachePadded(UnsafeCell::new(Slot { value: init(), version: 0, published: Nanos::ZERO }));
+    let mut slot = || CachePadded(UnsafeCell::new(Stamped::initial(init())));
     pair(Shared {
         slots: [slot(), slot(), slot()],
         in_flight: CachePadded(AtomicUsize::new(1)),
@@ -128,11 +135,7 @@ impl<T> ExchangeWriter<T> {
     }
 }
 
-impl<T> fmt::Debug for ExchangeWriter<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("ExchangeWriter").field("version", &self.version).finish_non_exhaustive()
-    }
-}
+impl_debug!(ExchangeWriter<T>, "version": |own| own.version);
 
 /// The reading side of an [`exchange`]. It owns its buffer until the next successful refresh.
 ///
@@ -175,7 +178,7 @@ impl<T> ExchangeReader<T> {
     /// Wait-free, real-time safe.
     #[inline]
     pub fn get(&self) -> &T {
-        &self.slot().value
+        &self.held().value
     }
 
     /// The same to change or to swap out: the reader owns the buffer until the next refresh.
@@ -184,7 +187,7 @@ impl<T> ExchangeReader<T> {
     /// Wait-free, real-time safe.
     #[inline]
     pub fn get_mut(&mut self) -> &mut T {
-        &mut self.slot_mut().value
+        &mut self.held_mut().value
     }
 
     /// Takes over what the reader of another exchange holds, with its version and its stamp; that one gets ours.
@@ -192,7 +195,7 @@ impl<T> ExchangeReader<T> {
     /// # Real-time
     /// Wait-free, real-time safe: it moves two values.
     pub(crate) fn adopt(&mut self, other: &mut Self) {
-        std::mem::swap(self.slot_mut(), other.slot_mut());
+        std::mem::swap(self.held_mut(), other.held_mut());
     }
 
     /// The version of the value, counting from 1; 0 before the first.
@@ -201,7 +204,7 @@ impl<T> ExchangeReader<T> {
     /// Wait-free, real-time safe.
     #[inline]
     pub fn version(&self) -> u64 {
-        self.slot().version
+        self.held().version
     }
 
     /// The stamp that the value was published with; zero before the first.
@@ -210,27 +213,23 @@ impl<T> ExchangeReader<T> {
     /// Wait-free, real-time safe.
     #[inline]
     pub fn published(&self) -> Nanos {
-        self.slot().published
+        self.held().published
     }
 
     #[inline]
-    fn slot(&self) -> &Slot<T> {
+    pub(crate) fn held(&self) -> &Stamped<T> {
         // SAFETY: `slot` is ours until the next swap, which needs `&mut self`.
         self.shared.slots[self.slot].with(|slot| unsafe { &*slot })
     }
 
     #[inline]
-    fn slot_mut(&mut self) -> &mut Slot<T> {
+    pub(crate) fn held_mut(&mut self) -> &mut Stamped<T> {
         // SAFETY: `slot` is ours until the next swap, and `&mut self` keeps the reference from outliving that.
         self.shared.slots[self.slot].with_mut(|slot| unsafe { &mut *slot })
     }
 }
 
-impl<T> fmt::Debug for ExchangeReader<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("ExchangeReader").field("version", &self.version()).finish_non_exhaustive()
-    }
-}
+impl_debug!(ExchangeReader<T>, "version": |own| own.version());
 
 #[cfg(all(test, not(loom)))]
 mod tests {
@@ -312,7 +311,7 @@ mod loom_tests {
         // Bounded preemptions keep the model small; known bugs of lock-free code need two or three.
         builder.preemption_bound = Some(3);
         builder.check(move || {
-            let slot = |_| CachePadded(UnsafeCell::new(Slot { value: 0, version: 0, published: Nanos::ZERO }));
+            let slot = |_| CachePadded(UnsafeCell::new(Stamped::initial(0)));
             let slots = std::array::from_fn(slot);
             let (mut writer, mut reader) =
                 pair(Shared { slots, in_flight: CachePadded(AtomicUsize::new(1)), ordering });

@@ -92,11 +92,7 @@ impl HistogramWriter {
     }
 }
 
-impl fmt::Debug for HistogramWriter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("HistogramWriter").finish_non_exhaustive()
-    }
-}
+impl_debug!(HistogramWriter);
 
 /// The side that looks, from any thread, as often as it likes.
 #[derive(Clone)]

@@ -12,7 +12,6 @@
 //! ```
 
 use crate::primitives::sync::{AtomicU64, AtomicUsize, CachePadded, Ordering, UnsafeCell};
-use std::fmt;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 
@@ -177,11 +176,7 @@ impl<T: Copy> Producer<T> {
     }
 }
 
-impl<T> fmt::Debug for Producer<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Producer").field("capacity", &self.slots.len()).finish_non_exhaustive()
-    }
-}
+impl_debug!(Producer<T>, "capacity": |own| own.slots.len());
 
 /// What a producer has done up to one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -291,11 +286,7 @@ impl<T: Copy> Consumer<T> {
     }
 }
 
-impl<T> fmt::Debug for Consumer<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Consumer").field("capacity", &self.slots.len()).finish_non_exhaustive()
-    }
-}
+impl_debug!(Consumer<T>, "capacity": |own| own.slots.len());
 
 #[cfg(all(test, not(loom)))]
 mod tests {

@@ -1,10 +1,10 @@
 //! How records leave an actor: a ring per source, drained by a logger that merges them by time.
 
 use crate::primitives::ring::{Consumer, Producer, Sums, ring};
-use crate::primitives::sync::{AtomicBool, Ordering};
+use crate::primitives::sync::{AtomicBool, Ordering, lock};
 use crate::records::record::Record;
 use crate::time::Nanos;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// All rings of a graph. The lock is taken when a ring is added and by the logger, never by a real-time tick.
 #[derive(Debug)]
@@ -96,7 +96,7 @@ impl Registry {
     /// nobody.
     pub(crate) fn replace(&self, old: Option<usize>, capacity: usize) -> NewRing {
         let (producer, consumer) = ring(capacity);
-        let mut rings = self.rings();
+        let mut rings = lock(&self.rings);
         let index = old.unwrap_or(rings.all.len());
         let mut before = 0;
         if old.is_some() {
@@ -130,13 +130,8 @@ impl Registry {
         if !self.wanted() {
             return 0;
         }
-        let rings = self.rings();
+        let rings = lock(&self.rings);
         rings.lost + rings.all.iter().map(|source| source.ring.lost()).sum::<u64>()
-    }
-
-    fn rings(&self) -> MutexGuard<'_, Rings> {
-        // Nothing that can panic half-way runs under the lock.
-        self.rings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -167,7 +162,7 @@ impl RecordDrain {
     /// Takes a lock and allocates: for loggers.
     pub fn drain(&mut self, records: &mut Vec<Record>) {
         let first = records.len();
-        let rings = &mut *self.0.rings();
+        let rings = &mut *lock(&self.0.rings);
         records.append(&mut rings.kept);
         for index in 0..rings.all.len() {
             let gap = rings.all[index].drain(records);
@@ -189,7 +184,7 @@ impl RecordDrain {
     /// # Real-time
     /// Takes a lock: for loggers.
     pub fn take_gap(&mut self) -> Option<RecordGap> {
-        self.0.rings().gap.take()
+        lock(&self.0.rings).gap.take()
     }
 }
 
@@ -257,6 +252,6 @@ mod tests {
         drain.drain(&mut records);
         let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|e| e.code).collect();
         assert_eq!(codes, [1, 2, 3, 4, 5, 8]);
-        assert_eq!(registry.rings().all.len(), 1);
+        assert_eq!(lock(&registry.rings).all.len(), 1);
     }
 }

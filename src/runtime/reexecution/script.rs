@@ -3,7 +3,7 @@
 //! The executor and all ports share one script. One thread runs everything, so its lock is never contended.
 
 use crate::actor::TickContext;
-use crate::ports::virtual_exchange::lock;
+use crate::primitives::sync::lock;
 use crate::records::port_use::PortUse;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};

@@ -14,7 +14,6 @@ use crate::reports::live::LiveReader;
 use crate::reports::report::{GroupReport, RuntimeFault};
 use crate::time::Nanos;
 use std::any::Any;
-use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Makes the actors of a group anew, with fresh halves of their ports.
@@ -140,8 +139,4 @@ impl Restarter {
     }
 }
 
-impl fmt::Debug for Restarter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Restarter").field("policy", &self.policy).finish_non_exhaustive()
-    }
-}
+impl_debug!(Restarter, "policy": |own| own.policy);

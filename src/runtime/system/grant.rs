@@ -1,9 +1,10 @@
 //! What the system granted: asked for and given, so that a refused privilege is reported and never silent.
 
+use crate::primitives::sync::lock;
 use crate::rate_group::RateGroup;
 use crate::system::os;
 use crate::system::wait::Waiter;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// What a run got from the system. Plain texts and numbers, easy to serialise.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -60,23 +61,18 @@ impl GrantHandle {
     /// # Real-time
     /// Takes a lock and allocates: for loggers.
     pub fn get(&self) -> Option<SystemGrant> {
-        self.lock().clone()
+        lock(&self.0).clone()
     }
 
     pub(crate) fn set(&self, grant: SystemGrant) {
-        *self.lock() = Some(grant);
+        *lock(&self.0) = Some(grant);
     }
 
     /// A group has got a new thread.
     pub(crate) fn replace(&self, group: usize, grant: GroupGrant) {
-        if let Some(place) = self.lock().as_mut().and_then(|system| system.groups.get_mut(group)) {
+        if let Some(place) = lock(&self.0).as_mut().and_then(|system| system.groups.get_mut(group)) {
             *place = grant;
         }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Option<SystemGrant>> {
-        // Nothing panics while it is held.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
