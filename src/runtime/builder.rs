@@ -31,6 +31,19 @@ enum Cast {
 
 /// Collects the ports and rate groups of a graph; see [`Runtime::builder`].
 ///
+/// A graph that cannot work is refused with the values that say why:
+///
+/// ```
+/// use palpate_runtime::{Execution, Nanos, RateGroup, Runtime};
+///
+/// let mut graph = Runtime::builder(Execution::Threaded);
+/// for name in ["a", "b"] {
+///     graph.group(RateGroup::hz(1000).name(name).pin(0).budget(Nanos(700_000)), vec![]);
+/// }
+/// let refused = graph.build().unwrap_err().to_string();
+/// assert!(refused.starts_with("the budgets on core 0 need 140.0 % (`a` 700µs of 1ms + `b` 700µs of 1ms)"));
+/// ```
+///
 /// # Real-time
 /// Not real-time safe: allocates. It is gone before anything ticks.
 pub struct RuntimeBuilder {
@@ -97,7 +110,8 @@ impl RuntimeBuilder {
         (port.writer(), port.reader())
     }
 
-    /// As [`exchange`](Self::exchange), with halves that a [restarted](Self::restartable) group can take again.
+    /// A port for the newest value of a large state, with halves that a [restarted](Self::restartable) group can take
+    /// again.
     pub fn exchange_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> ExchangePort<T> {
         let (plan, script) = self.plan_port();
         ExchangePort::new(self.execution, plan, script, init)
@@ -111,7 +125,7 @@ impl RuntimeBuilder {
         (port.writer(), port.reader())
     }
 
-    /// As [`queue`](Self::queue), with halves that a [restarted](Self::restartable) group can take again.
+    /// A port for ordered samples, with halves that a [restarted](Self::restartable) group can take again.
     pub fn queue_port<T: Copy + Send + 'static>(&mut self, capacity: usize) -> QueuePort<T> {
         let (plan, script) = self.plan_port();
         QueuePort::new(self.execution, plan, script, capacity)
@@ -122,7 +136,8 @@ impl RuntimeBuilder {
         outlet(init)
     }
 
-    /// As [`outlet`](Self::outlet), with halves that a [restarted](Self::restartable) group can take again.
+    /// A port for the newest value for a thread outside the graph, with halves that a [restarted](Self::restartable)
+    /// group can take again.
     pub fn outlet_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> OutletPort<T> {
         OutletPort::new(init)
     }
@@ -132,7 +147,7 @@ impl RuntimeBuilder {
         self.registry.recorder(capacity)
     }
 
-    /// As [`recorder`](Self::recorder), one that a [restarted](Self::restartable) group can take again.
+    /// A record sink for one actor that a [restarted](Self::restartable) group can take again.
     pub fn recorder_port(&mut self, capacity: usize) -> RecorderPort {
         RecorderPort::new(&self.registry, capacity)
     }
@@ -154,17 +169,19 @@ impl RuntimeBuilder {
         self
     }
 
-    /// Adds a rate group whose actors are made by `factory`: once when the graph is built, and again whenever one of them
-    /// panicked, reported a fault or did not return, as often as `restart` allows. The other groups run on meanwhile. What
-    /// stops the run by its overrun policy, or fails while it winds down, is not started again; an observer cannot be.
+    /// Adds a rate group whose actors are made by `factory`: once when the graph is built, and again whenever one of
+    /// them panicked, reported a fault or did not return, as often as `restart` allows. The other groups run on
+    /// meanwhile. What stops the run by its overrun policy, or fails while it winds down, is not started again; an
+    /// observer cannot be.
     ///
     /// The factory takes the halves of the actors' ports from ports that can be taken again
-    /// ([`exchange_port`](Self::exchange_port) and the like), which cuts the failed actors off. Periods that passed meanwhile
-    /// are skipped with the cause [`Fault`](crate::SlipCause::Fault), under every overrun policy.
+    /// ([`exchange_port`](Self::exchange_port) and the like), which cuts the failed actors off. Periods that passed
+    /// meanwhile are skipped with the cause [`Fault`](crate::SlipCause::Fault), under every overrun policy.
     ///
     /// # Real-time
-    /// On threads the factory runs, and the new actors are started, on the thread that then takes the group over, before it
-    /// is given its policy and core: both may allocate and take their time, and nobody waits for them but a stop.
+    /// On threads the factory runs, and the new actors are started, on the thread that then takes the group over,
+    /// before it is given its policy and core: both may allocate and take their time, and nobody waits for them but a
+    /// stop.
     pub fn restartable(
         &mut self,
         group: RateGroup,
@@ -177,8 +194,8 @@ impl RuntimeBuilder {
 
     /// Virtual time: makes the releases of a group late, as `disturbance` says.
     ///
-    /// It is asked once per wait, in the order of the releases, with the number of the release that the group waits for. If
-    /// the group wakes so late that another release runs, what was said holds for that one.
+    /// It is asked once per wait, in the order of the releases, with the number of the release that the group waits
+    /// for. If the group wakes so late that another release runs, what was said holds for that one.
     ///
     /// # Real-time
     /// Asked by virtual time only, between two releases: may allocate.
@@ -207,13 +224,14 @@ impl RuntimeBuilder {
     /// Checks the graph and makes it ready to start; the builder is empty afterwards.
     ///
     /// # Errors
-    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused), naming the group and the values, for a graph that cannot work:
-    /// a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all cores together, on
-    /// threads a latency beyond the period, equal real-time priorities pinned to one core, a priority outside 1 to 99, a
-    /// name used twice, no group that is not an observer; an overrun policy that says nothing or contradicts the release
-    /// mode, a watchdog below a period, a device-paced group without an actor; a disturbance of threads, of no group, or a
-    /// second one of the same; a [measurement](Self::measure_cost) of threads. Or what a [factory](Self::restartable) says. For a re-execution also if the recording is one
-    /// of another graph, and [`GraphErrorKind::Recording`](crate::GraphErrorKind::Recording) if it has gaps.
+    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused), naming the group and the values, for a graph that
+    /// cannot work: a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all
+    /// cores together, on threads a latency beyond the period, equal real-time priorities pinned to one core, a
+    /// priority outside 1 to 99, a name used twice, no group that is not an observer; an overrun policy that says
+    /// nothing or contradicts the release mode, a watchdog below a period, a device-paced group without an actor; a
+    /// disturbance of threads, of no group, or a second one of the same; a [measurement](Self::measure_cost) of
+    /// threads. Or what a [factory](Self::restartable) says. For a re-execution also if the recording is one of another
+    /// graph, and [`GraphErrorKind::Recording`](crate::GraphErrorKind::Recording) if it has gaps.
     pub fn build(&mut self) -> Result<Runtime, GraphError> {
         for (index, (group, _)) in self.groups.iter_mut().enumerate() {
             if group.name.is_empty() {
@@ -270,7 +288,8 @@ impl RuntimeBuilder {
         self.groups.iter().map(|(group, _)| group.clone()).collect()
     }
 
-    /// An observer ends after all others: what fails in it is told when it ends, and there is nothing it could go on with.
+    /// An observer ends after all others: what fails in it is told when it ends, and there is nothing it could go on
+    /// with.
     fn check_restartable(&self) -> Result<(), GraphError> {
         let wrong = |(group, cast): &&(RateGroup, Cast)| group.observer && matches!(cast, Cast::Restartable(..));
         self.groups.iter().find(wrong).map_or(Ok(()), |(group, _)| {

@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-/// What an actor's start, or a factory of actors, may fail with: any error.
+/// Any error: an actor's start and a factory of actors may fail with it.
 pub type ActorError = Box<dyn std::error::Error + Send + Sync>;
 
-/// What kind of [`GraphError`] it is, as far as a program can act on it.
+/// The kind of a [`GraphError`], as far as a program can act on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum GraphErrorKind {

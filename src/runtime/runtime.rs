@@ -27,6 +27,18 @@ const POLL: Duration = Duration::from_millis(5);
 
 /// A graph that was checked and can be started.
 ///
+/// ```
+/// use palpate_runtime::{Execution, Nanos, Outcome, RateGroup, Runtime, actor_fn};
+/// use std::time::Duration;
+///
+/// let mut graph = Runtime::builder(Execution::Virtual);
+/// graph.group(RateGroup::hz(100), vec![actor_fn("idle", |_| Outcome::Continue)]).until(Nanos(1_000_000_000));
+/// let running = graph.build()?.start()?;
+/// running.wait_for(Duration::MAX);
+/// assert_eq!(running.stop().groups[0].released, 101);
+/// # Ok::<(), palpate_runtime::GraphError>(())
+/// ```
+///
 /// # Real-time
 /// Not real-time safe: allocates, and starting it makes threads.
 pub struct Runtime {
@@ -47,7 +59,8 @@ impl Runtime {
     /// refuse now. Nothing is started.
     ///
     /// # Errors
-    /// [`GraphErrorKind::Refused`] if the process has been moved to fewer cores since the graph was built and no longer fits.
+    /// [`GraphErrorKind::Refused`] if the process has been moved to fewer cores since the graph was built and no longer
+    /// fits.
     pub fn plan(&self) -> Result<Plan, GraphError> {
         Plan::of(self.execution, &self.specs())
     }
@@ -174,7 +187,7 @@ impl RunningGraph {
         }
     }
 
-    /// Every group as it is now, in graph order: counts, lateness and execution time since the start.
+    /// The state of every group as it is now, in graph order: counts, lateness and execution time since the start.
     ///
     /// # Real-time
     /// Never disturbs a tick: wait-free on both sides. It allocates: for threads that show it.
@@ -190,7 +203,7 @@ impl RunningGraph {
         self.control.request_stop();
     }
 
-    /// A handle that asks for the same from another thread, also from one that handles signals.
+    /// A handle that asks the run to stop from another thread, also from one that handles signals.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -198,8 +211,8 @@ impl RunningGraph {
         StopHandle(Arc::clone(&self.control))
     }
 
-    /// Stops the run in order and reports. A fault of an actor is in the report, not an error; so is a group that did not
-    /// end within [`STOP_BOUND`] and was given up with its thread.
+    /// Stops the run in order and reports. A fault of an actor is in the report, not an error; so is a group that did
+    /// not end within [`STOP_BOUND`] and was given up with its thread.
     ///
     /// # Real-time
     /// Not real-time safe: waits for every group. Never from an actor: its own group is one of them.

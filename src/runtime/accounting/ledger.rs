@@ -98,8 +98,8 @@ impl Ledger {
         self.free
     }
 
-    /// From when on a device's frame runs the next release or a later one. An earlier one comes in a period that has had
-    /// its release.
+    /// From when on a device's frame runs the next release or a later one. An earlier one comes in a period that has
+    /// had its release.
     pub(crate) fn next_frame_from(&self) -> Nanos {
         self.timeline.frames_from(self.next)
     }
@@ -127,7 +127,8 @@ impl Ledger {
 
     /// Decides what to do now that the wait for the next release is over, and books what is skipped.
     pub(crate) fn decide(&mut self, wake: &Wake) -> Decision {
-        // What was due while it was down is skipped, whatever the policy: it is not an overrun, and nobody catches it up.
+        // What was due while it was down is skipped, whatever the policy: it is not an overrun, and nobody catches it
+        // up.
         let policy = if self.down { OverrunPolicy::Skip } else { self.policy };
         self.lateness = self.blame(wake);
         self.given_up = 0;
@@ -180,8 +181,9 @@ impl Ledger {
         self.next = tick + 1;
     }
 
-    /// Why a release is late, if it is: it was down after a fault, or the group was free and the device had not delivered, or it was free and asleep, or
-    /// its own work went on for more than a period, or else the reason that the release before was late already.
+    /// Why a release is late, if it is: it was down after a fault, or the group was free and the device had not
+    /// delivered, or it was free and asleep, or its own work went on for more than a period, or else the reason that
+    /// the release before was late already.
     fn blame(&mut self, wake: &Wake) -> SlipCause {
         if std::mem::take(&mut self.down) {
             return SlipCause::Fault;

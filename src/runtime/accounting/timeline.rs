@@ -57,8 +57,8 @@ impl Timeline {
         self.rate.last_release(since).min(self.count - 1).max(next)
     }
 
-    /// The release that a device's frame at `time` runs: `next` up to half a period after it is due, then the nearest that
-    /// the run has.
+    /// The release that a device's frame at `time` runs: `next` up to half a period after it is due, then the nearest
+    /// that the run has.
     pub(crate) fn of_frame(&self, next: u64, time: Nanos) -> u64 {
         let half_period = Nanos(self.period.0 / 2);
         self.rate.last_release((time + half_period).saturating_sub(self.offset)).min(self.count - 1).max(next)
@@ -66,9 +66,9 @@ impl Timeline {
 
     /// From when on a frame runs release `n` or a later one: seven eighths of a period before it is due.
     ///
-    /// More than the half that a nearest release would give, and that is what keeps a device whose frames drift across the
-    /// grid from losing many: after a slip at half a period late it is half a period early, and jitter of three eighths of
-    /// a period does not make it skip and leave out by turns.
+    /// More than the half that a nearest release would give, and that is what keeps a device whose frames drift across
+    /// the grid from losing many: after a slip at half a period late it is half a period early, and jitter of three
+    /// eighths of a period does not make it skip and leave out by turns.
     pub(crate) fn frames_from(&self, n: u64) -> Nanos {
         self.due(n).saturating_sub(Nanos(self.period.0 / 8 * 7))
     }
@@ -89,8 +89,8 @@ impl Timeline {
         self.phase = time.saturating_sub(self.offset + self.rate.release(n));
     }
 
-    /// Shifts the grid so that the latest nominal release is due at `now`, and returns its number; `None`, and no shift,
-    /// after the end of the run.
+    /// Shifts the grid so that the latest nominal release is due at `now`, and returns its number; `None`, and no
+    /// shift, after the end of the run.
     pub(crate) fn rephase(&mut self, now: Nanos) -> Option<u64> {
         if now > self.until {
             return None;

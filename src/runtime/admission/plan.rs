@@ -14,51 +14,62 @@ use std::fmt;
 
 /// The schedule of a graph; its `Display` is a table.
 ///
+/// ```
+/// use palpate_runtime::{Execution, Nanos, Plan, RateGroup};
+///
+/// let groups = [RateGroup::hz(1000).name("fast").budget(Nanos(250_000)), RateGroup::hz(30).name("slow")];
+/// let plan = Plan::of(Execution::Virtual, &groups)?;
+/// assert_eq!((plan.total_load, plan.coincidences[0].every), (0.25, Nanos(100_000_000)));
+/// println!("{plan}");
+/// # Ok::<(), palpate_runtime::GraphError>(())
+/// ```
+///
 /// # Real-time
 /// Not real-time safe: allocates, starts threads. Before the run.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Plan {
-    /// How the graph would run.
+    /// The execution that the graph was built for.
     pub execution: Execution,
     /// Processor cores that the process may use.
     pub cores: usize,
-    /// One per rate group, in graph order.
+    /// What each rate group asks for, in graph order.
     pub groups: Vec<GroupPlan>,
-    /// What the declared budgets need of each core that a group is pinned to, in parts of it.
+    /// The load that the declared budgets put on each core that a group is pinned to, as a part of that core (0 to 1).
     pub core_load: BTreeMap<usize, f64>,
-    /// What the declared budgets of all groups need together, in cores.
+    /// The load that the declared budgets of all groups are together, in cores.
     pub total_load: f64,
-    /// Pairs of groups that share a core, or may, and have releases at the same instant; in virtual time every pair does.
+    /// Pairs of groups that share a core, or may, and have releases at the same instant; in virtual time every pair
+    /// does.
     pub coincidences: Vec<Coincidence>,
-    /// What the system would refuse now, a sentence each; it degrades a run and never fails it.
+    /// Privileges that the system would refuse now, a sentence each; a refusal degrades a run and never fails it.
     pub missing: Vec<String>,
 }
 
-/// What one rate group asks for.
+/// The demands of one rate group on the machine, as declared.
 ///
 /// # Real-time
 /// Not real-time safe: allocates. Before the run.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct GroupPlan {
-    /// Its name.
+    /// The name of the group.
     pub name: String,
-    /// Its rate.
+    /// The rate of the group.
     pub rate: Rate,
-    /// Delay of every release.
+    /// The delay of every release, counted from the start of the run.
     pub offset: Nanos,
     /// The deadline in force, counted from the release.
     pub deadline: Nanos,
-    /// Computing time per release, if it is known.
+    /// The declared computing time of one release, if there is one.
     pub budget: Option<Nanos>,
-    /// The core it is pinned to.
+    /// The number of the core that the group is pinned to.
     pub cpu: Option<usize>,
     /// The real-time priority asked for.
     pub priority: Option<u8>,
-    /// How it waits for its releases.
+    /// The way in which the group waits for its releases, in words.
     pub wait: String,
-    /// What it does with releases that it cannot make in time.
+    /// The overrun policy: what becomes of releases that the group cannot make in time.
     pub overrun: String,
 }
 
@@ -82,7 +93,7 @@ impl GroupPlan {
         }
     }
 
-    /// The budget as a part of the period.
+    /// The budget as a part of the period (0 to 1); `None` without a budget.
     pub fn utilisation(&self) -> Option<f64> {
         self.budget.map(|budget| budget.as_secs_f64() / self.rate.period_s())
     }
@@ -92,16 +103,17 @@ impl GroupPlan {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Coincidence {
-    /// The group that was added first; in virtual time it ticks first.
+    /// The name of the group that was added first; in virtual time it ticks first.
     pub first: String,
-    /// The other one.
+    /// The name of the group that was added later.
     pub second: String,
     /// The time from one such instant to the next.
     pub every: Nanos,
 }
 
 impl Plan {
-    /// Refuses a graph of these groups that cannot work: what [`of`](Self::of) does first. The system is asked for nothing.
+    /// Refuses a graph of these groups that cannot work: what [`of`](Self::of) does first. The system is asked for
+    /// nothing.
     ///
     /// # Errors
     /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused), naming the group and the values; see
@@ -156,8 +168,8 @@ fn coincidences(groups: &[RateGroup], execution: Execution) -> Vec<Coincidence> 
 
 /// The time between two instants at which both groups are released; `None` if there is none.
 ///
-/// Release n of a is due at o_a + n s_a / r_a, so both meet where n A - m B = C with A = s_a r_b, B = s_b r_a and C = (o_b -
-/// o_a) r_a r_b, all in parts of 1 / (r_a r_b): in integers, and so either for ever or never.
+/// Release n of a is due at o_a + n s_a / r_a, so both meet where n A - m B = C with A = s_a r_b, B = s_b r_a and C =
+/// (o_b - o_a) r_a r_b, all in parts of 1 / (r_a r_b): in integers, and so either for ever or never.
 fn meeting(a: &RateGroup, b: &RateGroup) -> Option<Nanos> {
     const NANOS_PER_S: u128 = 1_000_000_000;
     let ((r_a, s_a), (r_b, s_b)) = (a.rate.as_fraction(), b.rate.as_fraction());

@@ -4,20 +4,20 @@ use crate::accounting::timeline::{Wake, WokenBy};
 use crate::group::group_run::GroupRun;
 use crate::time::Nanos;
 
-/// What goes wrong with one release in virtual time; nothing by default. See
+/// An injected disturbance of one release in virtual time; nothing goes wrong by default. See
 /// [`RuntimeBuilder::disturb`](crate::RuntimeBuilder::disturb).
 ///
-/// A group wakes when its release is due, or when its own work before is done if that is later, and `late_wake` after that.
-/// It then works for `work`. The end of a release, and the time from which others see what it published, is the later of
-/// this and the group's declared [latency](crate::RateGroup::latency), which by itself occupies nobody.
+/// A group wakes when its release is due, or when its own work before is done if that is later, and `late_wake` after
+/// that. It then works for `work`. The end of a release, and the time from which others see what it published, is the
+/// later of this and the group's declared [latency](crate::RateGroup::latency), which by itself occupies nobody.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Disturbance {
-    /// How long the group sleeps on after it should have woken.
+    /// The time for which the group sleeps on after it should have woken.
     pub late_wake: Nanos,
-    /// How long the release keeps the group busy.
+    /// The time for which the release keeps the group busy.
     pub work: Nanos,
-    /// How much later than due the device of a [device-paced](crate::Release::DevicePaced) group delivers; without a
-    /// meaning in others.
+    /// The delay, counted from the due time, with which the device of a [device-paced](crate::Release::DevicePaced)
+    /// group delivers; without a meaning in others.
     pub stall: Nanos,
 }
 
@@ -81,8 +81,8 @@ impl VirtualPace {
         }
     }
 
-    /// The group begins to wind down at `now`: the clock releases it from here on, and if it waits for its device, it does
-    /// not wait any longer.
+    /// The group begins to wind down at `now`: the clock releases it from here on, and if it waits for its device, it
+    /// does not wait any longer.
     pub(crate) fn wind_down(&mut self, group: &GroupRun, now: Nanos) {
         if self.watchdog.take().is_some()
             && let (Some(planned), Some(due)) = (&mut self.next, group.ledger.next_due())

@@ -6,10 +6,11 @@ pub(crate) mod group_thread;
 pub(crate) mod threaded;
 pub(crate) mod virtual_time;
 
-/// How a graph is executed.
+/// The execution of a graph: in virtual time or in real time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Execution {
-    /// One thread for everything, in the order of virtual time, as fast as the machine allows; bit-identical every time.
+    /// One thread for everything, in the order of virtual time, as fast as the machine allows; bit-identical every
+    /// time.
     Virtual,
     /// One thread per rate group, in real time.
     Threaded,

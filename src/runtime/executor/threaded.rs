@@ -137,8 +137,8 @@ impl Threads {
         self.seats.iter().any(|seat| seat.restart.is_some())
     }
 
-    /// Takes the mail and lets failed groups start again; true when all groups have ended, or only observers are left that
-    /// had [`STOP_BOUND`] to close what they hold.
+    /// Takes the mail and lets failed groups start again; true when all groups have ended, or only observers are left
+    /// that had [`STOP_BOUND`] to close what they hold.
     pub(crate) fn poll(&mut self) -> bool {
         while let Ok(message) = self.mail.try_recv() {
             match message {

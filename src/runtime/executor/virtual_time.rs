@@ -134,7 +134,8 @@ impl VirtualRun {
         script.done(index, group)
     }
 
-    /// Groups that wind down go on, the others end. In a re-execution all of them do: how a run wound down was recorded.
+    /// Groups that wind down go on, the others end. In a re-execution all of them do: how a run wound down was
+    /// recorded.
     fn begin_stop(&mut self) {
         self.stopping = true;
         let repeats = self.reexecution.is_some();
@@ -172,7 +173,8 @@ impl VirtualRun {
             }
             AfterFault::End => {
                 if group.spec.observer {
-                    // It costs what it would have observed and nothing else; it ends after the others, however it fares.
+                    // It costs what it would have observed and nothing else; it ends after the others, however it
+                    // fares.
                     self.paces[index].take();
                     self.supervisor.note(Message::Fault(fault));
                 } else {

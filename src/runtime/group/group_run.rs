@@ -125,7 +125,8 @@ impl GroupRun {
         self.lease = Some(lease);
     }
 
-    /// Records what each actor takes, if somebody reads records and there are several; `clock` counts from the start of the run.
+    /// Records what each actor takes, if somebody reads records and there are several; `clock` counts from the start of
+    /// the run.
     pub(crate) fn time_actors(&mut self, clock: impl Fn() -> Nanos + Send + 'static) {
         if self.recorder.is_some() && self.members.count() > 1 {
             self.timer = Some(ActorTimer::new(clock));
@@ -147,7 +148,8 @@ impl GroupRun {
         self.members.undo_start(&self.last);
     }
 
-    /// Goes on in [`GroupMode::Stopping`] from `now` for as long as the group asked for; false if it did not or has done so already.
+    /// Goes on in [`GroupMode::Stopping`] from `now` for as long as the group asked for; false if it did not or has
+    /// done so already.
     pub(crate) fn begin_wind_down(&mut self, now: Nanos) -> bool {
         let periods = self.spec.rate.last_release(self.spec.wind_down);
         if self.winding_down || periods == 0 {

@@ -28,14 +28,26 @@ pub(crate) enum ReaderKind<T> {
     Virtual(VirtualReader<T>),
 }
 
-/// Publishes the newest value of a state.
+/// Publishes the newest value of a large state to a [`Reader`] in another actor.
+///
+/// ```
+/// use palpate_runtime::{Execution, Rate, Runtime, TickContext};
+///
+/// let (mut writer, mut reader) = Runtime::builder(Execution::Threaded).exchange(|| [0.0; 3]);
+/// let ctx = TickContext::by_hand(Rate::hz(1000), 4); // what the executor gives to a tick
+/// writer.buffer()[2] = 0.5;
+/// writer.publish(&ctx);
+/// assert!(reader.refresh(&ctx));
+/// assert_eq!((reader.get()[2], reader.version(), reader.published()), (0.5, 1, ctx.scheduled));
+/// ```
 pub struct Writer<T> {
     kind: WriterKind<T>,
     versions: FencedCounter,
     group: WriterGroup,
 }
 
-/// Reads the newest value of a state. The reader owns its buffer until the next successful refresh.
+/// Reads the newest value of a state that a [`Writer`] publishes, as its example shows. The reader owns its buffer
+/// until the next successful refresh.
 pub struct Reader<T> {
     kind: ReaderKind<T>,
     group: WriterGroup,

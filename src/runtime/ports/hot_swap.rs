@@ -72,7 +72,8 @@ impl<H> Swappable<H> {
         if self.inbox.refresh() { self.inbox.get_mut().fresh.take() } else { None }
     }
 
-    /// Puts `fresh` in force; what it replaces has to be [given back](Self::give_back) before the next delivery is taken.
+    /// Puts `fresh` in force; what it replaces has to be [given back](Self::give_back) before the next delivery is
+    /// taken.
     pub(crate) fn replace(&mut self, fresh: H) -> H {
         std::mem::replace(&mut self.half, fresh)
     }
@@ -97,8 +98,8 @@ impl<T> Swappable<ExchangeWriter<T>> {
 }
 
 impl<T> Swappable<ExchangeReader<T>> {
-    /// Takes the newest value, the last one of a writer whose place was taken included; what was taken before stays until
-    /// there is another.
+    /// Takes the newest value, the last one of a writer whose place was taken included; what was taken before stays
+    /// until there is another.
     ///
     /// # Real-time
     /// Wait-free, real-time safe; once per restart of the writer it moves the value from one buffer into another.

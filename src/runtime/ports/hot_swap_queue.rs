@@ -24,8 +24,8 @@ impl<T: Copy> SwappableConsumer<T> {
         Self { link, previous: None }
     }
 
-    /// The number of the newest sample in the ring in force, if it has any; a ring that is drained is left here, and only
-    /// here.
+    /// The number of the newest sample in the ring in force, if it has any; a ring that is drained is left here, and
+    /// only here.
     pub(crate) fn newest(&mut self) -> Option<u64> {
         if let Some(drained) = self.previous.take_if(|previous| previous.available() == 0) {
             self.link.give_back(drained);

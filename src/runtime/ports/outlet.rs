@@ -12,6 +12,16 @@ pub struct OutletWriter<T>(Swappable<ExchangeWriter<T>>, FencedCounter);
 
 /// The outside thread's side of an outlet. It owns its buffer until the next successful refresh.
 ///
+/// ```
+/// use palpate_runtime::{Execution, Rate, Runtime, TickContext};
+///
+/// let (mut writer, mut reader) = Runtime::builder(Execution::Threaded).outlet(|| 0.0);
+/// *writer.buffer() = 1.5;
+/// writer.publish(&TickContext::by_hand(Rate::hz(30), 0)); // in a tick
+/// assert!(reader.refresh()); // on a thread of the program's own
+/// assert_eq!(*reader.get(), 1.5);
+/// ```
+///
 /// It lends out its value: threads may share it only if they may share that.
 ///
 /// ```compile_fail,E0277
@@ -75,7 +85,7 @@ impl<T> OutletReader<T> {
         self.0.half().get()
     }
 
-    /// The same to change or to swap out: the reader owns the buffer until the next refresh.
+    /// The value of the last refresh, to change or to swap out: the reader owns the buffer until the next refresh.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

@@ -23,7 +23,17 @@ pub(crate) enum ReaderKind<T> {
     Virtual(VirtualReceiver<T>),
 }
 
-/// Sends samples that all count, in order.
+/// Sends samples that all count, in order, to a [`QueueReader`] in another actor.
+///
+/// ```
+/// use palpate_runtime::{Execution, Rate, Runtime, TickContext};
+///
+/// let (mut writer, mut reader) = Runtime::builder(Execution::Threaded).queue(2);
+/// let ctx = TickContext::by_hand(Rate::hz(1000), 4); // what the executor gives to a tick
+/// assert_eq!([7, 8, 9].map(|sample| writer.push(&ctx, sample)), [true, true, false]);
+/// assert_eq!((reader.pop(&ctx), reader.pop(&ctx), reader.pop(&ctx)), (Some(7), Some(8), None));
+/// assert_eq!(writer.dropped(), 1);
+/// ```
 pub struct QueueWriter<T> {
     kind: WriterKind<T>,
     group: WriterGroup,
@@ -32,7 +42,7 @@ pub struct QueueWriter<T> {
     dropped: UseRecorder,
 }
 
-/// Receives samples in the order they were sent.
+/// Receives the samples of a [`QueueWriter`] in the order they were sent, as its example shows.
 pub struct QueueReader<T> {
     kind: ReaderKind<T>,
     group: WriterGroup,

@@ -109,11 +109,12 @@ struct Exchange<T> {
 /// - A new writer goes on with the versions. The reader that stays keeps its value, and still gets what was published
 ///   before and not taken yet.
 /// - A new reader begins as at the start of the run, with the initial value and version 0, and gets everything that is
-///   published from then on. What was published before may be in use by the one that it replaces, and is not shown again.
+///   published from then on. What was published before may be in use by the one that it replaces, and is not shown
+/// again.
 ///
 /// # Real-time
-/// The half that stays takes the new one over in its next `publish` or `refresh`. That call is wait-free like any other, and
-/// moves one value from buffer to buffer.
+/// The half that stays takes the new one over in its next `publish` or `refresh`. That call is wait-free like any
+/// other, and moves one value from buffer to buffer.
 pub struct ExchangePort<T>(Arc<Mutex<Exchange<T>>>);
 
 impl<T: Send + 'static> ExchangePort<T> {
@@ -230,12 +231,12 @@ struct Outlet<T> {
     versions: FencedCounter,
 }
 
-/// An [outlet](crate::RuntimeBuilder::outlet) whose halves can be taken again, as those of an [`ExchangePort`]; clones are the
-/// same port.
+/// An [outlet](crate::RuntimeBuilder::outlet) whose halves can be taken again, as those of an [`ExchangePort`]; clones
+/// are the same port.
 ///
 /// # Real-time
-/// The half that stays takes the new one over in its next `publish` or `refresh`. That call is wait-free like any other, and
-/// moves one value from buffer to buffer.
+/// The half that stays takes the new one over in its next `publish` or `refresh`. That call is wait-free like any
+/// other, and moves one value from buffer to buffer.
 pub struct OutletPort<T>(Arc<Mutex<Outlet<T>>>);
 
 impl<T: Send + 'static> OutletPort<T> {

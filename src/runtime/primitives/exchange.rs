@@ -181,7 +181,7 @@ impl<T> ExchangeReader<T> {
         &self.held().value
     }
 
-    /// The same to change or to swap out: the reader owns the buffer until the next refresh.
+    /// The value of the last refresh, to change or to swap out: the reader owns the buffer until the next refresh.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -256,7 +256,8 @@ mod tests {
     fn what_may_be_sent_goes_through_and_what_may_be_shared_is_shared() {
         fn send<T: Send>(_: &T) {}
         fn sync<T: Sync>(_: &T) {}
-        // Check that a value need not be shareable to be handed over; that such a reader cannot be shared does not compile
+        // Check that a value need not be shareable to be handed over; that such a reader cannot be shared does not
+        // compile
         let (writer, reader) = exchange(|| std::cell::Cell::new(0));
         send(&writer);
         send(&reader);

@@ -32,8 +32,9 @@ impl FencedCounter {
     /// Wait-free (one atomic addition), real-time safe.
     #[inline]
     pub(crate) fn next(&self) -> Option<u64> {
-        // Relaxed: only the order of the operations on this one count matters, and every atomic has one. What is numbered
-        // travels by other means, which bring their own ordering. Additions after the fence are read by nobody.
+        // Relaxed: only the order of the operations on this one count matters, and every atomic has one. What is
+        // numbered travels by other means, which bring their own ordering. Additions after the fence are read by
+        // nobody.
         let last = self.0.fetch_add(1, Ordering::Relaxed);
         (last & FENCED == 0).then_some(last + 1)
     }

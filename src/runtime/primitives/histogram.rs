@@ -6,19 +6,6 @@
 //!
 //! The writer makes plain loads and stores, no read-modify-write: it costs a tick a few nanoseconds, and readers cost
 //! it nothing but the cache line that they read. A reader may see a time in the buckets that is not in the sum yet.
-//!
-//! ```
-//! use palpate_runtime::histogram::histogram;
-//! use palpate_runtime::Nanos;
-//!
-//! let (mut writer, reader) = histogram();
-//! for us in 1..=1000 {
-//!     writer.record(Nanos(us * 1000));
-//! }
-//! let times = reader.snapshot();
-//! assert_eq!((times.count(), times.max()), (1000, Nanos(1_000_000)));
-//! assert!((500_000..=516_000).contains(&times.percentile(0.5).0));
-//! ```
 
 use crate::primitives::sync::{AtomicU64, CachePadded, Ordering};
 use crate::time::Nanos;
@@ -86,15 +73,15 @@ impl HistogramWriter {
         }
         sum.store(sum.load(Ordering::Relaxed).wrapping_add(time.0), Ordering::Relaxed);
         let count = &counts[bucket(time.0.min(LIMIT))];
-        // Release: with the acquire in `snapshot`, so that a reader that sees the count also sees a maximum and a sum that
-        // hold it.
+        // Release: with the acquire in `snapshot`, so that a reader that sees the count also sees a maximum and a sum
+        // that hold it.
         count.store(count.load(Ordering::Relaxed) + 1, Ordering::Release);
     }
 }
 
 impl_debug!(HistogramWriter);
 
-/// The side that looks, from any thread, as often as it likes.
+/// The reading side of a histogram: any thread may look, as often as it likes, while times are counted.
 #[derive(Clone)]
 pub struct HistogramReader(Arc<CachePadded<Shared>>);
 
@@ -117,7 +104,7 @@ impl fmt::Debug for HistogramReader {
     }
 }
 
-/// What a histogram held at one moment.
+/// A histogram of times as it was at one moment: counts, sum, maximum and percentiles.
 ///
 /// # Real-time
 /// Its methods are bounded and real-time safe; cloning it allocates, and dropping it frees memory.
@@ -137,23 +124,23 @@ impl Histogram {
         Self { counts, count: self.count + other.count, sum, max: self.max.max(other.max) }
     }
 
-    /// How many times were counted.
+    /// The number of times that were counted.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Their sum.
+    /// The sum of all times that were counted.
     pub fn sum(&self) -> Nanos {
         self.sum
     }
 
-    /// The largest; zero if there is none.
+    /// The largest time that was counted; zero if there is none.
     pub fn max(&self) -> Nanos {
         self.max
     }
 
-    /// The time that a share `q` (0 to 1) of all times does not exceed: never below the exact one, at most 1/32 above it;
-    /// zero if nothing was counted.
+    /// The time that a share `q` (0 to 1) of all times does not exceed: never below the exact one, at most 1/32 above
+    /// it; zero if nothing was counted.
     pub fn percentile(&self, q: f64) -> Nanos {
         let rank = ((q * self.count as f64).ceil() as u64).clamp(1, self.count.max(1));
         let mut below = 0;

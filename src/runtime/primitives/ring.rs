@@ -15,8 +15,9 @@ use crate::primitives::sync::{AtomicU64, AtomicUsize, CachePadded, Ordering, Uns
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 
-/// How many slots ahead of the one that is written the next is fetched: about what a tick writes into one ring, so that the
-/// lines of a tick, which the reader or the memory has by then, are there when it begins. Measured: 15 ns of 60 a tick.
+/// How many slots ahead of the one that is written the next is fetched: about what a tick writes into one ring, so that
+/// the lines of a tick, which the reader or the memory has by then, are there when it begins. Measured: 15 ns of 60 a
+/// tick.
 const AHEAD: usize = 4;
 
 /// A place for a value.
@@ -28,8 +29,8 @@ unsafe impl<T: Send> Sync for Slot<T> {}
 // SAFETY: as above; a value in a slot is a value.
 unsafe impl<T: Send> Send for Slot<T> {}
 
-/// The slots of a ring. Each side has their address of its own: to fetch it from what both share costs a cache miss in a tick
-/// that begins cold.
+/// The slots of a ring. Each side has their address of its own: to fetch it from what both share costs a cache miss in
+/// a tick that begins cold.
 struct Slots<T>(Arc<[Slot<T>]>);
 
 struct Shared {
@@ -48,8 +49,9 @@ impl<T> Slots<T> {
         let slots: Arc<[Slot<T>]> =
             (0..rounded(capacity)).map(|_| Slot(UnsafeCell::new(MaybeUninit::uninit()))).collect();
         for slot in &*slots {
-            // Where memory is not locked, a page that nothing was written to would be faulted in by the first push to it.
-            // SAFETY: nobody else has the slot yet. Volatile: the compiler may leave out a write that nothing reads.
+            // Where memory is not locked, a page that nothing was written to would be faulted in by the first push to
+            // it. SAFETY: nobody else has the slot yet. Volatile: the compiler may leave out a write that nothing
+            // reads.
             slot.0.with_mut(|slot| unsafe { slot.write_volatile(MaybeUninit::zeroed()) });
         }
         Self(slots)
@@ -142,8 +144,8 @@ impl<T: Copy> Producer<T> {
             // Acquire: with the consumer's release of `head`, so that its read of the slot is over before we overwrite.
             self.head = self.shared.head.load(Ordering::Acquire);
             if self.tail.wrapping_sub(self.head) == self.slots.len() {
-                // No read-modify-write: this is its only writer. Release: with the acquire in `sums`, so that a loss is not
-                // seen before the pushes that came before it.
+                // No read-modify-write: this is its only writer. Release: with the acquire in `sums`, so that a loss is
+                // not seen before the pushes that came before it.
                 self.shared.lost.store(self.shared.lost.load(Ordering::Relaxed) + 1, Ordering::Release);
                 return false;
             }
@@ -159,7 +161,7 @@ impl<T: Copy> Producer<T> {
         true
     }
 
-    /// How many values fit.
+    /// The number of values that fit into the ring.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -258,7 +260,7 @@ impl<T: Copy> Consumer<T> {
         }
     }
 
-    /// How many values there are to take now.
+    /// The number of values that there are to take now.
     ///
     /// # Real-time
     /// Wait-free (one load), real-time safe.
@@ -269,7 +271,7 @@ impl<T: Copy> Consumer<T> {
         self.tail.wrapping_sub(self.head)
     }
 
-    /// How many values fit.
+    /// The number of values that fit into the ring.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

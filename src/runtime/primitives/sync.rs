@@ -44,8 +44,8 @@ pub(crate) use imp::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, UnsafeCell};
 pub(crate) use std::sync::atomic::Ordering;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Locks a mutex, also after a panic under it: whoever locks one of ours leaves whole what it guards, and what may panic there
-/// is at most a program's `init`, which runs before anything is changed.
+/// Locks a mutex, also after a panic under it: whoever locks one of ours leaves whole what it guards, and what may
+/// panic there is at most a program's `init`, which runs before anything is changed.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

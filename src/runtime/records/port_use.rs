@@ -3,7 +3,7 @@
 use crate::records::record::{Channel, Record};
 use crate::time::Nanos;
 
-/// What a release did with a port.
+/// The kind of a [`PortUse`]: what a release did with a port.
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
@@ -49,17 +49,17 @@ impl PortUseKind {
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortUse {
-    /// Scheduled time of the release.
+    /// The scheduled time of the release.
     pub time: Nanos,
     /// The rate group of the release.
     pub group: u16,
-    /// The port, in the order in which the builder made them.
+    /// The number of the port, in the order in which the builder made them.
     pub port: u32,
-    /// What happened.
+    /// The kind of the use.
     pub kind: PortUseKind,
     /// The number of the release.
     pub tick: u64,
-    /// Version or number of an attempt: see [`PortUseKind`].
+    /// A version or the number of an attempt, see [`PortUseKind`].
     pub count: u64,
     /// FencedCounter the uses of one kind of one port from 0, so that a missing one is noticed.
     pub sequence: u64,

@@ -2,7 +2,7 @@
 
 use crate::time::Nanos;
 
-/// What a [`Record`] is about. The runtime owns numbers below 16; programs number their own from 16.
+/// The channel of a [`Record`]: what it is about. The runtime owns numbers below 16; programs number their own from 16.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Channel(pub u16);
 
@@ -11,9 +11,9 @@ impl Channel {
     pub const TICK: Self = Self(0);
     /// Something that happened once, `code` says what: see [`Event`].
     pub const EVENT: Self = Self(1);
-    /// What a release saw through a port: see [`PortUse`](crate::PortUse).
+    /// A use of a port by a release: see [`PortUse`](crate::PortUse).
     pub const PORT: Self = Self(2);
-    /// What each actor of a group took of one release: see [`ActorTimes`].
+    /// The time that each actor of a group took of one release: see [`ActorTimes`].
     pub const ACTORS: Self = Self(3);
     /// The first number that programs may use.
     pub const FIRST_USER: Self = Self(16);
@@ -28,7 +28,7 @@ impl Channel {
 pub struct Record {
     /// The scheduled time of the release that made it.
     pub stamp: Nanos,
-    /// What the record is about.
+    /// The channel: what the record is about.
     pub channel: Channel,
     /// A small number with a meaning of the channel's own (a mode, a cause, a group).
     pub code: u16,
@@ -58,13 +58,13 @@ impl Record {
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Event {
-    /// When.
+    /// The time at which it happened.
     pub stamp: Nanos,
     /// The rate group it happened in.
     pub group: u16,
-    /// What: a number below 256 is the runtime's ([`Event::PANIC`]), others are the program's.
+    /// The code of what happened: a number below 256 is the runtime's ([`Event::PANIC`]), others are the program's.
     pub code: u32,
-    /// A number that belongs to it.
+    /// A number that belongs to the code.
     pub detail: u64,
 }
 

@@ -59,7 +59,7 @@ impl Source {
 /// Records lost because a ring was full when they were pushed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordGap {
-    /// How many.
+    /// The number of records that were lost.
     pub records: u64,
     /// The stamp of the last record before them; they end at the drain that told of them at the latest.
     pub from: Nanos,
@@ -136,6 +136,17 @@ impl Registry {
 }
 
 /// A record sink of one actor.
+///
+/// ```
+/// use palpate_runtime::{Event, Execution, Nanos, Runtime};
+///
+/// let mut graph = Runtime::builder(Execution::Threaded);
+/// let (mut recorder, mut drain) = (graph.recorder(16), graph.drain());
+/// recorder.push(Event { stamp: Nanos(5), group: 0, code: 300, detail: 42 }); // in a tick
+/// let mut records = Vec::new();
+/// drain.drain(&mut records); // in a logger
+/// assert_eq!(Event::from_record(&records[0]).map(|event| event.detail), Some(42));
+/// ```
 #[derive(Debug)]
 pub struct Recorder(Producer<Record>);
 
@@ -179,7 +190,7 @@ impl RecordDrain {
         self.0.lost()
     }
 
-    /// What was found lost in the drains since the last call, all recorders together.
+    /// The gap that was found in the drains since the last call, of all recorders together; `None` if nothing was lost.
     ///
     /// # Real-time
     /// Takes a lock: for loggers.
@@ -216,8 +227,8 @@ mod tests {
         assert_eq!(drain.lost(), 1);
     }
 
-    // Check that a gap is told once, from the last record before it, and that what follows it is not taken for what came
-    // before.
+    // Check that a gap is told once, from the last record before it, and that what follows it is not taken for what
+    // came before.
     #[test]
     fn a_gap_begins_with_the_last_record_before_it() {
         let registry = Registry::new();

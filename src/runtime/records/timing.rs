@@ -4,7 +4,7 @@ use crate::actor::GroupMode;
 use crate::records::record::{Channel, Record};
 use crate::time::Nanos;
 
-/// Why a period was skipped or a deadline missed.
+/// The cause of a slip: why a period was skipped or a deadline missed.
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
@@ -27,7 +27,7 @@ pub enum SlipCause {
 }
 
 impl SlipCause {
-    /// All of them, by number.
+    /// All causes, by number.
     pub const ALL: [Self; 6] =
         [Self::None, Self::LateWake, Self::LongTick, Self::StalledPeer, Self::Policy, Self::Fault];
 
@@ -49,7 +49,7 @@ impl SlipCause {
     }
 }
 
-/// How often each cause of a slip, or of a missed deadline, occurred.
+/// Counts of slips, or of missed deadlines, by cause.
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
@@ -88,23 +88,23 @@ pub struct TickTiming {
     pub group: u16,
     /// The number of the release, counting skipped ones: release n is due at n periods.
     pub tick: u64,
-    /// When it was due.
+    /// The time at which the release was due.
     pub scheduled: Nanos,
-    /// When the thread was running again after its wait.
+    /// The time at which the thread was running again after its wait.
     pub woke: Nanos,
-    /// When the first actor's tick began.
+    /// The time at which the first actor's tick began.
     pub start: Nanos,
-    /// When the last actor's work was done.
+    /// The time at which the last actor's work was done.
     pub end: Nanos,
-    /// When it had to be done.
+    /// The deadline: the time by which the work had to be done.
     pub deadline: Nanos,
     /// Periods skipped between the release before and this one.
     pub slips: u32,
-    /// Why they were skipped or, without slips, why the deadline was missed.
+    /// The cause of the slips or, without slips, of the missed deadline.
     pub cause: SlipCause,
-    /// Of the slips, those that the overrun policy gave up by itself: their cause is [`SlipCause::Policy`].
+    /// Slips that the overrun policy gave up by itself, a part of `slips`: their cause is [`SlipCause::Policy`].
     pub given_up: u8,
-    /// How much the release did.
+    /// The mode in which the release ran.
     pub mode: GroupMode,
 }
 
@@ -158,8 +158,8 @@ impl TickTiming {
     }
 }
 
-/// What each actor of a group took of one release: its share of the time from [`TickTiming::start`] to
-/// [`TickTiming::end`], in the order of the actors.
+/// The times that the actors of a group took of one release: the share of each of the time from [`TickTiming::start`]
+/// to [`TickTiming::end`], in the order of the actors.
 ///
 /// Recorded on threads by groups with more than one actor; the parts add up to the whole.
 ///
@@ -169,11 +169,11 @@ impl TickTiming {
 pub struct ActorTimes {
     /// The rate group, in the order the groups were added.
     pub group: u16,
-    /// When the release was due.
+    /// The time at which the release was due.
     pub scheduled: Nanos,
-    /// How many of the times are actors'.
+    /// The number of actors, and so of times that mean something.
     pub actors: u8,
-    /// Each at most 4.29 s, the most that a record holds.
+    /// The time of each actor, at most 4.29 s, the most that a record holds.
     pub spent: [Nanos; Self::MAX],
 }
 

@@ -68,8 +68,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// The recording in `records`; those of other kinds are passed over. Call it when the run has ended: the last record
-    /// counts.
+    /// The recording in `records`; those of other kinds are passed over. Call it when the run has ended: the last
+    /// record counts.
     pub fn from_records<'a>(records: impl IntoIterator<Item = &'a Record>) -> Self {
         let mut recording = Self::default();
         for record in records {
@@ -89,8 +89,8 @@ impl Recording {
         self.uses.entry((used.port, used.kind)).or_default().push(*used);
     }
 
-    /// Leaves out everything that was due at `time` or later. A release of the rest that needs something of it cannot be
-    /// repeated and ends the re-execution with a fault that names it.
+    /// Leaves out everything that was due at `time` or later. A release of the rest that needs something of it cannot
+    /// be repeated and ends the re-execution with a fault that names it.
     #[must_use]
     pub fn before(mut self, time: Nanos) -> Self {
         for releases in self.releases.values_mut() {
@@ -102,12 +102,12 @@ impl Recording {
         self
     }
 
-    /// Releases of group `group`.
+    /// The number of releases of group `group`.
     pub fn released(&self, group: u16) -> u64 {
         self.releases.get(&group).map_or(0, |releases| releases.len() as u64)
     }
 
-    /// Uses of ports by group `group`.
+    /// The number of uses of ports by group `group`.
     pub fn port_uses(&self, group: u16) -> u64 {
         self.uses.values().flatten().filter(|used| used.group == group).count() as u64
     }

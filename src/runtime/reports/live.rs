@@ -8,26 +8,27 @@ use crate::records::timing::TickTiming;
 use crate::time::{Nanos, Rate};
 use std::sync::{Arc, OnceLock};
 
-/// A rate group at one moment of its run.
+/// A rate group at one moment of its run: counts, lateness and execution times so far.
 ///
-/// The parts are read one after the other while the group goes on: a release that is counted in the histograms may not be
-/// in [`released`](Self::released) yet, never the other way round. When the run is over they agree.
+/// The parts are read one after the other while the group goes on: a release that is counted in the histograms may not
+/// be in [`released`](Self::released) yet, never the other way round. When the run is over they agree.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct GroupLive {
     /// The group's name.
     pub name: String,
-    /// Its rate.
+    /// The rate of the group.
     pub rate: Rate,
-    /// Releases that ran.
+    /// The number of releases that ran.
     pub released: u64,
-    /// Periods without a release.
+    /// The number of periods without a release.
     pub skipped: u64,
-    /// Releases that ended after their deadline.
+    /// The number of releases that ended after their deadline.
     pub missed: u64,
-    /// From the scheduled time to the end of the wait, every release.
+    /// The lateness of every release: from its scheduled time to the end of the wait.
     pub lateness: Histogram,
-    /// From the first actor's start to the last one's end, every release; its sum is the time that the group was at work.
+    /// The execution time of every release, from the first actor's start to the last one's end; its sum is the time
+    /// that the group was at work.
     pub execution: Histogram,
 }
 

@@ -19,13 +19,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// Makes the actors of a group anew, with fresh halves of their ports.
 pub(crate) type Factory = Box<dyn FnMut() -> Result<Vec<Box<dyn Actor>>, ActorError> + Send>;
 
-/// When and how often a group is started again.
+/// The restart policy of a group: when and how often it is started again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Restart {
-    /// Restarts in one run; the fault after the last of them stops the run.
+    /// The number of restarts in one run; the fault after the last of them stops the run.
     pub at_most: u32,
-    /// Threads: a release that is due for this long and has not returned counts as one that never will. Its thread is
-    /// left behind with its ports, and a new one is started. Virtual time cannot see it.
+    /// The time after which a release counts as hung, on threads: one that is due for this long and has not returned
+    /// counts as one that never will. Its thread is left behind with its ports, and a new one is started. Virtual time
+    /// cannot see it.
     pub hung_after: Nanos,
 }
 
@@ -113,7 +114,8 @@ impl Restarter {
     }
 
     fn make(&mut self, ledger: Ledger) -> Result<(GroupRun, ExchangeReader<Ledger>), GraphError> {
-        // Unwind safe: a factory that panicked is not asked again in this restart, and says itself what it can do after.
+        // Unwind safe: a factory that panicked is not asked again in this restart, and says itself what it can do
+        // after.
         let made = quietly(|| catch_unwind(AssertUnwindSafe(&mut self.factory)));
         let place = || format!("rate group `{}`, factory", self.spec.name);
         let panicked = |panic: Box<dyn Any + Send>| {

@@ -6,7 +6,8 @@ use crate::system::os;
 use crate::system::wait::Waiter;
 use std::sync::{Arc, Mutex};
 
-/// What a run got from the system. Plain texts and numbers, easy to serialise.
+/// The privileges that a run got from the system, and facts about the machine. Plain texts and numbers, easy to
+/// serialise.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SystemGrant {
     /// True in virtual time, where nothing is asked for.
@@ -18,17 +19,17 @@ pub struct SystemGrant {
     /// Whether processors are kept out of idle states that take long to leave: `held off`, `not asked`, or why it was
     /// refused.
     pub idle_states: String,
-    /// What the kernel reads the time from.
+    /// The clock source: what the kernel reads the time from.
     pub clock_source: String,
     /// The kernel's release and build.
     pub kernel: String,
-    /// Processor cores that the process may use.
+    /// The number of processor cores that the process may use.
     pub cores: usize,
-    /// One per rate group, in graph order.
+    /// The privileges of each rate group, in graph order.
     pub groups: Vec<GroupGrant>,
 }
 
-/// What the thread of one rate group got.
+/// The privileges that the thread of one rate group asked for and got.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct GroupGrant {
     /// The group's name.
@@ -41,22 +42,22 @@ pub struct GroupGrant {
     pub priority_asked: u8,
     /// The real-time priority in force; 0 for none.
     pub priority: u8,
-    /// The core asked for.
+    /// The number of the core asked for.
     pub cpu_asked: Option<usize>,
-    /// The core the thread is pinned to.
+    /// The number of the core that the thread is pinned to.
     pub cpu: Option<usize>,
-    /// How it waits for its releases.
+    /// The way in which the thread waits for its releases, in words.
     pub wait: String,
-    /// Everything that was refused, with the reason; empty if nothing was.
+    /// The privileges that were refused, with the reason; empty if nothing was.
     pub refused: String,
 }
 
-/// Gives what the system granted, once it is known: before the first actor is started.
+/// A handle to what the system granted, which is known from before the first actor is started.
 #[derive(Clone, Debug, Default)]
 pub struct GrantHandle(Arc<Mutex<Option<SystemGrant>>>);
 
 impl GrantHandle {
-    /// What the system granted; `None` before the runtime is started.
+    /// The privileges that the system granted; `None` before the runtime is started.
     ///
     /// # Real-time
     /// Takes a lock and allocates: for loggers.

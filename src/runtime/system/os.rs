@@ -100,16 +100,17 @@ mod imp {
         if result == 0 { Ok(()) } else { Err(format!("SCHED_FIFO {priority} refused: {}", Error::last_os_error())) }
     }
 
-    /// Takes the real-time policy from another thread, which may be spinning and would keep its core from its replacement.
+    /// Takes the real-time policy from another thread, which may be spinning and would keep its core from its
+    /// replacement.
     pub(crate) fn give_up_realtime(thread: &JoinHandle<()>) {
         let parameter = libc::sched_param { sched_priority: 0 };
-        // SAFETY: the thread has not been joined or detached, so the handle is valid; the pointer is to a sched_param of our
-        // own. A refusal leaves the thread as it is.
+        // SAFETY: the thread has not been joined or detached, so the handle is valid; the pointer is to a sched_param
+        // of our own. A refusal leaves the thread as it is.
         unsafe { libc::pthread_setschedparam(thread.as_pthread_t(), libc::SCHED_OTHER, &raw const parameter) };
     }
 
-    /// Leaves signals to the program's other threads: a handler on this one would make system calls in a tick. Those that
-    /// a thread causes itself, by a bad access for example, stay.
+    /// Leaves signals to the program's other threads: a handler on this one would make system calls in a tick. Those
+    /// that a thread causes itself, by a bad access for example, stay.
     pub(crate) fn block_signals() {
         const OWN: [libc::c_int; 6] =
             [libc::SIGSEGV, libc::SIGBUS, libc::SIGFPE, libc::SIGILL, libc::SIGTRAP, libc::SIGABRT];

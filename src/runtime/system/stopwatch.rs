@@ -9,6 +9,15 @@ use crate::system::os::thread_cpu;
 use crate::time::Nanos;
 
 /// Counts the CPU time of pieces of work.
+///
+/// ```
+/// use palpate_runtime::Stopwatch;
+///
+/// let mut stopwatch = Stopwatch::new();
+/// let times = stopwatch.reader();
+/// (0..10).for_each(|n| Stopwatch::around(Some(&mut stopwatch), || assert!(n < 10)));
+/// assert_eq!(times.snapshot().count(), 10);
+/// ```
 #[derive(Debug)]
 pub struct Stopwatch {
     writer: HistogramWriter,
@@ -16,7 +25,7 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// One that has counted nothing.
+    /// A stopwatch that has counted nothing.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -26,7 +35,7 @@ impl Stopwatch {
         Self { writer, reader }
     }
 
-    /// What it counts, for any thread to read.
+    /// The histogram of the times counted, for any thread to read.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -46,7 +55,7 @@ impl Stopwatch {
         result
     }
 
-    /// What work that does nothing is counted with on this machine: the median of a thousand.
+    /// The time that work which does nothing is counted with on this machine: the median of a thousand.
     ///
     /// # Real-time
     /// Not real-time safe: allocates, makes system calls.

@@ -15,9 +15,9 @@ const SLICE_NS: u64 = 50_000_000;
 /// The margin of a sleep-then-spin wait: a high quantile of how late sleeps end, and a guard.
 ///
 /// A sleep that ends later than the estimate raises it by [`UP_NS`](Self::UP_NS), any other lowers it by
-/// [`DOWN_NS`](Self::DOWN_NS); the steps balance where one sleep in a thousand ends later, so the estimate is the 99.9 %
-/// quantile. A step does not depend on how far off the sleep was: a stall of the machine for 20 ms moves the margin no
-/// further than one for 100 us, and a second later it is forgotten.
+/// [`DOWN_NS`](Self::DOWN_NS); the steps balance where one sleep in a thousand ends later, so the estimate is the 99.9
+/// % quantile. A step does not depend on how far off the sleep was: a stall of the machine for 20 ms moves the margin
+/// no further than one for 100 us, and a second later it is forgotten.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct AdaptiveMargin {
     estimate_ns: u64,
@@ -88,8 +88,8 @@ impl Waiter {
         })
     }
 
-    /// Waits until the clock has reached `due_ns` and returns what it showed then; `None` if `leave` said that it is time
-    /// to leave instead.
+    /// Waits until the clock has reached `due_ns` and returns what it showed then; `None` if `leave` said that it is
+    /// time to leave instead.
     ///
     /// # Real-time
     /// Sleeps, and makes no other system call.

@@ -80,7 +80,7 @@ fn a_group_winds_down_without_the_actor_that_failed(execution: Execution) {
     let report = finish(&mut graph);
     assert_identity(&report);
     let fault = report.fault.unwrap();
-    assert!(fault.what.contains("runtime_faults.rs:") && fault.what.ends_with("injected"), "{fault}");
+    assert!(fault.what.contains("/faults.rs:") && fault.what.ends_with("injected"), "{fault}");
     // Check that the failed one is not called again and is stopped once, the other runs on for 30 periods
     assert!(failing_calls.lock().unwrap().iter().all(|call| call.0 == GroupMode::Normal && call.1 < 20));
     assert_eq!(failing_stops.iter().count(), 1);

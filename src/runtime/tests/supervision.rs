@@ -206,7 +206,7 @@ fn a_factory_that_panics_stops_the_run_and_says_where(execution: Execution) {
     let report = finish(graph.restartable(RateGroup::hz(100).name("g"), Restart::default(), factory));
     let fault = report.fault.unwrap().to_string();
     assert!(fault.contains("injected") && fault.contains("could not be started again"), "{fault}");
-    assert!(fault.contains("factory: panicked at tests/runtime_supervision.rs:"), "{fault}");
+    assert!(fault.contains("factory: panicked at src/runtime/tests/supervision.rs:"), "{fault}");
     assert!(fault.ends_with("no spare part"), "{fault}");
 }
 
