@@ -8,7 +8,7 @@ use std::io::{self, Write};
 use log_sample::{entries, environment, log_of, time_of};
 use palpate::ErrorKind;
 use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter, SceneFrame};
-use palpate::runtime::record::Record;
+use palpate::runtime::Record;
 use palpate::time::Nanos;
 use proptest::prelude::*;
 

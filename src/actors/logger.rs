@@ -9,7 +9,7 @@ use super::log_sink::{LogSink, Loss};
 use super::scene_watch::SceneWatch;
 use crate::error::{Error, ErrorKind};
 use crate::log::{Analysis, Environment, Level, LogRecord, RunReport, StatsCounter, TextEvent};
-use crate::runtime::record::Event;
+use crate::runtime::Event;
 use crate::runtime::{Actor, GrantHandle, Outcome, Record, RecordDrain, RecordGap, TickContext};
 use crate::runtime::Nanos;
 

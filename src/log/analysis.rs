@@ -8,7 +8,7 @@ use super::event::{Level, TextEvent};
 use super::group::{GroupCounter, GroupReport, TickFigures};
 use super::haptics::{DeviceReport, HapticsCounter};
 use super::records::LogRecord;
-use crate::runtime::record::{Event, TickTiming};
+use crate::runtime::{Event, TickTiming};
 use crate::runtime::Nanos;
 
 /// Events that a report lists; the others are only counted.
@@ -82,7 +82,7 @@ impl RunReport {
 ///
 /// ```
 /// use palpate::log::{Analysis, LogRecord};
-/// use palpate::runtime::record::TickTiming;
+/// use palpate::runtime::TickTiming;
 ///
 /// let mut analysis = Analysis::default();
 /// analysis.push(&LogRecord::Tick(TickTiming::default()));
@@ -231,8 +231,8 @@ impl Analysis {
 mod tests {
     use super::*;
     use crate::log::{CommandSample, ContactMode, ContactReport, ContactSample, ForceSample, GroupInfo, Resync};
-    use crate::runtime::Mode;
-    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::runtime::GroupMode;
+    use crate::runtime::{SlipCause, TickTiming};
 
     fn tick(tick: u64, late: u64, work: u64, slips: u32, cause: SlipCause) -> LogRecord {
         let scheduled = Nanos(tick * 1_000_000);
@@ -256,7 +256,7 @@ mod tests {
     fn slips_that_a_policy_gave_up_and_degraded_releases_are_counted_apart() {
         let mut analysis = Analysis::default();
         let timing = TickTiming { tick: 4, slips: 3, cause: SlipCause::LongTick, ..TickTiming::default() };
-        analysis.push(&LogRecord::Tick(TickTiming { given_up: 1, mode: Mode::Degraded, ..timing }));
+        analysis.push(&LogRecord::Tick(TickTiming { given_up: 1, mode: GroupMode::Degraded, ..timing }));
         let group = &analysis.report().groups[0];
         assert_eq!((group.skipped.of(SlipCause::LongTick), group.skipped.of(SlipCause::Policy)), (2, 1));
         assert_eq!(group.in_degraded_mode, 1);

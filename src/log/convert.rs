@@ -6,8 +6,8 @@ use super::records::{
 };
 use super::schema::{self, Vector3};
 use super::stats::{EventSum, GroupStats};
-use crate::runtime::Mode;
-use crate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+use crate::runtime::GroupMode;
+use crate::runtime::{ActorTimes, SlipCause, TickTiming};
 use crate::runtime::{PortUse, PortUseKind};
 use crate::runtime::Nanos;
 
@@ -65,7 +65,7 @@ impl From<schema::TickTiming> for TickTiming {
             slips: m.slips,
             cause: SlipCause::from_code(u8::try_from(m.cause).unwrap_or(u8::MAX)),
             given_up: u8::try_from(m.given_up).unwrap_or(u8::MAX),
-            mode: Mode::from_code(u8::try_from(m.mode).unwrap_or(u8::MAX)),
+            mode: GroupMode::from_code(u8::try_from(m.mode).unwrap_or(u8::MAX)),
         }
     }
 }

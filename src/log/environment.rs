@@ -19,7 +19,7 @@ pub enum Execution {
     },
 }
 
-/// A rate group, in the order that [`TickTiming::group`](crate::runtime::record::TickTiming::group) counts.
+/// A rate group, in the order that [`TickTiming::group`](crate::runtime::TickTiming::group) counts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GroupInfo {
     /// Its name; its topics are `/timing/NAME` and `/stats/NAME`.

@@ -1,6 +1,6 @@
 //! Text events: what a reader of the log should be told in words.
 
-use crate::runtime::record::Event;
+use crate::runtime::Event;
 use crate::runtime::Nanos;
 
 /// How grave an event is.

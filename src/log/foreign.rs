@@ -23,7 +23,7 @@ use prost::encoding::{WireType, decode_key, decode_varint};
 use prost_types::FileDescriptorSet;
 use prost_types::field_descriptor_proto::Type;
 
-use crate::runtime::record::{SlipCause, TickTiming};
+use crate::runtime::{SlipCause, TickTiming};
 use crate::runtime::Nanos;
 
 const SECOND: u64 = 1_000_000_000;

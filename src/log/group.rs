@@ -1,8 +1,8 @@
 //! The timing of one rate group over a run.
 
 use super::percentiles::{Distribution, Percentiles};
-use crate::runtime::Mode;
-use crate::runtime::record::{SlipCause, TickTiming};
+use crate::runtime::GroupMode;
+use crate::runtime::{SlipCause, TickTiming};
 use crate::runtime::Nanos;
 
 /// How often each cause of a slip or a missed deadline occurred.
@@ -131,7 +131,7 @@ impl GroupCounter {
         for (cause, slips) in timing.slips_by_cause() {
             self.skipped.add(cause, slips.into());
         }
-        self.in_degraded_mode += u64::from(timing.mode == Mode::Degraded);
+        self.in_degraded_mode += u64::from(timing.mode == GroupMode::Degraded);
         if timing.missed() {
             self.missed.add(timing.cause, 1);
         }

@@ -1,7 +1,7 @@
 //! The records of a haptic run, each fitting the runtime's 64-byte [`Record`].
 
 use crate::runtime::PortUse;
-use crate::runtime::record::{ActorTimes, Channel, Event, Record, TickTiming};
+use crate::runtime::{ActorTimes, Channel, Event, Record, TickTiming};
 use crate::runtime::Nanos;
 
 /// What served a haptic tick: a local model, or what it fell back to.

@@ -7,8 +7,9 @@ use prost_types::FileDescriptorSet;
 use super::foxglove;
 use super::proto::{proto_message, proto_schema, rust_type};
 use super::records::{ContactMode, ServedBy};
-use crate::runtime::record::SlipCause;
-use crate::runtime::{Mode, PortUseKind};
+use crate::runtime::SlipCause;
+// Logs know the mode by this name.
+use crate::runtime::{GroupMode as Mode, PortUseKind};
 
 pub(crate) use super::proto::LogMessage;
 

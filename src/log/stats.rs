@@ -2,7 +2,7 @@
 
 use super::event::TextEvent;
 use super::percentiles::{Distribution, Percentiles};
-use crate::runtime::record::TickTiming;
+use crate::runtime::TickTiming;
 use crate::runtime::Nanos;
 
 const SECOND: u64 = 1_000_000_000;

@@ -3,7 +3,7 @@
 use super::event::{Level, TextEvent};
 use super::foxglove::{self, Log, Pose, PoseInFrame, Quaternion, Timestamp, Vector3};
 use super::records::ToolSample;
-use crate::runtime::record::Event;
+use crate::runtime::Event;
 use crate::runtime::Nanos;
 
 /// The one frame of reference, world coordinates.

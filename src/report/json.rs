@@ -41,7 +41,7 @@ use crate::log::{
     CauseCounts, DeviceReport, Environment, Execution, ForceReport, GroupReport, Level, Percentiles, RunReport,
     TextEvent,
 };
-use crate::runtime::record::TickTiming;
+use crate::runtime::TickTiming;
 
 /// The report as one JSON document.
 pub fn to_json(report: &RunReport) -> String {
@@ -278,7 +278,7 @@ fn event(event: &TextEvent) -> Value {
 mod tests {
     use super::*;
     use crate::log::{Analysis, LogRecord};
-    use crate::runtime::record::TickTiming;
+    use crate::runtime::TickTiming;
     use crate::runtime::Nanos;
 
     #[test]

@@ -87,7 +87,7 @@ fn restart_after<'a>(report: &'a RunReport, fault: &TextEvent) -> Option<&'a Tex
 mod tests {
     use super::*;
     use crate::log::{Analysis, Environment, LogRecord};
-    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::runtime::{SlipCause, TickTiming};
     use crate::runtime::Nanos;
 
     fn report(slips: u32) -> RunReport {

@@ -70,7 +70,7 @@ impl Runtime {
     /// the same groups and ports in the same order. Exactly the recorded releases run, whatever rates, policies and
     /// [`until`](RuntimeBuilder::until) say, and every one of them sees through its ports what it saw then.
     ///
-    /// A recording that lacks a record ends in a [fault](RuntimeReport::fault) that names what is missing.
+    /// A recording that lacks a record ends in a [fault](crate::RuntimeReport::fault) that names what is missing.
     pub fn reexecution(recording: Recording) -> RuntimeBuilder {
         RuntimeBuilder::new(Execution::Virtual, Some(recording))
     }

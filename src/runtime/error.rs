@@ -18,6 +18,9 @@ pub enum GraphErrorKind {
 }
 
 /// The error of every fallible operation of the runtime.
+///
+/// # Real-time
+/// Not real-time safe: allocates. Before the run.
 #[derive(Debug)]
 pub struct GraphError {
     kind: GraphErrorKind,

@@ -122,3 +122,8 @@ pub use supervision::stop::{STOP_BOUND, StopHandle};
 pub use system::grant::{GrantHandle, GroupGrant, SystemGrant};
 pub use system::stopwatch::Stopwatch;
 pub use time::{Nanos, Rate};
+
+/// The README's program must compile.
+#[cfg(doctest)]
+#[doc = include_str!("README.md")]
+struct Readme;

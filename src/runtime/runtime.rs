@@ -176,7 +176,7 @@ impl RunningGraph {
         }
     }
 
-    /// True when every group has ended: by [`until`](RuntimeBuilder::until), by a stop or by a fault.
+    /// True when every group has ended: by [`until`](crate::RuntimeBuilder::until), by a stop or by a fault.
     ///
     /// # Real-time
     /// Not real-time safe: takes a lock, may start a group again. Never from an actor, as [`elapsed`](Self::elapsed).

@@ -11,7 +11,7 @@ use log_sample::{entries, log_of};
 use palpate::ErrorKind;
 use palpate::log::{LogEntry, LogReader, LogRecord, Window};
 use palpate::report::{Figure, Format, export_percentiles, export_table, export_trace};
-use palpate::runtime::record::TickTiming;
+use palpate::runtime::TickTiming;
 use palpate::time::Nanos;
 use serde_json::Value;
 

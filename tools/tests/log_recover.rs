@@ -8,7 +8,7 @@ use std::io::Cursor;
 
 use log_sample::log_of;
 use palpate::log::{GroupStats, LogEntry, LogInfo, LogReader, LogRecord, Recovered, check, recover};
-use palpate::runtime::record::{Record, TickTiming};
+use palpate::runtime::{Record, TickTiming};
 use proptest::prelude::*;
 
 const BOUNDARY: usize = 4096;

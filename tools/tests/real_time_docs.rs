@@ -11,18 +11,18 @@ const SCANNED: [&str; 7] = ["actors", "devices", "log/records.rs", "model", "run
 /// What a tick lives on: where the scan finds no function of one of these, it looks in the wrong place.
 const USED_BY_TICKS: &str = "
     Actor Reader Writer QueueReader QueueWriter OutletReader OutletWriter Recorder RecordDrain
-    ExchangePort QueuePort OutletPort RecorderPort MailReceiver MailSender StopHandle GrantHandle
-    ExchangeReader ExchangeWriter Consumer Producer HistogramReader HistogramWriter GroupLive
+    ExchangePort QueuePort OutletPort RecorderPort StopHandle GrantHandle
+    ExchangeReader ExchangeWriter Consumer Producer HistogramReader GroupLive
     Device ToolPath Pipeline Ramp Engagement AgeFade TankState Ledger Watchdog CoupledTool Body LocalModel PatchGeometry Simulation Succession step";
 
 /// Types whose own section speaks for all of their methods: plain values, actors, what is gone before a run.
 const SPEAK_FOR_ALL: &str = "
-    Nanos Rate TickContext Record TickTiming Event PortUse PortUseKind SlipCause SlipCounts Snapshot
+    Nanos Rate TickContext Record TickTiming Event PortUse PortUseKind SlipCause SlipCounts Histogram
     LogRecord ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice Region Shape
     Ports Projection SecondOrder Congruence Modal Balanced StateSpace ErrorBound LinearBody LocalityCheck ContactStiffness StiffnessError PaperMesh Response
     DeviceActor LocalActor GlobalActor LoggerActor LogSink
     Scripted Replayed
-    Block BlockBuilder SpringNetwork SpringNetworkBuilder InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";
+    Block BlockBuilder SpringNetwork SpringNetworkBuilder InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording GraphError";
 
 /// The name of a public type, trait or function, or `Owner::name` of a public method; and whether its docs have the section,
 /// with a text.

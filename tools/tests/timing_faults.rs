@@ -6,7 +6,7 @@ use std::path::Path;
 use palpate::log::LogReader;
 use palpate::log::timing::{Selection, TimingAnalysis, TimingReport, WorstTick};
 use palpate::report::timing_to_text;
-use palpate::runtime::record::SlipCause;
+use palpate::runtime::SlipCause;
 use palpate::runtime::{Disturbance, RateGroup};
 use palpate::scene::Scene;
 use palpate::session::{Session, SessionBuilder};

@@ -10,7 +10,7 @@ use super::selection::Selection;
 use super::worst::{Worst, WorstTick};
 use crate::log::environment::Environment;
 use crate::log::{Analysis, LogEntry, LogRecord, RunReport};
-use crate::runtime::record::TickTiming;
+use crate::runtime::TickTiming;
 use crate::runtime::Nanos;
 
 /// What a log says about the timing of its run.

@@ -19,7 +19,7 @@
 
 use super::analysis::TimingReport;
 use crate::log::{CauseCounts, DeviceReport, GroupReport, Percentiles};
-use crate::runtime::record::SlipCause;
+use crate::runtime::SlipCause;
 
 /// What a figure is measured in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use super::over_time::{Absorb, OverTime};
 use crate::log::environment::GroupInfo;
 use crate::log::group::{GroupCounter, TickFigures};
 use crate::log::percentiles::Distribution;
-use crate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+use crate::runtime::{ActorTimes, SlipCause, TickTiming};
 use crate::runtime::Nanos;
 
 /// Bins of a chart over time, at most.

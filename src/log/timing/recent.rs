@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::log::{CommandSample, ForceSample};
-use crate::runtime::record::{ActorTimes, TickTiming};
+use crate::runtime::{ActorTimes, TickTiming};
 use crate::runtime::Nanos;
 
 /// How far back it remembers. A slow group's release begins long before it ends, and a moment is looked at later still.

@@ -4,7 +4,7 @@
 //! it stands for was due (its own, or the first that was skipped before it) until it was done. One is just in time.
 
 use super::recent::{ForcePoint, Moment, Recent, is_of};
-use crate::runtime::record::{SlipCause, TickTiming};
+use crate::runtime::{SlipCause, TickTiming};
 use crate::runtime::Nanos;
 
 /// How many are kept.

@@ -1,7 +1,7 @@
 //! The figures of a rate group that have a distribution.
 
 use crate::log::TickGauge;
-use crate::runtime::record::TickTiming;
+use crate::runtime::TickTiming;
 
 /// A duration that each release of a rate group has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

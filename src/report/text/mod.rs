@@ -175,7 +175,7 @@ mod tests {
     use super::page::WIDTH;
     use super::*;
     use crate::log::{Analysis, GroupInfo, Level, LogRecord, Resync, TextEvent};
-    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::runtime::{SlipCause, TickTiming};
     use crate::runtime::Nanos;
 
     fn busy_report() -> RunReport {

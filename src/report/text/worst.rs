@@ -3,7 +3,7 @@
 use super::page::Page;
 use crate::log::timing::{TimingReport, WorstTick};
 use crate::report::units::{duration, force, plural};
-use crate::runtime::record::SlipCause;
+use crate::runtime::SlipCause;
 
 /// Periods shown on each side of a tick.
 const NEIGHBOURS: u64 = 4;
@@ -117,7 +117,7 @@ fn around(worst: &WorstTick) -> String {
 mod tests {
     use super::*;
     use crate::log::timing::Moment;
-    use crate::runtime::record::TickTiming;
+    use crate::runtime::TickTiming;
     use crate::runtime::Nanos;
 
     const MS: u64 = 1_000_000;

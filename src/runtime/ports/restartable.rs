@@ -109,8 +109,8 @@ struct Exchange<T> {
 /// - A new writer goes on with the versions. The reader that stays keeps its value, and still gets what was published
 ///   before and not taken yet.
 /// - A new reader begins as at the start of the run, with the initial value and version 0, and gets everything that is
-///   published from then on. What was published before may be in use by the one that it replaces, and is not shown
-/// again.
+///   published from then on. What was published before may be in use by the one that it replaces, and is not
+///   shown again.
 ///
 /// # Real-time
 /// The half that stays takes the new one over in its next `publish` or `refresh`. That call is wait-free like any

@@ -48,7 +48,7 @@ struct Shared {
 ///
 /// # Real-time
 /// Not real-time safe: allocates.
-pub fn histogram() -> (HistogramWriter, HistogramReader) {
+pub(crate) fn histogram() -> (HistogramWriter, HistogramReader) {
     let counts = std::array::from_fn(|_| AtomicU64::new(0));
     let shared = Arc::new(CachePadded(Shared { counts, sum: AtomicU64::new(0), max: AtomicU64::new(0) }));
     // Zeros may come from the system as pages still to be faulted in; a store is never left out.
@@ -57,7 +57,7 @@ pub fn histogram() -> (HistogramWriter, HistogramReader) {
 }
 
 /// The side that counts.
-pub struct HistogramWriter(Arc<CachePadded<Shared>>);
+pub(crate) struct HistogramWriter(Arc<CachePadded<Shared>>);
 
 impl HistogramWriter {
     /// Counts a time.
@@ -65,7 +65,7 @@ impl HistogramWriter {
     /// # Real-time
     /// Wait-free (three loads and stores, nothing shared is locked), real-time safe.
     #[inline]
-    pub fn record(&mut self, time: Nanos) {
+    pub(crate) fn record(&mut self, time: Nanos) {
         let Shared { counts, sum, max } = &**self.0;
         // Relaxed loads: this thread alone stores.
         if time.0 > max.load(Ordering::Relaxed) {

@@ -7,13 +7,13 @@ use crate::time::Nanos;
 pub struct Channel(pub u16);
 
 impl Channel {
-    /// One release of a rate group: see [`TickTiming`].
+    /// One release of a rate group: see [`TickTiming`](crate::TickTiming).
     pub const TICK: Self = Self(0);
     /// Something that happened once, `code` says what: see [`Event`].
     pub const EVENT: Self = Self(1);
     /// A use of a port by a release: see [`PortUse`](crate::PortUse).
     pub const PORT: Self = Self(2);
-    /// The time that each actor of a group took of one release: see [`ActorTimes`].
+    /// The time that each actor of a group took of one release: see [`ActorTimes`](crate::ActorTimes).
     pub const ACTORS: Self = Self(3);
     /// The first number that programs may use.
     pub const FIRST_USER: Self = Self(16);
@@ -77,7 +77,7 @@ impl Event {
     pub const STOPPED: u32 = 3;
     /// The code of a group's degraded releases changed; `detail` is the code, [`Event::RECOVERED`] when there is none.
     pub const DEGRADED: u32 = 4;
-    /// The overrun policy changed the group's [`GroupMode`]; `detail` is the number of periods skipped,
+    /// The overrun policy changed the group's [`GroupMode`](crate::GroupMode); `detail` is the number of periods skipped,
     /// [`Event::RECOVERED`] when the mode is normal again.
     pub const MODE: u32 = 5;
     /// The watchdog of a device-paced group took over; `detail` is the number of the release that was due,

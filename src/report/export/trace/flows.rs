@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::events::Track;
 use crate::log::{ForceSample, GlobalTick};
-use crate::runtime::record::TickTiming;
+use crate::runtime::TickTiming;
 use crate::runtime::Nanos;
 
 /// Haptic releases that are remembered: sixteen seconds at 1 kHz.

@@ -15,7 +15,7 @@ use super::{Micros, output_error};
 use crate::error::Error;
 use crate::log::{Environment, ForceSample, LogEntry, LogReader, LogRecord, Resync, TextEvent, Window, magnitude};
 use crate::report::json_string::JsonString;
-use crate::runtime::record::{ActorTimes, TickTiming};
+use crate::runtime::{ActorTimes, TickTiming};
 
 /// Writes what `window` holds of a log as one JSON document in the Trace Event Format.
 ///

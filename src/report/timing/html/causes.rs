@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::report::svg::Sign;
-use crate::runtime::record::SlipCause;
+use crate::runtime::SlipCause;
 
 /// The causes in the order of a legend.
 pub(super) const CAUSES: [SlipCause; 6] = [

@@ -2,7 +2,7 @@
 
 use crate::log::magnitude;
 use crate::log::timing::{ForcePoint, TimingReport, WorstTick};
-use crate::runtime::record::{SlipCause, TickTiming};
+use crate::runtime::{SlipCause, TickTiming};
 use crate::runtime::Nanos;
 
 /// What is shown of a lane and of a force, at most: the page stays small however fast the groups are.

@@ -6,7 +6,7 @@ use super::{BROAD, NARROW, chart_figure_in_two};
 use crate::log::timing::GroupTiming;
 use crate::report::svg::{Axis, Chart, Line, Mark, Signs};
 use crate::report::units::duration;
-use crate::runtime::record::SlipCause;
+use crate::runtime::SlipCause;
 
 /// The rows of signs, below the upper edge of the plot, and what they need of it.
 const ROWS: [f64; 2] = [9.0, 22.0];

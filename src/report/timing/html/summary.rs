@@ -153,7 +153,7 @@ fn cards(report: &TimingReport, numbers: &Numbers) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::runtime::{SlipCause, TickTiming};
     use crate::runtime::Nanos;
 
     #[test]

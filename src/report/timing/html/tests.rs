@@ -1,7 +1,7 @@
 use super::timing_html;
 use crate::log::timing::{Selection, TimingAnalysis, TimingReport};
 use crate::log::{CommandSample, Environment, Execution, ForceSample, GroupInfo, LogEntry, LogRecord, Resync};
-use crate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+use crate::runtime::{ActorTimes, SlipCause, TickTiming};
 use crate::runtime::Nanos;
 
 const MS: u64 = 1_000_000;
