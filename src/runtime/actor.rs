@@ -143,11 +143,7 @@ impl GroupMode {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn from_code(code: u8) -> Self {
-        match code {
-            1 => Self::Degraded,
-            2 => Self::Stopping,
-            _ => Self::Normal,
-        }
+        [Self::Normal, Self::Degraded, Self::Stopping].get(usize::from(code)).copied().unwrap_or_default()
     }
 
     /// The name of the mode in reports and exports.

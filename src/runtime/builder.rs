@@ -261,7 +261,17 @@ impl RuntimeBuilder {
                 }
                 Cast::Restartable(policy, factory) => {
                     let events = registry.wanted().then(|| registry.recorder(SUPERVISOR_EVENTS));
-                    let mut restarter = Restarter::new(policy, factory, index, spec, built.until, records, events);
+                    let mut restarter = Restarter {
+                        policy,
+                        factory,
+                        index,
+                        spec,
+                        until: built.until,
+                        records,
+                        events,
+                        shown: None,
+                        restarts: 0,
+                    };
                     let (group, books) = restarter.first()?;
                     (group, Some((restarter, books)))
                 }
@@ -271,10 +281,8 @@ impl RuntimeBuilder {
             disturbances.push(disturb);
             restarters.push(restarter);
         }
-        let reexecution = match built.recording {
-            Some((recording, script)) => Some(Reexecution::new(recording, script, &groups, built.ports)?),
-            None => None,
-        };
+        let repeat = |(recording, script)| Reexecution::new(recording, script, &groups, built.ports);
+        let reexecution = built.recording.map(repeat).transpose()?;
         let Self { execution, grants, measures_cost, .. } = built;
         Ok(Runtime { execution, groups, restarters, disturbances, reexecution, registry, grants, measures_cost })
     }

@@ -81,7 +81,7 @@ impl Runtime {
             self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names: Vec<String> = groups.iter().map(|group| group.spec.name.clone()).collect();
-        let live = groups.iter().map(GroupRun::live).collect();
+        let live = groups.iter().map(|group| group.shown.clone()).collect();
         let executor = match execution {
             Execution::Threaded => {
                 Executor::Threaded(Threads::start(groups, restarters, Arc::clone(&control), &grants)?)
@@ -91,8 +91,9 @@ impl Runtime {
                 start_actors(&mut groups)?;
                 let restarters =
                     restarters.into_iter().map(|restart| restart.map(|(restarter, _)| restarter)).collect();
-                let run = VirtualRun::new(groups, restarters, disturbances, reexecution, Arc::clone(&control));
-                Executor::Virtual(if measures_cost { run.measuring_cost() } else { run })
+                let control = Arc::clone(&control);
+                let run = VirtualRun::new(groups, restarters, disturbances, reexecution, control, measures_cost);
+                Executor::Virtual(run)
             }
         };
         let executor = Arc::new(Mutex::new(executor));
@@ -172,7 +173,7 @@ impl RunningGraph {
     pub fn elapsed(&self) -> Nanos {
         match &*lock(&self.executor) {
             Executor::Threaded(threads) => threads.elapsed(),
-            Executor::Virtual(run) => run.now(),
+            Executor::Virtual(run) => run.now,
         }
     }
 
@@ -219,20 +220,14 @@ impl RunningGraph {
     pub fn stop(self) -> RuntimeReport {
         let given_up = self.end();
         let executor = lock(&self.executor);
-        let (groups, fault) = match &*executor {
-            Executor::Threaded(threads) => threads.supervisor.results(),
-            Executor::Virtual(run) => run.supervisor.results(),
-        };
-        let costs = match &*executor {
-            Executor::Threaded(_) => Vec::new(),
+        let (supervisor, at, costs) = match &*executor {
+            Executor::Threaded(threads) => (&threads.supervisor, threads.elapsed(), Vec::new()),
             Executor::Virtual(run) => {
-                self.names.iter().cloned().zip(run.costs()).map(|(name, cpu)| GroupCost { name, cpu }).collect()
+                let cost = |(name, cpu): (&String, _)| GroupCost { name: name.clone(), cpu };
+                (&run.supervisor, run.now, self.names.iter().zip(run.costs()).map(cost).collect())
             }
         };
-        let (restarts, at) = match &*executor {
-            Executor::Threaded(threads) => (threads.restarts(), threads.elapsed()),
-            Executor::Virtual(run) => (run.restarts(), run.now()),
-        };
+        let ((groups, fault), restarts) = (supervisor.results(), supervisor.restarts.clone());
         let stuck = || RuntimeFault {
             group: given_up.join("`, `"),
             actor: String::new(),

@@ -20,7 +20,7 @@ pub(crate) struct Ledger {
     deadline: Nanos,
     next: u64,
     /// When the group could run again after its last work, and how long that work took.
-    free: Nanos,
+    pub(crate) free: Nanos,
     previous_work: Nanos,
     /// Why the current release is late, if it is.
     lateness: SlipCause,
@@ -37,8 +37,8 @@ pub(crate) struct Ledger {
     in_degraded_mode: u64,
     /// How often the watchdog of a device-paced group took over.
     pub(crate) takeovers: u64,
-    /// Set while the group is down after a fault.
-    down: bool,
+    /// Set while the group is down after a fault: what was due meanwhile is skipped because of it.
+    pub(crate) down: bool,
 }
 
 impl Ledger {
@@ -65,11 +65,6 @@ impl Ledger {
         }
     }
 
-    /// Goes on with the books of a group that failed: what was due since is skipped because of the fault.
-    pub(crate) fn resume(&mut self) {
-        self.down = true;
-    }
-
     /// Releases `periods` more from `now` on, and then no others. What is overdue by then is skipped.
     pub(crate) fn end_after(&mut self, now: Nanos, periods: u64) {
         let first = self.timeline.unbounded().latest_due(self.next, now);
@@ -91,11 +86,6 @@ impl Ledger {
     /// The number of the next release, which is the number of periods dealt with.
     pub(crate) fn elapsed_periods(&self) -> u64 {
         self.next
-    }
-
-    /// When the group's last work was done.
-    pub(crate) fn free(&self) -> Nanos {
-        self.free
     }
 
     /// From when on a device's frame runs the next release or a later one. An earlier one comes in a period that has

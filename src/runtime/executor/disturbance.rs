@@ -90,7 +90,7 @@ impl VirtualPace {
         {
             let ready = due.max(now);
             let work = planned.wake.free.unwrap_or(planned.wake.woke).saturating_sub(planned.wake.woke);
-            let woke = ready.max(group.ledger.free());
+            let woke = ready.max(group.ledger.free);
             *planned =
                 Planned { wake: Wake { woke, by: WokenBy::Timer, ready, free: Some(woke + work) }, took_over: None };
         }
@@ -101,7 +101,7 @@ impl VirtualPace {
         let release = group.ledger.elapsed_periods();
         let disturbance = self.disturb.as_mut().map_or(Disturbance::default(), |disturb| (disturb.0)(release));
         let (by, ready, took_over) = self.ready(due, disturbance.stall);
-        let woke = ready.max(group.ledger.free()) + disturbance.late_wake;
+        let woke = ready.max(group.ledger.free) + disturbance.late_wake;
         Planned { wake: Wake { woke, by, ready, free: Some(woke + disturbance.work) }, took_over }
     }
 

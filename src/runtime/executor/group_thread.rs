@@ -41,7 +41,7 @@ impl GroupThread {
     /// Runs the group to its end on the calling thread.
     pub(crate) fn run(mut self, mut waiter: Waiter) {
         if self.watched {
-            self.group.book_under(Arc::clone(&self.lease));
+            self.group.lease = Some(Arc::clone(&self.lease));
         }
         let base_ns = self.base_ns;
         self.group.time_actors(move || since(base_ns));
@@ -67,7 +67,7 @@ impl GroupThread {
                 }
                 return None;
             };
-            let winding_down = group.is_winding_down();
+            let winding_down = group.winding_down;
             let leave = || match observer {
                 true => control.observers_may_end(),
                 false => !winding_down && control.stop_requested() || lease.is_revoked(),
@@ -152,7 +152,7 @@ impl Replacement {
     /// The failure, with what the system said, if it gives no thread.
     pub(crate) fn spawn(self) -> Result<JoinHandle<()>, Box<Failure>> {
         let failure = self.failure.clone();
-        let thread = std::thread::Builder::new().name(self.restarter.group().to_owned());
+        let thread = std::thread::Builder::new().name(self.restarter.spec.name.clone());
         thread.spawn(move || self.run()).map_err(|error| Box::new(failure.not_answered(&error)))
     }
 

@@ -52,8 +52,6 @@ pub(crate) struct Threads {
     grants: GrantHandle,
     base_ns: u64,
     polled: Nanos,
-    /// Faults that were answered by a restart.
-    restarts: Vec<RuntimeFault>,
     /// Set when somebody has waited long enough: nobody waits for the rest again.
     given_up: bool,
     /// Since when only observers are left.
@@ -123,7 +121,6 @@ impl Threads {
             grants: grants.clone(),
             base_ns,
             polled: Nanos::ZERO,
-            restarts: Vec::new(),
             given_up: false,
             closing: None,
             ended_at: None,
@@ -202,7 +199,7 @@ impl Threads {
     /// A replacement has made the actors and goes on.
     fn install(&mut self, begun: Restarted) {
         self.seats[begun.group].restart = Some((begun.restarter, begun.books));
-        self.restarts.push(begun.failure.fault);
+        self.supervisor.restarts.push(begun.failure.fault);
         self.grants.replace(begun.group, begun.grant);
     }
 
@@ -239,8 +236,8 @@ impl Threads {
         if seat.overdue.0 != release {
             seat.overdue = (release, Nanos::ZERO);
         } else {
-            // Of the time since the last look, what it was overdue for.
-            let late = now.saturating_sub(due + restarter.patience());
+            // Of the time since the last look, what it was overdue for; a device-paced group may wait for its device.
+            let late = now.saturating_sub(due + restarter.spec.watchdog().unwrap_or_default());
             seat.overdue.1 = seat.overdue.1 + step.min(late);
         }
         seat.overdue.1 > restarter.policy.hung_after
@@ -263,22 +260,17 @@ impl Threads {
         let at = books.next_due().unwrap_or(now);
         restarter.abandoned(at);
         let fault = RuntimeFault {
-            group: restarter.group().to_owned(),
+            group: restarter.spec.name.clone(),
             actor: String::new(),
             at,
             what: format!("did not return within {} and was left behind", restarter.policy.hung_after),
         };
-        let (report, incarnation) = (restarter.report(&books), seat.incarnation);
+        let (report, incarnation) = (books.report(&restarter.spec), seat.incarnation);
         self.succeed(Box::new(Failure { group: index, incarnation, fault, report, books }));
     }
 
     pub(crate) fn elapsed(&self) -> Nanos {
         self.ended_at.unwrap_or_else(|| since(self.base_ns))
-    }
-
-    /// Faults that were answered by a restart.
-    pub(crate) fn restarts(&self) -> Vec<RuntimeFault> {
-        self.restarts.clone()
     }
 
     /// Requests a stop and waits for all groups, `bound` for each step of the way: a group that does not end is given

@@ -31,12 +31,12 @@ pub(crate) struct VirtualRun {
     /// `None` for groups that have ended.
     groups: Vec<Option<GroupRun>>,
     restarters: Vec<Option<Restarter>>,
-    restarts: Vec<RuntimeFault>,
     /// When each group wakes next.
     paces: Vec<VirtualPace>,
     /// What the releases of each group cost; empty if nobody asked.
     stopwatches: Vec<Stopwatch>,
-    now: Nanos,
+    /// Virtual time executed so far.
+    pub(crate) now: Nanos,
     /// Set once every group was told to stop.
     stopping: bool,
     reexecution: Option<Reexecution>,
@@ -51,32 +51,22 @@ impl VirtualRun {
         disturbances: Vec<Option<Disturb>>,
         reexecution: Option<Reexecution>,
         control: Arc<Control>,
+        measures_cost: bool,
     ) -> Self {
         panic_hook::install();
         let supervisor = Supervisor::new(groups.len());
         let paces = groups.iter().zip(disturbances).map(|(group, disturb)| VirtualPace::new(group, disturb)).collect();
+        let stopwatches = groups.iter().filter(|_| measures_cost).map(|_| Stopwatch::new()).collect();
         let groups = groups.into_iter().map(Some).collect();
-        let (now, stopping, restarts) = (Nanos::ZERO, false, Vec::new());
-        let stopwatches = Vec::new();
-        let mut run =
-            Self { groups, restarters, restarts, paces, stopwatches, now, stopping, reexecution, control, supervisor };
+        let (now, stopping) = (Nanos::ZERO, false);
+        let mut run = Self { groups, restarters, paces, stopwatches, now, stopping, reexecution, control, supervisor };
         run.end_what_is_over();
         run
-    }
-
-    /// Measures what each release costs.
-    pub(crate) fn measuring_cost(mut self) -> Self {
-        self.stopwatches = self.paces.iter().map(|_| Stopwatch::new()).collect();
-        self
     }
 
     /// What the releases of each group cost; empty if that is not measured.
     pub(crate) fn costs(&self) -> impl Iterator<Item = Histogram> {
         self.stopwatches.iter().map(|stopwatch| stopwatch.reader().snapshot())
-    }
-
-    pub(crate) fn now(&self) -> Nanos {
-        self.now
     }
 
     /// Executes `span` of virtual time, or up to the end of the run.
@@ -140,7 +130,7 @@ impl VirtualRun {
         self.stopping = true;
         let repeats = self.reexecution.is_some();
         for index in self.indices(false) {
-            let winds_down = self.groups[index].as_ref().is_some_and(GroupRun::is_winding_down);
+            let winds_down = self.groups[index].as_ref().is_some_and(|group| group.winding_down);
             if repeats || !(winds_down || self.begin_wind_down(index)) {
                 self.end(index);
             }
@@ -149,7 +139,7 @@ impl VirtualRun {
     }
 
     fn begin_wind_down(&mut self, index: usize) -> bool {
-        let Some(group) = self.groups[index].as_mut().filter(|group| !group.is_winding_down()) else { return false };
+        let Some(group) = self.groups[index].as_mut().filter(|group| !group.winding_down) else { return false };
         let begun = group.begin_wind_down(self.now);
         if begun {
             self.paces[index].wind_down(group, self.now);
@@ -195,7 +185,7 @@ impl VirtualRun {
             Ok((group, _)) => {
                 self.paces[index].plan(&group);
                 self.groups[index] = Some(group);
-                self.restarts.push(fault);
+                self.supervisor.restarts.push(fault);
             }
             Err(error) => {
                 let failure = Failure { group: index, incarnation: 0, fault, report, books };
@@ -204,11 +194,6 @@ impl VirtualRun {
                 self.control.group_ended();
             }
         }
-    }
-
-    /// Faults that were answered by a restart.
-    pub(crate) fn restarts(&self) -> Vec<RuntimeFault> {
-        self.restarts.clone()
     }
 
     /// The next release; at equal times the group that was added first. `None` if there is none any more.

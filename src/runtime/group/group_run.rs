@@ -24,18 +24,19 @@ pub(crate) struct GroupRun {
     pub(crate) spec: RateGroup,
     pub(crate) ledger: Ledger,
     live: LiveWriter,
-    shown: LiveReader,
+    /// What shows the group while it runs.
+    pub(crate) shown: LiveReader,
     /// Who keeps the books, if a supervisor may take them away.
-    lease: Option<Arc<Lease>>,
+    pub(crate) lease: Option<Arc<Lease>>,
     members: Members,
     /// Threads: what each of several actors takes.
     timer: Option<ActorTimer>,
     recorder: Option<Recorder>,
     /// Where a supervisor reads how far a group is that may have to be left behind.
-    books: Option<ExchangeWriter<Ledger>>,
+    pub(crate) books: Option<ExchangeWriter<Ledger>>,
     last: TickContext,
     degraded_code: Option<u32>,
-    winding_down: bool,
+    pub(crate) winding_down: bool,
     /// Its overrun policy has stopped the run.
     overran: bool,
     /// After a fault the actors are stopped and nothing else, unless the group winds down.
@@ -93,7 +94,7 @@ impl GroupRun {
 
     /// Refuses a device-paced group that has nobody to wait for its device.
     pub(crate) fn check_listener(&self) -> Result<(), GraphError> {
-        if self.spec.watchdog().is_some() && self.members.is_empty() {
+        if self.spec.watchdog().is_some() && self.members.count() == 0 {
             return Err(GraphError::new(
                 GraphErrorKind::Refused,
                 "is paced by a device and has no actor to wait for it; add one",
@@ -101,11 +102,6 @@ impl GroupRun {
             .at(format!("rate group `{}`", self.spec.name)));
         }
         Ok(())
-    }
-
-    /// Publishes the books after every release from now on.
-    pub(crate) fn publish_books(&mut self, books: ExchangeWriter<Ledger>) {
-        self.books = Some(books);
     }
 
     /// Starts the actors between two releases, in the place of ones that failed.
@@ -120,22 +116,12 @@ impl GroupRun {
         self.shown = shown;
     }
 
-    /// Books releases for as long as `lease` lasts.
-    pub(crate) fn book_under(&mut self, lease: Arc<Lease>) {
-        self.lease = Some(lease);
-    }
-
     /// Records what each actor takes, if somebody reads records and there are several; `clock` counts from the start of
     /// the run.
     pub(crate) fn time_actors(&mut self, clock: impl Fn() -> Nanos + Send + 'static) {
         if self.recorder.is_some() && self.members.count() > 1 {
             self.timer = Some(ActorTimer::new(clock));
         }
-    }
-
-    /// What shows this group while it runs.
-    pub(crate) fn live(&self) -> LiveReader {
-        self.shown.clone()
     }
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
@@ -173,10 +159,6 @@ impl GroupRun {
             return AfterFault::Restart;
         }
         if self.begin_wind_down(now) { AfterFault::GoOn } else { AfterFault::End }
-    }
-
-    pub(crate) fn is_winding_down(&self) -> bool {
-        self.winding_down
     }
 
     /// Asks the first actor to wait for its device: true if that has something new.

@@ -2,7 +2,7 @@
 
 use crate::actor::{Actor, Outcome, TickContext};
 use crate::error::{GraphError, GraphErrorKind};
-use crate::group::panic_hook::{quietly, text_of};
+use crate::group::panic_hook::{guarded, text_of};
 use crate::records::timing::ActorTimes;
 use crate::time::Nanos;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -44,10 +44,6 @@ impl Members {
         self.0.len()
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
     pub(crate) fn all_failed(&self) -> bool {
         self.0.iter().all(|member| member.failed)
     }
@@ -84,9 +80,7 @@ impl Members {
     /// Asks the first actor to wait for its device: true if that has something new.
     pub(crate) fn wait(&mut self, timeout: Nanos) -> Result<bool, Broken> {
         let Some(member) = self.0.first_mut().filter(|member| !member.failed) else { return Ok(false) };
-        // Unwind safe: after a panic the actor is asked whether it can go on, or stopped and dropped.
-        quietly(|| catch_unwind(AssertUnwindSafe(|| member.actor.wait(timeout))))
-            .map_err(|panic| (0, Fatal::Panic(format!("{} (in wait)", text_of(&*panic)))))
+        guarded(|| member.actor.wait(timeout)).map_err(|text| (0, Fatal::Panic(format!("{text} (in wait)"))))
     }
 
     /// All ticks, then all commits in reverse; the first code of a degraded result, if there was one.
@@ -121,11 +115,10 @@ impl Members {
             }
             Ok(())
         };
-        // Unwind safe: after a panic the actor is stopped and dropped, nothing else.
-        match quietly(|| catch_unwind(AssertUnwindSafe(work))) {
+        match guarded(work) {
             Ok(Ok(())) => Ok(degraded),
             Ok(Err(code)) => Err((current, Fatal::Fault(code))),
-            Err(panic) => Err((current, Fatal::Panic(text_of(&*panic)))),
+            Err(text) => Err((current, Fatal::Panic(text))),
         }
     }
 
@@ -135,7 +128,7 @@ impl Members {
         if std::mem::replace(&mut member.recovered, true) {
             return false;
         }
-        quietly(|| catch_unwind(AssertUnwindSafe(|| member.actor.recover()))).unwrap_or(false)
+        guarded(|| member.actor.recover()).unwrap_or(false)
     }
 
     /// Stops an actor before the others: what it holds must not wait for them.
@@ -143,7 +136,7 @@ impl Members {
         let member = &mut self.0[index];
         if !std::mem::replace(&mut member.failed, true) {
             // The fault that led here is the one to report.
-            let _ = quietly(|| catch_unwind(AssertUnwindSafe(|| member.actor.stop(ctx))));
+            let _ = guarded(|| member.actor.stop(ctx));
         }
     }
 
@@ -158,10 +151,9 @@ impl Members {
                 actor.stop(ctx);
             }
         };
-        let stopped = quietly(|| catch_unwind(AssertUnwindSafe(stop)));
-        let dropped = quietly(|| catch_unwind(AssertUnwindSafe(move || drop(actor))));
-        let broken = stopped.and(dropped);
-        Some(broken.map_err(|panic| (name, Fatal::Panic(format!("{} (in stop)", text_of(&*panic))))))
+        let stopped = guarded(stop);
+        let dropped = guarded(move || drop(actor));
+        Some(stopped.and(dropped).map_err(|text| (name, Fatal::Panic(format!("{text} (in stop)")))))
     }
 }
 

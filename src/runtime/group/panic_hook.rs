@@ -5,7 +5,7 @@
 
 use std::any::Any;
 use std::cell::Cell;
-use std::panic::{Location, set_hook, take_hook};
+use std::panic::{AssertUnwindSafe, Location, catch_unwind, set_hook, take_hook};
 use std::sync::Once;
 
 /// Longest file name kept, in bytes; the end of a longer one is what tells files apart.
@@ -37,21 +37,17 @@ pub(crate) fn install() {
     });
 }
 
-/// Calls an actor; a panic in it is kept quiet.
+/// Calls an actor; a panic in it is kept quiet, and its text is the error.
 ///
 /// # Real-time
-/// Wait-free, real-time safe.
+/// Wait-free, real-time safe, unless it panics.
 #[inline]
-pub(crate) fn quietly<R>(call: impl FnOnce() -> R) -> R {
-    /// Also when `call` unwinds.
-    struct Restore(bool);
-    impl Drop for Restore {
-        fn drop(&mut self) {
-            IN_ACTOR.set(self.0);
-        }
-    }
-    let _restore = Restore(IN_ACTOR.replace(true));
-    call()
+pub(crate) fn guarded<R>(call: impl FnOnce() -> R) -> Result<R, String> {
+    let before = IN_ACTOR.replace(true);
+    // Unwind safe: after a panic an actor is asked whether it can go on, or stopped and dropped, nothing else.
+    let result = catch_unwind(AssertUnwindSafe(call));
+    IN_ACTOR.set(before);
+    result.map_err(|panic| text_of(&*panic))
 }
 
 fn keep(location: &Location<'_>) {
@@ -78,12 +74,11 @@ pub(crate) fn text_of(panic: &(dyn Any + Send)) -> String {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use std::panic::catch_unwind;
 
     #[test]
     fn a_panic_in_an_actor_leaves_its_place_and_one_outside_does_not() {
         install();
-        assert!(catch_unwind(|| quietly(|| panic!("inside"))).is_err());
+        assert_eq!(guarded(|| panic!("inside")), Err::<(), _>("inside".to_owned()));
         let line = line!() - 1;
         assert!(place().ends_with(&format!("panic_hook.rs:{line}")));
         assert_eq!(place(), "", "it is taken once");

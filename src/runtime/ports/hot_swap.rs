@@ -235,12 +235,11 @@ mod tests {
 #[cfg(all(test, loom))]
 mod loom_tests {
     use super::*;
+    use crate::primitives::sync::check;
 
     #[test]
     fn loom_the_publication_after_two_deliveries_reaches_the_newest_reader() {
-        let mut builder = loom::model::Builder::new();
-        builder.preemption_bound = Some(3);
-        builder.check(|| {
+        check(|| {
             let (writer, _old) = exchange(|| 0_u64);
             let (mut writer, mut swapper) = swappable(writer);
             let thread = loom::thread::spawn(move || {

@@ -306,12 +306,10 @@ mod tests {
 #[cfg(all(test, loom))]
 mod loom_tests {
     use super::*;
+    use crate::primitives::sync::check;
 
     fn model(ordering: Ordering) {
-        let mut builder = loom::model::Builder::new();
-        // Bounded preemptions keep the model small; known bugs of lock-free code need two or three.
-        builder.preemption_bound = Some(3);
-        builder.check(move || {
+        check(move || {
             let slot = |_| CachePadded(UnsafeCell::new(Stamped::initial(0)));
             let slots = std::array::from_fn(slot);
             let (mut writer, mut reader) =

@@ -61,3 +61,12 @@ impl<T> std::ops::Deref for CachePadded<T> {
         &self.0
     }
 }
+
+/// Checks a model under every interleaving that loom finds.
+#[cfg(all(test, loom))]
+pub(crate) fn check(model: impl Fn() + Sync + Send + 'static) {
+    let mut builder = loom::model::Builder::new();
+    // Bounded preemptions keep the model small; known bugs of lock-free code need two or three.
+    builder.preemption_bound = Some(3);
+    builder.check(model);
+}

@@ -23,12 +23,7 @@ pub enum PortUseKind {
 impl PortUseKind {
     /// The kind with this number; `None` for numbers of a newer version.
     pub fn from_code(code: u32) -> Option<Self> {
-        match code {
-            0 => Some(Self::Took),
-            1 => Some(Self::Saw),
-            2 => Some(Self::Dropped),
-            _ => None,
-        }
+        [Self::Took, Self::Saw, Self::Dropped].get(code as usize).copied()
     }
 
     /// A short name for tables and logs.

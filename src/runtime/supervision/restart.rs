@@ -4,17 +4,15 @@ use crate::accounting::ledger::Ledger;
 use crate::actor::Actor;
 use crate::error::{ActorError, GraphError, GraphErrorKind};
 use crate::group::group_run::GroupRun;
-use crate::group::panic_hook::{place as panicked_at, quietly, text_of};
+use crate::group::panic_hook::{guarded, place as panicked_at};
 use crate::ports::restartable::RecorderPort;
 use crate::primitives::exchange::{ExchangeReader, exchange};
 use crate::rate_group::RateGroup;
 use crate::records::record::Event;
 use crate::records::recorder::Recorder;
 use crate::reports::live::LiveReader;
-use crate::reports::report::{GroupReport, RuntimeFault};
+use crate::reports::report::RuntimeFault;
 use crate::time::Nanos;
-use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Makes the actors of a group anew, with fresh halves of their ports.
 pub(crate) type Factory = Box<dyn FnMut() -> Result<Vec<Box<dyn Actor>>, ActorError> + Send>;
@@ -40,32 +38,20 @@ impl Default for Restart {
 /// What it takes to start a group again.
 pub(crate) struct Restarter {
     pub(crate) policy: Restart,
-    factory: Factory,
-    index: u16,
-    spec: RateGroup,
-    until: Option<Nanos>,
-    records: Option<RecorderPort>,
+    pub(crate) factory: Factory,
+    pub(crate) index: u16,
+    pub(crate) spec: RateGroup,
+    pub(crate) until: Option<Nanos>,
+    pub(crate) records: Option<RecorderPort>,
     /// Events of the supervisor about this group.
-    events: Option<Recorder>,
+    pub(crate) events: Option<Recorder>,
     /// What the group shows of itself, once it was made.
-    shown: Option<LiveReader>,
+    pub(crate) shown: Option<LiveReader>,
     /// Restarts so far.
-    restarts: u32,
+    pub(crate) restarts: u32,
 }
 
 impl Restarter {
-    pub(crate) fn new(
-        policy: Restart,
-        factory: Factory,
-        index: u16,
-        spec: RateGroup,
-        until: Option<Nanos>,
-        records: Option<RecorderPort>,
-        events: Option<Recorder>,
-    ) -> Self {
-        Self { policy, factory, index, spec, until, records, events, shown: None, restarts: 0 }
-    }
-
     /// The group as it is when the run starts.
     pub(crate) fn first(&mut self) -> Result<(GroupRun, ExchangeReader<Ledger>), GraphError> {
         let ledger = Ledger::new(self.index, &self.spec, self.until);
@@ -86,26 +72,12 @@ impl Restarter {
         mut ledger: Ledger,
         now: Nanos,
     ) -> Result<(GroupRun, ExchangeReader<Ledger>), GraphError> {
-        ledger.resume();
+        ledger.down = true;
         let (mut group, books) = self.make(ledger).map_err(|error| error.at(format!("restart after {fault}")))?;
         group.start_at(now).inspect_err(|_| group.undo_start())?;
         self.restarts += 1;
         self.event(now, Event::RESTARTED, self.restarts.into());
         Ok((group, books))
-    }
-
-    /// How late a release may be without any suspicion: a device-paced group waits for its device.
-    pub(crate) fn patience(&self) -> Nanos {
-        self.spec.watchdog().unwrap_or_default()
-    }
-
-    pub(crate) fn group(&self) -> &str {
-        &self.spec.name
-    }
-
-    /// The sums of a group whose actors cannot be asked.
-    pub(crate) fn report(&self, books: &Ledger) -> GroupReport {
-        books.report(&self.spec)
     }
 
     /// Notes that a thread was left behind in the release due at `at`.
@@ -116,20 +88,19 @@ impl Restarter {
     fn make(&mut self, ledger: Ledger) -> Result<(GroupRun, ExchangeReader<Ledger>), GraphError> {
         // Unwind safe: a factory that panicked is not asked again in this restart, and says itself what it can do
         // after.
-        let made = quietly(|| catch_unwind(AssertUnwindSafe(&mut self.factory)));
+        let made = guarded(&mut self.factory);
         let place = || format!("rate group `{}`, factory", self.spec.name);
-        let panicked = |panic: Box<dyn Any + Send>| {
-            GraphError::new(GraphErrorKind::Actor, format!("panicked{}: {}", panicked_at(), text_of(&*panic)))
-                .at(place())
+        let panicked = |text: String| {
+            GraphError::new(GraphErrorKind::Actor, format!("panicked{}: {text}", panicked_at())).at(place())
         };
         let actors = made.map_err(panicked)?.map_err(GraphError::from_actor)?;
         let recorder = self.records.as_ref().map(RecorderPort::recorder);
         let (writer, reader) = exchange(|| ledger);
         let mut group = GroupRun::new(self.index, self.spec.clone(), actors, recorder, ledger);
-        group.publish_books(writer);
+        group.books = Some(writer);
         match &self.shown {
             Some(shown) => group.show_on(shown.clone()),
-            None => self.shown = Some(group.live()),
+            None => self.shown = Some(group.shown.clone()),
         }
         Ok((group, reader))
     }

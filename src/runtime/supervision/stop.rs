@@ -104,7 +104,7 @@ impl StopHandle {
 #[cfg(all(test, loom))]
 mod loom_tests {
     use super::*;
-    use crate::primitives::sync::UnsafeCell;
+    use crate::primitives::sync::{UnsafeCell, check};
 
     /// What a group has recorded: loom notices a read that is not ordered after the write.
     struct Recorded(UnsafeCell<u64>);
@@ -114,10 +114,7 @@ mod loom_tests {
 
     /// Two groups record something and end, one of them after a stop was requested; an observer waits for both.
     fn model(orderings: [Ordering; 2]) {
-        let mut builder = loom::model::Builder::new();
-        // Bounded preemptions keep the model small; known bugs of lock-free code need two or three.
-        builder.preemption_bound = Some(3);
-        builder.check(move || {
+        check(move || {
             let control = Arc::new(Control { orderings, ..Control::of(2) });
             let recorded = Arc::new([(); 2].map(|()| Recorded(UnsafeCell::new(0))));
             let group = |index: usize, waits: bool| {

@@ -58,11 +58,13 @@ pub(crate) struct Restarted {
 pub(crate) struct Supervisor {
     reports: Vec<Option<GroupReport>>,
     fault: Option<RuntimeFault>,
+    /// Faults that were answered by a restart.
+    pub(crate) restarts: Vec<RuntimeFault>,
 }
 
 impl Supervisor {
     pub(crate) fn new(groups: usize) -> Self {
-        Self { reports: vec![None; groups], fault: None }
+        Self { reports: vec![None; groups], fault: None, restarts: Vec::new() }
     }
 
     pub(crate) fn note(&mut self, message: Message) {

@@ -131,15 +131,9 @@ pub(crate) fn refusals(groups: &[RateGroup]) -> Vec<String> {
             refused.push(format!("{}: timer slack {}", spec.name, grant.timer_slack));
         }
     }
-    if groups.iter().any(|spec| spec.priority.is_some())
-        && let Err(reason) = os::may_lock_everything()
-    {
-        refused.push(format!("memory: {reason}"));
-    }
-    if groups.iter().any(|spec| spec.priority.is_some())
-        && let Err(reason) = os::stay_awake()
-    {
-        refused.push(format!("idle states: {reason}"));
+    if groups.iter().any(|spec| spec.priority.is_some()) {
+        refused.extend(os::may_lock_everything().err().map(|reason| format!("memory: {reason}")));
+        refused.extend(os::stay_awake().err().map(|reason| format!("idle states: {reason}")));
     }
     refused
 }

@@ -61,10 +61,7 @@ mod imp {
     /// Wait-free, no system call (vDSO).
     #[inline]
     pub(crate) fn monotonic() -> u64 {
-        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-        // SAFETY: the pointer is to a timespec of our own; CLOCK_MONOTONIC always exists.
-        unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
-        time.tv_sec as u64 * NANOS_PER_S + time.tv_nsec as u64
+        read(libc::CLOCK_MONOTONIC)
     }
 
     /// CPU time that the calling thread has used, in nanoseconds.
@@ -72,9 +69,15 @@ mod imp {
     /// # Real-time
     /// A system call: not for a tick on a real-time thread.
     pub(crate) fn thread_cpu() -> u64 {
+        read(libc::CLOCK_THREAD_CPUTIME_ID)
+    }
+
+    /// Reads a clock that always exists, in nanoseconds.
+    #[inline]
+    fn read(clock: libc::clockid_t) -> u64 {
         let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-        // SAFETY: the pointer is to a timespec of our own; every thread has this clock.
-        unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut time) };
+        // SAFETY: the pointer is to a timespec of our own; both clocks that are asked for always exist.
+        unsafe { libc::clock_gettime(clock, &mut time) };
         time.tv_sec as u64 * NANOS_PER_S + time.tv_nsec as u64
     }
 
