@@ -31,17 +31,17 @@ const QUARANTINE: [(&str, &[&str]); 6] = [
         &[
             "model/body/kernel/avx2.rs",
             "model/body/kernel/avx512.rs",
-            "runtime/exchange.rs",
-            "runtime/os.rs",
-            "runtime/ring.rs",
+            "runtime/primitives/exchange.rs",
+            "runtime/system/os.rs",
+            "runtime/primitives/ring.rs",
         ],
     ),
     ("parry3d_f64", &["model/geometry.rs"]),
     ("faer", &["model/dense.rs", "model/reduction/linalg.rs", "model/sparse.rs"]),
     ("rayon", &["model/body/kernel/cores.rs"]),
     // However the path to them is cut up into braces.
-    ("atomic", &["runtime/sync.rs"]),
-    ("loom::", &["runtime/sync.rs"]),
+    ("atomic", &["runtime/primitives/sync.rs"]),
+    ("loom::", &["runtime/primitives/sync.rs"]),
 ];
 
 /// A source file by its path below `src/`.
@@ -285,8 +285,8 @@ fn the_checker_finds_forbidden_edges_however_they_are_written() {
         ("model/mesh/mod.rs", "use super::super::runtime::ring;"),
         ("model/local/hold.rs", "use super::super::super::time::Nanos;"),
         ("time.rs", "use super::error::Error;"),
-        ("runtime/os.rs", "let x = 'a'; let s = \"// \\\" \"; use crate::model::Vec3;"),
-        ("runtime/os.rs", "fn f<'a>(x: &'a str) {} use crate::model::Vec3;"),
+        ("runtime/system/os.rs", "let x = 'a'; let s = \"// \\\" \"; use crate::model::Vec3;"),
+        ("runtime/system/os.rs", "fn f<'a>(x: &'a str) {} use crate::model::Vec3;"),
         ("safety/clamp.rs", "use crate::devices::Device;"),
         ("log/mod.rs", "/* a comment */ use crate::scene::Scene;"),
         ("report/csv.rs", "use crate::session::Summary;"),
@@ -340,5 +340,5 @@ fn the_checker_finds_words_outside_their_quarantine() {
     ] {
         assert_eq!(escaped("model/blend.rs", text), [""; 0], "{text}");
     }
-    assert_eq!(escaped("runtime/ring.rs", "unsafe { x() }"), [""; 0]);
+    assert_eq!(escaped("runtime/primitives/ring.rs", "unsafe { x() }"), [""; 0]);
 }

@@ -3,7 +3,7 @@
 use crate::accounting::ledger::Ledger;
 use crate::actor::Actor;
 use crate::admission::plan::Plan;
-use crate::error::{ActorError, GraphError, GraphErrorKind};
+use crate::error::{ActorError, GraphError};
 use crate::executor::Execution;
 use crate::executor::disturbance::{Disturb, Disturbance};
 use crate::group::group_run::GroupRun;
@@ -301,8 +301,7 @@ impl RuntimeBuilder {
     fn check_restartable(&self) -> Result<(), GraphError> {
         let wrong = |(group, cast): &&(RateGroup, Cast)| group.observer && matches!(cast, Cast::Restartable(..));
         self.groups.iter().find(wrong).map_or(Ok(()), |(group, _)| {
-            Err(GraphError::new(GraphErrorKind::Refused, "an observer cannot be restartable; add it with `group`")
-                .at(format!("rate group `{}`", group.name)))
+            Err(GraphError::refused("an observer cannot be restartable; add it with `group`").in_group(&group.name))
         })
     }
 
@@ -310,7 +309,7 @@ impl RuntimeBuilder {
         if self.measures_cost && self.execution == Execution::Threaded {
             let wrong =
                 "the cost of threads is not measured: it takes system calls; their execution times are in every report";
-            return Err(GraphError::new(GraphErrorKind::Refused, wrong));
+            return Err(GraphError::refused(wrong));
         }
         Ok(())
     }
@@ -328,7 +327,7 @@ impl RuntimeBuilder {
             } else {
                 continue;
             };
-            return Err(GraphError::new(GraphErrorKind::Refused, wrong).at(format!("rate group `{name}`")));
+            return Err(GraphError::refused(wrong).in_group(name));
         }
         Ok(())
     }

@@ -35,6 +35,11 @@ impl GraphError {
         Self { kind, place: String::new(), message: one_line(&message.into()), source: None }
     }
 
+    /// The refusal of a graph, or of a thread for it.
+    pub(crate) fn refused(message: impl Into<String>) -> Self {
+        Self::new(GraphErrorKind::Refused, message)
+    }
+
     /// The error that an actor's start or a factory returned.
     pub(crate) fn from_actor(source: ActorError) -> Self {
         Self { source: Some(source), ..Self::new(GraphErrorKind::Actor, String::new()) }
@@ -46,6 +51,12 @@ impl GraphError {
         let place = place.as_ref();
         self.place = if self.place.is_empty() { place.to_owned() } else { format!("{place}: {}", self.place) };
         self
+    }
+
+    /// Puts the rate group in front in which it happened.
+    #[must_use]
+    pub(crate) fn in_group(self, name: &str) -> Self {
+        self.at(format!("rate group `{name}`"))
     }
 
     /// The kind, for programs.

@@ -2,7 +2,7 @@
 
 use crate::accounting::ledger::Ledger;
 use crate::admission::plan::Plan;
-use crate::error::{GraphError, GraphErrorKind};
+use crate::error::GraphError;
 use crate::executor::Execution;
 use crate::executor::disturbance::Disturb;
 use crate::executor::threaded::Threads;
@@ -59,7 +59,7 @@ impl Runtime {
     /// refuse now. Nothing is started.
     ///
     /// # Errors
-    /// [`GraphErrorKind::Refused`] if the process has been moved to fewer cores since the graph was built and no longer
+    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused) if the process has been moved to fewer cores since the graph was built and no longer
     /// fits.
     pub fn plan(&self) -> Result<Plan, GraphError> {
         Plan::of(self.execution, &self.specs())
@@ -75,7 +75,7 @@ impl Runtime {
     ///
     /// # Errors
     /// The error of the first actor whose start failed, after those already started were stopped; or
-    /// [`GraphErrorKind::Refused`] if the system gives no thread.
+    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused) if the system gives no thread.
     pub fn start(self) -> Result<RunningGraph, GraphError> {
         let Self { execution, mut groups, restarters, disturbances, reexecution, registry, grants, measures_cost } =
             self;
@@ -126,9 +126,7 @@ fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), GraphError> {
         }
     };
     let thread = std::thread::Builder::new().name("supervisor".to_owned()).spawn(watch);
-    thread
-        .map(drop)
-        .map_err(|error| GraphError::new(GraphErrorKind::Refused, format!("no thread for the supervisor: {error}")))
+    thread.map(drop).map_err(|error| GraphError::refused(format!("no thread for the supervisor: {error}")))
 }
 
 impl_debug!(Runtime, "execution": |own| own.execution, "groups": |own| own.specs());
@@ -228,12 +226,9 @@ impl RunningGraph {
             }
         };
         let ((groups, fault), restarts) = (supervisor.results(), supervisor.restarts.clone());
-        let stuck = || RuntimeFault {
-            group: given_up.join("`, `"),
-            actor: String::new(),
-            at,
-            what: format!("did not end within {STOP_BOUND:?} of a stop and was given up; its tick or stop must return"),
-        };
+        let what = "of a stop and was given up; its tick or stop must return";
+        let stuck =
+            || RuntimeFault::of_group(&given_up.join("`, `"), at, format!("did not end within {STOP_BOUND:?} {what}"));
         let fault = fault.or_else(|| (!given_up.is_empty()).then(stuck));
         let grant = self.grants.get().unwrap_or_default();
         RuntimeReport { groups, grant, fault, restarts, lost_records: self.registry.lost(), costs }

@@ -1,6 +1,6 @@
 //! The admission check: a graph that cannot work is refused when it is built, with the values that failed.
 
-use crate::error::{GraphError, GraphErrorKind};
+use crate::error::GraphError;
 use crate::executor::Execution;
 use crate::rate_group::{OverrunPolicy, RateGroup};
 use std::collections::BTreeMap;
@@ -13,10 +13,12 @@ const MAX_GROUPS: usize = 256;
 /// Virtual time may stand for any machine: how many cores this one has and how long a result takes are no matter there.
 pub(crate) fn admit(groups: &[RateGroup], execution: Execution, cores: usize) -> Result<(), GraphError> {
     if groups.iter().all(|group| group.observer) {
-        return Err(refuse("the graph has no group that is not an observer: it would end at once; add one"));
+        return Err(GraphError::refused(
+            "the graph has no group that is not an observer: it would end at once; add one",
+        ));
     }
     if groups.len() > MAX_GROUPS {
-        return Err(refuse(format!("{} rate groups, at most {MAX_GROUPS} are possible", groups.len())));
+        return Err(GraphError::refused(format!("{} rate groups, at most {MAX_GROUPS} are possible", groups.len())));
     }
     groups.iter().try_for_each(check_group)?;
     for (index, group) in groups.iter().enumerate() {
@@ -32,7 +34,7 @@ pub(crate) fn admit(groups: &[RateGroup], execution: Execution, cores: usize) ->
 }
 
 fn check_group(group: &RateGroup) -> Result<(), GraphError> {
-    let refuse = |message: String| Err(refuse(message).at(place(group)));
+    let refuse = |message: String| Err(GraphError::refused(message).in_group(&group.name));
     let period = group.rate.period();
     if let Some(deadline) = group.deadline
         && (deadline.0 == 0 || deadline > period)
@@ -62,7 +64,7 @@ fn check_group(group: &RateGroup) -> Result<(), GraphError> {
 
 /// Policies that say nothing, and release modes that contradict them.
 fn check_policy(group: &RateGroup) -> Result<(), GraphError> {
-    let refuse = |message: String| Err(refuse(message).at(place(group)));
+    let refuse = |message: String| Err(GraphError::refused(message).in_group(&group.name));
     if group.overrun == (OverrunPolicy::Degrade { recover_after: 0 }) {
         return refuse(
             "degrading until 0 releases were in time is the policy Skip; use that or a larger number".to_owned(),
@@ -88,12 +90,12 @@ fn check_policy(group: &RateGroup) -> Result<(), GraphError> {
 
 fn check_pair(a: &RateGroup, b: &RateGroup) -> Result<(), GraphError> {
     if a.name == b.name {
-        return Err(refuse(format!("two rate groups are called `{}`; give each its own name", a.name)));
+        return Err(GraphError::refused(format!("two rate groups are called `{}`; give each its own name", a.name)));
     }
     if let (Some(priority), Some(cpu)) = (a.priority, a.cpu)
         && (b.priority, b.cpu) == (a.priority, a.cpu)
     {
-        return Err(refuse(format!(
+        return Err(GraphError::refused(format!(
             "rate groups `{}` and `{}` both have real-time priority {priority} on core {cpu}: one would wait for the \
              other to sleep; give them different priorities or cores",
             a.name, b.name
@@ -113,7 +115,7 @@ fn check_latency(group: &RateGroup) -> Result<(), GraphError> {
          latency or the rate, or run in virtual time",
         group.latency
     );
-    Err(refuse(message).at(place(group)))
+    Err(GraphError::refused(message).in_group(&group.name))
 }
 
 /// Budgets as parts of their periods: the sum and its terms.
@@ -149,7 +151,7 @@ fn check_cores(groups: &[RateGroup]) -> Result<(), GraphError> {
     }
     match cores.iter().find(|(_, load)| load.exceeds(1)) {
         None => Ok(()),
-        Some((cpu, load)) => Err(refuse(format!(
+        Some((cpu, load)) => Err(GraphError::refused(format!(
             "the budgets on core {cpu} need {} of its 100 %; lower them or use another core",
             load.in_words()
         ))),
@@ -164,20 +166,16 @@ fn check_all(groups: &[RateGroup], cores: usize) -> Result<(), GraphError> {
         return Ok(());
     }
     let cores = if cores == 1 { "1 core".to_owned() } else { format!("{cores} cores") };
-    Err(refuse(format!("the budgets need {} of {cores}; lower them, or allow the process more cores", load.in_words())))
-}
-
-fn place(group: &RateGroup) -> String {
-    format!("rate group `{}`", group.name)
-}
-
-fn refuse(message: impl Into<String>) -> GraphError {
-    GraphError::new(GraphErrorKind::Refused, message)
+    Err(GraphError::refused(format!(
+        "the budgets need {} of {cores}; lower them, or allow the process more cores",
+        load.in_words()
+    )))
 }
 
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
+    use crate::error::GraphErrorKind;
     use crate::time::{Nanos, Rate};
 
     fn named(name: &str) -> RateGroup {

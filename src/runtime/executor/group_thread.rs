@@ -22,31 +22,37 @@ use std::time::Duration;
 /// How often an observer that has ended looks whether the others have.
 const POLL: Duration = Duration::from_millis(2);
 
-/// What a group's thread has to do with.
-pub(crate) struct GroupThread {
-    pub(crate) group: GroupRun,
+/// What the thread of a group shares with the supervisor.
+pub(crate) struct Link {
     /// Time zero of the run, of the monotonic clock.
     pub(crate) base_ns: u64,
+    /// Counts the threads that the group has had, from 0.
     pub(crate) incarnation: usize,
-    /// A fault is for the supervisor to answer, who starts the group again.
-    pub(crate) restartable: bool,
-    /// The supervisor looks at its books, and dismisses a thread that does not return.
-    pub(crate) watched: bool,
     pub(crate) lease: Arc<Lease>,
     pub(crate) control: Arc<Control>,
     pub(crate) post: Sender<Message>,
+}
+
+/// The thread of a group and what it needs.
+pub(crate) struct GroupThread {
+    pub(crate) group: GroupRun,
+    /// A fault is for the supervisor to answer, who starts the group again.
+    pub(crate) restartable: bool,
+    /// The supervisor looks at its books, and revokes the lease of a thread that does not return.
+    pub(crate) watched: bool,
+    pub(crate) link: Link,
 }
 
 impl GroupThread {
     /// Runs the group to its end on the calling thread.
     pub(crate) fn run(mut self, mut waiter: Waiter) {
         if self.watched {
-            self.group.lease = Some(Arc::clone(&self.lease));
+            self.group.lease = Some(Arc::clone(&self.link.lease));
         }
-        let base_ns = self.base_ns;
+        let base_ns = self.link.base_ns;
         self.group.time_actors(move || since(base_ns));
         let failed = self.release_all(&mut waiter);
-        if self.lease.is_revoked() {
+        if self.link.lease.is_revoked() {
             // Its place is taken: it says nothing any more, and its actors go with it.
             return;
         }
@@ -55,7 +61,8 @@ impl GroupThread {
 
     /// Runs release after release; the fault if the supervisor is to answer it.
     fn release_all(&mut self, waiter: &mut Waiter) -> Option<RuntimeFault> {
-        let Self { group, base_ns, lease, control, post, .. } = self;
+        let Self { group, link, .. } = self;
+        let Link { base_ns, lease, control, post, .. } = &*link;
         let base_ns = *base_ns;
         let observer = group.spec.observer;
         let now = || since(base_ns);
@@ -105,8 +112,9 @@ impl GroupThread {
     }
 
     fn end(self, failed: Option<RuntimeFault>) {
-        let Self { mut group, control, post, base_ns, incarnation, .. } = self;
-        let (control, post) = (&*control, &post);
+        let Self { mut group, link, .. } = self;
+        let Link { base_ns, incarnation, control, post, .. } = &link;
+        let (base_ns, incarnation) = (*base_ns, *incarnation);
         let index = usize::from(group.index);
         let observer = group.spec.observer;
         if observer {
@@ -134,43 +142,31 @@ impl GroupThread {
     }
 }
 
-/// What it takes to go on after a failure.
-pub(crate) struct Replacement {
-    pub(crate) restarter: Restarter,
-    pub(crate) failure: Box<Failure>,
-    pub(crate) incarnation: usize,
-    pub(crate) base_ns: u64,
-    pub(crate) lease: Arc<Lease>,
-    pub(crate) control: Arc<Control>,
-    pub(crate) post: Sender<Message>,
-}
-
-impl Replacement {
-    /// Starts the thread.
+impl Link {
+    /// Starts the thread that takes the place of one that failed: it makes the actors anew and goes on with the group.
+    /// Nobody waits for it, however long that takes.
     ///
     /// # Errors
     /// The failure, with what the system said, if it gives no thread.
-    pub(crate) fn spawn(self) -> Result<JoinHandle<()>, Box<Failure>> {
-        let failure = self.failure.clone();
-        let thread = std::thread::Builder::new().name(self.restarter.spec.name.clone());
-        thread.spawn(move || self.run()).map_err(|error| Box::new(failure.not_answered(&error)))
+    pub(crate) fn replace(self, restarter: Restarter, failure: Box<Failure>) -> Result<JoinHandle<()>, Box<Failure>> {
+        let unanswered = failure.clone();
+        let thread = std::thread::Builder::new().name(restarter.spec.name.clone());
+        let run = move || self.run_again(restarter, failure);
+        thread.spawn(run).map_err(|error| Box::new(unanswered.not_answered(&error)))
     }
 
-    fn run(self) {
-        let Self { mut restarter, failure, incarnation, base_ns, lease, control, post } = self;
-        match restarter.again(&failure.fault, failure.books, since(base_ns)) {
+    fn run_again(self, mut restarter: Restarter, failure: Box<Failure>) {
+        match restarter.again(&failure.fault, failure.books, since(self.base_ns)) {
             Ok((group, books)) => {
                 // The actors were started without it, like those before them.
                 let granted = set_up_thread(&group.spec);
                 let restartable = restarter.may_restart();
                 let begun = Restarted { group: failure.group, restarter, books, failure, grant: granted.group };
-                let _ = post.try_send(Message::Restarted(Box::new(begun)));
-                let watched = true;
-                GroupThread { group, base_ns, incarnation, restartable, watched, lease, control, post }
-                    .run(granted.waiter);
+                let _ = self.post.try_send(Message::Restarted(Box::new(begun)));
+                GroupThread { group, restartable, watched: true, link: self }.run(granted.waiter);
             }
             Err(error) => {
-                let _ = post.try_send(Message::NotRestarted(Box::new(failure.not_answered(&error))));
+                let _ = self.post.try_send(Message::NotRestarted(Box::new(failure.not_answered(&error))));
             }
         }
     }

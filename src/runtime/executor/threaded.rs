@@ -2,8 +2,8 @@
 //! again what failed.
 
 use crate::accounting::ledger::Ledger;
-use crate::error::{GraphError, GraphErrorKind};
-use crate::executor::group_thread::{GroupThread, Replacement, since};
+use crate::error::GraphError;
+use crate::executor::group_thread::{GroupThread, Link, since};
 use crate::group::group_run::{GroupRun, start_actors};
 use crate::group::lease::Lease;
 use crate::group::panic_hook;
@@ -101,16 +101,10 @@ impl Threads {
         for (((group, gate), restart), handle) in groups.into_iter().zip(gates).zip(restarters).zip(handles) {
             let lease = Arc::new(Lease::default());
             // A thread waits at its gate until it gets its group, so this cannot fail.
-            let _ = gate.send(GroupThread {
-                group,
-                base_ns,
-                incarnation: 0,
-                restartable: restart.as_ref().is_some_and(|(restarter, _)| restarter.may_restart()),
-                watched: restart.is_some(),
-                lease: Arc::clone(&lease),
-                control: Arc::clone(&control),
-                post: post.clone(),
-            });
+            let (control, post) = (Arc::clone(&control), post.clone());
+            let link = Link { base_ns, incarnation: 0, lease: Arc::clone(&lease), control, post };
+            let restartable = restart.as_ref().is_some_and(|(restarter, _)| restarter.may_restart());
+            let _ = gate.send(GroupThread { group, restartable, watched: restart.is_some(), link });
             seats.push(Seat { handle: Some(handle), restart, incarnation: 0, lease, overdue: (0, Nanos::ZERO) });
         }
         Ok(Self {
@@ -181,16 +175,14 @@ impl Threads {
         seat.incarnation += 1;
         seat.lease = Arc::new(Lease::default());
         seat.overdue = (0, Nanos::ZERO);
-        let replacement = Replacement {
-            restarter,
-            failure,
+        let link = Link {
             incarnation: seat.incarnation,
             base_ns: self.base_ns,
             lease: Arc::clone(&seat.lease),
             control: Arc::clone(&self.control),
             post: self.post.clone(),
         };
-        match replacement.spawn() {
+        match link.replace(restarter, failure) {
             Ok(handle) => seat.handle = Some(handle),
             Err(failure) => self.give_up(failure),
         }
@@ -259,12 +251,8 @@ impl Threads {
         }
         let at = books.next_due().unwrap_or(now);
         restarter.abandoned(at);
-        let fault = RuntimeFault {
-            group: restarter.spec.name.clone(),
-            actor: String::new(),
-            at,
-            what: format!("did not return within {} and was left behind", restarter.policy.hung_after),
-        };
+        let what = format!("did not return within {} and was left behind", restarter.policy.hung_after);
+        let fault = RuntimeFault::of_group(&restarter.spec.name, at, what);
         let (report, incarnation) = (books.report(&restarter.spec), seat.incarnation);
         self.succeed(Box::new(Failure { group: index, incarnation, fault, report, books }));
     }
@@ -318,9 +306,7 @@ fn spawn(spec: &RateGroup) -> Result<(JoinHandle<()>, Sender<GroupThread>, Threa
             thread.run(waiter);
         }
     };
-    let failed = |reason: String| {
-        GraphError::new(GraphErrorKind::Refused, format!("no thread for rate group `{}`: {reason}", spec.name))
-    };
+    let failed = |reason: String| GraphError::refused(format!("no thread for rate group `{}`: {reason}", spec.name));
     let thread = std::thread::Builder::new().name(spec.name.clone()).spawn(body);
     let thread = thread.map_err(|error| failed(error.to_string()))?;
     let granted = granted.recv().map_err(|_| failed("it ended during its set-up".to_owned()))?;

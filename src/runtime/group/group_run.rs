@@ -4,7 +4,7 @@ use crate::accounting::ledger::Ledger;
 use crate::accounting::overrun::Decision;
 use crate::accounting::timeline::Wake;
 use crate::actor::{Actor, GroupMode, Phase, TickContext};
-use crate::error::{GraphError, GraphErrorKind};
+use crate::error::GraphError;
 use crate::group::lease::Lease;
 use crate::group::members::{ActorTimer, Fatal, Members};
 use crate::group::panic_hook::place;
@@ -95,11 +95,8 @@ impl GroupRun {
     /// Refuses a device-paced group that has nobody to wait for its device.
     pub(crate) fn check_listener(&self) -> Result<(), GraphError> {
         if self.spec.watchdog().is_some() && self.members.count() == 0 {
-            return Err(GraphError::new(
-                GraphErrorKind::Refused,
-                "is paced by a device and has no actor to wait for it; add one",
-            )
-            .at(format!("rate group `{}`", self.spec.name)));
+            let wrong = "is paced by a device and has no actor to wait for it; add one";
+            return Err(GraphError::refused(wrong).in_group(&self.spec.name));
         }
         Ok(())
     }
@@ -311,7 +308,7 @@ impl GroupRun {
         let at = self.ledger.due(self.ledger.elapsed_periods() - 1);
         self.event(at, Event::STOPPED, skipped);
         let what = format!("stopped by its overrun policy with {skipped} releases due at once");
-        RuntimeFault { group: self.spec.name.clone(), actor: String::new(), at, what }
+        RuntimeFault::of_group(&self.spec.name, at, what)
     }
 
     fn event(&mut self, stamp: Nanos, code: u32, detail: u64) {

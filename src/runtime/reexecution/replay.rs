@@ -3,7 +3,7 @@
 //! Of every group the releases run in their order. Among the groups, the earliest-scheduled release runs whose recorded
 //! reads are all there: its ports show exactly what they showed then, whatever ran in between.
 
-use crate::error::{GraphError, GraphErrorKind};
+use crate::error::GraphError;
 use crate::group::group_run::GroupRun;
 use crate::records::timing::RecordedRelease;
 use crate::reexecution::recording::Recording;
@@ -33,7 +33,7 @@ impl Reexecution {
     /// The re-execution of `recording` by a graph of `groups` with `ports` ports that follow `script`.
     ///
     /// # Errors
-    /// [`GraphErrorKind::Recording`] for a recording with gaps, [`GraphErrorKind::Refused`] for one of another graph.
+    /// [`GraphErrorKind::Recording`](crate::GraphErrorKind::Recording) for a recording with gaps, [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused) for one of another graph.
     pub(crate) fn new(
         recording: Recording,
         script: Script,
@@ -50,7 +50,7 @@ impl Reexecution {
                 recording.ports(),
                 groups.len()
             );
-            return Err(GraphError::new(GraphErrorKind::Refused, message));
+            return Err(GraphError::refused(message));
         }
         let mut releases = recording.into_releases(groups.len());
         // Observers follow their own schedule.
@@ -105,5 +105,5 @@ impl Reexecution {
 }
 
 fn fault(group: &GroupRun, release: &RecordedRelease, what: String) -> RuntimeFault {
-    RuntimeFault { group: group.spec.name.clone(), actor: String::new(), at: release.scheduled, what }
+    RuntimeFault::of_group(&group.spec.name, release.scheduled, what)
 }

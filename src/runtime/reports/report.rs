@@ -44,6 +44,13 @@ pub struct RuntimeFault {
     pub what: String,
 }
 
+impl RuntimeFault {
+    /// A fault of a group itself, not of an actor in it.
+    pub(crate) fn of_group(group: &str, at: Nanos, what: String) -> Self {
+        Self { group: group.to_owned(), actor: String::new(), at, what }
+    }
+}
+
 impl fmt::Display for RuntimeFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "rate group `{}`", self.group)?;
