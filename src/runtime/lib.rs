@@ -1,4 +1,4 @@
-//! The runtime: actors in rate groups, on real-time threads or in deterministic virtual time; no physics.
+//! Actors in rate groups, on real-time threads or in deterministic virtual time; no physics.
 //!
 //! A graph is a set of [rate groups](RateGroup), each with [actors](Actor) that are released together, connected by
 //! ports. It runs *threaded*, one thread per group with absolute sleeps and, where granted, SCHED_FIFO, or in *virtual

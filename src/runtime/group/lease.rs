@@ -1,4 +1,4 @@
-//! Who keeps the books of a group: its thread, until the supervisor dismisses it.
+//! Who keeps the books of a group: its thread, until the supervisor revokes its lease on them.
 
 use crate::primitives::sync::{AtomicU8, Ordering};
 
@@ -21,7 +21,7 @@ impl Default for Lease {
 }
 
 impl Lease {
-    /// The thread is about to book a release; false if it was dismissed.
+    /// The thread is about to book a release; false if its lease was revoked.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -34,7 +34,7 @@ impl Lease {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub(crate) fn end_booking(&self) {
-        // Release: with the acquire in `dismiss`, so that who takes over reads the last books.
+        // Release: with the acquire in `revoke`, so that who takes over reads the last books.
         self.0.store(OPEN, Ordering::Release);
     }
 
@@ -43,7 +43,7 @@ impl Lease {
         self.0.compare_exchange(OPEN, REVOKED, Ordering::Acquire, Ordering::Relaxed).is_ok()
     }
 
-    /// True once the thread was dismissed.
+    /// True once the lease was revoked.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -60,11 +60,11 @@ mod loom_tests {
     use std::sync::Arc;
 
     struct Books(UnsafeCell<u64>);
-    // SAFETY: written while booking and read after a dismissal; that these exclude each other is what the model checks.
+    // SAFETY: written while booking and read after a revocation; that these exclude each other is what the model checks.
     unsafe impl Sync for Books {}
 
     #[test]
-    fn loom_a_dismissal_never_meets_a_booking_and_reads_the_last_books() {
+    fn loom_a_revocation_never_meets_a_booking_and_reads_the_last_books() {
         loom::model(|| {
             let shared = Arc::new((Lease::default(), Books(UnsafeCell::new(0))));
             let own = Arc::clone(&shared);
