@@ -10,7 +10,7 @@
 //!
 //! `cargo run --release --example device_paced`
 
-use palpate_runtime::{Actor, Execution, GraphError, Nanos, Outcome, RateGroup, Runtime, SlipCause, TickContext};
+use palpate_runtime::{Actor, Execution, GraphError, Nanos, Outcome, RateGroup, Runtime, TickContext};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -85,6 +85,6 @@ fn main() -> Result<(), GraphError> {
     }
     println!("releases without a frame {}", paced.degraded);
     println!("watchdog take-overs      {}", paced.watchdog_takeovers);
-    assert!(paced.slips.of(SlipCause::StalledPeer) >= 20 && paced.watchdog_takeovers >= 1);
+    assert!(paced.watchdog_takeovers >= 1, "the device was silent");
     Ok(())
 }
