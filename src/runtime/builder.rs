@@ -1,38 +1,27 @@
 //! The builder: it hands out ports, collects rate groups and refuses graphs that cannot work.
 
-use super::actor::Actor;
-use super::deadline::Ledger;
-use super::disturbance::{Disturb, Disturbance};
-use super::grant::GrantHandle;
-use super::outlet::{self, OutletReader, OutletWriter};
-use super::port::{Reader, Writer};
-use super::port_memory::PortPlan;
-use super::queue_port::{QueueReader, QueueWriter};
-use super::rate_group::RateGroup;
-use super::recorder::{RecordDrain, Recorder, Registry};
-use super::recording::Recording;
-use super::reexecution::Reexecution;
-use super::release::GroupRun;
-use super::restart::{Factory, Restart, Restarter};
-use super::rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};
-use super::running::Runtime;
-use super::schedule::admit_here;
-use super::script::{Script, ScriptedPort};
-use super::virtual_port::flight;
-use super::virtual_queue::VirtualQueue;
-use crate::error::{ActorError, GraphError, GraphErrorKind};
+use crate::accounting::ledger::Ledger;
+use crate::actor::Actor;
+use crate::admission::plan::Plan;
+use crate::error::{ActorError, GraphError};
+use crate::executor::Execution;
+use crate::executor::disturbance::{Disturb, Disturbance};
+use crate::group::group_run::GroupRun;
+use crate::ports::exchange_port::{Reader, Writer};
+use crate::ports::outlet::{OutletReader, OutletWriter, outlet};
+use crate::ports::port_state::PortPlan;
+use crate::ports::queue_port::{QueueReader, QueueWriter};
+use crate::ports::restartable::{ExchangePort, OutletPort, QueuePort, RecorderPort};
+use crate::rate_group::RateGroup;
+use crate::records::recorder::{RecordDrain, Recorder, Registry};
+use crate::reexecution::recording::Recording;
+use crate::reexecution::replay::Reexecution;
+use crate::reexecution::script::{Script, ScriptedPort};
+use crate::runtime::Runtime;
+use crate::supervision::restart::{Factory, Restart, Restarter};
+use crate::system::grant::GrantHandle;
 use crate::time::{Nanos, Rate};
-use std::fmt;
 use std::sync::Arc;
-
-/// How a graph is executed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Execution {
-    /// One thread for everything, in the order of virtual time, as fast as the machine allows; bit-identical every time.
-    Virtual,
-    /// One thread per rate group, in real time.
-    Threaded,
-}
 
 /// Who plays in a group.
 enum Cast {
@@ -41,6 +30,19 @@ enum Cast {
 }
 
 /// Collects the ports and rate groups of a graph; see [`Runtime::builder`].
+///
+/// A graph that cannot work is refused with the values that say why:
+///
+/// ```
+/// use palpate_runtime::{Execution, Nanos, RateGroup, Runtime};
+///
+/// let mut graph = Runtime::builder(Execution::Threaded);
+/// for name in ["a", "b"] {
+///     graph.group(RateGroup::hz(1000).name(name).pin(0).budget(Nanos(700_000)), vec![]);
+/// }
+/// let refused = graph.build().unwrap_err().to_string();
+/// assert!(refused.starts_with("the budgets on core 0 need 140.0 % (`a` 700µs of 1ms + `b` 700µs of 1ms)"));
+/// ```
 ///
 /// # Real-time
 /// Not real-time safe: allocates. It is gone before anything ticks.
@@ -58,8 +60,24 @@ pub struct RuntimeBuilder {
     recording: Option<(Recording, Script)>,
 }
 
+impl Runtime {
+    /// A builder for a graph that runs in this execution.
+    pub fn builder(execution: Execution) -> RuntimeBuilder {
+        RuntimeBuilder::new(execution, None)
+    }
+
+    /// A builder for a graph that repeats `recording` in virtual time: it must be built as the recorded one was, with
+    /// the same groups and ports in the same order. Exactly the recorded releases run, whatever rates, policies and
+    /// [`until`](RuntimeBuilder::until) say, and every one of them sees through its ports what it saw then.
+    ///
+    /// A recording that lacks a record ends in a [fault](crate::RuntimeReport::fault) that names what is missing.
+    pub fn reexecution(recording: Recording) -> RuntimeBuilder {
+        RuntimeBuilder::new(Execution::Virtual, Some(recording))
+    }
+}
+
 impl RuntimeBuilder {
-    pub(super) fn new(execution: Execution, recording: Option<Recording>) -> Self {
+    pub(crate) fn new(execution: Execution, recording: Option<Recording>) -> Self {
         Self {
             execution,
             groups: Vec::new(),
@@ -92,13 +110,11 @@ impl RuntimeBuilder {
         (port.writer(), port.reader())
     }
 
-    /// As [`exchange`](Self::exchange), with halves that a [restarted](Self::restartable) group can take again.
+    /// A port for the newest value of a large state, with halves that a [restarted](Self::restartable) group can take
+    /// again.
     pub fn exchange_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> ExchangePort<T> {
         let (plan, script) = self.plan_port();
-        match self.execution {
-            Execution::Virtual => ExchangePort::in_virtual_time(plan, flight(script, init)),
-            Execution::Threaded => ExchangePort::threaded(plan, init),
-        }
+        ExchangePort::new(self.execution, plan, script, init)
     }
 
     /// A port for ordered samples that holds at least `capacity` of them, rounded up to a power of two.
@@ -109,21 +125,19 @@ impl RuntimeBuilder {
         (port.writer(), port.reader())
     }
 
-    /// As [`queue`](Self::queue), with halves that a [restarted](Self::restartable) group can take again.
+    /// A port for ordered samples, with halves that a [restarted](Self::restartable) group can take again.
     pub fn queue_port<T: Copy + Send + 'static>(&mut self, capacity: usize) -> QueuePort<T> {
         let (plan, script) = self.plan_port();
-        match self.execution {
-            Execution::Virtual => QueuePort::in_virtual_time(plan, VirtualQueue::new(script, capacity)),
-            Execution::Threaded => QueuePort::threaded(plan, capacity),
-        }
+        QueuePort::new(self.execution, plan, script, capacity)
     }
 
     /// The newest value for a thread outside the graph, such as a renderer; visible at once in both executions.
     pub fn outlet<T: Send>(&mut self, init: impl FnMut() -> T) -> (OutletWriter<T>, OutletReader<T>) {
-        outlet::outlet(init)
+        outlet(init)
     }
 
-    /// As [`outlet`](Self::outlet), with halves that a [restarted](Self::restartable) group can take again.
+    /// A port for the newest value for a thread outside the graph, with halves that a [restarted](Self::restartable)
+    /// group can take again.
     pub fn outlet_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> OutletPort<T> {
         OutletPort::new(init)
     }
@@ -133,7 +147,7 @@ impl RuntimeBuilder {
         self.registry.recorder(capacity)
     }
 
-    /// As [`recorder`](Self::recorder), one that a [restarted](Self::restartable) group can take again.
+    /// A record sink for one actor that a [restarted](Self::restartable) group can take again.
     pub fn recorder_port(&mut self, capacity: usize) -> RecorderPort {
         RecorderPort::new(&self.registry, capacity)
     }
@@ -155,17 +169,19 @@ impl RuntimeBuilder {
         self
     }
 
-    /// Adds a rate group whose actors are made by `factory`: once when the graph is built, and again whenever one of them
-    /// panicked, reported a fault or did not return, as often as `restart` allows. The other groups run on meanwhile. What
-    /// stops the run by its overrun policy, or fails while it winds down, is not started again; an observer cannot be.
+    /// Adds a rate group whose actors are made by `factory`: once when the graph is built, and again whenever one of
+    /// them panicked, reported a fault or did not return, as often as `restart` allows. The other groups run on
+    /// meanwhile. What stops the run by its overrun policy, or fails while it winds down, is not started again; an
+    /// observer cannot be.
     ///
     /// The factory takes the halves of the actors' ports from ports that can be taken again
-    /// ([`exchange_port`](Self::exchange_port) and the like), which cuts the failed actors off. Periods that passed meanwhile
-    /// are skipped with the cause [`Fault`](super::SlipCause::Fault), under every overrun policy.
+    /// ([`exchange_port`](Self::exchange_port) and the like), which cuts the failed actors off. Periods that passed
+    /// meanwhile are skipped with the cause [`Fault`](crate::SlipCause::Fault), under every overrun policy.
     ///
     /// # Real-time
-    /// On threads the factory runs, and the new actors are started, on the thread that then takes the group over, before it
-    /// is given its policy and core: both may allocate and take their time, and nobody waits for them but a stop.
+    /// On threads the factory runs, and the new actors are started, on the thread that then takes the group over,
+    /// before it is given its policy and core: both may allocate and take their time, and nobody waits for them but a
+    /// stop.
     pub fn restartable(
         &mut self,
         group: RateGroup,
@@ -178,8 +194,8 @@ impl RuntimeBuilder {
 
     /// Virtual time: makes the releases of a group late, as `disturbance` says.
     ///
-    /// It is asked once per wait, in the order of the releases, with the number of the release that the group waits for. If
-    /// the group wakes so late that another release runs, what was said holds for that one.
+    /// It is asked once per wait, in the order of the releases, with the number of the release that the group waits
+    /// for. If the group wakes so late that another release runs, what was said holds for that one.
     ///
     /// # Real-time
     /// Asked by virtual time only, between two releases: may allocate.
@@ -192,7 +208,7 @@ impl RuntimeBuilder {
         self
     }
 
-    /// Virtual time: measures the CPU time of every release, for [`RuntimeReport::costs`](super::RuntimeReport::costs).
+    /// Virtual time: measures the CPU time of every release, for [`RuntimeReport::costs`](crate::RuntimeReport::costs).
     /// Nothing that an actor computes depends on it.
     pub fn measure_cost(&mut self) -> &mut Self {
         self.measures_cost = true;
@@ -208,20 +224,21 @@ impl RuntimeBuilder {
     /// Checks the graph and makes it ready to start; the builder is empty afterwards.
     ///
     /// # Errors
-    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused), naming the group and the values, for a graph that cannot work:
-    /// a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all cores together, on
-    /// threads a latency beyond the period, equal real-time priorities pinned to one core, a priority outside 1 to 99, a
-    /// name used twice, no group that is not an observer; an overrun policy that says nothing or contradicts the release
-    /// mode, a watchdog below a period, a device-paced group without an actor; a disturbance of threads, of no group, or a
-    /// second one of the same; a [measurement](Self::measure_cost) of threads. Or what a [factory](Self::restartable) says. For a re-execution also if the recording is one
-    /// of another graph, and [`GraphErrorKind::Recording`](crate::GraphErrorKind::Recording) if it has gaps.
+    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused), naming the group and the values, for a graph that
+    /// cannot work: a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all
+    /// cores together, on threads a latency beyond the period, equal real-time priorities pinned to one core, a
+    /// priority outside 1 to 99, a name used twice, no group that is not an observer; an overrun policy that says
+    /// nothing or contradicts the release mode, a watchdog below a period, a device-paced group without an actor; a
+    /// disturbance of threads, of no group, or a second one of the same; a [measurement](Self::measure_cost) of
+    /// threads. Or what a [factory](Self::restartable) says. For a re-execution also if the recording is one of another
+    /// graph, and [`GraphErrorKind::Recording`](crate::GraphErrorKind::Recording) if it has gaps.
     pub fn build(&mut self) -> Result<Runtime, GraphError> {
         for (index, (group, _)) in self.groups.iter_mut().enumerate() {
             if group.name.is_empty() {
                 group.name = format!("group-{index}");
             }
         }
-        admit_here(&self.groups.iter().map(|(group, _)| group.clone()).collect::<Vec<_>>(), self.execution)?;
+        Plan::check(self.execution, &self.specs())?;
         self.check_restartable()?;
         self.check_disturbances()?;
         self.check_measurement()?;
@@ -229,6 +246,7 @@ impl RuntimeBuilder {
         let registry = built.registry;
         let mut groups = Vec::with_capacity(built.groups.len());
         let mut restarters = Vec::with_capacity(built.groups.len());
+        let mut disturbances = Vec::with_capacity(built.groups.len());
         for (index, (spec, cast)) in built.groups.into_iter().enumerate() {
             // The admission check keeps the number of groups far below this.
             let index = index as u16;
@@ -243,21 +261,30 @@ impl RuntimeBuilder {
                 }
                 Cast::Restartable(policy, factory) => {
                     let events = registry.wanted().then(|| registry.recorder(SUPERVISOR_EVENTS));
-                    let mut restarter = Restarter::new(policy, factory, index, spec, built.until, records, events);
+                    let mut restarter = Restarter {
+                        policy,
+                        factory,
+                        index,
+                        spec,
+                        until: built.until,
+                        records,
+                        events,
+                        shown: None,
+                        restarts: 0,
+                    };
                     let (group, books) = restarter.first()?;
                     (group, Some((restarter, books)))
                 }
             };
             group.check_listener()?;
-            groups.push(group.disturbed_by(disturb));
+            groups.push(group);
+            disturbances.push(disturb);
             restarters.push(restarter);
         }
-        let reexecution = match built.recording {
-            Some((recording, script)) => Some(Reexecution::new(recording, script, &groups, built.ports)?),
-            None => None,
-        };
-        let runtime = Runtime::new(built.execution, groups, restarters, reexecution, registry, built.grants);
-        Ok(if built.measures_cost { runtime.measuring_cost() } else { runtime })
+        let repeat = |(recording, script)| Reexecution::new(recording, script, &groups, built.ports);
+        let reexecution = built.recording.map(repeat).transpose()?;
+        let Self { execution, grants, measures_cost, .. } = built;
+        Ok(Runtime { execution, groups, restarters, disturbances, reexecution, registry, grants, measures_cost })
     }
 }
 
@@ -265,12 +292,16 @@ impl RuntimeBuilder {
 const SUPERVISOR_EVENTS: usize = 64;
 
 impl RuntimeBuilder {
-    /// An observer ends after all others: what fails in it is told when it ends, and there is nothing it could go on with.
+    fn specs(&self) -> Vec<RateGroup> {
+        self.groups.iter().map(|(group, _)| group.clone()).collect()
+    }
+
+    /// An observer ends after all others: what fails in it is told when it ends, and there is nothing it could go on
+    /// with.
     fn check_restartable(&self) -> Result<(), GraphError> {
         let wrong = |(group, cast): &&(RateGroup, Cast)| group.observer && matches!(cast, Cast::Restartable(..));
         self.groups.iter().find(wrong).map_or(Ok(()), |(group, _)| {
-            Err(GraphError::new(GraphErrorKind::Refused, "an observer cannot be restartable; add it with `group`")
-                .at(format!("rate group `{}`", group.name)))
+            Err(GraphError::refused("an observer cannot be restartable; add it with `group`").in_group(&group.name))
         })
     }
 
@@ -278,7 +309,7 @@ impl RuntimeBuilder {
         if self.measures_cost && self.execution == Execution::Threaded {
             let wrong =
                 "the cost of threads is not measured: it takes system calls; their execution times are in every report";
-            return Err(GraphError::new(GraphErrorKind::Refused, wrong));
+            return Err(GraphError::refused(wrong));
         }
         Ok(())
     }
@@ -296,7 +327,7 @@ impl RuntimeBuilder {
             } else {
                 continue;
             };
-            return Err(GraphError::new(GraphErrorKind::Refused, wrong).at(format!("rate group `{name}`")));
+            return Err(GraphError::refused(wrong).in_group(name));
         }
         Ok(())
     }
@@ -307,12 +338,4 @@ fn ring_capacity(rate: Rate) -> usize {
     ((8.0 * rate.as_hz()) as usize).clamp(256, 65_536)
 }
 
-impl fmt::Debug for RuntimeBuilder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let groups: Vec<_> = self.groups.iter().map(|(group, _)| group).collect();
-        f.debug_struct("RuntimeBuilder")
-            .field("execution", &self.execution)
-            .field("groups", &groups)
-            .finish_non_exhaustive()
-    }
-}
+impl_debug!(RuntimeBuilder, "execution": |own| own.execution, "groups": |own| own.specs());

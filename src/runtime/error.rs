@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-/// What an actor's start, or a factory of actors, may fail with: any error.
+/// Any error: an actor's start and a factory of actors may fail with it.
 pub type ActorError = Box<dyn std::error::Error + Send + Sync>;
 
-/// What kind of [`GraphError`] it is, as far as a program can act on it.
+/// The kind of a [`GraphError`], as far as a program can act on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum GraphErrorKind {
@@ -18,6 +18,9 @@ pub enum GraphErrorKind {
 }
 
 /// The error of every fallible operation of the runtime.
+///
+/// # Real-time
+/// Not real-time safe: allocates. Before the run.
 #[derive(Debug)]
 pub struct GraphError {
     kind: GraphErrorKind,
@@ -32,6 +35,11 @@ impl GraphError {
         Self { kind, place: String::new(), message: one_line(&message.into()), source: None }
     }
 
+    /// The refusal of a graph, or of a thread for it.
+    pub(crate) fn refused(message: impl Into<String>) -> Self {
+        Self::new(GraphErrorKind::Refused, message)
+    }
+
     /// The error that an actor's start or a factory returned.
     pub(crate) fn from_actor(source: ActorError) -> Self {
         Self { source: Some(source), ..Self::new(GraphErrorKind::Actor, String::new()) }
@@ -43,6 +51,12 @@ impl GraphError {
         let place = place.as_ref();
         self.place = if self.place.is_empty() { place.to_owned() } else { format!("{place}: {}", self.place) };
         self
+    }
+
+    /// Puts the rate group in front in which it happened.
+    #[must_use]
+    pub(crate) fn in_group(self, name: &str) -> Self {
+        self.at(format!("rate group `{name}`"))
     }
 
     /// The kind, for programs.

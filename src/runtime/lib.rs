@@ -1,4 +1,4 @@
-//! The runtime: actors in rate groups, on real-time threads or in deterministic virtual time; no physics.
+//! Actors in rate groups, on real-time threads or in deterministic virtual time; no physics.
 //!
 //! A graph is a set of [rate groups](RateGroup), each with [actors](Actor) that are released together, connected by
 //! ports. It runs *threaded*, one thread per group with absolute sleeps and, where granted, SCHED_FIFO, or in *virtual
@@ -14,7 +14,7 @@
 //! - Re-execution: a run on threads, [recorded](Recording), is repeated in virtual time bit for bit.
 //! - Admission: a graph that cannot work is refused when it is built, with the sum that failed; its
 //!   [plan](Runtime::plan) says what it asks for and what this system would refuse.
-//! - Introspection: [`Running::live`] shows counts, lateness and execution time of every group at any moment.
+//! - Introspection: [`RunningGraph::live`] shows counts, lateness and execution time of every group at any moment.
 //! - Faults: a panic or a reported fault stops the whole graph in order, after [winding down](RateGroup::wind_down), and
 //!   is in the [report](RuntimeReport); a [restartable](RuntimeBuilder::restartable) group is started again instead.
 //!
@@ -65,80 +65,65 @@
 //! # Ok::<(), palpate_runtime::GraphError>(())
 //! ```
 
-mod actor;
-mod builder;
-mod deadline;
-mod disturbance;
-mod error;
-pub mod exchange;
-mod grant;
-mod group_thread;
-pub mod histogram;
-mod laps;
-mod link;
-mod linked_queue;
-mod live;
-pub mod mailbox;
-mod members;
-mod numbers;
-mod os;
-mod outlet;
-mod overrun;
-mod pace;
-mod panic_hook;
-mod plan;
-mod port;
-mod port_memory;
-mod port_use;
-mod queue_port;
-mod rate_group;
-pub mod record;
-mod recorder;
-mod recording;
-mod reexecution;
-mod release;
-mod report;
-mod restart;
-mod rewire;
-pub mod ring;
-mod running;
-mod schedule;
-mod script;
-mod stopwatch;
-mod successor;
-mod supervisor;
-mod sync;
-mod tenure;
-mod threaded;
-mod time;
-mod timeline;
-mod virtual_port;
-mod virtual_queue;
-mod virtual_time;
-mod wait;
-mod wake;
+/// `Debug` for types of which only a part can be shown: these fields, and that there are more.
+macro_rules! impl_debug {
+    ($type:ident $(<$param:ident>)? $(, $field:literal: |$own:ident| $shown:expr)*) => {
+        impl $(<$param>)? std::fmt::Debug for $type $(<$param>)? {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.debug_struct(stringify!($type))
+                    $(.field($field, &(|$own: &Self| $shown)(self)))*
+                    .finish_non_exhaustive()
+            }
+        }
+    };
+}
 
-pub use actor::{Actor, Mode, Outcome, TickContext, actor_fn};
-pub use builder::{Execution, RuntimeBuilder};
-pub use deadline::SlipCounts;
-pub use disturbance::Disturbance;
+mod accounting;
+mod actor;
+mod admission;
+mod builder;
+mod error;
+mod executor;
+mod group;
+mod ports;
+mod primitives;
+mod rate_group;
+mod records;
+mod reexecution;
+mod reports;
+mod runtime;
+mod supervision;
+mod system;
+mod time;
+
+pub use actor::{Actor, GroupMode, Outcome, TickContext, actor_fn};
+pub use admission::plan::{Coincidence, GroupPlan, Plan};
+pub use builder::RuntimeBuilder;
 pub use error::{ActorError, GraphError, GraphErrorKind};
-pub use grant::{GrantHandle, GroupGrant, SystemGrant};
-pub use live::GroupLive;
-pub use outlet::{OutletReader, OutletWriter};
-pub use plan::{Coincidence, GroupPlan, Plan};
-pub use port::{Reader, Writer};
-pub use port_use::{PortUse, PortUseKind};
-pub use queue_port::{QueueReader, QueueWriter};
+pub use executor::Execution;
+pub use executor::disturbance::Disturbance;
+pub use ports::exchange_port::{Reader, Writer};
+pub use ports::outlet::{OutletReader, OutletWriter};
+pub use ports::queue_port::{QueueReader, QueueWriter};
+pub use ports::restartable::{ExchangePort, OutletPort, QueuePort, RecorderPort};
+pub use primitives::histogram::{Histogram, HistogramReader};
+pub use primitives::{exchange, ring};
 pub use rate_group::{OverrunPolicy, RateGroup, Release, Wait};
-pub use record::{ActorTimes, Channel, Event, Record, SlipCause, TickTiming};
-pub use recorder::{RecordDrain, RecordGap, Recorder};
-pub use recording::Recording;
-pub use report::{GroupCost, GroupReport, RuntimeFault, RuntimeReport};
-pub use restart::Restart;
-pub use rewire::{ExchangePort, OutletPort, QueuePort, RecorderPort};
-pub use running::{Running, Runtime, STOP_BOUND};
-pub use schedule::admit_here;
-pub use stopwatch::Stopwatch;
-pub use supervisor::StopHandle;
+pub use records::port_use::{PortUse, PortUseKind};
+pub use records::record::{Channel, Event, Record};
+pub use records::recorder::{RecordDrain, RecordGap, Recorder};
+pub use records::timing::{ActorTimes, SlipCause, SlipCounts, TickTiming};
+pub use reexecution::recording::Recording;
+pub use reports::live::GroupLive;
+pub use reports::report::{GroupCost, GroupReport, RuntimeFault, RuntimeReport};
+pub use runtime::{RunningGraph, Runtime};
+pub use supervision::restart::Restart;
+pub use supervision::stop::{STOP_BOUND, StopHandle};
+pub use system::grant::{GrantHandle, GroupGrant, SystemGrant};
+pub use system::stopwatch::Stopwatch;
 pub use time::{Nanos, Rate};
+
+/// The README's program must compile.
+#[cfg(doctest)]
+#[doc = include_str!("README.md")]
+struct Readme;

@@ -2,7 +2,7 @@
 
 use crate::time::{Nanos, Rate};
 
-/// What happens to releases that were due while the group was still busy or asleep.
+/// The overrun policy of a group: what becomes of releases that were due while it was still busy or asleep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OverrunPolicy {
@@ -17,13 +17,14 @@ pub enum OverrunPolicy {
     },
     /// Run at once and shift the group's phase: the next release is due one period after this one began.
     ///
-    /// As `Skip`, but the group keeps its distance between releases instead of its place in time. Release n is the latest
-    /// one that the nominal grid has at that time, so that tick numbers stay true to the clock. Where phases have added up
-    /// to a period, that period is skipped with the cause [`Policy`](super::SlipCause::Policy); so is the last one of a
-    /// run whose shifted release would come after the end.
+    /// Like `Skip`, but the group keeps its distance between releases instead of its place in time. Release n is the
+    /// latest one that the nominal grid has at that time, so that tick numbers stay true to the clock. Where phases
+    /// have added up to a period, that period is skipped with the cause [`Policy`](crate::SlipCause::Policy); so is the
+    /// last one of a run whose shifted release would come after the end.
     Rephase,
-    /// As `Skip`, and from then on ask for less: [`Mode::Degraded`](super::Mode::Degraded) until `recover_after` releases
-    /// in a row had no slips and met their deadlines. The mode of each release is recorded with its timing.
+    /// Like `Skip`, and from then on ask for less: [`GroupMode::Degraded`](crate::GroupMode::Degraded) until
+    /// `recover_after` releases in a row had no slips and met their deadlines. The mode of each release is recorded
+    /// with its timing.
     Degrade {
         /// Releases in time that make the mode normal again.
         recover_after: u32,
@@ -32,28 +33,30 @@ pub enum OverrunPolicy {
     Stop,
 }
 
-/// What releases a group.
+/// The source of the releases of a group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Release {
-    /// The clock.
+    /// The clock releases the group, period by period.
     #[default]
     Periodic,
-    /// A device, by a blocking read: the first actor of the group is asked to [wait](super::Actor::wait) for it.
+    /// A device releases the group, by a blocking read: the first actor of the group is asked to
+    /// [wait](crate::Actor::wait) for it.
     ///
-    /// What it delivers runs the next release, up to seven eighths of a period before that is due; from half a period after
-    /// it was due on, the release nearest in time, and the periods between are skipped with the cause
-    /// [`StalledPeer`](super::SlipCause::StalledPeer). An earlier frame, the second in the period of one release, is left
-    /// out. So the grid of ticks stays that of the nominal rate whatever the device's own clock does: a device 2 per mille
-    /// slow skips 2 periods in a thousand. That a thread was woken late cannot be told from a late frame.
+    /// What it delivers runs the next release, up to seven eighths of a period before that is due; from half a period
+    /// after it was due on, the release nearest in time, and the periods between are skipped with the cause
+    /// [`StalledPeer`](crate::SlipCause::StalledPeer). An earlier frame, the second in the period of one release, is
+    /// left out. So the grid of ticks stays that of the nominal rate whatever the device's own clock does: a device 2
+    /// per mille slow skips 2 periods in a thousand. That a thread was woken late cannot be told from a late frame.
     DevicePaced {
-        /// How long after a due time the device may stay silent. Then the group goes on at its nominal period by the
-        /// clock, until the device delivers again; both are recorded as [`Event::WATCHDOG`](super::Event::WATCHDOG).
+        /// The time after a due time for which the device may stay silent. Then the group goes on at its nominal period
+        /// by the clock, until the device delivers again; both are recorded as
+        /// [`Event::WATCHDOG`](crate::Event::WATCHDOG).
         watchdog: Nanos,
     },
 }
 
-/// How a group's thread waits for its next release.
+/// The way in which a group's thread waits for its next release.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Wait {
@@ -65,7 +68,7 @@ pub enum Wait {
     Sleep,
     /// Sleep until a fixed `margin` before the release, then spin. Only under a real-time policy; otherwise it sleeps.
     SleepSpin {
-        /// How long to spin at most.
+        /// The time before the release from which on the thread spins.
         margin: Nanos,
     },
     /// Spin all the time. Only under a real-time policy; otherwise it sleeps.
@@ -74,30 +77,38 @@ pub enum Wait {
 
 /// The rate, the timing contract and the thread of a group of actors.
 ///
-/// What releases it is its [`Release`] mode: the clock, or a device that has one of its own. The third way, virtual time,
-/// is a property of the executor: there every group is released by the virtual clock, a device-paced one as if its device
-/// delivered on time, unless a [disturbance](super::Disturbance) delays it.
+/// What releases it is its [`Release`] mode: the clock, or a device that has one of its own. The third way, virtual
+/// time, is a property of the executor: there every group is released by the virtual clock, a device-paced one as if
+/// its device delivered on time, unless a [disturbance](crate::Disturbance) delays it.
 ///
-/// Values that cannot work are refused by [`RuntimeBuilder::build`](super::RuntimeBuilder::build).
+/// Values that cannot work are refused by [`RuntimeBuilder::build`](crate::RuntimeBuilder::build).
+///
+/// ```
+/// use palpate_runtime::{Nanos, OverrunPolicy, Rate, RateGroup};
+///
+/// let control = RateGroup::hz(1000).name("control").pin(1).realtime(80).budget(Nanos(300_000));
+/// let video = RateGroup::new(Rate::new(2997, 100)).overrun(OverrunPolicy::Rephase);
+/// assert_eq!((control.rate().period(), video.rate().as_hz()), (Nanos(1_000_000), 29.97));
+/// ```
 ///
 /// # Real-time
 /// Not real-time safe: its name allocates. Before the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RateGroup {
-    pub(super) name: String,
-    pub(super) rate: Rate,
-    pub(super) offset: Nanos,
-    pub(super) deadline: Option<Nanos>,
-    pub(super) budget: Option<Nanos>,
-    pub(super) latency: Nanos,
-    pub(super) cpu: Option<usize>,
-    pub(super) priority: Option<u8>,
-    pub(super) overrun: OverrunPolicy,
-    pub(super) release: Release,
-    pub(super) wait: Wait,
-    pub(super) observer: bool,
-    pub(super) wind_down: Nanos,
-    pub(super) wind_down_at_end: bool,
+    pub(crate) name: String,
+    pub(crate) rate: Rate,
+    pub(crate) offset: Nanos,
+    pub(crate) deadline: Option<Nanos>,
+    pub(crate) budget: Option<Nanos>,
+    pub(crate) latency: Nanos,
+    pub(crate) cpu: Option<usize>,
+    pub(crate) priority: Option<u8>,
+    pub(crate) overrun: OverrunPolicy,
+    pub(crate) release: Release,
+    pub(crate) wait: Wait,
+    pub(crate) observer: bool,
+    pub(crate) wind_down: Nanos,
+    pub(crate) wind_down_at_end: bool,
 }
 
 impl RateGroup {
@@ -129,7 +140,7 @@ impl RateGroup {
         Self::new(Rate::hz(hz))
     }
 
-    /// Its name in reports and logs, unique in the graph; `group-0`, `group-1`, ... if not given.
+    /// Names the group in reports and logs, unique in the graph; `group-0`, `group-1`, ... if not given.
     #[must_use]
     pub fn name(mut self, name: impl Into<String>) -> Self {
         self.name = name.into();
@@ -143,56 +154,57 @@ impl RateGroup {
         self
     }
 
-    /// When a release must be done, counted from when it is due; at most, and by default, one period.
+    /// Sets the time by which a release must be done, counted from when it is due; at most, and by default, one period.
     #[must_use]
     pub fn deadline(mut self, deadline: Nanos) -> Self {
         self.deadline = Some(deadline);
         self
     }
 
-    /// The computing time that one release is expected to need: what the admission check adds up.
+    /// Declares the computing time that one release is expected to need: what the admission check adds up.
     #[must_use]
     pub fn budget(mut self, budget: Nanos) -> Self {
         self.budget = Some(budget);
         self
     }
 
-    /// Virtual time: when its publications become visible to other groups, counted from the release. It may exceed the period; several
-    /// publications are then in flight and become visible in order. A latency beyond the deadline misses it each time.
-    /// Threads take the time that they take, and a latency beyond the period is refused there.
+    /// Declares, for virtual time, when the publications of a release become visible to other groups, counted from the
+    /// release. It may exceed the period; several publications are then in flight and become visible in order. A
+    /// latency beyond the deadline misses it each time. Threads take the time that they take, and a latency beyond the
+    /// period is refused there.
     #[must_use]
     pub fn latency(mut self, latency: Nanos) -> Self {
         self.latency = latency;
         self
     }
 
-    /// The latency that it declares.
+    /// The latency that was declared, zero if none was.
     pub fn declared_latency(&self) -> Nanos {
         self.latency
     }
 
-    /// Threads: the processor core to stay on.
+    /// Pins the thread of the group to the processor core with this number.
     #[must_use]
     pub fn pin(mut self, cpu: usize) -> Self {
         self.cpu = Some(cpu);
         self
     }
 
-    /// Threads: asks for SCHED_FIFO with this priority, 1 to 99. A refusal is reported, the run goes on without.
+    /// Asks for SCHED_FIFO on threads with this priority, 1 to 99. A refusal is reported, the run goes on without.
     #[must_use]
     pub fn realtime(mut self, priority: u8) -> Self {
         self.priority = Some(priority);
         self
     }
 
-    /// What happens to releases that the group could not make in time.
+    /// Sets what becomes of releases that the group could not make in time.
     #[must_use]
     pub fn overrun(mut self, policy: OverrunPolicy) -> Self {
         self.overrun = policy;
         self
     }
 
-    /// What releases the group.
+    /// Sets what releases the group: the clock or a device.
     #[must_use]
     pub fn release(mut self, release: Release) -> Self {
         self.release = release;
@@ -206,55 +218,50 @@ impl RateGroup {
         self.release(Release::DevicePaced { watchdog })
     }
 
-    /// Threads: how to wait for the next release.
+    /// Sets how the thread of the group waits for its next release.
     #[must_use]
     pub fn wait(mut self, wait: Wait) -> Self {
         self.wait = wait;
         self
     }
 
-    /// Makes it an observer, such as a logger: it ends after all other groups have ended, with one more tick that sees
-    /// all they left behind. That last tick is no release: it is not counted and has no timing record.
+    /// Makes the group an observer, such as a logger: it ends after all other groups have ended, with one more tick
+    /// that sees all they left behind. That last tick is no release: it is not counted and has no timing record.
     #[must_use]
     pub fn observer(mut self) -> Self {
         self.observer = true;
         self
     }
 
-    /// When a stop is requested or an actor of the group has failed, the group is released for this long in
-    /// [`Mode::Stopping`](super::Mode::Stopping), without the failed actor, so that it can bring what it drives to rest.
-    /// Periods that are overdue by then are skipped and do not count; a device is not waited for. A fault that a
-    /// [restart](super::RuntimeBuilder::restartable) answers begins none.
+    /// Lets the group bring what it drives to rest: when a stop is requested or an actor of it has failed, it is
+    /// released for this long in [`GroupMode::Stopping`](crate::GroupMode::Stopping), without the failed actor, so that
+    /// it can bring what it drives to rest. Periods that are overdue by then are skipped and do not count; a device is
+    /// not waited for. A fault that a [restart](crate::RuntimeBuilder::restartable) answers begins none.
     #[must_use]
     pub fn wind_down(mut self, time: Nanos) -> Self {
         self.wind_down = time;
         self
     }
 
-    /// It also [winds down](Self::wind_down) after its last release when the run ends
-    /// [by itself](super::RuntimeBuilder::until).
+    /// Lets the group also [wind down](Self::wind_down) after its last release when the run ends
+    /// [by itself](crate::RuntimeBuilder::until).
     #[must_use]
     pub fn wind_down_at_end(mut self) -> Self {
         self.wind_down_at_end = true;
         self
     }
 
-    /// True if a [budget](Self::budget) was given.
-    pub fn has_budget(&self) -> bool {
-        self.budget.is_some()
-    }
-
-    /// The budget that was given.
+    /// The budget that was declared, if one was.
     pub fn declared_budget(&self) -> Option<Nanos> {
         self.budget
     }
 
-    /// The rate.
+    /// The rate of the group.
     pub fn rate(&self) -> Rate {
         self.rate
     }
 
-    /// The longest time that it makes up release by release instead of skipping it.
+    /// The longest time that the group makes up release by release instead of skipping it.
     pub fn catches_up(&self) -> Nanos {
         match self.overrun {
             OverrunPolicy::CatchUp { max } => self.rate.release(max.into()),
@@ -263,7 +270,7 @@ impl RateGroup {
     }
 
     /// The watchdog of a device-paced group.
-    pub(super) fn watchdog(&self) -> Option<Nanos> {
+    pub(crate) fn watchdog(&self) -> Option<Nanos> {
         match self.release {
             Release::Periodic => None,
             Release::DevicePaced { watchdog } => Some(watchdog),
@@ -271,7 +278,7 @@ impl RateGroup {
     }
 
     /// The deadline in force, counted from the release.
-    pub(super) fn relative_deadline(&self) -> Nanos {
+    pub(crate) fn relative_deadline(&self) -> Nanos {
         self.deadline.unwrap_or(self.rate.period())
     }
 }

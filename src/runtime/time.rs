@@ -14,27 +14,27 @@ impl Nanos {
     /// The start of the run.
     pub const ZERO: Self = Self(0);
 
-    /// From a duration; saturates after 584 years.
+    /// Nanoseconds of a duration; saturates after 584 years.
     pub fn from_duration(duration: Duration) -> Self {
         Self(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX))
     }
 
-    /// From seconds, rounded to the nearest nanosecond; negative and NaN give zero.
+    /// Nanoseconds of a time in seconds, rounded to the nearest; negative and NaN give zero.
     pub fn from_secs_f64(seconds: f64) -> Self {
         Self((seconds * 1e9).round() as u64)
     }
 
-    /// In seconds, correctly rounded: 3 ms is the double nearest to 0.003.
+    /// The time in seconds, correctly rounded: 3 ms is the double nearest to 0.003.
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / 1e9
     }
 
-    /// As a standard duration.
+    /// The time as a standard duration.
     pub fn to_duration(self) -> Duration {
         Duration::from_nanos(self.0)
     }
 
-    /// `self - other`, or zero.
+    /// The difference `self - other`, or zero.
     #[must_use]
     pub fn saturating_sub(self, other: Self) -> Self {
         Self(self.0.saturating_sub(other.0))
@@ -65,7 +65,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// `hz` releases per second.
+    /// A rate of `hz` releases per second.
     ///
     /// # Panics
     /// If `hz` is zero.
@@ -73,7 +73,7 @@ impl Rate {
         Self::new(hz, 1)
     }
 
-    /// `releases` per `seconds`.
+    /// A rate of `releases` per `seconds`.
     ///
     /// # Panics
     /// If either is zero.
@@ -95,17 +95,17 @@ impl Rate {
             .map(|(releases, seconds)| Self::new(releases as u32, seconds))
     }
 
-    /// As releases per seconds, as it was made.
+    /// The rate as the two numbers that it was made of: releases, per this many seconds.
     pub fn as_fraction(self) -> (u32, u32) {
         (self.releases, self.seconds)
     }
 
-    /// In hertz.
+    /// The rate in hertz.
     pub fn as_hz(self) -> f64 {
         f64::from(self.releases) / f64::from(self.seconds)
     }
 
-    /// The period (s).
+    /// The period in seconds.
     pub fn period_s(self) -> f64 {
         f64::from(self.seconds) / f64::from(self.releases)
     }

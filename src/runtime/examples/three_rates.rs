@@ -6,9 +6,9 @@
 //! What goes down is the newest value of something slow (an [exchange](palpate_runtime::RuntimeBuilder::exchange)): the
 //! planner's target, the estimator's state. What goes up is every sample of something fast (a queue): measurements.
 
-use palpate_runtime::ActorError;
-use palpate_runtime::{Execution, Outcome, RateGroup, Runtime, RuntimeBuilder, RuntimeReport, TickTiming, actor_fn};
-use palpate_runtime::Nanos;
+use palpate_runtime::{
+    Execution, GraphError, Nanos, Outcome, RateGroup, Runtime, RuntimeBuilder, RuntimeReport, TickTiming, actor_fn,
+};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -125,7 +125,7 @@ fn build(graph: &mut RuntimeBuilder) -> (Shared<f64>, Shared<TickTiming>) {
     (track, timings)
 }
 
-fn run(execution: Execution) -> Result<Outputs, Error> {
+fn run(execution: Execution) -> Result<Outputs, GraphError> {
     let mut graph = Runtime::builder(execution);
     let (track, timings) = build(&mut graph);
     let running = graph.build()?.start()?;
@@ -148,7 +148,7 @@ fn print_lateness(timings: &[TickTiming]) {
     }
 }
 
-fn main() -> Result<(), Error> {
+fn main() -> Result<(), GraphError> {
     println!("{SECONDS} s in real time");
     let real = run(Execution::Threaded)?;
     print_lateness(&real.timings);

@@ -6,11 +6,10 @@ mod support;
 
 use device_clock::DeviceClock;
 use palpate_runtime::{
-    Actor, Disturbance, Event, Execution, GrantHandle, Mode, Outcome, OverrunPolicy, RateGroup, Record, Runtime,
-    RuntimeBuilder, RuntimeReport, SlipCause, TickContext, TickTiming, actor_fn,
+    Actor, ActorError, Disturbance, Event, Execution, GrantHandle, GraphErrorKind, GroupMode, Nanos, Outcome,
+    OverrunPolicy, RateGroup, Record, Runtime, RuntimeBuilder, RuntimeReport, SlipCause, TickContext, TickTiming,
+    actor_fn,
 };
-use palpate_runtime::Nanos;
-use palpate_runtime::{ActorError, GraphErrorKind};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -98,10 +97,10 @@ impl Actor for Witness {
         self.name
     }
 
-    fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
+    fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
         self.note("start");
         assert_eq!((ctx.tick, ctx.scheduled), (0, Nanos::ZERO));
-        if self.does(0, Deed::FailStart) { Err(Error::new(ErrorKind::Device, "no device")) } else { Ok(()) }
+        if self.does(0, Deed::FailStart) { Err("no device".into()) } else { Ok(()) }
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
@@ -151,7 +150,7 @@ fn starts_run_in_group_order_on_the_building_thread_before_release_zero(executio
         fn name(&self) -> &str {
             "thread"
         }
-        fn start(&mut self, _: &TickContext) -> Result<(), Error> {
+        fn start(&mut self, _: &TickContext) -> Result<(), ActorError> {
             assert_eq!(std::thread::current().id(), self.1);
             self.0.lock().unwrap().push("thread start".into());
             Ok(())
@@ -240,7 +239,7 @@ fn what_start_publishes_is_there_at_release_zero(execution: Execution) {
         fn name(&self) -> &str {
             "early"
         }
-        fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
+        fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
             *self.0.buffer() = 42;
             self.0.publish(ctx);
             self.1.push(ctx, 43);
@@ -476,7 +475,8 @@ fn a_failed_start_stops_what_was_started_and_names_the_actor(execution: Executio
         .group(group("two", 1000), vec![Witness::doing("b", &log, 0, Deed::FailStart), Witness::boxed("c", &log)]);
     let error = graph.build().unwrap().start().unwrap_err();
     assert_eq!(error.to_string(), "rate group `two`, actor `b`: no device");
-    assert_eq!(error.kind(), ErrorKind::Device);
+    assert_eq!(error.kind(), GraphErrorKind::Actor);
+    assert_eq!(error.into_actor_error().unwrap().to_string(), "no device");
     assert_eq!(lines(&log), ["a start", "b start", "a stop", "b stop"]);
 }
 
@@ -521,7 +521,7 @@ fn the_grant_is_known_when_actors_start(execution: Execution) {
         fn name(&self) -> &str {
             "asks"
         }
-        fn start(&mut self, _: &TickContext) -> Result<(), Error> {
+        fn start(&mut self, _: &TickContext) -> Result<(), ActorError> {
             let grant = self.0.get().unwrap();
             assert_eq!(grant.groups[0].name, "g");
             assert!(!grant.groups[0].wait.is_empty() && grant.cores > 0);
@@ -622,7 +622,7 @@ fn a_degraded_group_tells_its_actors_and_recovers(execution: Execution) {
     let (report, timings, events, _) = overrun(execution, OverrunPolicy::Degrade { recover_after: 4 });
     let group = &report.groups[0];
     assert_eq!(group.elapsed_periods, 61);
-    let is_degraded = |t: &TickTiming| t.mode == Mode::Degraded;
+    let is_degraded = |t: &TickTiming| t.mode == GroupMode::Degraded;
     let long = timings.iter().position(|t| t.slips >= 4 && t.cause == SlipCause::LongTick).unwrap();
     // The release after the overrun is degraded, and four more if they are in time.
     assert!(timings.iter().skip(long).take(5).all(is_degraded));

@@ -4,10 +4,9 @@ mod device_clock;
 
 use device_clock::DeviceClock;
 use palpate_runtime::{
-    Actor, Event, Execution, Outcome, OverrunPolicy, RateGroup, Record, Restart, Runtime, RuntimeReport, SlipCause,
-    TickContext, TickTiming, actor_fn,
+    Actor, Event, Execution, Nanos, Outcome, OverrunPolicy, RateGroup, Record, Restart, Runtime, RuntimeReport,
+    SlipCause, TickContext, TickTiming, actor_fn,
 };
-use palpate_runtime::Nanos;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -162,7 +161,7 @@ fn a_panic_in_its_wait_is_a_fault_like_any_other() {
     let report = running.stop();
     let fault = report.fault.clone().unwrap();
     assert_eq!((fault.group.as_str(), fault.actor.as_str(), fault.at), ("g", "waiting", Nanos::ZERO));
-    assert!(fault.what.starts_with("panicked at tests/runtime_device_paced.rs:"), "{fault}");
+    assert!(fault.what.contains("/device_paced.rs:"), "{fault}");
     assert!(fault.what.ends_with("deliberate (in wait)"), "{fault}");
     // Check that it was asked once, ran nothing, and that the log says so
     assert_eq!((*asked.lock().unwrap(), report.groups[0].released), (1, 0));

@@ -4,10 +4,9 @@
 mod support;
 
 use palpate_runtime::{
-    Actor, Event, Execution, Mode, Outcome, RateGroup, Record, Restart, Runtime, RuntimeBuilder, RuntimeReport,
-    SlipCause, TickContext, actor_fn,
+    Actor, Event, Execution, GroupMode, Nanos, Outcome, RateGroup, Record, Restart, Runtime, RuntimeBuilder,
+    RuntimeReport, SlipCause, TickContext, actor_fn,
 };
-use palpate_runtime::Nanos;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -24,8 +23,8 @@ in_both_executions! {
     values_and_samples_reach_the_restarted_group_and_come_back
 }
 
-/// Mode and release of every call.
-type Calls = Arc<Mutex<Vec<(Mode, u64)>>>;
+/// GroupMode and release of every call.
+type Calls = Arc<Mutex<Vec<(GroupMode, u64)>>>;
 
 /// Writes down how it is called; the first call from release `panic_at` on fails (that one may have been skipped).
 struct Caller {
@@ -70,7 +69,7 @@ fn assert_identity(report: &RuntimeReport) {
 }
 
 fn stopping(calls: &Calls) -> Vec<u64> {
-    calls.lock().unwrap().iter().filter(|call| call.0 == Mode::Stopping).map(|call| call.1).collect()
+    calls.lock().unwrap().iter().filter(|call| call.0 == GroupMode::Stopping).map(|call| call.1).collect()
 }
 
 fn a_group_winds_down_without_the_actor_that_failed(execution: Execution) {
@@ -81,13 +80,13 @@ fn a_group_winds_down_without_the_actor_that_failed(execution: Execution) {
     let report = finish(&mut graph);
     assert_identity(&report);
     let fault = report.fault.unwrap();
-    assert!(fault.what.contains("runtime_faults.rs:") && fault.what.ends_with("injected"), "{fault}");
+    assert!(fault.what.contains("/faults.rs:") && fault.what.ends_with("injected"), "{fault}");
     // Check that the failed one is not called again and is stopped once, the other runs on for 30 periods
-    assert!(failing_calls.lock().unwrap().iter().all(|call| call.0 == Mode::Normal && call.1 < 20));
+    assert!(failing_calls.lock().unwrap().iter().all(|call| call.0 == GroupMode::Normal && call.1 < 20));
     assert_eq!(failing_stops.iter().count(), 1);
     assert_eq!(other_stops.iter().count(), 1);
     let stopping = stopping(&other_calls);
-    let failed = other_calls.lock().unwrap().iter().filter(|call| call.0 == Mode::Normal).map(|call| call.1).max();
+    let failed = other_calls.lock().unwrap().iter().filter(|call| call.0 == GroupMode::Normal).map(|call| call.1).max();
     let failed = failed.unwrap();
     assert!(failed >= 20 && stopping.iter().all(|tick| (failed + 1..=failed + 30).contains(tick)), "{stopping:?}");
     let skipped = report.groups[0].skipped as usize;

@@ -1,12 +1,13 @@
 //! What a running graph shows of itself: monotone while it runs, equal to the report when it is over.
 
-use palpate_runtime::{Execution, GroupLive, Outcome, OverrunPolicy, RateGroup, Running, Runtime, actor_fn};
-use palpate_runtime::Nanos;
+use palpate_runtime::{
+    Execution, GroupLive, Nanos, Outcome, OverrunPolicy, RateGroup, RunningGraph, Runtime, actor_fn,
+};
 use std::time::{Duration, Instant};
 
 const MS: u64 = 1_000_000;
 
-fn start(execution: Execution) -> Running {
+fn start(execution: Execution) -> RunningGraph {
     let spiky = actor_fn("spiky", move |ctx| {
         let start = Instant::now();
         while execution == Execution::Threaded && ctx.tick % 50 == 20 && start.elapsed() < Duration::from_millis(4) {

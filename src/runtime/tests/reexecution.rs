@@ -1,11 +1,10 @@
 //! A recorded run is repeated bit for bit, whatever threads and clocks did to it; one that is not complete is refused.
 
 use palpate_runtime::{
-    Actor, Execution, Outcome, OverrunPolicy, PortUse, PortUseKind, QueueReader, QueueWriter, RateGroup, Reader,
-    Record, Recording, Runtime, RuntimeBuilder, RuntimeReport, TickContext, TickTiming, Writer, actor_fn,
+    Actor, ActorError, Execution, GraphError, GraphErrorKind, Nanos, Outcome, OverrunPolicy, PortUse, PortUseKind,
+    QueueReader, QueueWriter, RateGroup, Reader, Record, Recording, Runtime, RuntimeBuilder, RuntimeReport,
+    TickContext, TickTiming, Writer, actor_fn,
 };
-use palpate_runtime::Nanos;
-use palpate_runtime::{ActorError, GraphErrorKind};
 use proptest::prelude::*;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -75,7 +74,7 @@ impl Actor for Mixer {
         "mixer"
     }
 
-    fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
+    fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
         self.publish(ctx);
         Ok(())
     }
@@ -128,7 +127,7 @@ impl Ran {
     }
 }
 
-fn run(mut graph: RuntimeBuilder, plan: &Plan, stalls: bool) -> Result<Ran, Error> {
+fn run(mut graph: RuntimeBuilder, plan: &Plan, stalls: bool) -> Result<Ran, GraphError> {
     let outputs = Arc::new(Mutex::new(vec![Vec::new(); 3]));
     let records: Arc<Mutex<Vec<Record>>> = Arc::default();
     let mut drain = graph.drain();

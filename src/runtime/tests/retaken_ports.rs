@@ -4,11 +4,9 @@
 mod support;
 
 use palpate_runtime::{
-    Actor, Execution, Outcome, PortUse, PortUseKind, RateGroup, Reader, Record, Recording, Restart, Runtime,
-    RuntimeBuilder, RuntimeReport, TickContext, Writer, actor_fn,
+    Actor, ActorError, Execution, Nanos, Outcome, PortUse, PortUseKind, RateGroup, Reader, Record, Recording, Restart,
+    Runtime, RuntimeBuilder, RuntimeReport, TickContext, Writer, actor_fn,
 };
-use palpate_runtime::Nanos;
-use palpate_runtime::{ActorError, GraphErrorKind};
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -126,9 +124,9 @@ impl Actor for Starter {
         "starter"
     }
 
-    fn start(&mut self, ctx: &TickContext) -> Result<(), Error> {
+    fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
         let version = publish(&mut self.writer, ctx, self.value);
-        if version > 0 { Ok(()) } else { Err(Error::new(GraphErrorKind::Refused, "the writer is fenced")) }
+        if version > 0 { Ok(()) } else { Err("the writer is fenced".into()) }
     }
 
     fn tick(&mut self, _: &TickContext) -> Outcome {

@@ -3,14 +3,13 @@
 mod support;
 
 use palpate_runtime::{
-    Disturbance, Execution, Outcome, OverrunPolicy, RateGroup, Runtime, RuntimeReport, SlipCause, TickContext,
-    TickTiming, actor_fn,
+    Disturbance, Execution, Nanos, Outcome, OverrunPolicy, Rate, RateGroup, Runtime, RuntimeReport, SlipCause,
+    TickContext, TickTiming, actor_fn,
 };
-use palpate_runtime::{Nanos, Rate};
 use proptest::prelude::*;
-use support::busy;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use support::busy;
 
 const MS: u64 = 1_000_000;
 

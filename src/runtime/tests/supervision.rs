@@ -6,10 +6,9 @@ mod support;
 
 use device_clock::DeviceClock;
 use palpate_runtime::{
-    Actor, Disturbance, Execution, Mode, Outcome, OverrunPolicy, RateGroup, Restart, Runtime, RuntimeBuilder,
-    RuntimeReport, SlipCause, TickContext, actor_fn,
+    Actor, Disturbance, Execution, GroupMode, Nanos, Outcome, OverrunPolicy, RateGroup, Restart, Runtime,
+    RuntimeBuilder, RuntimeReport, SlipCause, TickContext, actor_fn,
 };
-use palpate_runtime::Nanos;
 use std::collections::HashSet;
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
@@ -28,7 +27,7 @@ in_both_executions! {
     a_silent_device_takes_no_time_from_the_wind_down
 }
 
-type Calls = Arc<Mutex<Vec<(Mode, u64)>>>;
+type Calls = Arc<Mutex<Vec<(GroupMode, u64)>>>;
 
 /// Writes down its calls; fails from release `fails_at` on, and goes on after a panic if it `recovers`.
 struct Caller {
@@ -70,7 +69,7 @@ fn finish(graph: &mut RuntimeBuilder) -> RuntimeReport {
 }
 
 fn stopping(calls: &Calls) -> Vec<u64> {
-    calls.lock().unwrap().iter().filter(|call| call.0 == Mode::Stopping).map(|call| call.1).collect()
+    calls.lock().unwrap().iter().filter(|call| call.0 == GroupMode::Stopping).map(|call| call.1).collect()
 }
 
 /// Check that the wind-down had its whole length: 30 periods, of which the host may have cost some.
@@ -139,7 +138,7 @@ fn a_group_that_winds_down_is_not_started_again(execution: Execution) {
     assert!(report.fault.is_some());
     assert_whole_wind_down(&well, &report);
     // Check that nothing runs in normal mode after the end
-    assert!(well.lock().unwrap().iter().all(|&(mode, tick)| (mode == Mode::Stopping) == (tick > 20)), "{well:?}");
+    assert!(well.lock().unwrap().iter().all(|&(mode, tick)| (mode == GroupMode::Stopping) == (tick > 20)), "{well:?}");
 }
 
 /// Its release `long` and those right after it overrun by some periods, in the way of the execution.
@@ -207,7 +206,7 @@ fn a_factory_that_panics_stops_the_run_and_says_where(execution: Execution) {
     let report = finish(graph.restartable(RateGroup::hz(100).name("g"), Restart::default(), factory));
     let fault = report.fault.unwrap().to_string();
     assert!(fault.contains("injected") && fault.contains("could not be started again"), "{fault}");
-    assert!(fault.contains("factory: panicked at tests/runtime_supervision.rs:"), "{fault}");
+    assert!(fault.contains("factory: panicked at src/runtime/tests/supervision.rs:"), "{fault}");
     assert!(fault.ends_with("no spare part"), "{fault}");
 }
 

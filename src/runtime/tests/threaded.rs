@@ -3,12 +3,11 @@
 mod support;
 
 use palpate_runtime::{
-    Event, Execution, Outcome, OverrunPolicy, RateGroup, Runtime, SlipCause, TickTiming, Wait, actor_fn,
+    Event, Execution, Nanos, Outcome, OverrunPolicy, RateGroup, Runtime, SlipCause, TickTiming, Wait, actor_fn,
 };
-use palpate_runtime::Nanos;
-use support::busy;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use support::busy;
 
 const MS: u64 = 1_000_000;
 

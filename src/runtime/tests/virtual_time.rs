@@ -1,7 +1,8 @@
 //! Virtual time: order of releases, when publications become visible, and bit-identical records.
 
-use palpate_runtime::{Channel, Event, Execution, Outcome, RateGroup, Record, Runtime, TickTiming, actor_fn};
-use palpate_runtime::{Nanos, Rate};
+use palpate_runtime::{
+    Channel, Event, Execution, Nanos, Outcome, Rate, RateGroup, Record, Runtime, TickTiming, actor_fn,
+};
 use proptest::prelude::*;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

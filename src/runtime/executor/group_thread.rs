@@ -1,0 +1,183 @@
+//! The thread of one rate group: it waits, releases, and goes on, winds down or ends after a fault.
+//!
+//! After warm-up the loop allocates nothing, takes no lock and makes no system call but its sleep.
+
+use crate::accounting::timeline::Wake;
+use crate::executor::device_wait::DeviceWait;
+use crate::group::group_run::{AfterFault, GroupRun};
+use crate::group::lease::Lease;
+use crate::reports::report::RuntimeFault;
+use crate::supervision::restart::Restarter;
+use crate::supervision::stop::Control;
+use crate::supervision::supervisor::{Failure, Message, Restarted};
+use crate::system::grant::set_up_thread;
+use crate::system::os;
+use crate::system::wait::Waiter;
+use crate::time::Nanos;
+use crossbeam_channel::Sender;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// How often an observer that has ended looks whether the others have.
+const POLL: Duration = Duration::from_millis(2);
+
+/// What the thread of a group shares with the supervisor.
+pub(crate) struct Link {
+    /// Time zero of the run, of the monotonic clock.
+    pub(crate) base_ns: u64,
+    /// Counts the threads that the group has had, from 0.
+    pub(crate) incarnation: usize,
+    pub(crate) lease: Arc<Lease>,
+    pub(crate) control: Arc<Control>,
+    pub(crate) post: Sender<Message>,
+}
+
+/// The thread of a group and what it needs.
+pub(crate) struct GroupThread {
+    pub(crate) group: GroupRun,
+    /// A fault is for the supervisor to answer, who starts the group again.
+    pub(crate) restartable: bool,
+    /// The supervisor looks at its books, and revokes the lease of a thread that does not return.
+    pub(crate) watched: bool,
+    pub(crate) link: Link,
+}
+
+impl GroupThread {
+    /// Runs the group to its end on the calling thread.
+    pub(crate) fn run(mut self, mut waiter: Waiter) {
+        if self.watched {
+            self.group.lease = Some(Arc::clone(&self.link.lease));
+        }
+        let base_ns = self.link.base_ns;
+        self.group.time_actors(move || since(base_ns));
+        let failed = self.release_all(&mut waiter);
+        if self.link.lease.is_revoked() {
+            // Its place is taken: it says nothing any more, and its actors go with it.
+            return;
+        }
+        self.end(failed);
+    }
+
+    /// Runs release after release; the fault if the supervisor is to answer it.
+    fn release_all(&mut self, waiter: &mut Waiter) -> Option<RuntimeFault> {
+        let Self { group, link, .. } = self;
+        let Link { base_ns, lease, control, post, .. } = &*link;
+        let base_ns = *base_ns;
+        let observer = group.spec.observer;
+        let now = || since(base_ns);
+        let mut pace = DeviceWait::new(group);
+        loop {
+            let Some(due) = group.ledger.next_due() else {
+                if group.spec.wind_down_at_end && group.begin_wind_down(now()) {
+                    continue;
+                }
+                return None;
+            };
+            let winding_down = group.winding_down;
+            let leave = || match observer {
+                true => control.observers_may_end(),
+                false => !winding_down && control.stop_requested() || lease.is_revoked(),
+            };
+            let mut sleep =
+                |until: Nanos| waiter.until(base_ns + until.0, leave).map(|woke_ns| Nanos(woke_ns - base_ns));
+            let wake = match &mut pace {
+                None => Ok(sleep(due).map(|woke| Wake::by_timer(due, woke))),
+                Some(pace) => pace.wait(group, due, now, |until| sleep(until).is_some()),
+            };
+            if lease.is_revoked() {
+                return None;
+            }
+            let result = match wake {
+                Ok(Some(wake)) => group.release(wake, |_| now(), |_| now()),
+                Ok(None) if group.begin_wind_down(now()) => continue,
+                Ok(None) => return None,
+                Err(fault) => Err(fault),
+            };
+            let Err(fault) = result else { continue };
+            match group.after_fault(now(), self.restartable, control.stop_requested()) {
+                AfterFault::Restart => return Some(fault),
+                AfterFault::GoOn => post_fault(post, control, fault),
+                AfterFault::End if observer => {
+                    // It costs what it would have observed and nothing else.
+                    let _ = post.try_send(Message::Fault(fault));
+                    return None;
+                }
+                AfterFault::End => {
+                    post_fault(post, control, fault);
+                    return None;
+                }
+            }
+        }
+    }
+
+    fn end(self, failed: Option<RuntimeFault>) {
+        let Self { mut group, link, .. } = self;
+        let Link { base_ns, incarnation, control, post, .. } = &link;
+        let (base_ns, incarnation) = (*base_ns, *incarnation);
+        let index = usize::from(group.index);
+        let observer = group.spec.observer;
+        if observer {
+            while !control.observers_may_end() {
+                std::thread::sleep(POLL);
+            }
+            if let Err(fault) = group.last_tick(since(base_ns)) {
+                post_fault(post, control, fault);
+            }
+        }
+        let books = group.ledger;
+        let (report, fault) = group.finish(since(base_ns));
+        if let Some(fault) = failed {
+            let _ =
+                post.try_send(Message::Failed(Box::new(Failure { group: index, incarnation, fault, report, books })));
+            return;
+        }
+        if let Some(fault) = fault {
+            post_fault(post, control, fault);
+        }
+        if !observer {
+            control.group_ended();
+        }
+        let _ = post.try_send(Message::Ended(index, Box::new(report)));
+    }
+}
+
+impl Link {
+    /// Starts the thread that takes the place of one that failed: it makes the actors anew and goes on with the group.
+    /// Nobody waits for it, however long that takes.
+    ///
+    /// # Errors
+    /// The failure, with what the system said, if it gives no thread.
+    pub(crate) fn replace(self, restarter: Restarter, failure: Box<Failure>) -> Result<JoinHandle<()>, Box<Failure>> {
+        let unanswered = failure.clone();
+        let thread = std::thread::Builder::new().name(restarter.spec.name.clone());
+        let run = move || self.run_again(restarter, failure);
+        thread.spawn(run).map_err(|error| Box::new(unanswered.not_answered(&error)))
+    }
+
+    fn run_again(self, mut restarter: Restarter, failure: Box<Failure>) {
+        match restarter.again(&failure.fault, failure.books, since(self.base_ns)) {
+            Ok((group, books)) => {
+                // The actors were started without it, like those before them.
+                let granted = set_up_thread(&group.spec);
+                let restartable = restarter.may_restart();
+                let begun = Restarted { group: failure.group, restarter, books, failure, grant: granted.group };
+                let _ = self.post.try_send(Message::Restarted(Box::new(begun)));
+                GroupThread { group, restartable, watched: true, link: self }.run(granted.waiter);
+            }
+            Err(error) => {
+                let _ = self.post.try_send(Message::NotRestarted(Box::new(failure.not_answered(&error))));
+            }
+        }
+    }
+}
+
+fn post_fault(post: &Sender<Message>, control: &Control, fault: RuntimeFault) {
+    let _ = post.try_send(Message::Fault(fault));
+    control.request_stop();
+}
+
+/// The time since the start of the run.
+pub(crate) fn since(base_ns: u64) -> Nanos {
+    Nanos(os::monotonic().saturating_sub(base_ns))
+}

@@ -1,0 +1,188 @@
+//! What a running group shows of itself: counts and times, readable at any moment without disturbing a tick.
+
+use crate::accounting::ledger::Ledger;
+use crate::primitives::histogram::{Histogram, HistogramReader, HistogramWriter, histogram};
+use crate::primitives::sync::{AtomicU64, CachePadded, Ordering};
+use crate::rate_group::RateGroup;
+use crate::records::timing::TickTiming;
+use crate::time::{Nanos, Rate};
+use std::sync::{Arc, OnceLock};
+
+/// A rate group at one moment of its run: counts, lateness and execution times so far.
+///
+/// The parts are read one after the other while the group goes on: a release that is counted in the histograms may not
+/// be in [`released`](Self::released) yet, never the other way round. When the run is over they agree.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct GroupLive {
+    /// The group's name.
+    pub name: String,
+    /// The rate of the group.
+    pub rate: Rate,
+    /// The number of releases that ran.
+    pub released: u64,
+    /// The number of periods without a release.
+    pub skipped: u64,
+    /// The number of releases that ended after their deadline.
+    pub missed: u64,
+    /// The lateness of every release: from its scheduled time to the end of the wait.
+    pub lateness: Histogram,
+    /// The execution time of every release, from the first actor's start to the last one's end; its sum is the time
+    /// that the group was at work.
+    pub execution: Histogram,
+}
+
+#[derive(Debug, Default)]
+struct Counts {
+    released: AtomicU64,
+    skipped: AtomicU64,
+    missed: AtomicU64,
+}
+
+/// What one writer shows. Each has its own: one that was fenced counts on where nobody looks.
+#[derive(Debug)]
+struct Shown {
+    counts: Arc<CachePadded<Counts>>,
+    lateness: HistogramReader,
+    execution: HistogramReader,
+    /// Lateness and execution of all writers before.
+    before: Option<(Histogram, Histogram)>,
+    /// What the writer shows that has taken its place.
+    next: OnceLock<Arc<Shown>>,
+}
+
+/// The group's side.
+#[derive(Debug)]
+pub(crate) struct LiveWriter {
+    counts: Arc<CachePadded<Counts>>,
+    lateness: HistogramWriter,
+    execution: HistogramWriter,
+}
+
+/// The side of whoever wants to know.
+#[derive(Clone, Debug)]
+pub(crate) struct LiveReader {
+    name: String,
+    rate: Rate,
+    first: Arc<Shown>,
+}
+
+pub(crate) fn live(group: &RateGroup) -> (LiveWriter, LiveReader) {
+    let (writer, first) = Shown::new(Counts::default(), None);
+    (writer, LiveReader { name: group.name.clone(), rate: group.rate, first })
+}
+
+impl Shown {
+    fn new(counts: Counts, before: Option<(Histogram, Histogram)>) -> (LiveWriter, Arc<Self>) {
+        let counts = Arc::new(CachePadded(counts));
+        let ((lateness, lateness_shown), (execution, execution_shown)) = (histogram(), histogram());
+        let writer = LiveWriter { counts: Arc::clone(&counts), lateness, execution };
+        let next = OnceLock::new();
+        (writer, Arc::new(Self { counts, lateness: lateness_shown, execution: execution_shown, before, next }))
+    }
+
+    /// The times of this writer and of all before it.
+    fn times(&self) -> (Histogram, Histogram) {
+        let (lateness, execution) = (self.lateness.snapshot(), self.execution.snapshot());
+        match &self.before {
+            Some(before) => (before.0.merged(&lateness), before.1.merged(&execution)),
+            None => (lateness, execution),
+        }
+    }
+}
+
+impl LiveWriter {
+    /// Shows a release that the ledger has closed.
+    #[inline]
+    pub(crate) fn release(&mut self, timing: &TickTiming, ledger: &Ledger) {
+        self.lateness.record(timing.woke.saturating_sub(timing.scheduled));
+        self.execution.record(timing.end.saturating_sub(timing.start));
+        self.count(ledger);
+    }
+
+    /// Shows the books, after a change that is no release.
+    #[inline]
+    pub(crate) fn count(&self, ledger: &Ledger) {
+        let Counts { released, skipped, missed } = &**self.counts;
+        skipped.store(ledger.skipped.total(), Ordering::Relaxed);
+        missed.store(ledger.missed, Ordering::Relaxed);
+        // Release: with the acquire in `read`, so that whoever sees this release also sees its times and its skips.
+        released.store(ledger.released, Ordering::Release);
+    }
+}
+
+impl LiveReader {
+    /// The group's side for actors that take the place of others; what the one before still counts is seen by nobody.
+    pub(crate) fn next_writer(&self) -> LiveWriter {
+        let last = self.last();
+        let Counts { released, skipped, missed } = &**last.counts;
+        let copy = |count: &AtomicU64| AtomicU64::new(count.load(Ordering::Acquire));
+        let counts = Counts { released: copy(released), skipped: copy(skipped), missed: copy(missed) };
+        let (writer, shown) = Shown::new(counts, Some(last.times()));
+        // Set once: only the one who starts a group again comes here.
+        let _ = last.next.set(shown);
+        writer
+    }
+
+    /// What the writer in force shows: as many steps away as the group was started again.
+    fn last(&self) -> &Shown {
+        let mut last = &self.first;
+        while let Some(next) = last.next.get() {
+            last = next;
+        }
+        last
+    }
+
+    pub(crate) fn read(&self) -> GroupLive {
+        let shown = self.last();
+        // Acquire: with the release in `count`; everything below is read afterwards.
+        let released = shown.counts.released.load(Ordering::Acquire);
+        let (lateness, execution) = shown.times();
+        GroupLive {
+            name: self.name.clone(),
+            rate: self.rate,
+            released,
+            skipped: shown.counts.skipped.load(Ordering::Relaxed),
+            missed: shown.counts.missed.load(Ordering::Relaxed),
+            lateness,
+            execution,
+        }
+    }
+}
+
+impl GroupLive {
+    /// The share of `elapsed` that the group was at work, from 0 to 1; waiting, also by spinning, is no work.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn busy(&self, elapsed: Nanos) -> f64 {
+        if elapsed == Nanos::ZERO { 0.0 } else { self.execution.sum().0 as f64 / elapsed.0 as f64 }
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_and_times_go_on_with_the_next_writer_and_a_fenced_one_has_no_part_in_them() {
+        let group = RateGroup::hz(1000).name("g");
+        let (mut fenced, reader) = live(&group);
+        let mut ledger = Ledger::new(0, &group, None);
+        let timing = |us: u64| TickTiming { end: Nanos(1000 * us), ..TickTiming::default() };
+        let early = reader.clone();
+        ledger.released = 1;
+        fenced.release(&timing(7), &ledger);
+        let mut next = reader.next_writer();
+        assert_eq!((reader.read().released, reader.read().execution.max()), (1, Nanos(7000)));
+        ledger.released = 100;
+        fenced.release(&timing(900), &ledger);
+        ledger.released = 2;
+        next.release(&timing(5), &ledger);
+        for reader in [&reader, &early] {
+            let shown = reader.read();
+            let times = (shown.execution.count(), shown.execution.sum(), shown.execution.max());
+            assert_eq!((shown.released, times), (2, (2, Nanos(12_000), Nanos(7000))));
+        }
+    }
+}

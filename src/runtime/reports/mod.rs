@@ -1,0 +1,4 @@
+//! What a run tells of itself: at any moment, and when it is over.
+
+pub(crate) mod live;
+pub(crate) mod report;

@@ -1,0 +1,296 @@
+//! A built graph and a run in progress.
+
+use crate::accounting::ledger::Ledger;
+use crate::admission::plan::Plan;
+use crate::error::GraphError;
+use crate::executor::Execution;
+use crate::executor::disturbance::Disturb;
+use crate::executor::threaded::Threads;
+use crate::executor::virtual_time::VirtualRun;
+use crate::group::group_run::{GroupRun, start_actors};
+use crate::primitives::exchange::ExchangeReader;
+use crate::primitives::sync::lock;
+use crate::rate_group::RateGroup;
+use crate::records::recorder::Registry;
+use crate::reexecution::replay::Reexecution;
+use crate::reports::live::{GroupLive, LiveReader};
+use crate::reports::report::{GroupCost, RuntimeFault, RuntimeReport};
+use crate::supervision::restart::Restarter;
+use crate::supervision::stop::{Control, STOP_BOUND, StopHandle};
+use crate::system::grant::{GrantHandle, SystemGrant};
+use crate::time::Nanos;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// How often a waiting program looks at the supervisor's mailbox.
+const POLL: Duration = Duration::from_millis(5);
+
+/// A graph that was checked and can be started.
+///
+/// ```
+/// use palpate_runtime::{Execution, Nanos, Outcome, RateGroup, Runtime, actor_fn};
+/// use std::time::Duration;
+///
+/// let mut graph = Runtime::builder(Execution::Virtual);
+/// graph.group(RateGroup::hz(100), vec![actor_fn("idle", |_| Outcome::Continue)]).until(Nanos(1_000_000_000));
+/// let running = graph.build()?.start()?;
+/// running.wait_for(Duration::MAX);
+/// assert_eq!(running.stop().groups[0].released, 101);
+/// # Ok::<(), palpate_runtime::GraphError>(())
+/// ```
+///
+/// # Real-time
+/// Not real-time safe: allocates, and starting it makes threads.
+pub struct Runtime {
+    pub(crate) execution: Execution,
+    pub(crate) groups: Vec<GroupRun>,
+    pub(crate) restarters: Vec<Option<(Restarter, ExchangeReader<Ledger>)>>,
+    /// Virtual time: what makes each group late.
+    pub(crate) disturbances: Vec<Option<Disturb>>,
+    pub(crate) reexecution: Option<Reexecution>,
+    pub(crate) registry: Arc<Registry>,
+    pub(crate) grants: GrantHandle,
+    /// Virtual time: measures what each release costs.
+    pub(crate) measures_cost: bool,
+}
+
+impl Runtime {
+    /// The schedule: what each group asks for, what the cores bear, which releases coincide, and what this system would
+    /// refuse now. Nothing is started.
+    ///
+    /// # Errors
+    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused) if the process has been moved to fewer cores since the graph was built and no longer
+    /// fits.
+    pub fn plan(&self) -> Result<Plan, GraphError> {
+        Plan::of(self.execution, &self.specs())
+    }
+
+    fn specs(&self) -> Vec<RateGroup> {
+        self.groups.iter().map(|group| group.spec.clone()).collect()
+    }
+
+    /// Sets the threads up, then starts all actors one after the other on this thread, then releases the groups.
+    ///
+    /// In virtual time nothing is released yet: [`RunningGraph::wait_for`] executes.
+    ///
+    /// # Errors
+    /// The error of the first actor whose start failed, after those already started were stopped; or
+    /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused) if the system gives no thread.
+    pub fn start(self) -> Result<RunningGraph, GraphError> {
+        let Self { execution, mut groups, restarters, disturbances, reexecution, registry, grants, measures_cost } =
+            self;
+        let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
+        let names: Vec<String> = groups.iter().map(|group| group.spec.name.clone()).collect();
+        let live = groups.iter().map(|group| group.shown.clone()).collect();
+        let executor = match execution {
+            Execution::Threaded => {
+                Executor::Threaded(Threads::start(groups, restarters, Arc::clone(&control), &grants)?)
+            }
+            Execution::Virtual => {
+                grants.set(SystemGrant::of_virtual_time(groups.iter().map(|group| &group.spec)));
+                start_actors(&mut groups)?;
+                let restarters =
+                    restarters.into_iter().map(|restart| restart.map(|(restarter, _)| restarter)).collect();
+                let control = Arc::clone(&control);
+                let run = VirtualRun::new(groups, restarters, disturbances, reexecution, control, measures_cost);
+                Executor::Virtual(run)
+            }
+        };
+        let executor = Arc::new(Mutex::new(executor));
+        if let Err(error) = watch(&executor) {
+            if let Executor::Threaded(threads) = &mut *lock(&executor) {
+                // Nobody else would: the groups have been released.
+                threads.join(&names, STOP_BOUND);
+            }
+            return Err(error);
+        }
+        Ok(RunningGraph { executor, control, names, live, registry, grants })
+    }
+}
+
+/// Starts a thread that answers faults while the program does not look, if there is a group that can be started again.
+/// It ends with the run.
+fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), GraphError> {
+    let needed = matches!(&*lock(executor), Executor::Threaded(threads) if threads.need_watching());
+    if !needed {
+        return Ok(());
+    }
+    let watched = Arc::downgrade(executor);
+    let over = |executor: &mut Executor| match executor {
+        Executor::Threaded(threads) => threads.poll(),
+        Executor::Virtual(_) => true,
+    };
+    let watch = move || {
+        while watched.upgrade().is_some_and(|executor| !over(&mut lock(&executor))) {
+            std::thread::sleep(POLL);
+        }
+    };
+    let thread = std::thread::Builder::new().name("supervisor".to_owned()).spawn(watch);
+    thread.map(drop).map_err(|error| GraphError::refused(format!("no thread for the supervisor: {error}")))
+}
+
+impl_debug!(Runtime, "execution": |own| own.execution, "groups": |own| own.specs());
+
+enum Executor {
+    Threaded(Threads),
+    Virtual(VirtualRun),
+}
+
+/// A run in progress. Dropping it stops it, within [`STOP_BOUND`] for each group that does not end.
+pub struct RunningGraph {
+    executor: Arc<Mutex<Executor>>,
+    control: Arc<Control>,
+    names: Vec<String>,
+    live: Vec<LiveReader>,
+    registry: Arc<Registry>,
+    grants: GrantHandle,
+}
+
+impl RunningGraph {
+    /// Lets the run go on for `span`, less if it ends before.
+    ///
+    /// Threads: sleeps and looks at the supervisor's mailbox. Virtual time: executes the releases of that span.
+    ///
+    /// # Real-time
+    /// Not real-time safe: sleeps, or executes the run. Never from an actor: in virtual time it would wait for itself.
+    pub fn wait_for(&self, span: Duration) {
+        if let Executor::Virtual(run) = &mut *lock(&self.executor) {
+            return run.advance(Nanos::from_duration(span));
+        }
+        let start = Instant::now();
+        while !self.finished() {
+            let Some(left) = span.checked_sub(start.elapsed()).filter(|left| !left.is_zero()) else { return };
+            std::thread::sleep(left.min(POLL));
+        }
+    }
+
+    /// Time since the start of the run: the clock's, or virtual time executed so far.
+    ///
+    /// # Real-time
+    /// Not real-time safe: takes a lock. Never from an actor: in virtual time [`wait_for`](Self::wait_for) holds it.
+    pub fn elapsed(&self) -> Nanos {
+        match &*lock(&self.executor) {
+            Executor::Threaded(threads) => threads.elapsed(),
+            Executor::Virtual(run) => run.now,
+        }
+    }
+
+    /// True when every group has ended: by [`until`](crate::RuntimeBuilder::until), by a stop or by a fault.
+    ///
+    /// # Real-time
+    /// Not real-time safe: takes a lock, may start a group again. Never from an actor, as [`elapsed`](Self::elapsed).
+    pub fn finished(&self) -> bool {
+        match &mut *lock(&self.executor) {
+            Executor::Threaded(threads) => threads.poll(),
+            Executor::Virtual(run) => run.supervisor.all_ended(),
+        }
+    }
+
+    /// The state of every group as it is now, in graph order: counts, lateness and execution time since the start.
+    ///
+    /// # Real-time
+    /// Never disturbs a tick: wait-free on both sides. It allocates: for threads that show it.
+    pub fn live(&self) -> Vec<GroupLive> {
+        self.live.iter().map(LiveReader::read).collect()
+    }
+
+    /// Asks every group to end after the release it is in; returns at once.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn request_stop(&self) {
+        self.control.request_stop();
+    }
+
+    /// A handle that asks the run to stop from another thread, also from one that handles signals.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn stop_handle(&self) -> StopHandle {
+        StopHandle(Arc::clone(&self.control))
+    }
+
+    /// Stops the run in order and reports. A fault of an actor is in the report, not an error; so is a group that did
+    /// not end within [`STOP_BOUND`] and was given up with its thread.
+    ///
+    /// # Real-time
+    /// Not real-time safe: waits for every group. Never from an actor: its own group is one of them.
+    pub fn stop(self) -> RuntimeReport {
+        let given_up = self.end();
+        let executor = lock(&self.executor);
+        let (supervisor, at, costs) = match &*executor {
+            Executor::Threaded(threads) => (&threads.supervisor, threads.elapsed(), Vec::new()),
+            Executor::Virtual(run) => {
+                let cost = |(name, cpu): (&String, _)| GroupCost { name: name.clone(), cpu };
+                (&run.supervisor, run.now, self.names.iter().zip(run.costs()).map(cost).collect())
+            }
+        };
+        let ((groups, fault), restarts) = (supervisor.results(), supervisor.restarts.clone());
+        let what = "of a stop and was given up; its tick or stop must return";
+        let stuck =
+            || RuntimeFault::of_group(&given_up.join("`, `"), at, format!("did not end within {STOP_BOUND:?} {what}"));
+        let fault = fault.or_else(|| (!given_up.is_empty()).then(stuck));
+        let grant = self.grants.get().unwrap_or_default();
+        RuntimeReport { groups, grant, fault, restarts, lost_records: self.registry.lost(), costs }
+    }
+
+    /// Ends the run if it has not ended; returns the groups that had to be given up.
+    fn end(&self) -> Vec<String> {
+        match &mut *lock(&self.executor) {
+            Executor::Threaded(threads) => threads.join(&self.names, STOP_BOUND),
+            Executor::Virtual(run) => {
+                run.end_all();
+                Vec::new()
+            }
+        }
+    }
+}
+
+impl Drop for RunningGraph {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+impl_debug!(RunningGraph, "groups": |own| own.names.clone());
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::{Outcome, RateGroup, actor_fn};
+
+    #[test]
+    fn a_run_can_be_shared_between_threads() {
+        fn shared<T: Send + Sync>() {}
+        shared::<RunningGraph>();
+        shared::<StopHandle>();
+    }
+
+    #[test]
+    fn a_group_that_does_not_return_is_given_up_and_observers_still_end() {
+        let bound = Duration::from_millis(300);
+        let (release, stuck) = std::sync::mpsc::channel::<()>();
+        let stuck = actor_fn("stuck", move |_| {
+            let _ = stuck.recv();
+            Outcome::Continue
+        });
+        let mut graph = Runtime::builder(Execution::Threaded);
+        graph.group(RateGroup::hz(100).name("stuck"), vec![stuck]);
+        graph.group(RateGroup::hz(100).name("log").observer(), vec![]);
+        let running = graph.build().unwrap().start().unwrap();
+        running.wait_for(Duration::from_millis(30));
+        let given_up = |bound| match &mut *lock(&running.executor) {
+            Executor::Threaded(threads) => threads.join(&running.names, bound),
+            Executor::Virtual(_) => unreachable!("the graph is threaded"),
+        };
+        assert_eq!(given_up(bound), ["stuck"]);
+        // Check that a later stop, and the drop, do not wait for it again
+        let again = Instant::now();
+        assert_eq!(given_up(STOP_BOUND), ["stuck"]);
+        assert!(again.elapsed() < STOP_BOUND);
+        let report = running.stop();
+        assert_eq!(report.fault.map(|fault| fault.group).as_deref(), Some("stuck"));
+        assert_eq!(report.groups.iter().map(|group| group.name.as_str()).collect::<Vec<_>>(), ["log"]);
+        drop(release);
+    }
+}

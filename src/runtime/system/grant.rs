@@ -1,0 +1,167 @@
+//! What the system granted: asked for and given, so that a refused privilege is reported and never silent.
+
+use crate::primitives::sync::lock;
+use crate::rate_group::RateGroup;
+use crate::system::os;
+use crate::system::wait::Waiter;
+use std::sync::{Arc, Mutex};
+
+/// The privileges that a run got from the system, and facts about the machine. Plain texts and numbers, easy to
+/// serialise.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SystemGrant {
+    /// True in virtual time, where nothing is asked for.
+    pub virtual_time: bool,
+    /// Whether memory is locked: `locked`, `not asked`, or why it was refused.
+    pub mlock: String,
+    /// Timer slack of the group threads: `1 ns`, `not asked`, or why it was refused.
+    pub timer_slack: String,
+    /// Whether processors are kept out of idle states that take long to leave: `held off`, `not asked`, or why it was
+    /// refused.
+    pub idle_states: String,
+    /// The clock source: what the kernel reads the time from.
+    pub clock_source: String,
+    /// The kernel's release and build.
+    pub kernel: String,
+    /// The number of processor cores that the process may use.
+    pub cores: usize,
+    /// The privileges of each rate group, in graph order.
+    pub groups: Vec<GroupGrant>,
+}
+
+/// The privileges that the thread of one rate group asked for and got.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct GroupGrant {
+    /// The group's name.
+    pub name: String,
+    /// The scheduling policy asked for.
+    pub policy_asked: String,
+    /// The scheduling policy in force.
+    pub policy: String,
+    /// The real-time priority asked for; 0 for none.
+    pub priority_asked: u8,
+    /// The real-time priority in force; 0 for none.
+    pub priority: u8,
+    /// The number of the core asked for.
+    pub cpu_asked: Option<usize>,
+    /// The number of the core that the thread is pinned to.
+    pub cpu: Option<usize>,
+    /// The way in which the thread waits for its releases, in words.
+    pub wait: String,
+    /// The privileges that were refused, with the reason; empty if nothing was.
+    pub refused: String,
+}
+
+/// A handle to what the system granted, which is known from before the first actor is started.
+#[derive(Clone, Debug, Default)]
+pub struct GrantHandle(Arc<Mutex<Option<SystemGrant>>>);
+
+impl GrantHandle {
+    /// The privileges that the system granted; `None` before the runtime is started.
+    ///
+    /// # Real-time
+    /// Takes a lock and allocates: for loggers.
+    pub fn get(&self) -> Option<SystemGrant> {
+        lock(&self.0).clone()
+    }
+
+    pub(crate) fn set(&self, grant: SystemGrant) {
+        *lock(&self.0) = Some(grant);
+    }
+
+    /// A group has got a new thread.
+    pub(crate) fn replace(&self, group: usize, grant: GroupGrant) {
+        if let Some(place) = lock(&self.0).as_mut().and_then(|system| system.groups.get_mut(group)) {
+            *place = grant;
+        }
+    }
+}
+
+/// What the calling thread's set-up led to.
+pub(crate) struct ThreadGrant {
+    pub(crate) group: GroupGrant,
+    pub(crate) timer_slack: String,
+    pub(crate) waiter: Waiter,
+}
+
+const FIFO: &str = "SCHED_FIFO";
+const OTHER: &str = "SCHED_OTHER";
+
+/// Sets the calling thread up for `spec` as far as the system allows.
+pub(crate) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
+    os::block_signals();
+    let mut refused = Vec::new();
+    let mut granted = |result: Result<(), String>| result.map_err(|reason| refused.push(reason)).is_ok();
+    os::touch_stack();
+    let timer_slack = os::set_timer_slack().map_or_else(|reason| reason, |()| "1 ns".to_owned());
+    let cpu = spec.cpu.filter(|&cpu| granted(os::pin(cpu)));
+    let priority = spec.priority.filter(|&priority| granted(os::set_realtime(priority)));
+    let waiter = Waiter::new(spec.wait, priority.is_some(), spec.rate.period());
+    let group = GroupGrant {
+        name: spec.name.clone(),
+        policy_asked: if spec.priority.is_some() { FIFO } else { OTHER }.to_owned(),
+        policy: if priority.is_some() { FIFO } else { OTHER }.to_owned(),
+        priority_asked: spec.priority.unwrap_or(0),
+        priority: priority.unwrap_or(0),
+        cpu_asked: spec.cpu,
+        cpu,
+        wait: waiter.to_string(),
+        refused: refused.join("; "),
+    };
+    ThreadGrant { group, timer_slack, waiter }
+}
+
+/// What a threaded run of `groups` would be refused now, a sentence each: the same set-up on threads that end at once.
+pub(crate) fn refusals(groups: &[RateGroup]) -> Vec<String> {
+    let mut refused = Vec::new();
+    for spec in groups {
+        let own = spec.clone();
+        let probe = std::thread::Builder::new().name(spec.name.clone()).spawn(move || set_up_thread(&own));
+        let grant = match probe.map(std::thread::JoinHandle::join) {
+            Ok(Ok(grant)) => grant,
+            _ => {
+                refused.push(format!("{}: the system gives no thread", spec.name));
+                continue;
+            }
+        };
+        if !grant.group.refused.is_empty() {
+            refused.push(format!("{}: {}", spec.name, grant.group.refused));
+        }
+        if grant.timer_slack.starts_with("refused") {
+            refused.push(format!("{}: timer slack {}", spec.name, grant.timer_slack));
+        }
+    }
+    if groups.iter().any(|spec| spec.priority.is_some()) {
+        refused.extend(os::may_lock_everything().err().map(|reason| format!("memory: {reason}")));
+        refused.extend(os::stay_awake().err().map(|reason| format!("idle states: {reason}")));
+    }
+    refused
+}
+
+impl SystemGrant {
+    /// The facts about the machine; groups and privileges are left to the caller.
+    pub(crate) fn of_machine() -> Self {
+        Self {
+            virtual_time: false,
+            mlock: "not asked".to_owned(),
+            timer_slack: "not asked".to_owned(),
+            idle_states: "not asked".to_owned(),
+            clock_source: os::clock_source(),
+            kernel: os::kernel(),
+            cores: os::cores(),
+            groups: Vec::new(),
+        }
+    }
+
+    /// The grant of a virtual run: one thread, nothing asked for.
+    pub(crate) fn of_virtual_time<'a>(groups: impl Iterator<Item = &'a RateGroup>) -> Self {
+        let group = |spec: &RateGroup| GroupGrant {
+            name: spec.name.clone(),
+            policy_asked: OTHER.to_owned(),
+            policy: OTHER.to_owned(),
+            wait: "virtual".to_owned(),
+            ..GroupGrant::default()
+        };
+        Self { virtual_time: true, groups: groups.map(group).collect(), ..Self::of_machine() }
+    }
+}

@@ -1,0 +1,252 @@
+//! What the operating system is asked for: clock, sleep, policy, memory. The only file that names libc.
+//!
+//! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
+
+pub(crate) use imp::{
+    block_signals, give_up_realtime, lock_memory, may_lock_everything, monotonic, set_realtime, set_timer_slack,
+    sleep_until, stay_awake, thread_cpu,
+};
+
+use std::fs::read_to_string;
+
+/// Moves the calling thread to one core.
+pub(crate) fn pin(cpu: usize) -> Result<(), String> {
+    let cores = core_affinity::get_core_ids().unwrap_or_default();
+    let Some(&core) = cores.iter().find(|core| core.id == cpu) else {
+        return Err(format!("core {cpu} is not available to this process"));
+    };
+    if core_affinity::set_for_current(core) { Ok(()) } else { Err(format!("pinning to core {cpu} was refused")) }
+}
+
+/// Writes to as much of the calling thread's stack as a tick may need, so that where memory is not locked its first
+/// deep call faults no page.
+#[inline(never)]
+pub(crate) fn touch_stack() {
+    const DEEPEST_TICK: usize = 128 * 1024;
+    std::hint::black_box(&mut [1_u8; DEEPEST_TICK]);
+}
+
+/// Processor cores that the process may use.
+pub(crate) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// The kernel's release and build.
+pub(crate) fn kernel() -> String {
+    match (read_to_string("/proc/sys/kernel/osrelease"), read_to_string("/proc/sys/kernel/version")) {
+        (Ok(release), Ok(version)) => format!("Linux {} {}", release.trim(), version.trim()),
+        _ => std::env::consts::OS.to_owned(),
+    }
+}
+
+/// What the kernel reads the time from.
+pub(crate) fn clock_source() -> String {
+    let path = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
+    read_to_string(path).map_or_else(|_| "not available".to_owned(), |name| name.trim().to_owned())
+}
+
+#[cfg(target_os = "linux")]
+mod imp {
+    use std::fs::File;
+    use std::io::{Error, Write};
+    use std::os::unix::thread::JoinHandleExt;
+    use std::sync::OnceLock;
+    use std::thread::JoinHandle;
+
+    const NANOS_PER_S: u64 = 1_000_000_000;
+
+    /// Time since some start of the machine's own, in nanoseconds.
+    ///
+    /// # Real-time
+    /// Wait-free, no system call (vDSO).
+    #[inline]
+    pub(crate) fn monotonic() -> u64 {
+        read(libc::CLOCK_MONOTONIC)
+    }
+
+    /// CPU time that the calling thread has used, in nanoseconds.
+    ///
+    /// # Real-time
+    /// A system call: not for a tick on a real-time thread.
+    pub(crate) fn thread_cpu() -> u64 {
+        read(libc::CLOCK_THREAD_CPUTIME_ID)
+    }
+
+    /// Reads a clock that always exists, in nanoseconds.
+    #[inline]
+    fn read(clock: libc::clockid_t) -> u64 {
+        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+        // SAFETY: the pointer is to a timespec of our own; both clocks that are asked for always exist.
+        unsafe { libc::clock_gettime(clock, &mut time) };
+        time.tv_sec as u64 * NANOS_PER_S + time.tv_nsec as u64
+    }
+
+    /// Sleeps until [`monotonic`] has reached `time`, or a signal came.
+    #[inline]
+    pub(crate) fn sleep_until(time: u64) {
+        let time = libc::timespec {
+            tv_sec: (time / NANOS_PER_S) as libc::time_t,
+            tv_nsec: (time % NANOS_PER_S) as libc::c_long,
+        };
+        // SAFETY: the pointer is to a timespec of our own; an absolute sleep writes no remainder.
+        unsafe { libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &time, std::ptr::null_mut()) };
+    }
+
+    /// Gives the calling thread SCHED_FIFO at `priority`.
+    pub(crate) fn set_realtime(priority: u8) -> Result<(), String> {
+        let parameter = libc::sched_param { sched_priority: priority.into() };
+        // Threads that this one creates start without the policy: a library called by an actor must not inherit it.
+        let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
+        // The system call itself: musl's wrapper always fails, and 0 means the calling thread.
+        // SAFETY: the pointer is to a sched_param of our own and outlives the call.
+        let result = unsafe { libc::syscall(libc::SYS_sched_setscheduler, 0, policy, &raw const parameter) };
+        if result == 0 { Ok(()) } else { Err(format!("SCHED_FIFO {priority} refused: {}", Error::last_os_error())) }
+    }
+
+    /// Takes the real-time policy from another thread, which may be spinning and would keep its core from its
+    /// replacement.
+    pub(crate) fn give_up_realtime(thread: &JoinHandle<()>) {
+        let parameter = libc::sched_param { sched_priority: 0 };
+        // SAFETY: the thread has not been joined or detached, so the handle is valid; the pointer is to a sched_param
+        // of our own. A refusal leaves the thread as it is.
+        unsafe { libc::pthread_setschedparam(thread.as_pthread_t(), libc::SCHED_OTHER, &raw const parameter) };
+    }
+
+    /// Leaves signals to the program's other threads: a handler on this one would make system calls in a tick. Those
+    /// that a thread causes itself, by a bad access for example, stay.
+    pub(crate) fn block_signals() {
+        const OWN: [libc::c_int; 6] =
+            [libc::SIGSEGV, libc::SIGBUS, libc::SIGFPE, libc::SIGILL, libc::SIGTRAP, libc::SIGABRT];
+        let mut set = std::mem::MaybeUninit::<libc::sigset_t>::uninit();
+        // SAFETY: `sigfillset` initialises the set, which the others then read and write; none keeps the pointer.
+        unsafe {
+            libc::sigfillset(set.as_mut_ptr());
+            for signal in OWN {
+                libc::sigdelset(set.as_mut_ptr(), signal);
+            }
+            // Cannot fail with this first argument.
+            libc::pthread_sigmask(libc::SIG_BLOCK, set.as_ptr(), std::ptr::null_mut());
+        }
+    }
+
+    /// Makes the calling thread's sleeps end as close to their time as the timer can.
+    pub(crate) fn set_timer_slack() -> Result<(), String> {
+        // SAFETY: PR_SET_TIMERSLACK takes a number and touches no memory.
+        let result = unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1 as libc::c_ulong, 0, 0, 0) };
+        if result == 0 { Ok(()) } else { Err(format!("refused: {}", Error::last_os_error())) }
+    }
+
+    /// Keeps the processors out of idle states that take time to leave, for as long as the file is open: about 25 us of
+    /// every wake-up. It costs power.
+    pub(crate) fn stay_awake() -> Result<File, String> {
+        const DEVICE: &str = "/dev/cpu_dma_latency";
+        let refused = |error: Error| format!("refused: {DEVICE}: {error}");
+        let mut file = File::options().write(true).open(DEVICE).map_err(refused)?;
+        // The largest latency allowed, in microseconds, as the kernel's PM QoS interface reads it.
+        file.write_all(&0_i32.to_ne_bytes()).map_err(refused)?;
+        Ok(file)
+    }
+
+    /// Locks the process's memory, now and future, once; every call returns what the first one achieved.
+    pub(crate) fn lock_memory() -> Result<(), String> {
+        static RESULT: OnceLock<Result<(), String>> = OnceLock::new();
+        RESULT
+            .get_or_init(|| {
+                may_lock_everything()?;
+                // SAFETY: takes flags and touches no memory of ours.
+                let result = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) };
+                if result == 0 { Ok(()) } else { Err(format!("refused: {}", Error::last_os_error())) }
+            })
+            .clone()
+    }
+
+    /// Whether locking would work, without locking anything.
+    ///
+    /// Under a finite limit the lock itself can succeed and a later allocation then fails, which would be a crash for a
+    /// refused privilege.
+    pub(crate) fn may_lock_everything() -> Result<(), String> {
+        let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+        // SAFETY: the pointer is to an rlimit of our own.
+        let known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &mut limit) } == 0;
+        if has_lock_capability() || (known && limit.rlim_cur == libc::RLIM_INFINITY) {
+            return Ok(());
+        }
+        Err(format!("not locked: the limit is {} bytes (ulimit -l unlimited, or CAP_IPC_LOCK)", limit.rlim_cur))
+    }
+
+    fn has_lock_capability() -> bool {
+        const CAP_IPC_LOCK: u32 = 14;
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
+        effective
+            .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
+            .is_some_and(|mask| mask & (1 << CAP_IPC_LOCK) != 0)
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod imp {
+    use std::sync::OnceLock;
+    use std::time::{Duration, Instant};
+
+    const NOT_AVAILABLE: &str = "not available on this system";
+
+    pub(crate) fn monotonic() -> u64 {
+        static START: OnceLock<Instant> = OnceLock::new();
+        START.get_or_init(Instant::now).elapsed().as_nanos() as u64
+    }
+
+    /// The nearest that there is: it counts preemption too.
+    pub(crate) fn thread_cpu() -> u64 {
+        monotonic()
+    }
+
+    pub(crate) fn sleep_until(time: u64) {
+        std::thread::sleep(Duration::from_nanos(time.saturating_sub(monotonic())));
+    }
+
+    pub(crate) fn set_realtime(_priority: u8) -> Result<(), String> {
+        Err(NOT_AVAILABLE.to_owned())
+    }
+
+    pub(crate) fn give_up_realtime(_thread: &std::thread::JoinHandle<()>) {}
+
+    pub(crate) fn block_signals() {}
+
+    pub(crate) fn set_timer_slack() -> Result<(), String> {
+        Err(NOT_AVAILABLE.to_owned())
+    }
+
+    pub(crate) fn stay_awake() -> Result<std::fs::File, String> {
+        Err("not available on this system".to_owned())
+    }
+
+    pub(crate) fn lock_memory() -> Result<(), String> {
+        Err(NOT_AVAILABLE.to_owned())
+    }
+
+    pub(crate) fn may_lock_everything() -> Result<(), String> {
+        Err(NOT_AVAILABLE.to_owned())
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sleep_never_ends_before_its_time() {
+        for _ in 0..3 {
+            let due = monotonic() + 200_000;
+            while monotonic() < due {
+                sleep_until(due);
+            }
+            assert!(monotonic() >= due);
+        }
+    }
+
+    #[test]
+    fn a_core_that_does_not_exist_is_refused_and_named() {
+        assert!(pin(usize::MAX).unwrap_err().contains(&usize::MAX.to_string()));
+    }
+}
