@@ -7,13 +7,13 @@
 //! `cargo bench -p palpate-haply --bench exchange`
 
 #[path = "../src/guard.rs"]
-#[allow(dead_code, reason = "only what protocol needs")]
+#[allow(dead_code, unused_imports, reason = "only what protocol needs")]
 mod guard;
 #[path = "../src/protocol.rs"]
-#[allow(dead_code, reason = "only what the tick needs")]
+#[allow(dead_code, unused_imports, reason = "only what the tick needs")]
 mod protocol;
 #[path = "../src/wire.rs"]
-#[allow(dead_code, reason = "only what the tick needs")]
+#[allow(dead_code, unused_imports, reason = "only what the tick needs")]
 mod wire;
 
 use std::alloc::{GlobalAlloc, Layout, System};

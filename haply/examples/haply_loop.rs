@@ -6,7 +6,7 @@
 //!
 //! Look for: no lost command and no missing reply, as many commands as releases, and the round trip far below a millisecond.
 //!
-//! `cargo run --release --features haply --example haply_loop -- --seconds 600`
+//! `cargo run --release -p palpate-haply --features mock --example haply_loop -- --seconds 600`
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};

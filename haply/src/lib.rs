@@ -1,4 +1,36 @@
-//! The Haply Inverse service 3.5: a client for its Inverse3 devices.
+//! A Haply Inverse3 as a device of palpate: a client of the Haply Inverse service 3.5, and a mock of that service to try it
+//! without hardware.
+//!
+//! ```no_run
+//! use palpate::model::{body::Block, mesh::Face};
+//! use palpate_haply::{Haply, HaplyOptions};
+//!
+//! # fn main() -> Result<(), palpate::Error> {
+//! let body = Block::builder([12; 3], [0.1; 3]).fix(Face::ZMin).build()?;
+//! let session = palpate::Session::builder(body).device(Haply::connect(HaplyOptions::new(3.0))?).build()?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A scene with `device.kind = "haply"` is opened by [`open`]: `Session::from_scene(scene).open_haply_with(palpate_haply::open)`.
+//! The feature `mock` adds `palpate_haply::mock`, the service with one device in a simulated hand; the command
+//! `palpate mock haply` starts it.
+//!
+//! The service speaks JSON over WebSocket. On the simulation channel it sends one inventory when a client connects and from
+//! then on exactly one state for each message of the client, so the client is the one who keeps the pace; commands do not
+//! persist. What concerns safety comes over a second channel, of events. Source: the vendor's documentation of the service
+//! and its crate `haply` 1.3.1, against which the mock is tested (`interop/haply`).
+//!
+//! | file | is |
+//! | --- | --- |
+//! | `client` | the device: one command per tick, one reply each |
+//! | `link`, `events` | the threads that connect again and that listen for events |
+//! | `guard` | what the events mean for the force |
+//! | `hold`, `watch` | the expiry of a force: on the client's clock, and by a thread where the tick does not go on |
+//! | `pulse` | which replies are missing, and when the force may come back |
+//! | `protocol` | messages out and in, by `serde_json`, nothing allocated for a state |
+//! | `wire` | a connection, by `tungstenite`: limits, and buffers that come back |
+//! | `mock` | the service without hardware |
 
 mod client;
 mod events;

@@ -102,7 +102,7 @@ impl MockService {
             let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(fail)?;
             listener.set_nonblocking(true).map_err(fail)?;
             let address = listener.local_addr().map_err(fail)?;
-            Ok((listener, address))
+            Ok::<_, Error>((listener, address))
         };
         let ((simulation, address), (events, events_address)) = (listen(options.port)?, listen(options.events_port)?);
         let world = Arc::new(Mutex::new(World::new(options)));
