@@ -218,7 +218,8 @@ fn simulate(stream: TcpStream, world: &Mutex<World>) -> Result<(), Broken> {
             _ => (None, Duration::ZERO),
         };
         if locked(world).is_away() {
-            return Ok(wire.close());
+            wire.close();
+            return Ok(());
         }
         sleep(delay);
         if let Some(state) = answer {
@@ -237,7 +238,8 @@ fn announce(stream: TcpStream, world: &Mutex<World>) -> Result<(), Broken> {
         // What a client says here means nothing; that it has gone does.
         wire.receive()?;
         if locked(world).is_away() {
-            return Ok(wire.close());
+            wire.close();
+            return Ok(());
         }
         for text in events.try_iter() {
             wire.say(&text)?;
