@@ -6,7 +6,7 @@
 //!
 //! Look for: no lost command and no missing reply, as many commands as releases, and the round trip far below a millisecond.
 //!
-//! `cargo run --release --features haply --example haply_loop -- --seconds 600`
+//! `cargo run --release -p palpate-haply --features mock --example haply_loop -- --seconds 600`
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
@@ -15,10 +15,10 @@ use std::time::Duration;
 
 use palpate::ErrorKind;
 use palpate::devices::ForceCommand;
-use palpate::devices::haply::mock::{MockOptions, MockService};
-use palpate::devices::haply::{Haply, HaplyCounts, HaplyOptions};
 use palpate::prelude::*;
 use palpate::runtime::{Actor, Execution, Outcome, RateGroup, Runtime, SlipCause, TickContext};
+use palpate_haply::mock::{MockOptions, MockService};
+use palpate_haply::{Haply, HaplyCounts, HaplyOptions};
 
 /// A wall below the mock's hand: height (m) and stiffness (N/m).
 const WALL_M: f64 = 0.14;

@@ -1,18 +1,18 @@
 //! The device: one command per tick, one reply each.
 
-use super::events::Events;
-use super::guard::Guard;
-use super::hold::Hold;
-use super::link::{self, Link, Links, Lost};
-use super::options::HaplyOptions;
-use super::protocol::{self, Commands, Reply};
-use super::pulse::Pulse;
-use super::watch::Watch;
-use super::websocket::WebSocket;
-use palpate::devices::{Calibration, Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
-use palpate::{Error, ErrorKind};
+use crate::events::Events;
+use crate::guard::Guard;
+use crate::hold::Hold;
+use crate::link::{self, Link, Links, Lost};
+use crate::options::HaplyOptions;
+use crate::protocol::{self, Commands, Reply};
+use crate::pulse::Pulse;
+use crate::watch::Watch;
+use crate::wire::Wire;
+use palpate::devices::{Calibration, Capabilities};
 use palpate::model::Vec3;
 use palpate::runtime::Nanos;
+use palpate::{Device, DeviceFault, DeviceState, Error, ErrorKind, ForceCommand};
 use std::time::{Duration, Instant};
 
 /// Replies that one look takes: the service sends one for each command, and few are under way.
@@ -63,7 +63,7 @@ pub struct Haply {
     commands: Commands,
     links: Links,
     events: Option<Events>,
-    link: Option<WebSocket>,
+    link: Option<Wire>,
     /// The next frame is the first of its connection.
     is_first: bool,
     guard: Guard,
@@ -116,7 +116,7 @@ impl Haply {
         let no_thread = |error| fail("the service", &options.address, format!("has no thread of its own: {error}"));
         let (watch, connections) = Watch::start(commands.clone()).map_err(no_thread)?;
         // There is room for the first.
-        let _ = connections.try_send(first.socket.second().map_err(no_thread)?);
+        let _ = connections.try_send(first.wire.second().map_err(no_thread)?);
         let links = Links::new(options.address.clone(), id.clone(), connections).map_err(no_thread)?;
         let mut haply = Self {
             name: format!("haply {id}"),
@@ -182,7 +182,7 @@ impl Haply {
     }
 
     fn use_link(&mut self, link: Link) {
-        self.link = Some(link.socket);
+        self.link = Some(link.wire);
         self.is_first = true;
         self.pulse = Pulse::new(self.options.period);
         self.guard.reconnected();
@@ -227,52 +227,42 @@ impl Haply {
             self.counts.stale += 1;
             self.send(now, Some([0.0; 3]));
         }
-        if self.pulse.is_hopeless(now)
-            && let Some(socket) = self.link.take()
-        {
-            self.lose(Lost::Silent, socket);
+        if self.pulse.is_hopeless(now) {
+            self.lose(Lost::Silent);
         }
     }
 
     fn receive(&mut self) {
         for _ in 0..MOST_PER_LOOK {
-            let Some(mut socket) = self.link.take() else { return };
-            let lost = match socket.receive() {
-                Ok(false) => {
-                    self.link = Some(socket);
-                    return;
-                }
-                Ok(true) => match protocol::reply(socket.message(), &self.id) {
-                    Ok(reply) => {
+            let Some(wire) = &mut self.link else { return };
+            let lost = match wire.receive() {
+                Ok(None) => return,
+                Ok(Some(frame)) => match protocol::reply(&frame, &self.id) {
+                    Some(reply) => {
                         self.counts.replies += u64::from(self.pulse.waiting() > 0);
                         self.pulse.replied(Instant::now());
                         self.accept(reply);
-                        self.link = Some(socket);
                         continue;
                     }
-                    Err(_) => Lost::Garbage,
+                    None => Lost::Garbage,
                 },
                 Err(broken) => Lost::Broken(broken),
             };
-            self.lose(lost, socket);
-            return;
+            return self.lose(lost);
         }
         // Nobody has asked for so many.
-        if let Some(socket) = self.link.take() {
-            self.lose(Lost::Garbage, socket);
-        }
+        self.lose(Lost::Garbage);
     }
 
-    fn lose(&mut self, why: Lost, mut socket: WebSocket) {
+    fn lose(&mut self, why: Lost) {
+        let Some(mut wire) = self.link.take() else { return };
         // A last word, in case that only the replies are lost; a command that has no reply either is not counted.
-        let _ = socket.send(|out| {
-            self.commands.force(out, false, [0.0; 3]);
-        });
+        let _ = wire.send(|out| self.commands.force(out, false, [0.0; 3]));
         self.counts.lost += self.pulse.waiting() as u64;
         self.pulse = Pulse::new(self.options.period);
         self.commanded = [0.0; 3];
         self.watch.expect(None);
-        self.links.lose(why, socket);
+        self.links.lose(why, wire);
     }
 
     /// Why there is no force now.
@@ -286,24 +276,22 @@ impl Haply {
 
     /// Sends a force, or only asks for the state.
     fn send(&mut self, now: Instant, force: Option<[f64; 3]>) {
-        let Some(mut socket) = self.link.take() else {
-            return;
-        };
-        let (commands, is_first) = (&self.commands, self.is_first);
-        let mut written = [0.0; 3];
-        let sent = socket.send(|out| match force {
-            Some(force) => written = commands.force(out, is_first, force),
-            None => commands.probe(out, is_first),
+        let Some(wire) = &mut self.link else { return };
+        let sent = wire.send(|out| match force {
+            Some(force) => self.commands.force(out, self.is_first, force),
+            None => {
+                self.commands.probe(out, self.is_first);
+                [0.0; 3]
+            }
         });
         match sent {
-            Ok(()) => {
+            Ok(written) => {
                 (self.is_first, self.is_driven, self.commanded) = (false, true, written);
                 self.watch.expect(self.hold.ends().filter(|_| written != [0.0; 3]));
                 self.counts.commands += 1;
                 self.pulse.sent(now);
-                self.link = Some(socket);
             }
-            Err(broken) => self.lose(Lost::Broken(broken), socket),
+            Err(broken) => self.lose(Lost::Broken(broken)),
         }
     }
 
@@ -425,11 +413,9 @@ impl Device for Haply {
 
 impl Drop for Haply {
     fn drop(&mut self) {
-        if let Some(socket) = &mut self.link {
-            let _ = socket.send(|out| {
-                self.commands.force(out, self.is_first, [0.0; 3]);
-            });
-            socket.close();
+        if let Some(wire) = &mut self.link {
+            let _ = wire.send(|out| self.commands.force(out, self.is_first, [0.0; 3]));
+            wire.close();
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The events channel: a thread of its own that reads, says what happened and passes on what the tick must know.
 
-use super::guard::News;
-use super::protocol::{self, Notice};
-use super::websocket::WebSocket;
+use crate::guard::News;
+use crate::protocol;
+use crate::wire::Wire;
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
 use std::io;
 use std::time::Duration;
@@ -19,7 +19,7 @@ const QUEUE: usize = 256;
 
 /// The tick's end of the channel; the thread ends when it is dropped.
 #[derive(Debug)]
-pub(super) struct Events {
+pub(crate) struct Events {
     news: Receiver<News>,
     _alive: Sender<()>,
 }
@@ -29,26 +29,26 @@ impl Events {
     ///
     /// # Errors
     /// If the first connection fails: a force without its safety events is no offer.
-    pub(super) fn connect(address: String, device: String) -> io::Result<Self> {
-        let socket = connect(&address)?;
+    pub(crate) fn connect(address: String, device: String) -> io::Result<Self> {
+        let wire = connect(&address)?;
         let (sender, news) = bounded(QUEUE);
         let (alive, stopped) = bounded(0);
         std::thread::Builder::new()
             .name("haply-events".to_owned())
-            .spawn(move || Listener { address, device, news: sender, stopped }.run(socket))?;
+            .spawn(move || Listener { address, device, news: sender, stopped }.run(wire))?;
         Ok(Self { news, _alive: alive })
     }
 
     /// The next piece of news, if there is one; allocates nothing and does not wait.
-    pub(super) fn next(&self) -> Option<News> {
+    pub(crate) fn next(&self) -> Option<News> {
         self.news.try_recv().ok()
     }
 }
 
-fn connect(address: &str) -> io::Result<WebSocket> {
-    let socket = WebSocket::connect(address)?;
-    socket.block_for(LISTENS_FOR)?;
-    Ok(socket)
+fn connect(address: &str) -> io::Result<Wire> {
+    let wire = Wire::connect(address)?;
+    wire.block_for(LISTENS_FOR)?;
+    Ok(wire)
 }
 
 struct Listener {
@@ -59,28 +59,28 @@ struct Listener {
 }
 
 impl Listener {
-    fn run(self, mut socket: WebSocket) {
+    fn run(self, mut wire: Wire) {
         loop {
             let why = loop {
                 if self.is_stopped() {
                     return;
                 }
-                match socket.receive() {
-                    Ok(true) => self.pass_on(socket.message()),
-                    Ok(false) => {}
+                match wire.receive() {
+                    Ok(Some(message)) => self.pass_on(&message),
+                    Ok(None) => {}
                     Err(why) => break why,
                 }
             };
             // First the tick, then the words: whoever reads these may keep this thread waiting.
             self.tell(News::ChannelLost);
             warn!("haply: the events channel at {} {why}: no force until it is back", self.address);
-            socket = loop {
+            wire = loop {
                 std::thread::sleep(RETRY);
                 if self.is_stopped() {
                     return;
                 }
-                if let Ok(socket) = connect(&self.address) {
-                    break socket;
+                if let Ok(wire) = connect(&self.address) {
+                    break wire;
                 }
             };
             self.tell(News::ChannelBack);
@@ -94,15 +94,15 @@ impl Listener {
 
     fn pass_on(&self, message: &[u8]) {
         let text = String::from_utf8_lossy(message);
-        match protocol::notice(message, &self.device) {
-            Ok(Some(notice)) => {
-                self.tell(News::Of(notice));
-                warn!("haply: device {}: {notice:?}: {text}", self.device);
+        match protocol::news(message, &self.device) {
+            Ok(Some(news)) => {
+                self.tell(news);
+                warn!("haply: device {}: {news:?}: {text}", self.device);
             }
             Ok(None) => debug!("haply: {text}"),
             Err(_) => {
                 // It may have been one that concerns safety.
-                self.tell(News::Of(Notice::UnknownSafety));
+                self.tell(News::UnknownSafety);
                 warn!("haply: the events channel sent what is no event, no force for now: {text:.80}");
             }
         }

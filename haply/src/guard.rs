@@ -14,18 +14,35 @@
 //! What was latched is forgotten when both channels were connected again since: a service that was started again has no brake to
 //! release. One of them alone says nothing about the brake.
 
-use super::protocol::Notice;
 use palpate::devices::{DeviceFault, SafetyStop};
 use std::time::{Duration, Instant};
 
 /// How long the force stays away after an event that nothing takes back.
-pub(super) const PAUSE: Duration = Duration::from_secs(1);
+pub(crate) const PAUSE: Duration = Duration::from_secs(1);
 
-/// News for the tick.
+/// What has happened to the device or to the events channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum News {
-    /// Of the device.
-    Of(Notice),
+pub(crate) enum News {
+    /// The emergency brake is on.
+    EbrakeTriggered,
+    /// It is off again.
+    EbrakeReleased,
+    /// The FOD stage went up to high risk (level warning and above).
+    FodRaised,
+    /// It went back to low risk (level info or notice).
+    FodLowered,
+    /// A motor stalled.
+    Stall,
+    /// The device reached its stability ceiling.
+    StabilityCeiling,
+    /// A safety event that was not known when this was written.
+    UnknownSafety,
+    /// The device is there.
+    Connected,
+    /// The device is gone.
+    Disconnected,
+    /// Another session has it.
+    Busy,
     /// The channel itself is lost: whatever happens now is not heard of.
     ChannelLost,
     /// It is back.
@@ -34,7 +51,7 @@ pub(super) enum News {
 
 /// The state that the news have left.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Guard {
+pub(crate) struct Guard {
     is_braked: bool,
     is_guarded: bool,
     is_gone: bool,
@@ -46,8 +63,8 @@ pub(super) struct Guard {
 
 impl Guard {
     /// Takes one piece of news.
-    pub(super) fn take(&mut self, news: News, now: Instant) {
-        if matches!(news, News::Of(Notice::EbrakeTriggered | Notice::FodRaised | Notice::Disconnected)) {
+    pub(crate) fn take(&mut self, news: News, now: Instant) {
+        if matches!(news, News::EbrakeTriggered | News::FodRaised | News::Disconnected) {
             self.renewed = [false; 2];
         }
         match news {
@@ -57,16 +74,16 @@ impl Guard {
                 self.renewed[1] = true;
                 self.forget_another_service();
             }
-            News::Of(Notice::EbrakeTriggered) => self.is_braked = true,
-            News::Of(Notice::EbrakeReleased) => self.is_braked = false,
-            News::Of(Notice::FodRaised) => self.is_guarded = true,
-            News::Of(Notice::FodLowered) => self.is_guarded = false,
-            News::Of(Notice::Disconnected) => self.is_gone = true,
-            News::Of(Notice::Connected) => self.is_gone = false,
-            News::Of(Notice::Stall) => self.pause(now, DeviceFault::SafetyStop(SafetyStop::Stall)),
-            News::Of(Notice::StabilityCeiling) => self.pause(now, DeviceFault::SafetyStop(SafetyStop::Unstable)),
-            News::Of(Notice::UnknownSafety) => self.pause(now, DeviceFault::SafetyStop(SafetyStop::Other)),
-            News::Of(Notice::Busy) => self.pause(now, DeviceFault::Busy),
+            News::EbrakeTriggered => self.is_braked = true,
+            News::EbrakeReleased => self.is_braked = false,
+            News::FodRaised => self.is_guarded = true,
+            News::FodLowered => self.is_guarded = false,
+            News::Disconnected => self.is_gone = true,
+            News::Connected => self.is_gone = false,
+            News::Stall => self.pause(now, DeviceFault::SafetyStop(SafetyStop::Stall)),
+            News::StabilityCeiling => self.pause(now, DeviceFault::SafetyStop(SafetyStop::Unstable)),
+            News::UnknownSafety => self.pause(now, DeviceFault::SafetyStop(SafetyStop::Other)),
+            News::Busy => self.pause(now, DeviceFault::Busy),
         }
     }
 
@@ -75,7 +92,7 @@ impl Guard {
     }
 
     /// The simulation channel is connected again.
-    pub(super) fn reconnected(&mut self) {
+    pub(crate) fn reconnected(&mut self) {
         self.renewed[0] = true;
         self.forget_another_service();
     }
@@ -87,7 +104,7 @@ impl Guard {
     }
 
     /// Why there may be no force now.
-    pub(super) fn fault(&mut self, now: Instant) -> Option<DeviceFault> {
+    pub(crate) fn fault(&mut self, now: Instant) -> Option<DeviceFault> {
         if self.pause.is_some_and(|(until, _)| now >= until) {
             self.pause = None;
         }
@@ -115,9 +132,9 @@ mod tests {
     fn every_event_stops_the_force_and_what_ends_it_lets_it_back() {
         let now = Instant::now();
         for (stop, end, fault) in [
-            (News::Of(Notice::EbrakeTriggered), News::Of(Notice::EbrakeReleased), stop(SafetyStop::EmergencyBrake)),
-            (News::Of(Notice::FodRaised), News::Of(Notice::FodLowered), stop(SafetyStop::Other)),
-            (News::Of(Notice::Disconnected), News::Of(Notice::Connected), DeviceFault::Disconnected),
+            (News::EbrakeTriggered, News::EbrakeReleased, stop(SafetyStop::EmergencyBrake)),
+            (News::FodRaised, News::FodLowered, stop(SafetyStop::Other)),
+            (News::Disconnected, News::Connected, DeviceFault::Disconnected),
             (News::ChannelLost, News::ChannelBack, stop(SafetyStop::Other)),
         ] {
             let mut guard = Guard::default();
@@ -132,15 +149,15 @@ mod tests {
     #[test]
     fn what_nothing_takes_back_stops_the_force_for_a_while() {
         let now = Instant::now();
-        for (notice, fault) in [
-            (Notice::Stall, stop(SafetyStop::Stall)),
-            (Notice::StabilityCeiling, stop(SafetyStop::Unstable)),
-            (Notice::UnknownSafety, stop(SafetyStop::Other)),
-            (Notice::Busy, DeviceFault::Busy),
+        for (news, fault) in [
+            (News::Stall, stop(SafetyStop::Stall)),
+            (News::StabilityCeiling, stop(SafetyStop::Unstable)),
+            (News::UnknownSafety, stop(SafetyStop::Other)),
+            (News::Busy, DeviceFault::Busy),
         ] {
             let mut guard = Guard::default();
-            guard.take(News::Of(notice), now);
-            guard.take(News::Of(notice), now + PAUSE / 2);
+            guard.take(news, now);
+            guard.take(news, now + PAUSE / 2);
             assert_eq!(guard.fault(now + PAUSE), Some(fault));
             assert_eq!(guard.fault(now + 3 * PAUSE / 2), None);
         }
@@ -150,15 +167,15 @@ mod tests {
     fn a_service_that_was_started_again_has_no_brake_to_release() {
         let now = Instant::now();
         let mut guard = Guard::default();
-        guard.take(News::Of(Notice::EbrakeTriggered), now);
-        guard.take(News::Of(Notice::Disconnected), now);
+        guard.take(News::EbrakeTriggered, now);
+        guard.take(News::Disconnected, now);
         // Check that one new connection alone, before or after, does not release a brake
         guard.reconnected();
         assert_eq!(guard.fault(now), Some(DeviceFault::Disconnected));
         guard.take(News::ChannelLost, now);
         guard.take(News::ChannelBack, now);
         assert_eq!(guard.fault(now), None);
-        guard.take(News::Of(Notice::EbrakeTriggered), now);
+        guard.take(News::EbrakeTriggered, now);
         guard.reconnected();
         assert_eq!(guard.fault(now), Some(stop(SafetyStop::EmergencyBrake)));
         guard.take(News::ChannelBack, now);

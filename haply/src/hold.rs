@@ -2,12 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use palpate::devices::ForceCommand;
+use palpate::ForceCommand;
 use palpate::runtime::Nanos;
 
 /// One command between two writes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Hold {
+pub(crate) struct Hold {
     command: ForceCommand,
     /// When it ends, as reckoned when it came: a clock of reads that stands still does not prolong it.
     end: Option<Instant>,
@@ -16,23 +16,23 @@ pub(super) struct Hold {
 }
 
 impl Hold {
-    pub(super) fn new(now: Instant) -> Self {
+    pub(crate) fn new(now: Instant) -> Self {
         Self { command: ForceCommand::ZERO, end: None, read: (Nanos::ZERO, now) }
     }
 
     /// A read for `time` began at `now`.
-    pub(super) fn saw(&mut self, time: Nanos, now: Instant) {
+    pub(crate) fn saw(&mut self, time: Nanos, now: Instant) {
         self.read = (time, now);
     }
 
-    pub(super) fn set(&mut self, command: ForceCommand) {
+    pub(crate) fn set(&mut self, command: ForceCommand) {
         let (time, at) = self.read;
         self.end = at.checked_add(Duration::from_nanos(command.expires.saturating_sub(time).0));
         self.command = command;
     }
 
     /// The force now (N): zero from the expiry on.
-    pub(super) fn force(&mut self, now: Instant) -> [f64; 3] {
+    pub(crate) fn force(&mut self, now: Instant) -> [f64; 3] {
         if self.command.expires <= self.read.0 || self.end.is_some_and(|end| now >= end) {
             self.command = ForceCommand::ZERO;
         }
@@ -40,7 +40,7 @@ impl Hold {
     }
 
     /// When the force ends; `None` if it has no end.
-    pub(super) fn ends(&self) -> Option<Instant> {
+    pub(crate) fn ends(&self) -> Option<Instant> {
         self.end
     }
 }

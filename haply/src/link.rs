@@ -1,7 +1,7 @@
 //! The simulation channel's connection, made and made again by a thread of its own: a tick never waits for a connection.
 
-use super::protocol::{self, Reply};
-use super::websocket::{Broken, WebSocket};
+use crate::protocol::{self, Reply};
+use crate::wire::{Broken, Wire};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::time::Duration;
 use tracing::warn;
@@ -10,8 +10,8 @@ use tracing::warn;
 const RETRY: Duration = Duration::from_millis(100);
 
 /// Why the tick gave a connection up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Lost {
+#[derive(Debug)]
+pub(crate) enum Lost {
     /// The socket said so.
     Broken(Broken),
     /// It sent something that is no state.
@@ -32,15 +32,15 @@ impl std::fmt::Display for Lost {
 
 /// A connection with the state that it began with.
 #[derive(Debug)]
-pub(super) struct Link {
-    pub(super) socket: WebSocket,
-    pub(super) first: Reply,
+pub(crate) struct Link {
+    pub(crate) wire: Wire,
+    pub(crate) first: Reply,
 }
 
 /// The tick's side of the thread; it ends when this is dropped.
 #[derive(Debug)]
-pub(super) struct Links {
-    lost: Sender<(Lost, WebSocket)>,
+pub(crate) struct Links {
+    lost: Sender<(Lost, Wire)>,
     made: Receiver<Link>,
 }
 
@@ -48,35 +48,33 @@ pub(super) struct Links {
 ///
 /// # Errors
 /// What went wrong, as the end of a sentence that begins with the service and its address.
-pub(super) fn connect(address: &str, wanted: Option<&str>) -> Result<(Link, String), String> {
-    let mut socket = WebSocket::connect(address).map_err(|error| format!("does not answer: {error}"))?;
-    let is_received = socket.receive().map_err(|broken| broken.to_string())?;
-    if !is_received {
-        return Err("sent no inventory within 2 s".to_owned());
-    }
-    let not_a_state = |_| "sent an inventory that cannot be read".to_owned();
-    let ids = protocol::device_ids(socket.message()).map_err(not_a_state)?;
+pub(crate) fn connect(address: &str, wanted: Option<&str>) -> Result<(Link, String), String> {
+    let mut wire = Wire::connect(address).map_err(|error| format!("does not answer: {error}"))?;
+    let received = wire.receive().map_err(|broken| broken.to_string())?;
+    let frame = received.ok_or("sent no inventory within 2 s")?;
+    let not_a_state = "sent an inventory that cannot be read";
+    let ids = protocol::device_ids(&frame).ok_or(not_a_state)?;
     let id = match wanted {
         None => ids.first().cloned().ok_or("has no Inverse3")?,
         Some(id) if ids.iter().any(|found| found == id) => id.to_owned(),
         Some(id) => return Err(format!("has no device {id:?}, it has {ids:?}")),
     };
-    let first = protocol::reply(socket.message(), &id).map_err(not_a_state)?;
-    socket.never_block().map_err(|error| error.to_string())?;
-    Ok((Link { socket, first }, id))
+    let first = protocol::reply(&frame, &id).ok_or(not_a_state)?;
+    wire.never_block().map_err(|error| error.to_string())?;
+    Ok((Link { wire, first }, id))
 }
 
 impl Links {
     /// Starts the thread that connects to `address` again whenever it is told to; a second writer on each new connection
     /// goes to `watch`.
-    pub(super) fn new(address: String, device: String, watch: Sender<WebSocket>) -> std::io::Result<Self> {
-        let (lost, losses) = bounded::<(Lost, WebSocket)>(1);
+    pub(crate) fn new(address: String, device: String, watch: Sender<Wire>) -> std::io::Result<Self> {
+        let (lost, losses) = bounded::<(Lost, Wire)>(1);
         let (sender, made) = bounded(1);
         std::thread::Builder::new().name("haply-link".to_owned()).spawn(move || {
             // Ends with the tick's side: then there is nobody to lose a connection.
-            for (why, mut socket) in &losses {
+            for (why, mut wire) in &losses {
                 // For every writer on it; then the words, which may have to wait for a reader.
-                socket.close();
+                wire.close();
                 warn!("haply: the service at {address} {why}: the force is zero, reconnecting");
                 if !reconnect(&address, &device, &losses, &sender, &watch) {
                     return;
@@ -87,13 +85,13 @@ impl Links {
     }
 
     /// Hands over a connection that is of no use any more, and asks for another. Neither waits nor closes it.
-    pub(super) fn lose(&self, why: Lost, socket: WebSocket) {
+    pub(crate) fn lose(&self, why: Lost, wire: Wire) {
         // There is one connection, and the thread takes a loss before it makes the next one: there is room.
-        let _ = self.lost.try_send((why, socket));
+        let _ = self.lost.try_send((why, wire));
     }
 
     /// The new connection, once it is there. Does not wait.
-    pub(super) fn take(&self) -> Option<Link> {
+    pub(crate) fn take(&self) -> Option<Link> {
         self.made.try_recv().ok()
     }
 }
@@ -102,9 +100,9 @@ impl Links {
 fn reconnect(
     address: &str,
     device: &str,
-    losses: &Receiver<(Lost, WebSocket)>,
+    losses: &Receiver<(Lost, Wire)>,
     sender: &Sender<Link>,
-    watch: &Sender<WebSocket>,
+    watch: &Sender<Wire>,
 ) -> bool {
     let mut last = String::new();
     loop {
@@ -113,7 +111,7 @@ fn reconnect(
             return false;
         }
         let made = connect(address, Some(device)).and_then(|(link, _)| {
-            let second = link.socket.second().map_err(|error| error.to_string())?;
+            let second = link.wire.second().map_err(|error| error.to_string())?;
             Ok((link, second))
         });
         match made {

@@ -1,8 +1,8 @@
 //! What a connection to the service needs to know.
 
-use super::protocol::is_plain;
-use palpate::{Error, ErrorKind};
+use crate::protocol::is_plain;
 use palpate::model::Vec3;
+use palpate::{Error, ErrorKind};
 use std::time::Duration;
 
 /// How to reach the service, which device, and what it may do.
@@ -23,7 +23,7 @@ pub struct HaplyOptions {
     pub basis: String,
     /// Where the device's base is in the scene (m).
     pub origin_m: Vec3,
-    /// The time of one tick: how long a reply may take, and the pace of [`wait`](palpate::devices::Device::wait).
+    /// The time of one tick: how long a reply may take, and the pace of [`wait`](palpate::Device::wait).
     pub period: Duration,
 }
 
@@ -46,7 +46,7 @@ impl HaplyOptions {
     }
 
     /// Refuses what could not go into a frame.
-    pub(super) fn check(&self) -> Result<(), Error> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         let names =
             [("profile", Some(&self.profile)), ("basis", Some(&self.basis)), ("device_id", self.device_id.as_ref())];
         let refuse = |message: String| Err(Error::new(ErrorKind::Device, message).at("haply"));

@@ -28,7 +28,7 @@ const TOO_MANY_LATE: u32 = 50;
 
 /// The state of the exchange of commands and replies over one connection.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pulse {
+pub(crate) struct Pulse {
     late: Duration,
     /// When the commands without a reply were sent, oldest first.
     sent: [Option<Instant>; SLOTS],
@@ -45,7 +45,7 @@ pub(super) struct Pulse {
 }
 
 impl Pulse {
-    pub(super) fn new(period: Duration) -> Self {
+    pub(crate) fn new(period: Duration) -> Self {
         Self {
             late: period.mul_f64(LATE_TICKS),
             sent: [None; SLOTS],
@@ -60,24 +60,24 @@ impl Pulse {
     }
 
     /// Commands without a reply.
-    pub(super) fn waiting(&self) -> usize {
+    pub(crate) fn waiting(&self) -> usize {
         self.sent.iter().flatten().count()
     }
 
     /// There is room for another command: one per tick, and none on top of those that a late service still has to answer.
-    pub(super) fn may_send(&self) -> bool {
+    pub(crate) fn may_send(&self) -> bool {
         if self.is_stale { self.waiting() == 0 } else { self.waiting() < MOST_WAITING }
     }
 
     /// A command was sent.
-    pub(super) fn sent(&mut self, now: Instant) {
+    pub(crate) fn sent(&mut self, now: Instant) {
         if let Some(free) = self.sent.iter_mut().find(|sent| sent.is_none()) {
             *free = Some(now);
         }
     }
 
     /// A reply has come; it answers the oldest command.
-    pub(super) fn replied(&mut self, now: Instant) {
+    pub(crate) fn replied(&mut self, now: Instant) {
         let Some(sent) = self.sent[0] else {
             return;
         };
@@ -97,7 +97,7 @@ impl Pulse {
     }
 
     /// True when the reply to the oldest command has just become too late: the force has to go now.
-    pub(super) fn turns_stale(&mut self, now: Instant) -> bool {
+    pub(crate) fn turns_stale(&mut self, now: Instant) -> bool {
         let is_late = self.sent[0].is_some_and(|sent| now.saturating_duration_since(sent) > self.late);
         if is_late {
             self.in_time = 0;
@@ -109,18 +109,18 @@ impl Pulse {
     }
 
     /// The reply is missing, or late ones have not been made up for.
-    pub(super) fn is_stale(&self) -> bool {
+    pub(crate) fn is_stale(&self) -> bool {
         self.is_stale
     }
 
     /// The connection is of no use any more.
-    pub(super) fn is_hopeless(&self, now: Instant) -> bool {
+    pub(crate) fn is_hopeless(&self, now: Instant) -> bool {
         let is_silent = self.sent[0].is_some_and(|sent| now.saturating_duration_since(sent) > SILENT);
         is_silent || self.late_replies >= TOO_MANY_LATE
     }
 
     /// The share of the force that may be exerted now; `is_allowed` says whether anything else speaks against it.
-    pub(super) fn gain(&mut self, is_allowed: bool, now: Instant) -> f64 {
+    pub(crate) fn gain(&mut self, is_allowed: bool, now: Instant) -> f64 {
         if !is_allowed || self.is_stale || self.in_time < RELIABLE {
             (self.gain, self.ramped) = (0.0, None);
             return 0.0;
@@ -133,7 +133,7 @@ impl Pulse {
     }
 
     /// From the last command that was answered to the look that found its reply.
-    pub(super) fn round_trip(&self) -> Option<Duration> {
+    pub(crate) fn round_trip(&self) -> Option<Duration> {
         self.round_trip
     }
 }

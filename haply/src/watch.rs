@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
-use super::protocol::Commands;
-use super::websocket::WebSocket;
+use crate::protocol::Commands;
+use crate::wire::Wire;
 
 /// Between two looks at the clock.
 const LOOK: Duration = Duration::from_millis(5);
@@ -25,14 +25,14 @@ struct Shared {
 
 /// The tick's side; the thread ends when this and every [`Sender`] of connections are dropped.
 #[derive(Debug)]
-pub(super) struct Watch {
+pub(crate) struct Watch {
     shared: Arc<Mutex<Shared>>,
     seen: u64,
 }
 
 impl Watch {
     /// Starts the thread. It speaks over the connection that was sent last.
-    pub(super) fn start(commands: Commands) -> std::io::Result<(Self, Sender<WebSocket>)> {
+    pub(crate) fn start(commands: Commands) -> std::io::Result<(Self, Sender<Wire>)> {
         let shared = Arc::new(Mutex::new(Shared::default()));
         let (sender, connections) = bounded(4);
         let theirs = Arc::clone(&shared);
@@ -43,14 +43,14 @@ impl Watch {
     }
 
     /// A force was commanded that ends then, or none. Does not wait.
-    pub(super) fn expect(&self, due: Option<Instant>) {
+    pub(crate) fn expect(&self, due: Option<Instant>) {
         if let Ok(mut shared) = self.shared.try_lock() {
             shared.due = due;
         }
     }
 
     /// How many zeros the thread has said since the last question. Does not wait.
-    pub(super) fn zeros(&mut self) -> u64 {
+    pub(crate) fn zeros(&mut self) -> u64 {
         let Ok(zeros) = self.shared.try_lock().map(|shared| shared.zeros) else {
             return 0;
         };
@@ -58,8 +58,8 @@ impl Watch {
     }
 }
 
-fn watch(shared: &Mutex<Shared>, connections: &Receiver<WebSocket>, commands: &Commands) {
-    let mut socket: Option<WebSocket> = None;
+fn watch(shared: &Mutex<Shared>, connections: &Receiver<Wire>, commands: &Commands) {
+    let mut wire: Option<Wire> = None;
     loop {
         match connections.recv_timeout(LOOK) {
             Ok(next) => {
@@ -67,7 +67,7 @@ fn watch(shared: &Mutex<Shared>, connections: &Receiver<WebSocket>, commands: &C
                 if let Ok(mut shared) = shared.try_lock() {
                     shared.due = None;
                 }
-                socket = Some(next);
+                wire = Some(next);
             }
             Err(RecvTimeoutError::Disconnected) => return,
             Err(RecvTimeoutError::Timeout) => {}
@@ -75,11 +75,9 @@ fn watch(shared: &Mutex<Shared>, connections: &Receiver<WebSocket>, commands: &C
         if !is_due(shared) {
             continue;
         }
-        if let Some(socket) = &mut socket {
+        if let Some(wire) = &mut wire {
             // A connection that is broken takes no force either.
-            let _ = socket.send(|out| {
-                commands.force(out, false, [0.0; 3]);
-            });
+            let _ = wire.send(|out| commands.force(out, false, [0.0; 3]));
         }
         // No words: whoever reads them could keep this thread from the next one. The tick counts its zeros.
     }

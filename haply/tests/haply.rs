@@ -6,15 +6,15 @@ use std::time::{Duration, Instant};
 
 use palpate::ErrorKind;
 use palpate::devices::conformance::{self, Verdict};
-use palpate::devices::haply::mock::{MockFault, MockFaultKind, MockOptions, MockService};
-use palpate::devices::haply::{Haply, HaplyCounts, HaplyOptions};
 use palpate::devices::{Calibration, Capabilities, ForceCommand, SafetyStop};
 use palpate::prelude::*;
 use palpate::runtime::{Actor, Execution, Outcome, RateGroup, Runtime, TickContext};
+use palpate_haply::mock::{MockFault, MockFaultKind, MockOptions, MockService};
+use palpate_haply::{Haply, HaplyCounts, HaplyOptions};
 use tracing::field::{Field, Visit};
 use tracing::{Event, Metadata, Subscriber, span};
 
-#[path = "hot_path_support/allocator.rs"]
+#[path = "../../tests/hot_path_support/allocator.rs"]
 mod allocator;
 
 #[global_allocator]
@@ -67,7 +67,7 @@ struct Listener;
 
 impl Subscriber for Listener {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        metadata.target().starts_with("palpate::devices::haply")
+        metadata.target().starts_with("palpate_haply")
     }
     fn new_span(&self, _: &span::Attributes<'_>) -> span::Id {
         span::Id::from_u64(1)
@@ -454,10 +454,9 @@ fn a_session_is_released_by_the_service_and_feels_the_block() {
     assert_eq!(service.applied_n(), [0.0; 3]);
 }
 
-#[cfg(feature = "scene")]
 fn scene(address: &str, events_address: &str, more: &str) -> Result<palpate::scene::Scene, Error> {
     let addresses = format!("max_force_n = 3.0\naddress = \"{address}\"\nevents_address = \"{events_address}\"");
-    let text = include_str!("../scenes/haply.toml")
+    let text = include_str!("../../scenes/haply.toml")
         .replace("max_force_n = 3.0", &addresses)
         .replace("kind = \"haply\"", &format!("kind = \"haply\"\n{more}"))
         .replace("duration_s = 10.0", "duration_s = 1.0");
@@ -465,11 +464,10 @@ fn scene(address: &str, events_address: &str, more: &str) -> Result<palpate::sce
 }
 
 #[test]
-#[cfg(feature = "scene")]
 fn a_scene_names_the_service_and_its_device_releases_the_haptic_group() {
     let service = service();
     let scene = scene(&service.address(), &service.events_address(), "").unwrap();
-    let summary = Session::from_scene(scene).build().unwrap().run().unwrap();
+    let summary = Session::from_scene(scene).open_haply_with(palpate_haply::open).build().unwrap().run().unwrap();
     let local = &summary.runtime.groups[0];
     // One second, and the time in which the force goes to rest
     assert!(summary.runtime.fault.is_none() && local.elapsed_periods >= 1001, "{summary}");
@@ -481,11 +479,18 @@ fn a_scene_names_the_service_and_its_device_releases_the_haptic_group() {
 }
 
 #[test]
-#[cfg(feature = "scene")]
 fn a_scene_that_cannot_reach_or_cannot_have_the_device_is_refused_in_one_line() {
-    let reached = Session::from_scene(scene("127.0.0.1:1", "", "").unwrap()).build().unwrap_err().to_string();
+    let reached = Session::from_scene(scene("127.0.0.1:1", "", "").unwrap())
+        .open_haply_with(palpate_haply::open)
+        .build()
+        .unwrap_err()
+        .to_string();
     assert!(reached.starts_with("haply: the service at 127.0.0.1:1 does not answer"), "{reached}");
-    let simulated = Session::from_scene(scene("127.0.0.1:1", "", "").unwrap()).virtual_time().build().unwrap_err();
+    let simulated = Session::from_scene(scene("127.0.0.1:1", "", "").unwrap())
+        .open_haply_with(palpate_haply::open)
+        .virtual_time()
+        .build()
+        .unwrap_err();
     assert!(simulated.to_string().contains("device.kind: is \"haply\", a device that is really there"), "{simulated}");
     let glued = scene("127.0.0.1:1", "", "attach_node = [5, 5, 11]").unwrap_err().to_string();
     assert!(glued.contains("device.attach_node: glues a tool"), "{glued}");

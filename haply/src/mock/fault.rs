@@ -1,86 +1,76 @@
 //! What a mock service can do wrong, once, after so many commands.
 
+use serde_json::{Value, json};
 use std::time::Duration;
 
-/// A way to fail.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum MockFaultKind {
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $kind:ident $name:literal)*) => {
+        /// A way to fail.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
+        pub enum MockFaultKind {
+            $($(#[$doc])* $kind,)*
+        }
+
+        impl MockFaultKind {
+            /// Every way to fail, in the order of the documentation.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$kind),*];
+
+            /// Its name on the command line.
+            ///
+            /// # Real-time
+            /// Wait-free.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$kind => $name,)*
+                }
+            }
+        }
+    };
+}
+
+kinds! {
     /// Reads on and answers nothing; the next connection is answered again.
-    Silent,
+    Silent "silent"
     /// Answers each message 5 ms late, on this connection.
-    Slow,
+    Slow "slow"
     /// Answers with what is no state, on this connection.
-    Garbage,
+    Garbage "garbage"
     /// Closes every connection and takes no new one for 300 ms.
-    Vanish,
+    Vanish "vanish"
     /// The emergency brake engages, and is released after [`MockFaultKind::LASTS`].
-    Ebrake,
-    /// The FOD stage goes up, and down again after the same time.
-    Fod,
+    Ebrake "ebrake"
+    /// The FOD stage goes up, and down again after [`MockFaultKind::LASTS`].
+    Fod "fod"
     /// A motor stalls.
-    Stall,
+    Stall "stall"
     /// The stability ceiling is reached.
-    Ceiling,
-    /// The device is unplugged, and is back after the same time.
-    Unplug,
+    Ceiling "ceiling"
+    /// The device is unplugged, and is back after [`MockFaultKind::LASTS`].
+    Unplug "unplug"
     /// Another session has the device.
-    Busy,
+    Busy "busy"
     /// A safety event that no client can know.
-    Unknown,
-    /// The status says that the device is not calibrated, for the same time; no event does.
-    Uncalibrated,
-    /// The status says that the device is not ready, for the same time; no event does.
-    Unready,
+    Unknown "unknown"
+    /// The status says for [`MockFaultKind::LASTS`] that the device is not calibrated; no event does.
+    Uncalibrated "uncalibrated"
+    /// The status says for [`MockFaultKind::LASTS`] that the device is not ready; no event does.
+    Unready "unready"
 }
 
 impl MockFaultKind {
-    /// All of them.
-    pub const ALL: [Self; 13] = [
-        Self::Silent,
-        Self::Slow,
-        Self::Garbage,
-        Self::Vanish,
-        Self::Ebrake,
-        Self::Fod,
-        Self::Stall,
-        Self::Ceiling,
-        Self::Unplug,
-        Self::Busy,
-        Self::Unknown,
-        Self::Uncalibrated,
-        Self::Unready,
-    ];
-
     /// How long a fault lasts that ends by itself.
     pub const LASTS: Duration = Duration::from_millis(500);
 
-    /// As it is called on the command line.
-    ///
-    /// # Real-time
-    /// Wait-free.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Silent => "silent",
-            Self::Slow => "slow",
-            Self::Garbage => "garbage",
-            Self::Vanish => "vanish",
-            Self::Ebrake => "ebrake",
-            Self::Fod => "fod",
-            Self::Stall => "stall",
-            Self::Ceiling => "ceiling",
-            Self::Unplug => "unplug",
-            Self::Busy => "busy",
-            Self::Unknown => "unknown",
-            Self::Uncalibrated => "uncalibrated",
-            Self::Unready => "unready",
-        }
-    }
-
-    /// The event that announces it, and the one that takes it back: name, level, safety type, message.
-    pub(super) fn events(self) -> Option<(Event, Option<Event>)> {
-        let safety = |level, kind, message| Event { name: "device-safety-triggered", level, kind: Some(kind), message };
-        let device = |name, level, message| Event { name, level, kind: None, message };
+    /// The event that announces it, and the one that takes it back.
+    pub(super) fn events(self, id: &str) -> Option<(Value, Option<Value>)> {
+        let event = |name: &str, level: &str, data: Value, message: &str| json!({"name": name, "category": "device", "level": level, "data": data, "message": message});
+        let safety = |level, kind: &str, message| {
+            let data = json!({"device_family": "inverse", "device_id": id, "safety_type": kind});
+            event("device-safety-triggered", level, data, message)
+        };
+        let device =
+            |name, level, message| event(name, level, json!({"device_family": "inverse", "device_id": id}), message);
         Some(match self {
             Self::Silent | Self::Slow | Self::Garbage | Self::Vanish | Self::Uncalibrated | Self::Unready => {
                 return None;
@@ -102,25 +92,5 @@ impl MockFaultKind {
             ),
             Self::Busy => (device("device-busy", "warning", "Device is in use by another session"), None),
         })
-    }
-}
-
-/// One message of the events channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Event {
-    pub(super) name: &'static str,
-    pub(super) level: &'static str,
-    /// The `safety_type`, if it is a safety event.
-    pub(super) kind: Option<&'static str>,
-    pub(super) message: &'static str,
-}
-
-impl Event {
-    pub(super) fn text(&self, device: &str) -> String {
-        let kind = self.kind.map_or(String::new(), |kind| format!(r#","safety_type":"{kind}""#));
-        format!(
-            r#"{{"name":"{}","category":"device","level":"{}","data":{{"device_family":"inverse","device_id":"{device}"{kind}}},"message":"{}"}}"#,
-            self.name, self.level, self.message
-        )
     }
 }

@@ -6,26 +6,22 @@
 
 mod fault;
 mod plant;
-mod request;
 mod world;
 
 pub use fault::MockFaultKind;
 
-use super::protocol::is_plain;
-use super::websocket::WebSocket;
-use palpate::{Error, ErrorKind};
+use crate::protocol::is_plain;
+use crate::wire::{Broken, Wire};
 use crossbeam_channel::bounded;
+use palpate::{Error, ErrorKind};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::Duration;
-use world::{Answer, World};
+use world::World;
 
 /// How often waiting threads look whether they should end, or have something to say.
 const LOOK: Duration = Duration::from_millis(5);
-
-/// How late a slow service is.
-const SLOW: Duration = Duration::from_millis(5);
 
 /// A fault, once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,7 +106,7 @@ impl MockService {
         };
         let ((simulation, address), (events, events_address)) = (listen(options.port)?, listen(options.events_port)?);
         let world = Arc::new(Mutex::new(World::new(options)));
-        let spawn = |listener: TcpListener, serve: fn(TcpStream, &Mutex<World>)| {
+        let spawn = |listener: TcpListener, serve: Serve| {
             let world = Arc::clone(&world);
             std::thread::spawn(move || accept(&listener, &world, serve));
         };
@@ -174,11 +170,14 @@ impl Drop for MockService {
     }
 }
 
+/// Serves one client that has connected.
+type Serve = fn(TcpStream, &Mutex<World>) -> Result<(), Broken>;
+
 fn locked(world: &Mutex<World>) -> MutexGuard<'_, World> {
     world.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn accept(listener: &TcpListener, world: &Arc<Mutex<World>>, serve: fn(TcpStream, &Mutex<World>)) {
+fn accept(listener: &TcpListener, world: &Arc<Mutex<World>>, serve: Serve) {
     loop {
         let is_away = {
             let mut world = locked(world);
@@ -200,75 +199,50 @@ fn accept(listener: &TcpListener, world: &Arc<Mutex<World>>, serve: fn(TcpStream
     }
 }
 
-/// One client of the simulation channel.
-fn simulate(stream: TcpStream, world: &Mutex<World>) {
-    let Ok(mut socket) = WebSocket::accept(stream) else {
-        return;
-    };
+/// One client of the simulation channel, until it or the service goes.
+fn simulate(stream: TcpStream, world: &Mutex<World>) -> Result<(), Broken> {
+    let mut wire = Wire::accept(stream)?;
     let (session, inventory) = {
         let mut world = locked(world);
         world.counts.connections += 1;
         world.go_on();
         (world.counts.connections, world.state(true, world.counts.connections))
     };
-    if socket.block_for(LOOK).is_err() || socket.send(|out| out.extend_from_slice(inventory.as_bytes())).is_err() {
-        return;
-    }
+    wire.block_for(LOOK)?;
+    wire.say(&inventory)?;
     loop {
-        let is_message = socket.receive();
-        {
-            let world = locked(world);
-            if world.is_over || world.is_away() {
-                return socket.close();
-            }
+        let message = wire.receive()?;
+        // Counted before it is sent: a client that has an answer must find it counted.
+        let (answer, delay) = match message {
+            Some(message) if !locked(world).is_away() => locked(world).answer(&message, session),
+            _ => (None, Duration::ZERO),
+        };
+        if locked(world).is_away() {
+            wire.close();
+            return Ok(());
         }
-        let answer = match is_message {
-            Ok(true) => locked(world).answer(socket.message(), session),
-            Ok(false) => continue,
-            Err(_) => return,
-        };
-        let state = match answer {
-            Answer::Now(state) => state,
-            Answer::Late(state) => {
-                sleep(SLOW);
-                state
-            }
-            Answer::Nothing => continue,
-            Answer::Leave => return socket.close(),
-        };
-        // Counted before it is sent: a client that has it must find it counted.
-        locked(world).counts.replies += 1;
-        if socket.send(|out| out.extend_from_slice(state.as_bytes())).is_err() {
-            return;
+        sleep(delay);
+        if let Some(state) = answer {
+            wire.say(&state)?;
         }
     }
 }
 
-/// One client of the events channel.
-fn announce(stream: TcpStream, world: &Mutex<World>) {
-    let Ok(mut socket) = WebSocket::accept(stream) else {
-        return;
-    };
+/// One client of the events channel, until it or the service goes.
+fn announce(stream: TcpStream, world: &Mutex<World>) -> Result<(), Broken> {
+    let mut wire = Wire::accept(stream)?;
     let (sender, events) = bounded(1024);
     locked(world).listeners.push(sender);
-    if socket.block_for(LOOK).is_err() {
-        return;
-    }
+    wire.block_for(LOOK)?;
     loop {
         // What a client says here means nothing; that it has gone does.
-        if socket.receive().is_err() {
-            return;
-        }
-        {
-            let world = locked(world);
-            if world.is_over || world.is_away() {
-                return socket.close();
-            }
+        wire.receive()?;
+        if locked(world).is_away() {
+            wire.close();
+            return Ok(());
         }
         for text in events.try_iter() {
-            if socket.send(|out| out.extend_from_slice(text.as_bytes())).is_err() {
-                return;
-            }
+            wire.say(&text)?;
         }
     }
 }
@@ -277,16 +251,19 @@ fn announce(stream: TcpStream, world: &Mutex<World>) {
 mod tests {
     use super::*;
 
-    fn service() -> (MockService, WebSocket) {
+    fn service() -> (MockService, Wire) {
         let service = MockService::start(MockOptions { port: 0, events_port: 0, ..MockOptions::default() }).unwrap();
-        let socket = WebSocket::connect(&service.address()).unwrap();
-        (service, socket)
+        let wire = Wire::connect(&service.address()).unwrap();
+        (service, wire)
     }
 
-    fn exchange(socket: &mut WebSocket, message: &str) -> String {
-        socket.send(|out| out.extend_from_slice(message.as_bytes())).unwrap();
-        assert_eq!(socket.receive(), Ok(true), "{message}");
-        String::from_utf8(socket.message().to_vec()).unwrap()
+    fn received(wire: &mut Wire) -> String {
+        String::from_utf8(wire.receive().unwrap().unwrap().to_vec()).unwrap()
+    }
+
+    fn exchange(wire: &mut Wire, message: &str) -> String {
+        wire.say(message).unwrap();
+        received(wire)
     }
 
     const FORCE: &str =
@@ -294,31 +271,30 @@ mod tests {
 
     #[test]
     fn a_client_gets_one_inventory_and_then_one_state_for_each_message() {
-        let (service, mut socket) = service();
-        assert_eq!(socket.receive(), Ok(true));
-        assert!(socket.message().starts_with(b"{") && String::from_utf8_lossy(socket.message()).contains("\"config\""));
-        let state = exchange(&mut socket, FORCE);
+        let (service, mut wire) = service();
+        assert!(received(&mut wire).contains("\"config\""));
+        let state = exchange(&mut wire, FORCE);
         assert!(state.contains("\"control_mode\":\"force\"") && !state.contains("\"config\""), "{state}");
         // Check that nothing is pushed, and that what is no message has its reply and its event as well
-        socket.block_for(Duration::from_millis(50)).unwrap();
-        assert_eq!(socket.receive(), Ok(false));
-        exchange(&mut socket, "garbage");
-        exchange(&mut socket, r#"{"session":{"force_render_full_state":{}}}"#);
+        wire.block_for(Duration::from_millis(50)).unwrap();
+        assert!(wire.receive().unwrap().is_none());
+        exchange(&mut wire, "garbage");
+        exchange(&mut wire, r#"{"session":{"force_render_full_state":{}}}"#);
         let counts = service.counts();
         assert_eq!((counts.messages, counts.replies, counts.commands, counts.malformed), (3, 3, 1, 1));
     }
 
     #[test]
     fn two_commands_in_one_frame_conflict_and_a_device_without_commands_goes_idle() {
-        let (service, mut socket) = service();
-        assert_eq!(socket.receive(), Ok(true));
+        let (service, mut wire) = service();
+        received(&mut wire);
         let both = FORCE.replace("{\"set_c", "{\"set_cursor_position\":{},\"set_c");
-        exchange(&mut socket, &both);
+        exchange(&mut wire, &both);
         assert_eq!((service.counts().conflicts, service.applied_n()), (1, [0.0; 3]));
-        exchange(&mut socket, FORCE);
+        exchange(&mut wire, FORCE);
         sleep(Duration::from_millis(50));
         let probe = r#"{"inverse3":[{"device_id":"049D","commands":{"probe_position":{}}}]}"#;
-        assert!(exchange(&mut socket, probe).contains("\"control_mode\":\"idle\""));
+        assert!(exchange(&mut wire, probe).contains("\"control_mode\":\"idle\""));
         assert_eq!(service.applied_n(), [0.0; 3]);
     }
 }

@@ -1,25 +1,43 @@
 //! The mock's state, shared by its threads under one lock.
 
-use super::fault::{Event, MockFaultKind};
+use super::fault::MockFaultKind;
 use super::plant::Plant;
-use super::request::{Request, request};
 use super::{MockCounts, MockFault, MockOptions};
+use crate::protocol::Vector;
 use crossbeam_channel::Sender;
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
 use std::time::{Duration, Instant};
 
 /// How long a service that has vanished stays away.
 const AWAY: Duration = Duration::from_millis(300);
 
+/// How late a slow service is.
+const SLOW: Duration = Duration::from_millis(5);
+
 /// Forces that are kept from the beginning of the fault on.
 const MOST_KEPT: usize = 10_000;
 
-/// What a session is to do about a message.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) enum Answer {
-    Now(String),
-    Late(String),
-    Nothing,
-    Leave,
+/// A client's message, as far as the mock follows it.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Request {
+    session: Map<String, Value>,
+    inverse3: Vec<Asked>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Asked {
+    device_id: String,
+    commands: Map<String, Value>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct SetForce {
+    vector: Option<Vector>,
+    execute: Option<bool>,
 }
 
 #[derive(Debug)]
@@ -35,7 +53,7 @@ pub(super) struct World {
     faulty: Option<u64>,
     away_until: Option<Instant>,
     /// When the fault ends by itself.
-    ends: Option<(Instant, Option<Event>)>,
+    ends: Option<(Instant, Option<Value>)>,
     is_braked: bool,
     is_unplugged: bool,
     is_calibrated: bool,
@@ -64,8 +82,9 @@ impl World {
         }
     }
 
+    /// Connections are closed, and none are taken.
     pub(super) fn is_away(&self) -> bool {
-        self.away_until.is_some_and(|until| Instant::now() < until)
+        self.is_over || self.away_until.is_some_and(|until| Instant::now() < until)
     }
 
     /// The force on the plant now (N).
@@ -95,61 +114,69 @@ impl World {
         if let Some((_, event)) = self.ends.take_if(|(end, _)| now >= *end) {
             self.recover();
             if let Some(event) = event {
-                self.tell(&event.text(&self.options.device_id));
+                self.tell(&event);
             }
         }
     }
 
-    /// Answers one message of connection `session`.
-    pub(super) fn answer(&mut self, message: &[u8], session: u64) -> Answer {
+    /// Follows one message of connection `session`. Gives the answer, if there is one, and how late it is.
+    pub(super) fn answer(&mut self, message: &[u8], session: u64) -> (Option<String>, Duration) {
         self.go_on();
         self.counts.messages += 1;
-        let wants_inventory = match request(message, &self.options.device_id) {
-            Ok(request) => {
-                self.follow(&request);
-                request.wants_inventory
-            }
-            Err(_) => {
-                self.counts.malformed += 1;
-                self.tell(r#"{"name":"invalid-io-channel","category":"input","level":"warning","data":{"received_data":""},"message":"not a message"}"#);
-                false
-            }
-        };
-        let fault = self.options.fault;
+        let wants_inventory = self.follow(message).unwrap_or_else(|_| {
+            self.counts.malformed += 1;
+            self.warn("invalid-io-channel", json!({"received_data": ""}), "not a message");
+            false
+        });
         if self.faulty.is_none()
-            && let Some(fault) = fault
+            && let Some(fault) = self.options.fault
             && self.counts.commands > fault.after
         {
             self.faulty = Some(session);
             self.begin(fault.kind);
         }
-        let state = self.state(wants_inventory, session);
-        match fault.filter(|_| self.faulty == Some(session)).map(|fault| fault.kind) {
-            Some(MockFaultKind::Silent) => Answer::Nothing,
-            Some(MockFaultKind::Slow) => Answer::Late(state),
-            Some(MockFaultKind::Garbage) => Answer::Now("{\"inverse3\":[{\"device_id\":".to_owned() + &state[..40]),
-            Some(MockFaultKind::Vanish) => Answer::Leave,
-            _ => Answer::Now(state),
+        let mut state = self.state(wants_inventory, session);
+        let mut delay = Duration::ZERO;
+        match self.options.fault.filter(|_| self.faulty == Some(session)).map(|fault| fault.kind) {
+            Some(MockFaultKind::Silent | MockFaultKind::Vanish) => return (None, delay),
+            Some(MockFaultKind::Slow) => delay = SLOW,
+            Some(MockFaultKind::Garbage) => state.truncate(40),
+            _ => {}
         }
+        self.counts.replies += 1;
+        (Some(state), delay)
     }
 
-    fn follow(&mut self, request: &Request) {
-        self.counts.sessions += u64::from(request.configures_session);
-        self.counts.probes += u64::from(request.is_probe);
-        self.counts.commands += u64::from(request.set_commands > 0);
-        if request.set_commands > 1 {
-            self.counts.conflicts += 1;
-            self.tell(r#"{"name":"invalid-value","category":"input","level":"warning","data":{"field":"commands","reason":"conflict","context":"inverse3"},"message":"two commands in one frame"}"#);
-            return;
+    /// Gives whether the message asks for the configuration of every device once more.
+    fn follow(&mut self, message: &[u8]) -> serde_json::Result<bool> {
+        let Request { session, inverse3 } = serde_json::from_slice(message)?;
+        let (mut is_probe, mut set_commands, mut force_n) = (false, 0, None);
+        for asked in inverse3.iter().filter(|asked| asked.device_id == self.options.device_id) {
+            is_probe |= asked.commands.contains_key("probe_position");
+            set_commands += asked.commands.keys().filter(|name| name.starts_with("set_")).count();
+            if let Some(set) = asked.commands.get("set_cursor_force") {
+                let SetForce { vector, execute } = SetForce::deserialize(set)?;
+                force_n = vector.filter(|_| execute != Some(false)).or(force_n);
+            }
         }
-        let Some(force_n) = request.force_n else {
-            return;
-        };
+        self.counts.sessions += u64::from(session.contains_key("configure"));
+        self.counts.probes += u64::from(is_probe);
+        self.counts.commands += u64::from(set_commands > 0);
+        if set_commands > 1 {
+            self.counts.conflicts += 1;
+            let data = json!({"field": "commands", "reason": "conflict", "context": "inverse3"});
+            self.warn("invalid-value", data, "two commands in one frame");
+        } else if let Some(force_n) = force_n {
+            self.command(force_n.into());
+        }
+        Ok(session.contains_key("force_render_full_state"))
+    }
+
+    fn command(&mut self, force_n: [f64; 3]) {
         if self.faulty.is_some() && self.forces_n.len() < MOST_KEPT {
             self.forces_n.push(force_n);
         }
-        let is_driven = !self.is_braked && !self.is_unplugged && self.is_calibrated && self.is_ready;
-        if is_driven {
+        if !self.is_braked && !self.is_unplugged && self.is_calibrated && self.is_ready {
             self.plant.command(force_n);
         }
     }
@@ -164,43 +191,113 @@ impl World {
         if !(self.is_calibrated && self.is_ready) {
             self.ends = Some((now + MockFaultKind::LASTS, None));
         }
-        if let Some((event, end)) = kind.events() {
-            self.tell(&event.text(&self.options.device_id));
+        if let Some((event, end)) = kind.events(&self.options.device_id) {
+            self.tell(&event);
             self.ends = end.map(|end| (now + MockFaultKind::LASTS, Some(end)));
         }
     }
 
-    fn tell(&mut self, text: &str) {
+    /// Says that a client's message was wrong.
+    fn warn(&mut self, name: &str, data: Value, message: &str) {
+        self.tell(&json!({"name": name, "category": "input", "level": "warning", "data": data, "message": message}));
+    }
+
+    fn tell(&mut self, event: &Value) {
         self.counts.events += 1;
-        self.listeners.retain(|listener| listener.send(text.to_owned()).is_ok());
+        self.listeners.retain(|listener| listener.send(event.to_string()).is_ok());
     }
 
     /// A state frame; with the configuration if it is the inventory.
     pub(super) fn state(&self, with_config: bool, session: u64) -> String {
-        let device = if self.is_unplugged { String::new() } else { self.device(with_config) };
-        format!(
-            r#"{{"session_id":{session},"inverse3":[{device}],"verse_grip":[],"wireless_verse_grip":[],"custom_verse_grip":[]}}"#
-        )
+        let mut devices = Vec::new();
+        if !self.is_unplugged {
+            let mut device = self.device();
+            if with_config {
+                device["config"] = config(&self.options.device_id);
+            }
+            devices.push(device);
+        }
+        json!({"session_id": session, "inverse3": devices, "verse_grip": [], "wireless_verse_grip": [], "custom_verse_grip": []})
+            .to_string()
     }
 
-    fn device(&self, with_config: bool) -> String {
-        let id = &self.options.device_id;
-        let config = if with_config {
-            format!(
-                r#""config":{{"type":"inverse3","device_info":{{"major_version":7,"minor_version":1,"id":"{id}","device_type":"inverse3","uuid":"ED78730C8173560784AB4167961D{id}"}},"port":"mock","extended_device_id":"ED78730C8173560784AB4167961D{id}","extended_firmware_version":"8C20FDC8010AA1E15AA133CDA2534874","gravity_compensation":{{"enabled":true,"scaling_factor":0.75}},"handedness":"right","streaming_mode":"USB","torque_scaling":{{"enabled":true}},"cursor_offset":{{"x":0,"y":0,"z":0}},"coordinate_origin":"device_base","basis":{{"permutation":"XYZ"}}}},"#
-            )
-        } else {
-            String::new()
+    fn device(&self) -> Value {
+        // To the nanometre, as a service says no more either.
+        let vector = |v: [f64; 3]| {
+            let [x, y, z] = v.map(|c| (1e9 * c).round() / 1e9);
+            json!({"x": x, "y": y, "z": z})
         };
-        let vector = |[x, y, z]: [f64; 3]| format!(r#"{{"x":{x:.9},"y":{y:.9},"z":{z:.9}}}"#);
         let is_idle = self.plant.is_idle();
         let (mode, domain, control) =
             if is_idle { ("idle", "undefined", "idle") } else { ("position", "cartesian", "force") };
-        let (position, velocity) = (vector(self.plant.position_m), vector(self.plant.velocity_m_s));
-        let force = vector(self.plant.force_n());
-        format!(
-            r#"{{"device_id":"{id}",{config}"state":{{"angular_position":{{"a0":-88.81024,"a1":118.23612,"a2":3.7508194}},"angular_velocity":{{"a0":0,"a1":0,"a2":0}},"body_orientation":{{"x":0.035461426,"y":0.6989746,"z":0.0025634766,"w":0.71429443}},"cursor_position":{position},"cursor_velocity":{velocity},"current_cursor_force":{force},"mode":"{mode}","control_domain":"{domain}","control_mode":"{control}","transform":{{}},"transform_velocity":{{}}}},"status":{{"calibrated":{},"in_use":{},"power_supply":true,"ready":{},"started":true}}}}"#,
-            self.is_calibrated, !is_idle, self.is_ready
-        )
+        json!({
+            "device_id": self.options.device_id,
+            "state": {
+                "angular_position": {"a0": -88.81024, "a1": 118.23612, "a2": 3.7508194},
+                "angular_velocity": {"a0": 0, "a1": 0, "a2": 0},
+                "body_orientation": {"x": 0.035461426, "y": 0.6989746, "z": 0.0025634766, "w": 0.71429443},
+                "cursor_position": vector(self.plant.position_m),
+                "cursor_velocity": vector(self.plant.velocity_m_s),
+                "current_cursor_force": vector(self.plant.force_n()),
+                "mode": mode,
+                "control_domain": domain,
+                "control_mode": control,
+                "transform": {},
+                "transform_velocity": {},
+            },
+            "status": {
+                "calibrated": self.is_calibrated,
+                "in_use": !is_idle,
+                "power_supply": true,
+                "ready": self.is_ready,
+                "started": true,
+            },
+        })
+    }
+}
+
+fn config(id: &str) -> Value {
+    let uuid = format!("ED78730C8173560784AB4167961D{id}");
+    json!({
+        "type": "inverse3",
+        "device_info": {"major_version": 7, "minor_version": 1, "id": id, "device_type": "inverse3", "uuid": uuid},
+        "port": "mock",
+        "extended_device_id": uuid,
+        "extended_firmware_version": "8C20FDC8010AA1E15AA133CDA2534874",
+        "gravity_compensation": {"enabled": true, "scaling_factor": 0.75},
+        "handedness": "right",
+        "streaming_mode": "USB",
+        "torque_scaling": {"enabled": true},
+        "cursor_offset": {"x": 0, "y": 0, "z": 0},
+        "coordinate_origin": "device_base",
+        "basis": {"permutation": "XYZ"},
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forces_probes_and_conflicts_are_told_apart() {
+        let mut world = World::new(MockOptions::default());
+        let mut follow = |text: &str| {
+            world.counts = MockCounts::default();
+            world.plant.command([0.0; 3]);
+            let wants_inventory = world.follow(text.as_bytes()).ok();
+            let MockCounts { sessions, commands, probes, conflicts, .. } = world.counts;
+            (wants_inventory, [sessions, commands, probes, conflicts], world.plant.force_n())
+        };
+        let first = r#"{"session":{"configure":{"profile":{"name":"p"}}},"inverse3":[{"device_id":"049D","commands":
+            {"set_cursor_force":{"vector":{"x":1,"y":-2,"z":0.5}}}}]}"#;
+        assert_eq!(follow(first), (Some(false), [1, 1, 0, 0], [1.0, -2.0, 0.5]));
+        assert_eq!(follow(&first.replace("049D", "FFFF")), (Some(false), [1, 0, 0, 0], [0.0; 3]));
+        let unexecuted = first.replace("0.5}", "0.5},\"execute\":false");
+        assert_eq!(follow(&unexecuted), (Some(false), [1, 1, 0, 0], [0.0; 3]));
+        let probe = r#"{"session":{"force_render_full_state":{}},"inverse3":[{"device_id":"049D","commands":{"probe_position":{}}}]}"#;
+        assert_eq!(follow(probe), (Some(true), [0, 0, 1, 0], [0.0; 3]));
+        let both = first.replace("{\"set_c", "{\"set_cursor_position\":{\"position\":{}},\"set_c");
+        assert_eq!(follow(&both), (Some(false), [1, 1, 0, 1], [0.0; 3]));
+        assert_eq!(follow("{\"inverse3\":[{]}").0, None);
     }
 }

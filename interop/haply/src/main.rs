@@ -5,7 +5,7 @@ use std::time::Duration;
 use haply::HaplyDevice;
 use haply::device_model::{ControlMode, Force, ForceInput, ProfileConfig, SessionConfigure};
 use haply::events::EventChannel;
-use palpate::devices::haply::mock::{MockFaultKind, MockOptions, MockService};
+use palpate_haply::mock::{MockFaultKind, MockOptions, MockService};
 use tokio::time::sleep;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
