@@ -36,9 +36,8 @@ impl NearestTriangle {
         let vertices: Vec<Vector> = nodes.iter().map(|&node| Vector::from(positions[node as usize])).collect();
         let vertex = |node: u32| nodes.binary_search(&node).unwrap_or(0) as u32;
         let triangles = surface.triangles.iter().map(|triangle| triangle.map(vertex)).collect();
-        let mesh = TriMesh::new(vertices.clone(), triangles).map_err(|error| {
-            ModelError::new(format!("the surface cannot be searched: {error}")).at("body")
-        })?;
+        let mesh = TriMesh::new(vertices.clone(), triangles)
+            .map_err(|error| ModelError::new(format!("the surface cannot be searched: {error}")).at("body"))?;
         Ok(Self { mesh, nodes, vertices })
     }
 

@@ -7,18 +7,16 @@
 pub mod blend;
 pub mod body;
 pub mod contact;
-mod dense;
-mod dissection;
 pub mod equilibrium;
 mod error;
 pub mod forecast;
 pub mod geometry;
 pub mod implicit;
 pub mod integrator;
+pub mod linear_algebra;
 pub mod local;
 pub mod mesh;
 pub mod simulation;
-mod sparse;
 pub mod surroundings;
 pub mod tangent;
 

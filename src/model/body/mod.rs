@@ -14,6 +14,7 @@ pub use network::{SpringNetwork, SpringNetworkBuilder};
 pub use region::Region;
 pub(crate) use region::{Material, materials, region_field};
 pub use shape::Shape;
+pub(crate) use spring::assemble;
 pub use spring::{Spring, SpringTangent};
 
 use super::mesh::Surface;

@@ -92,7 +92,10 @@ impl SpringNetworkBuilder {
             return Err(ModelError::of("nodes", message));
         }
         if self.masses.len() != nodes {
-            return Err(ModelError::of("masses", format!("{} for {nodes} nodes: one each is needed", self.masses.len())));
+            return Err(ModelError::of(
+                "masses",
+                format!("{} for {nodes} nodes: one each is needed", self.masses.len()),
+            ));
         }
         if let Some((n, m)) = self.masses.iter().enumerate().find(|(_, m)| !(m.is_finite() && **m > 0.0)) {
             let message = format!("node {n} has {m} kg: a finite value above 0 is needed");

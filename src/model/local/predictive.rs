@@ -142,7 +142,7 @@ impl Predictive {
 
     /// As [`tick`](LocalModel::tick), with the forecast in place of the path. False if it does not hold the present motion.
     fn predict_by_forecast(&mut self, basis: &Basis, resync: &mut ResyncView<'_>) -> bool {
-        let (ring, forecast, stepping) = (self.ring(), basis.forecast(), self.stepping);
+        let (ring, forecast, stepping) = (self.ring(), &basis.forecast, self.stepping);
         let span = f64::from(resync.horizon) * stepping.tick;
         let (state, forces) = resync.global.forces_without(resync.index);
         if !forecast.launch(&mut self.surroundings, (state, self.springs.rest()), forces, span) {
@@ -150,7 +150,7 @@ impl Predictive {
         }
         self.path.clear(self.window.ring, stepping.step(), (resync.horizon * stepping.substeps) as usize + 1);
         // The surroundings take one step per tick if that is stable; within it the ring keeps its velocity.
-        let steps = if stepping.tick < forecast.model().stable_step() { 1 } else { stepping.substeps };
+        let steps = if stepping.tick < forecast.model.stable_step() { 1 } else { stepping.substeps };
         let (d, each) = (stepping.tick / f64::from(steps), stepping.substeps / steps);
         let origin = flat(&self.state.positions[ring.clone()]);
         self.take_near_forces();
@@ -169,10 +169,10 @@ impl Predictive {
                 path.push(&state.positions[ring.clone()], &state.velocities[ring.clone()], forces);
                 if substep % each == 0 {
                     deviations(ring_forces, forces, &resting);
-                    forecast.model().step(surroundings, ring_forces, d);
+                    forecast.model.step(surroundings, ring_forces, d);
                     x.copy_from_slice(&origin);
                     v.fill(0.0);
-                    forecast.model().add_ring(surroundings, x, v);
+                    forecast.model.add_ring(surroundings, x, v);
                 }
                 substep += 1;
                 let force = self.contact_step(tool, stepping.step());
@@ -224,12 +224,12 @@ impl Predictive {
         if let Some(basis) = &basis {
             let expected = self.path.at(self.substep).forces;
             deviations(&mut self.ring_forces, &self.forces[self.window.movable..], expected);
-            basis.answers().step(&mut self.surroundings, &self.ring_forces, d);
+            basis.answers.step(&mut self.surroundings, &self.ring_forces, d);
         }
         self.substep += 1;
         self.path.at(self.substep).write(&mut self.ring_positions, &mut self.ring_velocities);
         if let Some(basis) = &basis {
-            basis.answers().add_ring(&self.surroundings, &mut self.ring_positions, &mut self.ring_velocities);
+            basis.answers.add_ring(&self.surroundings, &mut self.ring_positions, &mut self.ring_velocities);
         }
         self.basis = basis;
         self.place_ring_before(0.0);
@@ -270,7 +270,7 @@ impl LocalModel for Predictive {
         self.others.extend(beside.filter_map(|(node, force)| Some((self.window.movable(node)?, force))));
         self.take_present(&resync);
         self.predict(&mut resync);
-        self.surroundings.rest(self.basis.as_ref().map_or(0, |basis| basis.answers().states()));
+        self.surroundings.rest(self.basis.as_ref().map_or(0, |basis| basis.answers.states()));
         self.watched.take(resync.global.state());
     }
 

@@ -1,9 +1,5 @@
 //! From an error budget to a number of states: how the linear estimate relates to the force error of a whole run.
 
-use super::SpringGraph;
-use super::reduction::Reduction;
-use crate::error::ModelError;
-
 /// How large a basis is to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Size {
@@ -46,28 +42,6 @@ impl Estimate {
     /// Wait-free, real-time safe.
     pub fn expected_pct(&self) -> f64 {
         FLOOR_PCT.hypot(GAIN * self.linear_pct)
-    }
-}
-
-/// The estimate for every number of states of the surroundings of `patch` (ids in increasing order), from 1 on, in one pass.
-/// Empty if nothing around the patch can move.
-///
-/// # Errors
-/// If nothing holds the surroundings together.
-///
-/// # Real-time
-/// Not real-time safe: factorises the body several times.
-pub fn errors_by_states(graph: &SpringGraph, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, ModelError> {
-    // No number of states keeps this budget, so that all are looked at.
-    let Some(mut reduction) = Reduction::new(graph, patch, Size::ErrorPct(0.0)) else { return Ok(Vec::new()) };
-    loop {
-        if let Some(errors) = reduction.errors() {
-            let estimate = |(index, &error): (usize, &f64)| (index + 1, Estimate { linear_pct: 100.0 * error });
-            return Ok(errors.iter().enumerate().map(estimate).collect());
-        }
-        if reduction.advance(graph)?.is_some() {
-            return Ok(Vec::new());
-        }
     }
 }
 

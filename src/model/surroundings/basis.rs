@@ -3,14 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::super::Vec3;
-use super::super::body::State;
-use super::SpringGraph;
-use super::accuracy::{Estimate, Size};
+use super::accuracy::Estimate;
 use super::products::Columns;
 use super::reduced::{Reduced, ReducedMotion};
-use super::reduction::Reduction;
-use crate::error::ModelError;
+use crate::Vec3;
+use crate::body::State;
 
 /// A forecast is used where what it leaves out moves less than this share of what there is.
 const LEFT_OUT: f64 = 0.02;
@@ -24,29 +21,12 @@ const LEFT_OUT: f64 = 0.02;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Basis {
     pub(super) patch: Vec<u32>,
-    pub(super) answers: Reduced,
-    pub(super) forecast: Forecast,
+    pub(crate) answers: Reduced,
+    pub(crate) forecast: Forecast,
     pub(super) estimate: Option<Estimate>,
 }
 
 impl Basis {
-    /// The basis of the surroundings of `patch` (ids in increasing order), of the given size. `None` if nothing around the patch can move.
-    ///
-    /// # Errors
-    /// If nothing holds the surroundings together, so that they have no finite answer.
-    ///
-    /// # Real-time
-    /// Not real-time safe: factorises a matrix of the whole body's size, seconds of work for a large one. [`Reduction`] does
-    /// the same in parts.
-    pub fn compute(graph: &SpringGraph, patch: &[u32], size: impl Into<Size>) -> Result<Option<Self>, ModelError> {
-        let Some(mut reduction) = Reduction::new(graph, patch, size) else { return Ok(None) };
-        loop {
-            if let Some(basis) = reduction.advance(graph)? {
-                return Ok(Some(basis));
-            }
-        }
-    }
-
     /// Ids of the patch nodes, in increasing order.
     ///
     /// # Real-time
@@ -70,14 +50,6 @@ impl Basis {
     pub fn estimate(&self) -> Option<Estimate> {
         self.estimate
     }
-
-    pub(crate) fn answers(&self) -> &Reduced {
-        &self.answers
-    }
-
-    pub(crate) fn forecast(&self) -> &Forecast {
-        &self.forecast
-    }
 }
 
 /// The surroundings as they go on from a given state of the whole body.
@@ -88,14 +60,10 @@ pub(crate) struct Forecast {
     pub(super) masses: Vec<f64>,
     /// Modes on those nodes as columns, three numbers a node (1/sqrt(kg)).
     pub(super) modes: Columns,
-    pub(super) model: Reduced,
+    pub(crate) model: Reduced,
 }
 
 impl Forecast {
-    pub(crate) fn model(&self) -> &Reduced {
-        &self.model
-    }
-
     /// Sets `motion` to the present `state` of a body with nodes at rest at `rest` (m), with the forces in it (N); `span` is
     /// how far the forecast has to reach (s). False if the states leave out too much of the present motion.
     ///
