@@ -1,10 +1,10 @@
 //! A whole body with its contacts, advanced tick by tick: the global model, and `full` at the haptic rate.
 
-use super::Vec3;
-use super::body::{Body, State};
-use super::contact::{Contact, Deformable, Law, ToolMotion, Touch, step_all};
-use super::integrator::Spectrum;
+use crate::Vec3;
+use crate::body::{Body, State};
+use crate::contact::{Contact, Deformable, Law, ToolMotion, Touch, step_all};
 use crate::error::ModelError;
+use crate::integrator::Spectrum;
 
 /// How time is divided: ticks of the haptic rate, each of several explicit substeps.
 ///
@@ -16,6 +16,13 @@ pub struct Stepping {
     pub tick: f64,
     /// Explicit substeps per tick, at least one.
     pub substeps: u32,
+}
+
+impl Default for Stepping {
+    /// One substep per millisecond.
+    fn default() -> Self {
+        Self { tick: 1e-3, substeps: 1 }
+    }
 }
 
 impl Stepping {

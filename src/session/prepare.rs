@@ -17,7 +17,7 @@ use super::tools::{Making, Tool, complete, tools};
 use crate::devices::Device;
 use crate::error::Error;
 use crate::model::Vec3;
-use crate::model::blend::Blend;
+use crate::model::local::Blend;
 use crate::model::body::{Block, Body, State};
 use crate::model::contact::Law;
 use crate::model::equilibrium::static_equilibrium;

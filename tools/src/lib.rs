@@ -1,1 +1,3 @@
+//! What the command `palpate` is made of.
 
+pub mod reduction;

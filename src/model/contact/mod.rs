@@ -26,20 +26,37 @@ mod walk;
 use super::Vec3;
 
 pub use deformable::Deformable;
-pub use step::{Touch, step, step_all, step_implicit};
+pub(crate) use step::step_implicit;
+pub use step::{Touch, step, step_all};
 
 /// The state of a contact.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Mode {
+#[repr(u16)]
+pub enum ContactMode {
     /// No force: not touching, or just released and still tracked.
     #[default]
-    Free,
+    Free = 0,
     /// The contact point follows the tool.
-    Stick,
+    Stick = 1,
     /// The tool slides over the surface.
-    Slip,
+    Slip = 2,
     /// Every node of the triangle is held: no force can be computed.
-    Lost,
+    Lost = 3,
+}
+
+impl ContactMode {
+    /// The mode with this number; unknown numbers read as free.
+    pub fn from_code(code: u16) -> Self {
+        match code {
+            1 => Self::Stick,
+            2 => Self::Slip,
+            3 => Self::Lost,
+            _ => Self::Free,
+        }
+    }
 }
 
 /// Which normal a contact uses.
@@ -86,7 +103,7 @@ pub struct Contact {
     /// Weights of the triangle's three nodes; they sum to one.
     pub weights: [f64; 3],
     /// The mode.
-    pub mode: Mode,
+    pub mode: ContactMode,
     /// Glued to its point: no cone test, no release.
     pub glued: bool,
     /// The normal that the last step used; zero before the first.
@@ -96,12 +113,12 @@ pub struct Contact {
 impl Contact {
     /// Glued to the surface at `weights` of `triangle`.
     pub fn glued(triangle: u32, weights: [f64; 3]) -> Self {
-        Self { triangle: Some(triangle), weights, mode: Mode::Stick, glued: true, normal: Vec3::zeros() }
+        Self { triangle: Some(triangle), weights, mode: ContactMode::Stick, glued: true, normal: Vec3::zeros() }
     }
 
     /// True if a force acts.
     pub fn is_touching(&self) -> bool {
-        matches!(self.mode, Mode::Stick | Mode::Slip)
+        matches!(self.mode, ContactMode::Stick | ContactMode::Slip)
     }
 }
 

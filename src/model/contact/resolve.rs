@@ -4,7 +4,7 @@ use super::super::Vec3;
 use super::deformable::Deformable;
 use super::normal::contact_normal;
 use super::triangle::interpolate;
-use super::{Law, Mode, ToolMotion};
+use super::{ContactMode, Law, ToolMotion};
 
 /// Penetration is recovered at this speed (m/s); an open gap is closed in full.
 const RECOVERY: f64 = 0.1;
@@ -17,7 +17,7 @@ pub(super) const NO_TIME: f64 = 1e-12;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resolution {
     /// The mode that resulted.
-    pub mode: Mode,
+    pub mode: ContactMode,
     /// Impulse on the tool (N s).
     pub impulse: Vec3,
     /// The normal used.
@@ -25,7 +25,7 @@ pub(super) struct Resolution {
 }
 
 impl Resolution {
-    pub(super) fn without_force(mode: Mode, normal: Vec3) -> Self {
+    pub(super) fn without_force(mode: ContactMode, normal: Vec3) -> Self {
         Self { mode, impulse: Vec3::zeros(), normal }
     }
 }
@@ -65,27 +65,27 @@ pub(super) fn resolve(
     let compliance: f64 = nodes.iter().zip(weights).map(|(&node, w)| w * w * body.inverse_masses[node]).sum();
     let normal = contact_normal(law.normals, body.surface, body.positions, triangle, weights);
     if compliance < IMMOVABLE {
-        return Resolution::without_force(Mode::Lost, normal);
+        return Resolution::without_force(ContactMode::Lost, normal);
     }
     if d_c < NO_TIME {
         // Found at the very end of the step: tracked, and resolved in the next one.
-        return Resolution::without_force(Mode::Free, normal);
+        return Resolution::without_force(ContactMode::Free, normal);
     }
     let point = interpolate(weights, &nodes.map(|node| body.positions[node]));
     let velocity = interpolate(weights, &nodes.map(|node| body.velocities[node]));
     let target = target_velocity(point, &normal, tool, d_c, d);
     let mut impulse = (velocity - target) / compliance;
-    let mut mode = Mode::Stick;
+    let mut mode = ContactMode::Stick;
     if !is_glued {
         let along = impulse.dot(&normal);
         // Written so that an impulse that is not a number releases.
         if along.is_nan() || along <= 0.0 {
-            return Resolution::without_force(Mode::Free, normal);
+            return Resolution::without_force(ContactMode::Free, normal);
         }
         let tangential = impulse - normal * along;
         let limit = law.friction * along;
         if tangential.norm() > limit {
-            mode = Mode::Slip;
+            mode = ContactMode::Slip;
             impulse = normal * along + tangential * (limit / tangential.norm());
         }
     }

@@ -1,11 +1,11 @@
 //! One step with contact, for a whole body and for a patch, explicit and implicit alike.
 
-use super::super::implicit::ImplicitStep;
-use super::super::{Vec3, integrator};
 use super::coupled::resolve_coupled;
 use super::deformable::Deformable;
 use super::resolve::{Place, Resolution, resolve};
-use super::{Contact, Equations, Law, Mode, ToolMotion, paper};
+use super::{Contact, ContactMode, Equations, Law, ToolMotion, paper};
+use crate::linear::ImplicitStep;
+use crate::{Vec3, integrator};
 
 /// A tool on a body: where it touches, and what it felt in the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -74,7 +74,7 @@ pub fn step_all(
 ///
 /// # Real-time
 /// Bounded, real-time safe: 9 n^2 multiply-adds for n nodes, and what detection costs.
-pub fn step_implicit(
+pub(crate) fn step_implicit(
     body: &mut Deformable<'_>,
     system: &mut ImplicitStep,
     forces: &[Vec3],
@@ -131,7 +131,7 @@ fn press(
 /// After the motion: the contact of a tool that slid is where the tool is now.
 fn follow(body: &Deformable<'_>, contact: &mut Contact, law: &Law, tool: ToolMotion) {
     if let Some(triangle) = contact.triangle
-        && contact.mode != Mode::Stick
+        && contact.mode != ContactMode::Stick
     {
         body.reseat(contact, law, triangle, &tool.to);
     }

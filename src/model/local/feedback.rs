@@ -1,10 +1,10 @@
 //! What the global model learns from the local one.
 
-use super::super::Vec3;
-use super::super::body::State;
-use super::super::contact::Contact;
-use super::super::simulation::Simulation;
-use super::Kind;
+use super::kind::Kind;
+use crate::Vec3;
+use crate::body::State;
+use crate::contact::Contact;
+use crate::simulation::Simulation;
 
 /// What the global model learns from the local one, besides the tool's trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,120 +1,45 @@
-//! The linear patch that four local models share; they differ in how the surroundings enter.
+//! The linear patch: four local models that differ in how its surroundings enter, see [`Boundary`].
 
-use std::sync::Arc;
-
-use nalgebra::DMatrix;
-
-use super::super::Vec3;
-use super::super::body::{Body, State};
-use super::super::contact::{Contact, Deformable, Equations, Law, ToolMotion, step, step_implicit};
-use super::super::implicit::ImplicitStep;
-use super::super::simulation::Stepping;
-use super::super::tangent::{Drift, PatchTangent};
+use super::boundary::Boundary;
 use super::feedback::{Feedback, PatchGeometry};
-use super::felt::Felt;
+use super::patch::Patch;
 use super::stable::stable_stepping;
-use super::window::Window;
-use super::{Kind, LocalModel, ResyncView, Watched};
+use super::{Kind, LocalModel, ResyncView};
+use crate::Vec3;
+use crate::contact::{Contact, Equations, ToolMotion, step_implicit};
+use crate::linear::{Drift, ImplicitStep, PatchTangent};
 
 /// What a linear patch is made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LinearSpec {
+pub(super) struct LinearSpec {
     /// Patch nodes along the surface, along it, into depth.
-    pub size: [usize; 3],
+    pub(super) size: [usize; 3],
     /// What it tells the global model.
-    pub feedback: Feedback,
+    pub(super) feedback: Feedback,
     /// One implicit step per tick in place of the global model's explicit ones, even where these are stable.
-    pub is_implicit: bool,
+    pub(super) is_implicit: bool,
 }
 
-/// How the surroundings of a linear patch answer between two resyncs. The default is the paper's: they stand still.
-pub trait Boundary: Send + std::fmt::Debug {
-    /// The model that it makes of a linear patch.
-    const KIND: Kind;
-
-    /// How much of the coupling of patch node `row` to the outside node `column` of `body` answers to the patch's motion.
-    ///
-    /// # Real-time
-    /// For the global actor, at each resync: bounded.
-    fn share(&self, _body: &dyn Body, _row: u32, _column: u32) -> f64 {
-        1.0
-    }
-
-    /// What is added to the stiffness of the patch of `nodes` (N/m, 3n x 3n).
-    ///
-    /// # Real-time
-    /// For the global actor, at each resync: may allocate, and may block until another model has found the same.
-    fn compliance(&mut self, _nodes: &[u32]) -> Option<Arc<DMatrix<f64>>> {
-        None
-    }
-
-    /// Haptic ticks for which outside nodes move on with their velocity at the resync.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    fn moving_ticks(&self) -> u32 {
-        0
-    }
-}
-
-/// The nodes around the contact, with their tangent at the resync, in surroundings `B`.
+/// The nodes around the contact, with their tangent at the resync, in surroundings that `boundary` says.
 #[derive(Clone, Debug)]
-pub struct LinearPatch<B> {
-    boundary: B,
+pub(super) struct LinearPatch {
+    boundary: Boundary,
     spec: LinearSpec,
-    window: Window,
+    /// Its forces are those on the movable nodes.
+    patch: Patch,
     tangent: PatchTangent,
     /// In use if the patch is implicit.
     system: ImplicitStep,
-    /// Of all window nodes, movable ones first.
-    state: State,
-    inverse_masses: Vec<f64>,
-    /// Of the movable nodes.
-    forces: Vec<Vec3>,
-    /// Its triangle is local.
-    contact: Contact,
-    law: Law,
-    stepping: Stepping,
-    built_at: u64,
-    /// Ticks since then.
-    ticks: u32,
     is_implicit: bool,
-    felt: Felt,
-    watched: Watched,
+    /// Ticks since it was built.
+    ticks: u32,
 }
 
-impl<B: Boundary> LinearPatch<B> {
-    /// An empty patch in surroundings `boundary`.
-    ///
-    /// # Real-time
-    /// Not called in a tick. Memory comes with the first [`rebuild`](LocalModel::rebuild).
-    pub fn with_boundary(spec: LinearSpec, boundary: B) -> Self {
-        Self {
-            boundary,
-            spec,
-            window: Window::default(),
-            tangent: PatchTangent::default(),
-            system: ImplicitStep::default(),
-            state: State::default(),
-            inverse_masses: Vec::new(),
-            forces: Vec::new(),
-            contact: Contact::default(),
-            law: Law::default(),
-            stepping: Stepping { tick: 1e-3, substeps: 1 },
-            built_at: 0,
-            ticks: 0,
-            is_implicit: false,
-            felt: Felt::default(),
-            watched: Watched::default(),
-        }
-    }
-
-    /// Number of nodes that move.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn nodes(&self) -> usize {
-        self.window.movable
+impl LinearPatch {
+    /// An empty patch. Memory comes with the first [`rebuild`](LocalModel::rebuild).
+    pub(super) fn new(spec: LinearSpec, boundary: Boundary) -> Self {
+        let (patch, tangent, system) = Default::default();
+        Self { boundary, spec, patch, tangent, system, is_implicit: false, ticks: 0 }
     }
 
     /// The surroundings `t` seconds into the present tick.
@@ -122,7 +47,7 @@ impl<B: Boundary> LinearPatch<B> {
         let moving = self.boundary.moving_ticks();
         let ticks = f64::from(self.ticks.min(moving));
         let is_moving = self.ticks < moving;
-        Drift { time: ticks * self.stepping.tick + if is_moving { t } else { 0.0 }, is_moving }
+        Drift { time: ticks * self.patch.stepping.tick + if is_moving { t } else { 0.0 }, is_moving }
     }
 
     /// One step from `t` seconds into the present tick; returns the force on the tool (N).
@@ -130,68 +55,61 @@ impl<B: Boundary> LinearPatch<B> {
         // An implicit step takes its forces at its end.
         let ahead = if self.is_implicit { d } else { 0.0 };
         let drift = self.drift(t + ahead);
-        let movable = self.window.movable;
-        let (x, v) = (&self.state.positions[..movable], &self.state.velocities[..movable]);
-        self.tangent.forces(x, v, ahead, drift, &mut self.forces);
-        let mut deformable = Deformable {
-            positions: &mut self.state.positions,
-            velocities: &mut self.state.velocities,
-            inverse_masses: &self.inverse_masses,
-            surface: &self.window.surface,
-            candidates: &self.window.candidates,
-        };
-        let (forces, contact, law) = (&self.forces, &mut self.contact, &self.law);
+        let Self { patch, system, tangent, .. } = self;
+        let movable = patch.window.movable;
+        let (x, v) = (&patch.state.positions[..movable], &patch.state.velocities[..movable]);
+        tangent.forces(x, v, ahead, drift, &mut patch.forces);
         if self.is_implicit {
-            step_implicit(&mut deformable, &mut self.system, forces, contact, law, tool)
+            patch.with_contact(|body, forces, contact, law| step_implicit(body, system, forces, contact, law, tool))
         } else {
-            step(&mut deformable, forces, contact, law, tool, d)
+            patch.step(tool, d)
         }
+    }
+
+    /// The nodes that the patch does not move stop.
+    fn hold_rim(&mut self) {
+        self.patch.state.velocities[self.patch.window.movable..].fill(Vec3::zeros());
     }
 }
 
-impl<B: Boundary> LocalModel for LinearPatch<B> {
+impl LocalModel for LinearPatch {
     fn rebuild(&mut self, resync: ResyncView<'_>) {
-        let global = resync.global;
-        let (body, state) = (global.body(), global.state());
-        self.window.rebuild(body, &resync.triangles[..1], self.spec.size, None);
-        let (window, movable) = (&self.window, self.window.movable);
-        let nodes = &window.nodes[..movable];
-        window.gather(&state.positions, &mut self.state.positions);
-        window.gather(&state.velocities, &mut self.state.velocities);
+        let (triangles, size) = (&resync.triangles[..1], self.spec.size);
+        let body = resync.global.body();
+        self.patch.window.rebuild(body, triangles, None, |nodes| body.patch(triangles, size, nodes));
+        self.patch.take_present(&resync);
         if self.boundary.moving_ticks() == 0 {
             // The rim stands still, and so must the velocities that a contact on it would see.
-            self.state.velocities[movable..].fill(Vec3::zeros());
+            self.hold_rim();
         }
-        window.gather_movable(body.inverse_masses(), &mut self.inverse_masses);
-        self.forces.resize(movable, Vec3::zeros());
-        let share = |row, column| self.boundary.share(body, row, column);
-        self.tangent.rebuild(body, state, nodes, &|node| window.movable(node), &share);
-        for (node, force) in global.exerted_beside(resync.index) {
+        let Self { boundary, spec, patch, tangent, .. } = self;
+        let window = &patch.window;
+        let nodes = &window.nodes[..window.movable];
+        patch.forces.resize(nodes.len(), Vec3::zeros());
+        let share = |row, column| boundary.share(body, row, column);
+        tangent.rebuild(body, resync.global.state(), nodes, &|node| window.movable(node), &share);
+        for (node, force) in resync.global.exerted_beside(resync.index) {
             if let Some(place) = window.movable(node) {
-                self.tangent.add_force(place, force);
+                tangent.add_force(place, force);
             }
         }
-        if let Some(stiffness) = self.boundary.compliance(nodes) {
-            self.tangent.add_stiffness(&stiffness);
+        if let Some(stiffness) = boundary.compliance(nodes) {
+            tangent.add_stiffness(&stiffness);
         }
-        self.contact = window.localised(global.contact(resync.index));
-        (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
         self.ticks = 0;
-        self.felt = Felt::new(global.force(resync.index));
-        (self.stepping, self.is_implicit) =
-            stable_stepping(self.spec.is_implicit, &self.tangent, &self.inverse_masses, self.stepping, &self.law);
+        (patch.stepping, self.is_implicit) =
+            stable_stepping(spec.is_implicit, tangent, &patch.inverse_masses, patch.stepping, &patch.law);
         if self.is_implicit {
-            self.law.equations = Equations::Corrected;
-            self.system.rebuild(&self.tangent, &self.inverse_masses, self.stepping.step());
+            patch.law.equations = Equations::Corrected;
+            self.system.rebuild(tangent, &patch.inverse_masses, patch.stepping.step());
         }
-        self.watched.take(state);
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-        if let Some(force) = self.felt.held() {
+        if let Some(force) = self.patch.held() {
             return force;
         }
-        let (stepping, mut t) = (self.stepping, 0.0);
+        let (stepping, mut t) = (self.patch.stepping, 0.0);
         let force = stepping.tick(tool, |tool, d| {
             let force = self.step(tool, t, d);
             t += d;
@@ -199,51 +117,48 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
         });
         self.ticks = self.ticks.saturating_add(1);
         if self.ticks == self.boundary.moving_ticks() {
-            self.state.velocities[self.window.movable..].fill(Vec3::zeros());
+            self.hold_rim();
         }
-        self.felt.after(force, &self.state, self.window.has_left(&self.contact))
+        self.patch.feel(force)
     }
 
     fn built_at(&self) -> u64 {
-        self.built_at
+        self.patch.built_at
     }
 
     fn serves_as(&self) -> Kind {
-        if self.felt.held().is_some() { Kind::Hold } else { B::KIND }
-    }
-
-    fn catches_up(&self) -> bool {
-        true
+        if self.patch.held().is_some() { Kind::Hold } else { self.boundary.kind() }
     }
 
     fn contact(&self) -> Contact {
-        self.window.globalised(&self.contact)
+        self.patch.global_contact()
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {
-        self.window.movable(node).map(|place| self.state.positions[place])
+        self.patch.position(node)
     }
 
     fn global_position(&self, probe: usize) -> Option<Vec3> {
-        self.watched.positions.get(probe).copied()
+        self.patch.watched.position(probe)
     }
 
     fn watch(&mut self, nodes: &[u32]) {
-        self.watched.set(nodes);
+        self.patch.watched.set(nodes);
     }
 
     fn geometry(&self, geometry: &mut PatchGeometry) -> bool {
+        let patch = &self.patch;
         geometry.clear();
         geometry.contact = self.contact();
         match self.spec.feedback {
             // What has left is as it was then.
-            _ if self.felt.held().is_some() => return false,
+            _ if patch.held().is_some() => return false,
             Feedback::Trajectory => return false,
-            Feedback::Geometry => (0..self.window.movable).for_each(|place| self.add_to(geometry, place)),
+            Feedback::Geometry => (0..patch.window.movable).for_each(|place| patch.tell(geometry, place)),
             Feedback::ContactNodes => {
-                let touched = self.contact.triangle.map(|t| self.window.surface.triangles[t as usize]);
-                for place in touched.into_iter().flatten().filter(|&place| (place as usize) < self.window.movable) {
-                    self.add_to(geometry, place as usize);
+                let touched = patch.contact.triangle.map(|t| patch.window.surface.triangles[t as usize]);
+                for place in touched.into_iter().flatten().filter(|&place| (place as usize) < patch.window.movable) {
+                    patch.tell(geometry, place as usize);
                 }
             }
         }
@@ -251,21 +166,15 @@ impl<B: Boundary> LocalModel for LinearPatch<B> {
     }
 }
 
-impl<B> LinearPatch<B> {
-    fn add_to(&self, geometry: &mut PatchGeometry, place: usize) {
-        geometry.push(self.window.nodes[place], self.state.positions[place], self.state.velocities[place]);
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::super::body::Block;
-    use super::super::super::forecast::ToolForecast;
-    use super::super::super::mesh::Face;
-    use super::super::super::simulation::Simulation;
-    use super::super::super::surroundings::Bases;
-    use super::super::{LinearBoundary, Patch};
+    use super::super::ToolForecast;
     use super::*;
+    use crate::body::{Block, Body, State};
+    use crate::contact::Law;
+    use crate::mesh::Face;
+    use crate::simulation::{Simulation, Stepping};
+    use crate::surroundings::Bases;
 
     /// A block whose nodes all move sideways, touched in the middle of its top.
     fn touched() -> (Simulation, u32) {
@@ -278,36 +187,25 @@ mod tests {
         (Simulation::new(Box::new(block), state, contact, Law::default(), stepping).unwrap(), top)
     }
 
-    fn rebuilt<B: Boundary>(mut model: LinearPatch<B>, (global, top): (&mut Simulation, u32)) -> LinearPatch<B> {
-        let (tool, bases) = (ToolForecast::default(), Bases::default());
-        let (triangles, tools) = (&[top], &[tool]);
-        model.rebuild(ResyncView {
-            global,
-            tick: 0,
-            triangles,
-            patch: None,
-            tools,
-            index: 0,
-            horizon: 0,
-            bases: &bases,
-        });
+    fn rebuilt(feedback: Feedback, boundary: Boundary, (global, top): (&mut Simulation, u32)) -> LinearPatch {
+        let spec = LinearSpec { size: [4, 4, 2], feedback, is_implicit: false };
+        let mut model = LinearPatch::new(spec, boundary);
+        let (tools, bases) = (&[ToolForecast::default()], &Bases::default());
+        let triangles = &[top];
+        model.rebuild(ResyncView { global, tick: 0, triangles, patch: None, tools, index: 0, horizon: 0, bases });
         model
-    }
-
-    fn spec(feedback: Feedback) -> LinearSpec {
-        LinearSpec { size: [4, 4, 2], feedback, is_implicit: false }
     }
 
     #[test]
     fn surroundings_move_for_their_ticks_and_then_stand_still() {
         let (mut global, top) = touched();
-        let mut model = rebuilt(LinearBoundary::new(spec(Feedback::Trajectory), 3), (&mut global, top));
-        let rim = model.window.movable;
-        let start = model.state.positions[rim];
+        let mut model = rebuilt(Feedback::Trajectory, Boundary::Drifting { ticks: 3 }, (&mut global, top));
+        let rim = model.patch.window.movable;
+        let start = model.patch.state.positions[rim];
         let tool = Vec3::new(0.02, 0.02, 0.05);
         let mut seen = Vec::new();
         for _ in 0..5 {
-            seen.push((model.drift(0.5e-3), model.state.positions[rim].x - start.x));
+            seen.push((model.drift(0.5e-3), model.patch.state.positions[rim].x - start.x));
             model.tick(ToolMotion { from: tool, to: tool });
         }
         let near = |a: f64, b: f64| (a - b).abs() < 1e-15;
@@ -317,9 +215,9 @@ mod tests {
             assert_eq!(drift.is_moving, is_moving);
             assert!(near(moved, ticks * 1e-3 * 0.1), "tick {tick}: the rim moved {moved}");
         }
-        let mut still = rebuilt(Patch::new(spec(Feedback::Trajectory)), (&mut global, top));
+        let mut still = rebuilt(Feedback::Trajectory, Boundary::Still, (&mut global, top));
         still.tick(ToolMotion { from: tool, to: tool });
-        assert_eq!((still.drift(0.0), still.state.positions[rim]), (Drift::default(), start));
+        assert_eq!((still.drift(0.0), still.patch.state.positions[rim]), (Drift::default(), start));
     }
 
     #[test]
@@ -327,7 +225,7 @@ mod tests {
         let (mut global, top) = touched();
         let corners = global.body().surface().triangles[top as usize];
         let mut told = |feedback| {
-            let model = rebuilt(Patch::new(spec(feedback)), (&mut global, top));
+            let model = rebuilt(feedback, Boundary::Still, (&mut global, top));
             let mut geometry = PatchGeometry::default();
             model.geometry(&mut geometry).then_some(geometry)
         };

@@ -1,42 +1,37 @@
 //! Local models: what runs at the haptic rate between two results of the global model. One file per model.
 
 mod aim;
-mod condensed;
+mod blend;
+mod boundary;
 mod feedback;
-mod felt;
+mod forecast;
 mod full;
 mod hold;
 mod kind;
 mod linear;
-mod linear_boundary;
 mod near;
 mod patch;
 mod predictive;
 mod ring_path;
-mod scaled_boundary;
 mod stable;
 mod succession;
 mod template;
 mod window;
 
-use super::Vec3;
-use super::body::State;
-use super::contact::{Contact, ToolMotion};
-use super::forecast::ToolForecast;
-use super::simulation::Simulation;
-use super::surroundings::Bases;
+use crate::Vec3;
+use crate::body::State;
+use crate::contact::{Contact, ToolMotion};
+use crate::simulation::Simulation;
+use crate::surroundings::Bases;
 
 pub use aim::{Aim, wider};
-pub use condensed::{Condensed, Yielding};
+pub use blend::{Blend, BlendKind, Jump};
 pub use feedback::{Feedback, PatchGeometry};
+pub use forecast::{ToolForecast, ToolHistory};
 pub use full::Full;
 pub use hold::Hold;
 pub use kind::Kind;
-pub use linear::{Boundary, LinearPatch, LinearSpec};
-pub use linear_boundary::{Drifting, LinearBoundary};
-pub use patch::{Patch, Still};
-pub use predictive::{Prediction, Predictive};
-pub use scaled_boundary::{Layered, ScaledBoundary};
+pub use predictive::Prediction;
 pub use stable::MOST_EXPLICIT_STEPS;
 pub use succession::{Resynced, Served, Succession};
 pub use template::Template;
@@ -94,7 +89,9 @@ pub trait LocalModel: Send + std::fmt::Debug {
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    fn catches_up(&self) -> bool;
+    fn catches_up(&self) -> bool {
+        true
+    }
 
     /// The contact; its triangle is a global id.
     ///
@@ -106,25 +103,31 @@ pub trait LocalModel: Send + std::fmt::Debug {
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    fn position(&self, node: u32) -> Option<Vec3>;
+    fn position(&self, _node: u32) -> Option<Vec3> {
+        None
+    }
 
-    /// Where `node` was in the global model that this one was built from (m); `None` if that is not known.
+    /// Where the watched node of number `probe` was in the global model that this one was built from (m); `None` if that is not known.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    fn global_position(&self, probe: usize) -> Option<Vec3>;
+    fn global_position(&self, _probe: usize) -> Option<Vec3> {
+        None
+    }
 
     /// Nodes whose global position is to be remembered at each rebuild, by place in this list.
     ///
     /// # Real-time
     /// Not called in a tick: may allocate.
-    fn watch(&mut self, nodes: &[u32]);
+    fn watch(&mut self, _nodes: &[u32]) {}
 
     /// Writes what it tells the global model, but for the tick; false if that is nothing.
     ///
     /// # Real-time
     /// Bounded and real-time safe if `geometry` has room for the patch, see [`PatchGeometry::with_room`].
-    fn geometry(&self, geometry: &mut PatchGeometry) -> bool;
+    fn geometry(&self, _geometry: &mut PatchGeometry) -> bool {
+        false
+    }
 }
 
 /// Global positions of watched nodes at the resync.
@@ -137,6 +140,10 @@ struct Watched {
 impl Watched {
     fn set(&mut self, nodes: &[u32]) {
         self.nodes = nodes.to_vec();
+    }
+
+    fn position(&self, probe: usize) -> Option<Vec3> {
+        self.positions.get(probe).copied()
     }
 
     fn take(&mut self, state: &State) {

@@ -1,9 +1,9 @@
 //! The springs that touch a patch, as they are: non-linear, between nodes in a window's numbering.
 
-use super::super::Vec3;
-use super::super::body::kernel::NetworkKernel;
-use super::super::surroundings::SpringGraph;
 use super::window::Window;
+use crate::Vec3;
+use crate::body::kernel::NetworkKernel;
+use crate::surroundings::SpringGraph;
 
 /// Every spring with a node in the patch.
 #[derive(Clone, Debug, Default)]

@@ -1,6 +1,9 @@
 //! What is predicted for the ring around a patch, substep by substep.
 
-use super::super::Vec3;
+use std::ops::Range;
+
+use crate::Vec3;
+use crate::body::State;
 
 /// Past its end the prediction coasts with its last velocity for this long (s), then stands still.
 const COASTING: f64 = 15e-3;
@@ -37,10 +40,11 @@ impl RingPath {
         self.samples.reserve(3 * self.numbers * count);
     }
 
-    pub(super) fn push(&mut self, positions: &[Vec3], velocities: &[Vec3], forces: &[Vec3]) {
-        for vectors in [positions, velocities, forces] {
-            debug_assert_eq!(3 * vectors.len(), self.numbers);
-            vectors.iter().for_each(|vector| self.samples.extend_from_slice(vector.as_slice()));
+    /// Appends the nodes of `ring` with the `forces` on them.
+    pub(super) fn push(&mut self, state: &State, forces: &[Vec3], ring: Range<usize>) {
+        debug_assert_eq!(3 * ring.len(), self.numbers);
+        for vectors in [&state.positions, &state.velocities, forces] {
+            vectors[ring.clone()].iter().for_each(|vector| self.samples.extend_from_slice(vector.as_slice()));
         }
     }
 
@@ -83,7 +87,8 @@ mod tests {
         let mut path = RingPath::default();
         path.clear(1, 1e-3, 3);
         for n in 0..3 {
-            path.push(&[Vec3::x() * f64::from(n)], &[Vec3::x()], &[Vec3::y() * f64::from(n)]);
+            let state = State { positions: vec![Vec3::x() * f64::from(n)], velocities: vec![Vec3::x()] };
+            path.push(&state, &[Vec3::y() * f64::from(n)], 0..1);
         }
         let at = |n| {
             let (mut x, mut v) = ([0.0; 3], [0.0; 3]);

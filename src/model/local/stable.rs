@@ -1,8 +1,8 @@
 //! Which step a linear patch takes: the global model's, unless the patch as it is now asks for another.
 
-use super::super::contact::{Equations, Law};
-use super::super::simulation::Stepping;
-use super::super::tangent::PatchTangent;
+use crate::contact::{Equations, Law};
+use crate::linear::PatchTangent;
+use crate::simulation::Stepping;
 
 /// A step above this share of the stability limit is replaced: the limit is known up to a percent.
 const STABLE_SHARE: f64 = 0.98;
@@ -41,9 +41,9 @@ pub(super) fn stable_stepping(
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::body::{Block, Body, State};
-    use super::super::super::mesh::Face;
     use super::*;
+    use crate::body::{Block, Body, State};
+    use crate::mesh::Face;
 
     /// Of a patch of a block that is pressed flat to `share` of its height, with two steps of `step` seconds.
     fn chosen(share: f64, step: f64, equations: Equations) -> (u32, bool) {

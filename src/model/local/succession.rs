@@ -1,9 +1,9 @@
 //! From one local model to the next: swap in, catch up, blend.
 
-use super::super::Vec3;
-use super::super::blend::{Blend, Jump};
-use super::super::contact::ToolMotion;
 use super::LocalModel;
+use super::blend::{Blend, Jump};
+use crate::Vec3;
+use crate::contact::ToolMotion;
 
 /// Ticks that a late model is advanced per haptic tick until it has caught up; the old model serves meanwhile.
 const CATCH_UP_TICKS: u64 = 8;
@@ -184,9 +184,8 @@ impl Succession {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, PatchGeometry, ResyncView};
+    use super::super::{BlendKind, Kind, ResyncView};
     use super::*;
-    use crate::blend::BlendKind;
     use crate::contact::Contact;
 
     /// Adds up the motion that it was given; its force is its base plus that.
@@ -217,16 +216,6 @@ mod tests {
         }
         fn contact(&self) -> Contact {
             Contact::default()
-        }
-        fn position(&self, _: u32) -> Option<Vec3> {
-            None
-        }
-        fn global_position(&self, _: usize) -> Option<Vec3> {
-            None
-        }
-        fn watch(&mut self, _: &[u32]) {}
-        fn geometry(&self, _: &mut PatchGeometry) -> bool {
-            false
         }
     }
 

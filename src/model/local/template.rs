@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::super::body::Body;
-use super::super::surroundings::{Condensation, SpringGraph};
-use super::{
-    Condensed, Feedback, Hold, Kind, Layered, LinearBoundary, LinearSpec, LocalModel, Patch, Prediction, Predictive,
-    ScaledBoundary, Yielding,
-};
+use super::boundary::{Boundary, Layers, Yielding};
+use super::hold::Hold;
+use super::linear::{LinearPatch, LinearSpec};
+use super::predictive::{Prediction, Predictive};
+use super::{Feedback, Kind, LocalModel};
+use crate::body::Body;
 use crate::error::ModelError;
+use crate::surroundings::{Condensation, SpringGraph};
 
 /// What the local models of a session are made from.
 #[derive(Clone, Debug)]
@@ -22,16 +23,8 @@ pub struct Template {
     feedback: Feedback,
     prediction: Prediction,
     is_implicit: bool,
-    period_ticks: u32,
-    surroundings: Surroundings,
-}
-
-/// What is found out about the body once.
-#[derive(Clone, Debug)]
-enum Surroundings {
-    None,
-    Layered(Layered),
-    Yielding(Yielding),
+    /// For the linear models.
+    boundary: Boundary,
 }
 
 impl Template {
@@ -50,24 +43,16 @@ impl Template {
                 ModelError::of("local.model", message)
             })
         };
-        let surroundings = match kind {
-            Kind::ScaledBoundary => Surroundings::Layered(Layered::new(body)),
-            Kind::Condensed => Surroundings::Yielding(Yielding::new(Condensation::new(springs()?)?)),
-            _ => Surroundings::None,
+        let boundary = match kind {
+            Kind::LinearBoundary => Boundary::Drifting { ticks: 33 },
+            Kind::ScaledBoundary => Boundary::Layered(Layers::new(body)),
+            Kind::Condensed => Boundary::Yielding(Yielding::new(Condensation::new(springs()?)?)),
+            _ => Boundary::Still,
         };
         let springs =
             if matches!(kind, Kind::Predicted | Kind::Predictive) { Some(Arc::new(springs()?)) } else { None };
-        let feedback = Feedback::of(kind);
-        Ok(Self {
-            kind,
-            patch,
-            springs,
-            feedback,
-            prediction: Prediction::default(),
-            is_implicit: false,
-            period_ticks: 33,
-            surroundings,
-        })
+        let (feedback, prediction) = (Feedback::of(kind), Prediction::default());
+        Ok(Self { kind, patch, springs, feedback, prediction, is_implicit: false, boundary })
     }
 
     /// Tells the global model `feedback`.
@@ -106,7 +91,9 @@ impl Template {
     /// Wait-free, real-time safe.
     #[must_use]
     pub fn with_period(mut self, ticks: u32) -> Self {
-        self.period_ticks = ticks;
+        if let Boundary::Drifting { ticks: moving } = &mut self.boundary {
+            *moving = ticks;
+        }
         self
     }
 
@@ -124,18 +111,13 @@ impl Template {
     /// Not real-time safe: allocates.
     pub fn empty(&self) -> Option<Box<dyn LocalModel>> {
         let spec = LinearSpec { size: self.patch, feedback: self.feedback, is_implicit: self.is_implicit };
-        Some(match (self.kind, &self.surroundings, &self.springs) {
-            (Kind::Full, ..) => return None,
-            (Kind::Patch, ..) => Box::new(Patch::new(spec)),
-            (Kind::LinearBoundary, ..) => Box::new(LinearBoundary::new(spec, self.period_ticks)),
-            (Kind::ScaledBoundary, Surroundings::Layered(layered), _) => Box::new(ScaledBoundary::new(spec, *layered)),
-            (Kind::Condensed, Surroundings::Yielding(yielding), _) => Box::new(Condensed::new(spec, yielding.clone())),
-            (Kind::Predicted | Kind::Predictive, _, Some(springs)) => {
+        Some(match (self.kind, &self.springs) {
+            (Kind::Full, _) => return None,
+            (Kind::Predicted | Kind::Predictive, Some(springs)) => {
                 Box::new(Predictive::new(self.patch, self.prediction, Arc::clone(springs)))
             }
-            (Kind::Hold | Kind::ScaledBoundary | Kind::Condensed | Kind::Predicted | Kind::Predictive, ..) => {
-                Box::new(Hold::default())
-            }
+            (kind, _) if kind.is_linear() => Box::new(LinearPatch::new(spec, self.boundary.clone())),
+            _ => Box::new(Hold::default()),
         })
     }
 }

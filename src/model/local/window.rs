@@ -1,10 +1,10 @@
 //! The part of a body that a local model holds: its nodes, and the surface around them, in compact numbering.
 
-use super::super::Vec3;
-use super::super::body::Body;
-use super::super::contact::Contact;
-use super::super::mesh::{NONE, Surface};
-use super::super::surroundings::SpringGraph;
+use crate::Vec3;
+use crate::body::Body;
+use crate::contact::Contact;
+use crate::mesh::{NONE, Surface};
+use crate::surroundings::SpringGraph;
 
 /// Patch nodes first; then, if the model asks for them, the nodes that a spring joins to the patch: the ring, which can
 /// move, and held ones; then the rim: surface nodes that contact needs for normals and walking.
@@ -32,20 +32,9 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Makes the window anew around surface triangles `triangles`, with the ring if `springs` are given; costs as much as
-    /// the patch, whatever the body.
+    /// Makes the window anew around surface triangles `triangles` for the nodes that `patch` gives, in increasing order, with
+    /// the ring if `springs` are given; costs as much as the patch, whatever the body.
     pub(super) fn rebuild(
-        &mut self,
-        body: &dyn Body,
-        triangles: &[u32],
-        size: [usize; 3],
-        springs: Option<&SpringGraph>,
-    ) {
-        self.rebuild_with(body, triangles, springs, |nodes| body.patch(triangles, size, nodes));
-    }
-
-    /// The same for the patch nodes that `patch` gives, in increasing order.
-    pub(super) fn rebuild_with(
         &mut self,
         body: &dyn Body,
         triangles: &[u32],

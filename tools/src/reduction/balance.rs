@@ -6,7 +6,7 @@ use super::linalg::{Matrix, product, product_t, scaled_columns, svd};
 use super::lyapunov;
 use super::modal::Modal;
 use super::state_space::StateSpace;
-use crate::error::{Error, ErrorKind};
+use palpate_model::ModelError;
 
 /// Hankel singular values below this share of the largest are rounding: cut before balancing.
 pub const NUMERICAL_RANK: f64 = 1e-14;
@@ -43,7 +43,7 @@ impl Balanced {
     ///
     /// # Errors
     /// If a mode has no damping or no stiffness: the system is not asymptotically stable.
-    pub fn modal(modal: &Modal) -> Result<Self, Error> {
+    pub fn modal(modal: &Modal) -> Result<Self, ModelError> {
         let factors = gramian::controllability(modal).zip(gramian::observability(modal));
         let realisation = Realisation {
             times_a: &|x| modal.times_a(x),
@@ -59,7 +59,7 @@ impl Balanced {
     ///
     /// # Errors
     /// If it is not asymptotically stable.
-    pub fn general(small: &Congruence) -> Result<Self, Error> {
+    pub fn general(small: &Congruence) -> Result<Self, ModelError> {
         let (a, input, output) = small.first_order().ok_or_else(unstable)?;
         let output = output.transpose();
         let factors = lyapunov::factors(&a, &input, &output);
@@ -78,7 +78,7 @@ impl Balanced {
     ///
     /// # Errors
     /// If it is not asymptotically stable.
-    pub fn of(small: &Congruence) -> Result<Self, Error> {
+    pub fn of(small: &Congruence) -> Result<Self, ModelError> {
         match small.modal() {
             Some(modal) => {
                 let mut balanced = Self::modal(&modal)?;
@@ -138,7 +138,7 @@ impl Balanced {
     }
 }
 
-fn unstable() -> Error {
+fn unstable() -> ModelError {
     let message = "the system is not asymptotically stable: it needs damping, and something that holds it";
-    Error::new(ErrorKind::Scene, message).at("body.material.damping_ratio")
+    ModelError::of("body.material.damping_ratio", message)
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::linalg::{CMatrix, Matrix, complex, product_t, solve_complex, symmetrised};
+use super::linalg::{CMatrix, Matrix, complex, product_t, solve_positive, symmetrised};
 use super::modal::Modal;
 use super::response::Response;
 use super::system::{Ports, Rayleigh, SecondOrder};
@@ -106,7 +106,7 @@ impl Congruence {
     pub(super) fn first_order(&self) -> Option<(Matrix, Matrix, Matrix)> {
         let r = self.mass.nrows();
         let w = (self.stiffness.trace() / self.mass.trace()).abs().sqrt();
-        let right = |matrix: &Matrix| super::linalg::solve_positive(&self.mass, matrix);
+        let right = |matrix: &Matrix| solve_positive(&self.mass, matrix);
         let (k, c, b) = (right(&self.stiffness)?, right(&self.damping)?, right(&self.ports.input)?);
         let mut a = Matrix::zeros(2 * r, 2 * r);
         (0..r).for_each(|at| a[(at, r + at)] = w);
@@ -123,7 +123,7 @@ impl Congruence {
 
 impl Response for Congruence {
     fn at(&self, s: Complex<f64>) -> Option<CMatrix> {
-        let x = solve_complex(self.dynamic_stiffness(s), &complex(&self.ports.input))?;
+        let x = self.dynamic_stiffness(s).lu().solve(&complex(&self.ports.input))?;
         Some(complex(&self.ports.direct) + self.outputs(s).transpose() * x)
     }
 }

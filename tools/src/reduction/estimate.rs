@@ -4,10 +4,10 @@ use nalgebra::Complex;
 
 use super::congruence::Congruence;
 use super::krylov::Projection;
-use super::linalg::{CMatrix, Matrix, complex, product_t, side_by_side, solve_complex};
+use super::linalg::{CMatrix, Matrix, complex, product_t, side_by_side};
 use super::slow_modes::slow_modes;
 use super::system::{Rayleigh, SecondOrder};
-use crate::error::Error;
+use palpate_model::ModelError;
 
 /// The slowest mode is found up to this share of its frequency squared.
 const CLOSE: f64 = 0.99;
@@ -41,7 +41,7 @@ impl ErrorBound {
     ///
     /// # Errors
     /// If nothing holds the system.
-    pub fn new(system: &SecondOrder, model: &Projection, shift: f64) -> Result<Self, Error> {
+    pub fn new(system: &SecondOrder, model: &Projection, shift: f64) -> Result<Self, ModelError> {
         let ports = &system.ports;
         let basis = &model.basis;
         let products = [system.times_mass(basis), system.times_damping(basis), system.times_stiffness(basis)];
@@ -51,10 +51,7 @@ impl ErrorBound {
         // The iteration comes from above.
         let slowest = CLOSE * slow_modes(system, 1)?.0.first().copied().unwrap_or(0.0);
         let known = system.rayleigh();
-        let rayleigh = known.unwrap_or_else(|| {
-            let (c, k) = (system.damping_trace(), system.stiffness_trace());
-            Rayleigh { mass: 0.0, stiffness: c / k }
-        });
+        let rayleigh = known.unwrap_or_else(|| Rayleigh { mass: 0.0, stiffness: system.damping_over_stiffness() });
         Ok(Self { gram, model: model.model.clone(), rayleigh, shift, slowest, is_rigorous: known.is_some() })
     }
 
@@ -66,7 +63,7 @@ impl ErrorBound {
         let mut sides = CMatrix::zeros(r, m + p);
         sides.columns_mut(0, m).copy_from(&complex(&model.ports.input));
         sides.columns_mut(m, p).copy_from(&model.outputs(s));
-        let answers = solve_complex(model.dynamic_stiffness(s), &sides)?;
+        let answers = model.dynamic_stiffness(s).lu().solve(&sides)?;
         let (x, y) = (answers.columns(0, m).into_owned(), answers.columns(m, p).into_owned());
         // The residuals as combinations of the columns behind `gram`.
         let residual = |z: &CMatrix, of_input: bool| {

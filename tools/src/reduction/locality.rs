@@ -2,22 +2,20 @@
 
 use nalgebra::Complex;
 
-use super::super::sparse::SparseFactor;
 use super::congruence::Congruence;
-use super::linalg::{CMatrix, Matrix, append_orthonormal, complex, product_t, side_by_side};
+use super::krylov::many_shifts;
+use super::linalg::{CMatrix, DEPENDENT, Matrix, SparseFactor, append_orthonormal, complex, product_t, side_by_side};
 use super::linear_body::LinearBody;
 use super::modal::Modal;
 use super::response::{Response, log_spaced};
-use super::system::{Ports, Rayleigh, SecondOrder, solved};
-use crate::error::Error;
+use super::system::{Ports, Rayleigh};
+use palpate_model::ModelError;
 
 /// Frequencies (Hz) at which the response of a contact is matched, rest among them: each costs a factorisation, and three solutions a
 /// contact. They are dense where the slow modes of a body of tissue ring.
 const MATCHED_HZ: [f64; 12] = [0.0, 5.0, 10.0, 14.0, 20.0, 28.0, 40.0, 60.0, 100.0, 200.0, 500.0, 1000.0];
 /// Frequencies in the band that errors are taken over.
 const SAMPLES: usize = 25;
-/// Directions of which this share of their length is new are combinations of those that are there.
-const DEPENDENT: f64 = 1e-11;
 /// Patches of more coordinates, and those without modes, are reduced first.
 const DENSE: usize = 400;
 /// Contacts that are solved for together.
@@ -98,6 +96,7 @@ impl StiffnessError {
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
+#[derive(Debug)]
 pub struct LocalityCheck<'a> {
     body: &'a LinearBody,
     rayleigh: Option<Rayleigh>,
@@ -106,23 +105,17 @@ pub struct LocalityCheck<'a> {
     hz: Vec<f64>,
 }
 
-impl std::fmt::Debug for LocalityCheck<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("LocalityCheck").field("hz", &self.hz).finish_non_exhaustive()
-    }
-}
-
 impl<'a> LocalityCheck<'a> {
     /// For contacts with `body` and errors over `band_hz`.
     ///
     /// # Errors
     /// If nothing holds the body.
-    pub fn new(body: &'a LinearBody, band_hz: [f64; 2]) -> Result<Self, Error> {
+    pub fn new(body: &'a LinearBody, band_hz: [f64; 2]) -> Result<Self, ModelError> {
         let factor = |&hz: &f64| {
             let s = 2.0 * std::f64::consts::PI * hz;
             Ok((s, body.system().factorised(s)?))
         };
-        let matched = MATCHED_HZ.iter().map(factor).collect::<Result<_, Error>>()?;
+        let matched = MATCHED_HZ.iter().map(factor).collect::<Result<_, ModelError>>()?;
         let hz = [vec![0.0], log_spaced(band_hz[0], band_hz[1], SAMPLES)].concat();
         Ok(Self { body, rayleigh: body.system().rayleigh(), matched, hz })
     }
@@ -139,7 +132,7 @@ impl<'a> LocalityCheck<'a> {
 
     fn whole_together(&self, contacts: &[Matrix]) -> Vec<ContactStiffness> {
         let all = side_by_side(&contacts.iter().collect::<Vec<_>>());
-        let answers: Vec<Matrix> = self.matched.iter().map(|(_, factor)| solved(factor, all.clone())).collect();
+        let answers: Vec<Matrix> = self.matched.iter().map(|(_, factor)| factor.solve(all.clone())).collect();
         let of = |at: usize| {
             let at_contact = answers.iter().map(|answer| answer.columns(3 * at, 3).into_owned()).collect::<Vec<_>>();
             self.project(&at_contact, &contacts[at])
@@ -163,11 +156,11 @@ impl<'a> LocalityCheck<'a> {
     ///
     /// # Errors
     /// None that [`new`](Self::new) does not have.
-    pub fn finer(&self, contact: &Matrix) -> Result<ContactStiffness, Error> {
+    pub fn finer(&self, contact: &Matrix) -> Result<ContactStiffness, ModelError> {
         let system = self.body.system();
         let between =
             MATCHED_HZ.windows(2).map(|pair| if pair[0] == 0.0 { 0.5 * pair[1] } else { (pair[0] * pair[1]).sqrt() });
-        let mut answers: Vec<Matrix> = self.matched.iter().map(|(_, factor)| solved(factor, contact.clone())).collect();
+        let mut answers: Vec<Matrix> = self.matched.iter().map(|(_, factor)| factor.solve(contact.clone())).collect();
         for hz in between {
             answers.push(system.solve(2.0 * std::f64::consts::PI * hz, contact.clone())?);
         }
@@ -178,17 +171,14 @@ impl<'a> LocalityCheck<'a> {
     ///
     /// # Errors
     /// If the patch is not held together.
-    pub fn patch(&self, coordinates: &[usize], contact: &Matrix) -> Result<ContactStiffness, Error> {
-        let part = self.part(coordinates, contact)?;
+    pub fn patch(&self, coordinates: &[usize], contact: &Matrix) -> Result<ContactStiffness, ModelError> {
+        let ports = Ports::compliance(contact.select_rows(coordinates));
+        let part = self.body.system().part(coordinates).with_ports(ports)?;
         if coordinates.len() <= DENSE && self.rayleigh.is_some() {
             return Ok(ContactStiffness::of(Congruence::whole(&part)));
         }
         let shifts: Vec<f64> = self.matched.iter().map(|(s, _)| *s).collect();
-        Ok(ContactStiffness::of(super::krylov::many_shifts(&part, &shifts)?.model))
-    }
-
-    fn part(&self, coordinates: &[usize], contact: &Matrix) -> Result<SecondOrder, Error> {
-        self.body.system().part(coordinates).with_ports(Ports::compliance(contact.select_rows(coordinates)))
+        Ok(ContactStiffness::of(many_shifts(&part, &shifts)?.model))
     }
 }
 

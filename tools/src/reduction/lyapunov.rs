@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, Schur};
 
-use super::linalg::{CMatrix, Matrix, complex, svd};
+use super::linalg::{CMatrix, Matrix, complex, scaled_columns, svd};
 
 /// Singular values of a factor below this share of the largest are rounding.
 const RANK: f64 = 1e-16;
@@ -62,5 +62,5 @@ fn real(z: &CMatrix) -> Option<Matrix> {
     let both = Matrix::from_fn(n, 2 * k, |i, j| if j < k { z[(i, j)].re } else { z[(i, j - k)].im });
     let (u, sigma, _) = svd(&both)?;
     let rank = sigma.iter().take_while(|&&s| s > RANK * sigma[0]).count();
-    Some(super::linalg::scaled_columns(&u.columns(0, rank).into_owned(), sigma.into_iter()))
+    Some(scaled_columns(&u.columns(0, rank).into_owned(), sigma.into_iter()))
 }

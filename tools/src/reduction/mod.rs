@@ -13,9 +13,9 @@
 //! in rad/s.
 //!
 //! ```
-//! use palpate::model::reduction::{Balanced, Modal, PaperMesh, Response};
+//! use palpate_cli::reduction::{Balanced, Modal, PaperMesh, Response};
 //!
-//! # fn main() -> Result<(), palpate::Error> {
+//! # fn main() -> Result<(), palpate_model::ModelError> {
 //! let system = PaperMesh::square(5).system()?;
 //! let whole = Modal::new(&system).expect("its damping is proportional");
 //! let balanced = Balanced::modal(&whole)?;

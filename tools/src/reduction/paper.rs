@@ -2,7 +2,7 @@
 
 use super::linalg::Matrix;
 use super::system::{Assembly, Ports, SecondOrder};
-use crate::error::Error;
+use palpate_model::ModelError;
 
 /// A 2D or 3D lattice of cells with springs and dampers to all neighbours, every edge or face but the top held. Its input is
 /// the displacement of the top's middle node, its output the force that moves it.
@@ -95,7 +95,7 @@ impl PaperMesh {
     ///
     /// # Errors
     /// If a number is not positive, the mesh has fewer than two cells along an axis, or not two or three axes.
-    pub fn system(&self) -> Result<SecondOrder, Error> {
+    pub fn system(&self) -> Result<SecondOrder, ModelError> {
         self.check()?;
         let d = self.cells.len();
         let (free, middle) = (self.free_nodes(), self.middle());
@@ -134,10 +134,10 @@ impl PaperMesh {
         Ok(assembly.build(n, Ports::held(coupling, damping, direct)))
     }
 
-    fn check(&self) -> Result<(), Error> {
+    fn check(&self) -> Result<(), ModelError> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         if !matches!(self.cells.len(), 2 | 3) || self.cells.iter().any(|&n| n < 2) {
-            return Err(Error::scene(
+            return Err(ModelError::of(
                 "cells",
                 format!("{:?}: two or three numbers of at least 2 are needed", self.cells),
             ));
@@ -146,7 +146,7 @@ impl PaperMesh {
             [("stiffness", self.stiffness), ("mass", self.mass), ("damping_ratio", self.damping_ratio)]
         {
             if !positive(value) {
-                return Err(Error::scene(field, format!("{value}: a finite value above 0 is needed")));
+                return Err(ModelError::of(field, format!("{value}: a finite value above 0 is needed")));
             }
         }
         Ok(())

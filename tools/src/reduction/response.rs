@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::linalg::{CMatrix, norm2};
+use super::linalg::{CMatrix, Matrix};
 use super::modal::Modal;
 use super::system::SecondOrder;
 
@@ -80,6 +80,29 @@ pub fn typical_gain_error(system: &SecondOrder, model: &dyn Response, other: &dy
     let hz = system.typical_frequency() / (2.0 * std::f64::consts::PI);
     let frequencies = log_spaced(1e-3 * hz, 1e2 * hz, 240);
     100.0 * largest_gain(model, Some(other), &frequencies) / largest_gain(model, None, &frequencies)
+}
+
+/// The largest singular value of a small complex matrix.
+fn norm2(matrix: &CMatrix) -> f64 {
+    match matrix.shape() {
+        (0, _) | (_, 0) => 0.0,
+        (1, 1) => matrix[(0, 0)].norm(),
+        _ => {
+            // The Hermitian A^H A as a real symmetric matrix of twice the size.
+            let gram = matrix.adjoint() * matrix;
+            let n = gram.nrows();
+            let real = Matrix::from_fn(2 * n, 2 * n, |i, j| {
+                let z = gram[(i % n, j % n)];
+                match (i < n, j < n) {
+                    (true, true) | (false, false) => z.re,
+                    (true, false) => -z.im,
+                    (false, true) => z.im,
+                }
+            });
+            let eigen = real.symmetric_eigenvalues();
+            eigen.iter().fold(0.0_f64, |largest, &value| largest.max(value)).sqrt()
+        }
+    }
 }
 
 /// The maximum of a function with one peak between `low` and `high`.

@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::linalg::{CMatrix, Matrix, complex, eigenvalues, solve_complex};
+use super::linalg::{CMatrix, Matrix, complex, eigenvalues};
 use super::response::Response;
 
 /// x' = A x + B u, y = C x + D u.
@@ -42,7 +42,7 @@ impl Response for StateSpace {
     fn at(&self, s: Complex<f64>) -> Option<CMatrix> {
         let mut matrix = complex(&(-&self.a));
         (0..self.order()).for_each(|at| matrix[(at, at)] += s);
-        let x = solve_complex(matrix, &complex(&self.b))?;
+        let x = matrix.lu().solve(&complex(&self.b))?;
         Some(complex(&self.c) * x + complex(&self.d))
     }
 }

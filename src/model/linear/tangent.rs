@@ -3,16 +3,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::body::{Body, State};
-use super::integrator::{Spectrum, largest_eigenvalue};
-use super::{Mat3, Vec3};
+use crate::body::{Body, State};
+use crate::integrator::{Spectrum, largest_eigenvalue};
+use crate::{Mat3, Vec3};
 
 /// Force on the n nodes of a patch as a linear function of their motion and of the time that their surroundings move on.
 ///
 /// f = f_0 + K (x - x_0) + C (v - v_0) + C_B v_B + t K_B v_B, with f_0 the force at (x_0, v_0) while every node outside
 /// stands still, and v_B the velocities of these nodes at the resync.
 #[derive(Clone, Debug, Default)]
-pub struct PatchTangent {
+pub(crate) struct PatchTangent {
     /// f_0 (N), 3n.
     force: DVector<f64>,
     /// C_B v_B (N), 3n.
@@ -35,16 +35,16 @@ pub struct PatchTangent {
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Drift {
+pub(crate) struct Drift {
     /// For how long they have moved on with their velocity at the resync (s).
-    pub time: f64,
+    pub(crate) time: f64,
     /// True while they still do.
-    pub is_moving: bool,
+    pub(crate) is_moving: bool,
 }
 
 /// How much of the coupling of a patch node (first) to a node outside (second) answers to the patch's motion, both by
 /// global id; 1 is all of it.
-pub type Share<'a> = &'a dyn Fn(u32, u32) -> f64;
+pub(crate) type Share<'a> = &'a dyn Fn(u32, u32) -> f64;
 
 impl PatchTangent {
     /// Linearises `body` at `state` for the rows of `nodes`; `place` finds a node's place in `nodes`. The negative
@@ -53,7 +53,7 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// For the global actor: allocates when the number of nodes is not that of the call before.
-    pub fn rebuild(
+    pub(crate) fn rebuild(
         &mut self,
         body: &dyn Body,
         state: &State,
@@ -116,7 +116,7 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// For the global actor: bounded.
-    pub fn add_force(&mut self, place: usize, force: Vec3) {
+    pub(crate) fn add_force(&mut self, place: usize, force: Vec3) {
         let mut rows = self.force.fixed_rows_mut::<3>(3 * place);
         rows += force;
     }
@@ -125,7 +125,7 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// For the global actor: bounded.
-    pub fn add_stiffness(&mut self, stiffness: &DMatrix<f64>) {
+    pub(crate) fn add_stiffness(&mut self, stiffness: &DMatrix<f64>) {
         let n = self.force.len();
         if stiffness.shape() == (n, n) {
             let mut position = self.matrix.columns_mut(0, n);
@@ -138,7 +138,14 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// Bounded, real-time safe: 18 n^2 multiply-adds.
-    pub fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], ahead: f64, drift: Drift, forces: &mut [Vec3]) {
+    pub(crate) fn forces(
+        &mut self,
+        positions: &[Vec3],
+        velocities: &[Vec3],
+        ahead: f64,
+        drift: Drift,
+        forces: &mut [Vec3],
+    ) {
         let n = self.origin.positions.len();
         let (by_position, by_velocity) = self.deviation.as_mut_slice().split_at_mut(3 * n);
         let nodes = positions.iter().zip(velocities).zip(&self.origin.positions);
@@ -167,7 +174,7 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// For the global actor: allocates; bounded, usually some 600 n^2 multiply-adds.
-    pub fn spectrum(&self, inverse_masses: &[f64]) -> Spectrum {
+    pub(crate) fn spectrum(&self, inverse_masses: &[f64]) -> Spectrum {
         let n = self.nodes();
         let (mut direction, mut product) = (DVector::zeros(3 * n), DVector::zeros(3 * n));
         let mut largest = |first: usize| {
@@ -189,7 +196,7 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn matrix(&self) -> &DMatrix<f64> {
+    pub(crate) fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
     }
 
@@ -197,16 +204,16 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn nodes(&self) -> usize {
+    pub(crate) fn nodes(&self) -> usize {
         self.origin.positions.len()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::body::Block;
-    use super::super::mesh::Face;
     use super::*;
+    use crate::body::Block;
+    use crate::mesh::Face;
 
     #[test]
     fn the_patch_force_is_exact_at_the_origin_and_linear_around_it() {

@@ -1,7 +1,7 @@
 //! Where the tool is expected to go, from where it was: a prediction runs along it.
 
-use super::Vec3;
-use super::contact::ToolMotion;
+use crate::Vec3;
+use crate::contact::ToolMotion;
 
 /// The velocity dies away in about this time (s): a hand does not go on as it went for longer.
 const DECAY: f64 = 60e-3;

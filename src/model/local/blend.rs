@@ -1,6 +1,6 @@
 //! How the force moves from an old local model to a new one.
 
-use super::Vec3;
+use crate::Vec3;
 
 /// The ways of blending.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
