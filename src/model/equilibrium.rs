@@ -14,6 +14,23 @@ const MAX_ITERATIONS: usize = 200;
 /// Newton with the true tangent, or with the clamped one (always positive definite for an anchored body) where the
 /// true one is not positive definite; the step is halved until the residual falls.
 ///
+/// ```
+/// use palpate_model::Vec3;
+/// use palpate_model::body::{Block, Body};
+/// use palpate_model::equilibrium::static_equilibrium;
+/// use palpate_model::mesh::Face;
+///
+/// # fn main() -> Result<(), palpate_model::ModelError> {
+/// let mut block = Block::builder([5; 3], [0.04; 3]).fix(Face::ZMin).build()?;
+/// let node = block.lattice().id([2, 2, 4]);
+/// let pulled = block.rest()[node as usize] + Vec3::z() * 0.005;
+/// let state = static_equilibrium(&mut block, &[(node, pulled)])?;
+/// let below = block.lattice().id([2, 2, 3]) as usize;
+/// assert!(state.positions[below].z > block.rest()[below].z, "its neighbours follow");
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// If no equilibrium is found, for instance because nothing anchors the body.
 ///

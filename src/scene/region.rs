@@ -2,8 +2,7 @@
 
 use super::BodySpec;
 use crate::error::Error;
-use crate::model::body::{Material, Region, Shape, materials, region_field};
-use crate::model::mesh::Lattice;
+use crate::model::body::{Block, Region, Shape};
 
 /// A part of the body that differs in material.
 ///
@@ -44,20 +43,13 @@ impl RegionSpec {
 
 /// Refuses regions that cannot be, or are nowhere.
 pub(super) fn validate(body: &BodySpec) -> Result<(), Error> {
-    if body.regions.is_empty() {
-        return Ok(());
-    }
-    let base = Material {
-        stiffness: body.material.stiffness_n_per_m,
-        damping_ratio: body.material.damping_ratio,
-        node_mass: body.material.node_mass_kg,
-    };
-    let regions: Vec<Region> = body.regions.iter().map(RegionSpec::region).collect();
-    let lattice = Lattice { nodes: body.block.nodes };
-    let refuse = |(index, (key, message)): (usize, (&'static str, String))| {
-        Error::scene(&region_field("body.region", index, key), message)
-    };
-    materials(lattice, body.block.size_m, base, &regions).map(drop).map_err(refuse)
+    let (block, material) = (&body.block, &body.material);
+    let builder = Block::builder(block.nodes, block.size_m)
+        .stiffness(material.stiffness_n_per_m)
+        .damping_ratio(material.damping_ratio)
+        .node_mass(material.node_mass_kg);
+    let builder = body.regions.iter().map(RegionSpec::region).fold(builder, |builder, region| builder.region(region));
+    builder.check_regions().map_err(|error| Error::scene(&format!("body.{}", error.place()), error.message()))
 }
 
 /// A shape as a table of one key, its kind.

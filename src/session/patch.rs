@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn the_window_is_where_the_tool_is_glued_or_comes_first() {
         let block = block();
-        let at = |scene: &Scene| block.lattice().place(first_touched(scene, &block).unwrap());
+        let at = |scene: &Scene| block.lattice().coordinates(first_touched(scene, &block).unwrap());
         let mut moved = scene(0.5, None);
         assert_eq!(at(&moved), [3, 3, 5], "one of the four in the middle of the top");
         let path = |z: f64| ToolPath::new(vec![0.0, 1.0], vec![[0.02, 0.02, 0.12], [0.081, 0.06, z]]).unwrap();

@@ -282,9 +282,9 @@ pub(super) fn as_run(scene: &Scene, named: Option<(&[Option<u32>], &[u32])>) -> 
     if let (Some(body), Some((attached, probes))) = (&scene.body, named) {
         let lattice = Lattice { nodes: body.block.nodes };
         for (device, node) in scene.devices.iter_mut().zip(attached) {
-            device.attach_node = node.map(|node| lattice.place(node));
+            device.attach_node = node.map(|node| lattice.coordinates(node));
         }
-        scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.place(node) }).collect();
+        scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.coordinates(node) }).collect();
     }
     scene
 }

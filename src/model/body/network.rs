@@ -12,6 +12,23 @@ use crate::mesh::{Lists, Surface};
 /// of eight without a common node; forces are bit-identical from run to run, and change in the last digits
 /// with the order of nodes and springs.
 ///
+/// ```
+/// use palpate_model::Vec3;
+/// use palpate_model::body::{Body, Spring, SpringNetwork};
+///
+/// # fn main() -> Result<(), palpate_model::ModelError> {
+/// let corners = [Vec3::zeros(), Vec3::x() * 0.01, Vec3::y() * 0.01, Vec3::z() * 0.01];
+/// let spring = |i: usize, j: usize| {
+///     (i as u32, j as u32, Spring { stiffness: 30.0, damping: 0.1, rest_length: (corners[i] - corners[j]).norm() })
+/// };
+/// let springs = [spring(0, 1), spring(0, 2), spring(0, 3), spring(1, 2), spring(2, 3), spring(3, 1)];
+/// let builder = SpringNetwork::builder(corners.to_vec()).masses(vec![1e-3; 4]).springs(springs).fix(0);
+/// let network = builder.surface(vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).build()?;
+/// assert_eq!(network.spring_count(), Some(6));
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Real-time
 /// Its forces are bounded and real-time safe; to make it or a copy of it allocates.
 #[derive(Clone, Debug)]
@@ -150,12 +167,12 @@ impl SpringNetwork {
         SpringNetworkBuilder { rest, masses, held, springs, triangles }
     }
 
-    /// Its springs and the nodes that they join, as the builder got them.
+    /// The springs and the nodes that they join, as the builder got them.
     pub fn springs(&self) -> &[(u32, u32, Spring)] {
         &self.springs
     }
 
-    /// Computes its forces with `set`, to compare sets; the fastest one is chosen otherwise.
+    /// Computes the network's forces with `set`, to compare sets; the fastest one is chosen otherwise.
     ///
     /// # Errors
     /// If this machine does not have it.
@@ -164,7 +181,7 @@ impl SpringNetwork {
         Ok(self)
     }
 
-    /// Computes its forces on `cores` cores: the calling thread and threads of its own, which copies share. Worth it
+    /// Computes the network's forces on `cores` cores: the calling thread and threads of its own, which copies share. Worth it
     /// from some 1,000 nodes on if the other cores are free. Forces are bit-identical from run to run for one number of
     /// cores. With more than one, evaluations are no longer real-time safe: they allocate and may block.
     ///

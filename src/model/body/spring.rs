@@ -1,6 +1,6 @@
 //! One spring with a parallel damper: force and tangent.
 
-use super::super::{Mat3, Vec3};
+use crate::{Mat3, Vec3};
 
 /// A spring and a damper in parallel between two nodes.
 ///
@@ -46,7 +46,7 @@ impl Spring {
 
     /// The tangent at `along` = x_j - x_i, `closing` = v_j - v_i.
     ///
-    /// With `clamp` the geometric term (s / L)(I - u u^T) of a spring under compression (s < 0) is left out.
+    /// `clamp` leaves the geometric term (s / L)(I - u u^T) of a spring under compression (s < 0) out.
     pub fn tangent(&self, along: Vec3, closing: Vec3, clamp: bool) -> SpringTangent {
         let Some((u, length)) = self.direction(along) else {
             return SpringTangent { position: Mat3::zeros(), velocity: Mat3::zeros() };

@@ -1,9 +1,8 @@
 //! The contact of an implicit step: normal and tangential motion couple, and every node answers.
 
 use super::deformable::Deformable;
-use super::normal::contact_normal;
 use super::resolve::{IMMOVABLE, NO_TIME, Place, Resolution, target_velocity};
-use super::triangle::interpolate;
+use super::triangle::{contact_normal, interpolate};
 use super::{ContactMode, Law, ToolMotion};
 use crate::linear::ImplicitStep;
 use crate::{Mat3, Vec3};
@@ -11,7 +10,7 @@ use crate::{Mat3, Vec3};
 /// Rounds for the direction of slip; it turns by the anisotropy of W, a few degrees, and less in every round.
 const ROUNDS: usize = 8;
 
-/// As [`super::resolve::resolve`], with the compliance W = G A^-1 G^T (3 x 3) of the contact point in place of the number
+/// Solves the contact as [`super::resolve::resolve`] does, with the compliance W = G A^-1 G^T (3 x 3) of the contact point in place of the number
 /// S: W J = G v* - v_t to stick, n.W (n + mu t) j_n = n.(G v* - v_t) to slip, v = v* - A^-1 G^T J.
 pub(super) fn resolve_coupled(
     body: &mut Deformable<'_>,

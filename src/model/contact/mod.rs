@@ -11,23 +11,22 @@
 //! force on the tool: J / d
 //! ```
 //!
-//! [`step_all`] does the same for several tools, and [`step_implicit`] differs in v*, which comes from a linear system, and in the impulse, which moves every node.
+//! Several tools are resolved one after the other. An implicit step differs in v*, which comes from a linear system, and in the
+//! impulse, which moves every node.
 
 mod coupled;
 mod deformable;
-mod normal;
 mod paper;
 mod resolve;
 mod step;
 mod swept;
 mod triangle;
-mod walk;
 
-use super::Vec3;
+use crate::Vec3;
 
 pub use deformable::Deformable;
-pub(crate) use step::step_implicit;
-pub use step::{Touch, step, step_all};
+pub use step::step;
+pub(crate) use step::{Touch, step_all, step_implicit};
 
 /// The state of a contact.
 ///
@@ -59,7 +58,7 @@ impl ContactMode {
     }
 }
 
-/// Which normal a contact uses.
+/// The choice of the normal that a contact uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Normals {
@@ -70,7 +69,7 @@ pub enum Normals {
     Face,
 }
 
-/// Which equations resolve a contact.
+/// The choice of the equations that resolve a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Equations {
@@ -81,18 +80,18 @@ pub enum Equations {
     Paper,
 }
 
-/// How contacts are resolved.
+/// The law by which contacts are resolved.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Law {
     /// Coulomb coefficient mu; infinite for a tool that sticks until pulled off.
     pub friction: f64,
-    /// The normal used.
+    /// The normal that contacts use.
     pub normals: Normals,
-    /// The equations used.
+    /// The equations that resolve them.
     pub equations: Equations,
 }
 
-/// Where the tool touches: a surface triangle, barycentric weights and the mode.
+/// A contact of a tool: the surface triangle that it touches, barycentric weights and the mode.
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
@@ -102,7 +101,7 @@ pub struct Contact {
     pub triangle: Option<u32>,
     /// Weights of the triangle's three nodes; they sum to one.
     pub weights: [f64; 3],
-    /// The mode.
+    /// The state of the contact.
     pub mode: ContactMode,
     /// Glued to its point: no cone test, no release.
     pub glued: bool,
@@ -111,7 +110,7 @@ pub struct Contact {
 }
 
 impl Contact {
-    /// Glued to the surface at `weights` of `triangle`.
+    /// A contact that is glued to the surface at `weights` of `triangle`.
     pub fn glued(triangle: u32, weights: [f64; 3]) -> Self {
         Self { triangle: Some(triangle), weights, mode: ContactMode::Stick, glued: true, normal: Vec3::zeros() }
     }
@@ -128,9 +127,9 @@ impl Contact {
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolMotion {
-    /// Position at the start (m).
+    /// The tool's position at the start of the step (m).
     pub from: Vec3,
-    /// Position at the end (m).
+    /// The tool's position at the end of the step (m).
     pub to: Vec3,
 }
 

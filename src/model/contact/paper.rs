@@ -7,11 +7,10 @@
 //! internal forces are those of the body (f_0 of (3) is missing in (11)); detection, release and edge crossing, which
 //! the paper does not give, are those of the corrected equations.
 
-use super::super::{Vec3, integrator};
 use super::deformable::Deformable;
-use super::normal::contact_normal;
-use super::triangle::interpolate;
+use super::triangle::{contact_normal, interpolate};
 use super::{Contact, ContactMode, Law, ToolMotion};
+use crate::{Vec3, integrator};
 
 /// Without a movable node there is nothing to project (sum of the squared weights).
 const IMMOVABLE: f64 = 1e-12;

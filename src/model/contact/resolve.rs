@@ -1,10 +1,9 @@
 //! The corrected contact equations: velocity level, mass-weighted, with Coulomb friction.
 
-use super::super::Vec3;
 use super::deformable::Deformable;
-use super::normal::contact_normal;
-use super::triangle::interpolate;
+use super::triangle::{contact_normal, interpolate};
 use super::{ContactMode, Law, ToolMotion};
+use crate::Vec3;
 
 /// Penetration is recovered at this speed (m/s); an open gap is closed in full.
 const RECOVERY: f64 = 0.1;

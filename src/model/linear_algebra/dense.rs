@@ -41,11 +41,17 @@ fn product_of(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Matrix {
 }
 
 /// The product A B.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn product(a: &Matrix, b: &Matrix) -> Matrix {
     product_of(view(a), view(b))
 }
 
 /// The product A^T B.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn product_t(a: &Matrix, b: &Matrix) -> Matrix {
     product_of(view(a).transpose(), view(b))
 }
@@ -68,6 +74,9 @@ pub(crate) fn symmetric_product(a: &Matrix) -> Matrix {
 
 /// Eigenvalues in increasing order and orthonormal eigenvectors of a symmetric matrix, of which the lower triangle is read;
 /// `None` if a number is not finite.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn symmetric_eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
     if !is_finite(matrix) {
         return None;
@@ -80,6 +89,9 @@ pub fn symmetric_eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
 }
 
 /// U, the singular values in decreasing order and V of A = U S V^T, thin; `None` if a number is not finite.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn svd(matrix: &Matrix) -> Option<(Matrix, Vec<f64>, Matrix)> {
     if !is_finite(matrix) {
         return None;
@@ -89,6 +101,9 @@ pub fn svd(matrix: &Matrix) -> Option<(Matrix, Vec<f64>, Matrix)> {
 }
 
 /// Eigenvalues of a general real matrix; `None` if a number is not finite.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn eigenvalues(matrix: &Matrix) -> Option<Vec<Complex<f64>>> {
     if matrix.is_empty() {
         return Some(Vec::new());
@@ -97,11 +112,17 @@ pub fn eigenvalues(matrix: &Matrix) -> Option<Vec<Complex<f64>>> {
 }
 
 /// L with A = L L^T for a symmetric positive definite A; `None` if it is not.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn cholesky(a: &Matrix) -> Option<Matrix> {
     Some(owned(view(a).llt(Side::Lower).ok()?.L()))
 }
 
 /// X with A X = B for a symmetric positive definite A; `None` if it is not.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn solve_positive(a: &Matrix, b: &Matrix) -> Option<Matrix> {
     let factor = view(a).llt(Side::Lower).ok()?;
     let mut x: Mat<f64> = view(b).to_owned();
@@ -110,6 +131,9 @@ pub fn solve_positive(a: &Matrix, b: &Matrix) -> Option<Matrix> {
 }
 
 /// L with L L^T = Z Z^T, square, for a Z with more columns than rows.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn lower_factor(z: &Matrix) -> Matrix {
     owned(view(z).transpose().qr().thin_R().transpose())
 }

@@ -10,6 +10,9 @@ const WIDEST_CUT: f64 = 0.4;
 
 /// Nested dissection (George 1973) by planes: the order in which to eliminate the unknowns, three for each of the nodes at
 /// `points` that `pairs` join. `None` if no plane divides them well, so that an order which does not look at places is better.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
 pub fn dissection(points: &[Vec3], pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Option<Vec<usize>> {
     let adjacency = Lists::new(points.len(), pairs.flat_map(|[a, b]| [(a, b), (b, a)]));
     let mut order = Vec::with_capacity(points.len());

@@ -37,6 +37,9 @@ impl std::fmt::Debug for SparseFactor {
 impl SparseFactor {
     /// Factorises the n x n matrix given by the sum of `entries` (row, column, value) of its lower triangle. The unknowns are eliminated in the given `order`, each of 0 .. n once, or in one of approximate minimum degree
     /// (Amestoy, Davis, Duff 1996). `None` if it is not positive definite, or the order is none.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn new(n: usize, entries: &[(usize, usize, f64)], order: Option<&[usize]>) -> Option<Self> {
         let (starts, rows, values) = assembled(n, entries)?;
         let matrix = SparseColMatRef::new(SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows), &values);
@@ -70,6 +73,9 @@ impl SparseFactor {
     }
 
     /// The solution for each column of `right` (n numbers).
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn solve(&self, mut right: Matrix) -> Matrix {
         let factor = LltRef::new(&self.symbolic, &self.values);
         let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(GROUP, Par::Seq));

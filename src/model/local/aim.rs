@@ -27,7 +27,7 @@ pub struct Aim {
 }
 
 impl Aim {
-    /// Over `surface` with nodes at `positions`.
+    /// A search over `surface` with nodes at `positions` (m).
     ///
     /// # Errors
     /// If the surface has no triangles.
@@ -38,7 +38,7 @@ impl Aim {
         Ok(Self { nearest: NearestTriangle::new(surface, positions)? })
     }
 
-    /// Moves the surface to `positions`.
+    /// Moves the nodes of the surface to `positions` (m).
     ///
     /// # Real-time
     /// For the global actor: bounded, allocates nothing.

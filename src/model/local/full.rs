@@ -16,7 +16,7 @@ pub struct Full {
 }
 
 impl Full {
-    /// Around a simulation.
+    /// The model that runs `simulation`.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -24,7 +24,7 @@ impl Full {
         Self { simulation, watched: Vec::new() }
     }
 
-    /// The simulation.
+    /// The simulation that it runs.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

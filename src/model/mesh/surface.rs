@@ -20,7 +20,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// From triangles over `nodes` nodes.
+    /// A surface of `triangles` over `nodes` nodes, with its adjacency.
     ///
     /// # Errors
     /// If a triangle names a node that does not exist or twice the same, or an edge has more than two triangles.

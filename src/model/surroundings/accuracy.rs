@@ -1,11 +1,11 @@
 //! From an error budget to a number of states: how the linear estimate relates to the force error of a whole run.
 
-/// How large a basis is to be.
+/// The wanted size of a basis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Size {
-    /// So many states, at most.
+    /// At most so many states.
     States(usize),
-    /// As few as keep the expected error within so many % (rms over a run, of the peak force).
+    /// The least number of states that keeps the expected error within so many % (rms over a run, of the peak force).
     ErrorPct(f64),
 }
 
@@ -15,15 +15,15 @@ impl From<usize> for Size {
     }
 }
 
-/// What is left however many states there are (%): the forecast of the tool and the rest of the body's non-linearity. Measured
+/// The force error that is left however many states there are (%): that of the forecast of the tool and the rest of the body's non-linearity. Measured
 /// one global period late with 100 states: `hand` 0.34, `wave` 0.24, `drag_friction` 0.20, `drag_slip` 0.12.
 pub const FLOOR_PCT: f64 = 0.35;
 /// Force error of a run for an error of the linear force: the share of the force that deviates from the forecast. Measured
 /// with 5 to 100 states, one period late: 0.2 to 0.72, the largest with 5 on `hand`.
 const GAIN: f64 = 0.8;
-/// The least budget that can be kept (%): closer to the floor the states grow without end.
+/// The least error budget that can be kept (%): closer to the floor the states grow without end.
 pub const LEAST_PCT: f64 = 0.4;
-/// States beyond which no more are tried for a budget.
+/// The largest number of states that is tried for an error budget.
 pub const MOST_STATES: usize = 150;
 
 /// The reduction error of the linear contact force of a basis.

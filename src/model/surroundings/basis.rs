@@ -35,7 +35,7 @@ impl Basis {
         &self.patch
     }
 
-    /// States in which the ring answers.
+    /// The number of states in which the ring answers.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -43,7 +43,7 @@ impl Basis {
         self.answers.states()
     }
 
-    /// How far the force is off in so many states, if they were chosen by that.
+    /// The estimate of the force error by which the number of states was chosen, if it was.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -101,7 +101,7 @@ impl Forecast {
     }
 }
 
-/// The bases that are there, by patch.
+/// A collection of bases, by patch.
 #[derive(Clone, Debug, Default)]
 pub struct Bases {
     /// In the order of the patches: of two that serve as well, every run takes the same.
@@ -109,7 +109,7 @@ pub struct Bases {
 }
 
 impl Bases {
-    /// The basis for `patch` (ids in increasing order), if it is there.
+    /// The basis for `patch` (ids in increasing order), if there is one.
     ///
     /// # Real-time
     /// Bounded, by the patch; does not allocate.
@@ -126,7 +126,7 @@ impl Bases {
         self.of.values().filter(holds).map(|basis| &basis.patch[..]).min_by_key(|patch| patch.len())
     }
 
-    /// Of the bases whose patch holds all of `nodes`, the patch of the one that has most nodes of `wanted`.
+    /// The patch that has most nodes of `wanted`, of a basis whose patch holds all of `nodes`.
     ///
     /// # Real-time
     /// For the global actor: looks at all bases.
@@ -136,7 +136,7 @@ impl Bases {
         self.of.values().filter(holds).map(|basis| &basis.patch[..]).max_by_key(common)
     }
 
-    /// All of them.
+    /// All bases, in the order of their patches.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -144,7 +144,7 @@ impl Bases {
         self.of.values().map(|basis| &**basis)
     }
 
-    /// Adds one.
+    /// Adds a basis, in place of one for the same patch.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -152,7 +152,7 @@ impl Bases {
         self.of.insert(basis.patch.clone(), basis);
     }
 
-    /// How many there are.
+    /// The number of bases.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -160,7 +160,7 @@ impl Bases {
         self.of.len()
     }
 
-    /// True without any.
+    /// True if there is no basis.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

@@ -59,8 +59,8 @@ enum Stage {
 }
 
 impl Reduction {
-    /// Of the surroundings of `patch` (ids in increasing order), with at most so many states or as many as an error budget
-    /// needs; `None` if nothing around the patch can move.
+    /// Begins the basis of the surroundings of `patch` (ids in increasing order), with at most so many states or as many as an
+    /// error budget needs; `None` if nothing around the patch can move.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -79,7 +79,7 @@ impl Reduction {
         })
     }
 
-    /// Ids of the patch nodes.
+    /// Ids of the patch nodes that the basis is for.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -95,7 +95,7 @@ impl Reduction {
         self.far.unknowns() > LARGE
     }
 
-    /// Does the next part; the basis after the last.
+    /// Does the next part; returns the basis after the last one.
     ///
     /// # Errors
     /// If nothing holds the surroundings together, so that they have no finite answer.

@@ -1,24 +1,26 @@
 //! `predictive`: a non-linear patch in a ring that moves as predicted, corrected by reduced surroundings.
 
+mod ring;
+
 use std::sync::Arc;
 
-use super::near::NearSprings;
+use self::ring::{NearSprings, RingPath};
 use super::patch::Patch;
-use super::ring_path::RingPath;
 use super::{Kind, LocalModel, ResyncView};
 use crate::Vec3;
 use crate::body::State;
 use crate::contact::{Contact, ToolMotion};
 use crate::surroundings::{Basis, ReducedMotion, SpringGraph};
 
-/// How `predictive` finds where its ring will go.
+/// The way in which `predictive` finds where its ring will go.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Prediction {
-    /// By a reduced model of the surroundings, where that holds the present motion; else as [`Full`](Self::Full).
+    /// A reduced model of the surroundings says it, where that holds the present motion; else the whole body, see
+    /// [`Full`](Self::Full).
     #[default]
     Reduced,
-    /// By running the whole body ahead.
+    /// The whole body runs ahead and says it.
     Full,
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::Kind;
+use super::super::kind::Kind;
 use crate::Vec3;
 use crate::body::Body;
 use crate::linear_algebra::Matrix;
@@ -13,7 +13,7 @@ const KEPT: usize = 4 << 20;
 
 /// The surroundings of a linear patch.
 #[derive(Clone, Debug)]
-pub(super) enum Boundary {
+pub(crate) enum Boundary {
     /// `patch`: they stand still (paper, section 2.3).
     Still,
     /// `linear_boundary`: they go on with their velocity at the resync, x_B = x_B0 + t v_B, for so many haptic ticks, one
@@ -59,14 +59,14 @@ impl Boundary {
 /// springs that fit between the patch node and the body's end, in the direction of the spring. The force at the resync is not
 /// changed.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Layers {
+pub(crate) struct Layers {
     /// Corners of the box around the body at rest (m).
     low: Vec3,
     high: Vec3,
 }
 
 impl Layers {
-    pub(super) fn new(body: &dyn Body) -> Self {
+    pub(crate) fn new(body: &dyn Body) -> Self {
         let none = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
         let (low, high) = body.rest().iter().fold(none, |(low, high), x| (low.inf(x), high.sup(x)));
         Self { low, high }
@@ -87,7 +87,7 @@ impl Layers {
 /// the nodes outside. Static: the surroundings have no inertia and no damping of their own. The geometry must not be fed
 /// back: the global model would give way a second time. Copies share what has been computed.
 #[derive(Clone, Debug)]
-pub(super) struct Yielding(Arc<Mutex<Windows>>);
+pub(crate) struct Yielding(Arc<Mutex<Windows>>);
 
 #[derive(Debug)]
 struct Windows {
@@ -97,7 +97,7 @@ struct Windows {
 }
 
 impl Yielding {
-    pub(super) fn new(surroundings: Condensation) -> Self {
+    pub(crate) fn new(surroundings: Condensation) -> Self {
         Self(Arc::new(Mutex::new(Windows { surroundings, known: Vec::new() })))
     }
 

@@ -1,13 +1,18 @@
 //! The linear patch: four local models that differ in how its surroundings enter, see [`Boundary`].
 
-use super::boundary::Boundary;
+mod boundary;
+mod stable;
+
+use self::stable::stable_stepping;
 use super::feedback::{Feedback, PatchGeometry};
 use super::patch::Patch;
-use super::stable::stable_stepping;
 use super::{Kind, LocalModel, ResyncView};
 use crate::Vec3;
 use crate::contact::{Contact, Equations, ToolMotion, step_implicit};
 use crate::linear::{Drift, ImplicitStep, PatchTangent};
+
+pub(super) use boundary::{Boundary, Layers, Yielding};
+pub use stable::MOST_EXPLICIT_STEPS;
 
 /// What a linear patch is made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
