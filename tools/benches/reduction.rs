@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use palpate::model::reduction::{Balanced, Modal, PaperMesh, low_rank, one_shift};
+use palpate_cli::reduction::{Balanced, Modal, PaperMesh, low_rank, one_shift};
 use palpate::session::{PaperStudy, reduce_paper};
 
 /// Frequencies that the low-rank path matches.

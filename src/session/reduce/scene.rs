@@ -12,7 +12,7 @@ use crate::log::reduction::{
 };
 use crate::model::body::{Block, Body, State};
 use crate::model::reduction::{
-    ContactStiffness, LinearBody, LocalityCheck, Matrix, StateSpace, StiffnessError, gain_error, log_spaced, low_rank,
+    ContactStiffness, LinearBody, LocalityCheck, Matrix, Modal, StateSpace, StiffnessError, gain_error, log_spaced, low_rank,
     one_shift, stiffness_along, typical_gain_error,
 };
 use crate::model::surroundings::{SpringGraph, errors_by_states};
@@ -252,7 +252,7 @@ impl Study<'_> {
         orders.extend(order);
         orders.sort_unstable();
         orders.dedup();
-        let (model, modal) = (&reduced.projection.model, reduced.projection.model.modal());
+        let (model, modal) = (&reduced.projection.model, Modal::of(&reduced.projection.model));
         let hinf_pct = |truncated: &StateSpace| match &modal {
             Some(modal) => gain_error(modal, truncated),
             None => typical_gain_error(&system, model, truncated),

@@ -79,7 +79,7 @@ impl Balanced {
     /// # Errors
     /// If it is not asymptotically stable.
     pub fn of(small: &Congruence) -> Result<Self, ModelError> {
-        match small.modal() {
+        match Modal::of(small) {
             Some(modal) => {
                 let mut balanced = Self::modal(&modal)?;
                 balanced.displacements = balanced.displacements.rows(0, small.mass.nrows()).into_owned();

@@ -14,7 +14,7 @@ const CLOSE: f64 = 0.99;
 
 /// Bounds the error of a [`Projection`] at any frequency.
 ///
-/// With D(s) = s^2 M + s C + K, the residuals R = B - D T X of the answer and L = P + s V - D T Y of the dual one, the error of the
+/// Let D(s) = s^2 M + s C + K. By the residuals R = B - D T X of the answer and L = P + s V - D T Y of the dual one, the error of the
 /// response is exactly L^T D^-1 R (Grimme 1997; Feng, Antoulas and Benner 2017, Int. J. Numer. Methods Eng.). With C = alpha M + beta K all
 /// three matrices have the same modes, so that D^-1 is at most c(s) times A^-1, A = s0^2 M + s0 C + K at a real s0, with c(s) the largest
 /// ratio of the two over all frequencies that a mode can have, from the slowest one up: one factorisation serves all s, and the bound is
@@ -37,7 +37,7 @@ pub struct ErrorBound {
 }
 
 impl ErrorBound {
-    /// For a model of `system`; `shift` is s0 (rad/s).
+    /// The bound for a model of `system`; `shift` is s0 (rad/s).
     ///
     /// # Errors
     /// If nothing holds the system.
@@ -92,7 +92,7 @@ impl ErrorBound {
         Some(self.ratio(s) * size(&residual(&x, true)) * size(&residual(&y, false)))
     }
 
-    /// As [`at`](Self::at), at a frequency (Hz).
+    /// The bound at a frequency (Hz), see [`at`](Self::at).
     pub fn at_hz(&self, hz: f64) -> Option<f64> {
         self.at(Complex::new(0.0, 2.0 * std::f64::consts::PI * hz))
     }

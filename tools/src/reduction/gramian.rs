@@ -15,7 +15,7 @@ pub(super) fn controllability(modal: &Modal) -> Option<Matrix> {
     factor(&modal.frequencies, &modal.dampings, &modal.input())
 }
 
-/// The same of the observability Gramian Q.
+/// A factor of the observability Gramian Q, as [`controllability`] has one of P.
 pub(super) fn observability(modal: &Modal) -> Option<Matrix> {
     // A^T = [0, -w; w, -c].
     let reversed: Vec<f64> = modal.frequencies.iter().map(|w| -w).collect();

@@ -29,7 +29,7 @@ impl Projection {
 /// moments and ports.
 ///
 /// The congruence keeps the structure (Su and Craig 1991, J. Guid. Control Dyn. 14; Bai and Su 2005, SIAM J. Matrix Anal. 26).
-/// With proportional damping s^2 M + s C + K is a multiple of K + l(s) M: moments in l, from one Krylov space of (K + l M)^-1 M. Else the
+/// Under proportional damping s^2 M + s C + K is a multiple of K + l(s) M: moments in l, from one Krylov space of (K + l M)^-1 M. Else the
 /// recurrence of second order of the moments in s.
 ///
 /// # Errors
@@ -129,7 +129,7 @@ const FASTEST: f64 = 8.0;
 pub struct LowRank {
     /// The system in the span of its answers to real frequencies.
     pub projection: Projection,
-    /// That, balanced.
+    /// The balanced model of that.
     pub balanced: Balanced,
 }
 

@@ -39,9 +39,9 @@ enum Small {
 }
 
 impl ContactStiffness {
-    /// From a compliance: forces at the contact go in, its displacements come out.
+    /// The stiffness of a compliance: forces at the contact go in, its displacements come out.
     pub fn of(model: Congruence) -> Self {
-        let compliance = match model.modal() {
+        let compliance = match Modal::of(&model) {
             Some(modal) => Small::Modal(modal),
             None => Small::General(model),
         };
@@ -65,16 +65,16 @@ impl Response for ContactStiffness {
 /// A plain value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StiffnessError {
-    /// At rest.
+    /// The error at rest.
     pub at_rest: f64,
-    /// Root of the mean square over the logarithm of the frequency in the band.
+    /// The root of the mean square error over the logarithm of the frequency in the band.
     pub band: f64,
-    /// The worst in the band.
+    /// The worst error in the band.
     pub worst: f64,
 }
 
 impl StiffnessError {
-    /// Of `model` against `reference` over `hz`, the first of them for rest.
+    /// The errors of `model` against `reference` over `hz`, the first of them for rest.
     pub fn between(model: &dyn Response, reference: &dyn Response, hz: &[f64]) -> Self {
         let errors: Vec<f64> = hz
             .iter()
@@ -106,7 +106,7 @@ pub struct LocalityCheck<'a> {
 }
 
 impl<'a> LocalityCheck<'a> {
-    /// For contacts with `body` and errors over `band_hz`.
+    /// A check for contacts with `body` and errors over `band_hz`.
     ///
     /// # Errors
     /// If nothing holds the body.
@@ -120,7 +120,7 @@ impl<'a> LocalityCheck<'a> {
         Ok(Self { body, rayleigh: body.system().rayleigh(), matched, hz })
     }
 
-    /// Rest, and the frequencies of the band (Hz).
+    /// The frequencies at which errors are taken: rest, and those of the band (Hz).
     pub fn frequencies(&self) -> &[f64] {
         &self.hz
     }

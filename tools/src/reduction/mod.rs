@@ -50,8 +50,8 @@ pub use krylov::{LowRank, Projection, low_rank, many_shifts, one_shift, spread_s
 pub use linalg::{CMatrix, Matrix};
 pub use linear_body::LinearBody;
 pub use locality::{ContactStiffness, LocalityCheck, StiffnessError, stiffness_along};
-pub use modal::Modal;
+pub use modal::{Modal, gain_error, typical_gain_error};
 pub use paper::PaperMesh;
-pub use response::{Response, gain_error, largest_gain, log_spaced, typical_gain_error};
+pub use response::{Response, largest_gain, log_spaced};
 pub use state_space::StateSpace;
 pub use system::{Ports, Rayleigh, SecondOrder};

@@ -4,8 +4,8 @@ use nalgebra::Complex;
 
 use super::congruence::Congruence;
 use super::linalg::{CMatrix, Matrix, complex, pencil_eigen, product, symmetric_eigen};
-use super::response::Response;
-use super::system::{Ports, SecondOrder};
+use super::response::{Response, largest_gain, log_spaced};
+use super::system::{Ports, Rayleigh, SecondOrder};
 
 /// q'' + c q' + w^2 q = Phi^T B u for each mode, with x = Phi q.
 ///
@@ -17,7 +17,7 @@ pub struct Modal {
     pub frequencies: Vec<f64>,
     /// c of each mode (1/s).
     pub dampings: Vec<f64>,
-    /// Phi^T B and what comes out.
+    /// The ports: Phi^T B and what comes out.
     pub ports: Ports,
     /// Phi, n x n (1/sqrt(kg)).
     pub shapes: Matrix,
@@ -47,14 +47,14 @@ impl Modal {
         }
     }
 
-    /// As [`new`](Self::new), of a small system.
-    pub(super) fn of(small: &Congruence) -> Option<Self> {
+    /// The modes of a small system; `None` where [`new`](Self::new) has none.
+    pub fn of(small: &Congruence) -> Option<Self> {
         let rayleigh = small.rayleigh()?;
         let (values, shapes) = pencil_eigen(&small.stiffness, &small.mass)?;
         Self::from_eigen(values, shapes, rayleigh, &small.ports)
     }
 
-    fn from_eigen(values: Vec<f64>, shapes: Matrix, rayleigh: super::system::Rayleigh, ports: &Ports) -> Option<Self> {
+    fn from_eigen(values: Vec<f64>, shapes: Matrix, rayleigh: Rayleigh, ports: &Ports) -> Option<Self> {
         if values.iter().any(|&value| value <= 0.0) {
             return None;
         }
@@ -124,4 +124,29 @@ impl Response for Modal {
         }
         out.iter().all(|z| z.is_finite()).then_some(out)
     }
+}
+
+/// The infinity norm of `modal` minus `other` over that of `modal`, %: over frequencies from well below its slowest mode to well above
+/// the fastest, and at those of its modes that ring.
+///
+/// # Real-time
+/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
+pub fn gain_error(modal: &Modal, other: &dyn Response) -> f64 {
+    let hz = |w: f64| w / (2.0 * std::f64::consts::PI);
+    let (Some(&slow), Some(&fast)) = (modal.frequencies.first(), modal.frequencies.last()) else { return 0.0 };
+    let mut frequencies = log_spaced(hz(1e-2 * slow), hz(10.0 * fast), 200);
+    let rings = |&(w, c): &(&f64, &f64)| c < w;
+    frequencies.extend(modal.frequencies.iter().zip(&modal.dampings).filter(rings).map(|(w, _)| hz(*w)));
+    frequencies.sort_by(f64::total_cmp);
+    100.0 * largest_gain(modal, Some(other), &frequencies) / largest_gain(modal, None, &frequencies)
+}
+
+/// The error that [`gain_error`] measures, for a `model` of `system` that has no modes, %.
+///
+/// # Real-time
+/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
+pub fn typical_gain_error(system: &SecondOrder, model: &dyn Response, other: &dyn Response) -> f64 {
+    let hz = system.typical_frequency() / (2.0 * std::f64::consts::PI);
+    let frequencies = log_spaced(1e-3 * hz, 1e2 * hz, 240);
+    100.0 * largest_gain(model, Some(other), &frequencies) / largest_gain(model, None, &frequencies)
 }

@@ -25,12 +25,12 @@ pub struct PaperMesh {
 }
 
 impl PaperMesh {
-    /// n x n cells.
+    /// A mesh of n x n cells.
     pub fn square(n: usize) -> Self {
         Self::of(vec![n; 2])
     }
 
-    /// n x n x n cells.
+    /// A mesh of n x n x n cells.
     pub fn cube(n: usize) -> Self {
         Self::of(vec![n; 3])
     }
@@ -45,21 +45,21 @@ impl PaperMesh {
         Self { cells, stiffness: 100.0, mass: 1e-3, damping_ratio: 1.0 }
     }
 
-    /// The same mesh with zeta = `ratio`.
+    /// Sets zeta to `ratio`.
     #[must_use]
     pub fn damping_ratio(mut self, ratio: f64) -> Self {
         self.damping_ratio = ratio;
         self
     }
 
-    /// The same mesh with springs of `k` (N/m).
+    /// Sets the stiffness of every spring to `k` (N/m).
     #[must_use]
     pub fn stiffness(mut self, k: f64) -> Self {
         self.stiffness = k;
         self
     }
 
-    /// 2 or 3.
+    /// The number of dimensions: 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.cells.len()
     }

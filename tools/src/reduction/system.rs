@@ -10,7 +10,7 @@ use palpate_model::ModelError;
 /// How far damping may be from alpha M + beta K, entry by entry and relative to its largest, to count as proportional.
 const PROPORTIONAL: f64 = 1e-9;
 
-/// What goes into a system of n coordinates and what comes out: y = D u + P^T x + V^T x', with B u on the right-hand side.
+/// The ports of a system of n coordinates, what goes into it and what comes out: y = D u + P^T x + V^T x', with B u on the right-hand side.
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
@@ -97,7 +97,7 @@ pub struct SecondOrder {
     entries: Vec<Entry>,
     /// The order in which the coordinates are eliminated, if a good one is known.
     order: Option<Vec<usize>>,
-    /// What goes in and comes out.
+    /// The ports of the system.
     pub ports: Ports,
 }
 
@@ -339,7 +339,7 @@ impl SecondOrder {
         Self { order, ..self }
     }
 
-    /// The same system with other ports.
+    /// The system with other ports.
     ///
     /// # Errors
     /// If they do not have a row for each coordinate.
