@@ -269,9 +269,6 @@ impl Simulation {
     }
 
     /// The contact of a tool, to put in what a local model found.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub(crate) fn contact_mut(&mut self, tool: usize) -> &mut Contact {
         &mut self.touches[tool].contact
     }

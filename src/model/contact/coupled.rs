@@ -1,8 +1,7 @@
 //! The contact of an implicit step: normal and tangential motion couple, and every node answers.
 
 use super::deformable::Deformable;
-use super::resolve::{IMMOVABLE, NO_TIME, Place, Resolution, target_velocity};
-use super::triangle::{contact_normal, interpolate};
+use super::resolve::{Place, Resolution, approach};
 use super::{ContactMode, Law, ToolMotion};
 use crate::linear::ImplicitStep;
 use crate::{Mat3, Vec3};
@@ -16,23 +15,18 @@ pub(super) fn resolve_coupled(
     body: &mut Deformable<'_>,
     system: &ImplicitStep,
     law: &Law,
-    Place { triangle, weights, is_glued }: Place<'_>,
+    place: Place<'_>,
     tool: ToolMotion,
     d_c: f64,
 ) -> Resolution {
-    let nodes = body.corners(triangle);
-    let normal = contact_normal(law.normals, body.surface, body.positions, triangle, weights);
+    let (nodes, weights) = (body.corners(place.triangle), place.weights);
     let compliance = system.compliance(&nodes, weights);
-    if compliance.trace() < IMMOVABLE {
-        return Resolution::without_force(ContactMode::Lost, normal);
-    }
-    if d_c < NO_TIME {
-        return Resolution::without_force(ContactMode::Free, normal);
-    }
-    let point = interpolate(weights, &nodes.map(|node| body.positions[node]));
-    let velocity = interpolate(weights, &nodes.map(|node| body.velocities[node]));
-    let closing = velocity - target_velocity(point, &normal, tool, d_c, system.step());
-    let (mode, impulse) = impulse(&compliance, closing, &normal, if is_glued { None } else { Some(law.friction) });
+    let (normal, closing) = match approach(body, law, place, tool, [d_c, system.step()], compliance.trace()) {
+        Ok(found) => found,
+        Err(without_force) => return without_force,
+    };
+    let friction = if place.is_glued { None } else { Some(law.friction) };
+    let (mode, impulse) = impulse(&compliance, closing, &normal, friction);
     system.push(body.velocities, &nodes, weights, impulse);
     Resolution { mode, impulse, normal }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::PatchTangent;
+use super::tangent::{PatchTangent, flatten};
 use crate::integrator::snap;
 use crate::{Mat3, Vec3};
 
@@ -44,9 +44,6 @@ impl ImplicitStep {
     }
 
     /// The step d (s).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub(crate) fn step(&self) -> f64 {
         self.d
     }
@@ -56,9 +53,7 @@ impl ImplicitStep {
     /// # Real-time
     /// Bounded, real-time safe: 9 n^2 multiply-adds.
     pub(crate) fn accelerate(&mut self, velocities: &mut [Vec3], forces: &[Vec3]) {
-        for (to, from) in self.forces.as_mut_slice().as_chunks_mut::<3>().0.iter_mut().zip(forces) {
-            *to = (*from).into();
-        }
+        flatten(forces, self.forces.as_mut_slice());
         self.change.gemv(self.d, &self.inverse, &self.forces, 0.0);
         for (v, change) in velocities.iter_mut().zip(self.change.as_slice().as_chunks::<3>().0) {
             *v = snap(*v + Vec3::from(*change));
@@ -100,7 +95,7 @@ impl ImplicitStep {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Drift;
+    use super::super::{Drift, patch_of};
     use super::*;
     use crate::body::{Block, Body, State};
     use crate::mesh::Face;
@@ -115,11 +110,7 @@ mod tests {
     fn patch(stiffness: f64, zeta: f64) -> Patch {
         let builder = Block::builder([6; 3], [0.05; 3]).stiffness(stiffness).damping_ratio(zeta).node_mass(0.5e-3);
         let block = builder.fix(Face::ZMin).build().unwrap();
-        let mut nodes = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
-        let mut tangent = PatchTangent::default();
-        let place = |node: u32| nodes.iter().position(|&other| other == node);
-        tangent.rebuild(&block, &State::at_rest(block.rest()), &nodes, &place, &|_, _| 1.0);
+        let (nodes, tangent) = patch_of(&block, &State::at_rest(block.rest()));
         let rest: Vec<Vec3> = nodes.iter().map(|&node| block.rest()[node as usize]).collect();
         let inverse_masses = nodes.iter().map(|&node| block.inverse_masses()[node as usize]).collect();
         let mut state = State::at_rest(&rest);

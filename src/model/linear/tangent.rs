@@ -74,9 +74,7 @@ impl PatchTangent {
         self.drift.fill(0.0);
         self.node_forces.resize(n, Vec3::zeros());
         body.node_forces(state, nodes, &mut self.node_forces);
-        for (force, node) in self.force.as_mut_slice().as_chunks_mut::<3>().0.iter_mut().zip(&self.node_forces) {
-            *force = (*node).into();
-        }
+        flatten(&self.node_forces, self.force.as_mut_slice());
         let Self { force, dragged, drift, matrix, .. } = self;
         let mut add = |row: usize, column: usize, position: Mat3, velocity: Mat3| {
             let mut place = matrix.fixed_view_mut::<3, 3>(row, column);
@@ -164,9 +162,7 @@ impl PatchTangent {
             self.product.axpy(drift.time, &self.drift, 1.0);
         }
         self.product.gemv(1.0, &self.matrix, &self.deviation, 1.0);
-        for (force, product) in forces.iter_mut().zip(self.product.as_slice().as_chunks::<3>().0) {
-            *force = Vec3::from(*product);
-        }
+        unflatten(self.product.as_slice(), forces);
     }
 
     /// The largest eigenvalues of K and C with these masses (1/kg, the first n are read): what an explicit step of this patch
@@ -180,37 +176,37 @@ impl PatchTangent {
         let mut largest = |first: usize| {
             let matrix = self.matrix.columns(first, 3 * n);
             largest_eigenvalue(inverse_masses[..n].to_vec(), 1e-3, |from, to| {
-                for (to, from) in direction.as_mut_slice().as_chunks_mut::<3>().0.iter_mut().zip(from) {
-                    *to = (*from).into();
-                }
+                flatten(from, direction.as_mut_slice());
                 product.gemv(1.0, &matrix, &direction, 0.0);
-                for (to, from) in to.iter_mut().zip(product.as_slice().as_chunks::<3>().0) {
-                    *to = Vec3::from(*from);
-                }
+                unflatten(product.as_slice(), to);
             })
         };
         Spectrum { stiffness: largest(0), damping: largest(3 * n) }
     }
 
     /// K and C side by side (N/m, N s/m), 3n x 6n.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub(crate) fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
     }
 
     /// Number of patch nodes n.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub(crate) fn nodes(&self) -> usize {
         self.origin.positions.len()
     }
 }
 
+/// Writes the numbers of `vectors` one after the other, as far as both reach.
+pub(super) fn flatten(vectors: &[Vec3], to: &mut [f64]) {
+    to.as_chunks_mut::<3>().0.iter_mut().zip(vectors).for_each(|(to, vector)| *to = (*vector).into());
+}
+
+fn unflatten(from: &[f64], vectors: &mut [Vec3]) {
+    vectors.iter_mut().zip(from.as_chunks::<3>().0).for_each(|(vector, from)| *vector = Vec3::from(*from));
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::patch_of;
     use super::*;
     use crate::body::Block;
     use crate::mesh::Face;
@@ -224,11 +220,8 @@ mod tests {
             *x += Vec3::new(n.sin(), (2.0 * n).cos(), (3.0 * n).sin()) * 1e-3 + Vec3::z() * (0.1 * x.z);
             *v = Vec3::new((5.0 * n).sin(), (7.0 * n).cos(), (11.0 * n).sin()) * 0.1;
         }
-        let mut nodes = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
+        let (nodes, mut tangent) = patch_of(&block, &state);
         let place = |node: u32| nodes.iter().position(|&other| other == node);
-        let mut tangent = PatchTangent::default();
-        tangent.rebuild(&block, &state, &nodes, &place, &|_, _| 1.0);
 
         // The body with everything outside the patch standing still is what the linear model stands for.
         let mut frozen = state.clone();
@@ -267,11 +260,8 @@ mod tests {
             let n = n as f64;
             *v = Vec3::new((5.0 * n).sin(), (7.0 * n).cos(), (11.0 * n).sin()) * 1e-3;
         }
-        let mut nodes = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
+        let (nodes, mut tangent) = patch_of(&block, &state);
         let place = |node: u32| nodes.iter().position(|&other| other == node);
-        let mut tangent = PatchTangent::default();
-        tangent.rebuild(&block, &state, &nodes, &place, &|_, _| 1.0);
         let time = 1e-3;
         let mut later = state.clone();
         for (node, (x, v)) in later.positions.iter_mut().zip(&later.velocities).enumerate() {

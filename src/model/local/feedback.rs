@@ -24,11 +24,7 @@ impl Feedback {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Trajectory => "trajectory",
-            Self::ContactNodes => "contact_nodes",
-            Self::Geometry => "geometry",
-        }
+        ["trajectory", "contact_nodes", "geometry"][self as usize]
     }
 
     /// True if `model` can give this feedback: a linear patch. One that gives way more than the body does between held surroundings

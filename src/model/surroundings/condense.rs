@@ -93,15 +93,15 @@ impl Condensation {
 mod tests {
     use super::*;
     use crate::Vec3;
-    use crate::body::{Block, Body};
+    use crate::body::{Block, Body, State};
     use crate::equilibrium::static_equilibrium;
+    use crate::linear::patch_of;
     use crate::mesh::Face;
 
     #[test]
     fn a_patch_with_its_condensed_surroundings_yields_as_the_whole_body_does() {
         let mut block = Block::builder([6; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
-        let mut nodes = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
+        let (nodes, _) = patch_of(&block, &State::at_rest(block.rest()));
         let condensation = Condensation::new(SpringGraph::new(&block).unwrap()).unwrap();
         let schur = condensation.held(&nodes) - condensation.compliance(&nodes).unwrap();
 

@@ -37,34 +37,22 @@ impl SpringGraph {
     }
 
     /// Rest positions (m).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn rest(&self) -> &[Vec3] {
+    pub(crate) fn rest(&self) -> &[Vec3] {
         &self.rest
     }
 
     /// Inverse masses (1/kg), zero for held nodes.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn inverse_masses(&self) -> &[f64] {
+    pub(crate) fn inverse_masses(&self) -> &[f64] {
         &self.inverse_masses
     }
 
     /// All springs.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn links(&self) -> &[Link] {
+    pub(crate) fn links(&self) -> &[Link] {
         &self.links
     }
 
     /// The springs at `node`, by their place in [`links`](Self::links).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn at_node(&self, node: u32) -> &[u32] {
+    pub(crate) fn at_node(&self, node: u32) -> &[u32] {
         self.at_node.of(node)
     }
 
@@ -79,7 +67,7 @@ impl SpringGraph {
     ///
     /// # Real-time
     /// For the global actor, at each resync: bounded by the patch; the lists may grow.
-    pub fn neighbours(&self, patch: &[u32], ring: &mut Vec<u32>, held: &mut Vec<u32>) {
+    pub(crate) fn neighbours(&self, patch: &[u32], ring: &mut Vec<u32>, held: &mut Vec<u32>) {
         ring.clear();
         held.clear();
         for &node in patch {

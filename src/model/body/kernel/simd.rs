@@ -115,11 +115,7 @@ impl InstructionSet {
 
     /// Its name in logs and reports.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Portable => "portable",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-        }
+        ["portable", "avx2", "avx512"][self as usize]
     }
 
     /// Does `work` with this set; with the portable one where the machine lacks it.
