@@ -1,11 +1,12 @@
 //! Static condensation, with and without modes of what is left out.
 
+use palpate_model::ModelError;
+
 use super::congruence::Congruence;
 use super::krylov::Projection;
 use super::linalg::Matrix;
-use super::slow_modes::slow_modes;
+use super::modal::slow_modes;
 use super::system::SecondOrder;
-use palpate_model::ModelError;
 
 /// Guyan's reduction (1965, AIAA J. 3): the coordinates in `kept` (in increasing order) stay, all others follow as they do at rest. Exact
 /// at rest for ports at the kept coordinates; mass and damping go along.

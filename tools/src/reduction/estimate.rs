@@ -1,13 +1,13 @@
 //! How wrong a congruence can be, from its residual alone.
 
 use nalgebra::Complex;
+use palpate_model::ModelError;
 
 use super::congruence::Congruence;
 use super::krylov::Projection;
 use super::linalg::{CMatrix, Matrix, complex, product_t, side_by_side};
-use super::slow_modes::slow_modes;
+use super::modal::slow_modes;
 use super::system::{Rayleigh, SecondOrder};
-use palpate_model::ModelError;
 
 /// The slowest mode is found up to this share of its frequency squared.
 const CLOSE: f64 = 0.99;

@@ -1,10 +1,11 @@
 //! Structure-preserving moment matching: a congruence whose basis answers like the whole around chosen frequencies.
 
+use palpate_model::ModelError;
+
 use super::balance::Balanced;
 use super::congruence::Congruence;
 use super::linalg::{DEPENDENT, Matrix, append_orthonormal, orthogonal, push_column};
 use super::system::SecondOrder;
-use palpate_model::ModelError;
 
 /// A reduced model x = T z and its basis T.
 ///

@@ -1,11 +1,12 @@
 //! A deformable body, linear around a state, with a port wherever a tool may touch it.
 
-use super::linalg::Matrix;
-use super::system::{Assembly, Ports, SecondOrder};
 use palpate_model::ModelError;
 use palpate_model::Vec3;
 use palpate_model::body::{Body, State};
 use palpate_model::linear_algebra::dissection;
+
+use super::linalg::Matrix;
+use super::system::{Assembly, Ports, SecondOrder};
 
 /// The movable nodes of a body around a state, three coordinates each.
 ///

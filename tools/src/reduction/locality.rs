@@ -1,6 +1,7 @@
 //! How much of what a tool feels at a contact a patch between held surroundings captures.
 
 use nalgebra::Complex;
+use palpate_model::ModelError;
 
 use super::congruence::Congruence;
 use super::krylov::many_shifts;
@@ -9,7 +10,6 @@ use super::linear_body::LinearBody;
 use super::modal::Modal;
 use super::response::{Response, log_spaced};
 use super::system::{Ports, Rayleigh};
-use palpate_model::ModelError;
 
 /// Frequencies (Hz) at which the response of a contact is matched, rest among them: each costs a factorisation, and three solutions a
 /// contact. They are dense where the slow modes of a body of tissue ring.

@@ -1,11 +1,12 @@
-//! Modes of a proportionally damped system: its responses and Gramians in closed form.
+//! Modes of a proportionally damped system: its responses and Gramians in closed form; and the slowest ones of a large system.
 
 use nalgebra::Complex;
+use palpate_model::ModelError;
 
 use super::congruence::Congruence;
-use super::linalg::{CMatrix, Matrix, complex, pencil_eigen, product, symmetric_eigen};
+use super::linalg::{CMatrix, Matrix, append_orthonormal, complex, pencil_eigen, product, symmetric_eigen};
 use super::response::{Response, largest_gain, log_spaced};
-use super::system::{Ports, Rayleigh, SecondOrder};
+use super::system::{Ports, Rayleigh, SecondOrder, not_held};
 
 /// q'' + c q' + w^2 q = Phi^T B u for each mode, with x = Phi q.
 ///
@@ -149,4 +150,37 @@ pub fn typical_gain_error(system: &SecondOrder, model: &dyn Response, other: &dy
     let hz = system.typical_frequency() / (2.0 * std::f64::consts::PI);
     let frequencies = log_spaced(1e-3 * hz, 1e2 * hz, 240);
     100.0 * largest_gain(model, Some(other), &frequencies) / largest_gain(model, None, &frequencies)
+}
+
+/// The largest number of steps of the iteration.
+const STEPS: usize = 60;
+/// Frequencies squared that change by less than this share in a step are found.
+const TOLERANCE: f64 = 1e-10;
+
+/// w^2 (rad^2/s^2) and shapes (n x count) of the `count` slowest undamped modes, by block inverse iteration (Bathe 1973) from the answers to forces that differ from
+/// coordinate to coordinate.
+pub(super) fn slow_modes(system: &SecondOrder, count: usize) -> Result<(Vec<f64>, Matrix), ModelError> {
+    let n = system.coordinates();
+    let count = count.min(n);
+    let width = (2 * count + 4).min(n);
+    let factor = system.factorised(0.0)?;
+    let mut block =
+        Matrix::from_fn(n, width, |row, column| ((row * (2 * column + 1)) as f64 * 0.7 + column as f64).sin());
+    let mut last = vec![0.0; count];
+    for _ in 0..STEPS {
+        let answers = factor.solve(system.times_mass(&block));
+        let mut basis = Matrix::zeros(n, 0);
+        append_orthonormal(&mut basis, &answers, 1e-12);
+        // Modes of the mass-normalised problem in that span.
+        let small = Congruence::new(system, &basis);
+        let (values, vectors) = pencil_eigen(&small.stiffness, &small.mass).ok_or_else(not_held)?;
+        block = product(&basis, &vectors);
+        let found = values.iter().take(count).zip(&last).all(|(new, old)| (new - old).abs() <= TOLERANCE * new);
+        last = values[..count.min(values.len())].to_vec();
+        if found {
+            break;
+        }
+    }
+    let count = count.min(block.ncols());
+    Ok((last, block.columns(0, count).into_owned()))
 }

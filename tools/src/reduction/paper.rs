@@ -1,8 +1,9 @@
 //! The meshes of the paper's section 2.2: squares and cubes of cells whose top-middle node is moved.
 
+use palpate_model::ModelError;
+
 use super::linalg::Matrix;
 use super::system::{Assembly, Ports, SecondOrder};
-use palpate_model::ModelError;
 
 /// A 2D or 3D lattice of cells with springs and dampers to all neighbours, every edge or face but the top held. Its input is
 /// the displacement of the top's middle node, its output the force that moves it.

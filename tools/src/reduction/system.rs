@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 
 use nalgebra::Complex;
+use palpate_model::ModelError;
 
 use super::linalg::{CMatrix, Matrix, SparseFactor, product_t, side_by_side, span};
-use palpate_model::ModelError;
 
 /// How far damping may be from alpha M + beta K, entry by entry and relative to its largest, to count as proportional.
 const PROPORTIONAL: f64 = 1e-9;
