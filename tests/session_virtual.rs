@@ -6,7 +6,7 @@ use palpate::actors::{DeviceSample, ForceCommand, LocalActor, LocalPorts, ModelS
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
 use palpate::log::{ForceSample, LogRecord};
 use palpate::model::Vec3;
-use palpate::model::blend::Blend;
+use palpate::model::local::Blend;
 use palpate::model::body::{Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
 use palpate::model::integrator::Spectrum;

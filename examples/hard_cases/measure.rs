@@ -118,7 +118,7 @@ fn unequal_masses() -> Result<SpringNetwork, Error> {
     let block = Block::builder([6; 3], [0.05; 3]).fix(Face::ZMin).build()?;
     let lattice = block.lattice();
     let mass = |node: u32| -> f64 {
-        let odd = lattice.place(node).iter().sum::<usize>() % 2 == 1;
+        let odd = lattice.coordinates(node).iter().sum::<usize>() % 2 == 1;
         if odd { 0.5e-6 } else { 0.5e-3 }
     };
     let rest = block.rest().to_vec();

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::body::Body;
 use crate::model::contact::ToolMotion;
-use crate::model::forecast::{ToolForecast, ToolHistory};
+use crate::model::local::{ToolForecast, ToolHistory};
 use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, wider};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;

@@ -4,7 +4,7 @@ use super::cause::Cause;
 use super::messages::{DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
 use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync, ServedBy};
 use crate::model::Vec3;
-use crate::model::contact::{Contact, Mode};
+use crate::model::contact::Contact;
 use crate::model::local::{Kind, LocalModel, PatchGeometry, Resynced, Served, Succession};
 use crate::runtime::{
     Actor, Mode as RunMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
@@ -281,7 +281,7 @@ fn finite_or_zero(force: Vec3) -> Vec3 {
 
 /// What sliding took of the tool's motion `moved` (m) under `force` (N).
 fn friction_work(contact: &Contact, force: Vec3, moved: Vec3) -> f64 {
-    if contact.mode != Mode::Slip {
+    if contact.mode != ContactMode::Slip {
         return 0.0;
     }
     let tangential = force - contact.normal * force.dot(&contact.normal);
@@ -292,12 +292,7 @@ fn contact_sample(time: Nanos, contact: &Contact, force: Vec3) -> ContactSample 
     let along = force.dot(&contact.normal);
     ContactSample {
         time,
-        mode: match contact.mode {
-            Mode::Free => ContactMode::Free,
-            Mode::Stick => ContactMode::Stick,
-            Mode::Slip => ContactMode::Slip,
-            Mode::Lost => ContactMode::Lost,
-        },
+        mode: contact.mode,
         triangle: contact.triangle.unwrap_or(u32::MAX),
         weights: [contact.weights[1], contact.weights[2]],
         normal: contact.normal.into(),

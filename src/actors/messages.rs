@@ -3,7 +3,7 @@
 use crate::devices::DeviceState;
 use crate::model::Vec3;
 use crate::model::body::State;
-use crate::model::contact::{Contact, Mode};
+use crate::model::contact::{Contact, ContactMode};
 use crate::runtime::Nanos;
 
 /// The device's newest state, numbered.
@@ -53,7 +53,7 @@ pub struct ToolView {
     /// Force on the tool (N).
     pub force: Vec3,
     /// State of the contact.
-    pub mode: Mode,
+    pub mode: ContactMode,
 }
 
 /// The newest state of the body, for a program that draws.

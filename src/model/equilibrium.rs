@@ -2,8 +2,8 @@
 
 use super::Vec3;
 use super::body::{Body, State};
-use super::sparse::SparseCholesky;
 use crate::error::ModelError;
+use crate::linear_algebra::{Matrix, SparseFactor, push_block};
 
 /// Residual force per node at which the equilibrium is reached, relative to the largest force in play.
 const TOLERANCE: f64 = 1e-12;
@@ -13,6 +13,23 @@ const MAX_ITERATIONS: usize = 200;
 ///
 /// Newton with the true tangent, or with the clamped one (always positive definite for an anchored body) where the
 /// true one is not positive definite; the step is halved until the residual falls.
+///
+/// ```
+/// use palpate_model::Vec3;
+/// use palpate_model::body::{Block, Body};
+/// use palpate_model::equilibrium::static_equilibrium;
+/// use palpate_model::mesh::Face;
+///
+/// # fn main() -> Result<(), palpate_model::ModelError> {
+/// let mut block = Block::builder([5; 3], [0.04; 3]).fix(Face::ZMin).build()?;
+/// let node = block.lattice().id([2, 2, 4]);
+/// let pulled = block.rest()[node as usize] + Vec3::z() * 0.005;
+/// let state = static_equilibrium(&mut block, &[(node, pulled)])?;
+/// let below = block.lattice().id([2, 2, 3]) as usize;
+/// assert!(state.positions[below].z > block.rest()[below].z, "its neighbours follow");
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
 /// If no equilibrium is found, for instance because nothing anchors the body.
@@ -32,7 +49,6 @@ pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<S
     let mut place = vec![usize::MAX; body.rest().len()];
     free.iter().enumerate().for_each(|(p, &node)| place[node as usize] = p);
 
-    let mut solver = SparseCholesky::default();
     let mut forces = vec![Vec3::zeros(); place.len()];
     body.forces(&state, &mut forces);
     // The start is rest with held nodes displaced, so this is the scale of all forces.
@@ -43,9 +59,8 @@ pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<S
         if before <= TOLERANCE * scale {
             return Ok(state);
         }
-        let Some(step) = [false, true]
-            .into_iter()
-            .find_map(|clamp| newton_step(body, &state, &free, &place, &forces, clamp, &mut solver))
+        let Some(step) =
+            [false, true].into_iter().find_map(|clamp| newton_step(body, &state, &free, &place, &forces, clamp))
         else {
             break;
         };
@@ -81,23 +96,18 @@ fn newton_step(
     place: &[usize],
     forces: &[Vec3],
     clamp: bool,
-    solver: &mut SparseCholesky,
 ) -> Option<Vec<Vec3>> {
     let mut entries = Vec::new();
     body.tangent(state, free, clamp, &mut |block| {
         let (row, column) = (place[block.row as usize], place[block.column as usize]);
         if column != usize::MAX {
-            for r in 0..3 {
-                for c in 0..3 {
-                    entries.push((3 * row + r, 3 * column + c, -block.position[(r, c)]));
-                }
-            }
+            push_block(&mut entries, 3 * row, 3 * column, &-block.position);
         }
     });
-    let mut x: Vec<f64> =
-        free.iter().flat_map(|&node| forces[node as usize].iter().copied().collect::<Vec<_>>()).collect();
-    solver.solve(&entries, &mut x)?;
-    Some(x.as_chunks::<3>().0.iter().map(|&step| Vec3::from(step)).collect())
+    let right = Matrix::from_iterator(3 * free.len(), 1, free.iter().flat_map(|&node| &forces[node as usize]).copied());
+    let x = SparseFactor::of_triplets(3 * free.len(), &entries)?.solve(right);
+    let is_finite = x.iter().all(|x| x.is_finite());
+    is_finite.then(|| x.as_slice().as_chunks::<3>().0.iter().map(|&step| Vec3::from(step)).collect())
 }
 
 #[cfg(test)]

@@ -21,19 +21,19 @@ impl ModelError {
         Self::new(message).at(field)
     }
 
-    /// The same error with its place put in front: `place: earlier place: message`.
+    /// Puts `place` in front of the error's own: `place: earlier place: message`.
     #[must_use]
     pub fn at(mut self, place: &str) -> Self {
         self.place = if self.place.is_empty() { place.to_owned() } else { format!("{place}: {}", self.place) };
         self
     }
 
-    /// The field that it names; may be empty.
+    /// The field that the error names; may be empty.
     pub fn place(&self) -> &str {
         &self.place
     }
 
-    /// What is wrong with it, and what would be right.
+    /// The message: what is wrong with the field, and what would be right.
     pub fn message(&self) -> &str {
         &self.message
     }

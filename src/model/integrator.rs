@@ -17,7 +17,7 @@ pub(super) fn snap(vector: Vec3) -> Vec3 {
 ///
 /// # Real-time
 /// Bounded, real-time safe.
-pub fn accelerate(velocities: &mut [Vec3], forces: &[Vec3], inverse_masses: &[f64], d: f64) {
+pub(crate) fn accelerate(velocities: &mut [Vec3], forces: &[Vec3], inverse_masses: &[f64], d: f64) {
     for ((velocity, force), &inverse_mass) in velocities.iter_mut().zip(forces).zip(inverse_masses) {
         *velocity = snap(*velocity + force * (d * inverse_mass));
     }
@@ -27,7 +27,7 @@ pub fn accelerate(velocities: &mut [Vec3], forces: &[Vec3], inverse_masses: &[f6
 ///
 /// # Real-time
 /// Bounded, real-time safe.
-pub fn advance(positions: &mut [Vec3], velocities: &[Vec3], d: f64) {
+pub(crate) fn advance(positions: &mut [Vec3], velocities: &[Vec3], d: f64) {
     for (position, velocity) in positions.iter_mut().zip(velocities) {
         *position = snap(*position + velocity * d);
     }

@@ -4,25 +4,17 @@
 //! The equations are those of the paper (Jacobs, Moore, Cavusoglu, IJRR 2010) with the corrections that DESIGN.md
 //! lists. One step of any model, whole body or patch, is [`contact::step`].
 
-pub mod blend;
 pub mod body;
 pub mod contact;
-mod dense;
-#[allow(missing_docs, missing_debug_implementations)]
-pub mod dissection;
 pub mod equilibrium;
 mod error;
-pub mod forecast;
-pub mod geometry;
-pub mod implicit;
 pub mod integrator;
+mod linear;
+pub mod linear_algebra;
 pub mod local;
 pub mod mesh;
 pub mod simulation;
-#[allow(missing_docs, missing_debug_implementations)]
-pub mod sparse;
 pub mod surroundings;
-pub mod tangent;
 
 pub use error::ModelError;
 

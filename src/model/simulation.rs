@@ -1,10 +1,10 @@
 //! A whole body with its contacts, advanced tick by tick: the global model, and `full` at the haptic rate.
 
-use super::Vec3;
-use super::body::{Body, State};
-use super::contact::{Contact, Deformable, Law, ToolMotion, Touch, step_all};
-use super::integrator::Spectrum;
+use crate::Vec3;
+use crate::body::{Body, State};
+use crate::contact::{Contact, Deformable, Law, ToolMotion, Touch, step_all};
 use crate::error::ModelError;
+use crate::integrator::Spectrum;
 
 /// How time is divided: ticks of the haptic rate, each of several explicit substeps.
 ///
@@ -16,6 +16,13 @@ pub struct Stepping {
     pub tick: f64,
     /// Explicit substeps per tick, at least one.
     pub substeps: u32,
+}
+
+impl Default for Stepping {
+    /// One substep per millisecond.
+    fn default() -> Self {
+        Self { tick: 1e-3, substeps: 1 }
+    }
 }
 
 impl Stepping {
@@ -83,7 +90,7 @@ impl Simulation {
         Ok(new.with_tool(contact))
     }
 
-    /// The same with one more tool, in `contact`.
+    /// Adds one more tool, which starts in `contact`.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -95,7 +102,7 @@ impl Simulation {
         self
     }
 
-    /// A copy, if the body can make one.
+    /// A copy of body, state and contacts, if the body can make one of itself.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -130,7 +137,7 @@ impl Simulation {
     /// Advances one haptic tick while the one tool moves along `tool`; returns the force on it, its mean over the tick (N).
     ///
     /// # Real-time
-    /// As [`tick_all`](Self::tick_all).
+    /// Bounded and real-time safe if the body's forces are.
     pub fn tick(&mut self, tool: ToolMotion) -> Vec3 {
         self.tick_all(&[tool]);
         self.means[0]
@@ -174,7 +181,7 @@ impl Simulation {
     ///
     /// # Real-time
     /// For the global actor: costs as much as the ticks; `present` keeps the state meanwhile and may grow.
-    pub fn look_ahead(
+    pub(crate) fn look_ahead(
         &mut self,
         ticks: u32,
         motion: impl Fn(usize, u32) -> ToolMotion,
@@ -195,7 +202,7 @@ impl Simulation {
     ///
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
-    pub fn forces_without(&mut self, tool: usize) -> (&State, &[Vec3]) {
+    pub(crate) fn forces_without(&mut self, tool: usize) -> (&State, &[Vec3]) {
         self.body.forces(&self.state, &mut self.forces);
         for other in (0..self.touches.len()).filter(|&other| other != tool) {
             for (node, force) in self.exerted(other) {
@@ -205,11 +212,11 @@ impl Simulation {
         (&self.state, &self.forces)
     }
 
-    /// What all tools but `tool` exert: nodes, each with a force on it (N).
+    /// The nodes that all tools but `tool` press, each with the force on it (N).
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn exerted_beside(&self, tool: usize) -> impl Iterator<Item = (u32, Vec3)> {
+    pub(crate) fn exerted_beside(&self, tool: usize) -> impl Iterator<Item = (u32, Vec3)> {
         (0..self.touches.len()).filter(move |&other| other != tool).flat_map(|other| self.exerted(other))
     }
 
@@ -221,7 +228,7 @@ impl Simulation {
         nodes.into_iter().flat_map(move |nodes| (0..3).map(move |i| (nodes[i], -force * weights[i])))
     }
 
-    /// The body.
+    /// The body that is simulated.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -229,7 +236,7 @@ impl Simulation {
         &*self.body
     }
 
-    /// Positions and velocities.
+    /// Positions and velocities of all nodes of the body.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -237,7 +244,7 @@ impl Simulation {
         &self.state
     }
 
-    /// Positions and velocities, to put in what a local model found.
+    /// Positions and velocities of all nodes, to put in what a local model found.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -245,7 +252,7 @@ impl Simulation {
         &mut self.state
     }
 
-    /// Number of tools.
+    /// Number of tools that touch the body or may touch it.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -261,11 +268,8 @@ impl Simulation {
         &self.touches[tool].contact
     }
 
-    /// The same, to put in what a local model found.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn contact_mut(&mut self, tool: usize) -> &mut Contact {
+    /// The contact of a tool, to put in what a local model found.
+    pub(crate) fn contact_mut(&mut self, tool: usize) -> &mut Contact {
         &mut self.touches[tool].contact
     }
 
@@ -277,7 +281,7 @@ impl Simulation {
         (self.touches[tool].contact, self.means[tool]) = (contact, force);
     }
 
-    /// How contacts are resolved.
+    /// The law by which contacts are resolved.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -285,7 +289,7 @@ impl Simulation {
         &self.law
     }
 
-    /// How time is divided.
+    /// The haptic tick and its substeps.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -305,7 +309,7 @@ impl Simulation {
 /// Substeps per tick of `tick` (s) from the body's stability limit.
 ///
 /// # Real-time
-/// Not real-time safe: as [`Spectrum::estimate`].
+/// Not real-time safe: allocates, and evaluates the body's forces hundreds of times.
 pub fn stable_substeps(body: &mut dyn Body, tick: f64) -> u32 {
     Spectrum::estimate(body).substeps(tick)
 }

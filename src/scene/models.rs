@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-pub use crate::model::blend::BlendKind;
+pub use crate::model::local::BlendKind;
 pub use crate::model::local::{Feedback, Kind as LocalModelKind};
 
 pub use crate::model::local::Prediction;

@@ -8,7 +8,7 @@ use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::log::ModelReason;
 use crate::model::Vec3;
-use crate::model::forecast::ToolForecast;
+use crate::model::local::ToolForecast;
 use crate::model::local::{Aim, wider};
 use crate::model::surroundings::{Bases, SpringGraph};
 use crate::runtime::{Actor, ExchangePort, RateGroup, RuntimeBuilder};

@@ -5,20 +5,20 @@ mod common;
 
 use common::*;
 use nalgebra::Complex;
-use palpate::model::Vec3;
-use palpate::model::body::{Body, State};
-use palpate::model::contact::Contact;
 use palpate_cli::reduction::{
     Balanced, Congruence, ErrorBound, LinearBody, LocalityCheck, Modal, PaperMesh, Ports, Projection, Response,
     SecondOrder, StiffnessError, condensed, craig_bampton, gain_error, guyan, largest_gain, log_spaced, low_rank,
     many_shifts, one_shift, patch, spread_shifts,
 };
+use palpate_model::Vec3;
+use palpate_model::body::{Body, State};
+use palpate_model::contact::Contact;
 
 /// k of the paper's meshes (N/m): the references are in units of it.
 const K: f64 = 100.0;
 
 fn json(name: &str) -> serde_json::Value {
-    let path = format!("{}/tests/reference/reduction/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/../tests/reference/reduction/{name}.json", env!("CARGO_MANIFEST_DIR"));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

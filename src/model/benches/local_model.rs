@@ -9,7 +9,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_ma
 use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, State};
 use palpate_model::contact::{Contact, Law, ToolMotion};
-use palpate_model::forecast::ToolForecast;
+use palpate_model::local::ToolForecast;
 use palpate_model::local::{Kind, LocalModel, ResyncView, Template};
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};

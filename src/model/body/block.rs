@@ -1,14 +1,26 @@
 //! The block of point masses joined by springs to all 26 neighbours: the paper's body.
 
-use super::super::Vec3;
-use super::super::mesh::{Face, Lattice, Surface};
 use super::kernel::{InstructionSet, LatticeKernel};
 use super::lattice_springs::LatticeSprings;
-use super::region::{Material, Region, materials, region_field};
+use super::region::{Material, Region, materials};
 use super::{Body, Link, State, TangentBlock};
+use crate::Vec3;
 use crate::error::ModelError;
+use crate::mesh::{Face, Lattice, Surface};
 
 /// A block of nodes and springs; made by [`Block::builder`].
+///
+/// ```
+/// use palpate_model::body::Block;
+/// use palpate_model::mesh::Face;
+///
+/// # fn main() -> Result<(), palpate_model::ModelError> {
+/// let builder = Block::builder([12; 3], [0.1; 3]).stiffness(30.0).damping_ratio(0.3).node_mass(0.5e-3);
+/// let block = builder.fix(Face::ZMin).build()?;
+/// assert_eq!(block.spring_count(), 18_788);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Real-time
 /// Its forces are bounded and real-time safe; to make it or a copy of it allocates.
@@ -43,7 +55,7 @@ impl BlockBuilder {
         self
     }
 
-    /// zeta in b = zeta sqrt(2 m k), the paper's definition.
+    /// Damping ratio zeta of every spring: b = zeta sqrt(2 m k), the paper's definition.
     #[must_use]
     pub fn damping_ratio(mut self, zeta: f64) -> Self {
         self.material.damping_ratio = zeta;
@@ -57,7 +69,7 @@ impl BlockBuilder {
         self
     }
 
-    /// Makes a part of it of something else; a later region wins where several give the same.
+    /// Makes a part of the block of something else; a later region wins where several give the same.
     ///
     /// A node has the material of the regions that hold its rest position. A spring between two materials is half a
     /// spring of each in series: k = 2 k1 k2 / (k1 + k2), as a rod that changes halfway, and b likewise from each node's
@@ -73,6 +85,14 @@ impl BlockBuilder {
     pub fn fix(mut self, face: Face) -> Self {
         self.fixed.push(face);
         self
+    }
+
+    /// Refuses regions that cannot be or hold no node; the block is to have two nodes or more along each axis.
+    ///
+    /// # Errors
+    /// If there is one: `region[index].key` and what is wrong with it.
+    pub fn check_regions(&self) -> Result<(), ModelError> {
+        materials(Lattice { nodes: self.nodes }, self.size, self.material, &self.regions).map(drop)
     }
 
     /// Makes the block.
@@ -101,7 +121,7 @@ impl BlockBuilder {
         let spacing: [f64; 3] = std::array::from_fn(|axis| self.size[axis] / (self.nodes[axis] - 1) as f64);
         let at = |id: usize| lattice.coordinates(id as u32);
         let held = |id: usize| self.fixed.iter().any(|&face| face.holds(at(id), self.nodes));
-        let materials = self.materials()?;
+        let materials = materials(lattice, self.size, self.material, &self.regions)?;
         let springs = LatticeSprings::new(&lattice, spacing, &materials);
         let inverse_mass = |id: usize| if held(id) { 0.0 } else { 1.0 / materials[id].node_mass };
         Ok(Block {
@@ -118,20 +138,6 @@ impl BlockBuilder {
             springs,
         })
     }
-
-    /// The material of every node.
-    fn materials(&self) -> Result<Vec<Material>, ModelError> {
-        materials(Lattice { nodes: self.nodes }, self.size, self.material, &self.regions)
-            .map_err(|(index, (key, message))| ModelError::of(&region_field(index, key), message))
-    }
-
-    /// Checks the regions alone; nodes, sizes and the material around them must be sound.
-    ///
-    /// # Errors
-    /// If a region holds no node, differs in nothing or is impossible; the place is `region[INDEX].KEY`.
-    pub fn check_regions(&self) -> Result<(), ModelError> {
-        self.materials().map(drop)
-    }
 }
 
 impl Block {
@@ -141,22 +147,22 @@ impl Block {
         BlockBuilder { nodes, size, material, regions: Vec::new(), fixed: Vec::new() }
     }
 
-    /// The lattice: numbering and neighbours.
+    /// The lattice of the nodes: their numbering and neighbours.
     pub fn lattice(&self) -> Lattice {
         self.lattice
     }
 
-    /// Number of springs.
+    /// Number of springs of the block.
     pub fn spring_count(&self) -> usize {
         self.springs.len()
     }
 
-    /// The instruction set that its forces are computed with on this machine.
+    /// The name of the instruction set that forces of blocks are computed with on this machine.
     pub fn instruction_set() -> &'static str {
         InstructionSet::detect().name()
     }
 
-    /// Computes its forces with `set`, to compare sets; the fastest one is chosen otherwise.
+    /// Computes the block's forces with `set`, to compare sets; the fastest one is chosen otherwise.
     ///
     /// # Errors
     /// If this machine does not have it.
@@ -165,7 +171,7 @@ impl Block {
         Ok(self)
     }
 
-    /// Computes its forces on `cores` cores: the calling thread and threads of its own, which copies share. Worth it
+    /// Computes the block's forces on `cores` cores: the calling thread and threads of its own, which copies share. Worth it
     /// from some 1,000 nodes on if the other cores are free. Forces are bit-identical from run to run for one number of
     /// cores. With more than one, evaluations are no longer real-time safe: they allocate and may block.
     ///

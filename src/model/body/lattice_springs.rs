@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use super::super::mesh::Lattice;
 use super::kernel::{LANES, Lane};
 use super::region::{Material, in_series};
 use super::spring::Spring;
+use crate::mesh::Lattice;
 
 /// All springs in one direction: from node p to p + `delta`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,12 +38,13 @@ pub(super) enum Elasticity {
 /// Springs to all 26 neighbours of every node.
 #[derive(Clone, Debug)]
 pub(super) struct LatticeSprings {
-    nodes: usize,
-    elasticity: Elasticity,
-    offsets: [Offset; 13],
+    /// Number of nodes.
+    pub(super) nodes: usize,
+    pub(super) elasticity: Elasticity,
+    pub(super) offsets: [Offset; 13],
     /// For every eight nodes p and every offset, whose bit n says that the spring from p + n is there: where the
     /// lattice ends there is none.
-    exist: Vec<[u8; 13]>,
+    pub(super) exist: Vec<[u8; 13]>,
 }
 
 impl LatticeSprings {
@@ -69,28 +70,9 @@ impl LatticeSprings {
         Self { nodes, elasticity, offsets, exist }
     }
 
-    /// Number of nodes.
-    pub(super) fn nodes(&self) -> usize {
-        self.nodes
-    }
-
     /// How far the nodes of a spring are apart at most, in the numbering.
     pub(super) fn reach(&self) -> usize {
         self.offsets.iter().map(|offset| offset.delta).max().unwrap_or(0)
-    }
-
-    /// Stiffness and damping of the springs.
-    pub(super) fn elasticity(&self) -> &Elasticity {
-        &self.elasticity
-    }
-
-    pub(super) fn offsets(&self) -> &[Offset; 13] {
-        &self.offsets
-    }
-
-    /// Which springs are there, for every eight nodes.
-    pub(super) fn exist(&self) -> &[[u8; 13]] {
-        &self.exist
     }
 
     /// Number of springs.

@@ -13,22 +13,23 @@ pub use kernel::InstructionSet;
 pub use network::{SpringNetwork, SpringNetworkBuilder};
 pub use region::Region;
 pub use shape::Shape;
+pub(crate) use spring::assemble;
 pub use spring::{Spring, SpringTangent};
 
-use super::mesh::Surface;
-use super::{Mat3, Vec3};
+use crate::mesh::Surface;
+use crate::{Mat3, Vec3};
 
 /// Positions (m) and velocities (m/s) of all nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
-    /// One position per node.
+    /// The position of each node (m).
     pub positions: Vec<Vec3>,
-    /// One velocity per node.
+    /// The velocity of each node (m/s).
     pub velocities: Vec<Vec3>,
 }
 
 impl State {
-    /// At rest at `positions`.
+    /// The state of nodes that rest at `positions` (m).
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -79,7 +80,7 @@ impl TangentBlock {
 pub struct Link {
     /// The nodes that it joins.
     pub nodes: [u32; 2],
-    /// The spring.
+    /// The spring itself.
     pub spring: Spring,
 }
 
@@ -87,6 +88,21 @@ pub struct Link {
 ///
 /// The block of springs is one implementation; a program brings its own by implementing this trait. Forces may be
 /// non-linear in the positions and must be linear in the velocities. Masses need not be equal.
+///
+/// ```
+/// use palpate_model::Vec3;
+/// use palpate_model::body::{Block, Body, State};
+///
+/// # fn main() -> Result<(), palpate_model::ModelError> {
+/// let mut body: Box<dyn Body> = Box::new(Block::builder([3; 3], [0.02; 3]).build()?);
+/// let mut state = State::at_rest(body.rest());
+/// state.positions[26].z += 0.001;
+/// let mut forces = vec![Vec3::zeros(); body.rest().len()];
+/// body.forces(&state, &mut forces);
+/// assert!(forces[26].z < 0.0, "its springs pull the node back");
+/// # Ok(())
+/// # }
+/// ```
 pub trait Body: Send + std::fmt::Debug {
     /// Rest positions (m), one per node.
     ///
@@ -145,7 +161,7 @@ pub trait Body: Send + std::fmt::Debug {
         None
     }
 
-    /// How many springs [`springs`](Self::springs) has; `None` if it has none to give.
+    /// The number of springs that [`springs`](Self::springs) gives; `None` if it has none to give.
     ///
     /// # Real-time
     /// Not called in a tick: may allocate.

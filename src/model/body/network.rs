@@ -1,16 +1,33 @@
 //! A body of any nodes and springs.
 
-use super::super::Vec3;
-use super::super::mesh::Surface;
 use super::kernel::{InstructionSet, NetworkKernel};
 use super::{Body, Link, Spring, State, TangentBlock};
+use crate::Vec3;
 use crate::error::ModelError;
+use crate::mesh::{Lists, Surface};
 
 /// Point masses joined by an arbitrary list of springs; made by [`SpringNetwork::builder`].
 ///
 /// Nodes keep the numbers that the builder got. For its forces they are renumbered inside and the springs put in batches
 /// of eight without a common node; forces are bit-identical from run to run, and change in the last digits
 /// with the order of nodes and springs.
+///
+/// ```
+/// use palpate_model::Vec3;
+/// use palpate_model::body::{Body, Spring, SpringNetwork};
+///
+/// # fn main() -> Result<(), palpate_model::ModelError> {
+/// let corners = [Vec3::zeros(), Vec3::x() * 0.01, Vec3::y() * 0.01, Vec3::z() * 0.01];
+/// let spring = |i: usize, j: usize| {
+///     (i as u32, j as u32, Spring { stiffness: 30.0, damping: 0.1, rest_length: (corners[i] - corners[j]).norm() })
+/// };
+/// let springs = [spring(0, 1), spring(0, 2), spring(0, 3), spring(1, 2), spring(2, 3), spring(3, 1)];
+/// let builder = SpringNetwork::builder(corners.to_vec()).masses(vec![1e-3; 4]).springs(springs).fix(0);
+/// let network = builder.surface(vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).build()?;
+/// assert_eq!(network.spring_count(), Some(6));
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Real-time
 /// Its forces are bounded and real-time safe; to make it or a copy of it allocates.
@@ -20,10 +37,8 @@ pub struct SpringNetwork {
     inverse_masses: Vec<f64>,
     surface: Surface,
     springs: Vec<(u32, u32, Spring)>,
-    /// Where each node's list begins in `at_node`; one entry more than nodes.
-    node_start: Vec<u32>,
-    /// The springs at each node and the nodes at their other ends, one list after the other.
-    at_node: Vec<(u32, u32)>,
+    /// The springs at each node.
+    at_node: Lists,
     kernel: NetworkKernel,
 }
 
@@ -80,8 +95,8 @@ impl SpringNetworkBuilder {
     ///
     /// # Errors
     /// If there are no nodes, a number is not finite, a mass or rest length is not positive, a stiffness or damping is
-    /// negative, a spring joins a node to itself, something names a node that is not there, or the surface is not a
-    /// manifold.
+    /// negative, a spring joins a node to itself or to one at the same place, something names a node that is not there, or
+    /// the surface is not a manifold.
     pub fn build(self) -> Result<SpringNetwork, ModelError> {
         let nodes = self.rest.len();
         if nodes == 0 || nodes >= u32::MAX as usize {
@@ -92,7 +107,10 @@ impl SpringNetworkBuilder {
             return Err(ModelError::of("nodes", message));
         }
         if self.masses.len() != nodes {
-            return Err(ModelError::of("masses", format!("{} for {nodes} nodes: one each is needed", self.masses.len())));
+            return Err(ModelError::of(
+                "masses",
+                format!("{} for {nodes} nodes: one each is needed", self.masses.len()),
+            ));
         }
         if let Some((n, m)) = self.masses.iter().enumerate().find(|(_, m)| !(m.is_finite() && **m > 0.0)) {
             let message = format!("node {n} has {m} kg: a finite value above 0 is needed");
@@ -102,32 +120,34 @@ impl SpringNetworkBuilder {
             return Err(ModelError::of("fix", format!("node {node}: there are only {nodes}")));
         }
         for (n, spring) in self.springs.iter().enumerate() {
-            check(spring, nodes).map_err(|what| ModelError::of("springs", format!("spring {n}: {what}")))?;
+            check(spring, &self.rest).map_err(|what| ModelError::of("springs", format!("spring {n}: {what}")))?;
         }
         let mut inverse_masses: Vec<f64> = self.masses.iter().map(|m| 1.0 / m).collect();
         for node in self.held {
             inverse_masses[node as usize] = 0.0;
         }
-        let (node_start, at_node) = by_node(nodes, &self.springs);
+        let ends = self.springs.iter().zip(0..).flat_map(|(&(i, j, _), spring)| [(i, spring), (j, spring)]);
         Ok(SpringNetwork {
             surface: Surface::new(nodes, self.triangles)?,
             kernel: NetworkKernel::new(nodes, &self.springs),
             rest: self.rest,
             inverse_masses,
+            at_node: Lists::new(nodes, ends),
             springs: self.springs,
-            node_start,
-            at_node,
         })
     }
 }
 
 /// What is wrong with a spring.
-fn check(&(i, j, spring): &(u32, u32, Spring), nodes: usize) -> Result<(), String> {
-    if i.max(j) as usize >= nodes {
-        return Err(format!("nodes {i} and {j}: there are only {nodes}"));
+fn check(&(i, j, spring): &(u32, u32, Spring), rest: &[Vec3]) -> Result<(), String> {
+    if i.max(j) as usize >= rest.len() {
+        return Err(format!("nodes {i} and {j}: there are only {}", rest.len()));
     }
     if i == j {
         return Err(format!("it joins node {i} to itself"));
+    }
+    if rest[i as usize] == rest[j as usize] {
+        return Err(format!("nodes {i} and {j} are at the same place, so that it has no direction: move one of them"));
     }
     let not_negative = |value: f64| value.is_finite() && value >= 0.0;
     if !(not_negative(spring.stiffness) && not_negative(spring.damping)) {
@@ -140,18 +160,6 @@ fn check(&(i, j, spring): &(u32, u32, Spring), nodes: usize) -> Result<(), Strin
     Ok(())
 }
 
-/// Each node's springs and neighbours, one list after the other, and where the lists begin.
-fn by_node(nodes: usize, springs: &[(u32, u32, Spring)]) -> (Vec<u32>, Vec<(u32, u32)>) {
-    let mut ends: Vec<(u32, u32, u32)> = Vec::with_capacity(2 * springs.len());
-    for (n, &(i, j, _)) in springs.iter().enumerate() {
-        ends.extend([(i, n as u32, j), (j, n as u32, i)]);
-    }
-    ends.sort_unstable();
-    let start = |node| ends.partition_point(|&(at, ..)| at < node) as u32;
-    let starts = (0..=nodes as u32).map(start).collect();
-    (starts, ends.into_iter().map(|(_, spring, other)| (spring, other)).collect())
-}
-
 impl SpringNetwork {
     /// Starts a network of nodes at `rest` (m), without springs and surface; masses must be given.
     pub fn builder(rest: Vec<Vec3>) -> SpringNetworkBuilder {
@@ -159,12 +167,12 @@ impl SpringNetwork {
         SpringNetworkBuilder { rest, masses, held, springs, triangles }
     }
 
-    /// Its springs and the nodes that they join, as the builder got them.
+    /// The springs and the nodes that they join, as the builder got them.
     pub fn springs(&self) -> &[(u32, u32, Spring)] {
         &self.springs
     }
 
-    /// Computes its forces with `set`, to compare sets; the fastest one is chosen otherwise.
+    /// Computes the network's forces with `set`, to compare sets; the fastest one is chosen otherwise.
     ///
     /// # Errors
     /// If this machine does not have it.
@@ -173,7 +181,7 @@ impl SpringNetwork {
         Ok(self)
     }
 
-    /// Computes its forces on `cores` cores: the calling thread and threads of its own, which copies share. Worth it
+    /// Computes the network's forces on `cores` cores: the calling thread and threads of its own, which copies share. Worth it
     /// from some 1,000 nodes on if the other cores are free. Forces are bit-identical from run to run for one number of
     /// cores. With more than one, evaluations are no longer real-time safe: they allocate and may block.
     ///
@@ -187,12 +195,12 @@ impl SpringNetwork {
 
     /// The springs at `node` and their other ends, with the differences of position and velocity to there.
     fn around<'a>(&'a self, state: &'a State, node: u32) -> impl Iterator<Item = (u32, Spring, Vec3, Vec3)> + 'a {
-        let node = node as usize;
-        let list = &self.at_node[self.node_start[node] as usize..self.node_start[node + 1] as usize];
-        list.iter().map(move |&(spring, other)| {
-            let to = other as usize;
-            let along = state.positions[to] - state.positions[node];
-            (other, self.springs[spring as usize].2, along, state.velocities[to] - state.velocities[node])
+        self.at_node.of(node).iter().map(move |&spring| {
+            let (i, j, spring) = self.springs[spring as usize];
+            let other = if i == node { j } else { i };
+            let (from, to) = (node as usize, other as usize);
+            let along = state.positions[to] - state.positions[from];
+            (other, spring, along, state.velocities[to] - state.velocities[from])
         })
     }
 }

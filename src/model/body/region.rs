@@ -1,17 +1,18 @@
 //! Regions of a block that are made of something else: layers and inclusions.
 
-use super::super::mesh::Lattice;
-use super::shape::Shape;
+use super::shape::{RegionFault, Shape};
+use crate::error::ModelError;
+use crate::mesh::Lattice;
 
 /// What the nodes of a block and the halves of the springs at them are made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Material {
+pub(super) struct Material {
     /// k of a spring between two such nodes (N/m).
-    pub(crate) stiffness: f64,
+    pub(super) stiffness: f64,
     /// zeta in b = zeta sqrt(2 m k).
-    pub(crate) damping_ratio: f64,
+    pub(super) damping_ratio: f64,
     /// m of the node (kg).
-    pub(crate) node_mass: f64,
+    pub(super) node_mass: f64,
 }
 
 impl Material {
@@ -39,27 +40,28 @@ pub(super) fn in_series(a: f64, b: f64) -> f64 {
 
 /// A part of a block that differs in material. What it leaves out stays as it was: the block's, or an earlier region's.
 ///
+/// ```
+/// use palpate_model::body::{Block, Region, Shape};
+///
+/// # fn main() -> Result<(), palpate_model::ModelError> {
+/// let nodule = Region::new(Shape::Sphere { centre: [0.05, 0.05, 0.07], radius: 0.02 }).stiffness(300.0);
+/// let block = Block::builder([12; 3], [0.1; 3]).stiffness(30.0).region(nodule).build()?;
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
-    /// Where: all nodes whose rest position is in it.
+    /// The part: all nodes whose rest position is in this shape.
     pub shape: Shape,
-    /// k of a spring between two of its nodes (N/m).
+    /// Stiffness k of a spring between two of the region's nodes (N/m).
     pub stiffness: Option<f64>,
-    /// zeta in b = zeta sqrt(2 m k).
+    /// Damping ratio zeta in b = zeta sqrt(2 m k).
     pub damping_ratio: Option<f64>,
-    /// Mass of each of its nodes (kg).
+    /// Mass of each of the region's nodes (kg).
     pub node_mass: Option<f64>,
-}
-
-/// What is wrong with a region: the key in scene files, and what would be right.
-pub(crate) type RegionFault = (&'static str, String);
-
-/// The dotted place of `key` in the region of number `index`.
-pub(crate) fn region_field(index: usize, key: &str) -> String {
-    let dot = if key.is_empty() { "" } else { "." };
-    format!("region[{index}]{dot}{key}")
 }
 
 impl Region {
@@ -72,19 +74,19 @@ impl Region {
         Self { shape, stiffness: None, damping_ratio: None, node_mass: None }
     }
 
-    /// Stiffness of a spring between two of its nodes (N/m).
+    /// Sets the stiffness of a spring between two of the region's nodes (N/m).
     #[must_use]
     pub fn stiffness(self, n_per_m: f64) -> Self {
         Self { stiffness: Some(n_per_m), ..self }
     }
 
-    /// zeta in b = zeta sqrt(2 m k), with m and k as they are in the region.
+    /// Sets the damping ratio zeta in b = zeta sqrt(2 m k), with m and k as they are in the region.
     #[must_use]
     pub fn damping_ratio(self, zeta: f64) -> Self {
         Self { damping_ratio: Some(zeta), ..self }
     }
 
-    /// Mass of each of its nodes (kg).
+    /// Sets the mass of each of the region's nodes (kg).
     #[must_use]
     pub fn node_mass(self, kg: f64) -> Self {
         Self { node_mass: Some(kg), ..self }
@@ -160,16 +162,19 @@ impl Region {
 /// The material of every node of a block of `size` (m): `base`, and over it `regions` in order.
 ///
 /// # Errors
-/// The number of the region that cannot be, and what is wrong with it.
-pub(crate) fn materials(
+/// If a region cannot be: `region[index].key` and what is wrong with it.
+pub(super) fn materials(
     lattice: Lattice,
     size: [f64; 3],
     base: Material,
     regions: &[Region],
-) -> Result<Vec<Material>, (usize, RegionFault)> {
+) -> Result<Vec<Material>, ModelError> {
     let mut materials = vec![base; lattice.len()];
     for (index, region) in regions.iter().enumerate() {
-        region.apply(lattice, size, &mut materials).map_err(|fault| (index, fault))?;
+        region.apply(lattice, size, &mut materials).map_err(|(key, message)| {
+            let dot = if key.is_empty() { "" } else { "." };
+            ModelError::of(&format!("region[{index}]{dot}{key}"), message)
+        })?;
     }
     Ok(materials)
 }
@@ -272,8 +277,8 @@ mod tests {
             (Region::new(inside).node_mass(1e-320), "", "beyond all numbers"),
         ] {
             let error = materials(LATTICE, SIZE, BASE, &[stiff(inside), region]).unwrap_err();
-            assert_eq!((error.0, error.1.0), (1, key), "{region:?}");
-            assert!(error.1.1.contains(words), "{region:?}: {}", error.1.1);
+            assert_eq!(error.place().trim_start_matches("region[1]").trim_start_matches('.'), key, "{region:?}");
+            assert!(error.message().contains(words), "{region:?}: {error}");
         }
     }
 }

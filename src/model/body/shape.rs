@@ -1,6 +1,7 @@
 //! Shapes of regions: which nodes of a block lie in them.
 
-use super::region::RegionFault;
+/// What is wrong with a region: the key in scene files, and what would be right.
+pub(super) type RegionFault = (&'static str, String);
 
 /// A part of space, closed: what lies on its boundary belongs to it.
 ///
@@ -10,9 +11,9 @@ use super::region::RegionFault;
 pub enum Shape {
     /// All points within `radius` of `centre` (m).
     Sphere {
-        /// Its middle (m).
+        /// The sphere's middle (m).
         centre: [f64; 3],
-        /// Its radius (m).
+        /// The sphere's radius (m).
         radius: f64,
     },
     /// All points between two corners (m).
@@ -24,9 +25,9 @@ pub enum Shape {
     },
     /// An ellipsoid with its axes along x, y and z.
     Ellipsoid {
-        /// Its middle (m).
+        /// The ellipsoid's middle (m).
         centre: [f64; 3],
-        /// Its semi-axes (m).
+        /// The ellipsoid's semi-axes (m).
         radii: [f64; 3],
     },
     /// All points between two planes.
@@ -70,40 +71,32 @@ impl Shape {
         }
     }
 
-    /// What is wrong with it: the number's name in scene files, and what would be right.
+    /// The first of its numbers that is wrong.
     pub(super) fn fault(&self) -> Option<RegionFault> {
         let is_finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         let is_positive = |values: &[f64]| is_finite(values) && values.iter().all(|&value| value > 0.0);
-        let fault = |key, message| Some((key, message));
+        let refuse = |is_good: bool, key, what: String| (!is_good).then_some((key, what));
+        let finite = |key, x: [f64; 3]| refuse(is_finite(&x), key, format!("is {x:?}, must be three finite numbers"));
         match *self {
-            Self::Sphere { centre, .. } if !is_finite(&centre) => {
-                fault("shape.sphere.centre_m", format!("is {centre:?}, must be three finite numbers"))
+            Self::Sphere { centre, radius } => finite("shape.sphere.centre_m", centre).or_else(|| {
+                let what = format!("is {radius}, must be a finite number above 0");
+                refuse(is_positive(&[radius]), "shape.sphere.radius_m", what)
+            }),
+            Self::Ellipsoid { centre, radii } => finite("shape.ellipsoid.centre_m", centre).or_else(|| {
+                let what = format!("is {radii:?}, must be three finite numbers above 0");
+                refuse(is_positive(&radii), "shape.ellipsoid.radii_m", what)
+            }),
+            Self::Box { min, max } => finite("shape.box.min_m", min).or_else(|| {
+                let what = format!("is {max:?}, must be three finite numbers of at least {min:?}");
+                refuse(is_finite(&max) && (0..3).all(|n| max[n] >= min[n]), "shape.box.max_m", what)
+            }),
+            Self::Layer { axis, from, to } => {
+                let axis = refuse(axis < 3, "shape.layer.axis", format!("is {axis}, must be 0, 1 or 2 for x, y or z"));
+                let least = format!("is {to}, must be a finite number of at least from_m, {from}");
+                let from_fault = format!("is {from}, must be a finite number");
+                axis.or_else(|| refuse(from.is_finite(), "shape.layer.from_m", from_fault))
+                    .or_else(|| refuse(to.is_finite() && to >= from, "shape.layer.to_m", least))
             }
-            Self::Sphere { radius, .. } if !is_positive(&[radius]) => {
-                fault("shape.sphere.radius_m", format!("is {radius}, must be a finite number above 0"))
-            }
-            Self::Ellipsoid { centre, .. } if !is_finite(&centre) => {
-                fault("shape.ellipsoid.centre_m", format!("is {centre:?}, must be three finite numbers"))
-            }
-            Self::Ellipsoid { radii, .. } if !is_positive(&radii) => {
-                fault("shape.ellipsoid.radii_m", format!("is {radii:?}, must be three finite numbers above 0"))
-            }
-            Self::Box { min, .. } if !is_finite(&min) => {
-                fault("shape.box.min_m", format!("is {min:?}, must be three finite numbers"))
-            }
-            Self::Box { min, max } if !is_finite(&max) || (0..3).any(|n| max[n] < min[n]) => {
-                fault("shape.box.max_m", format!("is {max:?}, must be three finite numbers of at least {min:?}"))
-            }
-            Self::Layer { axis, .. } if axis > 2 => {
-                fault("shape.layer.axis", format!("is {axis}, must be 0, 1 or 2 for x, y or z"))
-            }
-            Self::Layer { from, .. } if !from.is_finite() => {
-                fault("shape.layer.from_m", format!("is {from}, must be a finite number"))
-            }
-            Self::Layer { from, to, .. } if !(to.is_finite() && to >= from) => {
-                fault("shape.layer.to_m", format!("is {to}, must be a finite number of at least from_m, {from}"))
-            }
-            _ => None,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! One spring with a parallel damper: force and tangent.
 
-use super::super::{Mat3, Vec3};
+use crate::{Mat3, Vec3};
 
 /// A spring and a damper in parallel between two nodes.
 ///
@@ -29,27 +29,28 @@ impl Spring {
     /// A spring shorter than this share of its rest length has no direction: no force, no tangent.
     pub const COLLAPSED: f64 = 1e-3;
 
+    /// The unit vector along a spring whose second node is `along` (m) from the first, and its length (m); `None` for one that
+    /// is too short to have a direction.
+    pub(crate) fn direction(&self, along: Vec3) -> Option<(Vec3, f64)> {
+        let length = along.norm();
+        (length >= Self::COLLAPSED * self.rest_length).then(|| (along / length, length))
+    }
+
     /// Force on the first node (N): `[k (L - L0) + b u.(v_j - v_i)] u`, u the unit vector to the second node.
     ///
     /// `along` = x_j - x_i (m), `closing` = v_j - v_i (m/s).
     pub fn force(&self, along: Vec3, closing: Vec3) -> Vec3 {
-        let length = along.norm();
-        if length < Self::COLLAPSED * self.rest_length {
-            return Vec3::zeros();
-        }
-        let u = along / length;
+        let Some((u, length)) = self.direction(along) else { return Vec3::zeros() };
         u * (self.stiffness * (length - self.rest_length) + self.damping * u.dot(&closing))
     }
 
     /// The tangent at `along` = x_j - x_i, `closing` = v_j - v_i.
     ///
-    /// With `clamp` the geometric term (s / L)(I - u u^T) of a spring under compression (s < 0) is left out.
+    /// `clamp` leaves the geometric term (s / L)(I - u u^T) of a spring under compression (s < 0) out.
     pub fn tangent(&self, along: Vec3, closing: Vec3, clamp: bool) -> SpringTangent {
-        let length = along.norm();
-        if length < Self::COLLAPSED * self.rest_length {
+        let Some((u, length)) = self.direction(along) else {
             return SpringTangent { position: Mat3::zeros(), velocity: Mat3::zeros() };
-        }
-        let u = along / length;
+        };
         let axial = u * u.transpose();
         let rate = u.dot(&closing);
         let tension = self.stiffness * (length - self.rest_length) + self.damping * rate;
@@ -58,6 +59,24 @@ impl Spring {
         SpringTangent {
             position: axial * self.stiffness + (Mat3::identity() - axial) * geometric + turning,
             velocity: axial * self.damping,
+        }
+    }
+}
+
+/// Adds what a spring along the unit vector `direction` gives to a symmetric matrix, `weight` times u u^T: its blocks at the
+/// `places` of its two nodes, as far as these have one, and the opposite between them.
+pub(crate) fn assemble(
+    direction: Vec3,
+    weight: f64,
+    places: [Option<usize>; 2],
+    mut add: impl FnMut(usize, usize, Mat3),
+) {
+    let block = direction * direction.transpose() * weight;
+    for (end, row) in places.into_iter().enumerate() {
+        for (other, column) in places.into_iter().enumerate() {
+            if let (Some(row), Some(column)) = (row, column) {
+                add(row, column, if end == other { block } else { -block });
+            }
         }
     }
 }

@@ -1,53 +1,46 @@
 //! The contact of an implicit step: normal and tangential motion couple, and every node answers.
 
-use super::super::implicit::ImplicitStep;
-use super::super::{Mat3, Vec3};
 use super::deformable::Deformable;
-use super::normal::contact_normal;
-use super::resolve::{IMMOVABLE, NO_TIME, Place, Resolution, target_velocity};
-use super::triangle::interpolate;
-use super::{Law, Mode, ToolMotion};
+use super::resolve::{Place, Resolution, approach};
+use super::{ContactMode, Law, ToolMotion};
+use crate::linear::ImplicitStep;
+use crate::{Mat3, Vec3};
 
 /// Rounds for the direction of slip; it turns by the anisotropy of W, a few degrees, and less in every round.
 const ROUNDS: usize = 8;
 
-/// As [`super::resolve::resolve`], with the compliance W = G A^-1 G^T (3 x 3) of the contact point in place of the number
+/// Solves the contact as [`super::resolve::resolve`] does, with the compliance W = G A^-1 G^T (3 x 3) of the contact point in place of the number
 /// S: W J = G v* - v_t to stick, n.W (n + mu t) j_n = n.(G v* - v_t) to slip, v = v* - A^-1 G^T J.
 pub(super) fn resolve_coupled(
     body: &mut Deformable<'_>,
     system: &ImplicitStep,
     law: &Law,
-    Place { triangle, weights, is_glued }: Place<'_>,
+    place: Place<'_>,
     tool: ToolMotion,
     d_c: f64,
 ) -> Resolution {
-    let nodes = body.corners(triangle);
-    let normal = contact_normal(law.normals, body.surface, body.positions, triangle, weights);
+    let (nodes, weights) = (body.corners(place.triangle), place.weights);
     let compliance = system.compliance(&nodes, weights);
-    if compliance.trace() < IMMOVABLE {
-        return Resolution::without_force(Mode::Lost, normal);
-    }
-    if d_c < NO_TIME {
-        return Resolution::without_force(Mode::Free, normal);
-    }
-    let point = interpolate(weights, &nodes.map(|node| body.positions[node]));
-    let velocity = interpolate(weights, &nodes.map(|node| body.velocities[node]));
-    let closing = velocity - target_velocity(point, &normal, tool, d_c, system.step());
-    let (mode, impulse) = impulse(&compliance, closing, &normal, if is_glued { None } else { Some(law.friction) });
+    let (normal, closing) = match approach(body, law, place, tool, [d_c, system.step()], compliance.trace()) {
+        Ok(found) => found,
+        Err(without_force) => return without_force,
+    };
+    let friction = if place.is_glued { None } else { Some(law.friction) };
+    let (mode, impulse) = impulse(&compliance, closing, &normal, friction);
     system.push(body.velocities, &nodes, weights, impulse);
     Resolution { mode, impulse, normal }
 }
 
 /// The impulse on the tool (N s) that takes away `closing` = G v* - v_t (m/s) within the cone of `friction`; `None` is glued.
 /// Whatever the numbers, the impulse is in the cone.
-fn impulse(compliance: &Mat3, closing: Vec3, normal: &Vec3, friction: Option<f64>) -> (Mode, Vec3) {
-    let none = (Mode::Free, Vec3::zeros());
+fn impulse(compliance: &Mat3, closing: Vec3, normal: &Vec3, friction: Option<f64>) -> (ContactMode, Vec3) {
+    let none = (ContactMode::Free, Vec3::zeros());
     let Some(sticking) = compliance.try_inverse().map(|inverse| inverse * closing) else { return none };
-    let Some(friction) = friction else { return (Mode::Stick, sticking) };
+    let Some(friction) = friction else { return (ContactMode::Stick, sticking) };
     let along = sticking.dot(normal);
     let mut across = sticking - normal * along;
     if along > 0.0 && across.norm() <= friction * along {
-        return (Mode::Stick, sticking);
+        return (ContactMode::Stick, sticking);
     }
     // A surface that leaves the tool by itself is released; what cannot slip has to stick. Written so that what is not a
     // number releases.
@@ -73,7 +66,7 @@ fn impulse(compliance: &Mat3, closing: Vec3, normal: &Vec3, friction: Option<f64
     }
     // Coupling so strong that friction would lift the surface off: the normal part alone.
     let frictionless = || pressed(*normal);
-    found.or_else(frictionless).map_or(none, |impulse| (Mode::Slip, impulse))
+    found.or_else(frictionless).map_or(none, |impulse| (ContactMode::Slip, impulse))
 }
 
 #[cfg(test)]
@@ -89,7 +82,7 @@ mod tests {
     fn within_the_cone_the_point_follows_the_tool() {
         let closing = Vec3::new(0.02, -0.01, 1.0);
         let (mode, impulse) = impulse(&anisotropic(), closing, &Vec3::z(), Some(3.0));
-        assert_eq!(mode, Mode::Stick);
+        assert_eq!(mode, ContactMode::Stick);
         assert!((anisotropic() * impulse - closing).norm() < 1e-14);
     }
 
@@ -98,7 +91,7 @@ mod tests {
         for mu in [0.0, 0.1, 0.5, 1.0] {
             let closing = Vec3::new(5.0, -3.0, 1.0);
             let (mode, impulse) = impulse(&anisotropic(), closing, &Vec3::z(), Some(mu));
-            assert_eq!(mode, Mode::Slip, "{mu}");
+            assert_eq!(mode, ContactMode::Slip, "{mu}");
             let left = closing - anisotropic() * impulse;
             assert!(left.z.abs() < 1e-12, "{mu}: {left}");
             let (friction, sliding) = (impulse.xy(), left.xy());
@@ -111,8 +104,8 @@ mod tests {
     #[test]
     fn a_surface_that_leaves_is_released_and_nothing_leaves_the_cone() {
         let away = Vec3::new(0.5, 0.0, -1.0);
-        assert_eq!(impulse(&anisotropic(), away, &Vec3::z(), Some(0.3)), (Mode::Free, Vec3::zeros()));
-        assert_eq!(impulse(&anisotropic(), Vec3::repeat(f64::NAN), &Vec3::z(), Some(0.3)).0, Mode::Free);
+        assert_eq!(impulse(&anisotropic(), away, &Vec3::z(), Some(0.3)), (ContactMode::Free, Vec3::zeros()));
+        assert_eq!(impulse(&anisotropic(), Vec3::repeat(f64::NAN), &Vec3::z(), Some(0.3)).0, ContactMode::Free);
         for n in 0..2000 {
             let n = f64::from(n);
             let closing = Vec3::new((3.1 * n).sin(), (1.7 * n).cos(), (0.9 * n).sin());

@@ -1,11 +1,9 @@
 //! What a contact step works on: nodes, their surface, and where on it the tool is.
 
-use super::super::mesh::Surface;
-use super::super::{Vec3, integrator};
-use super::normal::contact_normal;
-use super::triangle::interpolate;
-use super::walk::walk;
+use super::triangle::{contact_normal, interpolate, walk};
 use super::{Contact, Law, ToolMotion, swept};
+use crate::mesh::Surface;
+use crate::{Vec3, integrator};
 
 /// A released tool that is nearer than this is still tracked (m): touching again needs no new detection.
 const TRACKED_GAP: f64 = 3e-4;

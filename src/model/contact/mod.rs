@@ -11,38 +11,54 @@
 //! force on the tool: J / d
 //! ```
 //!
-//! [`step_all`] does the same for several tools, and [`step_implicit`] differs in v*, which comes from a linear system, and in the impulse, which moves every node.
+//! Several tools are resolved one after the other. An implicit step differs in v*, which comes from a linear system, and in the
+//! impulse, which moves every node.
 
 mod coupled;
 mod deformable;
-mod normal;
 mod paper;
 mod resolve;
 mod step;
 mod swept;
 mod triangle;
-mod walk;
 
-use super::Vec3;
+use crate::Vec3;
 
 pub use deformable::Deformable;
-pub use step::{Touch, step, step_all, step_implicit};
+pub use step::step;
+pub(crate) use step::{Touch, step_all, step_implicit};
 
 /// The state of a contact.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Mode {
+#[repr(u16)]
+pub enum ContactMode {
     /// No force: not touching, or just released and still tracked.
     #[default]
-    Free,
+    Free = 0,
     /// The contact point follows the tool.
-    Stick,
+    Stick = 1,
     /// The tool slides over the surface.
-    Slip,
+    Slip = 2,
     /// Every node of the triangle is held: no force can be computed.
-    Lost,
+    Lost = 3,
 }
 
-/// Which normal a contact uses.
+impl ContactMode {
+    /// The mode with this number; unknown numbers read as free.
+    pub fn from_code(code: u16) -> Self {
+        match code {
+            1 => Self::Stick,
+            2 => Self::Slip,
+            3 => Self::Lost,
+            _ => Self::Free,
+        }
+    }
+}
+
+/// The choice of the normal that a contact uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Normals {
@@ -53,7 +69,7 @@ pub enum Normals {
     Face,
 }
 
-/// Which equations resolve a contact.
+/// The choice of the equations that resolve a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Equations {
@@ -64,18 +80,18 @@ pub enum Equations {
     Paper,
 }
 
-/// How contacts are resolved.
+/// The law by which contacts are resolved.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Law {
     /// Coulomb coefficient mu; infinite for a tool that sticks until pulled off.
     pub friction: f64,
-    /// The normal used.
+    /// The normal that contacts use.
     pub normals: Normals,
-    /// The equations used.
+    /// The equations that resolve them.
     pub equations: Equations,
 }
 
-/// Where the tool touches: a surface triangle, barycentric weights and the mode.
+/// A contact of a tool: the surface triangle that it touches, barycentric weights and the mode.
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
@@ -85,8 +101,8 @@ pub struct Contact {
     pub triangle: Option<u32>,
     /// Weights of the triangle's three nodes; they sum to one.
     pub weights: [f64; 3],
-    /// The mode.
-    pub mode: Mode,
+    /// The state of the contact.
+    pub mode: ContactMode,
     /// Glued to its point: no cone test, no release.
     pub glued: bool,
     /// The normal that the last step used; zero before the first.
@@ -94,14 +110,14 @@ pub struct Contact {
 }
 
 impl Contact {
-    /// Glued to the surface at `weights` of `triangle`.
+    /// A contact that is glued to the surface at `weights` of `triangle`.
     pub fn glued(triangle: u32, weights: [f64; 3]) -> Self {
-        Self { triangle: Some(triangle), weights, mode: Mode::Stick, glued: true, normal: Vec3::zeros() }
+        Self { triangle: Some(triangle), weights, mode: ContactMode::Stick, glued: true, normal: Vec3::zeros() }
     }
 
     /// True if a force acts.
     pub fn is_touching(&self) -> bool {
-        matches!(self.mode, Mode::Stick | Mode::Slip)
+        matches!(self.mode, ContactMode::Stick | ContactMode::Slip)
     }
 }
 
@@ -111,9 +127,9 @@ impl Contact {
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolMotion {
-    /// Position at the start (m).
+    /// The tool's position at the start of the step (m).
     pub from: Vec3,
-    /// Position at the end (m).
+    /// The tool's position at the end of the step (m).
     pub to: Vec3,
 }
 

@@ -7,11 +7,10 @@
 //! internal forces are those of the body (f_0 of (3) is missing in (11)); detection, release and edge crossing, which
 //! the paper does not give, are those of the corrected equations.
 
-use super::super::{Vec3, integrator};
 use super::deformable::Deformable;
-use super::normal::contact_normal;
-use super::triangle::interpolate;
-use super::{Contact, Law, Mode, ToolMotion};
+use super::triangle::{contact_normal, interpolate};
+use super::{Contact, ContactMode, Law, ToolMotion};
+use crate::{Vec3, integrator};
 
 /// Without a movable node there is nothing to project (sum of the squared weights).
 const IMMOVABLE: f64 = 1e-12;
@@ -25,7 +24,7 @@ pub(super) fn step(
     tool: ToolMotion,
     d: f64,
 ) -> Vec3 {
-    let (was_touching, was_slipping) = (contact.triangle.is_some(), contact.mode == Mode::Slip);
+    let (was_touching, was_slipping) = (contact.triangle.is_some(), contact.mode == ContactMode::Slip);
     integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
     let Some((triangle, _)) = body.detect(contact, tool, d) else {
         body.drift(d);
@@ -33,7 +32,7 @@ pub(super) fn step(
     };
     contact.normal = contact_normal(law.normals, body.surface, body.positions, triangle, &contact.weights);
     let Some(point) = Point::new(body, triangle, contact.weights) else {
-        contact.mode = Mode::Lost;
+        contact.mode = ContactMode::Lost;
         body.drift(d);
         body.reseat(contact, law, triangle, &tool.to);
         return Vec3::zeros();
@@ -41,42 +40,42 @@ pub(super) fn step(
     let velocity = point.of(body.velocities);
     let slowed;
     (contact.mode, slowed) = if contact.glued {
-        (Mode::Stick, velocity)
+        (ContactMode::Stick, velocity)
     } else if was_touching && velocity.dot(&contact.normal) <= 0.0 {
-        (Mode::Free, Vec3::zeros())
+        (ContactMode::Free, Vec3::zeros())
     } else {
         cone(velocity, &contact.normal, law.friction, was_slipping)
     };
-    if contact.mode == Mode::Stick {
+    if contact.mode == ContactMode::Stick {
         drift_with_old_velocities(body, forces, d);
         point.slow(body, slowed);
     } else {
         point.slow(body, slowed);
         body.drift(d);
     }
-    if contact.mode != Mode::Free {
+    if contact.mode != ContactMode::Free {
         // Section 4.1: the surface is pushed to the tool, along the normal without friction, along its motion with it.
         let gap = tool.to - point.of(body.positions);
         let follows = contact.glued || law.friction > 0.0;
         point.push(body, if follows { gap } else { contact.normal * gap.dot(&contact.normal) });
     }
-    if contact.mode != Mode::Stick {
+    if contact.mode != ContactMode::Stick {
         body.reseat(contact, law, triangle, &tool.to);
     }
     point.net_force(slowed, d)
 }
 
 /// What of the contact point's velocity is taken away, (24) to (29).
-fn cone(velocity: Vec3, normal: &Vec3, friction: f64, was_slipping: bool) -> (Mode, Vec3) {
+fn cone(velocity: Vec3, normal: &Vec3, friction: f64, was_slipping: bool) -> (ContactMode, Vec3) {
     let along = normal * velocity.dot(normal);
     let across = velocity - along;
     let limit = friction * along.norm();
     if !was_slipping && across.norm() <= limit {
-        return (Mode::Stick, velocity);
+        return (ContactMode::Stick, velocity);
     }
     // (27) scales to the limit whether above or below it; 0/0 is read as no friction, an infinite limit as sticking.
     let scale = if limit.is_finite() && across.norm() > 0.0 { limit / across.norm() } else { 1.0 };
-    (Mode::Slip, along + across * scale)
+    (ContactMode::Slip, along + across * scale)
 }
 
 /// (13): the positions of a sticking step move with the velocities before it.

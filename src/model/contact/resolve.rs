@@ -1,23 +1,22 @@
 //! The corrected contact equations: velocity level, mass-weighted, with Coulomb friction.
 
-use super::super::Vec3;
 use super::deformable::Deformable;
-use super::normal::contact_normal;
-use super::triangle::interpolate;
-use super::{Law, Mode, ToolMotion};
+use super::triangle::{contact_normal, interpolate};
+use super::{ContactMode, Law, ToolMotion};
+use crate::Vec3;
 
 /// Penetration is recovered at this speed (m/s); an open gap is closed in full.
 const RECOVERY: f64 = 0.1;
 /// Below this compliance S (1/kg) all nodes are held and no force can be computed.
-pub(super) const IMMOVABLE: f64 = 1e-9;
+const IMMOVABLE: f64 = 1e-9;
 /// A remaining step shorter than this cannot carry an impulse (s).
-pub(super) const NO_TIME: f64 = 1e-12;
+const NO_TIME: f64 = 1e-12;
 
 /// What a contact did in one step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resolution {
     /// The mode that resulted.
-    pub mode: Mode,
+    pub mode: ContactMode,
     /// Impulse on the tool (N s).
     pub impulse: Vec3,
     /// The normal used.
@@ -25,7 +24,7 @@ pub(super) struct Resolution {
 }
 
 impl Resolution {
-    pub(super) fn without_force(mode: Mode, normal: Vec3) -> Self {
+    fn without_force(mode: ContactMode, normal: Vec3) -> Self {
         Self { mode, impulse: Vec3::zeros(), normal }
     }
 }
@@ -38,15 +37,35 @@ pub(super) struct Place<'a> {
     pub is_glued: bool,
 }
 
-/// The velocity that the contact point is to take over the last `d_c` of a step of `d` (s): v_t = (q1 - q_start + r) / d_c, r
-/// the drift between the tool and `point`.
-pub(super) fn target_velocity(point: Vec3, normal: &Vec3, tool: ToolMotion, d_c: f64, d: f64) -> Vec3 {
-    let mut drift = tool.from - point;
+/// The normal of a contact whose point has the `compliance` (1/kg), and its closing velocity G v* - v_t (m/s) over the last `d_c`
+/// of a step of `d` (s): v_t = (q1 - q_start + r) / d_c, r the drift between the tool and the point.
+///
+/// # Errors
+/// The outcome where there can be no force: nothing gives way, or no time is left.
+pub(super) fn approach(
+    body: &Deformable<'_>,
+    law: &Law,
+    Place { triangle, weights, .. }: Place<'_>,
+    tool: ToolMotion,
+    [d_c, d]: [f64; 2],
+    compliance: f64,
+) -> Result<(Vec3, Vec3), Resolution> {
+    let nodes = body.corners(triangle);
+    let normal = contact_normal(law.normals, body.surface, body.positions, triangle, weights);
+    if compliance < IMMOVABLE {
+        return Err(Resolution::without_force(ContactMode::Lost, normal));
+    }
+    if d_c < NO_TIME {
+        // Found at the very end of the step: tracked, and resolved in the next one.
+        return Err(Resolution::without_force(ContactMode::Free, normal));
+    }
+    let mut drift = tool.from - interpolate(weights, &nodes.map(|node| body.positions[node]));
     let (length, cap) = (drift.norm(), RECOVERY * d);
-    if length > cap && drift.dot(normal) < 0.0 {
+    if length > cap && drift.dot(&normal) < 0.0 {
         drift *= cap / length;
     }
-    (tool.to - tool.from + drift) / d_c
+    let target = (tool.to - tool.from + drift) / d_c;
+    Ok((normal, interpolate(weights, &nodes.map(|node| body.velocities[node])) - target))
 }
 
 /// Solves the contact over the last `d_c` of a step of `d` (s) and changes the three nodes' velocities.
@@ -56,36 +75,29 @@ pub(super) fn target_velocity(point: Vec3, normal: &Vec3, tool: ToolMotion, d_c:
 pub(super) fn resolve(
     body: &mut Deformable<'_>,
     law: &Law,
-    Place { triangle, weights, is_glued }: Place<'_>,
+    place: Place<'_>,
     tool: ToolMotion,
     d_c: f64,
     d: f64,
 ) -> Resolution {
-    let nodes = body.corners(triangle);
+    let (nodes, weights) = (body.corners(place.triangle), place.weights);
     let compliance: f64 = nodes.iter().zip(weights).map(|(&node, w)| w * w * body.inverse_masses[node]).sum();
-    let normal = contact_normal(law.normals, body.surface, body.positions, triangle, weights);
-    if compliance < IMMOVABLE {
-        return Resolution::without_force(Mode::Lost, normal);
-    }
-    if d_c < NO_TIME {
-        // Found at the very end of the step: tracked, and resolved in the next one.
-        return Resolution::without_force(Mode::Free, normal);
-    }
-    let point = interpolate(weights, &nodes.map(|node| body.positions[node]));
-    let velocity = interpolate(weights, &nodes.map(|node| body.velocities[node]));
-    let target = target_velocity(point, &normal, tool, d_c, d);
-    let mut impulse = (velocity - target) / compliance;
-    let mut mode = Mode::Stick;
-    if !is_glued {
+    let (normal, closing) = match approach(body, law, place, tool, [d_c, d], compliance) {
+        Ok(found) => found,
+        Err(without_force) => return without_force,
+    };
+    let mut impulse = closing / compliance;
+    let mut mode = ContactMode::Stick;
+    if !place.is_glued {
         let along = impulse.dot(&normal);
         // Written so that an impulse that is not a number releases.
         if along.is_nan() || along <= 0.0 {
-            return Resolution::without_force(Mode::Free, normal);
+            return Resolution::without_force(ContactMode::Free, normal);
         }
         let tangential = impulse - normal * along;
         let limit = law.friction * along;
         if tangential.norm() > limit {
-            mode = Mode::Slip;
+            mode = ContactMode::Slip;
             impulse = normal * along + tangential * (limit / tangential.norm());
         }
     }

@@ -1,25 +1,49 @@
 //! One step with contact, for a whole body and for a patch, explicit and implicit alike.
 
-use super::super::implicit::ImplicitStep;
-use super::super::{Vec3, integrator};
 use super::coupled::resolve_coupled;
 use super::deformable::Deformable;
 use super::resolve::{Place, Resolution, resolve};
-use super::{Contact, Equations, Law, Mode, ToolMotion, paper};
+use super::{Contact, ContactMode, Equations, Law, ToolMotion, paper};
+use crate::linear::ImplicitStep;
+use crate::{Vec3, integrator};
 
 /// A tool on a body: where it touches, and what it felt in the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Touch {
+pub(crate) struct Touch {
     /// The contact.
-    pub contact: Contact,
+    pub(crate) contact: Contact,
     /// The force on the tool (N), the impulse over the full step.
-    pub force: Vec3,
+    pub(crate) force: Vec3,
 }
 
 /// One explicit step of `d` seconds: velocities take `forces`, the tool's contact is found and resolved, positions move.
 /// Returns the force on the tool (N), the impulse over the full step.
 ///
 /// Velocities of nodes with zero inverse mass are theirs to keep.
+///
+/// ```
+/// use palpate_model::Vec3;
+/// use palpate_model::body::{Block, Body, State};
+/// use palpate_model::contact::{Contact, Deformable, Law, ToolMotion, step};
+///
+/// # fn main() -> Result<(), palpate_model::ModelError> {
+/// let mut block = Block::builder([4; 3], [0.03; 3]).build()?;
+/// let State { mut positions, mut velocities } = State::at_rest(block.rest());
+/// let forces = vec![Vec3::zeros(); positions.len()];
+/// let mut body = Deformable {
+///     positions: &mut positions,
+///     velocities: &mut velocities,
+///     inverse_masses: block.inverse_masses(),
+///     surface: block.surface(),
+///     candidates: &(0..block.surface().triangles.len() as u32).collect::<Vec<_>>(),
+/// };
+/// // From 1 mm above the block to 1 mm below its top.
+/// let tool = ToolMotion { from: Vec3::new(0.014, 0.016, 0.031), to: Vec3::new(0.014, 0.016, 0.029) };
+/// let force = step(&mut body, &forces, &mut Contact::default(), &Law::default(), tool, 1e-3);
+/// assert!(force.z > 0.0, "the surface pushes the tool out");
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Real-time
 /// Bounded, real-time safe.
@@ -38,14 +62,15 @@ pub fn step(
     move_with_tool(body, contact, law, tool, d, |body, place, tool, d_c| resolve(body, law, place, tool, d_c, d))
 }
 
-/// The same for several tools, each with its own contact; `motion` is that of the tool at a place of `touches`.
+/// One explicit step of `d` seconds with several tools, each with its own contact; `motion` is that of the tool at a place of
+/// `touches`.
 ///
 /// They are resolved one after the other: exact as long as no two of them touch the same node, else the later one has its
 /// way. The equations of the paper are for one tool, and for one alone.
 ///
 /// # Real-time
 /// Bounded, real-time safe.
-pub fn step_all(
+pub(crate) fn step_all(
     body: &mut Deformable<'_>,
     forces: &[Vec3],
     touches: &mut [Touch],
@@ -69,12 +94,12 @@ pub fn step_all(
     }
 }
 
-/// The same for the implicit step `system` of a linear patch: `forces` are those at its end for unchanged velocities, and
+/// One step by the implicit `system` of a linear patch, explicit but for that: `forces` are those at its end for unchanged velocities, and
 /// every node answers to the tool's impulse. The equations are the corrected ones.
 ///
 /// # Real-time
 /// Bounded, real-time safe: 9 n^2 multiply-adds for n nodes, and what detection costs.
-pub fn step_implicit(
+pub(crate) fn step_implicit(
     body: &mut Deformable<'_>,
     system: &mut ImplicitStep,
     forces: &[Vec3],
@@ -131,7 +156,7 @@ fn press(
 /// After the motion: the contact of a tool that slid is where the tool is now.
 fn follow(body: &Deformable<'_>, contact: &mut Contact, law: &Law, tool: ToolMotion) {
     if let Some(triangle) = contact.triangle
-        && contact.mode != Mode::Stick
+        && contact.mode != ContactMode::Stick
     {
         body.reseat(contact, law, triangle, &tool.to);
     }

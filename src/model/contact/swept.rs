@@ -1,9 +1,9 @@
 //! Detection: a swept point against moving triangles, and a point that is already inside.
 
-use super::super::Vec3;
-use super::super::mesh::Surface;
 use super::ToolMotion;
 use super::triangle::Projection;
+use crate::Vec3;
+use crate::mesh::Surface;
 
 /// A place on the surface where the tool comes in.
 #[derive(Clone, Copy, Debug, PartialEq)]

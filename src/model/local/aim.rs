@@ -1,12 +1,11 @@
 //! Which part of the surface the next local models have to hold.
 
-use super::super::Vec3;
-use super::super::body::Body;
-use super::super::contact::Contact;
-use super::super::forecast::ToolForecast;
-use super::super::geometry::NearestTriangle;
-use super::super::mesh::Surface;
+use super::forecast::ToolForecast;
+use crate::Vec3;
+use crate::body::Body;
+use crate::contact::Contact;
 use crate::error::ModelError;
+use crate::mesh::{NearestTriangle, Surface};
 
 /// Slower tools have no direction (m/s).
 const AT_REST: f64 = 1e-3;
@@ -28,7 +27,7 @@ pub struct Aim {
 }
 
 impl Aim {
-    /// Over `surface` with nodes at `positions`.
+    /// A search over `surface` with nodes at `positions` (m).
     ///
     /// # Errors
     /// If the surface has no triangles.
@@ -39,7 +38,7 @@ impl Aim {
         Ok(Self { nearest: NearestTriangle::new(surface, positions)? })
     }
 
-    /// Moves the surface to `positions`.
+    /// Moves the nodes of the surface to `positions` (m).
     ///
     /// # Real-time
     /// For the global actor: bounded, allocates nothing.

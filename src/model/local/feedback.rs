@@ -1,12 +1,12 @@
 //! What the global model learns from the local one.
 
-use super::super::Vec3;
-use super::super::body::State;
-use super::super::contact::Contact;
-use super::super::simulation::Simulation;
-use super::Kind;
+use super::kind::Kind;
+use crate::Vec3;
+use crate::body::State;
+use crate::contact::Contact;
+use crate::simulation::Simulation;
 
-/// What the global model learns from the local one, besides the tool's trajectory.
+/// The feedback that the global model gets from the local one, besides the tool's trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Feedback {
@@ -19,19 +19,15 @@ pub enum Feedback {
 }
 
 impl Feedback {
-    /// Its name in scene files.
+    /// The feedback's name in scene files.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Trajectory => "trajectory",
-            Self::ContactNodes => "contact_nodes",
-            Self::Geometry => "geometry",
-        }
+        ["trajectory", "contact_nodes", "geometry"][self as usize]
     }
 
-    /// True if `model` can give it: a linear patch. One that gives way more than the body does between held surroundings
+    /// True if `model` can give this feedback: a linear patch. One that gives way more than the body does between held surroundings
     /// must not: `condensed` has their compliance in its own state, and the global model would add it again;
     /// `scaled_boundary` sinks in, and pulls the body after it if its whole geometry is taken over.
     ///
@@ -45,7 +41,7 @@ impl Feedback {
         }
     }
 
-    /// What `model` does without being asked for another: the paper's for its patch, for the others what is nearest to the
+    /// The feedback that `model` gives without being asked for another: the paper's for its patch, for the others what is nearest to the
     /// whole body at the haptic rate (DESIGN.md).
     ///
     /// # Real-time
@@ -55,16 +51,16 @@ impl Feedback {
     }
 }
 
-/// What a patch found, for a global model that takes it over.
+/// The state of a patch, for a global model that takes it over.
 #[derive(Clone, Debug, Default)]
 pub struct PatchGeometry {
     /// The haptic tick that it belongs to.
     pub tick: u64,
     /// Global ids of the nodes that are fed back; there may be none, with no contact.
     pub nodes: Vec<u32>,
-    /// Their positions (m) and velocities (m/s).
+    /// Positions (m) and velocities (m/s) of these nodes.
     pub state: State,
-    /// The contact; its triangle is a global id.
+    /// The patch's contact; its triangle is a global id.
     pub contact: Contact,
 }
 

@@ -1,9 +1,9 @@
 //! `full`: the whole body at the haptic rate, the reference that the others are measured against.
 
-use super::super::Vec3;
-use super::super::contact::{Contact, ToolMotion};
-use super::super::simulation::Simulation;
-use super::{Kind, LocalModel, PatchGeometry, ResyncView};
+use super::{Kind, LocalModel, ResyncView};
+use crate::Vec3;
+use crate::contact::{Contact, ToolMotion};
+use crate::simulation::Simulation;
 
 /// The global model itself, run at the haptic rate. There is nothing to resync with.
 ///
@@ -16,7 +16,7 @@ pub struct Full {
 }
 
 impl Full {
-    /// Around a simulation.
+    /// The model that runs `simulation`.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -24,7 +24,7 @@ impl Full {
         Self { simulation, watched: Vec::new() }
     }
 
-    /// The simulation.
+    /// The simulation that it runs.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -68,9 +68,5 @@ impl LocalModel for Full {
 
     fn watch(&mut self, nodes: &[u32]) {
         self.watched = nodes.to_vec();
-    }
-
-    fn geometry(&self, _: &mut PatchGeometry) -> bool {
-        false
     }
 }

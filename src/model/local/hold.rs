@@ -1,8 +1,8 @@
 //! `hold`: the last force of the global model, what haptics does without a local model.
 
-use super::super::Vec3;
-use super::super::contact::{Contact, ToolMotion};
-use super::{Kind, LocalModel, PatchGeometry, ResyncView, Watched};
+use super::{Kind, LocalModel, ResyncView, Watched};
+use crate::Vec3;
+use crate::contact::{Contact, ToolMotion};
 
 /// The force of the global model's last tick, held until the next.
 #[derive(Clone, Debug, Default)]
@@ -41,19 +41,11 @@ impl LocalModel for Hold {
         self.contact
     }
 
-    fn position(&self, _: u32) -> Option<Vec3> {
-        None
-    }
-
     fn global_position(&self, probe: usize) -> Option<Vec3> {
-        self.watched.positions.get(probe).copied()
+        self.watched.position(probe)
     }
 
     fn watch(&mut self, nodes: &[u32]) {
         self.watched.set(nodes);
-    }
-
-    fn geometry(&self, _: &mut PatchGeometry) -> bool {
-        false
     }
 }

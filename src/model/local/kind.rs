@@ -1,6 +1,6 @@
 //! The local models by name.
 
-/// The local models.
+/// The kinds of local models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Kind {
@@ -8,18 +8,18 @@ pub enum Kind {
     Full,
     /// [`Hold`](super::Hold): the last force of the global model.
     Hold,
-    /// [`Patch`](super::Patch): the paper's, a linear patch in fixed surroundings.
+    /// The paper's: a linear patch in fixed surroundings.
     Patch,
-    /// [`LinearBoundary`](super::LinearBoundary): a linear patch in surroundings that move on.
+    /// A linear patch in surroundings that move on with their velocity at the resync.
     LinearBoundary,
-    /// [`ScaledBoundary`](super::ScaledBoundary): a linear patch on springs scaled by depth.
+    /// A linear patch on springs scaled by depth.
     ScaledBoundary,
-    /// [`Condensed`](super::Condensed): a linear patch in surroundings that give way as at rest.
+    /// A linear patch in surroundings that give way as at rest.
     Condensed,
-    /// [`Predictive`](super::Predictive) without a basis: a non-linear patch in surroundings that move as predicted, whatever
-    /// happens.
+    /// A non-linear patch in surroundings that move as predicted, whatever happens: [`Predictive`](Self::Predictive) without a
+    /// basis.
     Predicted,
-    /// [`Predictive`](super::Predictive): a non-linear patch in surroundings that move as predicted, corrected by a reduced
+    /// A non-linear patch in surroundings that move as predicted, corrected by a reduced
     /// model of them.
     Predictive,
 }
@@ -37,7 +37,7 @@ impl Kind {
         Self::Full,
     ];
 
-    /// Its name in scene files, tables and logs.
+    /// The model's name in scene files, tables and logs.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -54,7 +54,7 @@ impl Kind {
         }
     }
 
-    /// True if it holds a patch around the tool.
+    /// True if the model holds a patch around the tool.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -62,7 +62,7 @@ impl Kind {
         !matches!(self, Self::Full | Self::Hold)
     }
 
-    /// True if its patch is linear: one that can take an implicit step.
+    /// True if the model's patch is linear: one that can take an implicit step.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

@@ -1,44 +1,32 @@
 //! Local models: what runs at the haptic rate between two results of the global model. One file per model.
 
 mod aim;
-mod condensed;
 mod feedback;
-mod felt;
+mod forecast;
 mod full;
 mod hold;
 mod kind;
 mod linear;
-mod linear_boundary;
-mod near;
 mod patch;
 mod predictive;
-mod ring_path;
-mod scaled_boundary;
-mod stable;
 mod succession;
 mod template;
-mod window;
 
-use super::Vec3;
-use super::body::State;
-use super::contact::{Contact, ToolMotion};
-use super::forecast::ToolForecast;
-use super::simulation::Simulation;
-use super::surroundings::Bases;
+use crate::Vec3;
+use crate::body::State;
+use crate::contact::{Contact, ToolMotion};
+use crate::simulation::Simulation;
+use crate::surroundings::Bases;
 
 pub use aim::{Aim, wider};
-pub use condensed::{Condensed, Yielding};
 pub use feedback::{Feedback, PatchGeometry};
+pub use forecast::{ToolForecast, ToolHistory};
 pub use full::Full;
 pub use hold::Hold;
 pub use kind::Kind;
-pub use linear::{Boundary, LinearPatch, LinearSpec};
-pub use linear_boundary::{Drifting, LinearBoundary};
-pub use patch::{Patch, Still};
-pub use predictive::{Prediction, Predictive};
-pub use scaled_boundary::{Layered, ScaledBoundary};
-pub use stable::MOST_EXPLICIT_STEPS;
-pub use succession::{Resynced, Served, Succession};
+pub use linear::MOST_EXPLICIT_STEPS;
+pub use predictive::Prediction;
+pub use succession::{Blend, BlendKind, Jump, Resynced, Served, Succession};
 pub use template::Template;
 
 /// The global model at a resync, and what is expected: what a local model is built from.
@@ -53,19 +41,19 @@ pub struct ResyncView<'a> {
     pub triangles: &'a [u32],
     /// The patch to use, if it is not to be the one around the triangles: node ids in increasing order.
     pub patch: Option<&'a [u32]>,
-    /// Where each tool is, and where it is expected.
+    /// The forecast of each tool: where it is, and where it is expected.
     pub tools: &'a [ToolForecast],
     /// The tool that the model is for.
     pub index: usize,
     /// Haptic ticks that the model may have to reach ahead, catching up included.
     pub horizon: u32,
-    /// Reduced surroundings that are there.
+    /// The reduced surroundings that have been computed so far.
     pub bases: &'a Bases,
 }
 
 /// A model that turns tool motion into force at the haptic rate.
 pub trait LocalModel: Send + std::fmt::Debug {
-    /// Makes it anew, in place, from the global model.
+    /// Makes the model anew, in place, from the global model.
     ///
     /// # Real-time
     /// For the global actor: may allocate, at first use and where its size changes.
@@ -78,53 +66,61 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// Bounded, real-time safe.
     fn tick(&mut self, tool: ToolMotion) -> Vec3;
 
-    /// The haptic tick that its state was built at; catching up starts there.
+    /// The haptic tick that the model's state was built at; catching up starts there.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     fn built_at(&self) -> u64;
 
-    /// What its force in the last tick was: its own kind, or what it falls back to.
+    /// The kind of model that made the force of the last tick: its own, or the one that it falls back to.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     fn serves_as(&self) -> Kind;
 
-    /// True if its state has to be advanced to the present before it can serve.
+    /// True if the model's state has to be advanced to the present before it can serve.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    fn catches_up(&self) -> bool;
+    fn catches_up(&self) -> bool {
+        true
+    }
 
-    /// The contact; its triangle is a global id.
+    /// The tool's contact in this model; its triangle is a global id.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
     fn contact(&self) -> Contact;
 
-    /// Where `node` (a global id) is in this model (m); `None` if the model does not hold it.
+    /// The position of `node` (a global id) in this model (m); `None` if the model does not hold it.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    fn position(&self, node: u32) -> Option<Vec3>;
+    fn position(&self, _node: u32) -> Option<Vec3> {
+        None
+    }
 
-    /// Where `node` was in the global model that this one was built from (m); `None` if that is not known.
+    /// The position that the watched node of number `probe` had in the global model that this one was built from (m); `None` if that is not known.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    fn global_position(&self, probe: usize) -> Option<Vec3>;
+    fn global_position(&self, _probe: usize) -> Option<Vec3> {
+        None
+    }
 
-    /// Nodes whose global position is to be remembered at each rebuild, by place in this list.
+    /// Sets the nodes whose global position is to be remembered at each rebuild, by place in this list.
     ///
     /// # Real-time
     /// Not called in a tick: may allocate.
-    fn watch(&mut self, nodes: &[u32]);
+    fn watch(&mut self, _nodes: &[u32]) {}
 
-    /// Writes what it tells the global model, but for the tick; false if that is nothing.
+    /// Writes what the model tells the global one, but for the tick; false if that is nothing.
     ///
     /// # Real-time
     /// Bounded and real-time safe if `geometry` has room for the patch, see [`PatchGeometry::with_room`].
-    fn geometry(&self, geometry: &mut PatchGeometry) -> bool;
+    fn geometry(&self, _geometry: &mut PatchGeometry) -> bool {
+        false
+    }
 }
 
 /// Global positions of watched nodes at the resync.
@@ -137,6 +133,10 @@ struct Watched {
 impl Watched {
     fn set(&mut self, nodes: &[u32]) {
         self.nodes = nodes.to_vec();
+    }
+
+    fn position(&self, probe: usize) -> Option<Vec3> {
+        self.positions.get(probe).copied()
     }
 
     fn take(&mut self, state: &State) {

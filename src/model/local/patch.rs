@@ -1,25 +1,282 @@
-//! `patch`: the paper's local model, a linear patch around the tool in surroundings that stand still.
+//! What the models with a patch have in common: the part of the body that they hold, its nodes and the surface around them in
+//! compact numbering, and what the tool feels of it.
 
-use super::Kind;
-use super::linear::{Boundary, LinearPatch, LinearSpec};
+use super::{PatchGeometry, ResyncView, Watched};
+use crate::Vec3;
+use crate::body::{Body, State};
+use crate::contact::{Contact, Deformable, Law, ToolMotion, step};
+use crate::mesh::{NONE, Surface};
+use crate::simulation::Stepping;
+use crate::surroundings::SpringGraph;
 
-/// The nodes around the contact, with their tangent at the resync; every other node stands still (paper, section 2.3).
-pub type Patch = LinearPatch<Still>;
-
-/// Surroundings that stand still.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Still;
-
-impl Boundary for Still {
-    const KIND: Kind = Kind::Patch;
+/// A patch of a body and its contact, in the numbering of its window.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Patch {
+    pub(super) window: Window,
+    /// Of all window nodes, movable ones first.
+    pub(super) state: State,
+    /// Zero for all nodes that the patch does not move (1/kg).
+    pub(super) inverse_masses: Vec<f64>,
+    pub(super) forces: Vec<Vec3>,
+    pub(super) contact: Contact,
+    pub(super) law: Law,
+    pub(super) stepping: Stepping,
+    pub(super) built_at: u64,
+    pub(super) watched: Watched,
+    /// The force of the last tick whose contact was inside the patch (N).
+    felt: Vec3,
+    has_left: bool,
 }
 
 impl Patch {
-    /// An empty patch.
-    ///
-    /// # Real-time
-    /// Not called in a tick. Memory comes with the first [`rebuild`](super::LocalModel::rebuild).
-    pub fn new(spec: LinearSpec) -> Self {
-        Self::with_boundary(spec, Still)
+    /// All but the forces as they are in the global model; the window is there.
+    pub(super) fn take_present(&mut self, resync: &ResyncView<'_>) {
+        let (global, window) = (&*resync.global, &self.window);
+        window.gather(&global.state().positions, &mut self.state.positions);
+        window.gather(&global.state().velocities, &mut self.state.velocities);
+        window.gather_movable(global.body().inverse_masses(), &mut self.inverse_masses);
+        self.contact = window.localised(global.contact(resync.index));
+        (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
+        (self.felt, self.has_left) = (global.force(resync.index), false);
+        self.watched.take(global.state());
+    }
+
+    /// The last force, once the contact has left the patch (N).
+    pub(super) fn held(&self) -> Option<Vec3> {
+        self.has_left.then_some(self.felt)
+    }
+
+    /// What is felt (N) after a tick with `force`: the patch's own force until the contact leaves it, the last one from then on.
+    pub(super) fn feel(&mut self, force: Vec3) -> Vec3 {
+        // A state that is not finite touches nothing: its zero force would look like a free tool.
+        if !self.state.is_finite() {
+            return Vec3::repeat(f64::NAN);
+        }
+        self.has_left = self.contact_has_left();
+        if !self.has_left {
+            self.felt = force;
+        }
+        self.felt
+    }
+
+    /// True if the contact presses on a node that gives way in the body, but not here.
+    pub(super) fn contact_has_left(&self) -> bool {
+        self.window.has_left(&self.contact)
+    }
+
+    /// One explicit step of `d` seconds under the forces and the tool's; returns the force on the tool (N).
+    pub(super) fn step(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
+        self.with_contact(|body, forces, contact, law| step(body, forces, contact, law, tool, d))
+    }
+
+    /// Does `step` with the patch, its forces, its contact and its law.
+    pub(super) fn with_contact(
+        &mut self,
+        step: impl FnOnce(&mut Deformable<'_>, &[Vec3], &mut Contact, &Law) -> Vec3,
+    ) -> Vec3 {
+        let mut deformable = Deformable {
+            positions: &mut self.state.positions,
+            velocities: &mut self.state.velocities,
+            inverse_masses: &self.inverse_masses,
+            surface: &self.window.surface,
+            candidates: &self.window.candidates,
+        };
+        step(&mut deformable, &self.forces, &mut self.contact, &self.law)
+    }
+
+    /// The contact in the body's numbering.
+    pub(super) fn global_contact(&self) -> Contact {
+        self.window.globalised(&self.contact)
+    }
+
+    /// Where a node of the body is (m), if the patch moves it.
+    pub(super) fn position(&self, node: u32) -> Option<Vec3> {
+        self.window.movable(node).map(|place| self.state.positions[place])
+    }
+
+    /// Adds its node at `place` to what is told to the global model.
+    pub(super) fn tell(&self, geometry: &mut PatchGeometry, place: usize) {
+        geometry.push(self.window.nodes[place], self.state.positions[place], self.state.velocities[place]);
+    }
+}
+
+/// Patch nodes first; then, if the model asks for them, the nodes that a spring joins to the patch: the ring, which can
+/// move, and held ones; then the rim: surface nodes that contact needs for normals and walking.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Window {
+    /// Global id of each local node.
+    pub nodes: Vec<u32>,
+    /// How many of them the patch moves; they come first, in increasing order.
+    pub movable: usize,
+    /// How many ring nodes follow, in increasing order; 0 if they were not asked for.
+    pub ring: usize,
+    /// The surface over local nodes: every triangle that shares a node with one that the tool can press.
+    pub surface: Surface,
+    /// Global id of each local triangle.
+    pub triangles: Vec<u32>,
+    /// Local triangles with a movable node, and those around the centre: those that detection looks at.
+    pub candidates: Vec<u32>,
+    /// By local node: true for those that give way in the body, but not here.
+    beyond: Vec<bool>,
+    /// Local place of each global node and triangle, or [`NONE`]; as long as the body, only touched entries change.
+    local_node: Vec<u32>,
+    local_triangle: Vec<u32>,
+    /// Of the patch: the ring, and held nodes.
+    neighbours: [Vec<u32>; 2],
+}
+
+impl Window {
+    /// Makes the window anew around surface triangles `triangles` for the nodes that `patch` gives, in increasing order, with
+    /// the ring if `springs` are given; costs as much as the patch, whatever the body.
+    pub(super) fn rebuild(
+        &mut self,
+        body: &dyn Body,
+        triangles: &[u32],
+        springs: Option<&SpringGraph>,
+        patch: impl FnOnce(&mut Vec<u32>),
+    ) {
+        let whole = body.surface();
+        self.forget();
+        self.local_node.resize(body.rest().len(), NONE);
+        self.local_triangle.resize(whole.triangles.len(), NONE);
+        patch(&mut self.nodes);
+        self.movable = self.nodes.len();
+        for (place, &node) in self.nodes.iter().enumerate() {
+            self.local_node[node as usize] = place as u32;
+        }
+        self.neighbours.iter_mut().for_each(Vec::clear);
+        if let Some(springs) = springs {
+            let [ring, held] = &mut self.neighbours;
+            springs.neighbours(&self.nodes, ring, held);
+        }
+        self.ring = self.neighbours[0].len();
+        for list in 0..self.neighbours.len() {
+            for place in 0..self.neighbours[list].len() {
+                self.add_node(self.neighbours[list][place]);
+            }
+        }
+        // On a held face nothing moves, but the tool is to be found there too.
+        for &triangle in triangles {
+            for node in whole.triangles[triangle as usize] {
+                self.add_node(node);
+            }
+        }
+        // First the triangles of movable nodes and those asked for (the candidates), then those around their corners (for
+        // normals).
+        self.grow(whole, 0..self.movable);
+        for &triangle in triangles {
+            self.add_triangle(triangle);
+        }
+        let candidates = self.triangles.len();
+        let corners: Vec<u32> = self.triangles.iter().flat_map(|&t| whole.triangles[t as usize]).collect();
+        for node in corners {
+            self.add_triangles(whole, node);
+        }
+        self.add_corners(whole, candidates);
+        self.candidates.clear();
+        self.candidates.extend(0..candidates as u32);
+
+        self.surface.triangles.clear();
+        self.surface.neighbours.clear();
+        for &t in &self.triangles {
+            self.surface.triangles.push(whole.triangles[t as usize].map(|node| self.local_node[node as usize]));
+            let local = |t: u32| if t == NONE { NONE } else { self.local_triangle[t as usize] };
+            self.surface.neighbours.push(whole.neighbours[t as usize].map(local));
+        }
+        self.surface.index_nodes(self.nodes.len());
+
+        let masses = body.inverse_masses();
+        self.beyond.clear();
+        self.beyond.resize(self.movable, false);
+        self.beyond.extend(self.nodes[self.movable..].iter().map(|&node| masses[node as usize] > 0.0));
+    }
+
+    fn add_node(&mut self, node: u32) {
+        if self.local_node[node as usize] == NONE {
+            self.local_node[node as usize] = self.nodes.len() as u32;
+            self.nodes.push(node);
+        }
+    }
+
+    /// Adds the triangles at the nodes of `places`, and then their missing corners.
+    fn grow(&mut self, whole: &Surface, places: std::ops::Range<usize>) {
+        let start = self.triangles.len();
+        for place in places {
+            self.add_triangles(whole, self.nodes[place]);
+        }
+        self.add_corners(whole, start);
+    }
+
+    fn add_triangles(&mut self, whole: &Surface, node: u32) {
+        for &t in whole.at_node(node) {
+            self.add_triangle(t);
+        }
+    }
+
+    fn add_triangle(&mut self, triangle: u32) {
+        if self.local_triangle[triangle as usize] == NONE {
+            self.local_triangle[triangle as usize] = self.triangles.len() as u32;
+            self.triangles.push(triangle);
+        }
+    }
+
+    fn add_corners(&mut self, whole: &Surface, start: usize) {
+        for place in start..self.triangles.len() {
+            for node in whole.triangles[self.triangles[place] as usize] {
+                self.add_node(node);
+            }
+        }
+    }
+
+    fn forget(&mut self) {
+        self.nodes.drain(..).for_each(|node| self.local_node[node as usize] = NONE);
+        self.triangles.drain(..).for_each(|t| self.local_triangle[t as usize] = NONE);
+    }
+
+    /// Local place of a global node.
+    pub(super) fn node(&self, global: u32) -> Option<u32> {
+        self.local_node.get(global as usize).copied().filter(|&place| place != NONE)
+    }
+
+    /// Local place of a global triangle.
+    pub(super) fn triangle(&self, global: u32) -> Option<u32> {
+        self.local_triangle.get(global as usize).copied().filter(|&place| place != NONE)
+    }
+
+    /// Place of a global node among the movable ones.
+    pub(super) fn movable(&self, global: u32) -> Option<usize> {
+        self.node(global).map(|place| place as usize).filter(|&place| place < self.movable)
+    }
+
+    /// The contact in local numbering. One outside the window cannot be followed here: detection starts anew.
+    pub(super) fn localised(&self, contact: &Contact) -> Contact {
+        match contact.triangle.and_then(|triangle| self.triangle(triangle)) {
+            Some(triangle) => Contact { triangle: Some(triangle), ..*contact },
+            None => Contact { glued: contact.glued, ..Contact::default() },
+        }
+    }
+
+    /// The contact in the body's numbering.
+    pub(super) fn globalised(&self, contact: &Contact) -> Contact {
+        Contact { triangle: contact.triangle.map(|triangle| self.triangles[triangle as usize]), ..*contact }
+    }
+
+    /// True if `contact`, in local numbering, presses on a node that gives way in the body, but not here.
+    pub(super) fn has_left(&self, contact: &Contact) -> bool {
+        let touched = contact.triangle.filter(|_| contact.is_touching());
+        touched.is_some_and(|t| self.surface.triangles[t as usize].iter().any(|&node| self.beyond[node as usize]))
+    }
+
+    /// Writes the inverse mass of each local node (1/kg), zero for those that the patch does not move.
+    pub(super) fn gather_movable(&self, inverse_masses: &[f64], local: &mut Vec<f64>) {
+        local.clear();
+        local.extend(self.nodes[..self.movable].iter().map(|&node| inverse_masses[node as usize]));
+        local.resize(self.nodes.len(), 0.0);
+    }
+
+    /// Copies the window's share of a global array.
+    pub(super) fn gather(&self, global: &[Vec3], local: &mut Vec<Vec3>) {
+        local.clear();
+        local.extend(self.nodes.iter().map(|&node| global[node as usize]));
     }
 }

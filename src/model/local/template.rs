@@ -2,18 +2,46 @@
 
 use std::sync::Arc;
 
-use super::super::body::Body;
-use super::super::surroundings::{Condensation, SpringGraph};
-use super::{
-    Condensed, Feedback, Hold, Kind, Layered, LinearBoundary, LinearSpec, LocalModel, Patch, Prediction, Predictive,
-    ScaledBoundary, Yielding,
-};
+use super::hold::Hold;
+use super::linear::{Boundary, Layers, LinearPatch, LinearSpec, Yielding};
+use super::predictive::{Prediction, Predictive};
+use super::{Feedback, Kind, LocalModel};
+use crate::body::Body;
 use crate::error::ModelError;
+use crate::surroundings::{Condensation, SpringGraph};
 
-/// What the local models of a session are made from.
+/// The recipe for the local models of a session: what they are made from.
+///
+/// ```
+/// use palpate_model::Vec3;
+/// use palpate_model::body::{Block, Body, State};
+/// use palpate_model::contact::{Contact, Law, ToolMotion};
+/// use palpate_model::local::{Kind, LocalModel, ResyncView, Template, ToolForecast};
+/// use palpate_model::mesh::Face;
+/// use palpate_model::simulation::{Simulation, Stepping};
+/// use palpate_model::surroundings::Bases;
+///
+/// # fn main() -> Result<(), palpate_model::ModelError> {
+/// let block = Block::builder([6; 3], [0.05; 3]).fix(Face::ZMin).build()?;
+/// let template = Template::new(Kind::Patch, [4, 4, 2], &block)?;
+/// let (state, triangle) = (State::at_rest(block.rest()), block.surface().triangles.len() as u32 - 5);
+/// let contact = Contact::glued(triangle, [0.2, 0.3, 0.5]);
+/// let stepping = Stepping { tick: 1e-3, substeps: 2 };
+/// let mut global = Simulation::new(Box::new(block), state, contact, Law::default(), stepping)?;
+///
+/// // At every resync the local model is built from the global one; then it runs on by itself.
+/// let mut model = template.empty().expect("all but `full` have one");
+/// let tools = &[ToolForecast::at_rest(Vec3::new(0.03, 0.03, 0.05))];
+/// let (triangles, bases) = (&[triangle], &Bases::default());
+/// model.rebuild(ResyncView { global: &mut global, tick: 0, triangles, patch: None, tools, index: 0, horizon: 33, bases });
+/// let force = model.tick(ToolMotion { from: tools[0].position, to: tools[0].position + Vec3::z() * 1e-3 });
+/// assert!(force.z < 0.0, "it pulls the tool back");
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Template {
-    /// Which model.
+    /// The kind of model.
     pub kind: Kind,
     /// Patch nodes along the surface, along it, into depth.
     pub patch: [usize; 3],
@@ -22,20 +50,12 @@ pub struct Template {
     feedback: Feedback,
     prediction: Prediction,
     is_implicit: bool,
-    period_ticks: u32,
-    surroundings: Surroundings,
-}
-
-/// What is found out about the body once.
-#[derive(Clone, Debug)]
-enum Surroundings {
-    None,
-    Layered(Layered),
-    Yielding(Yielding),
+    /// For the linear models.
+    boundary: Boundary,
 }
 
 impl Template {
-    /// For models of `body`; a patch has `patch` nodes along the surface, along it, into depth. It tells the global model what
+    /// A recipe for models of `body`; a patch has `patch` nodes along the surface, along it, into depth. It tells the global model what
     /// the model is best with, takes the global model's explicit steps, and expects a resync every 33 ticks.
     ///
     /// # Errors
@@ -50,27 +70,19 @@ impl Template {
                 ModelError::of("local.model", message)
             })
         };
-        let surroundings = match kind {
-            Kind::ScaledBoundary => Surroundings::Layered(Layered::new(body)),
-            Kind::Condensed => Surroundings::Yielding(Yielding::new(Condensation::new(springs()?)?)),
-            _ => Surroundings::None,
+        let boundary = match kind {
+            Kind::LinearBoundary => Boundary::Drifting { ticks: 33 },
+            Kind::ScaledBoundary => Boundary::Layered(Layers::new(body)),
+            Kind::Condensed => Boundary::Yielding(Yielding::new(Condensation::new(springs()?)?)),
+            _ => Boundary::Still,
         };
         let springs =
             if matches!(kind, Kind::Predicted | Kind::Predictive) { Some(Arc::new(springs()?)) } else { None };
-        let feedback = Feedback::of(kind);
-        Ok(Self {
-            kind,
-            patch,
-            springs,
-            feedback,
-            prediction: Prediction::default(),
-            is_implicit: false,
-            period_ticks: 33,
-            surroundings,
-        })
+        let (feedback, prediction) = (Feedback::of(kind), Prediction::default());
+        Ok(Self { kind, patch, springs, feedback, prediction, is_implicit: false, boundary })
     }
 
-    /// Tells the global model `feedback`.
+    /// Lets the models tell the global one `feedback`.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -80,7 +92,7 @@ impl Template {
         self
     }
 
-    /// `predictive` looks ahead by `prediction`.
+    /// Lets `predictive` look ahead by `prediction`.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -90,7 +102,7 @@ impl Template {
         self
     }
 
-    /// A linear patch takes one implicit step per tick.
+    /// Lets a linear patch take one implicit step per tick.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -100,13 +112,15 @@ impl Template {
         self
     }
 
-    /// A period of the global model is `ticks` haptic ticks.
+    /// Sets the period of the global model to `ticks` haptic ticks.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     #[must_use]
     pub fn with_period(mut self, ticks: u32) -> Self {
-        self.period_ticks = ticks;
+        if let Boundary::Drifting { ticks: moving } = &mut self.boundary {
+            *moving = ticks;
+        }
         self
     }
 
@@ -124,18 +138,13 @@ impl Template {
     /// Not real-time safe: allocates.
     pub fn empty(&self) -> Option<Box<dyn LocalModel>> {
         let spec = LinearSpec { size: self.patch, feedback: self.feedback, is_implicit: self.is_implicit };
-        Some(match (self.kind, &self.surroundings, &self.springs) {
-            (Kind::Full, ..) => return None,
-            (Kind::Patch, ..) => Box::new(Patch::new(spec)),
-            (Kind::LinearBoundary, ..) => Box::new(LinearBoundary::new(spec, self.period_ticks)),
-            (Kind::ScaledBoundary, Surroundings::Layered(layered), _) => Box::new(ScaledBoundary::new(spec, *layered)),
-            (Kind::Condensed, Surroundings::Yielding(yielding), _) => Box::new(Condensed::new(spec, yielding.clone())),
-            (Kind::Predicted | Kind::Predictive, _, Some(springs)) => {
+        Some(match (self.kind, &self.springs) {
+            (Kind::Full, _) => return None,
+            (Kind::Predicted | Kind::Predictive, Some(springs)) => {
                 Box::new(Predictive::new(self.patch, self.prediction, Arc::clone(springs)))
             }
-            (Kind::Hold | Kind::ScaledBoundary | Kind::Condensed | Kind::Predicted | Kind::Predictive, ..) => {
-                Box::new(Hold::default())
-            }
+            (kind, _) if kind.is_linear() => Box::new(LinearPatch::new(spec, self.boundary.clone())),
+            _ => Box::new(Hold::default()),
         })
     }
 }

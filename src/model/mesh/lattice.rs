@@ -2,45 +2,51 @@
 
 /// A face of the block.
 ///
+/// ```
+/// use palpate_model::mesh::Face;
+///
+/// assert_eq!((Face::ZMax.name(), Face::ZMax.axis(), Face::ZMax.is_max()), ("z_max", 2, true));
+/// ```
+///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Face {
-    /// x = 0.
+    /// The face at x = 0.
     XMin,
-    /// x = the block's length.
+    /// The face at x = the block's length.
     XMax,
-    /// y = 0.
+    /// The face at y = 0.
     YMin,
-    /// y = the block's length.
+    /// The face at y = the block's length.
     YMax,
-    /// z = 0: the bottom.
+    /// The face at z = 0: the bottom.
     ZMin,
-    /// z = the block's height: the top.
+    /// The face at z = the block's height: the top.
     ZMax,
 }
 
 impl Face {
-    /// All six, in the order x, y, z.
+    /// All six faces, in the order x, y, z.
     pub const ALL: [Self; 6] = [Self::XMin, Self::XMax, Self::YMin, Self::YMax, Self::ZMin, Self::ZMax];
 
-    /// Its name in scene files.
+    /// The face's name in scene files.
     pub fn name(self) -> &'static str {
         ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"][self as usize]
     }
 
-    /// The axis across it: 0, 1 or 2 for x, y or z.
+    /// The axis across the face: 0, 1 or 2 for x, y or z.
     pub fn axis(self) -> usize {
         self as usize / 2
     }
 
-    /// True at the far end of its axis.
+    /// True if the face is at the far end of its axis.
     pub fn is_max(self) -> bool {
         self as usize % 2 == 1
     }
 
-    /// True if `node` of a lattice of `nodes` per axis lies on it.
+    /// True if `node` of a lattice of `nodes` per axis lies on the face.
     pub fn holds(self, node: [usize; 3], nodes: [usize; 3]) -> bool {
         node[self.axis()] == if self.is_max() { nodes[self.axis()] - 1 } else { 0 }
     }
@@ -74,13 +80,6 @@ impl Lattice {
         [1, 1, 1],
     ];
 
-    /// The node with this id: the inverse of [`id`](Self::id).
-    pub fn place(&self, id: u32) -> [usize; 3] {
-        let [nx, ny, _] = self.nodes;
-        let id = id as usize;
-        [id % nx, id / nx % ny, id / (nx * ny)]
-    }
-
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.nodes.iter().product()
@@ -96,7 +95,7 @@ impl Lattice {
         (i + self.nodes[0] * (j + self.nodes[1] * k)) as u32
     }
 
-    /// Where node `id` sits in the lattice.
+    /// The place of node `id` in the lattice, `[i, j, k]`: the inverse of [`id`](Self::id).
     pub fn coordinates(&self, id: u32) -> [usize; 3] {
         let [nx, ny, _] = self.nodes;
         let id = id as usize;

@@ -1,7 +1,11 @@
-//! Topology: the lattice of a block and triangle surfaces with their adjacency.
+//! Topology: the lattice of a block and triangle surfaces with their adjacency, and the search for the nearest triangle.
 
 mod lattice;
+mod lists;
+mod nearest;
 mod surface;
 
 pub use lattice::{Face, Lattice};
+pub(crate) use lists::Lists;
+pub(crate) use nearest::NearestTriangle;
 pub use surface::{NONE, Surface};

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::Lists;
 use crate::error::ModelError;
 
 /// No triangle, or no neighbour across an edge.
@@ -14,14 +15,12 @@ pub struct Surface {
     pub triangles: Vec<[u32; 3]>,
     /// For each triangle the neighbour across the edge opposite to its first, second and third node, or [`NONE`].
     pub neighbours: Vec<[u32; 3]>,
-    /// Where each node's list of triangles begins in `node_triangles`; one entry more than nodes.
-    node_start: Vec<u32>,
-    /// The triangles at each node, one list after the other.
-    node_triangles: Vec<u32>,
+    /// The triangles at each node.
+    at_node: Lists,
 }
 
 impl Surface {
-    /// From triangles over `nodes` nodes.
+    /// A surface of `triangles` over `nodes` nodes, with its adjacency.
     ///
     /// # Errors
     /// If a triangle names a node that does not exist or twice the same, or an edge has more than two triangles.
@@ -64,28 +63,8 @@ impl Surface {
 
     /// Fills the node -> triangle lists, reusing their memory.
     pub(crate) fn index_nodes(&mut self, nodes: usize) {
-        self.node_start.clear();
-        self.node_start.resize(nodes + 1, 0);
-        for triangle in &self.triangles {
-            for &node in triangle {
-                self.node_start[node as usize + 1] += 1;
-            }
-        }
-        for node in 0..nodes {
-            self.node_start[node + 1] += self.node_start[node];
-        }
-        self.node_triangles.clear();
-        self.node_triangles.resize(3 * self.triangles.len(), NONE);
-        for (t, triangle) in self.triangles.iter().enumerate() {
-            for &node in triangle {
-                // Each list is filled from its start; a free place still reads NONE.
-                let start = self.node_start[node as usize] as usize;
-                let list = &mut self.node_triangles[start..];
-                if let Some(place) = list.iter_mut().find(|place| **place == NONE) {
-                    *place = t as u32;
-                }
-            }
-        }
+        let triangles = self.triangles.iter().enumerate();
+        self.at_node.fill(nodes, triangles.flat_map(|(t, triangle)| triangle.map(|node| (node, t as u32))));
     }
 
     /// The triangles at `node`.
@@ -93,8 +72,7 @@ impl Surface {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn at_node(&self, node: u32) -> &[u32] {
-        let range = self.node_start[node as usize] as usize..self.node_start[node as usize + 1] as usize;
-        &self.node_triangles[range]
+        self.at_node.of(node)
     }
 
     /// True if `node` is a corner of some triangle.

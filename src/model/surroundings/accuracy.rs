@@ -1,15 +1,11 @@
 //! From an error budget to a number of states: how the linear estimate relates to the force error of a whole run.
 
-use super::SpringGraph;
-use super::reduction::Reduction;
-use crate::error::ModelError;
-
-/// How large a basis is to be.
+/// The wanted size of a basis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Size {
-    /// So many states, at most.
+    /// At most so many states.
     States(usize),
-    /// As few as keep the expected error within so many % (rms over a run, of the peak force).
+    /// The least number of states that keeps the expected error within so many % (rms over a run, of the peak force).
     ErrorPct(f64),
 }
 
@@ -19,15 +15,15 @@ impl From<usize> for Size {
     }
 }
 
-/// What is left however many states there are (%): the forecast of the tool and the rest of the body's non-linearity. Measured
+/// The force error that is left however many states there are (%): that of the forecast of the tool and the rest of the body's non-linearity. Measured
 /// one global period late with 100 states: `hand` 0.34, `wave` 0.24, `drag_friction` 0.20, `drag_slip` 0.12.
 pub const FLOOR_PCT: f64 = 0.35;
 /// Force error of a run for an error of the linear force: the share of the force that deviates from the forecast. Measured
 /// with 5 to 100 states, one period late: 0.2 to 0.72, the largest with 5 on `hand`.
 const GAIN: f64 = 0.8;
-/// The least budget that can be kept (%): closer to the floor the states grow without end.
+/// The least error budget that can be kept (%): closer to the floor the states grow without end.
 pub const LEAST_PCT: f64 = 0.4;
-/// States beyond which no more are tried for a budget.
+/// The largest number of states that is tried for an error budget.
 pub const MOST_STATES: usize = 150;
 
 /// The reduction error of the linear contact force of a basis.
@@ -46,28 +42,6 @@ impl Estimate {
     /// Wait-free, real-time safe.
     pub fn expected_pct(&self) -> f64 {
         FLOOR_PCT.hypot(GAIN * self.linear_pct)
-    }
-}
-
-/// The estimate for every number of states of the surroundings of `patch` (ids in increasing order), from 1 on, in one pass.
-/// Empty if nothing around the patch can move.
-///
-/// # Errors
-/// If nothing holds the surroundings together.
-///
-/// # Real-time
-/// Not real-time safe: factorises the body several times.
-pub fn errors_by_states(graph: &SpringGraph, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, ModelError> {
-    // No number of states keeps this budget, so that all are looked at.
-    let Some(mut reduction) = Reduction::new(graph, patch, Size::ErrorPct(0.0)) else { return Ok(Vec::new()) };
-    loop {
-        if let Some(errors) = reduction.errors() {
-            let estimate = |(index, &error): (usize, &f64)| (index + 1, Estimate { linear_pct: 100.0 * error });
-            return Ok(errors.iter().enumerate().map(estimate).collect());
-        }
-        if reduction.advance(graph)?.is_some() {
-            return Ok(Vec::new());
-        }
     }
 }
 

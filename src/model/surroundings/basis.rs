@@ -3,14 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::super::Vec3;
-use super::super::body::State;
-use super::SpringGraph;
-use super::accuracy::{Estimate, Size};
+use super::accuracy::Estimate;
 use super::products::Columns;
 use super::reduced::{Reduced, ReducedMotion};
-use super::reduction::Reduction;
-use crate::error::ModelError;
+use crate::Vec3;
+use crate::body::State;
 
 /// A forecast is used where what it leaves out moves less than this share of what there is.
 const LEFT_OUT: f64 = 0.02;
@@ -24,29 +21,12 @@ const LEFT_OUT: f64 = 0.02;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Basis {
     pub(super) patch: Vec<u32>,
-    pub(super) answers: Reduced,
-    pub(super) forecast: Forecast,
+    pub(crate) answers: Reduced,
+    pub(crate) forecast: Forecast,
     pub(super) estimate: Option<Estimate>,
 }
 
 impl Basis {
-    /// The basis of the surroundings of `patch` (ids in increasing order), of the given size. `None` if nothing around the patch can move.
-    ///
-    /// # Errors
-    /// If nothing holds the surroundings together, so that they have no finite answer.
-    ///
-    /// # Real-time
-    /// Not real-time safe: factorises a matrix of the whole body's size, seconds of work for a large one. [`Reduction`] does
-    /// the same in parts.
-    pub fn compute(graph: &SpringGraph, patch: &[u32], size: impl Into<Size>) -> Result<Option<Self>, ModelError> {
-        let Some(mut reduction) = Reduction::new(graph, patch, size) else { return Ok(None) };
-        loop {
-            if let Some(basis) = reduction.advance(graph)? {
-                return Ok(Some(basis));
-            }
-        }
-    }
-
     /// Ids of the patch nodes, in increasing order.
     ///
     /// # Real-time
@@ -55,7 +35,7 @@ impl Basis {
         &self.patch
     }
 
-    /// States in which the ring answers.
+    /// The number of states in which the ring answers.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -63,20 +43,12 @@ impl Basis {
         self.answers.states()
     }
 
-    /// How far the force is off in so many states, if they were chosen by that.
+    /// The estimate of the force error by which the number of states was chosen, if it was.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn estimate(&self) -> Option<Estimate> {
         self.estimate
-    }
-
-    pub(crate) fn answers(&self) -> &Reduced {
-        &self.answers
-    }
-
-    pub(crate) fn forecast(&self) -> &Forecast {
-        &self.forecast
     }
 }
 
@@ -88,14 +60,10 @@ pub(crate) struct Forecast {
     pub(super) masses: Vec<f64>,
     /// Modes on those nodes as columns, three numbers a node (1/sqrt(kg)).
     pub(super) modes: Columns,
-    pub(super) model: Reduced,
+    pub(crate) model: Reduced,
 }
 
 impl Forecast {
-    pub(crate) fn model(&self) -> &Reduced {
-        &self.model
-    }
-
     /// Sets `motion` to the present `state` of a body with nodes at rest at `rest` (m), with the forces in it (N); `span` is
     /// how far the forecast has to reach (s). False if the states leave out too much of the present motion.
     ///
@@ -133,7 +101,7 @@ impl Forecast {
     }
 }
 
-/// The bases that are there, by patch.
+/// A collection of bases, by patch.
 #[derive(Clone, Debug, Default)]
 pub struct Bases {
     /// In the order of the patches: of two that serve as well, every run takes the same.
@@ -141,7 +109,7 @@ pub struct Bases {
 }
 
 impl Bases {
-    /// The basis for `patch` (ids in increasing order), if it is there.
+    /// The basis for `patch` (ids in increasing order), if there is one.
     ///
     /// # Real-time
     /// Bounded, by the patch; does not allocate.
@@ -158,7 +126,7 @@ impl Bases {
         self.of.values().filter(holds).map(|basis| &basis.patch[..]).min_by_key(|patch| patch.len())
     }
 
-    /// Of the bases whose patch holds all of `nodes`, the patch of the one that has most nodes of `wanted`.
+    /// The patch that has most nodes of `wanted`, of a basis whose patch holds all of `nodes`.
     ///
     /// # Real-time
     /// For the global actor: looks at all bases.
@@ -168,7 +136,7 @@ impl Bases {
         self.of.values().filter(holds).map(|basis| &basis.patch[..]).max_by_key(common)
     }
 
-    /// All of them.
+    /// All bases, in the order of their patches.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -176,7 +144,7 @@ impl Bases {
         self.of.values().map(|basis| &**basis)
     }
 
-    /// Adds one.
+    /// Adds a basis, in place of one for the same patch.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -184,7 +152,7 @@ impl Bases {
         self.of.insert(basis.patch.clone(), basis);
     }
 
-    /// How many there are.
+    /// The number of bases.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -192,7 +160,7 @@ impl Bases {
         self.of.len()
     }
 
-    /// True without any.
+    /// True if there is no basis.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

@@ -1,27 +1,21 @@
 //! Static condensation: what the surroundings of a patch yield when it is pushed.
 
-use nalgebra::DMatrix;
-
-use super::super::sparse::SparseFactor;
 use super::graph::SpringGraph;
+use crate::body::assemble;
 use crate::error::ModelError;
+use crate::linear_algebra::{Matrix, SparseFactor, push_block};
 
 /// The stiffness of a whole body at rest, factorised once for every patch.
 ///
 /// With A = -K over all nodes that can move, the Schur complement of a patch L is S = ((A^-1)_LL)^-1: a solution for each of
 /// its coordinates, in place of a factorisation of its surroundings.
+#[derive(Debug)]
 pub struct Condensation {
     factor: SparseFactor,
     /// Place of each node among those that can move.
     places: Vec<Option<usize>>,
     movable: usize,
     springs: SpringGraph,
-}
-
-impl std::fmt::Debug for Condensation {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Condensation").field("movable", &self.movable).finish_non_exhaustive()
-    }
 }
 
 impl Condensation {
@@ -33,37 +27,21 @@ impl Condensation {
     /// # Real-time
     /// Not real-time safe: allocates, and factorises a sparse matrix of three rows per node.
     pub fn new(springs: SpringGraph) -> Result<Self, ModelError> {
-        let mut movable = 0;
-        let places: Vec<Option<usize>> = springs
-            .inverse_masses()
-            .iter()
-            .map(|&w| {
-                (w > 0.0).then(|| {
-                    movable += 1;
-                    movable - 1
-                })
-            })
-            .collect();
+        let is_movable = |&node: &usize| springs.inverse_masses()[node] > 0.0;
+        let mut places = vec![None; springs.rest().len()];
+        (0..places.len()).filter(is_movable).enumerate().for_each(|(place, node)| places[node] = Some(place));
+        let movable = places.iter().flatten().count();
         let mut entries = Vec::with_capacity(24 * springs.links().len());
         for link in springs.links() {
-            let [a, b] = link.nodes.map(|node| places[node as usize]);
-            let along = springs.rest()[link.nodes[1] as usize] - springs.rest()[link.nodes[0] as usize];
-            let u = along / along.norm();
-            let stiffness = u * u.transpose() * link.spring.stiffness;
-            for (row, column, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
-                let (Some(row), Some(column)) = (row, column) else { continue };
-                for r in 0..3 {
-                    for c in 0..3 {
-                        if 3 * row + r >= 3 * column + c {
-                            entries.push((3 * row + r, 3 * column + c, sign * stiffness[(r, c)]));
-                        }
-                    }
-                }
-            }
+            let Some(direction) = springs.direction(link) else { continue };
+            let rows = link.nodes.map(|node| places[node as usize].map(|place| 3 * place));
+            assemble(direction, link.spring.stiffness, rows, |row, column, block| {
+                push_block(&mut entries, row, column, &block);
+            });
         }
         let factor = Some(&places)
             .filter(|places| places.contains(&None))
-            .and_then(|_| SparseFactor::new(3 * movable, &entries));
+            .and_then(|_| SparseFactor::new(3 * movable, &entries, None));
         match factor {
             Some(factor) => Ok(Self { factor, places, movable, springs }),
             None => {
@@ -78,14 +56,12 @@ impl Condensation {
     ///
     /// # Real-time
     /// Not real-time safe: allocates, and solves a sparse system for each coordinate of the patch.
-    pub fn compliance(&self, nodes: &[u32]) -> Option<DMatrix<f64>> {
+    pub fn compliance(&self, nodes: &[u32]) -> Option<Matrix> {
         let (n, rows) = (3 * nodes.len(), 3 * self.movable);
         let places = nodes.iter().map(|&node| self.places[node as usize]).collect::<Option<Vec<_>>>()?;
         let row = |coordinate: usize| 3 * places[coordinate / 3] + coordinate % 3;
-        let mut columns = vec![0.0; rows * n];
-        (0..n).for_each(|column| columns[column * rows + row(column)] = 1.0);
-        self.factor.solve(&mut columns);
-        let inverse = DMatrix::from_fn(n, n, |r, c| columns[c * rows + row(r)]);
+        let units = Matrix::from_fn(rows, n, |r, column| f64::from(r == row(column)));
+        let inverse = self.factor.solve(units).select_rows(&(0..n).map(row).collect::<Vec<_>>());
         // Symmetric but for rounding, which the patch is not to have.
         let schur = inverse.try_inverse().map(|schur| (&schur + schur.transpose()) * 0.5)?;
         let added = self.held(nodes) - schur;
@@ -93,21 +69,20 @@ impl Condensation {
     }
 
     /// A_LL: the stiffness of the patch while all others are held.
-    fn held(&self, nodes: &[u32]) -> DMatrix<f64> {
-        let mut held = DMatrix::zeros(3 * nodes.len(), 3 * nodes.len());
+    fn held(&self, nodes: &[u32]) -> Matrix {
+        let mut held = Matrix::zeros(3 * nodes.len(), 3 * nodes.len());
         for (place, &node) in nodes.iter().enumerate() {
             for &link in self.springs.at_node(node) {
-                let link = self.springs.links()[link as usize];
-                let other = if link.nodes[0] == node { link.nodes[1] } else { link.nodes[0] };
-                let along = self.springs.rest()[other as usize] - self.springs.rest()[node as usize];
-                let u = along / along.norm();
-                let stiffness = u * u.transpose() * link.spring.stiffness;
-                let mut diagonal = held.fixed_view_mut::<3, 3>(3 * place, 3 * place);
-                diagonal += stiffness;
-                if let Ok(column) = nodes.binary_search(&other) {
-                    let mut coupling = held.fixed_view_mut::<3, 3>(3 * place, 3 * column);
-                    coupling -= stiffness;
-                }
+                let link = &self.springs.links()[link as usize];
+                let Some(direction) = self.springs.direction(link) else { continue };
+                let places = link.nodes.map(|node| nodes.binary_search(&node).ok());
+                assemble(direction, link.spring.stiffness, places, |row, column, block| {
+                    // The other rows come with their own nodes.
+                    if row == place {
+                        let mut part = held.fixed_view_mut::<3, 3>(3 * row, 3 * column);
+                        part += block;
+                    }
+                });
             }
         }
         held
@@ -116,17 +91,17 @@ impl Condensation {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::Vec3;
-    use super::super::super::body::{Block, Body};
-    use super::super::super::equilibrium::static_equilibrium;
-    use super::super::super::mesh::Face;
     use super::*;
+    use crate::Vec3;
+    use crate::body::{Block, Body, State};
+    use crate::equilibrium::static_equilibrium;
+    use crate::linear::patch_of;
+    use crate::mesh::Face;
 
     #[test]
     fn a_patch_with_its_condensed_surroundings_yields_as_the_whole_body_does() {
         let mut block = Block::builder([6; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
-        let mut nodes = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
+        let (nodes, _) = patch_of(&block, &State::at_rest(block.rest()));
         let condensation = Condensation::new(SpringGraph::new(&block).unwrap()).unwrap();
         let schur = condensation.held(&nodes) - condensation.compliance(&nodes).unwrap();
 

@@ -1,12 +1,11 @@
 //! How far the force at a contact is off when the surroundings of a patch answer in few states: an estimate for every
 //! number of states, in one pass.
 
-use nalgebra::{DMatrix, Matrix3};
-
-use super::super::dense;
-use super::SpringGraph;
 use super::far::Far;
+use super::graph::SpringGraph;
 use super::near::Near;
+use crate::Mat3;
+use crate::linear_algebra::{Matrix, eliminate};
 
 /// Real frequencies (1/s) at which the force is compared, evenly on a logarithmic scale. What the tool does differently from
 /// its forecast grows from nothing within one to three periods of the global model, as e^(s t) does at the first; at the last
@@ -25,9 +24,9 @@ pub(super) struct Contacts {
     near: Near,
     /// Patch and surroundings as one.
     body: Far,
-    mass: DMatrix<f64>,
-    damping: DMatrix<f64>,
-    stiffness: DMatrix<f64>,
+    mass: Matrix,
+    damping: Matrix,
+    stiffness: Matrix,
     states: usize,
     /// Of each pressed node by states: the sum of squares of relative errors so far.
     squares: Vec<Vec<f64>>,
@@ -36,11 +35,9 @@ pub(super) struct Contacts {
 
 impl Contacts {
     /// Of `patch` in its `ring`, with surroundings `far` in the span of the columns of `states`.
-    pub(super) fn new(graph: &SpringGraph, [patch, ring]: [&[u32]; 2], far: &Far, states: &[f64]) -> Self {
-        let (near, rows) = (Near::new(graph, patch, ring), far.unknowns());
-        let count = states.len() / rows.max(1);
-        let unknown = |at: usize| far.unknown(ring[at / 3], at % 3);
-        let on_ring = DMatrix::from_fn(3 * ring.len(), count, |at, state| states[state * rows + unknown(at)]);
+    pub(super) fn new(graph: &SpringGraph, [patch, ring]: [&[u32]; 2], far: &Far, states: &Matrix) -> Self {
+        let near = Near::new(graph, patch, ring);
+        let (count, on_ring) = (states.ncols(), states.select_rows(&far.unknowns_of(ring)));
         let (k, c) = far.stiffness_and_damping(states);
         Self {
             mass: near.beside(&near.mass, &on_ring, &far.mass(states), 1.0),
@@ -77,39 +74,33 @@ impl Contacts {
     }
 
     /// G D(s)^-1 G^T of the body itself, for each pressed node.
-    fn exact(&self, graph: &SpringGraph, s: f64) -> Option<Vec<Matrix3<f64>>> {
-        let (body, rows) = (&self.body, self.body.unknowns());
-        let factor = body.factorised(graph, s)?;
-        let pressed = &self.near.pressed;
-        let mut columns = vec![0.0; 3 * rows * pressed.len()];
-        let unknown = |at: usize| body.unknown(pressed[at / 3].node, at % 3);
-        columns.chunks_exact_mut(rows).enumerate().for_each(|(at, column)| column[unknown(at)] = 1.0);
-        factor.solve(&mut columns);
-        let entry =
-            |node: usize, row: usize, column: usize| columns[(3 * node + column) * rows + unknown(3 * node + row)];
-        Some((0..pressed.len()).map(|node| Matrix3::from_fn(|row, column| entry(node, row, column))).collect())
+    fn exact(&self, graph: &SpringGraph, s: f64) -> Option<Vec<Mat3>> {
+        let nodes: Vec<u32> = self.near.pressed.iter().map(|pressed| pressed.node).collect();
+        let answers = self.body.factorised(graph, s)?.solve(self.body.unit_forces(&nodes));
+        let rows = self.body.unknowns_of(&nodes);
+        let entry = |node: usize, row: usize, column: usize| answers[(rows[3 * node + row], 3 * node + column)];
+        Some((0..nodes.len()).map(|node| Mat3::from_fn(|row, column| entry(node, row, column))).collect())
     }
 
     /// G D_r(s)^-1 G^T for each pressed node, by r from 1 on.
-    fn compliances(&self, s: f64) -> Option<Vec<Vec<Matrix3<f64>>>> {
+    fn compliances(&self, s: f64) -> Option<Vec<Vec<Mat3>>> {
         let (columns, patch, pressed) = (self.mass.ncols(), self.near.patch, &self.near.pressed);
-        let rows = columns + 3 * pressed.len();
-        let mut bordered = vec![0.0; rows * columns];
-        for (column, bordered) in bordered.chunks_exact_mut(rows).enumerate() {
-            for (row, entry) in bordered.iter_mut().enumerate().take(columns).skip(column) {
+        let mut bordered = Matrix::zeros(columns + 3 * pressed.len(), columns);
+        for column in 0..columns {
+            for row in column..columns {
                 let at = (row, column);
-                *entry = s * (s * self.mass[at] + self.damping[at]) + self.stiffness[at];
+                bordered[at] = s * (s * self.mass[at] + self.damping[at]) + self.stiffness[at];
             }
         }
         for at in 0..3 * pressed.len() {
-            bordered[(pressed[at / 3].coordinate + at % 3) * rows + columns + at] = 1.0;
+            bordered[(columns + at, pressed[at / 3].coordinate + at % 3)] = 1.0;
         }
-        dense::eliminate(&mut bordered, rows)?;
+        eliminate(&mut bordered)?;
         let of_node = |node: usize| {
-            let (mut sum, mut sums) = (Matrix3::zeros(), Vec::with_capacity(self.states));
-            for (column, bordered) in bordered.chunks_exact(rows).enumerate() {
-                let part = &bordered[columns + 3 * node..][..3];
-                sum += Matrix3::from_fn(|i, j| part[i] * part[j] * bordered[column]);
+            let (mut sum, mut sums) = (Mat3::zeros(), Vec::with_capacity(self.states));
+            for (column, bordered) in bordered.column_iter().enumerate() {
+                let part = bordered.fixed_rows::<3>(columns + 3 * node);
+                sum += Mat3::from_fn(|i, j| part[i] * part[j] * bordered[column]);
                 if column >= patch {
                     sums.push(sum);
                 }
@@ -124,13 +115,12 @@ impl Contacts {
 mod tests {
     use nalgebra::{DMatrix, Matrix3};
 
-    use super::super::super::Vec3;
-    use super::super::super::body::{Block, Body, Spring, SpringNetwork};
-    use super::super::super::mesh::Face;
-    use super::super::accuracy::{FLOOR_PCT, Size, errors_by_states};
     use super::super::reduced::Damping;
-    use super::super::{Basis, SpringGraph};
+    use super::super::{Basis, FLOOR_PCT, Size, SpringGraph, errors_by_states};
     use super::FREQUENCIES;
+    use crate::Vec3;
+    use crate::body::{Block, Body, Spring, SpringNetwork};
+    use crate::mesh::Face;
 
     /// A number from 0 to 1.
     fn random(seed: &mut u64) -> f64 {
@@ -204,7 +194,7 @@ mod tests {
             let on_patch: Vec<usize> = patch.iter().copied().filter(movable).flat_map(coordinates).collect();
             let on_ring: Vec<usize> = ring.iter().copied().flat_map(coordinates).collect();
             let (p, r) = (on_patch.len(), basis.states());
-            let shapes = DMatrix::from_column_slice(on_ring.len(), r, &basis.answers.shapes.to_matrix());
+            let shapes = basis.answers.shapes.to_matrix();
             let mut to_all = DMatrix::zeros(3 * nodes, p + r);
             on_patch.iter().enumerate().for_each(|(column, &at)| to_all[(at, column)] = 1.0);
             for (row, &at) in on_ring.iter().enumerate() {

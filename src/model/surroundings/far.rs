@@ -1,22 +1,19 @@
 //! The part of a body that no spring of a patch touches, linear around its rest state.
 
-use super::super::dissection::{Adjacency, dissection};
-use super::super::sparse::SparseFactor;
-use super::super::{Mat3, Vec3, dense};
-use super::SpringGraph;
+use super::graph::SpringGraph;
+use crate::Vec3;
+use crate::body::{Spring, assemble};
+use crate::linear_algebra::{Matrix, SparseFactor, dissection, product_t, push_block, symmetric_product};
 
-/// A node that does not move, or that belongs to the patch.
-const NOT_FAR: u32 = u32::MAX;
 /// Damping over stiffness may differ by this much between springs and still count as proportional.
 const PROPORTIONAL: f64 = 1e-9;
 
-/// A spring in the direction that it has at rest, between places in [`Far::nodes`] or [`NOT_FAR`].
+/// A spring in the direction that it has at rest, between places in [`Far::nodes`]; `None` is a node that does not move.
 #[derive(Debug)]
 struct FarSpring {
-    places: [u32; 2],
+    places: [Option<u32>; 2],
     direction: Vec3,
-    stiffness: f64,
-    damping: f64,
+    spring: Spring,
 }
 
 /// The movable nodes outside a patch, and the springs between them.
@@ -26,34 +23,28 @@ pub(super) struct Far {
     pub(super) nodes: Vec<u32>,
     /// Their masses (kg).
     pub(super) masses: Vec<f64>,
-    place: Vec<u32>,
+    place: Vec<Option<u32>>,
     springs: Vec<FarSpring>,
 }
 
 impl Far {
     /// Outside `patch` (ids in increasing order).
     pub(super) fn new(graph: &SpringGraph, patch: &[u32]) -> Self {
-        let mut place = vec![NOT_FAR; graph.rest().len()];
+        let mut place = vec![None; graph.rest().len()];
         let mut nodes = Vec::new();
         let outside = |node: u32| patch.binary_search(&node).is_err();
         for (node, &w) in graph.inverse_masses().iter().enumerate() {
             if w > 0.0 && outside(node as u32) {
-                place[node] = nodes.len() as u32;
+                place[node] = Some(nodes.len() as u32);
                 nodes.push(node as u32);
             }
         }
         let masses = nodes.iter().map(|&node| 1.0 / graph.inverse_masses()[node as usize]).collect();
         let springs = graph.links().iter().filter(|link| link.nodes.iter().all(|&node| outside(node)));
         let springs = springs.filter_map(|link| {
-            let [a, b] = link.nodes.map(|node| node as usize);
-            let along = graph.rest()[b] - graph.rest()[a];
-            let is_spring = along.norm() > 0.0 && (place[a] != NOT_FAR || place[b] != NOT_FAR);
-            is_spring.then(|| FarSpring {
-                places: [place[a], place[b]],
-                direction: along.normalize(),
-                stiffness: link.spring.stiffness,
-                damping: link.spring.damping,
-            })
+            let places = link.nodes.map(|node| place[node as usize]);
+            let direction = graph.direction(link).filter(|_| places != [None; 2])?;
+            Some(FarSpring { places, direction, spring: link.spring })
         });
         let springs = springs.collect();
         Self { nodes, masses, place, springs }
@@ -64,9 +55,17 @@ impl Far {
         3 * self.nodes.len()
     }
 
-    /// The unknown of `node` (an id) along `axis`.
-    pub(super) fn unknown(&self, node: u32, axis: usize) -> usize {
-        3 * self.place[node as usize] as usize + axis
+    /// The unknowns of `nodes` (ids), three each.
+    pub(super) fn unknowns_of(&self, nodes: &[u32]) -> Vec<usize> {
+        let place = |&node: &u32| self.place[node as usize].expect("it is far and can move") as usize;
+        nodes.iter().map(place).flat_map(|place| 3 * place..3 * place + 3).collect()
+    }
+
+    /// A unit force on each of `nodes` (ids) along each axis, as columns.
+    pub(super) fn unit_forces(&self, nodes: &[u32]) -> Matrix {
+        let mut forces = Matrix::zeros(self.unknowns(), 3 * nodes.len());
+        self.unknowns_of(nodes).into_iter().enumerate().for_each(|(column, row)| forces[(row, column)] = 1.0);
+        forces
     }
 
     /// Entries (row, column, value) of the lower triangle of s^2 M - s C - K.
@@ -76,82 +75,59 @@ impl Far {
             entries.extend((0..3).map(|axis| (3 * place + axis, 3 * place + axis, s * s * mass)));
         }
         for spring in &self.springs {
-            let [a, b] = spring.places;
-            let block: Mat3 = spring.direction * spring.direction.transpose() * (spring.stiffness + s * spring.damping);
-            for (row, column, sign) in [(a, a, 1.0), (b, b, 1.0), (a.max(b), a.min(b), -1.0)] {
-                if row == NOT_FAR || column == NOT_FAR {
-                    continue;
-                }
-                for i in 0..3 {
-                    for j in 0..3 {
-                        let (row, column) = (3 * row as usize + i, 3 * column as usize + j);
-                        if row >= column {
-                            entries.push((row, column, sign * block[(i, j)]));
-                        }
-                    }
-                }
-            }
+            let rows = spring.places.map(|place| place.map(|place| 3 * place as usize));
+            let weight = spring.spring.stiffness + s * spring.spring.damping;
+            assemble(spring.direction, weight, rows, |row, column, block| {
+                push_block(&mut entries, row, column, &block);
+            });
         }
         entries
     }
 
     /// s^2 M - s C - K, factorised. `None` if nothing holds the body.
     pub(super) fn factorised(&self, graph: &SpringGraph, s: f64) -> Option<SparseFactor> {
-        let (n, entries) = (self.unknowns(), self.shifted(s));
-        match self.order(graph) {
-            Some(order) => SparseFactor::new_ordered(n, &entries, &order),
-            None => SparseFactor::new(n, &entries),
-        }
-    }
-
-    /// The unknowns in an order of elimination with little fill, if their places give one.
-    fn order(&self, graph: &SpringGraph) -> Option<Vec<usize>> {
+        // In an order of elimination with little fill, if the places of the nodes give one.
         let points: Vec<Vec3> = self.nodes.iter().map(|&node| graph.rest()[node as usize]).collect();
-        let pairs = self.springs.iter().map(|spring| spring.places).filter(|places| !places.contains(&NOT_FAR));
-        let order = dissection(&points, &Adjacency::new(points.len(), pairs))?;
-        Some(order.into_iter().flat_map(|place| (0..3).map(move |axis| 3 * place as usize + axis)).collect())
+        let pairs = self.springs.iter().filter_map(|spring| Some([spring.places[0]?, spring.places[1]?]));
+        SparseFactor::new(self.unknowns(), &self.shifted(s), dissection(&points, pairs).as_deref())
     }
 
     /// Multiplies each column of `columns` by M.
-    pub(super) fn times_mass(&self, columns: &mut [f64]) {
-        for column in columns.chunks_exact_mut(self.unknowns()) {
-            for (x, mass) in column.chunks_exact_mut(3).zip(&self.masses) {
+    pub(super) fn times_mass(&self, columns: &mut Matrix) {
+        for mut column in columns.column_iter_mut() {
+            for (x, mass) in column.as_mut_slice().as_chunks_mut::<3>().0.iter_mut().zip(&self.masses) {
                 x.iter_mut().for_each(|x| *x *= mass);
             }
         }
     }
 
     /// Phi^T M Phi for the columns of `shapes`.
-    pub(super) fn mass(&self, shapes: &[f64]) -> Vec<f64> {
-        let mut weighted = shapes.to_vec();
+    pub(super) fn mass(&self, shapes: &Matrix) -> Matrix {
+        let mut weighted = shapes.clone();
         self.times_mass(&mut weighted);
-        dense::product(shapes, &weighted, self.unknowns())
+        product_t(shapes, &weighted)
     }
 
     /// Phi^T K Phi and Phi^T C Phi: K and C answer to displacements and velocities with a force, so both are negative.
-    pub(super) fn stiffness_and_damping(&self, shapes: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let of = |weight: &dyn Fn(&FarSpring) -> f64| {
+    pub(super) fn stiffness_and_damping(&self, shapes: &Matrix) -> (Matrix, Matrix) {
+        let of = |weight: fn(&Spring) -> f64| {
             // How far each shape stretches each spring, times the root of the weight.
-            let mut stretches = Vec::with_capacity(shapes.len() / self.unknowns().max(1) * self.springs.len());
-            for shape in shapes.chunks_exact(self.unknowns()) {
-                let at = |place: u32| match place {
-                    NOT_FAR => Vec3::zeros(),
-                    place => Vec3::from_column_slice(&shape[3 * place as usize..][..3]),
+            let mut stretches = Matrix::zeros(self.springs.len(), shapes.ncols());
+            for (shape, mut stretches) in shapes.column_iter().zip(stretches.column_iter_mut()) {
+                let at = |place: Option<u32>| {
+                    place.map_or_else(Vec3::zeros, |place| shape.fixed_rows::<3>(3 * place as usize).into_owned())
                 };
-                let stretch = |spring: &FarSpring| {
-                    let [a, b] = spring.places.map(at);
-                    spring.direction.dot(&(b - a)) * weight(spring).sqrt()
-                };
-                stretches.extend(self.springs.iter().map(stretch));
+                for (FarSpring { places, direction, spring }, stretch) in self.springs.iter().zip(&mut stretches) {
+                    let [a, b] = places.map(at);
+                    *stretch = direction.dot(&(b - a)) * weight(spring).sqrt();
+                }
             }
-            let mut matrix = dense::symmetric_product(&stretches, self.springs.len());
-            matrix.iter_mut().for_each(|x| *x = -*x);
-            matrix
+            -symmetric_product(&stretches)
         };
-        let stiffness = of(&|spring| spring.stiffness);
+        let stiffness = of(|spring| spring.stiffness);
         let damping = match self.proportional_damping() {
-            Some(share) => stiffness.iter().map(|x| x * share).collect(),
-            None => of(&|spring| spring.damping),
+            Some(share) => &stiffness * share,
+            None => of(|spring| spring.damping),
         };
         (stiffness, damping)
     }
@@ -163,16 +139,15 @@ impl Far {
 
     /// Damping over stiffness, if it is the same for every spring.
     pub(super) fn proportional_damping(&self) -> Option<f64> {
-        let first = self.springs.first().filter(|spring| spring.stiffness > 0.0)?;
+        let first = self.springs.first().map(|first| first.spring).filter(|first| first.stiffness > 0.0)?;
         let share = first.damping / first.stiffness;
-        let same =
-            |spring: &FarSpring| (spring.damping - share * spring.stiffness).abs() <= PROPORTIONAL * spring.damping;
-        self.springs.iter().all(same).then_some(share)
+        let same = |spring: &Spring| (spring.damping - share * spring.stiffness).abs() <= PROPORTIONAL * spring.damping;
+        self.springs.iter().all(|other| same(&other.spring)).then_some(share)
     }
 
     /// Columns of smooth displacements, polynomials of the position up to `degree` along each axis: what waves of the
     /// whole body look like.
-    pub(super) fn smooth_fields(&self, graph: &SpringGraph, degree: i32) -> Vec<f64> {
+    pub(super) fn smooth_fields(&self, graph: &SpringGraph, degree: i32) -> Matrix {
         let rest = |node: u32| graph.rest()[node as usize];
         let low = self.nodes.iter().fold(Vec3::repeat(f64::INFINITY), |low, &node| low.inf(&rest(node)));
         let high = self.nodes.iter().fold(Vec3::repeat(f64::NEG_INFINITY), |high, &node| high.sup(&rest(node)));
@@ -189,6 +164,6 @@ impl Far {
                 }
             }
         }
-        columns
+        Matrix::from_vec(self.unknowns(), columns.len() / self.unknowns(), columns)
     }
 }

@@ -1,8 +1,8 @@
 //! A body's springs by node.
 
-use super::super::Vec3;
-use super::super::body::{Body, Link};
-use super::stored::digest;
+use crate::Vec3;
+use crate::body::{Body, Link};
+use crate::mesh::Lists;
 
 /// The springs of a body at rest, to be found by the nodes that they join.
 #[derive(Clone, Debug)]
@@ -10,9 +10,7 @@ pub struct SpringGraph {
     rest: Vec<Vec3>,
     inverse_masses: Vec<f64>,
     links: Vec<Link>,
-    /// The links at node n are `at_nodes[first[n]..first[n + 1]]`.
-    first: Vec<u32>,
-    at_nodes: Vec<u32>,
+    at_node: Lists,
     digest: u64,
 }
 
@@ -23,23 +21,11 @@ impl SpringGraph {
     /// Not real-time safe: allocates.
     pub fn new(body: &dyn Body) -> Option<Self> {
         let (links, rest) = (body.springs()?, body.rest().to_vec());
-        let mut first = vec![0_u32; rest.len() + 1];
-        for node in links.iter().flat_map(|link| link.nodes) {
-            first[node as usize + 1] += 1;
-        }
-        for node in 0..rest.len() {
-            first[node + 1] += first[node];
-        }
-        let (mut next, mut at_nodes) = (first.clone(), vec![0; 2 * links.len()]);
-        for (index, link) in links.iter().enumerate() {
-            for node in link.nodes {
-                at_nodes[next[node as usize] as usize] = index as u32;
-                next[node as usize] += 1;
-            }
-        }
+        let ends = links.iter().enumerate().flat_map(|(index, link)| link.nodes.map(|node| (node, index as u32)));
+        let at_node = Lists::new(rest.len(), ends);
         let inverse_masses = body.inverse_masses().to_vec();
         let digest = digest_of(&rest, &inverse_masses, &links);
-        Some(Self { inverse_masses, rest, links, first, at_nodes, digest })
+        Some(Self { inverse_masses, rest, links, at_node, digest })
     }
 
     /// A number that differs for bodies of other nodes, masses or springs.
@@ -51,35 +37,29 @@ impl SpringGraph {
     }
 
     /// Rest positions (m).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn rest(&self) -> &[Vec3] {
+    pub(crate) fn rest(&self) -> &[Vec3] {
         &self.rest
     }
 
     /// Inverse masses (1/kg), zero for held nodes.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn inverse_masses(&self) -> &[f64] {
+    pub(crate) fn inverse_masses(&self) -> &[f64] {
         &self.inverse_masses
     }
 
     /// All springs.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn links(&self) -> &[Link] {
+    pub(crate) fn links(&self) -> &[Link] {
         &self.links
     }
 
     /// The springs at `node`, by their place in [`links`](Self::links).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn at_node(&self, node: u32) -> &[u32] {
-        &self.at_nodes[self.first[node as usize] as usize..self.first[node as usize + 1] as usize]
+    pub(crate) fn at_node(&self, node: u32) -> &[u32] {
+        self.at_node.of(node)
+    }
+
+    /// The direction of a spring at rest; `None` for one that is too short to have one.
+    pub(super) fn direction(&self, link: &Link) -> Option<Vec3> {
+        let [a, b] = link.nodes.map(|node| self.rest[node as usize]);
+        link.spring.direction(b - a).map(|(direction, _)| direction)
     }
 
     /// Puts the nodes outside `patch` (in increasing order) that a spring joins to it in place of `ring` if they can move,
@@ -87,7 +67,7 @@ impl SpringGraph {
     ///
     /// # Real-time
     /// For the global actor, at each resync: bounded by the patch; the lists may grow.
-    pub fn neighbours(&self, patch: &[u32], ring: &mut Vec<u32>, held: &mut Vec<u32>) {
+    pub(crate) fn neighbours(&self, patch: &[u32], ring: &mut Vec<u32>, held: &mut Vec<u32>) {
         ring.clear();
         held.clear();
         for &node in patch {
@@ -115,4 +95,17 @@ fn digest_of(rest: &[Vec3], inverse_masses: &[f64], links: &[Link]) -> u64 {
     });
     let bytes: Vec<u8> = coordinates.chain(springs).flat_map(u64::to_le_bytes).collect();
     digest(&bytes)
+}
+
+/// FNV-1a over whole words: fast enough for megabytes, and any changed bit changes it.
+pub(super) fn digest(bytes: &[u8]) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut words = bytes.chunks_exact(size_of::<u64>());
+    let mut add = |word: u64| hash = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29);
+    for word in &mut words {
+        add(u64::from_le_bytes(word.try_into().unwrap_or_default()));
+    }
+    words.remainder().iter().for_each(|&byte| add(u64::from(byte)));
+    add(bytes.len() as u64);
+    hash
 }

@@ -1,8 +1,8 @@
 //! A patch and the springs that touch it, linear around rest.
 
-use nalgebra::{DMatrix, Matrix3};
-
-use super::SpringGraph;
+use super::graph::SpringGraph;
+use crate::body::assemble;
+use crate::linear_algebra::Matrix;
 
 /// At most so many nodes of a patch are pressed.
 const CONTACTS: usize = 12;
@@ -11,9 +11,9 @@ const CONTACTS: usize = 12;
 /// mass, which belongs to the surroundings.
 #[derive(Debug)]
 pub(super) struct Near {
-    pub(super) mass: DMatrix<f64>,
-    pub(super) damping: DMatrix<f64>,
-    pub(super) stiffness: DMatrix<f64>,
+    pub(super) mass: Matrix,
+    pub(super) damping: Matrix,
+    pub(super) stiffness: Matrix,
     /// Coordinates of the patch.
     pub(super) patch: usize,
     /// The nodes that a tool presses: those of the patch with the least stiffness towards the ring, as a
@@ -41,29 +41,20 @@ impl Near {
             movable.binary_search(&node).ok().map(|place| 3 * place).or_else(of_ring)
         };
         let total = on_patch + 3 * ring.len();
-        let [mut mass, mut damping, mut stiffness] = [0; 3].map(|_| DMatrix::zeros(total, total));
+        let [mut mass, mut damping, mut stiffness] = [0; 3].map(|_| Matrix::zeros(total, total));
         let mut outward = vec![0.0; movable.len()];
         for (at, &node) in movable.iter().enumerate() {
             (0..3).for_each(|axis| mass[(3 * at + axis, 3 * at + axis)] = 1.0 / graph.inverse_masses()[node as usize]);
         }
         for link in graph.links() {
             let is_near = link.nodes.map(|node| patch.binary_search(&node).is_ok());
-            let along = graph.rest()[link.nodes[1] as usize] - graph.rest()[link.nodes[0] as usize];
-            if !(is_near[0] || is_near[1]) || along.norm() == 0.0 {
-                continue;
-            }
-            let u = along.normalize();
+            let Some(direction) = graph.direction(link).filter(|_| is_near[0] || is_near[1]) else { continue };
             let places = link.nodes.map(place);
             for (matrix, weight) in [(&mut stiffness, link.spring.stiffness), (&mut damping, link.spring.damping)] {
-                let block: Matrix3<f64> = u * u.transpose() * weight;
-                for (row, row_sign) in places.iter().zip([-1.0, 1.0]) {
-                    for (column, sign) in places.iter().zip([-1.0, 1.0]) {
-                        if let (Some(row), Some(column)) = (*row, *column) {
-                            let mut part = matrix.fixed_view_mut::<3, 3>(row, column);
-                            part += block * (row_sign * sign);
-                        }
-                    }
-                }
+                assemble(direction, weight, places, |row, column, block| {
+                    let mut part = matrix.fixed_view_mut::<3, 3>(row, column);
+                    part += block;
+                });
             }
             if is_near[0] != is_near[1] {
                 let inner = places[usize::from(is_near[1])].filter(|place| *place < on_patch);
@@ -79,14 +70,13 @@ impl Near {
 
     /// `own` with the ring's coordinates replaced by states, which are `on_ring` there (a column each) and have `sign` times
     /// the matrix `far` of their own.
-    pub(super) fn beside(&self, own: &DMatrix<f64>, on_ring: &DMatrix<f64>, far: &[f64], sign: f64) -> DMatrix<f64> {
+    pub(super) fn beside(&self, own: &Matrix, on_ring: &Matrix, far: &Matrix, sign: f64) -> Matrix {
         let (patch, ring, states) = (self.patch, on_ring.nrows(), on_ring.ncols());
-        let mut all = DMatrix::zeros(patch + states, patch + states);
+        let mut all = Matrix::zeros(patch + states, patch + states);
         all.view_mut((0, 0), (patch, patch)).copy_from(&own.view((0, 0), (patch, patch)));
         all.view_mut((patch, 0), (states, patch)).copy_from(&on_ring.tr_mul(&own.view((patch, 0), (ring, patch))));
         let of_ring = on_ring.tr_mul(&(own.view((patch, patch), (ring, ring)) * on_ring));
-        let far = DMatrix::from_column_slice(states, states, far) * sign;
-        all.view_mut((patch, patch), (states, states)).copy_from(&(of_ring + far));
+        all.view_mut((patch, patch), (states, states)).copy_from(&(of_ring + far * sign));
         all
     }
 }

@@ -1,6 +1,7 @@
 //! Products of a tall matrix with few columns, eight rows at once: what a reduced model costs in a tick.
 
-use super::super::body::kernel::{InstructionSet, LANES, Lane, Simd, Work};
+use crate::body::kernel::{InstructionSet, LANES, Lane, Simd, Work};
+use crate::linear_algebra::Matrix;
 
 /// Eight numbers in one cache line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,12 +19,12 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Of `matrix`, column after column of `rows` numbers.
-    pub(super) fn new(matrix: &[f64], rows: usize) -> Self {
-        let height = rows.div_ceil(LANES);
-        let mut lines = Vec::with_capacity(height * matrix.len() / rows.max(1));
-        for column in matrix.chunks_exact(rows.max(1)) {
-            lines.extend(column.chunks(LANES).map(|chunk| {
+    /// The columns of `matrix`.
+    pub(super) fn new(matrix: &Matrix) -> Self {
+        let (rows, height) = (matrix.nrows(), matrix.nrows().div_ceil(LANES));
+        let mut lines = Vec::with_capacity(height * matrix.ncols());
+        for column in matrix.column_iter() {
+            lines.extend(column.as_slice().chunks(LANES).map(|chunk| {
                 let mut line = Line([0.0; LANES]);
                 line.0[..chunk.len()].copy_from_slice(chunk);
                 line
@@ -32,14 +33,11 @@ impl Columns {
         Self { lines, height, rows, set: InstructionSet::detect() }
     }
 
-    pub(super) fn rows(&self) -> usize {
-        self.rows
-    }
-
-    /// Column after column, without the padding.
-    pub(super) fn to_matrix(&self) -> Vec<f64> {
-        let columns = self.lines.chunks_exact(self.height.max(1));
-        columns.flat_map(|column| column.iter().flat_map(|line| line.0).take(self.rows)).collect()
+    /// The columns as they were, without the padding.
+    pub(super) fn to_matrix(&self) -> Matrix {
+        let columns = self.lines.len() / self.height.max(1);
+        let line = |row: usize, column: usize| &self.lines[column * self.height + row / LANES];
+        Matrix::from_fn(self.rows, columns, |row, column| line(row, column).0[row % LANES])
     }
 
     /// out += A^T y for each column of A; `y` has a number per row.
@@ -47,7 +45,7 @@ impl Columns {
         self.project_all([y], [out]);
     }
 
-    /// The same for several vectors, in one pass over the columns.
+    /// Does what [`project`](Self::project) does for several vectors, in one pass over the columns.
     pub(super) fn project_all<const N: usize>(&self, ys: [&[f64]; N], outs: [&mut [f64]; N]) {
         debug_assert!(ys.iter().all(|y| y.len() == self.rows));
         debug_assert!(outs.iter().all(|out| out.len() * self.height == self.lines.len()));
@@ -151,15 +149,15 @@ mod tests {
         let number = |n: usize| (1.7 * n as f64).sin();
         for rows in [1, 7, 8, 9, 33, 76 * 3] {
             let states = 5;
-            let matrix: Vec<f64> = (0..rows * states).map(number).collect();
+            let matrix = Matrix::from_fn(rows, states, |row, state| number(state * rows + row));
             let y: Vec<f64> = (0..rows).map(|n| number(n + 1000)).collect();
             let weights: [Vec<f64>; 2] = [2000, 3000].map(|at| (0..states).map(|n| number(n + at)).collect());
             for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
-                let columns = Columns { set, ..Columns::new(&matrix, rows) };
+                let columns = Columns { set, ..Columns::new(&matrix) };
                 let mut out = vec![1.0; states];
                 columns.project(&y, &mut out);
                 for (state, out) in out.iter().enumerate() {
-                    let expected: f64 = (0..rows).map(|row| matrix[state * rows + row] * y[row]).sum();
+                    let expected: f64 = (0..rows).map(|row| matrix[(row, state)] * y[row]).sum();
                     assert!((out - 1.0 - expected).abs() < 1e-12, "{set:?}, {rows} rows");
                 }
                 let mut sums = [vec![1.0; rows], vec![2.0; rows]];
@@ -167,7 +165,7 @@ mod tests {
                 columns.combine([&weights[0], &weights[1]], [x, v]);
                 for row in 0..rows {
                     for (n, sums) in sums.iter().enumerate() {
-                        let at = |state: usize| matrix[state * rows + row] * weights[n][state];
+                        let at = |state: usize| matrix[(row, state)] * weights[n][state];
                         let expected = (0..states).map(at).sum::<f64>() + 1.0 + n as f64;
                         assert!((sums[row] - expected).abs() < 1e-12, "{set:?}, {rows} rows");
                     }

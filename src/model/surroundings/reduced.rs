@@ -1,8 +1,8 @@
 //! A linear model in few states, in modal form, that answers to forces on a ring of nodes.
 
-use super::super::dense;
 use super::far::Far;
 use super::products::Columns;
+use crate::linear_algebra::{Matrix, modes, product, product_t};
 
 /// What the velocities do to the states' accelerations.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,30 +27,19 @@ pub(crate) struct Reduced {
 impl Reduced {
     /// The surroundings `far` in the span of the columns of `shapes`, with its modes there on all of `far` as columns.
     /// `None` if there is no motion in that span, nothing that holds it or a number is not finite.
-    pub(super) fn new(far: &Far, ring: &[u32], shapes: &[f64]) -> Option<(Self, Vec<f64>)> {
+    pub(super) fn new(far: &Far, ring: &[u32], shapes: &Matrix) -> Option<(Self, Matrix)> {
         if !far.has_springs() {
             return None;
         }
-        let columns = shapes.len() / far.unknowns().max(1);
         let (stiffness, damping) = far.stiffness_and_damping(shapes);
-        let (modes, values) = dense::modes(&far.mass(shapes), &stiffness);
+        let (modes, values) = modes(&far.mass(shapes), &stiffness).filter(|(_, values)| !values.is_empty())?;
         let states = values.len();
-        if states == 0 {
-            return None;
-        }
-        let shapes = dense::combinations(shapes, &modes, far.unknowns(), columns);
+        let shapes = product(shapes, &modes);
         let damping = match far.proportional_damping() {
             Some(share) => Damping::Diagonal(values.iter().map(|value| share * value).collect()),
-            None => {
-                Damping::Full(dense::product(&modes, &dense::combinations(&damping, &modes, columns, columns), columns))
-            }
+            None => Damping::Full(product_t(&modes, &product(&damping, &modes)).data.into()),
         };
-        let mut on_ring = Vec::with_capacity(3 * ring.len() * states);
-        for shape in shapes.chunks_exact(far.unknowns()) {
-            let of_node = |&node: &u32| &shape[far.unknown(node, 0)..][..3];
-            on_ring.extend(ring.iter().flat_map(of_node));
-        }
-        let on_ring = Columns::new(&on_ring, 3 * ring.len());
+        let on_ring = Columns::new(&shapes.select_rows(&far.unknowns_of(ring)));
         Some((Self { states, shapes: on_ring, stiffness: values, damping }, shapes))
     }
 

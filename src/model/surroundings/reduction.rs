@@ -1,15 +1,14 @@
 //! The computation of a basis, in parts that end in time.
 
-use super::super::dense;
-use super::super::sparse::SparseFactor;
-use super::SpringGraph;
 use super::accuracy::{Estimate, MOST_STATES, Size, states_within};
 use super::basis::{Basis, Forecast};
 use super::estimate::Contacts;
 use super::far::Far;
+use super::graph::SpringGraph;
 use super::products::Columns;
 use super::reduced::Reduced;
 use crate::error::ModelError;
+use crate::linear_algebra::{Matrix, SparseFactor, leading_combinations, leading_left_singular_vectors};
 
 /// The real frequency that the answers are expanded at (rad/s): between rest and the fastest that a hand does.
 const EXPANSION: f64 = 2.0 * std::f64::consts::PI * 30.0;
@@ -25,6 +24,7 @@ const SMOOTH_DEGREE: i32 = 2;
 const LARGE: usize = 20_000;
 
 /// A [`Basis`] in the making. Each part costs at most what the factorisation of the surroundings costs.
+#[derive(Debug)]
 pub struct Reduction {
     patch: Vec<u32>,
     ring: Vec<u32>,
@@ -34,38 +34,33 @@ pub struct Reduction {
     errors: Option<Vec<f64>>,
 }
 
+#[derive(Debug)]
 enum Stage {
     Factorise,
     /// So many moments are there; `last` is the right-hand side of the next.
     Moments {
         factor: SparseFactor,
         count: usize,
-        last: Vec<f64>,
-        all: Vec<f64>,
+        last: Matrix,
+        all: Matrix,
     },
     /// How many are enough?
     Compare {
         factor: SparseFactor,
-        wide: Vec<f64>,
+        wide: Matrix,
         contacts: Box<Contacts>,
     },
     Project {
         factor: SparseFactor,
         /// Columns that span what the states are taken from, the most important first.
-        wide: Vec<f64>,
+        wide: Matrix,
     },
     Done,
 }
 
-impl std::fmt::Debug for Reduction {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Reduction").field("unknowns", &self.far.unknowns()).finish_non_exhaustive()
-    }
-}
-
 impl Reduction {
-    /// Of the surroundings of `patch` (ids in increasing order), with at most so many states or as many as an error budget
-    /// needs; `None` if nothing around the patch can move.
+    /// Begins the basis of the surroundings of `patch` (ids in increasing order), with at most so many states or as many as an
+    /// error budget needs; `None` if nothing around the patch can move.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -84,7 +79,7 @@ impl Reduction {
         })
     }
 
-    /// Ids of the patch nodes.
+    /// Ids of the patch nodes that the basis is for.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -100,7 +95,7 @@ impl Reduction {
         self.far.unknowns() > LARGE
     }
 
-    /// Does the next part; the basis after the last.
+    /// Does the next part; returns the basis after the last one.
     ///
     /// # Errors
     /// If nothing holds the surroundings together, so that they have no finite answer.
@@ -112,12 +107,11 @@ impl Reduction {
         match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Factorise => {
                 let factor = far.factorised(graph, EXPANSION).ok_or_else(indefinite)?;
-                let last = unit_forces(far, ring);
-                self.stage = Stage::Moments { factor, count: 0, last, all: Vec::new() };
+                let all = Matrix::zeros(far.unknowns(), 0);
+                self.stage = Stage::Moments { factor, count: 0, last: far.unit_forces(ring), all };
             }
-            Stage::Moments { factor, count, mut last, mut all } => {
-                factor.solve(&mut last);
-                append_moment(far, &mut last, &mut all, count);
+            Stage::Moments { factor, count, last, mut all } => {
+                let last = append_moment(far, factor.solve(last), &mut all, count);
                 self.stage = match count + 1 {
                     MOMENTS => self.span(graph, factor, &all),
                     count => Stage::Moments { factor, count, last, all },
@@ -143,13 +137,13 @@ impl Reduction {
     }
 
     /// The states, the most important first.
-    fn span(&self, graph: &SpringGraph, factor: SparseFactor, moments: &[f64]) -> Stage {
+    fn span(&self, graph: &SpringGraph, factor: SparseFactor, moments: &Matrix) -> Stage {
         let Self { far, ring, patch, size, .. } = self;
         let most = match size {
             Size::States(states) => *states,
             Size::ErrorPct(_) => MOST_STATES,
         };
-        let wide = dense::leading_left_singular_vectors(moments, far.unknowns(), FORECAST_STATES.max(most));
+        let wide = leading_left_singular_vectors(moments, FORECAST_STATES.max(most));
         match size {
             Size::States(_) => Stage::Project { factor, wide },
             Size::ErrorPct(_) => {
@@ -159,7 +153,7 @@ impl Reduction {
         }
     }
 
-    fn project(&self, graph: &SpringGraph, factor: &SparseFactor, wide: &[f64]) -> Result<Basis, ModelError> {
+    fn project(&self, graph: &SpringGraph, factor: &SparseFactor, wide: &Matrix) -> Result<Basis, ModelError> {
         let Self { far, ring, size, errors, .. } = self;
         let states = match *size {
             Size::States(states) => states,
@@ -167,14 +161,17 @@ impl Reduction {
         };
         let linear = errors.as_ref().and_then(|errors| errors.get(states.checked_sub(1)?));
         let estimate = linear.map(|error| Estimate { linear_pct: 100.0 * error });
-        let columns = |count: usize| &wide[..wide.len().min(count * far.unknowns())];
-        let (narrow, wide) = (columns(states), columns(states.max(FORECAST_STATES)));
-        let (answers, _) = Reduced::new(far, ring, narrow).ok_or_else(indefinite)?;
-        let mut smooth = far.smooth_fields(graph, SMOOTH_DEGREE);
-        factor.solve(&mut smooth);
-        let shapes = [normalised(wide, far.unknowns()), normalised(&smooth, far.unknowns())].concat();
+        let columns = |count: usize| wide.columns(0, count.min(wide.ncols())).into_owned();
+        let (answers, _) = Reduced::new(far, ring, &columns(states)).ok_or_else(indefinite)?;
+        let mut shapes = columns(states.max(FORECAST_STATES));
+        append(&mut shapes, &factor.solve(far.smooth_fields(graph, SMOOTH_DEGREE)));
+        // Directions count, not lengths.
+        for mut shape in shapes.column_iter_mut() {
+            let norm = shape.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+            shape /= norm;
+        }
         let (model, modes) = Reduced::new(far, ring, &shapes).ok_or_else(indefinite)?;
-        let modes = Columns::new(&modes, far.unknowns());
+        let modes = Columns::new(&modes);
         let forecast = Forecast { nodes: far.nodes.clone(), masses: far.masses.clone(), modes, model };
         Ok(Basis { patch: self.patch.clone(), answers, forecast, estimate })
     }
@@ -184,42 +181,71 @@ fn indefinite() -> ModelError {
     ModelError::new("the surroundings of a patch are not held together").at("local.patch")
 }
 
-/// A unit force on each node of the ring along each axis, as columns.
-fn unit_forces(far: &Far, ring: &[u32]) -> Vec<f64> {
-    let mut forces = vec![0.0; far.unknowns() * 3 * ring.len()];
-    for (place, &node) in ring.iter().enumerate() {
-        for axis in 0..3 {
-            forces[(3 * place + axis) * far.unknowns() + far.unknown(node, axis)] = 1.0;
-        }
-    }
-    forces
-}
-
-/// Appends Z_n/|Z_n| to `all` and makes `moment`, which is Z_n, M Z_n. From the first on they are followed in the
-/// combinations of columns that are largest in Z_0: what is small there is even smaller in the rest.
-fn append_moment(far: &Far, moment: &mut Vec<f64>, all: &mut Vec<f64>, n: usize) {
+/// Appends Z_n/|Z_n| to `all` and returns M Z_n for the `moment` Z_n. From the first on they are followed in the combinations
+/// of columns that are largest in Z_0: what is small there is even smaller in the rest.
+fn append_moment(far: &Far, mut moment: Matrix, all: &mut Matrix, n: usize) -> Matrix {
     let scale = 1.0 / moment.iter().map(|x| x * x).sum::<f64>().sqrt();
     if n == 0 {
-        *moment = dense::leading_combinations(moment, far.unknowns(), LEADING);
+        moment = leading_combinations(moment, LEADING);
     }
-    all.extend(moment.iter().map(|x| x * scale));
-    far.times_mass(moment);
+    append(all, &(&moment * scale));
+    far.times_mass(&mut moment);
+    moment
 }
 
-/// Every column divided by its norm: directions count, not lengths.
-fn normalised(columns: &[f64], rows: usize) -> Vec<f64> {
-    let scaled = columns.chunks_exact(rows).flat_map(|column| {
-        let norm = column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-        column.iter().map(move |x| x / norm)
-    });
-    scaled.collect()
+/// Appends the columns of `more`.
+fn append(matrix: &mut Matrix, more: &Matrix) {
+    let columns = matrix.ncols();
+    matrix.resize_horizontally_mut(columns + more.ncols(), 0.0);
+    matrix.columns_mut(columns, more.ncols()).copy_from(more);
+}
+
+impl Basis {
+    /// The basis of the surroundings of `patch` (ids in increasing order), of the given size. `None` if nothing around the patch can move.
+    ///
+    /// # Errors
+    /// If nothing holds the surroundings together, so that they have no finite answer.
+    ///
+    /// # Real-time
+    /// Not real-time safe: factorises a matrix of the whole body's size, seconds of work for a large one. [`Reduction`] does
+    /// the same in parts.
+    pub fn compute(graph: &SpringGraph, patch: &[u32], size: impl Into<Size>) -> Result<Option<Self>, ModelError> {
+        let Some(mut reduction) = Reduction::new(graph, patch, size) else { return Ok(None) };
+        loop {
+            if let Some(basis) = reduction.advance(graph)? {
+                return Ok(Some(basis));
+            }
+        }
+    }
+}
+
+/// The estimate for every number of states of the surroundings of `patch` (ids in increasing order), from 1 on, in one pass.
+/// Empty if nothing around the patch can move.
+///
+/// # Errors
+/// If nothing holds the surroundings together.
+///
+/// # Real-time
+/// Not real-time safe: factorises the body several times.
+pub fn errors_by_states(graph: &SpringGraph, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, ModelError> {
+    // No number of states keeps this budget, so that all are looked at.
+    let Some(mut reduction) = Reduction::new(graph, patch, Size::ErrorPct(0.0)) else { return Ok(Vec::new()) };
+    loop {
+        if let Some(errors) = reduction.errors() {
+            let estimate = |(index, &error): (usize, &f64)| (index + 1, Estimate { linear_pct: 100.0 * error });
+            return Ok(errors.iter().enumerate().map(estimate).collect());
+        }
+        if reduction.advance(graph)?.is_some() {
+            return Ok(Vec::new());
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::body::{Block, Body};
-    use super::super::super::mesh::Face;
     use super::*;
+    use crate::body::{Block, Body};
+    use crate::mesh::Face;
 
     // Check a small body whose patch is all that can move but a corner: what is left hangs on the patch alone.
     #[test]

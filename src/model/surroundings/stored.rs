@@ -2,8 +2,10 @@
 
 use super::accuracy::Estimate;
 use super::basis::{Basis, Forecast};
+use super::graph::digest;
 use super::products::Columns;
 use super::reduced::{Damping, Reduced};
+use crate::linear_algebra::Matrix;
 
 /// What the bytes begin with; its number changes with what follows.
 const MAGIC: &[u8; 16] = b"palpate-basis-2\n";
@@ -50,19 +52,6 @@ impl Basis {
     }
 }
 
-/// FNV-1a over whole words: fast enough for megabytes, and any changed bit changes it.
-pub(super) fn digest(bytes: &[u8]) -> u64 {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut words = bytes.chunks_exact(WORD);
-    let mut add = |word: u64| hash = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(29);
-    for word in &mut words {
-        add(u64::from_le_bytes(word.try_into().unwrap_or_default()));
-    }
-    words.remainder().iter().for_each(|&byte| add(u64::from(byte)));
-    add(bytes.len() as u64);
-    hash
-}
-
 struct Writer(Vec<u8>);
 
 impl Writer {
@@ -81,8 +70,9 @@ impl Writer {
     }
 
     fn columns(&mut self, columns: &Columns) {
-        self.word(columns.rows() as u64);
-        self.numbers(&columns.to_matrix());
+        let matrix = columns.to_matrix();
+        self.word(matrix.nrows() as u64);
+        self.numbers(matrix.as_slice());
     }
 
     fn reduced(&mut self, model: &Reduced) {
@@ -128,8 +118,9 @@ impl Reader<'_> {
 
     fn columns(&mut self) -> Option<Columns> {
         let rows = usize::try_from(self.word()?).ok()?;
-        let matrix = self.numbers()?;
-        (rows > 0 && matrix.len().is_multiple_of(rows)).then(|| Columns::new(&matrix, rows))
+        let numbers = self.numbers()?;
+        let is_matrix = rows > 0 && numbers.len().is_multiple_of(rows);
+        is_matrix.then(|| Columns::new(&Matrix::from_vec(rows, numbers.len() / rows, numbers)))
     }
 
     fn reduced(&mut self) -> Option<Reduced> {
@@ -145,10 +136,10 @@ impl Reader<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::body::{Block, Body};
-    use super::super::super::mesh::Face;
     use super::super::{Size, SpringGraph};
     use super::*;
+    use crate::body::{Block, Body};
+    use crate::mesh::Face;
 
     #[test]
     fn a_basis_comes_back_whole_and_a_damaged_one_not_at_all() {

@@ -5,8 +5,8 @@ mod common;
 use common::*;
 use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, State};
-use palpate_model::contact::{Contact, Law, Mode, ToolMotion};
-use palpate_model::forecast::ToolForecast;
+use palpate_model::contact::{Contact, ContactMode, Law, ToolMotion};
+use palpate_model::local::ToolForecast;
 use palpate_model::local::{Kind, ResyncView, Template};
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
@@ -72,11 +72,11 @@ fn a_tool_on_a_fixed_face_is_lost_without_force() {
     let path: Vec<Vec3> = (0..=20).map(|k| Vec3::new(0.05, 0.0512, -0.001 + 0.0001 * f64::from(k))).collect();
     let felt = forces(&mut sim, &path);
     assert!(felt.iter().all(|force| *force == Vec3::zeros()));
-    assert_eq!(sim.contact(0).mode, Mode::Lost);
+    assert_eq!(sim.contact(0).mode, ContactMode::Lost);
     // It lets go like any other contact: below the face, nothing is tracked any more.
     let away = Vec3::new(0.05, 0.0512, -0.01);
     sim.tick(ToolMotion { from: *path.last().unwrap(), to: away });
-    assert_eq!((sim.contact(0).mode, sim.contact(0).triangle), (Mode::Lost, None));
+    assert_eq!((sim.contact(0).mode, sim.contact(0).triangle), (ContactMode::Lost, None));
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_patch_on_a_held_face_reports_the_lost_contact_too() {
     let corners = sim.body().surface().triangles[bottom as usize].map(|n| sim.body().rest()[n as usize]);
     let below = (corners[0] + corners[1] + corners[2]) / 3.0 - Vec3::z() * 0.001;
     let force = patch.tick(ToolMotion { from: below, to: below + Vec3::z() * 0.002 });
-    assert_eq!((force, patch.contact().mode), (Vec3::zeros(), Mode::Lost));
+    assert_eq!((force, patch.contact().mode), (Vec3::zeros(), ContactMode::Lost));
     assert_eq!(patch.contact().triangle, Some(bottom));
 }
 
@@ -256,7 +256,7 @@ fn a_released_tool_is_tracked_without_new_detection_and_dropped_when_it_leaves()
     // Off the surface by a tenth of a millimetre: no force, but still tracked.
     run(&mut sim, 0.098, 0.1001, 60);
     run(&mut sim, 0.1001, 0.1001, 600);
-    assert_eq!((sim.contact(0).mode, sim.contact(0).triangle.is_some()), (Mode::Free, true));
+    assert_eq!((sim.contact(0).mode, sim.contact(0).triangle.is_some()), (ContactMode::Free, true));
     assert_eq!(sim.force(0), Vec3::zeros());
     run(&mut sim, 0.1001, 0.102, 20);
     assert_eq!(sim.contact(0).triangle, None);

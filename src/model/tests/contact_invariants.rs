@@ -5,7 +5,7 @@ mod common;
 use common::*;
 use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, State};
-use palpate_model::contact::{Contact, Deformable, Law, Mode, ToolMotion, step};
+use palpate_model::contact::{Contact, ContactMode, Deformable, Law, ToolMotion, step};
 use palpate_model::equilibrium::static_equilibrium;
 use palpate_model::mesh::{Face, Lattice, Surface};
 use palpate_model::simulation::{Simulation, Stepping, stable_substeps};
@@ -113,9 +113,9 @@ proptest! {
         let error = sheet.point(&sheet.velocities, &held) - target;
         let limit = 1e-14 * target.norm().max(1.0);
         match contact.mode {
-            Mode::Stick => prop_assert!(error.norm() <= limit, "{} > {}", error.norm(), limit),
-            Mode::Slip => prop_assert!(error.dot(&contact.normal).abs() <= limit),
-            Mode::Free | Mode::Lost => {}
+            ContactMode::Stick => prop_assert!(error.norm() <= limit, "{} > {}", error.norm(), limit),
+            ContactMode::Slip => prop_assert!(error.dot(&contact.normal).abs() <= limit),
+            ContactMode::Free | ContactMode::Lost => {}
         }
     }
 
@@ -143,7 +143,7 @@ proptest! {
         let across = (force - contact.normal * along).norm();
         prop_assert!(along >= 0.0);
         prop_assert!(across <= mu * along * (1.0 + 1e-9) + 1e-9 * force.norm());
-        prop_assert_eq!(contact.mode == Mode::Free, force.norm() == 0.0);
+        prop_assert_eq!(contact.mode == ContactMode::Free, force.norm() == 0.0);
     }
 }
 

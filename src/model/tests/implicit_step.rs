@@ -5,9 +5,9 @@ mod common;
 use common::minjerk;
 use palpate_model::Vec3;
 use palpate_model::body::{Block, State};
-use palpate_model::contact::{Contact, Law, Mode, ToolMotion};
-use palpate_model::forecast::ToolForecast;
+use palpate_model::contact::{Contact, ContactMode, Law, ToolMotion};
 use palpate_model::integrator::Spectrum;
+use palpate_model::local::ToolForecast;
 use palpate_model::local::{Kind, LocalModel, ResyncView, Template};
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
@@ -57,7 +57,7 @@ fn tool(ms: f64) -> Vec3 {
 const MS: u32 = 260;
 
 /// Mean force of every millisecond, and the modes seen at their ends.
-fn run(mut model: Box<dyn LocalModel>, ticks: u32) -> (Vec<Vec3>, Vec<Mode>) {
+fn run(mut model: Box<dyn LocalModel>, ticks: u32) -> (Vec<Vec3>, Vec<ContactMode>) {
     let at = |tick: u32| tool(f64::from(tick) / f64::from(ticks));
     (0..MS)
         .map(|ms| {
@@ -83,8 +83,8 @@ fn one_implicit_step_per_millisecond_is_stable_and_near_to_many_explicit_ones() 
             let error = rms(&implicit, &explicit);
             println!("k x {factor}, zeta {zeta}, mu {friction}: {error:.2} %");
             assert!(error < 2.0, "k x {factor}, zeta {zeta}, mu {friction}: {error} %");
-            assert!(modes.contains(&Mode::Slip) && modes.contains(&Mode::Free), "{modes:?}");
-            assert!(friction == 0.0 || modes.contains(&Mode::Stick), "{modes:?}");
+            assert!(modes.contains(&ContactMode::Slip) && modes.contains(&ContactMode::Free), "{modes:?}");
+            assert!(friction == 0.0 || modes.contains(&ContactMode::Stick), "{modes:?}");
             assert!(implicit.last().unwrap().norm() == 0.0, "lifted");
         }
     }

@@ -5,7 +5,7 @@ mod common;
 use common::*;
 use palpate_model::Vec3;
 use palpate_model::body::{Body, State};
-use palpate_model::contact::{Contact, Deformable, Equations, Law, Mode, ToolMotion, step};
+use palpate_model::contact::{Contact, ContactMode, Deformable, Equations, Law, ToolMotion, step};
 use palpate_model::mesh::Surface;
 use palpate_model::simulation::Simulation;
 
@@ -56,7 +56,7 @@ impl Triangle {
 const WEIGHTS: [f64; 3] = [0.5, 0.3, 0.2];
 
 fn touching() -> Contact {
-    Contact { triangle: Some(0), weights: WEIGHTS, mode: Mode::Stick, ..Contact::default() }
+    Contact { triangle: Some(0), weights: WEIGHTS, mode: ContactMode::Stick, ..Contact::default() }
 }
 
 fn resting_tool(triangle: &Triangle) -> ToolMotion {
@@ -104,13 +104,13 @@ fn printed_friction_is_raised_to_its_limit_when_it_slips_below_it() {
         let force = triangle.step(&mut contact, &law(equations, 1.0), tool);
         force.xy().norm() / force.z
     };
-    assert!((share(Equations::Paper, Mode::Slip) - 1.0).abs() < 1e-12);
-    assert!((share(Equations::Paper, Mode::Stick) - 0.05).abs() < 1e-12);
-    assert!((share(Equations::Corrected, Mode::Slip) - 0.05).abs() < 1e-12);
+    assert!((share(Equations::Paper, ContactMode::Slip) - 1.0).abs() < 1e-12);
+    assert!((share(Equations::Paper, ContactMode::Stick) - 0.05).abs() < 1e-12);
+    assert!((share(Equations::Corrected, ContactMode::Slip) - 0.05).abs() < 1e-12);
     // 0/0 in (27) is read as no friction, not as NaN.
     let mut still = Triangle::new([0.5e-3; 3], [Vec3::z() * 0.2; 3]);
     let tool = resting_tool(&still);
-    let force = still.step(&mut Contact { mode: Mode::Slip, ..touching() }, &law(Equations::Paper, 1.0), tool);
+    let force = still.step(&mut Contact { mode: ContactMode::Slip, ..touching() }, &law(Equations::Paper, 1.0), tool);
     assert!(force.xy().norm() == 0.0 && force.z > 0.0, "{force}");
 }
 

@@ -173,12 +173,14 @@ fn a_network_agrees_with_its_block_in_everything_that_a_body_is_asked() {
 #[test]
 fn a_bad_network_is_refused_and_says_why() {
     let spring = Spring { stiffness: 1.0, damping: 0.1, rest_length: 1.0 };
-    let nodes = || SpringNetwork::builder(vec![Vec3::zeros(), Vec3::x(), Vec3::y()]).masses(vec![1.0; 3]);
+    let nodes_at = |last| SpringNetwork::builder(vec![Vec3::zeros(), Vec3::x(), last]).masses(vec![1.0; 3]);
+    let nodes = || nodes_at(Vec3::y());
     let bad = Spring { stiffness: f64::NAN, ..spring };
     let flat = Spring { rest_length: 0.0, ..spring };
     let cases = [
         (nodes().spring(0, 3, spring), "nodes 0 and 3"),
         (nodes().spring(0, 1, spring).spring(2, 2, spring), "spring 1: it joins node 2 to itself"),
+        (nodes_at(Vec3::x()).spring(1, 2, spring), "springs: spring 0: nodes 1 and 2 are at the same place"),
         (nodes().spring(0, 1, bad), "stiffness NaN"),
         (nodes().spring(0, 1, flat), "rest length 0"),
         (nodes().masses(vec![1.0; 2]), "2 for 3 nodes"),

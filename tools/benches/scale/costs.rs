@@ -7,7 +7,7 @@ use palpate::error::{Error, ErrorKind};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
-use palpate::model::forecast::ToolForecast;
+use palpate::model::local::ToolForecast;
 use palpate::model::integrator::Spectrum;
 use palpate::model::local::{Kind, LocalModel, Prediction, ResyncView, Template};
 use palpate::model::mesh::Face;

@@ -1,12 +1,13 @@
-//! Balanced truncation by the square-root method.
+//! Balanced truncation by the square-root method, and the first-order models that it gives.
+
+use nalgebra::Complex;
+use palpate_model::ModelError;
 
 use super::congruence::Congruence;
 use super::gramian;
-use super::linalg::{Matrix, product, product_t, scaled_columns, svd};
-use super::lyapunov;
+use super::linalg::{CMatrix, Matrix, complex, eigenvalues, product, product_t, scaled_columns, svd};
 use super::modal::Modal;
-use super::state_space::StateSpace;
-use palpate::{Error, ErrorKind};
+use super::response::Response;
 
 /// Hankel singular values below this share of the largest are rounding: cut before balancing.
 pub const NUMERICAL_RANK: f64 = 1e-14;
@@ -43,7 +44,7 @@ impl Balanced {
     ///
     /// # Errors
     /// If a mode has no damping or no stiffness: the system is not asymptotically stable.
-    pub fn modal(modal: &Modal) -> Result<Self, Error> {
+    pub fn modal(modal: &Modal) -> Result<Self, ModelError> {
         let factors = gramian::controllability(modal).zip(gramian::observability(modal));
         let realisation = Realisation {
             times_a: &|x| modal.times_a(x),
@@ -59,10 +60,10 @@ impl Balanced {
     ///
     /// # Errors
     /// If it is not asymptotically stable.
-    pub fn general(small: &Congruence) -> Result<Self, Error> {
+    pub fn general(small: &Congruence) -> Result<Self, ModelError> {
         let (a, input, output) = small.first_order().ok_or_else(unstable)?;
         let output = output.transpose();
-        let factors = lyapunov::factors(&a, &input, &output);
+        let factors = gramian::factors(&a, &input, &output);
         let n = small.mass.nrows();
         let realisation = Realisation {
             times_a: &|x| product(&a, x),
@@ -78,8 +79,8 @@ impl Balanced {
     ///
     /// # Errors
     /// If it is not asymptotically stable.
-    pub fn of(small: &Congruence) -> Result<Self, Error> {
-        match small.modal() {
+    pub fn of(small: &Congruence) -> Result<Self, ModelError> {
+        match Modal::of(small) {
             Some(modal) => {
                 let mut balanced = Self::modal(&modal)?;
                 balanced.displacements = balanced.displacements.rows(0, small.mass.nrows()).into_owned();
@@ -138,7 +139,49 @@ impl Balanced {
     }
 }
 
-fn unstable() -> Error {
+fn unstable() -> ModelError {
     let message = "the system is not asymptotically stable: it needs damping, and something that holds it";
-    Error::new(ErrorKind::Scene, message).at("body.material.damping_ratio")
+    ModelError::of("body.material.damping_ratio", message)
+}
+
+/// x' = A x + B u, y = C x + D u.
+///
+/// # Real-time
+/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StateSpace {
+    /// A (1/s), r x r.
+    pub a: Matrix,
+    /// B, r x m.
+    pub b: Matrix,
+    /// C, p x r.
+    pub c: Matrix,
+    /// D, p x m.
+    pub d: Matrix,
+}
+
+impl StateSpace {
+    /// Number of states r.
+    pub fn order(&self) -> usize {
+        self.a.nrows()
+    }
+
+    /// The eigenvalues of A (1/s); `None` if a number is not finite.
+    pub fn poles(&self) -> Option<Vec<Complex<f64>>> {
+        eigenvalues(&self.a)
+    }
+
+    /// True if every pole lies in the left half plane.
+    pub fn is_stable(&self) -> bool {
+        self.poles().is_some_and(|poles| poles.iter().all(|pole| pole.re < 0.0))
+    }
+}
+
+impl Response for StateSpace {
+    fn at(&self, s: Complex<f64>) -> Option<CMatrix> {
+        let mut matrix = complex(&(-&self.a));
+        (0..self.order()).for_each(|at| matrix[(at, at)] += s);
+        let x = matrix.lu().solve(&complex(&self.b))?;
+        Some(complex(&self.c) * x + complex(&self.d))
+    }
 }

@@ -1,11 +1,12 @@
 //! Static condensation, with and without modes of what is left out.
 
+use palpate_model::ModelError;
+
 use super::congruence::Congruence;
 use super::krylov::Projection;
 use super::linalg::Matrix;
-use super::slow_modes::slow_modes;
+use super::modal::slow_modes;
 use super::system::SecondOrder;
-use palpate::Error;
 
 /// Guyan's reduction (1965, AIAA J. 3): the coordinates in `kept` (in increasing order) stay, all others follow as they do at rest. Exact
 /// at rest for ports at the kept coordinates; mass and damping go along.
@@ -15,7 +16,7 @@ use palpate::Error;
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
-pub fn guyan(system: &SecondOrder, kept: &[usize]) -> Result<Projection, Error> {
+pub fn guyan(system: &SecondOrder, kept: &[usize]) -> Result<Projection, ModelError> {
     Ok(Projection::new(system, constraint_modes(system, kept)?))
 }
 
@@ -26,7 +27,7 @@ pub fn guyan(system: &SecondOrder, kept: &[usize]) -> Result<Projection, Error> 
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
-pub fn condensed(system: &SecondOrder, kept: &[usize]) -> Result<Projection, Error> {
+pub fn condensed(system: &SecondOrder, kept: &[usize]) -> Result<Projection, ModelError> {
     let Projection { basis, model } = guyan(system, kept)?;
     let mass = system.part(kept).mass();
     Ok(Projection { basis, model: model.with_mass(mass) })
@@ -39,7 +40,7 @@ pub fn condensed(system: &SecondOrder, kept: &[usize]) -> Result<Projection, Err
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
-pub fn craig_bampton(system: &SecondOrder, kept: &[usize], modes: usize) -> Result<Projection, Error> {
+pub fn craig_bampton(system: &SecondOrder, kept: &[usize], modes: usize) -> Result<Projection, ModelError> {
     let constraint = constraint_modes(system, kept)?;
     let others = others(system, kept);
     let (_, shapes) = slow_modes(&system.part(&others), modes)?;
@@ -67,7 +68,7 @@ fn others(system: &SecondOrder, kept: &[usize]) -> Vec<usize> {
 }
 
 /// How all coordinates follow the kept ones at rest, n x kept.
-fn constraint_modes(system: &SecondOrder, kept: &[usize]) -> Result<Matrix, Error> {
+fn constraint_modes(system: &SecondOrder, kept: &[usize]) -> Result<Matrix, ModelError> {
     let others = others(system, kept);
     let mut basis = Matrix::from_fn(system.coordinates(), kept.len(), |row, column| f64::from(kept[column] == row));
     if others.is_empty() {

@@ -2,8 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::linalg::{CMatrix, Matrix, complex, product_t, solve_complex, symmetrised};
-use super::modal::Modal;
+use super::linalg::{CMatrix, Matrix, complex, product_t, solve_positive, symmetrised};
 use super::response::Response;
 use super::system::{Ports, Rayleigh, SecondOrder};
 
@@ -22,7 +21,7 @@ pub struct Congruence {
     pub damping: Matrix,
     /// K_r, r x r.
     pub stiffness: Matrix,
-    /// B_r and what comes out.
+    /// The ports: B_r and what comes out.
     pub ports: Ports,
     rayleigh: Option<Rayleigh>,
 }
@@ -33,7 +32,8 @@ impl Congruence {
         Self::with(system, basis, system.ports.project(basis), system.rayleigh())
     }
 
-    /// The same with other `ports`, those of z already, where it is known whether the damping is proportional.
+    /// `system` in the span of `basis` with other `ports`, those of z already, where it is known whether the damping is
+    /// proportional.
     pub(super) fn with(system: &SecondOrder, basis: &Matrix, ports: Ports, rayleigh: Option<Rayleigh>) -> Self {
         let stiffness = symmetrised(&product_t(basis, &system.times_stiffness(basis)));
         let mass = symmetrised(&product_t(basis, &system.times_mass(basis)));
@@ -55,7 +55,7 @@ impl Congruence {
         }
     }
 
-    /// The same with the mass of only some coordinates, such as a condensation without the mass of what it leaves out.
+    /// The system with the mass of only some coordinates, such as a condensation without the mass of what it leaves out.
     pub(super) fn with_mass(mut self, mass: Matrix) -> Self {
         self.mass = mass;
         if self.rayleigh.is_some_and(|rayleigh| rayleigh.mass != 0.0) {
@@ -72,11 +72,6 @@ impl Congruence {
     /// alpha and beta, if C = alpha M + beta K.
     pub fn rayleigh(&self) -> Option<Rayleigh> {
         self.rayleigh
-    }
-
-    /// Its modes, if C is proportional.
-    pub fn modal(&self) -> Option<Modal> {
-        Modal::of(self)
     }
 
     /// s^2 M_r + s C_r + K_r at a complex s.
@@ -106,7 +101,7 @@ impl Congruence {
     pub(super) fn first_order(&self) -> Option<(Matrix, Matrix, Matrix)> {
         let r = self.mass.nrows();
         let w = (self.stiffness.trace() / self.mass.trace()).abs().sqrt();
-        let right = |matrix: &Matrix| super::linalg::solve_positive(&self.mass, matrix);
+        let right = |matrix: &Matrix| solve_positive(&self.mass, matrix);
         let (k, c, b) = (right(&self.stiffness)?, right(&self.damping)?, right(&self.ports.input)?);
         let mut a = Matrix::zeros(2 * r, 2 * r);
         (0..r).for_each(|at| a[(at, r + at)] = w);
@@ -123,7 +118,7 @@ impl Congruence {
 
 impl Response for Congruence {
     fn at(&self, s: Complex<f64>) -> Option<CMatrix> {
-        let x = solve_complex(self.dynamic_stiffness(s), &complex(&self.ports.input))?;
+        let x = self.dynamic_stiffness(s).lu().solve(&complex(&self.ports.input))?;
         Some(complex(&self.ports.direct) + self.outputs(s).transpose() * x)
     }
 }

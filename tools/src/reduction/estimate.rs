@@ -1,20 +1,20 @@
 //! How wrong a congruence can be, from its residual alone.
 
 use nalgebra::Complex;
+use palpate_model::ModelError;
 
 use super::congruence::Congruence;
 use super::krylov::Projection;
-use super::linalg::{CMatrix, Matrix, complex, product_t, side_by_side, solve_complex};
-use super::slow_modes::slow_modes;
+use super::linalg::{CMatrix, Matrix, complex, product_t, side_by_side};
+use super::modal::slow_modes;
 use super::system::{Rayleigh, SecondOrder};
-use palpate::Error;
 
 /// The slowest mode is found up to this share of its frequency squared.
 const CLOSE: f64 = 0.99;
 
 /// Bounds the error of a [`Projection`] at any frequency.
 ///
-/// With D(s) = s^2 M + s C + K, the residuals R = B - D T X of the answer and L = P + s V - D T Y of the dual one, the error of the
+/// Let D(s) = s^2 M + s C + K. By the residuals R = B - D T X of the answer and L = P + s V - D T Y of the dual one, the error of the
 /// response is exactly L^T D^-1 R (Grimme 1997; Feng, Antoulas and Benner 2017, Int. J. Numer. Methods Eng.). With C = alpha M + beta K all
 /// three matrices have the same modes, so that D^-1 is at most c(s) times A^-1, A = s0^2 M + s0 C + K at a real s0, with c(s) the largest
 /// ratio of the two over all frequencies that a mode can have, from the slowest one up: one factorisation serves all s, and the bound is
@@ -37,11 +37,11 @@ pub struct ErrorBound {
 }
 
 impl ErrorBound {
-    /// For a model of `system`; `shift` is s0 (rad/s).
+    /// The bound for a model of `system`; `shift` is s0 (rad/s).
     ///
     /// # Errors
     /// If nothing holds the system.
-    pub fn new(system: &SecondOrder, model: &Projection, shift: f64) -> Result<Self, Error> {
+    pub fn new(system: &SecondOrder, model: &Projection, shift: f64) -> Result<Self, ModelError> {
         let ports = &system.ports;
         let basis = &model.basis;
         let products = [system.times_mass(basis), system.times_damping(basis), system.times_stiffness(basis)];
@@ -51,10 +51,7 @@ impl ErrorBound {
         // The iteration comes from above.
         let slowest = CLOSE * slow_modes(system, 1)?.0.first().copied().unwrap_or(0.0);
         let known = system.rayleigh();
-        let rayleigh = known.unwrap_or_else(|| {
-            let (c, k) = (system.damping_trace(), system.stiffness_trace());
-            Rayleigh { mass: 0.0, stiffness: c / k }
-        });
+        let rayleigh = known.unwrap_or_else(|| Rayleigh { mass: 0.0, stiffness: system.damping_over_stiffness() });
         Ok(Self { gram, model: model.model.clone(), rayleigh, shift, slowest, is_rigorous: known.is_some() })
     }
 
@@ -66,7 +63,7 @@ impl ErrorBound {
         let mut sides = CMatrix::zeros(r, m + p);
         sides.columns_mut(0, m).copy_from(&complex(&model.ports.input));
         sides.columns_mut(m, p).copy_from(&model.outputs(s));
-        let answers = solve_complex(model.dynamic_stiffness(s), &sides)?;
+        let answers = model.dynamic_stiffness(s).lu().solve(&sides)?;
         let (x, y) = (answers.columns(0, m).into_owned(), answers.columns(m, p).into_owned());
         // The residuals as combinations of the columns behind `gram`.
         let residual = |z: &CMatrix, of_input: bool| {
@@ -95,7 +92,7 @@ impl ErrorBound {
         Some(self.ratio(s) * size(&residual(&x, true)) * size(&residual(&y, false)))
     }
 
-    /// As [`at`](Self::at), at a frequency (Hz).
+    /// The bound at a frequency (Hz), see [`at`](Self::at).
     pub fn at_hz(&self, hz: f64) -> Option<f64> {
         self.at(Complex::new(0.0, 2.0 * std::f64::consts::PI * hz))
     }

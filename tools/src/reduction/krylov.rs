@@ -1,13 +1,11 @@
 //! Structure-preserving moment matching: a congruence whose basis answers like the whole around chosen frequencies.
 
+use palpate_model::ModelError;
+
 use super::balance::Balanced;
 use super::congruence::Congruence;
-use super::linalg::{Matrix, append_orthonormal};
-use super::system::{SecondOrder, solved};
-use palpate::Error;
-
-/// Directions of which this share of their length is new are combinations of those that are there.
-const DEPENDENT: f64 = 1e-11;
+use super::linalg::{DEPENDENT, Matrix, append_orthonormal, orthogonal, push_column};
+use super::system::SecondOrder;
 
 /// A reduced model x = T z and its basis T.
 ///
@@ -32,7 +30,7 @@ impl Projection {
 /// moments and ports.
 ///
 /// The congruence keeps the structure (Su and Craig 1991, J. Guid. Control Dyn. 14; Bai and Su 2005, SIAM J. Matrix Anal. 26).
-/// With proportional damping s^2 M + s C + K is a multiple of K + l(s) M: moments in l, from one Krylov space of (K + l M)^-1 M. Else the
+/// Under proportional damping s^2 M + s C + K is a multiple of K + l(s) M: moments in l, from one Krylov space of (K + l M)^-1 M. Else the
 /// recurrence of second order of the moments in s.
 ///
 /// # Errors
@@ -40,9 +38,9 @@ impl Projection {
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
-pub fn one_shift(system: &SecondOrder, shift: f64, moments: usize) -> Result<Projection, Error> {
+pub fn one_shift(system: &SecondOrder, shift: f64, moments: usize) -> Result<Projection, ModelError> {
     let factor = system.factorised(shift)?;
-    let solve = |columns: Matrix| solved(&factor, columns);
+    let solve = |columns: Matrix| factor.solve(columns);
     let mut basis = Matrix::zeros(system.coordinates(), 0);
     let mut last = append_orthonormal(&mut basis, &solve(system.ports.directions()), DEPENDENT);
     if system.rayleigh().is_none() {
@@ -78,21 +76,13 @@ fn second_order_arnoldi(
         let mut right = system.times_mass(&(&last * (2.0 * shift) + &last_before));
         right += system.times_damping(&last);
         let next = -solve(right);
-        for (mut r, mut s) in next.column_iter().map(|r| r.into_owned()).zip(last.column_iter().map(|s| s.into_owned()))
-        {
-            let length = r.norm();
-            for _ in 0..2 {
-                let overlap = basis.tr_mul(&r);
-                r.gemv(-1.0, &basis, &overlap, 1.0);
-                s.gemv(-1.0, &before, &overlap, 1.0);
-            }
+        for (r, s) in next.column_iter().zip(last.column_iter()) {
+            let (length, mut s) = (r.norm(), s.into_owned());
+            let r = orthogonal(&basis, r.into_owned(), Some((&before, &mut s)));
             let left = r.norm();
             if left > DEPENDENT * length {
-                let at = basis.ncols();
-                basis = basis.insert_column(at, 0.0);
-                basis.set_column(at, &(r / left));
-                before = before.insert_column(at, 0.0);
-                before.set_column(at, &(s / left));
+                push_column(&mut basis, &(r / left));
+                push_column(&mut before, &(s / left));
             }
         }
     }
@@ -107,7 +97,7 @@ fn second_order_arnoldi(
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
-pub fn many_shifts(system: &SecondOrder, shifts: &[f64]) -> Result<Projection, Error> {
+pub fn many_shifts(system: &SecondOrder, shifts: &[f64]) -> Result<Projection, ModelError> {
     let directions = system.ports.directions();
     let mut basis = Matrix::zeros(system.coordinates(), 0);
     for &shift in shifts {
@@ -140,7 +130,7 @@ const FASTEST: f64 = 8.0;
 pub struct LowRank {
     /// The system in the span of its answers to real frequencies.
     pub projection: Projection,
-    /// That, balanced.
+    /// The balanced model of that.
     pub balanced: Balanced,
 }
 
@@ -151,7 +141,7 @@ pub struct LowRank {
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
-pub fn low_rank(system: &SecondOrder, count: usize) -> Result<LowRank, Error> {
+pub fn low_rank(system: &SecondOrder, count: usize) -> Result<LowRank, ModelError> {
     let projection = many_shifts(system, &spread_shifts(system, count))?;
     let balanced = Balanced::of(&projection.model)?;
     Ok(LowRank { projection, balanced })

@@ -1,11 +1,12 @@
 //! A deformable body, linear around a state, with a port wherever a tool may touch it.
 
-use palpate::model::Vec3;
-use palpate::model::body::{Body, State};
-use palpate::model::dissection::{Adjacency, dissection};
+use palpate_model::ModelError;
+use palpate_model::Vec3;
+use palpate_model::body::{Body, State};
+use palpate_model::linear_algebra::dissection;
+
 use super::linalg::Matrix;
 use super::system::{Assembly, Ports, SecondOrder};
-use palpate::{Error, ErrorKind};
 
 /// The movable nodes of a body around a state, three coordinates each.
 ///
@@ -28,15 +29,15 @@ impl LinearBody {
     ///
     /// # Errors
     /// If the state does not fit the body, or nothing of it can move.
-    pub fn new(body: &dyn Body, state: &State) -> Result<Self, Error> {
+    pub fn new(body: &dyn Body, state: &State) -> Result<Self, ModelError> {
         let masses = body.inverse_masses();
         if state.positions.len() != masses.len() {
             let message = format!("a state of {} nodes for a body of {}", state.positions.len(), masses.len());
-            return Err(Error::new(ErrorKind::Usage, message));
+            return Err(ModelError::new(message));
         }
         let nodes: Vec<u32> = (0..masses.len() as u32).filter(|&node| masses[node as usize] > 0.0).collect();
         if nodes.is_empty() {
-            return Err(Error::scene("body", "none of its nodes can move"));
+            return Err(ModelError::of("body", "none of its nodes can move"));
         }
         let mut places = vec![None; masses.len()];
         nodes.iter().enumerate().for_each(|(place, &node)| places[node as usize] = Some(place));
@@ -59,10 +60,7 @@ impl LinearBody {
         let none = Ports::compliance(Matrix::zeros(n, 0));
         let points: Vec<Vec3> = nodes.iter().map(|&node| state.positions[node as usize]).collect();
         let joined = assembly.places().filter(|(row, column)| row % 3 == 0 && column % 3 == 0 && row != column);
-        let pairs: Vec<[u32; 2]> = joined.map(|(row, column)| [row as u32 / 3, column as u32 / 3]).collect();
-        let order = dissection(&points, &Adjacency::new(points.len(), pairs.iter().copied()));
-        let order =
-            order.map(|order| order.into_iter().flat_map(|node| 3 * node as usize..3 * node as usize + 3).collect());
+        let order = dissection(&points, joined.map(|(row, column)| [row as u32 / 3, column as u32 / 3]));
         Ok(Self { system: assembly.build(n, none).eliminated_in(order), places, nodes })
     }
 
@@ -100,7 +98,7 @@ impl LinearBody {
     ///
     /// # Errors
     /// None for weights on nodes of the body.
-    pub fn compliance(&self, weights: &[(u32, f64)]) -> Result<SecondOrder, Error> {
+    pub fn compliance(&self, weights: &[(u32, f64)]) -> Result<SecondOrder, ModelError> {
         self.system.with_ports(Ports::compliance(self.contact(weights)))
     }
 
@@ -109,10 +107,10 @@ impl LinearBody {
     ///
     /// # Errors
     /// If none of them can move.
-    pub fn held(&self, nodes: &[u32]) -> Result<SecondOrder, Error> {
+    pub fn held(&self, nodes: &[u32]) -> Result<SecondOrder, ModelError> {
         let inputs = self.coordinates(nodes);
         if inputs.is_empty() {
-            return Err(Error::scene("node", "none of the nodes that are to be moved can move"));
+            return Err(ModelError::of("node", "none of the nodes that are to be moved can move"));
         }
         let n = self.system.coordinates();
         let units = Matrix::from_fn(n, inputs.len(), |row, column| f64::from(inputs[column] == row));

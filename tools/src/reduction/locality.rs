@@ -1,23 +1,21 @@
 //! How much of what a tool feels at a contact a patch between held surroundings captures.
 
 use nalgebra::Complex;
+use palpate_model::ModelError;
 
-use palpate::model::sparse::SparseFactor;
 use super::congruence::Congruence;
-use super::linalg::{CMatrix, Matrix, append_orthonormal, complex, product_t, side_by_side};
+use super::krylov::many_shifts;
+use super::linalg::{CMatrix, DEPENDENT, Matrix, SparseFactor, append_orthonormal, complex, product_t, side_by_side};
 use super::linear_body::LinearBody;
 use super::modal::Modal;
 use super::response::{Response, log_spaced};
-use super::system::{Ports, Rayleigh, SecondOrder, solved};
-use palpate::Error;
+use super::system::{Ports, Rayleigh};
 
 /// Frequencies (Hz) at which the response of a contact is matched, rest among them: each costs a factorisation, and three solutions a
 /// contact. They are dense where the slow modes of a body of tissue ring.
 const MATCHED_HZ: [f64; 12] = [0.0, 5.0, 10.0, 14.0, 20.0, 28.0, 40.0, 60.0, 100.0, 200.0, 500.0, 1000.0];
 /// Frequencies in the band that errors are taken over.
 const SAMPLES: usize = 25;
-/// Directions of which this share of their length is new are combinations of those that are there.
-const DEPENDENT: f64 = 1e-11;
 /// Patches of more coordinates, and those without modes, are reduced first.
 const DENSE: usize = 400;
 /// Contacts that are solved for together.
@@ -41,9 +39,9 @@ enum Small {
 }
 
 impl ContactStiffness {
-    /// From a compliance: forces at the contact go in, its displacements come out.
+    /// The stiffness of a compliance: forces at the contact go in, its displacements come out.
     pub fn of(model: Congruence) -> Self {
-        let compliance = match model.modal() {
+        let compliance = match Modal::of(&model) {
             Some(modal) => Small::Modal(modal),
             None => Small::General(model),
         };
@@ -67,16 +65,16 @@ impl Response for ContactStiffness {
 /// A plain value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StiffnessError {
-    /// At rest.
+    /// The error at rest.
     pub at_rest: f64,
-    /// Root of the mean square over the logarithm of the frequency in the band.
+    /// The root of the mean square error over the logarithm of the frequency in the band.
     pub band: f64,
-    /// The worst in the band.
+    /// The worst error in the band.
     pub worst: f64,
 }
 
 impl StiffnessError {
-    /// Of `model` against `reference` over `hz`, the first of them for rest.
+    /// The errors of `model` against `reference` over `hz`, the first of them for rest.
     pub fn between(model: &dyn Response, reference: &dyn Response, hz: &[f64]) -> Self {
         let errors: Vec<f64> = hz
             .iter()
@@ -98,6 +96,7 @@ impl StiffnessError {
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
+#[derive(Debug)]
 pub struct LocalityCheck<'a> {
     body: &'a LinearBody,
     rayleigh: Option<Rayleigh>,
@@ -106,28 +105,22 @@ pub struct LocalityCheck<'a> {
     hz: Vec<f64>,
 }
 
-impl std::fmt::Debug for LocalityCheck<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("LocalityCheck").field("hz", &self.hz).finish_non_exhaustive()
-    }
-}
-
 impl<'a> LocalityCheck<'a> {
-    /// For contacts with `body` and errors over `band_hz`.
+    /// A check for contacts with `body` and errors over `band_hz`.
     ///
     /// # Errors
     /// If nothing holds the body.
-    pub fn new(body: &'a LinearBody, band_hz: [f64; 2]) -> Result<Self, Error> {
+    pub fn new(body: &'a LinearBody, band_hz: [f64; 2]) -> Result<Self, ModelError> {
         let factor = |&hz: &f64| {
             let s = 2.0 * std::f64::consts::PI * hz;
             Ok((s, body.system().factorised(s)?))
         };
-        let matched = MATCHED_HZ.iter().map(factor).collect::<Result<_, Error>>()?;
+        let matched = MATCHED_HZ.iter().map(factor).collect::<Result<_, ModelError>>()?;
         let hz = [vec![0.0], log_spaced(band_hz[0], band_hz[1], SAMPLES)].concat();
         Ok(Self { body, rayleigh: body.system().rayleigh(), matched, hz })
     }
 
-    /// Rest, and the frequencies of the band (Hz).
+    /// The frequencies at which errors are taken: rest, and those of the band (Hz).
     pub fn frequencies(&self) -> &[f64] {
         &self.hz
     }
@@ -139,7 +132,7 @@ impl<'a> LocalityCheck<'a> {
 
     fn whole_together(&self, contacts: &[Matrix]) -> Vec<ContactStiffness> {
         let all = side_by_side(&contacts.iter().collect::<Vec<_>>());
-        let answers: Vec<Matrix> = self.matched.iter().map(|(_, factor)| solved(factor, all.clone())).collect();
+        let answers: Vec<Matrix> = self.matched.iter().map(|(_, factor)| factor.solve(all.clone())).collect();
         let of = |at: usize| {
             let at_contact = answers.iter().map(|answer| answer.columns(3 * at, 3).into_owned()).collect::<Vec<_>>();
             self.project(&at_contact, &contacts[at])
@@ -163,11 +156,11 @@ impl<'a> LocalityCheck<'a> {
     ///
     /// # Errors
     /// None that [`new`](Self::new) does not have.
-    pub fn finer(&self, contact: &Matrix) -> Result<ContactStiffness, Error> {
+    pub fn finer(&self, contact: &Matrix) -> Result<ContactStiffness, ModelError> {
         let system = self.body.system();
         let between =
             MATCHED_HZ.windows(2).map(|pair| if pair[0] == 0.0 { 0.5 * pair[1] } else { (pair[0] * pair[1]).sqrt() });
-        let mut answers: Vec<Matrix> = self.matched.iter().map(|(_, factor)| solved(factor, contact.clone())).collect();
+        let mut answers: Vec<Matrix> = self.matched.iter().map(|(_, factor)| factor.solve(contact.clone())).collect();
         for hz in between {
             answers.push(system.solve(2.0 * std::f64::consts::PI * hz, contact.clone())?);
         }
@@ -178,17 +171,14 @@ impl<'a> LocalityCheck<'a> {
     ///
     /// # Errors
     /// If the patch is not held together.
-    pub fn patch(&self, coordinates: &[usize], contact: &Matrix) -> Result<ContactStiffness, Error> {
-        let part = self.part(coordinates, contact)?;
+    pub fn patch(&self, coordinates: &[usize], contact: &Matrix) -> Result<ContactStiffness, ModelError> {
+        let ports = Ports::compliance(contact.select_rows(coordinates));
+        let part = self.body.system().part(coordinates).with_ports(ports)?;
         if coordinates.len() <= DENSE && self.rayleigh.is_some() {
             return Ok(ContactStiffness::of(Congruence::whole(&part)));
         }
         let shifts: Vec<f64> = self.matched.iter().map(|(s, _)| *s).collect();
-        Ok(ContactStiffness::of(super::krylov::many_shifts(&part, &shifts)?.model))
-    }
-
-    fn part(&self, coordinates: &[usize], contact: &Matrix) -> Result<SecondOrder, Error> {
-        self.body.system().part(coordinates).with_ports(Ports::compliance(contact.select_rows(coordinates)))
+        Ok(ContactStiffness::of(many_shifts(&part, &shifts)?.model))
     }
 }
 

@@ -15,7 +15,7 @@
 //! ```
 //! use palpate_cli::reduction::{Balanced, Modal, PaperMesh, Response};
 //!
-//! # fn main() -> Result<(), palpate::Error> {
+//! # fn main() -> Result<(), palpate_model::ModelError> {
 //! let system = PaperMesh::square(5).system()?;
 //! let whole = Modal::new(&system).expect("its damping is proportional");
 //! let balanced = Balanced::modal(&whole)?;
@@ -35,14 +35,11 @@ mod krylov;
 mod linalg;
 mod linear_body;
 mod locality;
-mod lyapunov;
 mod modal;
 mod paper;
 mod response;
-mod slow_modes;
-mod state_space;
 mod system;
-pub use balance::{Balanced, NUMERICAL_RANK};
+pub use balance::{Balanced, NUMERICAL_RANK, StateSpace};
 pub use condense::{condensed, craig_bampton, guyan, patch};
 pub use congruence::Congruence;
 pub use estimate::ErrorBound;
@@ -50,8 +47,7 @@ pub use krylov::{LowRank, Projection, low_rank, many_shifts, one_shift, spread_s
 pub use linalg::{CMatrix, Matrix};
 pub use linear_body::LinearBody;
 pub use locality::{ContactStiffness, LocalityCheck, StiffnessError, stiffness_along};
-pub use modal::Modal;
+pub use modal::{Modal, gain_error, typical_gain_error};
 pub use paper::PaperMesh;
-pub use response::{Response, gain_error, largest_gain, log_spaced, typical_gain_error};
-pub use state_space::StateSpace;
+pub use response::{Response, largest_gain, log_spaced};
 pub use system::{Ports, Rayleigh, SecondOrder};

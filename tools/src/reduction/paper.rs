@@ -1,8 +1,9 @@
 //! The meshes of the paper's section 2.2: squares and cubes of cells whose top-middle node is moved.
 
+use palpate_model::ModelError;
+
 use super::linalg::Matrix;
 use super::system::{Assembly, Ports, SecondOrder};
-use palpate::Error;
 
 /// A 2D or 3D lattice of cells with springs and dampers to all neighbours, every edge or face but the top held. Its input is
 /// the displacement of the top's middle node, its output the force that moves it.
@@ -25,12 +26,12 @@ pub struct PaperMesh {
 }
 
 impl PaperMesh {
-    /// n x n cells.
+    /// A mesh of n x n cells.
     pub fn square(n: usize) -> Self {
         Self::of(vec![n; 2])
     }
 
-    /// n x n x n cells.
+    /// A mesh of n x n x n cells.
     pub fn cube(n: usize) -> Self {
         Self::of(vec![n; 3])
     }
@@ -45,21 +46,21 @@ impl PaperMesh {
         Self { cells, stiffness: 100.0, mass: 1e-3, damping_ratio: 1.0 }
     }
 
-    /// The same mesh with zeta = `ratio`.
+    /// Sets zeta to `ratio`.
     #[must_use]
     pub fn damping_ratio(mut self, ratio: f64) -> Self {
         self.damping_ratio = ratio;
         self
     }
 
-    /// The same mesh with springs of `k` (N/m).
+    /// Sets the stiffness of every spring to `k` (N/m).
     #[must_use]
     pub fn stiffness(mut self, k: f64) -> Self {
         self.stiffness = k;
         self
     }
 
-    /// 2 or 3.
+    /// The number of dimensions: 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.cells.len()
     }
@@ -95,7 +96,7 @@ impl PaperMesh {
     ///
     /// # Errors
     /// If a number is not positive, the mesh has fewer than two cells along an axis, or not two or three axes.
-    pub fn system(&self) -> Result<SecondOrder, Error> {
+    pub fn system(&self) -> Result<SecondOrder, ModelError> {
         self.check()?;
         let d = self.cells.len();
         let (free, middle) = (self.free_nodes(), self.middle());
@@ -134,10 +135,10 @@ impl PaperMesh {
         Ok(assembly.build(n, Ports::held(coupling, damping, direct)))
     }
 
-    fn check(&self) -> Result<(), Error> {
+    fn check(&self) -> Result<(), ModelError> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         if !matches!(self.cells.len(), 2 | 3) || self.cells.iter().any(|&n| n < 2) {
-            return Err(Error::scene(
+            return Err(ModelError::of(
                 "cells",
                 format!("{:?}: two or three numbers of at least 2 are needed", self.cells),
             ));
@@ -146,7 +147,7 @@ impl PaperMesh {
             [("stiffness", self.stiffness), ("mass", self.mass), ("damping_ratio", self.damping_ratio)]
         {
             if !positive(value) {
-                return Err(Error::scene(field, format!("{value}: a finite value above 0 is needed")));
+                return Err(ModelError::of(field, format!("{value}: a finite value above 0 is needed")));
             }
         }
         Ok(())

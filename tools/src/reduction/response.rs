@@ -2,9 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::linalg::{CMatrix, norm2};
-use super::modal::Modal;
-use super::system::SecondOrder;
+use super::linalg::{CMatrix, Matrix};
 
 /// A linear model between m inputs and p outputs.
 ///
@@ -57,31 +55,6 @@ pub fn largest_gain(model: &dyn Response, other: Option<&dyn Response>, frequenc
     largest
 }
 
-/// The infinity norm of `modal` minus `other` over that of `modal`, %: over frequencies from well below its slowest mode to well above
-/// the fastest, and at those of its modes that ring.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
-pub fn gain_error(modal: &Modal, other: &dyn Response) -> f64 {
-    let hz = |w: f64| w / (2.0 * std::f64::consts::PI);
-    let (Some(&slow), Some(&fast)) = (modal.frequencies.first(), modal.frequencies.last()) else { return 0.0 };
-    let mut frequencies = log_spaced(hz(1e-2 * slow), hz(10.0 * fast), 200);
-    let rings = |&(w, c): &(&f64, &f64)| c < w;
-    frequencies.extend(modal.frequencies.iter().zip(&modal.dampings).filter(rings).map(|(w, _)| hz(*w)));
-    frequencies.sort_by(f64::total_cmp);
-    100.0 * largest_gain(modal, Some(other), &frequencies) / largest_gain(modal, None, &frequencies)
-}
-
-/// As [`gain_error`], of a model of `system` that has no modes.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
-pub fn typical_gain_error(system: &SecondOrder, model: &dyn Response, other: &dyn Response) -> f64 {
-    let hz = system.typical_frequency() / (2.0 * std::f64::consts::PI);
-    let frequencies = log_spaced(1e-3 * hz, 1e2 * hz, 240);
-    100.0 * largest_gain(model, Some(other), &frequencies) / largest_gain(model, None, &frequencies)
-}
-
 /// The maximum of a function with one peak between `low` and `high`.
 fn golden_maximum(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> f64 {
     let share = (5.0_f64.sqrt() - 1.0) / 2.0;
@@ -99,4 +72,27 @@ fn golden_maximum(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> f64 {
         }
     }
     at_a.max(at_b)
+}
+
+/// The largest singular value of a small complex matrix.
+fn norm2(matrix: &CMatrix) -> f64 {
+    match matrix.shape() {
+        (0, _) | (_, 0) => 0.0,
+        (1, 1) => matrix[(0, 0)].norm(),
+        _ => {
+            // The Hermitian A^H A as a real symmetric matrix of twice the size.
+            let gram = matrix.adjoint() * matrix;
+            let n = gram.nrows();
+            let real = Matrix::from_fn(2 * n, 2 * n, |i, j| {
+                let z = gram[(i % n, j % n)];
+                match (i < n, j < n) {
+                    (true, true) | (false, false) => z.re,
+                    (true, false) => -z.im,
+                    (false, true) => z.im,
+                }
+            });
+            let eigen = real.symmetric_eigenvalues();
+            eigen.iter().fold(0.0_f64, |largest, &value| largest.max(value)).sqrt()
+        }
+    }
 }

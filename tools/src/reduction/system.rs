@@ -3,15 +3,14 @@
 use std::collections::HashMap;
 
 use nalgebra::Complex;
+use palpate_model::ModelError;
 
-use palpate::model::sparse::SparseFactor;
-use super::linalg::{CMatrix, Matrix};
-use palpate::{Error, ErrorKind};
+use super::linalg::{CMatrix, Matrix, SparseFactor, product_t, side_by_side, span};
 
 /// How far damping may be from alpha M + beta K, entry by entry and relative to its largest, to count as proportional.
 const PROPORTIONAL: f64 = 1e-9;
 
-/// What goes into a system of n coordinates and what comes out: y = D u + P^T x + V^T x', with B u on the right-hand side.
+/// The ports of a system of n coordinates, what goes into it and what comes out: y = D u + P^T x + V^T x', with B u on the right-hand side.
 ///
 /// # Real-time
 /// Not real-time safe: allocates. For the analysis of a scene, not for its run.
@@ -48,7 +47,7 @@ impl Ports {
 
     /// The ports of coordinates z with x = T z, for the columns of `basis` T.
     pub(super) fn project(&self, basis: &Matrix) -> Self {
-        let project = |matrix: &Matrix| super::linalg::product_t(basis, matrix);
+        let project = |matrix: &Matrix| product_t(basis, matrix);
         Self {
             input: project(&self.input),
             position: project(&self.position),
@@ -69,8 +68,8 @@ impl Ports {
 
     /// Every direction in which something goes in or comes out, as orthonormal columns.
     pub(super) fn directions(&self) -> Matrix {
-        let all = super::linalg::side_by_side(&[&self.input, &self.position, &self.velocity]);
-        super::linalg::span(&all, 1e-9)
+        let all = side_by_side(&[&self.input, &self.position, &self.velocity]);
+        span(&all, 1e-9)
     }
 }
 
@@ -94,50 +93,51 @@ pub struct Rayleigh {
 #[derive(Clone, Debug)]
 pub struct SecondOrder {
     n: usize,
-    /// Rows and columns of the lower triangle, each place once.
-    places: Vec<(usize, usize)>,
-    mass: Vec<f64>,
-    damping: Vec<f64>,
-    stiffness: Vec<f64>,
+    /// The lower triangle, each place once.
+    entries: Vec<Entry>,
     /// The order in which the coordinates are eliminated, if a good one is known.
     order: Option<Vec<usize>>,
-    /// What goes in and comes out.
+    /// The ports of the system.
     pub ports: Ports,
 }
+
+/// A row, a column, and what M, C and K have there.
+type Entry = ((usize, usize), [f64; 3]);
+
+/// The place of a matrix in an [`Entry`].
+const MASS: usize = 0;
+const DAMPING: usize = 1;
+const STIFFNESS: usize = 2;
 
 /// Collects the entries of the three matrices; those of the same place are added.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Assembly {
     at: HashMap<(usize, usize), usize>,
-    places: Vec<(usize, usize)>,
-    values: Vec<[f64; 3]>,
+    entries: Vec<Entry>,
 }
 
 impl Assembly {
     /// Adds to the entries of M, C and K at a row and a column; those above the diagonal are left out.
-    pub(super) fn add(&mut self, row: usize, column: usize, [mass, damping, stiffness]: [f64; 3]) {
+    pub(super) fn add(&mut self, row: usize, column: usize, values: [f64; 3]) {
         if row < column {
             return;
         }
-        let Self { at, places, values } = self;
-        let place = *at.entry((row, column)).or_insert_with(|| {
-            places.push((row, column));
-            values.push([0.0; 3]);
-            places.len() - 1
+        let place = *self.at.entry((row, column)).or_insert_with(|| {
+            self.entries.push(((row, column), [0.0; 3]));
+            self.entries.len() - 1
         });
-        for (sum, value) in values[place].iter_mut().zip([mass, damping, stiffness]) {
+        for (sum, value) in self.entries[place].1.iter_mut().zip(values) {
             *sum += value;
         }
     }
 
     /// Rows and columns that have entries.
-    pub(super) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.places.iter().copied()
+    pub(super) fn places(&self) -> impl Iterator<Item = (usize, usize)> + Clone {
+        self.entries.iter().map(|&(place, _)| place)
     }
 
     pub(super) fn build(self, n: usize, ports: Ports) -> SecondOrder {
-        let of = |which: usize| self.values.iter().map(|values| values[which]).collect();
-        SecondOrder { n, mass: of(0), damping: of(1), stiffness: of(2), places: self.places, order: None, ports }
+        SecondOrder { n, entries: self.entries, order: None, ports }
     }
 }
 
@@ -153,11 +153,9 @@ impl SecondOrder {
         damping: &[(usize, usize, f64)],
         stiffness: &[(usize, usize, f64)],
         ports: Ports,
-    ) -> Result<Self, Error> {
-        let refuse = |message: &str| Err(Error::new(ErrorKind::Usage, format!("a linear system: {message}")));
-        if [&ports.input, &ports.position, &ports.velocity].iter().any(|matrix| matrix.nrows() != n) {
-            return refuse("the ports must have a row for each coordinate");
-        }
+    ) -> Result<Self, ModelError> {
+        check(n, &ports)?;
+        let refuse = |message: &str| Err(ModelError::new(format!("a linear system: {message}")));
         let mut assembly = Assembly::default();
         for (which, entries) in [mass, damping, stiffness].into_iter().enumerate() {
             for &(row, column, value) in entries {
@@ -185,44 +183,44 @@ impl SecondOrder {
         2 * self.n
     }
 
-    fn dense_of(&self, values: &[f64]) -> Matrix {
+    fn dense(&self, which: usize) -> Matrix {
         let mut out = Matrix::zeros(self.n, self.n);
-        for (&(row, column), &value) in self.places.iter().zip(values) {
-            out[(row, column)] = value;
-            out[(column, row)] = value;
+        for &((row, column), values) in &self.entries {
+            out[(row, column)] = values[which];
+            out[(column, row)] = values[which];
         }
         out
     }
 
     /// M, n x n.
     pub fn mass(&self) -> Matrix {
-        self.dense_of(&self.mass)
+        self.dense(MASS)
     }
 
     /// C, n x n.
     pub fn damping(&self) -> Matrix {
-        self.dense_of(&self.damping)
+        self.dense(DAMPING)
     }
 
     /// K, n x n.
     pub fn stiffness(&self) -> Matrix {
-        self.dense_of(&self.stiffness)
+        self.dense(STIFFNESS)
     }
 
     /// The diagonal of M if there is nothing else in it.
     pub(super) fn lumped_mass(&self) -> Option<Vec<f64>> {
         let mut diagonal = vec![0.0; self.n];
-        for (&(row, column), &value) in self.places.iter().zip(&self.mass) {
+        for &((row, column), values) in &self.entries {
             match row == column {
-                true => diagonal[row] = value,
-                false if value != 0.0 => return None,
+                true => diagonal[row] = values[MASS],
+                false if values[MASS] != 0.0 => return None,
                 false => {}
             }
         }
         Some(diagonal)
     }
 
-    fn times(&self, values: &[f64], columns: &Matrix) -> Matrix {
+    fn times(&self, which: usize, columns: &Matrix) -> Matrix {
         // Eight columns at once, side by side: an entry is read once for all of them.
         const WIDE: usize = 8;
         let mut out = Matrix::zeros(self.n, columns.ncols());
@@ -234,7 +232,8 @@ impl SecondOrder {
                 from.iter_mut().zip(column.iter()).for_each(|(from, x)| from[lane] = *x);
             }
             to.fill([0.0; WIDE]);
-            for (&(row, column), &value) in self.places.iter().zip(values) {
+            for &((row, column), values) in &self.entries {
+                let value = values[which];
                 if value == 0.0 {
                     continue;
                 }
@@ -257,50 +256,40 @@ impl SecondOrder {
 
     /// M X for the columns of X.
     pub fn times_mass(&self, columns: &Matrix) -> Matrix {
-        self.times(&self.mass, columns)
+        self.times(MASS, columns)
     }
 
     /// C X for the columns of X.
     pub fn times_damping(&self, columns: &Matrix) -> Matrix {
-        self.times(&self.damping, columns)
+        self.times(DAMPING, columns)
     }
 
     /// K X for the columns of X.
     pub fn times_stiffness(&self, columns: &Matrix) -> Matrix {
-        self.times(&self.stiffness, columns)
+        self.times(STIFFNESS, columns)
     }
 
     /// The factorised s^2 M + s C + K at a real s (rad/s).
     ///
     /// # Errors
     /// If it is not positive definite: nothing holds the body.
-    pub(super) fn factorised(&self, s: f64) -> Result<SparseFactor, Error> {
-        let values = self.mass.iter().zip(&self.damping).zip(&self.stiffness);
-        let entries: Vec<_> = self
-            .places
-            .iter()
-            .zip(values)
-            .map(|(&(row, column), ((m, c), k))| (row, column, s * s * m + s * c + k))
-            .collect();
-        let factor = match &self.order {
-            Some(order) => SparseFactor::new_ordered(self.n, &entries, order),
-            None => SparseFactor::new(self.n, &entries),
-        };
-        factor.ok_or_else(not_held)
+    pub(super) fn factorised(&self, s: f64) -> Result<SparseFactor, ModelError> {
+        let sum = |&((row, column), [m, c, k]): &Entry| (row, column, s * s * m + s * c + k);
+        let entries: Vec<_> = self.entries.iter().map(sum).collect();
+        SparseFactor::new(self.n, &entries, self.order.as_deref()).ok_or_else(not_held)
     }
 
     /// A^-1 X for the columns of X and A = s^2 M + s C + K at a real s (rad/s).
     ///
     /// # Errors
     /// If A is not positive definite: nothing holds the body.
-    pub fn solve(&self, s: f64, columns: Matrix) -> Result<Matrix, Error> {
-        Ok(solved(&self.factorised(s)?, columns))
+    pub fn solve(&self, s: f64, columns: Matrix) -> Result<Matrix, ModelError> {
+        Ok(self.factorised(s)?.solve(columns))
     }
 
     /// alpha and beta, if C = alpha M + beta K.
     pub fn rayleigh(&self) -> Option<Rayleigh> {
-        let rows = self.places.iter().zip(self.mass.iter().zip(&self.damping).zip(&self.stiffness));
-        let entries = || rows.clone().map(|(&place, ((&m, &c), &k))| (place, m, c, k));
+        let entries = || self.entries.iter().map(|&(place, [m, c, k])| (place, m, c, k));
         let coupling = entries().filter(|&((row, column), m, ..)| row != column && m == 0.0);
         let (mass, stiffness) = match coupling.max_by(|a, b| a.3.abs().total_cmp(&b.3.abs())).filter(|at| at.3 != 0.0) {
             // Where there is stiffness alone, beta is known to the last bit.
@@ -323,8 +312,7 @@ impl SecondOrder {
     /// s^2 M + s C + K at a complex s, n x n.
     pub fn dynamic_stiffness(&self, s: Complex<f64>) -> CMatrix {
         let mut out = CMatrix::zeros(self.n, self.n);
-        let values = self.mass.iter().zip(&self.damping).zip(&self.stiffness);
-        for (&(row, column), ((&m, &c), &k)) in self.places.iter().zip(values) {
+        for &((row, column), [m, c, k]) in &self.entries {
             let value = s * s * m + s * c + k;
             out[(row, column)] = value;
             out[(column, row)] = value;
@@ -334,34 +322,29 @@ impl SecondOrder {
 
     /// A frequency that is typical of the system (rad/s): sqrt(k/m) in the paper's meshes, from the diagonals of K and M.
     pub fn typical_frequency(&self) -> f64 {
-        0.5 * (self.trace(&self.stiffness) / self.trace(&self.mass)).sqrt()
+        0.5 * (self.trace(STIFFNESS) / self.trace(MASS)).sqrt()
     }
 
-    fn trace(&self, values: &[f64]) -> f64 {
-        self.places.iter().zip(values).filter(|((row, column), _)| row == column).map(|(_, value)| value).sum()
+    fn trace(&self, which: usize) -> f64 {
+        self.entries.iter().filter(|((row, column), _)| row == column).map(|(_, values)| values[which]).sum()
     }
 
-    pub(super) fn damping_trace(&self) -> f64 {
-        self.trace(&self.damping)
+    /// trace C / trace K (s).
+    pub(super) fn damping_over_stiffness(&self) -> f64 {
+        self.trace(DAMPING) / self.trace(STIFFNESS)
     }
 
-    pub(super) fn stiffness_trace(&self) -> f64 {
-        self.trace(&self.stiffness)
-    }
-
-    /// The same, factorised in the given order of its coordinates.
+    /// The system, to be factorised in the given order of its coordinates.
     pub(super) fn eliminated_in(self, order: Option<Vec<usize>>) -> Self {
         Self { order, ..self }
     }
 
-    /// The same system with other ports.
+    /// The system with other ports.
     ///
     /// # Errors
     /// If they do not have a row for each coordinate.
-    pub fn with_ports(&self, ports: Ports) -> Result<Self, Error> {
-        if [&ports.input, &ports.position, &ports.velocity].iter().any(|matrix| matrix.nrows() != self.n) {
-            return Err(Error::new(ErrorKind::Usage, "a linear system: the ports must have a row for each coordinate"));
-        }
+    pub fn with_ports(&self, ports: Ports) -> Result<Self, ModelError> {
+        check(self.n, &ports)?;
         Ok(Self { ports, ..self.clone() })
     }
 
@@ -369,36 +352,23 @@ impl SecondOrder {
     pub fn part(&self, kept: &[usize]) -> Self {
         let mut place = vec![None; self.n];
         kept.iter().enumerate().for_each(|(new, &old)| place[old] = Some(new));
-        let mut part = Self {
+        let Ports { input, position, velocity, direct } = &self.ports;
+        let [input, position, velocity] = [input, position, velocity].map(|matrix| matrix.select_rows(kept));
+        let entry = |&((row, column), values): &Entry| Some(((place[row]?, place[column]?), values));
+        Self {
             n: kept.len(),
-            places: Vec::new(),
-            mass: Vec::new(),
-            damping: Vec::new(),
-            stiffness: Vec::new(),
+            entries: self.entries.iter().filter_map(entry).collect(),
             order: self.order.as_ref().map(|order| order.iter().filter_map(|&at| place[at]).collect()),
-            ports: Ports {
-                input: self.ports.input.select_rows(kept),
-                position: self.ports.position.select_rows(kept),
-                velocity: self.ports.velocity.select_rows(kept),
-                direct: self.ports.direct.clone(),
-            },
-        };
-        for (entry, &(row, column)) in self.places.iter().enumerate() {
-            if let (Some(row), Some(column)) = (place[row], place[column]) {
-                part.places.push((row, column));
-                part.mass.push(self.mass[entry]);
-                part.damping.push(self.damping[entry]);
-                part.stiffness.push(self.stiffness[entry]);
-            }
+            ports: Ports { input, position, velocity, direct: direct.clone() },
         }
-        part
     }
 }
 
-/// A^-1 X for the columns of X.
-pub(super) fn solved(factor: &SparseFactor, mut columns: Matrix) -> Matrix {
-    factor.solve(columns.as_mut_slice());
-    columns
+/// Refuses ports of another number of coordinates.
+fn check(n: usize, ports: &Ports) -> Result<(), ModelError> {
+    let fits = [&ports.input, &ports.position, &ports.velocity].iter().all(|matrix| matrix.nrows() == n);
+    let error = || ModelError::new("a linear system: the ports must have a row for each coordinate");
+    fits.then_some(()).ok_or_else(error)
 }
 
 /// alpha and beta that make alpha m + beta k nearest to c over all rows of m, c and k.
@@ -416,6 +386,6 @@ fn least_squares(rows: impl Iterator<Item = [f64; 3]>) -> Option<(f64, f64)> {
     Some(((mc * kk - kc * mk) / determinant, (kc * mm - mc * mk) / determinant))
 }
 
-pub(super) fn not_held() -> Error {
-    Error::new(ErrorKind::Scene, "nothing holds the body, it has no response at rest").at("body.block.fixed")
+pub(super) fn not_held() -> ModelError {
+    ModelError::of("body.block.fixed", "nothing holds the body, it has no response at rest")
 }

@@ -5,8 +5,8 @@
 
 use std::arch::x86_64::*;
 
-use super::nodes::{Motion, Push};
-use super::simd::{Lane, Numbers, Simd, Work};
+use super::nodes::{Lane, Motion, Push};
+use super::simd::{Numbers, Simd, Work};
 
 /// Proof that this machine has AVX2 and FMA.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +50,17 @@ fn compiled(set: Avx2, work: impl Work) {
     work.run(set);
 }
 
+/// Operations that are one instruction for each half.
+macro_rules! lanewise {
+    ($($name:ident($($x:ident),+) = $instruction:ident;)+) => {$(
+        #[inline(always)]
+        fn $name(self, $($x: Pair),+) -> Pair {
+            // SAFETY: the features were detected.
+            unsafe { [$instruction($($x[0]),+), $instruction($($x[1]),+)] }
+        }
+    )+};
+}
+
 impl Simd for Avx2 {
     type V = Pair;
     type M = Pair;
@@ -75,34 +86,12 @@ impl Simd for Avx2 {
         }
     }
 
-    #[inline(always)]
-    fn add(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: the features were detected.
-        unsafe { [_mm256_add_pd(a[0], b[0]), _mm256_add_pd(a[1], b[1])] }
-    }
-
-    #[inline(always)]
-    fn sub(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: the features were detected.
-        unsafe { [_mm256_sub_pd(a[0], b[0]), _mm256_sub_pd(a[1], b[1])] }
-    }
-
-    #[inline(always)]
-    fn mul(self, a: Pair, b: Pair) -> Pair {
-        // SAFETY: the features were detected.
-        unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
-    }
-
-    #[inline(always)]
-    fn mul_add(self, a: Pair, b: Pair, c: Pair) -> Pair {
-        // SAFETY: the features were detected.
-        unsafe { [_mm256_fmadd_pd(a[0], b[0], c[0]), _mm256_fmadd_pd(a[1], b[1], c[1])] }
-    }
-
-    #[inline(always)]
-    fn mul_sub_from(self, a: Pair, b: Pair, c: Pair) -> Pair {
-        // SAFETY: the features were detected.
-        unsafe { [_mm256_fnmadd_pd(a[0], b[0], c[0]), _mm256_fnmadd_pd(a[1], b[1], c[1])] }
+    lanewise! {
+        add(a, b) = _mm256_add_pd;
+        sub(a, b) = _mm256_sub_pd;
+        mul(a, b) = _mm256_mul_pd;
+        mul_add(a, b, c) = _mm256_fmadd_pd;
+        mul_sub_from(a, b, c) = _mm256_fnmadd_pd;
     }
 
     #[inline(always)]

@@ -6,8 +6,8 @@
 use std::arch::x86_64::*;
 
 use super::super::super::Vec3;
-use super::nodes::{Motion, Push};
-use super::simd::{LANES, Lane, Numbers, Simd, Work};
+use super::nodes::{LANES, Lane, Motion, Push};
+use super::simd::{Numbers, Simd, Work};
 
 /// Proof that this machine has AVX-512F and AVX-512DQ.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +36,17 @@ fn compiled(set: Avx512, work: impl Work) {
 /// A register from a Vec3 array: 24 doubles without gaps.
 const _: () = assert!(size_of::<[Vec3; LANES]>() == 24 * size_of::<f64>());
 
+/// Operations that are one instruction each.
+macro_rules! lanewise {
+    ($($name:ident($($x:ident),+) = $instruction:ident;)+) => {$(
+        #[inline(always)]
+        fn $name(self, $($x: __m512d),+) -> __m512d {
+            // SAFETY: the features were detected.
+            unsafe { $instruction($($x),+) }
+        }
+    )+};
+}
+
 impl Simd for Avx512 {
     type V = __m512d;
     type M = __mmask8;
@@ -58,34 +69,12 @@ impl Simd for Avx512 {
         unsafe { _mm512_storeu_pd(to.as_mut_ptr(), value) }
     }
 
-    #[inline(always)]
-    fn add(self, a: __m512d, b: __m512d) -> __m512d {
-        // SAFETY: the features were detected.
-        unsafe { _mm512_add_pd(a, b) }
-    }
-
-    #[inline(always)]
-    fn sub(self, a: __m512d, b: __m512d) -> __m512d {
-        // SAFETY: the features were detected.
-        unsafe { _mm512_sub_pd(a, b) }
-    }
-
-    #[inline(always)]
-    fn mul(self, a: __m512d, b: __m512d) -> __m512d {
-        // SAFETY: the features were detected.
-        unsafe { _mm512_mul_pd(a, b) }
-    }
-
-    #[inline(always)]
-    fn mul_add(self, a: __m512d, b: __m512d, c: __m512d) -> __m512d {
-        // SAFETY: the features were detected.
-        unsafe { _mm512_fmadd_pd(a, b, c) }
-    }
-
-    #[inline(always)]
-    fn mul_sub_from(self, a: __m512d, b: __m512d, c: __m512d) -> __m512d {
-        // SAFETY: the features were detected.
-        unsafe { _mm512_fnmadd_pd(a, b, c) }
+    lanewise! {
+        add(a, b) = _mm512_add_pd;
+        sub(a, b) = _mm512_sub_pd;
+        mul(a, b) = _mm512_mul_pd;
+        mul_add(a, b, c) = _mm512_fmadd_pd;
+        mul_sub_from(a, b, c) = _mm512_fnmadd_pd;
     }
 
     #[inline(always)]

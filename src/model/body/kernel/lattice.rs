@@ -9,9 +9,9 @@ use std::ops::Range;
 use super::super::super::Vec3;
 use super::super::lattice_springs::{Coefficients, Elasticity, LatticeSprings};
 use super::cores::Cores;
-use super::nodes::Arrays;
+use super::nodes::{Arrays, LANES, Lane};
 use super::pull::{Springs, scale, shortest};
-use super::simd::{InstructionSet, LANES, Lane, Simd, Work};
+use super::simd::{InstructionSet, Simd, Work};
 #[cfg(feature = "parallel")]
 use crate::error::ModelError;
 
@@ -42,7 +42,7 @@ impl LatticeKernel {
     }
 
     fn divide(&mut self, springs: &LatticeSprings, parts: usize) {
-        let eights = springs.exist().len();
+        let eights = springs.exist.len();
         let parts = parts.min(eights);
         let part = |n: usize| LatticePart::new(springs, n * eights / parts..(n + 1) * eights / parts);
         self.parts = (0..parts).map(part).collect();
@@ -83,7 +83,7 @@ impl LatticePart {
     fn new(springs: &LatticeSprings, eights: Range<usize>) -> Self {
         let first = eights.start * LANES;
         let end = eights.end * LANES + springs.reach();
-        Self { nodes: first..end.min(springs.nodes()), arrays: Arrays::new(end - first), eights }
+        Self { nodes: first..end.min(springs.nodes), arrays: Arrays::new(end - first), eights }
     }
 
     /// The nodes in whose range the springs begin.
@@ -135,7 +135,7 @@ impl Work for Evaluation<'_> {
         fy.fill(0.0);
         fz.fill(0.0);
         let (motion, forces) = ([&*x, &*y, &*z, &*u, &*v, &*w], [&mut *fx, &mut *fy, &mut *fz]);
-        match springs.elasticity() {
+        match &springs.elasticity {
             &Elasticity::Uniform { stiffness, damping } => {
                 let same = Uniform { number: stiffness, stiffness: s.splat(stiffness), damping: s.splat(damping) };
                 accumulate(s, springs, eights, same, motion, forces);
@@ -256,7 +256,7 @@ fn accumulate<S: Simd, C: Source<S>>(
         let here = [s.load(lane(x, first)), s.load(lane(y, first)), s.load(lane(z, first))];
         let speed = [s.load(lane(u, first)), s.load(lane(v, first)), s.load(lane(w, first))];
         let mut own = [s.splat(0.0); 3];
-        for (direction, (bits, offset)) in springs.exist()[eight].iter().zip(springs.offsets()).enumerate() {
+        for (direction, (bits, offset)) in springs.exist[eight].iter().zip(&springs.offsets).enumerate() {
             let other = first + offset.delta;
             let along = [
                 s.sub(s.load(lane(x, other)), here[0]),

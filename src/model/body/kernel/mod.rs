@@ -20,5 +20,6 @@ mod simd;
 
 pub(super) use lattice::LatticeKernel;
 pub(crate) use network::NetworkKernel;
+pub(crate) use nodes::{LANES, Lane};
 pub use simd::InstructionSet;
-pub(crate) use simd::{LANES, Lane, Simd, Work};
+pub(crate) use simd::{Simd, Work};

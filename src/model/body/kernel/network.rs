@@ -9,10 +9,10 @@ use std::ops::Range;
 use super::super::super::Vec3;
 use super::super::Spring;
 use super::cores::Cores;
-use super::nodes::{Motion, Push};
+use super::nodes::{LANES, Lane, Motion, Push};
 use super::numbering::near_first;
 use super::pull::{Springs, scale};
-use super::simd::{InstructionSet, LANES, Lane, Numbers, Simd, Work};
+use super::simd::{InstructionSet, Numbers, Simd, Work};
 #[cfg(feature = "parallel")]
 use crate::error::ModelError;
 

@@ -1,6 +1,10 @@
 //! Nodes in memory as the kernels want them: coordinate by coordinate for a lattice, one cache line each for a network.
 
-use super::simd::{LANES, Lane};
+/// Springs, or nodes, that a kernel takes at once.
+pub(crate) const LANES: usize = 8;
+
+/// Eight doubles in memory.
+pub(crate) type Lane = [f64; LANES];
 
 /// Position and velocity of one node: x, y, z, unused, and again. One cache line, one AVX-512 register.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,11 +1,24 @@
 //! The portable instruction set: plain arithmetic on arrays, which the compiler vectorises as far as it can.
 
-use super::nodes::{Motion, Push};
-use super::simd::{LANES, Lane, Numbers, Simd};
+use super::nodes::{LANES, Lane, Motion, Push};
+use super::simd::{Numbers, Simd};
 
 /// Plain arithmetic: no fused multiply-add, which a processor may lack, and exact root and division.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Portable;
+
+/// Operations on one double after the other.
+macro_rules! lanewise {
+    ($($name:ident($($x:ident),+) = $of_one:expr;)+) => {$(
+        #[inline(always)]
+        fn $name(self, $($x: Lane),+) -> Lane {
+            std::array::from_fn(|lane| {
+                $(let $x = $x[lane];)+
+                $of_one
+            })
+        }
+    )+};
+}
 
 impl Simd for Portable {
     type V = Lane;
@@ -26,34 +39,13 @@ impl Simd for Portable {
         *to = value;
     }
 
-    #[inline(always)]
-    fn add(self, a: Lane, b: Lane) -> Lane {
-        std::array::from_fn(|lane| a[lane] + b[lane])
-    }
-
-    #[inline(always)]
-    fn sub(self, a: Lane, b: Lane) -> Lane {
-        std::array::from_fn(|lane| a[lane] - b[lane])
-    }
-
-    #[inline(always)]
-    fn mul(self, a: Lane, b: Lane) -> Lane {
-        std::array::from_fn(|lane| a[lane] * b[lane])
-    }
-
-    #[inline(always)]
-    fn mul_add(self, a: Lane, b: Lane, c: Lane) -> Lane {
-        std::array::from_fn(|lane| a[lane] * b[lane] + c[lane])
-    }
-
-    #[inline(always)]
-    fn mul_sub_from(self, a: Lane, b: Lane, c: Lane) -> Lane {
-        std::array::from_fn(|lane| c[lane] - a[lane] * b[lane])
-    }
-
-    #[inline(always)]
-    fn inverse_root(self, x: Lane) -> Lane {
-        std::array::from_fn(|lane| 1.0 / x[lane].sqrt())
+    lanewise! {
+        add(a, b) = a + b;
+        sub(a, b) = a - b;
+        mul(a, b) = a * b;
+        mul_add(a, b, c) = a * b + c;
+        mul_sub_from(a, b, c) = c - a * b;
+        inverse_root(x) = 1.0 / x.sqrt();
     }
 
     #[inline(always)]

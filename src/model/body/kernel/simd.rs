@@ -1,17 +1,11 @@
 //! Eight doubles at once: what the force kernels ask of an instruction set, and the choice of one at run time.
 
 use super::super::super::Vec3;
-use super::nodes::{Motion, Push};
+use super::nodes::{LANES, Lane, Motion, Push};
 use super::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::{avx2::Avx2, avx512::Avx512};
 use crate::error::ModelError;
-
-/// Springs, or nodes, that a kernel takes at once.
-pub(crate) const LANES: usize = 8;
-
-/// Eight doubles in memory.
-pub(crate) type Lane = [f64; LANES];
 
 /// Eight node numbers.
 pub(super) type Numbers = [u32; LANES];
@@ -121,11 +115,7 @@ impl InstructionSet {
 
     /// Its name in logs and reports.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Portable => "portable",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-        }
+        ["portable", "avx2", "avx512"][self as usize]
     }
 
     /// Does `work` with this set; with the portable one where the machine lacks it.

@@ -41,7 +41,7 @@ pub fn reference(name: &str) -> Vec<Vec<f64>> {
     let here = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = here.ancestors().map(|folder| folder.join("tests/reference")).find(|folder| folder.is_dir());
     let path = folder.expect("the reference series are in the repository").join(format!("{name}.csv"));
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let parse = |line: &str| line.split(',').map(|cell| cell.parse().expect("a number")).collect();
     text.lines().skip(1).map(parse).collect()
 }

@@ -98,7 +98,7 @@ fn row(mesh: &PaperMesh, published_error_pct: f64, published_s: Option<f64>) -> 
         let [a, b] = [&few, &more].map(|low_rank| low_rank.balanced.tail_pct(order));
         if (a - b).abs() <= AGREEMENT * b.max(NEGLIGIBLE_PCT) {
             method = "rational Krylov";
-            reduced = more.projection.model.modal().map(|modal| (modal, more.balanced));
+            reduced = Modal::of(&more.projection.model).map(|modal| (modal, more.balanced));
         }
     }
     let (modal, balanced) = match reduced {

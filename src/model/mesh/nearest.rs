@@ -4,13 +4,13 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::TriMesh;
 
-use super::Vec3;
-use super::mesh::Surface;
+use super::Surface;
+use crate::Vec3;
 use crate::error::ModelError;
 
 /// A surface with a bounding volume tree that follows its nodes.
 #[derive(Clone)]
-pub struct NearestTriangle {
+pub(crate) struct NearestTriangle {
     mesh: TriMesh,
     /// Node of each mesh vertex: the tree holds surface nodes only.
     nodes: Vec<u32>,
@@ -31,14 +31,13 @@ impl NearestTriangle {
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(surface: &Surface, positions: &[Vec3]) -> Result<Self, ModelError> {
+    pub(crate) fn new(surface: &Surface, positions: &[Vec3]) -> Result<Self, ModelError> {
         let nodes: Vec<u32> = (0..positions.len() as u32).filter(|&node| surface.has_node(node)).collect();
         let vertices: Vec<Vector> = nodes.iter().map(|&node| Vector::from(positions[node as usize])).collect();
         let vertex = |node: u32| nodes.binary_search(&node).unwrap_or(0) as u32;
         let triangles = surface.triangles.iter().map(|triangle| triangle.map(vertex)).collect();
-        let mesh = TriMesh::new(vertices.clone(), triangles).map_err(|error| {
-            ModelError::new(format!("the surface cannot be searched: {error}")).at("body")
-        })?;
+        let mesh = TriMesh::new(vertices.clone(), triangles)
+            .map_err(|error| ModelError::new(format!("the surface cannot be searched: {error}")).at("body"))?;
         Ok(Self { mesh, nodes, vertices })
     }
 
@@ -46,7 +45,7 @@ impl NearestTriangle {
     ///
     /// # Real-time
     /// For the global actor: refits the tree in place, allocates nothing.
-    pub fn refit(&mut self, positions: &[Vec3]) {
+    pub(crate) fn refit(&mut self, positions: &[Vec3]) {
         for (vertex, &node) in self.vertices.iter_mut().zip(&self.nodes) {
             *vertex = Vector::from(positions[node as usize]);
         }
@@ -57,7 +56,7 @@ impl NearestTriangle {
     ///
     /// # Real-time
     /// For the global actor: bounded, allocates nothing.
-    pub fn find(&self, point: &Vec3) -> u32 {
+    pub(crate) fn find(&self, point: &Vec3) -> u32 {
         // A hollow mesh: a tool inside the body also has a nearest triangle.
         let (_, (triangle, _)) = self.mesh.project_local_point_and_get_location(Vector::from(*point), false);
         triangle
@@ -66,8 +65,8 @@ impl NearestTriangle {
 
 #[cfg(test)]
 mod tests {
-    use super::super::body::{Block, Body};
     use super::*;
+    use crate::body::{Block, Body};
 
     #[test]
     fn the_nearest_triangle_follows_moving_nodes() {

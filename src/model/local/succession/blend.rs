@@ -1,8 +1,8 @@
 //! How the force moves from an old local model to a new one.
 
-use super::Vec3;
+use crate::Vec3;
 
-/// The ways of blending.
+/// The ways of blending an old model's force into a new one's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum BlendKind {
@@ -44,24 +44,24 @@ pub struct Jump {
 }
 
 impl Blend {
-    /// A blend over `ticks` haptic ticks; 0 ticks is a switch.
+    /// A blend of the given kind over `ticks` haptic ticks; 0 ticks is a switch.
     pub fn new(kind: BlendKind, ticks: u32) -> Self {
         Self { kind, ticks: if kind == BlendKind::None { 0 } else { ticks }, ..Self::default() }
     }
 
     /// Starts with a new model in place.
-    pub fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.elapsed = Some(0);
         self.jump = Jump::default();
     }
 
     /// True until the force is the new model's alone.
-    pub fn is_under_way(&self) -> bool {
+    pub(crate) fn is_under_way(&self) -> bool {
         self.elapsed.is_some()
     }
 
     /// True while the old model has to run too: as long as a crossfade lasts, else in the first tick.
-    pub fn needs_old(&self) -> bool {
+    pub(crate) fn needs_old(&self) -> bool {
         match self.kind {
             BlendKind::Crossfade => self.is_under_way(),
             BlendKind::None | BlendKind::Offset => self.elapsed == Some(0),
@@ -69,13 +69,13 @@ impl Blend {
     }
 
     /// How much of the force's change in the last tick was the swap's, not the model's (N). Read it after [`mix`](Self::mix).
-    pub fn step_now(&self) -> Vec3 {
+    pub(crate) fn step_now(&self) -> Vec3 {
         self.step_now
     }
 
     /// The blended force of one tick, and the resync's jump when the blend is over. `old` is read where it is
     /// [needed](Self::needs_old).
-    pub fn mix(&mut self, new: Vec3, old: Vec3) -> (Vec3, Option<Jump>) {
+    pub(crate) fn mix(&mut self, new: Vec3, old: Vec3) -> (Vec3, Option<Jump>) {
         let Some(elapsed) = self.elapsed else { return (new, None) };
         if elapsed == 0 {
             self.step = old - new;

@@ -1,26 +1,26 @@
 //! `predictive`: a non-linear patch in a ring that moves as predicted, corrected by reduced surroundings.
 
+mod ring;
+
 use std::sync::Arc;
 
-use super::super::Vec3;
-use super::super::body::State;
-use super::super::contact::{Contact, Deformable, Law, ToolMotion, step};
-use super::super::simulation::Stepping;
-use super::super::surroundings::{Basis, ReducedMotion, SpringGraph};
-use super::felt::Felt;
-use super::near::NearSprings;
-use super::ring_path::RingPath;
-use super::window::Window;
-use super::{Kind, LocalModel, PatchGeometry, ResyncView, Watched};
+use self::ring::{NearSprings, RingPath};
+use super::patch::Patch;
+use super::{Kind, LocalModel, ResyncView};
+use crate::Vec3;
+use crate::body::State;
+use crate::contact::{Contact, ToolMotion};
+use crate::surroundings::{Basis, ReducedMotion, SpringGraph};
 
-/// How `predictive` finds where its ring will go.
+/// The way in which `predictive` finds where its ring will go.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Prediction {
-    /// By a reduced model of the surroundings, where that holds the present motion; else as [`Full`](Self::Full).
+    /// A reduced model of the surroundings says it, where that holds the present motion; else the whole body, see
+    /// [`Full`](Self::Full).
     #[default]
     Reduced,
-    /// By running the whole body ahead.
+    /// The whole body runs ahead and says it.
     Full,
 }
 
@@ -34,17 +34,13 @@ pub enum Prediction {
 /// is no basis the ring moves as predicted whatever happens. A contact that leaves the patch would press against nodes
 /// that do not give way: from then on the last force is held.
 #[derive(Debug)]
-pub struct Predictive {
+pub(super) struct Predictive {
     size: [usize; 3],
     prediction: Prediction,
     springs: Arc<SpringGraph>,
-    window: Window,
+    /// Its window nodes are the patch, the ring, then what stands still; the ring is moved by its path.
+    patch: Patch,
     near: NearSprings,
-    /// Of all window nodes: the patch, the ring, then what stands still.
-    state: State,
-    /// Zero for all but the patch: the ring is moved by its path.
-    inverse_masses: Vec<f64>,
-    forces: Vec<Vec3>,
     /// Movable nodes that other tools touch, with the force that they exert at the resync, and are taken to go on with (N).
     others: Vec<(usize, Vec3)>,
     path: RingPath,
@@ -56,64 +52,47 @@ pub struct Predictive {
     ring_positions: Vec<f64>,
     ring_velocities: Vec<f64>,
     ring_forces: Vec<f64>,
-    /// Its triangle is local.
-    contact: Contact,
-    law: Law,
-    stepping: Stepping,
-    built_at: u64,
-    felt: Felt,
-    watched: Watched,
     /// The global model's present while it looks ahead.
     present: State,
 }
 
 impl Predictive {
-    /// An empty model with a patch of `size` = nodes along the surface, along it, into depth.
-    ///
-    /// # Real-time
-    /// Not called in a tick. Memory comes with the first [`rebuild`](LocalModel::rebuild).
-    pub fn new(size: [usize; 3], prediction: Prediction, springs: Arc<SpringGraph>) -> Self {
+    /// An empty model with a patch of `size` = nodes along the surface, along it, into depth. Memory comes with the first
+    /// [`rebuild`](LocalModel::rebuild).
+    pub(super) fn new(size: [usize; 3], prediction: Prediction, springs: Arc<SpringGraph>) -> Self {
+        let (patch, near, path, surroundings, present) = Default::default();
+        let (ring_positions, ring_velocities, ring_forces) = Default::default();
+        let (others, substep, basis) = Default::default();
         Self {
             size,
             prediction,
             springs,
-            window: Window::default(),
-            near: NearSprings::default(),
-            state: State::default(),
-            inverse_masses: Vec::new(),
-            forces: Vec::new(),
-            others: Vec::new(),
-            path: RingPath::default(),
-            substep: 0,
-            basis: None,
-            surroundings: ReducedMotion::default(),
-            ring_positions: Vec::new(),
-            ring_velocities: Vec::new(),
-            ring_forces: Vec::new(),
-            contact: Contact::default(),
-            law: Law::default(),
-            stepping: Stepping { tick: 1e-3, substeps: 1 },
-            built_at: 0,
-            felt: Felt::default(),
-            watched: Watched::default(),
-            present: State::default(),
+            patch,
+            near,
+            others,
+            path,
+            substep,
+            basis,
+            surroundings,
+            ring_positions,
+            ring_velocities,
+            ring_forces,
+            present,
         }
     }
 
     fn ring(&self) -> std::ops::Range<usize> {
-        self.window.movable..self.window.movable + self.window.ring
+        let window = &self.patch.window;
+        window.movable..window.movable + window.ring
     }
 
     /// Everything but the path as it is in the global model.
     fn take_present(&mut self, resync: &ResyncView<'_>) {
-        let (global, window) = (&*resync.global, &self.window);
-        window.gather(&global.state().positions, &mut self.state.positions);
-        window.gather(&global.state().velocities, &mut self.state.velocities);
+        self.patch.take_present(resync);
         // What is beyond the ring stands still.
-        self.state.velocities[window.movable + window.ring..].fill(Vec3::zeros());
-        self.contact = window.localised(global.contact(resync.index));
-        (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
-        (self.substep, self.felt) = (0, Felt::new(global.force(resync.index)));
+        let beyond = self.ring().end;
+        self.patch.state.velocities[beyond..].fill(Vec3::zeros());
+        self.substep = 0;
     }
 
     /// Finds the ring's path: by the forecast of the surroundings where it holds the present motion, or else by running
@@ -128,64 +107,69 @@ impl Predictive {
 
     fn predict_by_global(&mut self, resync: &mut ResyncView<'_>) {
         let ring = self.ring();
-        let Self { window, near, state, forces, path, present, stepping, .. } = self;
+        let Self { patch: Patch { window, state, forces, stepping, .. }, near, path, present, .. } = self;
         path.clear(window.ring, stepping.step(), (resync.horizon * stepping.substeps + 1) as usize);
         let motion = |tool: usize, n| resync.tools[tool].motion(n, stepping.tick);
         resync.global.look_ahead(resync.horizon, motion, present, |global| {
             window.gather(&global.positions, &mut state.positions);
             window.gather(&global.velocities, &mut state.velocities);
             near.forces(&state.positions, &state.velocities, forces);
-            path.push(&state.positions[ring.clone()], &state.velocities[ring.clone()], &forces[ring.clone()]);
+            path.push(state, forces, ring.clone());
         });
         self.take_present(resync);
     }
 
-    /// As [`tick`](LocalModel::tick), with the forecast in place of the path. False if it does not hold the present motion.
+    /// Does what [`tick`](LocalModel::tick) does, with the forecast in place of the path. False if that does not hold the present
+    /// motion.
     fn predict_by_forecast(&mut self, basis: &Basis, resync: &mut ResyncView<'_>) -> bool {
-        let (ring, forecast, stepping) = (self.ring(), basis.forecast(), self.stepping);
+        let (ring, forecast, stepping) = (self.ring(), &basis.forecast, self.patch.stepping);
         let span = f64::from(resync.horizon) * stepping.tick;
         let (state, forces) = resync.global.forces_without(resync.index);
         if !forecast.launch(&mut self.surroundings, (state, self.springs.rest()), forces, span) {
             return false;
         }
-        self.path.clear(self.window.ring, stepping.step(), (resync.horizon * stepping.substeps) as usize + 1);
+        self.path.clear(ring.len(), stepping.step(), (resync.horizon * stepping.substeps) as usize + 1);
         // The surroundings take one step per tick if that is stable; within it the ring keeps its velocity.
-        let steps = if stepping.tick < forecast.model().stable_step() { 1 } else { stepping.substeps };
+        let steps = if stepping.tick < forecast.model.stable_step() { 1 } else { stepping.substeps };
         let (d, each) = (stepping.tick / f64::from(steps), stepping.substeps / steps);
-        let origin = flat(&self.state.positions[ring.clone()]);
+        let origin = flat(&self.patch.state.positions[ring.clone()]);
         self.take_near_forces();
-        let resting = flat(&self.forces[ring.clone()]);
+        let resting = flat(&self.patch.forces[ring.clone()]);
         let mut substep = 0;
         for n in 0..resync.horizon {
-            if self.window.has_left(&self.contact) {
+            if self.patch.contact_has_left() {
                 // What the patch would do from here on is wrong.
                 self.take_present(resync);
                 return false;
             }
             stepping.tick(resync.tools[resync.index].motion(n, stepping.tick), |tool, _| {
                 self.take_near_forces();
-                let Self { path, state, ring_forces, surroundings, ring_positions: x, ring_velocities: v, .. } = self;
-                let forces = &self.forces[ring.clone()];
-                path.push(&state.positions[ring.clone()], &state.velocities[ring.clone()], forces);
+                self.push_path();
+                let Self { patch, ring_forces, surroundings, ring_positions: x, ring_velocities: v, .. } = self;
                 if substep % each == 0 {
-                    deviations(ring_forces, forces, &resting);
-                    forecast.model().step(surroundings, ring_forces, d);
+                    deviations(ring_forces, &patch.forces[ring.clone()], &resting);
+                    forecast.model.step(surroundings, ring_forces, d);
                     x.copy_from_slice(&origin);
                     v.fill(0.0);
-                    forecast.model().add_ring(surroundings, x, v);
+                    forecast.model.add_ring(surroundings, x, v);
                 }
                 substep += 1;
-                let force = self.contact_step(tool, stepping.step());
+                let force = patch.step(tool, stepping.step());
                 self.place_ring_before(f64::from((each - substep % each) % each) * stepping.step());
                 force
             });
         }
         // The end of the path, and all of it for a contact that is outside the patch already.
         self.take_near_forces();
-        let (state, forces) = (&self.state, &self.forces[ring.clone()]);
-        self.path.push(&state.positions[ring.clone()], &state.velocities[ring.clone()], forces);
+        self.push_path();
         self.take_present(resync);
         true
+    }
+
+    /// The ring as it is now, to the end of its path.
+    fn push_path(&mut self) {
+        let ring = self.ring();
+        self.path.push(&self.patch.state, &self.patch.forces, ring);
     }
 
     /// The ring's nodes to where they are `before` seconds before `ring_positions` with `ring_velocities`.
@@ -194,42 +178,31 @@ impl Predictive {
         let places = self.ring_positions.as_chunks::<3>().0.iter().zip(self.ring_velocities.as_chunks::<3>().0);
         for (node, (x, v)) in ring.zip(places) {
             let (x, v) = (Vec3::from(*x), Vec3::from(*v));
-            (self.state.positions[node], self.state.velocities[node]) = (x - v * before, v);
+            (self.patch.state.positions[node], self.patch.state.velocities[node]) = (x - v * before, v);
         }
     }
 
     fn take_near_forces(&mut self) {
-        self.near.forces(&self.state.positions, &self.state.velocities, &mut self.forces);
+        let Patch { state, forces, .. } = &mut self.patch;
+        self.near.forces(&state.positions, &state.velocities, forces);
         for &(place, force) in &self.others {
-            self.forces[place] += force;
+            forces[place] += force;
         }
-    }
-
-    /// The patch one substep on, under the near forces and the tool's.
-    fn contact_step(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
-        let mut deformable = Deformable {
-            positions: &mut self.state.positions,
-            velocities: &mut self.state.velocities,
-            inverse_masses: &self.inverse_masses,
-            surface: &self.window.surface,
-            candidates: &self.window.candidates,
-        };
-        step(&mut deformable, &self.forces, &mut self.contact, &self.law, tool, d)
     }
 
     fn substep(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
         self.take_near_forces();
-        let force = self.contact_step(tool, d);
+        let force = self.patch.step(tool, d);
         let basis = self.basis.take();
         if let Some(basis) = &basis {
             let expected = self.path.at(self.substep).forces;
-            deviations(&mut self.ring_forces, &self.forces[self.window.movable..], expected);
-            basis.answers().step(&mut self.surroundings, &self.ring_forces, d);
+            deviations(&mut self.ring_forces, &self.patch.forces[self.patch.window.movable..], expected);
+            basis.answers.step(&mut self.surroundings, &self.ring_forces, d);
         }
         self.substep += 1;
         self.path.at(self.substep).write(&mut self.ring_positions, &mut self.ring_velocities);
         if let Some(basis) = &basis {
-            basis.answers().add_ring(&self.surroundings, &mut self.ring_positions, &mut self.ring_velocities);
+            basis.answers.add_ring(&self.surroundings, &mut self.ring_positions, &mut self.ring_velocities);
         }
         self.basis = basis;
         self.place_ring_before(0.0);
@@ -253,69 +226,59 @@ fn deviations(out: &mut [f64], forces: &[Vec3], expected: &[f64]) {
 impl LocalModel for Predictive {
     fn rebuild(&mut self, mut resync: ResyncView<'_>) {
         let (body, triangles, size) = (resync.global.body(), resync.triangles, self.size);
-        self.window.rebuild_with(body, triangles, Some(&self.springs), |nodes| match resync.patch {
+        self.patch.window.rebuild(body, triangles, Some(&self.springs), |nodes| match resync.patch {
             Some(patch) => nodes.extend_from_slice(patch),
             None => body.patch(triangles, size, nodes),
         });
-        self.near.rebuild(&self.springs, &self.window);
-        let (window, movable) = (&self.window, self.window.movable);
-        window.gather_movable(resync.global.body().inverse_masses(), &mut self.inverse_masses);
-        self.forces.resize(window.nodes.len(), Vec3::zeros());
-        self.basis = resync.bases.get(&window.nodes[..movable]).cloned();
+        self.near.rebuild(&self.springs, &self.patch.window);
+        let window = &self.patch.window;
+        self.patch.forces.resize(window.nodes.len(), Vec3::zeros());
+        self.basis = resync.bases.get(&window.nodes[..window.movable]).cloned();
         for numbers in [&mut self.ring_positions, &mut self.ring_velocities, &mut self.ring_forces] {
-            numbers.resize(3 * self.window.ring, 0.0);
+            numbers.resize(3 * window.ring, 0.0);
         }
         let beside = resync.global.exerted_beside(resync.index);
         self.others.clear();
-        self.others.extend(beside.filter_map(|(node, force)| Some((self.window.movable(node)?, force))));
+        self.others.extend(beside.filter_map(|(node, force)| Some((window.movable(node)?, force))));
         self.take_present(&resync);
         self.predict(&mut resync);
-        self.surroundings.rest(self.basis.as_ref().map_or(0, |basis| basis.answers().states()));
-        self.watched.take(resync.global.state());
+        self.surroundings.rest(self.basis.as_ref().map_or(0, |basis| basis.answers.states()));
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-        if let Some(force) = self.felt.held() {
+        if let Some(force) = self.patch.held() {
             return force;
         }
-        let stepping = self.stepping;
+        let stepping = self.patch.stepping;
         let force = stepping.tick(tool, |tool, d| self.substep(tool, d));
-        self.felt.after(force, &self.state, self.window.has_left(&self.contact))
+        self.patch.feel(force)
     }
 
     fn built_at(&self) -> u64 {
-        self.built_at
+        self.patch.built_at
     }
 
     fn serves_as(&self) -> Kind {
         match &self.basis {
-            _ if self.felt.held().is_some() => Kind::Hold,
+            _ if self.patch.held().is_some() => Kind::Hold,
             None => Kind::Predicted,
             Some(_) => Kind::Predictive,
         }
     }
 
-    fn catches_up(&self) -> bool {
-        true
-    }
-
     fn contact(&self) -> Contact {
-        self.window.globalised(&self.contact)
+        self.patch.global_contact()
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {
-        self.window.movable(node).map(|place| self.state.positions[place])
+        self.patch.position(node)
     }
 
     fn global_position(&self, probe: usize) -> Option<Vec3> {
-        self.watched.positions.get(probe).copied()
+        self.patch.watched.position(probe)
     }
 
     fn watch(&mut self, nodes: &[u32]) {
-        self.watched.set(nodes);
-    }
-
-    fn geometry(&self, _: &mut PatchGeometry) -> bool {
-        false
+        self.patch.watched.set(nodes);
     }
 }

@@ -1,57 +1,29 @@
 //! The order in which the unknowns of a body in space are eliminated: halves first, what lies between them last.
 
-use super::Vec3;
+use crate::Vec3;
+use crate::mesh::Lists;
 
 /// Sets of so few nodes are not divided.
 const SMALL: usize = 24;
 /// A cut that takes more than this share of a set divides nothing: its nodes are not neighbours of those beside them.
 const WIDEST_CUT: f64 = 0.4;
 
-/// The neighbours of each node: those of n are `nodes[first[n]..first[n + 1]]`.
-pub struct Adjacency {
-    first: Vec<u32>,
-    nodes: Vec<u32>,
-}
-
-impl Adjacency {
-    /// Of `count` nodes that `pairs` join.
-    pub fn new(count: usize, pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
-        let mut first = vec![0_u32; count + 1];
-        pairs.clone().flatten().for_each(|node| first[node as usize + 1] += 1);
-        (0..count).for_each(|node| first[node + 1] += first[node]);
-        let (mut next, mut nodes) = (first.clone(), vec![0; first[count] as usize]);
-        for [a, b] in pairs {
-            for (node, other) in [(a, b), (b, a)] {
-                nodes[next[node as usize] as usize] = other;
-                next[node as usize] += 1;
-            }
-        }
-        Self { first, nodes }
-    }
-
-    fn of(&self, node: u32) -> &[u32] {
-        &self.nodes[self.first[node as usize] as usize..self.first[node as usize + 1] as usize]
-    }
-}
-
-/// Nested dissection (George 1973) by planes: the nodes at `points` in the order of their elimination. `None` if no plane
-/// divides them well, so that an order which does not look at places is better.
-pub fn dissection(points: &[Vec3], adjacency: &Adjacency) -> Option<Vec<u32>> {
+/// Nested dissection (George 1973) by planes: the order in which to eliminate the unknowns, three for each of the nodes at
+/// `points` that `pairs` join. `None` if no plane divides them well, so that an order which does not look at places is better.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
+pub fn dissection(points: &[Vec3], pairs: impl Iterator<Item = [u32; 2]> + Clone) -> Option<Vec<usize>> {
+    let adjacency = Lists::new(points.len(), pairs.flat_map(|[a, b]| [(a, b), (b, a)]));
     let mut order = Vec::with_capacity(points.len());
     let mut side = vec![0_u8; points.len()];
     let all = (0..points.len() as u32).collect();
-    divide(points, adjacency, all, &mut side, &mut order)?;
-    Some(order)
+    divide(points, &adjacency, all, &mut side, &mut order)?;
+    Some(order.into_iter().flat_map(|node| 3 * node as usize..3 * node as usize + 3).collect())
 }
 
 /// Appends `nodes` to `order`. `side` is working memory, zero for all nodes.
-fn divide(
-    points: &[Vec3],
-    adjacency: &Adjacency,
-    nodes: Vec<u32>,
-    side: &mut [u8],
-    order: &mut Vec<u32>,
-) -> Option<()> {
+fn divide(points: &[Vec3], adjacency: &Lists, nodes: Vec<u32>, side: &mut [u8], order: &mut Vec<u32>) -> Option<()> {
     if nodes.len() <= SMALL {
         order.extend(nodes);
         return Some(());
@@ -73,7 +45,7 @@ fn divide(
 
 /// `nodes` below the middle plane across `axis`, those from there on that they touch, and the rest; `None` if all are in one
 /// plane.
-fn cut(points: &[Vec3], adjacency: &Adjacency, nodes: &[u32], axis: usize, side: &mut [u8]) -> Option<[Vec<u32>; 3]> {
+fn cut(points: &[Vec3], adjacency: &Lists, nodes: &[u32], axis: usize, side: &mut [u8]) -> Option<[Vec<u32>; 3]> {
     const LOW: u8 = 1;
     let at = |node: u32| points[node as usize][axis];
     let mut places: Vec<f64> = nodes.iter().map(|&node| at(node)).collect();
@@ -100,13 +72,12 @@ mod tests {
     fn a_row_is_cut_in_the_middle_and_a_bundle_is_not() {
         let count = 100;
         let points: Vec<Vec3> = (0..count).map(|n| Vec3::new(f64::from(n), 0.0, 0.0)).collect();
-        let row = Adjacency::new(points.len(), (1..count).map(|n| [n - 1, n]));
-        let order = dissection(&points, &row).unwrap();
-        assert_eq!(*order.last().unwrap(), 50);
+        let order = dissection(&points, (1..count).map(|n| [n - 1, n])).unwrap();
+        assert_eq!(order[order.len() - 3..], [150, 151, 152]);
         let mut sorted = order.clone();
         sorted.sort_unstable();
-        assert!(sorted.into_iter().eq(0..count), "each once");
+        assert!(sorted.into_iter().eq(0..3 * count as usize), "each once");
         let pairs = (0..count).flat_map(|a| (0..a).map(move |b| [a, b]));
-        assert_eq!(dissection(&points, &Adjacency::new(points.len(), pairs)), None);
+        assert_eq!(dissection(&points, pairs), None);
     }
 }

@@ -1,8 +1,8 @@
 //! Which step a linear patch takes: the global model's, unless the patch as it is now asks for another.
 
-use super::super::contact::{Equations, Law};
-use super::super::simulation::Stepping;
-use super::super::tangent::PatchTangent;
+use crate::contact::{Equations, Law};
+use crate::linear::PatchTangent;
+use crate::simulation::Stepping;
 
 /// A step above this share of the stability limit is replaced: the limit is known up to a percent.
 const STABLE_SHARE: f64 = 0.98;
@@ -41,20 +41,17 @@ pub(super) fn stable_stepping(
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::body::{Block, Body, State};
-    use super::super::super::mesh::Face;
     use super::*;
+    use crate::body::{Block, Body, State};
+    use crate::linear::patch_of;
+    use crate::mesh::Face;
 
     /// Of a patch of a block that is pressed flat to `share` of its height, with two steps of `step` seconds.
     fn chosen(share: f64, step: f64, equations: Equations) -> (u32, bool) {
         let block = Block::builder([6; 3], [0.05; 3]).damping_ratio(0.3).fix(Face::ZMin).build().unwrap();
         let mut state = State::at_rest(block.rest());
         state.positions.iter_mut().for_each(|x| x.z *= share);
-        let mut nodes = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
-        let mut tangent = PatchTangent::default();
-        let place = |node: u32| nodes.iter().position(|&other| other == node);
-        tangent.rebuild(&block, &state, &nodes, &place, &|_, _| 1.0);
+        let (nodes, tangent) = patch_of(&block, &state);
         let inverse_masses: Vec<f64> = nodes.iter().map(|&node| block.inverse_masses()[node as usize]).collect();
         let law = Law { equations, ..Law::default() };
         let stepping = Stepping { tick: 2.0 * step, substeps: 2 };

@@ -3,16 +3,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::body::{Body, State};
-use super::integrator::{Spectrum, largest_eigenvalue};
-use super::{Mat3, Vec3};
+use crate::body::{Body, State};
+use crate::integrator::{Spectrum, largest_eigenvalue};
+use crate::{Mat3, Vec3};
 
 /// Force on the n nodes of a patch as a linear function of their motion and of the time that their surroundings move on.
 ///
 /// f = f_0 + K (x - x_0) + C (v - v_0) + C_B v_B + t K_B v_B, with f_0 the force at (x_0, v_0) while every node outside
 /// stands still, and v_B the velocities of these nodes at the resync.
 #[derive(Clone, Debug, Default)]
-pub struct PatchTangent {
+pub(crate) struct PatchTangent {
     /// f_0 (N), 3n.
     force: DVector<f64>,
     /// C_B v_B (N), 3n.
@@ -35,16 +35,16 @@ pub struct PatchTangent {
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Drift {
+pub(crate) struct Drift {
     /// For how long they have moved on with their velocity at the resync (s).
-    pub time: f64,
+    pub(crate) time: f64,
     /// True while they still do.
-    pub is_moving: bool,
+    pub(crate) is_moving: bool,
 }
 
 /// How much of the coupling of a patch node (first) to a node outside (second) answers to the patch's motion, both by
 /// global id; 1 is all of it.
-pub type Share<'a> = &'a dyn Fn(u32, u32) -> f64;
+pub(crate) type Share<'a> = &'a dyn Fn(u32, u32) -> f64;
 
 impl PatchTangent {
     /// Linearises `body` at `state` for the rows of `nodes`; `place` finds a node's place in `nodes`. The negative
@@ -53,7 +53,7 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// For the global actor: allocates when the number of nodes is not that of the call before.
-    pub fn rebuild(
+    pub(crate) fn rebuild(
         &mut self,
         body: &dyn Body,
         state: &State,
@@ -74,9 +74,7 @@ impl PatchTangent {
         self.drift.fill(0.0);
         self.node_forces.resize(n, Vec3::zeros());
         body.node_forces(state, nodes, &mut self.node_forces);
-        for (force, node) in self.force.as_mut_slice().as_chunks_mut::<3>().0.iter_mut().zip(&self.node_forces) {
-            *force = (*node).into();
-        }
+        flatten(&self.node_forces, self.force.as_mut_slice());
         let Self { force, dragged, drift, matrix, .. } = self;
         let mut add = |row: usize, column: usize, position: Mat3, velocity: Mat3| {
             let mut place = matrix.fixed_view_mut::<3, 3>(row, column);
@@ -116,7 +114,7 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// For the global actor: bounded.
-    pub fn add_force(&mut self, place: usize, force: Vec3) {
+    pub(crate) fn add_force(&mut self, place: usize, force: Vec3) {
         let mut rows = self.force.fixed_rows_mut::<3>(3 * place);
         rows += force;
     }
@@ -125,7 +123,7 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// For the global actor: bounded.
-    pub fn add_stiffness(&mut self, stiffness: &DMatrix<f64>) {
+    pub(crate) fn add_stiffness(&mut self, stiffness: &DMatrix<f64>) {
         let n = self.force.len();
         if stiffness.shape() == (n, n) {
             let mut position = self.matrix.columns_mut(0, n);
@@ -138,7 +136,14 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// Bounded, real-time safe: 18 n^2 multiply-adds.
-    pub fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], ahead: f64, drift: Drift, forces: &mut [Vec3]) {
+    pub(crate) fn forces(
+        &mut self,
+        positions: &[Vec3],
+        velocities: &[Vec3],
+        ahead: f64,
+        drift: Drift,
+        forces: &mut [Vec3],
+    ) {
         let n = self.origin.positions.len();
         let (by_position, by_velocity) = self.deviation.as_mut_slice().split_at_mut(3 * n);
         let nodes = positions.iter().zip(velocities).zip(&self.origin.positions);
@@ -157,9 +162,7 @@ impl PatchTangent {
             self.product.axpy(drift.time, &self.drift, 1.0);
         }
         self.product.gemv(1.0, &self.matrix, &self.deviation, 1.0);
-        for (force, product) in forces.iter_mut().zip(self.product.as_slice().as_chunks::<3>().0) {
-            *force = Vec3::from(*product);
-        }
+        unflatten(self.product.as_slice(), forces);
     }
 
     /// The largest eigenvalues of K and C with these masses (1/kg, the first n are read): what an explicit step of this patch
@@ -167,46 +170,46 @@ impl PatchTangent {
     ///
     /// # Real-time
     /// For the global actor: allocates; bounded, usually some 600 n^2 multiply-adds.
-    pub fn spectrum(&self, inverse_masses: &[f64]) -> Spectrum {
+    pub(crate) fn spectrum(&self, inverse_masses: &[f64]) -> Spectrum {
         let n = self.nodes();
         let (mut direction, mut product) = (DVector::zeros(3 * n), DVector::zeros(3 * n));
         let mut largest = |first: usize| {
             let matrix = self.matrix.columns(first, 3 * n);
             largest_eigenvalue(inverse_masses[..n].to_vec(), 1e-3, |from, to| {
-                for (to, from) in direction.as_mut_slice().as_chunks_mut::<3>().0.iter_mut().zip(from) {
-                    *to = (*from).into();
-                }
+                flatten(from, direction.as_mut_slice());
                 product.gemv(1.0, &matrix, &direction, 0.0);
-                for (to, from) in to.iter_mut().zip(product.as_slice().as_chunks::<3>().0) {
-                    *to = Vec3::from(*from);
-                }
+                unflatten(product.as_slice(), to);
             })
         };
         Spectrum { stiffness: largest(0), damping: largest(3 * n) }
     }
 
     /// K and C side by side (N/m, N s/m), 3n x 6n.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn matrix(&self) -> &DMatrix<f64> {
+    pub(crate) fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
     }
 
     /// Number of patch nodes n.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn nodes(&self) -> usize {
+    pub(crate) fn nodes(&self) -> usize {
         self.origin.positions.len()
     }
 }
 
+/// Writes the numbers of `vectors` one after the other, as far as both reach.
+pub(super) fn flatten(vectors: &[Vec3], to: &mut [f64]) {
+    to.as_chunks_mut::<3>().0.iter_mut().zip(vectors).for_each(|(to, vector)| *to = (*vector).into());
+}
+
+fn unflatten(from: &[f64], vectors: &mut [Vec3]) {
+    vectors.iter_mut().zip(from.as_chunks::<3>().0).for_each(|(vector, from)| *vector = Vec3::from(*from));
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::body::Block;
-    use super::super::mesh::Face;
+    use super::super::patch_of;
     use super::*;
+    use crate::body::Block;
+    use crate::mesh::Face;
 
     #[test]
     fn the_patch_force_is_exact_at_the_origin_and_linear_around_it() {
@@ -217,11 +220,8 @@ mod tests {
             *x += Vec3::new(n.sin(), (2.0 * n).cos(), (3.0 * n).sin()) * 1e-3 + Vec3::z() * (0.1 * x.z);
             *v = Vec3::new((5.0 * n).sin(), (7.0 * n).cos(), (11.0 * n).sin()) * 0.1;
         }
-        let mut nodes = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
+        let (nodes, mut tangent) = patch_of(&block, &state);
         let place = |node: u32| nodes.iter().position(|&other| other == node);
-        let mut tangent = PatchTangent::default();
-        tangent.rebuild(&block, &state, &nodes, &place, &|_, _| 1.0);
 
         // The body with everything outside the patch standing still is what the linear model stands for.
         let mut frozen = state.clone();
@@ -260,11 +260,8 @@ mod tests {
             let n = n as f64;
             *v = Vec3::new((5.0 * n).sin(), (7.0 * n).cos(), (11.0 * n).sin()) * 1e-3;
         }
-        let mut nodes = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
+        let (nodes, mut tangent) = patch_of(&block, &state);
         let place = |node: u32| nodes.iter().position(|&other| other == node);
-        let mut tangent = PatchTangent::default();
-        tangent.rebuild(&block, &state, &nodes, &place, &|_, _| 1.0);
         let time = 1e-3;
         let mut later = state.clone();
         for (node, (x, v)) in later.positions.iter_mut().zip(&later.velocities).enumerate() {

@@ -1,9 +1,56 @@
-//! What is predicted for the ring around a patch, substep by substep.
+//! The ring around a patch: the springs that reach it, as they are, and what is predicted for it, substep by substep.
 
-use super::super::Vec3;
+use std::ops::Range;
+
+use super::super::patch::Window;
+use crate::Vec3;
+use crate::body::State;
+use crate::body::kernel::NetworkKernel;
+use crate::surroundings::SpringGraph;
 
 /// Past its end the prediction coasts with its last velocity for this long (s), then stands still.
 const COASTING: f64 = 15e-3;
+
+/// Every spring with a node in the patch.
+#[derive(Clone, Debug, Default)]
+pub(super) struct NearSprings {
+    kernel: Option<NetworkKernel>,
+    /// Ids of the window's nodes that the springs were found for.
+    nodes: Vec<u32>,
+    movable: usize,
+}
+
+impl NearSprings {
+    /// Those of `window`, which holds the patch and all its neighbours.
+    pub(super) fn rebuild(&mut self, graph: &SpringGraph, window: &Window) {
+        if self.nodes == window.nodes && self.movable == window.movable {
+            return;
+        }
+        self.nodes.clone_from(&window.nodes);
+        self.movable = window.movable;
+        let mut springs = Vec::new();
+        for place in 0..window.movable {
+            for &link in graph.at_node(window.nodes[place]) {
+                let link = graph.links()[link as usize];
+                let [Some(a), Some(b)] = link.nodes.map(|node| window.node(node)) else { continue };
+                // A spring inside the patch is met from both its nodes.
+                let other = if a as usize == place { b } else { a };
+                if other as usize >= window.movable || place < other as usize {
+                    springs.push((a, b, link.spring));
+                }
+            }
+        }
+        self.kernel = Some(NetworkKernel::new(window.nodes.len(), &springs));
+    }
+
+    /// Writes the force that these springs put on each local node (N).
+    pub(super) fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], forces: &mut [Vec3]) {
+        match &mut self.kernel {
+            Some(kernel) => kernel.forces(positions, velocities, forces),
+            None => forces.fill(Vec3::zeros()),
+        }
+    }
+}
 
 /// The predicted motion of the ring: positions (m), velocities (m/s) and near springs' forces (N), three numbers for each
 /// ring node.
@@ -37,10 +84,11 @@ impl RingPath {
         self.samples.reserve(3 * self.numbers * count);
     }
 
-    pub(super) fn push(&mut self, positions: &[Vec3], velocities: &[Vec3], forces: &[Vec3]) {
-        for vectors in [positions, velocities, forces] {
-            debug_assert_eq!(3 * vectors.len(), self.numbers);
-            vectors.iter().for_each(|vector| self.samples.extend_from_slice(vector.as_slice()));
+    /// Appends the nodes of `ring` with the `forces` on them.
+    pub(super) fn push(&mut self, state: &State, forces: &[Vec3], ring: Range<usize>) {
+        debug_assert_eq!(3 * ring.len(), self.numbers);
+        for vectors in [&state.positions, &state.velocities, forces] {
+            vectors[ring.clone()].iter().for_each(|vector| self.samples.extend_from_slice(vector.as_slice()));
         }
     }
 
@@ -83,7 +131,8 @@ mod tests {
         let mut path = RingPath::default();
         path.clear(1, 1e-3, 3);
         for n in 0..3 {
-            path.push(&[Vec3::x() * f64::from(n)], &[Vec3::x()], &[Vec3::y() * f64::from(n)]);
+            let state = State { positions: vec![Vec3::x() * f64::from(n)], velocities: vec![Vec3::x()] };
+            path.push(&state, &[Vec3::y() * f64::from(n)], 0..1);
         }
         let at = |n| {
             let (mut x, mut v) = ([0.0; 3], [0.0; 3]);

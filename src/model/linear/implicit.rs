@@ -2,15 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::integrator::snap;
-use super::tangent::PatchTangent;
-use super::{Mat3, Vec3};
+use super::tangent::{PatchTangent, flatten};
+use crate::integrator::snap;
+use crate::{Mat3, Vec3};
 
 /// Backward Euler for a linear patch of n nodes: A (v+ - v) = d (f + d K v), A = M - d C - d^2 K, inverted once per resync.
 ///
 /// Linear, so that one solution is exact; K and C need not be symmetric.
 #[derive(Clone, Debug, Default)]
-pub struct ImplicitStep {
+pub(crate) struct ImplicitStep {
     /// A^-1 (1/kg), 3n x 3n.
     inverse: DMatrix<f64>,
     d: f64,
@@ -25,7 +25,7 @@ impl ImplicitStep {
     ///
     /// # Real-time
     /// For the global actor, at each resync: allocates, and works for about 18 n^3 multiply-adds.
-    pub fn rebuild(&mut self, tangent: &PatchTangent, inverse_masses: &[f64], d: f64) {
+    pub(crate) fn rebuild(&mut self, tangent: &PatchTangent, inverse_masses: &[f64], d: f64) {
         let n = 3 * tangent.nodes();
         let (k, c) = (tangent.matrix().columns(0, n), tangent.matrix().columns(n, n));
         let mut a = DMatrix::zeros(n, n);
@@ -44,10 +44,7 @@ impl ImplicitStep {
     }
 
     /// The step d (s).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn step(&self) -> f64 {
+    pub(crate) fn step(&self) -> f64 {
         self.d
     }
 
@@ -55,10 +52,8 @@ impl ImplicitStep {
     ///
     /// # Real-time
     /// Bounded, real-time safe: 9 n^2 multiply-adds.
-    pub fn accelerate(&mut self, velocities: &mut [Vec3], forces: &[Vec3]) {
-        for (to, from) in self.forces.as_mut_slice().as_chunks_mut::<3>().0.iter_mut().zip(forces) {
-            *to = (*from).into();
-        }
+    pub(crate) fn accelerate(&mut self, velocities: &mut [Vec3], forces: &[Vec3]) {
+        flatten(forces, self.forces.as_mut_slice());
         self.change.gemv(self.d, &self.inverse, &self.forces, 0.0);
         for (v, change) in velocities.iter_mut().zip(self.change.as_slice().as_chunks::<3>().0) {
             *v = snap(*v + Vec3::from(*change));
@@ -70,7 +65,7 @@ impl ImplicitStep {
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn compliance(&self, nodes: &[usize; 3], weights: &[f64; 3]) -> Mat3 {
+    pub(crate) fn compliance(&self, nodes: &[usize; 3], weights: &[f64; 3]) -> Mat3 {
         let mut compliance = Mat3::zeros();
         for (row, wr) in self.of_patch(nodes, weights) {
             for (column, wc) in self.of_patch(nodes, weights) {
@@ -84,7 +79,7 @@ impl ImplicitStep {
     ///
     /// # Real-time
     /// Bounded, real-time safe: 27 n multiply-adds.
-    pub fn push(&self, velocities: &mut [Vec3], nodes: &[usize; 3], weights: &[f64; 3], impulse: Vec3) {
+    pub(crate) fn push(&self, velocities: &mut [Vec3], nodes: &[usize; 3], weights: &[f64; 3], impulse: Vec3) {
         for (node, w) in self.of_patch(nodes, weights) {
             for (place, v) in velocities.iter_mut().enumerate().take(self.inverse.nrows() / 3) {
                 *v -= self.inverse.fixed_view::<3, 3>(3 * place, 3 * node) * (impulse * w);
@@ -100,10 +95,10 @@ impl ImplicitStep {
 
 #[cfg(test)]
 mod tests {
-    use super::super::body::{Block, Body, State};
-    use super::super::mesh::Face;
-    use super::super::tangent::Drift;
+    use super::super::{Drift, patch_of};
     use super::*;
+    use crate::body::{Block, Body, State};
+    use crate::mesh::Face;
 
     struct Patch {
         tangent: PatchTangent,
@@ -115,11 +110,7 @@ mod tests {
     fn patch(stiffness: f64, zeta: f64) -> Patch {
         let builder = Block::builder([6; 3], [0.05; 3]).stiffness(stiffness).damping_ratio(zeta).node_mass(0.5e-3);
         let block = builder.fix(Face::ZMin).build().unwrap();
-        let mut nodes = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [4, 4, 2], &mut nodes);
-        let mut tangent = PatchTangent::default();
-        let place = |node: u32| nodes.iter().position(|&other| other == node);
-        tangent.rebuild(&block, &State::at_rest(block.rest()), &nodes, &place, &|_, _| 1.0);
+        let (nodes, tangent) = patch_of(&block, &State::at_rest(block.rest()));
         let rest: Vec<Vec3> = nodes.iter().map(|&node| block.rest()[node as usize]).collect();
         let inverse_masses = nodes.iter().map(|&node| block.inverse_masses()[node as usize]).collect();
         let mut state = State::at_rest(&rest);
@@ -135,7 +126,7 @@ mod tests {
             let Self { tangent, state, forces, .. } = self;
             tangent.forces(&state.positions, &state.velocities, system.step(), Drift::default(), forces);
             system.accelerate(&mut state.velocities, forces);
-            super::super::integrator::advance(&mut state.positions, &state.velocities, system.step());
+            crate::integrator::advance(&mut state.positions, &state.velocities, system.step());
         }
 
         /// Kinetic and elastic energy (J): at rest there is no force, so -f.(x - x_0)/2 without velocities is the latter.

@@ -1,7 +1,7 @@
 //! Where the tool is expected to go, from where it was: a prediction runs along it.
 
-use super::Vec3;
-use super::contact::ToolMotion;
+use crate::Vec3;
+use crate::contact::ToolMotion;
 
 /// The velocity dies away in about this time (s): a hand does not go on as it went for longer.
 const DECAY: f64 = 60e-3;
@@ -31,7 +31,7 @@ pub struct ToolForecast {
 }
 
 impl ToolForecast {
-    /// Of a tool that rests at `position` (m).
+    /// The forecast for a tool that rests at `position` (m).
     pub fn at_rest(position: Vec3) -> Self {
         Self { position, ..Self::default() }
     }
@@ -44,7 +44,7 @@ impl ToolForecast {
     }
 
     /// The position `t` seconds from now if it kept its velocity: what a window has to be ready for.
-    pub fn unbraked(&self, t: f64) -> Vec3 {
+    pub(crate) fn unbraked(&self, t: f64) -> Vec3 {
         self.position + self.velocity * t
     }
 
@@ -74,7 +74,7 @@ impl ToolHistory {
         Self { positions: vec![position; ticks(CHANGE_SPAN, tick) + 1], known: 0, tick }
     }
 
-    /// The tool's position one tick later (m).
+    /// Adds the tool's position one tick after the last (m).
     ///
     /// # Real-time
     /// Bounded, real-time safe.
@@ -84,7 +84,7 @@ impl ToolHistory {
         self.known = (self.known + 1).min(self.positions.len() - 1);
     }
 
-    /// What is expected of it.
+    /// The forecast from the positions that are known.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

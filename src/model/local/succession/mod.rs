@@ -1,16 +1,19 @@
 //! From one local model to the next: swap in, catch up, blend.
 
-use super::super::Vec3;
-use super::super::blend::{Blend, Jump};
-use super::super::contact::ToolMotion;
+mod blend;
+
 use super::LocalModel;
+use crate::Vec3;
+use crate::contact::ToolMotion;
+
+pub use blend::{Blend, BlendKind, Jump};
 
 /// Ticks that a late model is advanced per haptic tick until it has caught up; the old model serves meanwhile.
 const CATCH_UP_TICKS: u64 = 8;
 /// Tool positions that are remembered for catching up; an older model is not used.
 const HISTORY: usize = 1024;
 
-/// What one tick gave.
+/// The result of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
     /// Mean force on the tool, blended (N); may be other than finite if a model diverged.
@@ -21,14 +24,14 @@ pub struct Served {
     pub swap_step: Vec3,
 }
 
-/// A resync that is over.
+/// A resync whose blend is over.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Resynced {
     /// Version of the model that serves since.
     pub version: u32,
     /// How many ticks old its state was when it began to serve.
     pub age: u64,
-    /// The discontinuity.
+    /// The discontinuity of the force.
     pub jump: Jump,
 }
 
@@ -149,7 +152,7 @@ impl Succession {
         self.history[tick as usize % HISTORY]
     }
 
-    /// The model that serves.
+    /// The model that serves now.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -157,7 +160,7 @@ impl Succession {
         &*self.serving
     }
 
-    /// Its version.
+    /// The version of the model that serves.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -165,7 +168,7 @@ impl Succession {
         self.version
     }
 
-    /// The last tick.
+    /// The number of the last tick.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -173,7 +176,7 @@ impl Succession {
         self.now
     }
 
-    /// Where the tool is (m).
+    /// The position of the tool at the end of the last tick (m).
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -184,9 +187,8 @@ impl Succession {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, PatchGeometry, ResyncView};
+    use super::super::{Kind, ResyncView};
     use super::*;
-    use crate::blend::BlendKind;
     use crate::contact::Contact;
 
     /// Adds up the motion that it was given; its force is its base plus that.
@@ -217,16 +219,6 @@ mod tests {
         }
         fn contact(&self) -> Contact {
             Contact::default()
-        }
-        fn position(&self, _: u32) -> Option<Vec3> {
-            None
-        }
-        fn global_position(&self, _: usize) -> Option<Vec3> {
-            None
-        }
-        fn watch(&mut self, _: &[u32]) {}
-        fn geometry(&self, _: &mut PatchGeometry) -> bool {
-            false
         }
     }
 
