@@ -1,7 +1,7 @@
 //! The local actor: turns the newest tool sample into a force at the haptic rate.
 
 use super::cause::Cause;
-use super::messages::{DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
+use super::messages::{DeviceSample, ComputedForce, SurfaceView, ToolTick, ToolView};
 use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync, ServedBy};
 use crate::model::Vec3;
 use crate::model::contact::{Contact, Mode};
@@ -42,7 +42,7 @@ pub struct LocalPorts {
     /// The device's newest state.
     pub samples: Reader<DeviceSample>,
     /// The newest force for it.
-    pub commands: Writer<ForceCommand>,
+    pub commands: Writer<ComputedForce>,
     /// Where local models come from.
     pub source: ModelSource,
     /// The newest tool and force for a program that draws.
@@ -247,7 +247,7 @@ impl Actor for LocalActor {
         let force = finite_or_zero(computed);
         let time = self.haptic.release(self.models.now());
         let age_ticks = u32::try_from(self.age_ticks()).unwrap_or(u32::MAX);
-        *self.ports.commands.buffer() = ForceCommand { time, force, age_ticks, swap_step, dissipated_j };
+        *self.ports.commands.buffer() = ComputedForce { time, force, age_ticks, swap_step, dissipated_j };
         self.ports.commands.publish(ctx);
         let mode = self.models.serving().contact().mode;
         *self.ports.view.buffer() = ToolView { time, position: self.models.tool(), force, mode };

@@ -1,9 +1,9 @@
 //! The actors of a haptic session: thin glue between models, devices, logs and the runtime.
 //!
 //! ```text
-//! device --DeviceSample--> local --ToolTick, PatchGeometry--> global
-//!        <--ForceCommand--       <--local model--              --Wishes--> basis
-//!                                                              <--Bases--
+//! device --DeviceSample---> local --ToolTick, PatchGeometry--> global
+//!        <--ComputedForce--       <--local model--              --Wishes--> basis
+//!                                                               <--Bases--
 //! every actor --records--> logger
 //! ```
 //!
@@ -32,5 +32,5 @@ pub use local::{LocalActor, LocalPorts, ModelSource};
 pub use log_file::{LAST_WAIT, LogFile, MOST_WAITING};
 pub use log_sink::{LogSink, Loss};
 pub use logger::{LOG_FAILURE, LoggerActor, LoggerOutcome};
-pub use messages::{Checkpoint, DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
+pub use messages::{Checkpoint, DeviceSample, ComputedForce, SurfaceView, ToolTick, ToolView};
 pub use scene_watch::SceneWatch;

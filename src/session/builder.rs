@@ -1,10 +1,7 @@
 //! Collects what a session is made of.
 
-use super::hardware::OpenHaply;
-use super::Session;
-use super::prepare::{Parts, prepare};
+use super::parts::{OpenHaply, Parts};
 use crate::devices::{Device, ToolPath};
-use crate::error::{Error, ErrorKind};
 use crate::model::body::Body;
 use crate::runtime::{Disturbance, Execution, RateGroup};
 use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, ModelChoice, SafetyStage, Scene, StepKind};
@@ -12,7 +9,7 @@ use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, ModelChoice, Safety
 /// Collects what a session is made of; fills the same [`Scene`] as a scene file and passes the same validation.
 #[derive(Debug)]
 pub struct SessionBuilder {
-    parts: Parts,
+    pub(super) parts: Parts,
 }
 
 impl SessionBuilder {
@@ -186,8 +183,8 @@ impl SessionBuilder {
     /// Runs in simulated time, on one thread, as fast as the machine allows and bit-identically every time.
     #[must_use]
     pub fn virtual_time(mut self) -> Self {
-        self.parts.execution = Execution::Virtual;
-        self.parts.in_real_time = false;
+        self.parts.options.execution = Execution::Virtual;
+        self.parts.options.in_real_time = false;
         self
     }
 
@@ -202,14 +199,14 @@ impl SessionBuilder {
         group: impl Into<String>,
         disturbance: impl FnMut(u64) -> Disturbance + Send + 'static,
     ) -> Self {
-        self.parts.disturbed.add(group.into(), disturbance);
+        self.parts.options.disturbed.add(group.into(), disturbance);
         self
     }
 
     /// Writes a log to `path`, overwriting what is there.
     #[must_use]
     pub fn log(mut self, path: impl Into<std::path::PathBuf>) -> Self {
-        self.parts.log = Some(path.into());
+        self.parts.options.log = Some(path.into());
         self
     }
 
@@ -223,7 +220,7 @@ impl SessionBuilder {
     /// Keeps every record in memory, for [`Summary::records`](super::Summary::records).
     #[must_use]
     pub fn keep_records(mut self) -> Self {
-        self.parts.keep_records = true;
+        self.parts.options.keep_records = true;
         self
     }
 
@@ -231,29 +228,7 @@ impl SessionBuilder {
     /// [`RuntimeReport::costs`](crate::runtime::RuntimeReport::costs) and [`Summary::builds`](super::Summary::builds).
     #[must_use]
     pub fn measure_cost(mut self) -> Self {
-        self.parts.measures_cost = true;
+        self.parts.options.measures_cost = true;
         self
-    }
-
-    /// Reads the log of an earlier run of this session, to execute it again in simulated time, as
-    /// [`Session::replay`] does for a scene. The builder must be filled as it was for that run, a body of the program's own is not
-    /// in the log. Devices may be left out, those of the log are used; where several are glued give any in their places, as
-    /// [`attach_node`](Self::attach_node) belongs to the one given last.
-    ///
-    /// # Errors
-    /// As [`Session::replay`]; also [`ErrorKind::Log`](crate::ErrorKind::Log) if the log is one of another session.
-    pub fn replay(self, log: &std::path::Path) -> Result<super::Replay, Error> {
-        super::Replay::of_parts(self.parts, log)
-    }
-
-    /// Checks everything and makes the session ready to start.
-    ///
-    /// # Errors
-    /// Whatever cannot work, naming the field and what would be right.
-    pub fn build(self) -> Result<Session, Error> {
-        if self.parts.measures_cost && self.parts.execution == Execution::Threaded {
-            return Err(Error::new(ErrorKind::Runtime, "cost is measured in virtual time only: use virtual_time()"));
-        }
-        Ok(Session { prepared: prepare(self.parts)? })
     }
 }

@@ -1,16 +1,15 @@
 //! A session that runs, and what is left of it afterwards.
 
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use super::sink::Memory;
 use crate::actors::{LoggerOutcome, SurfaceView, ToolView};
 use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
+use crate::model::mesh::Surface;
 use crate::runtime::histogram::{HistogramReader, Snapshot};
-use crate::runtime::{GroupLive, OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
-use crate::runtime::Nanos;
+use crate::runtime::{GroupLive, Nanos, OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
 
 /// A session that runs. Dropping it commands zero force and joins its threads, within
 /// [`STOP_BOUND`](crate::runtime::STOP_BOUND) per group.
@@ -35,14 +34,9 @@ impl Running {
         memory: Option<Memory>,
         viewer: Viewer,
         until: Option<Nanos>,
+        builds: Option<HistogramReader>,
     ) -> Self {
-        Self { runtime, outcome, memory, viewer: Some(viewer), until, builds: None }
-    }
-
-    /// Reports what `builds` has counted.
-    pub(super) fn measuring(mut self, builds: Option<HistogramReader>) -> Self {
-        self.builds = builds;
-        self
+        Self { runtime, outcome, memory, viewer: Some(viewer), until, builds }
     }
 
     /// Waits for `span`, or until the run has ended; in virtual time, runs that much of it.
@@ -101,6 +95,20 @@ impl Running {
     }
 }
 
+/// Records kept in memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory(Arc<Mutex<Vec<LogRecord>>>);
+
+impl Memory {
+    fn take(&self) -> Vec<LogRecord> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    pub(super) fn push(&self, record: LogRecord) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(record);
+    }
+}
+
 /// What a program that draws can see, without disturbing a tick.
 #[derive(Debug)]
 pub struct Viewer {
@@ -112,11 +120,11 @@ pub struct Viewer {
 
 impl Viewer {
     pub(super) fn new(
-        triangles: Vec<[u32; 3]>,
+        body: &Surface,
         surface: OutletReader<SurfaceView>,
         tools: Vec<OutletReader<ToolView>>,
     ) -> Self {
-        Self { triangles: triangles.into(), surface, tools }
+        Self { triangles: body.triangles.as_slice().into(), surface, tools }
     }
 
     /// Node ids of the surface triangles, counter-clockwise seen from outside; they never change.

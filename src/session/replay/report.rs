@@ -2,8 +2,7 @@
 
 use std::fmt;
 
-use crate::runtime::RuntimeFault;
-use crate::runtime::Nanos;
+use crate::runtime::{Nanos, RuntimeFault};
 
 /// How the samples of one topic compare.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! One run per fault: what is injected, and the force that reached the device all the while.
 
-#[path = "../common/altered_block.rs"]
+#[path = "../../../examples/common/altered_block.rs"]
 mod altered_block;
 
 use altered_block::AlteredBlock;

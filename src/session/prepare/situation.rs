@@ -1,13 +1,12 @@
 //! What each local model would cost on this body and this machine.
 
 use super::budget::{force_evaluation, nominal_evaluation};
-use super::prepare::Timing;
+use super::timing::Timing;
 use crate::model::body::{Body, State};
-use crate::model::local::MOST_EXPLICIT_STEPS;
-use crate::model::surroundings::MOST_STATES;
-use crate::runtime::Execution;
-use crate::scene::{BasisSize, LocalModelKind as Kind, Scene};
-use crate::runtime::Nanos;
+use crate::model::local::{Kind, MOST_EXPLICIT_STEPS};
+use crate::model::surroundings::{MOST_STATES, Size};
+use crate::runtime::{Execution, Nanos};
+use crate::scene::Scene;
 
 /// Contact, integration, device and records of a tick of the whole body, as a factor on its force evaluations.
 const OVERHEAD: f64 = 1.25;
@@ -82,7 +81,7 @@ impl Situation {
                 Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
                 Kind::Condensed => has_springs && is_held,
                 Kind::Predicted => has_springs,
-                Kind::Predictive => has_springs && scene.local.basis_size() != BasisSize::States(0),
+                Kind::Predictive => has_springs && scene.local.basis_size() != Size::States(0),
             };
             let mut named = scene.clone().with_model(*kind);
             named.local.name_chosen(*kind);
@@ -109,8 +108,8 @@ impl Situation {
             cores,
             error_pct: scene.local.chosen_within_pct(),
             states: match scene.local.basis_size() {
-                BasisSize::States(states) => states,
-                BasisSize::ErrorPct(_) => MOST_STATES,
+                Size::States(states) => states,
+                Size::ErrorPct(_) => MOST_STATES,
             },
             devices: scene.devices.len(),
             possible,

@@ -1,14 +1,14 @@
 //! The tools of a session: each with its device, its contact, its limits.
 
-use super::checks::{check_capabilities, check_ramp};
-use super::hardware::OpenHaply;
-use super::prepare::Parts;
-use super::{device, safety};
+use super::super::parts::{OpenHaply, Parts};
+use super::body::Start;
+use super::limits::{self, check_capabilities, check_ramp};
+use super::device;
 use crate::devices::Device;
 use crate::error::Error;
-use crate::model::body::{Body, State};
+use crate::model::body::Body;
 use crate::model::contact::Contact;
-use crate::runtime::Execution;
+use crate::runtime::{Execution, Rate};
 use crate::safety::Limits;
 use crate::safety::coupling::Design;
 use crate::scene::{DeviceSpec, SafetySpec, Scene, numbered};
@@ -17,26 +17,22 @@ const _: () = assert!(crate::scene::MAX_DEVICES == crate::log::MAX_DEVICES as us
 
 /// A tool before the start.
 #[derive(Debug)]
-pub(super) struct Tool {
+pub(in super::super) struct Tool {
     /// Its name; empty for the only one.
-    pub(super) name: String,
-    pub(super) device: Box<dyn Device>,
+    pub(in super::super) name: String,
+    pub(in super::super) device: Box<dyn Device>,
     /// How it touches the body at the start.
-    pub(super) contact: Contact,
-    pub(super) limits: Limits,
+    pub(in super::super) contact: Contact,
+    pub(in super::super) limits: Limits,
     /// Between device and simulated tool.
-    pub(super) coupling: Option<Design>,
+    pub(in super::super) coupling: Option<Design>,
 }
 
 /// What tools are made from.
 pub(super) struct Making<'a> {
     pub(super) scene: &'a Scene,
-    pub(super) body: &'a mut dyn Body,
-    pub(super) state: &'a State,
-    /// The haptic period (s).
-    pub(super) tick: f64,
-    /// The nodes that tools are glued to, one for each device.
-    pub(super) attached: &'a [Option<u32>],
+    pub(super) start: &'a mut Start,
+    pub(super) haptic: Rate,
     pub(super) execution: Execution,
     pub(super) open_haply: Option<OpenHaply>,
     pub(super) is_replay: bool,
@@ -63,12 +59,13 @@ pub(super) fn tools(
     brought: Vec<(Option<String>, Box<dyn Device>)>,
     making: Making<'_>,
 ) -> Result<(Vec<Tool>, SafetySpec), Error> {
-    let Making { scene, body, state, tick, attached, execution, open_haply, is_replay } = making;
+    let Making { scene, start, haptic, execution, open_haply, is_replay } = making;
+    let (body, state, tick) = (&mut *start.body, &start.state, haptic.period_s());
     // Both ledgers begin with a share of what is stored: together they give out no more than all of it.
-    let stored_j = safety::stored_energy(body, state) / scene.devices.len() as f64;
+    let stored_j = limits::stored_energy(body, state) / scene.devices.len() as f64;
     let mut brought = brought.into_iter();
     let (mut tools, mut all_resolved) = (Vec::new(), Vec::new());
-    for (index, (spec, &node)) in scene.devices.iter().zip(attached).enumerate() {
+    for (index, (spec, &node)) in scene.devices.iter().zip(&start.attached).enumerate() {
         let of_this = |error: Error| numbered(error, index, &scene.devices);
         let device = match brought.next() {
             Some((_, device)) => device,
@@ -79,13 +76,13 @@ pub(super) fn tools(
         };
         // What is executed again has met them already.
         let device = if is_replay { device } else { device::with_faults(device, spec) };
-        let device_limits = safety::device_limits(&scene.safety, &device.capabilities());
-        let resolved = safety::resolved(scene, &device_limits);
-        let limits = safety::limits(&resolved, &device_limits, stored_j, tick);
+        let device_limits = limits::device_limits(&scene.safety, &device.capabilities());
+        let resolved = limits::resolved(scene, &device_limits);
+        let limits = limits::limits(&resolved, &device_limits, stored_j, tick);
         check_ramp(&limits).map_err(of_this)?;
         check_capabilities(device.capabilities(), &limits).map_err(of_this)?;
         let coupling = match scene.local.coupling {
-            true => Some(safety::coupling(body, node, &device_limits, tick)?),
+            true => Some(limits::coupling(body, node, &device_limits, tick)?),
             false => None,
         };
         let contact = node.map_or_else(Contact::default, |node| glued(body, node));

@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
-use super::hardware::{OpenHaply, haply};
-use crate::devices::{Device, Faulty, Hand, Scripted, ToolPath};
-use crate::devices::{DeviceState, Replayed, ReplayedSample};
+use super::super::parts::OpenHaply;
+use crate::devices::{Device, DeviceState, Faulty, Hand, Replayed, ReplayedSample, Scripted, ToolPath};
 use crate::error::{Error, ErrorKind};
 use crate::log::{LogEntry, LogReader, LogRecord, ToolSample};
 use crate::model::Vec3;
@@ -46,6 +45,22 @@ pub(super) fn with_faults(device: Box<dyn Device>, spec: &DeviceSpec) -> Box<dyn
         return device;
     }
     Box::new(Faulty::new(device, spec.faults.iter().map(|fault| fault.window()).collect()))
+}
+
+/// Connects to the service of a Haply device that is driven every `tick` seconds.
+fn haply(
+    device: &DeviceSpec,
+    tick: f64,
+    execution: Execution,
+    open: Option<OpenHaply>,
+) -> Result<Box<dyn Device>, Error> {
+    if execution == Execution::Virtual {
+        let message = "is \"haply\", a device that is really there: it cannot run in virtual time";
+        return Err(Error::scene("device.kind", message));
+    }
+    let spec = device.haply.as_ref().ok_or_else(|| Error::scene("device.haply", "is missing"))?;
+    let message = "is \"haply\", which this program does not open: give `palpate_haply::open` to its session";
+    open.ok_or_else(|| Error::scene("device.kind", message))?(spec, tick)
 }
 
 /// Where the tool, or the hand that holds it, goes; without a path it stays where the node is that it is glued to.

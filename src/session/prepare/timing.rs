@@ -1,13 +1,38 @@
-//! How far ahead of the global model's state a local model has to reach.
+//! Rates, and how far ahead of the global model's state a local model has to reach.
 
-use crate::runtime::RateGroup;
-use crate::runtime::{Nanos, Rate};
+use crate::error::Error;
+use crate::runtime::{Nanos, Rate, RateGroup};
+use crate::scene::Scene;
 
 /// One period of service, and what catching up takes.
 const PERIODS_AHEAD: f64 = 1.25;
 
 /// On threads a result may be later than the work says by this factor: contact, integration, the prediction, other threads.
 const LATE_WORK: f64 = 2.0;
+
+/// How often the whole body's forces are evaluated: `substeps` times per haptic tick; and for how many ticks ahead.
+#[derive(Clone, Copy, Debug)]
+pub(in super::super) struct Timing {
+    pub(in super::super) haptic: Rate,
+    pub(in super::super) global: Rate,
+    pub(super) substeps: u32,
+    /// Haptic ticks that a local model may have to reach ahead.
+    pub(in super::super) horizon: u32,
+}
+
+impl Timing {
+    pub(super) fn new([haptic, global]: [Rate; 2], substeps: u32, lateness: Nanos, blend_ticks: u32) -> Self {
+        Self { haptic, global, substeps, horizon: horizon(haptic, global, lateness, blend_ticks) }
+    }
+}
+
+/// The haptic and the global rate of `scene`.
+pub(super) fn rates(scene: &Scene) -> Result<[Rate; 2], Error> {
+    let rate = |field: &str, hz: f64| {
+        Rate::from_hz(hz).ok_or_else(|| Error::scene(field, format!("is {hz}, which is no rate")))
+    };
+    Ok([rate("local.rate_hz", scene.local.rate_hz)?, rate("global.rate_hz", scene.global.rate_hz)?])
+}
 
 /// How late the results of the global group come: as declared, and on threads what following the tool takes at least.
 /// `work` is nominal for a haptic tick, so that a run has the same horizon everywhere; more than a period late is a
@@ -24,7 +49,7 @@ pub(super) fn lateness(global: &RateGroup, haptic: Rate, work: Nanos, in_real_ti
 
 /// Haptic ticks from the state that a local model is built from to the end of its service: its own `lateness`, one period
 /// until the next, and the time to catch up and to blend.
-pub(super) fn horizon(haptic: Rate, global: Rate, lateness: Nanos, blend_ticks: u32) -> u32 {
+fn horizon(haptic: Rate, global: Rate, lateness: Nanos, blend_ticks: u32) -> u32 {
     let periods = PERIODS_AHEAD + lateness.as_secs_f64() / global.period_s();
     (periods * haptic.as_hz() / global.as_hz()).ceil() as u32 + blend_ticks
 }

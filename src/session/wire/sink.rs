@@ -1,26 +1,12 @@
 //! Where a session's log entries go: a file, memory, or nowhere.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::path::Path;
 
-use crate::actors::LogFile;
-use crate::actors::{LogSink, Loss};
+use crate::actors::{LogFile, LogSink, Loss};
 use crate::error::Error;
 use crate::log::{Environment, GroupStats, LogRecord, SceneFrame, TextEvent};
 use crate::runtime::Nanos;
-
-/// Records kept in memory.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Memory(Arc<Mutex<Vec<LogRecord>>>);
-
-impl Memory {
-    pub(super) fn take(&self) -> Vec<LogRecord> {
-        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    fn push(&self, record: LogRecord) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(record);
-    }
-}
+use crate::session::running::Memory;
 
 /// All sinks that a session asked for, one after the other.
 pub(super) struct Sinks {
@@ -29,18 +15,9 @@ pub(super) struct Sinks {
 }
 
 impl Sinks {
-    /// Keeps records in `memory`, if there is one.
-    pub(super) fn new(memory: Option<Memory>) -> Self {
-        Self {
-            memory,
-            file: None,
-        }
-    }
-
-    /// Also writes a file.
-    pub(super) fn with_file(mut self, path: &std::path::Path, environment: &Environment) -> Result<Self, Error> {
-        self.file = Some(LogFile::create(path, environment)?);
-        Ok(self)
+    /// Keeps records in `memory` and writes them to a file at `path`, if there are any.
+    pub(super) fn new(memory: Option<Memory>, path: Option<&Path>, environment: &Environment) -> Result<Self, Error> {
+        Ok(Self { memory, file: path.map(|path| LogFile::create(path, environment)).transpose()? })
     }
 
     /// Writes to the file, if there is one. A file that failed counts what it loses; memory goes on.
@@ -54,23 +31,19 @@ impl LogSink for Sinks {
         if let Some(memory) = &self.memory {
             memory.push(*record);
         }
-        self.on_file(|file| file.record(record))?;
-        Ok(())
+        self.on_file(|file| file.record(record))
     }
 
     fn text(&mut self, event: &TextEvent) -> Result<(), Error> {
-        self.on_file(|file| file.text(event))?;
-        Ok(())
+        self.on_file(|file| file.text(event))
     }
 
     fn stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
-        self.on_file(|file| file.stats(stats))?;
-        Ok(())
+        self.on_file(|file| file.stats(stats))
     }
 
     fn scene(&mut self, frame: &SceneFrame) -> Result<(), Error> {
-        self.on_file(|file| file.scene(frame))?;
-        Ok(())
+        self.on_file(|file| file.scene(frame))
     }
 
     fn environment(&mut self, environment: &Environment) {
@@ -80,13 +53,11 @@ impl LogSink for Sinks {
     }
 
     fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error> {
-        self.on_file(|file| file.flush(log_time, now))?;
-        Ok(())
+        self.on_file(|file| file.flush(log_time, now))
     }
 
     fn finish(&mut self) -> Result<(), Error> {
-        self.on_file(LogFile::finish)?;
-        Ok(())
+        self.on_file(LogFile::finish)
     }
 
     fn take_loss(&mut self) -> Option<Loss> {

@@ -9,7 +9,9 @@ use crate::model::Vec3;
 use crate::model::local::{LocalModel, PatchGeometry};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
-use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RecorderPort, Stopwatch};
+use crate::runtime::{
+    Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RateGroup, RecorderPort, Restart, RuntimeBuilder, Stopwatch,
+};
 
 /// Between the local actor of a tool and the global one.
 pub(super) struct ToolLink {
@@ -87,15 +89,25 @@ impl GlobalMaker {
         self
     }
 
-    pub(super) fn can_restart(&self) -> bool {
-        self.spare.is_some()
+    /// Gives the actor to `graph` in a group of its own, which is started again after a fault if the body can be copied.
+    ///
+    /// # Errors
+    /// If the body has no surface.
+    pub(super) fn join(mut self, graph: &mut RuntimeBuilder, group: RateGroup) -> Result<(), Error> {
+        if self.spare.is_some() {
+            graph.restartable(group, Restart::default(), move || Ok(self.make()?));
+        } else {
+            let actors = self.make()?;
+            graph.group(group, actors);
+        }
+        Ok(())
     }
 
     /// The actor, connected; the one before is cut off.
     ///
     /// # Errors
     /// If the body has no surface, or was said to be copied and cannot be.
-    pub(super) fn make(&mut self) -> Result<Vec<Box<dyn Actor>>, Error> {
+    fn make(&mut self) -> Result<Vec<Box<dyn Actor>>, Error> {
         // First: taking the ports again cuts off the checkpoint too.
         if self.saved.refresh() {
             self.last.clone_from(self.saved.get());

@@ -2,13 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use super::prepare::Timing;
+use super::timing::Timing;
 use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::body::{Body, State};
 use crate::model::local::Kind;
-use crate::runtime::RateGroup;
-use crate::runtime::Nanos;
+use crate::runtime::{Nanos, RateGroup};
 
 /// Evaluations at most, and the time after which no other is begun: the least of several is what the machine can do when
 /// nothing else disturbs it.

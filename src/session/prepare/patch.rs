@@ -5,15 +5,15 @@ use crate::log::ModelReason;
 use crate::model::body::Body;
 use crate::model::local::Kind;
 use crate::model::mesh::Lattice;
-use crate::model::surroundings::{Estimate, FLOOR_PCT, SpringGraph, errors_by_states};
-use crate::scene::{BasisSize, Scene, patch_fits};
+use crate::model::surroundings::{Estimate, FLOOR_PCT, Size, SpringGraph, errors_by_states};
+use crate::scene::{Scene, patch_fits};
 
 /// What is tried, in the order of what a tick costs.
 const SIZES: [[usize; 3]; 5] = [[4, 4, 2], [4, 4, 3], [5, 5, 2], [6, 6, 2], [6, 6, 3]];
 
 /// A patch that was chosen, and what is expected of it.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct PatchChoice {
+pub(in super::super) struct PatchChoice {
     /// Nodes along the surface, along it, into depth.
     pub(super) size: [usize; 3],
     /// Of the reduced surroundings that the error is expected with.
@@ -26,7 +26,7 @@ pub(super) struct PatchChoice {
 
 impl PatchChoice {
     /// The reason for the model, with that for the patch.
-    pub(super) fn reason(&self, of_model: Option<ModelReason>) -> ModelReason {
+    pub(in super::super) fn reason(&self, of_model: Option<ModelReason>) -> ModelReason {
         let Self { size: [a, b, c], states, expected_pct, budget_pct, place } = self;
         let why = format!(
             "error_pct = {budget_pct} takes patch {a} x {b} x {c} ({expected_pct:.2} % expected with {states} states at \
@@ -48,7 +48,7 @@ impl PatchChoice {
 pub(super) fn choose(scene: &Scene, body: &dyn Body, attached: &[Option<u32>]) -> Option<PatchChoice> {
     let (None, Some(budget_pct)) = (scene.local.patch, scene.local.error_pct) else { return None };
     let basis = scene.local.basis_size();
-    if scene.local.model.named() != Some(Kind::Predictive) || basis == BasisSize::States(0) {
+    if scene.local.model.named() != Some(Kind::Predictive) || basis == Size::States(0) {
         return None;
     }
     let springs = SpringGraph::new(body)?;
@@ -81,10 +81,10 @@ pub(super) fn choose(scene: &Scene, body: &dyn Body, attached: &[Option<u32>]) -
 }
 
 /// The states of a basis of that size and the error that is expected with them (%).
-fn expected(errors: &[(usize, Estimate)], basis: BasisSize) -> (usize, f64) {
+fn expected(errors: &[(usize, Estimate)], basis: Size) -> (usize, f64) {
     let found = match basis {
-        BasisSize::States(states) => errors.get(..states.min(errors.len())).and_then(<[_]>::last),
-        BasisSize::ErrorPct(budget) => {
+        Size::States(states) => errors.get(..states.min(errors.len())).and_then(<[_]>::last),
+        Size::ErrorPct(budget) => {
             errors.iter().find(|(_, estimate)| estimate.expected_pct() <= budget).or(errors.last())
         }
     };

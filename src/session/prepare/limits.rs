@@ -13,10 +13,10 @@ use crate::scene::{SafetySpec, SafetyStage, Scene};
 
 /// A local model may miss two resyncs before it is old.
 const PERIODS_UNTIL_OLD: f64 = 3.0;
-/// And nothing younger than this is (ms).
+/// A local model younger than this is never old (ms).
 const YOUNGEST_OLD_MS: f64 = 100.0;
 
-/// At which the limits of a device without a rate of its own are told (s).
+/// The period at which the limits of a device without a rate of its own are told (s).
 const USUAL_PERIOD_S: f64 = 1e-3;
 
 /// What a device is taken for: what the scene says of it, else what the device says, else what is least. No stage knows how
@@ -88,6 +88,32 @@ pub(super) fn limits(safety: &SafetySpec, device: &DeviceLimits, stored_j: f64, 
         watchdog: safety.has(SafetyStage::Watchdog).then_some(watchdog),
         ..Limits::bare(device.max_force_n)
     }
+}
+
+/// Limits and gains follow from what the device says, so it must be possible; its largest force is [`check_ramp`]'s.
+pub(super) fn check_capabilities(capabilities: Capabilities, limits: &Limits) -> Result<(), Error> {
+    let asked = Capabilities { max_force_n: limits.max_force_n, continuous_force_n: None, ..capabilities };
+    asked.fault().map_or(Ok(()), |words| Err(Error::scene("device", format!("has impossible capabilities: {words}"))))
+}
+
+/// The slew limit must not keep the force from being gone when the ramp is over.
+pub(super) fn check_ramp(limits: &Limits) -> Result<(), Error> {
+    if !(limits.max_force_n.is_finite() && limits.max_force_n > 0.0) {
+        let message = format!("has a largest force of {} N, must be a finite number above 0", limits.max_force_n);
+        return Err(Error::scene("device", message));
+    }
+    let needed_s = limits.max_force_n / limits.max_slew_n_per_s;
+    if limits.ramp_s >= needed_s {
+        return Ok(());
+    }
+    let message = format!(
+        "is {} ms, but the largest force of {} N takes {} ms at the slew limit: use that or more, or raise \
+         safety.max_slew_n_per_ms",
+        limits.ramp_s * 1e3,
+        limits.max_force_n,
+        (needed_s * 1e3).ceil()
+    );
+    Err(Error::scene("safety.ramp_ms", message))
 }
 
 /// Steps along the straight way from rest to a state, over which the work of its forces is summed (Simpson's rule).

@@ -2,9 +2,14 @@
 
 use std::fmt;
 
+use super::body::Start;
 use super::situation::Situation;
+use super::timing::Timing;
+use crate::error::Error;
 use crate::log::ModelReason;
-use crate::scene::LocalModelKind as Kind;
+use crate::model::local::Kind;
+use crate::runtime::{Execution, Nanos};
+use crate::scene::{ModelChoice, Scene};
 
 /// A local model that was chosen, and why.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,7 +29,7 @@ impl fmt::Display for Choice {
 }
 
 /// `reason` with what else was decided, and what that misses.
-pub(super) fn extended(reason: Option<ModelReason>, why: String, missed: Option<String>) -> ModelReason {
+pub(in super::super) fn extended(reason: Option<ModelReason>, why: String, missed: Option<String>) -> ModelReason {
     match reason {
         Some(ModelReason { why: first, warning }) => {
             ModelReason { why: format!("{first}; {why}"), warning: warning.or(missed) }
@@ -35,7 +40,7 @@ pub(super) fn extended(reason: Option<ModelReason>, why: String, missed: Option<
 
 /// What is to be expected of a model one global period late: force error rms in % of the peak, the worst of the scenes `hand`,
 /// `wave`, `drag_friction` and `drag_slip` (`palpate compare scenes/NAME.toml`).
-pub(super) fn expected_error_pct(kind: Kind) -> f64 {
+fn expected_error_pct(kind: Kind) -> f64 {
     match kind {
         Kind::Hold => 33.0,
         Kind::Patch => 38.0,
@@ -48,11 +53,43 @@ pub(super) fn expected_error_pct(kind: Kind) -> f64 {
     }
 }
 
+/// The model that `scene` names, or the one that is right for it, which it names then. With that the reason, and what a force
+/// evaluation takes if that was measured or taken to be.
+///
+/// # Errors
+/// If a model of the whole body would have to be each tool's own.
+pub(super) fn model(
+    scene: &mut Scene,
+    start: &mut Start,
+    timing: Timing,
+    execution: Execution,
+) -> Result<(Kind, Option<Choice>, Option<Nanos>), Error> {
+    let (kind, choice, evaluation) = match scene.local.model {
+        ModelChoice::Named(kind) => (kind, None, None),
+        ModelChoice::Auto => {
+            let situation = Situation::of(scene, &mut *start.body, &start.state, timing, execution);
+            let choice = choose(&situation);
+            // The log's scene names the model and what was asked of it.
+            scene.local.name_chosen(choice.model);
+            (choice.model, Some(choice), Some(situation.evaluation))
+        }
+    };
+    let devices = scene.devices.len();
+    if kind == Kind::Full && devices > 1 {
+        let message = format!(
+            "is `full`, which is one model of the whole body, and the {devices} devices need one each: use another, such as \
+             \"predictive\""
+        );
+        return Err(Error::scene("local.model", message));
+    }
+    Ok((kind, choice, evaluation))
+}
+
 /// The cheapest model that fits the rates and meets `error_pct`; if there is none, the best that fits.
 ///
 /// `full` comes first: the others need the same work for their global model, and more. Then in order of cost. Where none
 /// meets the error, a tight `full` comes before a model that is wrong.
-pub(super) fn choose(situation: &Situation) -> Choice {
+fn choose(situation: &Situation) -> Choice {
     let error = situation.error_pct;
     let is_possible = |kind: &Kind| situation.possible.contains(kind);
     if is_possible(&Kind::Full) && situation.load(Kind::Full) <= 1.0 {
@@ -98,7 +135,6 @@ pub(super) fn choose(situation: &Situation) -> Choice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::Nanos;
 
     /// Two substeps at 1 kHz and 30 Hz on two cores, 42 ticks ahead, 20^3 nodes, 1 % wanted, every model possible.
     fn situation(evaluation_us: u64) -> Situation {

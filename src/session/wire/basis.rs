@@ -2,20 +2,15 @@
 
 use std::sync::Arc;
 
-use super::choice::extended;
-use super::prepare::Prepared;
 use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::log::ModelReason;
 use crate::model::Vec3;
 use crate::model::forecast::ToolForecast;
 use crate::model::local::{Aim, wider};
-use crate::model::surroundings::{Bases, SpringGraph};
-use crate::runtime::{Actor, ExchangePort, RateGroup, RuntimeBuilder};
-use crate::scene::BasisSize;
-
-/// The name of the group.
-pub(super) const GROUP: &str = "basis";
+use crate::model::surroundings::{Bases, Size, SpringGraph};
+use crate::runtime::{Actor, ExchangePort, RuntimeBuilder};
+use crate::session::prepare::{Prepared, extended};
 
 /// The basis actor's side of a session.
 pub(super) struct BasisSide {
@@ -34,11 +29,11 @@ impl BasisSide {
     /// # Errors
     /// If the surface cannot be searched.
     pub(super) fn new(graph: &mut RuntimeBuilder, prepared: &Prepared, tools: &[Vec3]) -> Result<Option<Self>, Error> {
-        let Some(springs) = prepared.template.springs.clone().filter(|_| prepared.reduces()) else {
+        let Some(springs) = prepared.plan.template.springs.clone().filter(|_| prepared.reduces()) else {
             return Ok(None);
         };
-        let store = BasisStore { size: prepared.basis_size, folder: prepared.basis_folder.clone() };
-        let pace = if prepared.prefetches { BasisPace::OneByOne } else { BasisPace::All };
+        let store = BasisStore { size: prepared.scene.local.basis_size(), folder: prepared.scene.local.basis_folder.clone() };
+        let pace = if prepared.plan.prefetches { BasisPace::OneByOne } else { BasisPace::All };
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
@@ -51,7 +46,7 @@ impl BasisSide {
 
     /// The reason for the model, with what the first basis came to if its states were chosen by a budget.
     pub(super) fn reason(&self, of_model: Option<ModelReason>) -> Option<ModelReason> {
-        let BasisSize::ErrorPct(budget) = self.store.size else { return of_model };
+        let Size::ErrorPct(budget) = self.store.size else { return of_model };
         let Some(basis) = self.known.iter().max_by_key(|basis| basis.states()) else { return of_model };
         let (states, Some(estimate)) = (basis.states(), basis.estimate()) else { return of_model };
         let (linear, expected) = (estimate.linear_pct, estimate.expected_pct());
@@ -69,18 +64,13 @@ impl BasisSide {
     }
 }
 
-/// The rate group: it looks for wishes as often as the global model makes them.
-pub(super) fn group(prepared: &Prepared) -> RateGroup {
-    RateGroup::new(prepared.global_rate).name(GROUP).latency(prepared.basis_latency)
-}
-
 /// The basis where each tool is, and before a run on threads one that holds a cell more around it.
 fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, tools: &[Vec3]) -> Result<Bases, Error> {
     let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
     let aim = Aim::new(body.surface(), &state.positions)?;
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
-    let size = prepared.template.patch;
-    let sizes: &[[usize; 3]] = if prepared.prefetches { &[size, wider(size)] } else { &[size] };
+    let size = prepared.plan.template.patch;
+    let sizes: &[[usize; 3]] = if prepared.plan.prefetches { &[size, wider(size)] } else { &[size] };
     for (index, &tool) in tools.iter().enumerate() {
         let contact = prepared.simulation.contact(index);
         aim.triangles(Some(contact), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
