@@ -17,10 +17,11 @@
 //!   no sleep. The actor walks through 256 kB to leave the scheduler's data out of the first-level cache.
 //! - *virtual time*: time simulated over time taken, the median of five runs.
 
-use palpate::runtime::{Execution, Outcome, OverrunPolicy, RateGroup, Runtime, RuntimeBuilder, TickTiming, actor_fn};
-use palpate::scene::{LocalModelKind, Scene};
-use palpate::session::Session;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
+use palpate::runtime::{Execution, Outcome, OverrunPolicy, RateGroup, Runtime, RuntimeBuilder, TickTiming, actor_fn};
+use palpate::scene::Scene;
+use palpate::session::Session;
 use std::hint::black_box;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};

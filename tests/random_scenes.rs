@@ -4,27 +4,27 @@
 //!
 //! The short form is part of the tests. The long one, 10,000 scenes:
 //! `cargo test --release --test random_scenes -- --ignored --nocapture`.
-#![cfg(feature = "scene")]
 
 mod random;
 
 use std::sync::{Arc, Mutex};
 
+use palpate::ErrorKind;
 use palpate::Session;
 use palpate::devices::{
     Capabilities, Device, DeviceFault, DeviceState, FaultWindow, Faulty, ForceCommand, Hand, HandSpec, InjectedFault,
     PlantSpec, SafetyStop, Scripted, ToolPath,
 };
-use palpate::error::ErrorKind;
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
+use palpate::model::blend::BlendKind;
+use palpate::model::mesh::Face;
 use palpate::runtime::Disturbance;
+use palpate::runtime::Nanos;
 use palpate::safety::Passivity;
 use palpate::scene::{
-    BlendKind, BlendSpec, BlockSpec, BodySpec, DeviceProfile, Face, Friction, MaterialSpec, ModelChoice, SafetySpec,
-    SafetyStage, Scene,
+    BlendSpec, BlockSpec, BodySpec, DeviceProfile, Friction, MaterialSpec, ModelChoice, SafetySpec, SafetyStage, Scene,
 };
-use palpate::runtime::Nanos;
 use random::Random;
 
 /// After so long nobody knows what the device did, and the force starts from zero (s).

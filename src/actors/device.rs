@@ -4,14 +4,14 @@
 //! within the ramp time; after a gap in which nobody drove the device it starts from zero.
 
 use super::cause::Cause;
-use super::messages::{DeviceSample, ComputedForce};
+use super::messages::{ComputedForce, DeviceSample};
 use crate::devices::{Calibration, Device, DeviceFault, DeviceState, ForceCommand};
 use crate::error::{Error, ErrorKind};
 use crate::log::{CommandSample, ToolSample};
 use crate::model::Vec3;
+use crate::runtime::Nanos;
 use crate::runtime::{Actor, Mode, Outcome, Reader, Recorder, TickContext, Writer};
 use crate::safety::{Input, Output, Pipeline, Request};
-use crate::runtime::Nanos;
 
 /// Releases without a new command after which the force goes to rest.
 const COMMAND_EXPIRES: u32 = 2;

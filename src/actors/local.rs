@@ -1,7 +1,7 @@
 //! The local actor: turns the newest tool sample into a force at the haptic rate.
 
 use super::cause::Cause;
-use super::messages::{DeviceSample, ComputedForce, SurfaceView, ToolTick, ToolView};
+use super::messages::{ComputedForce, DeviceSample, SurfaceView, ToolTick, ToolView};
 use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync, ServedBy};
 use crate::model::Vec3;
 use crate::model::contact::{Contact, Mode};
@@ -9,8 +9,8 @@ use crate::model::local::{Kind, LocalModel, PatchGeometry, Resynced, Served, Suc
 use crate::runtime::{
     Actor, Mode as RunMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
 };
-use crate::safety::coupling::CoupledTool;
 use crate::runtime::{Nanos, Rate};
+use crate::safety::coupling::CoupledTool;
 
 /// Haptic ticks that one release advances at most. After a long stall the rest is made up by the releases that follow:
 /// simulated time never stretches, and no release takes longer than this many ticks.
@@ -306,3 +306,7 @@ fn contact_sample(time: Nanos, contact: &Contact, force: Vec3) -> ContactSample 
         device: 0,
     }
 }
+
+#[cfg(test)]
+#[path = "tests/local.rs"]
+mod tests;

@@ -9,9 +9,9 @@ use super::log_sink::{LogSink, Loss};
 use super::scene_watch::SceneWatch;
 use crate::error::{Error, ErrorKind};
 use crate::log::{Analysis, Environment, Level, LogRecord, RunReport, StatsCounter, TextEvent};
+use crate::runtime::Nanos;
 use crate::runtime::record::Event;
 use crate::runtime::{Actor, GrantHandle, Outcome, Record, RecordDrain, RecordGap, TickContext};
-use crate::runtime::Nanos;
 
 /// The target of the event that says that a log could not be written, for programs that report the summary's
 /// `log_error` instead.

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use super::messages::SurfaceView;
 use crate::log::{Environment, LogRecord, SceneFrame, SceneTool};
 use crate::model::Vec3;
-use crate::runtime::{OutletReader, TickContext};
 use crate::runtime::Nanos;
+use crate::runtime::{OutletReader, TickContext};
 
 /// Diameter of a drawn tool, in the largest extent of the body.
 const TOOL_SIZE: f64 = 0.04;

@@ -11,7 +11,8 @@
 //! nodes that the tool moves at the tool's speed. An explicit exchange of the two multiplies an error by -m_e / m each tick, m_e
 //! being the mass that the body puts on the tool: so the simulated tool has a mass m = [`MASS_RATIO`] m_e.
 
-use super::{DeviceLimits, Force};
+use super::force::Force;
+use super::limits::DeviceLimits;
 
 /// The condition above is met with this factor to spare.
 pub const MARGIN: f64 = 1.5;

@@ -1,6 +1,11 @@
 //! What the pipeline is told before a run.
 
-use super::{ModelAge, Passivity, StartUp, Tank, ToolSpeed, Watchdog};
+use super::model_age::ModelAge;
+use super::passivity::Passivity;
+use super::start_up::StartUp;
+use super::tank::Tank;
+use super::tool_speed::ToolSpeed;
+use super::watchdog::Watchdog;
 
 /// What the pipeline needs to know of a device.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,13 @@
 //! The stages in their order, with what they remember.
 
-use super::{
-    Actions, AgeFade, Engagement, Force, Ledger, Limits, Ramp, TankState, clamp, control, dot, finite, norm, slew,
-    speed_gain,
-};
+use super::actions::Actions;
+use super::force::{Force, clamp, dot, finite, norm, slew};
+use super::limits::Limits;
+use super::model_age::AgeFade;
+use super::passivity::{Ledger, control};
+use super::start_up::{Engagement, Ramp};
+use super::tank::TankState;
+use super::tool_speed::speed_gain;
 
 /// What is asked of the device.
 #[derive(Clone, Copy, Debug, PartialEq)]

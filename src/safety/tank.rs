@@ -6,7 +6,7 @@
 //! than one that is blended over the time t: the work J v t / 2 on a tool that moves with v, and J^2 t^2 / (4 m) on one
 //! that it sets in motion itself. A step that the tank cannot pay is blended.
 
-use super::{Force, dot, norm};
+use super::force::{Force, dot, norm};
 
 /// The tank's limits.
 #[derive(Clone, Copy, Debug, PartialEq)]

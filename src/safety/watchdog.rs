@@ -1,6 +1,7 @@
 //! The last stage: a device that says nothing new is not pushed.
 
-use super::{Force, Ramp, slew};
+use super::force::{Force, slew};
+use super::start_up::Ramp;
 
 /// Counts how long a device has been silent.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::{FaultSpec, HaplySpec, ToolPath};
-use crate::devices::{Capabilities, HandSpec, PlantSpec};
+use super::{FaultSpec, HaplySpec};
+use crate::devices::{Capabilities, HandSpec, PlantSpec, ToolPath};
+use crate::error::Error;
 
 /// What moves the tool.
 #[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
@@ -55,7 +56,7 @@ pub enum DeviceKind {
     Hand,
     /// A tool that moves as in a log and ignores the force.
     Replay,
-    /// An Inverse3 behind the Haply Inverse service; needs feature `haply`.
+    /// An Inverse3 behind the Haply Inverse service; the crate `palpate-haply` opens it.
     Haply,
 }
 
@@ -87,5 +88,57 @@ impl DeviceProfile {
             Self::Falcon => Capabilities::FALCON,
             Self::Omega3 => Capabilities::OMEGA_3,
         }
+    }
+}
+
+/// `error` about `device`, which is the `index`-th of `devices`: with its number if there are several.
+pub(crate) fn numbered(error: Error, index: usize, devices: &[DeviceSpec]) -> Error {
+    error.with_place_of("device", &field(index, devices.len()))
+}
+
+/// Where the `index`-th of `count` devices stands in a scene: its number is given if there are several.
+pub(crate) fn field(index: usize, count: usize) -> String {
+    if count < 2 { "device".to_owned() } else { format!("device[{index}]") }
+}
+
+/// One table `[device]`, or several `[[device]]`.
+pub(super) mod one_or_many {
+    use serde::de::value::MapAccessDeserializer;
+    use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+    use serde::ser::{Serialize, Serializer};
+
+    use super::DeviceSpec;
+
+    pub(in crate::scene) fn serialize<S: Serializer>(devices: &[DeviceSpec], to: S) -> Result<S::Ok, S::Error> {
+        match devices {
+            [one] => one.serialize(to),
+            many => many.serialize(to),
+        }
+    }
+
+    pub(in crate::scene) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DeviceSpec>, D::Error> {
+        struct OneOrMany;
+
+        impl<'de> Visitor<'de> for OneOrMany {
+            type Value = Vec<DeviceSpec>;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a table [device], or several [[device]]")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                Ok(vec![DeviceSpec::deserialize(MapAccessDeserializer::new(map))?])
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Self::Value, A::Error> {
+                let mut devices = Vec::new();
+                while let Some(device) = items.next_element()? {
+                    devices.push(device);
+                }
+                Ok(devices)
+            }
+        }
+
+        from.deserialize_any(OneOrMany)
     }
 }

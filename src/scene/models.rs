@@ -2,14 +2,9 @@
 
 use std::path::PathBuf;
 
-pub use crate::model::blend::BlendKind;
-pub use crate::model::local::{Feedback, Kind as LocalModelKind};
-
-pub use crate::model::local::Prediction;
-use crate::model::surroundings::LEAST_PCT;
-pub use crate::model::surroundings::Size as BasisSize;
-
-use super::ModelChoice;
+use crate::model::blend::BlendKind;
+use crate::model::local::{Feedback, Kind, Prediction};
+use crate::model::surroundings::{LEAST_PCT, Size};
 
 /// The slow, detailed simulation.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
@@ -93,20 +88,20 @@ impl LocalSpec {
 
     /// Names the model that `auto` chose: a budget below what `predictive` keeps was met with a warning, and what it keeps is
     /// asked of it.
-    pub(crate) fn name_chosen(&mut self, kind: LocalModelKind) {
+    pub(crate) fn name_chosen(&mut self, kind: Kind) {
         self.model = kind.into();
-        if kind == LocalModelKind::Predictive {
+        if kind == Kind::Predictive {
             self.error_pct = self.error_pct.map(|error_pct| error_pct.max(LEAST_PCT));
         }
     }
 
     /// How large a basis is to be: a number of states that is given counts, then the budget.
-    pub fn basis_size(&self) -> BasisSize {
+    pub fn basis_size(&self) -> Size {
         match (self.basis, self.error_pct) {
-            (Some(states), _) => BasisSize::States(states),
+            (Some(states), _) => Size::States(states),
             // `auto` may choose a model that does not meet less, and says so.
-            (None, Some(error_pct)) => BasisSize::ErrorPct(error_pct.max(LEAST_PCT)),
-            (None, None) => BasisSize::States(50),
+            (None, Some(error_pct)) => Size::ErrorPct(error_pct.max(LEAST_PCT)),
+            (None, None) => Size::States(50),
         }
     }
 }
@@ -133,4 +128,107 @@ pub struct BlendSpec {
     /// How long (ms); not used by `none`.
     #[serde(default)]
     pub ms: f64,
+}
+
+/// A local model by name, or the choice of one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ModelChoice {
+    /// The cheapest that fits the rates and meets [`LocalSpec::error_pct`], chosen when a
+    /// session is built.
+    #[default]
+    Auto,
+    /// This one.
+    Named(Kind),
+}
+
+impl ModelChoice {
+    /// Every choice by name: the models in order of cost, then `auto`.
+    pub const NAMES: &'static [&'static str] = &NAMES;
+
+    /// Its name in scene files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => AUTO,
+            Self::Named(kind) => kind.name(),
+        }
+    }
+
+    /// The choice with this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let named = || Kind::ALL.into_iter().find(|kind| kind.name() == name).map(Self::Named);
+        if name == AUTO { Some(Self::Auto) } else { named() }
+    }
+
+    /// The model, if it is named.
+    pub fn named(self) -> Option<Kind> {
+        match self {
+            Self::Auto => None,
+            Self::Named(kind) => Some(kind),
+        }
+    }
+
+    /// True if `holds` is true of the model, or of every one that could be chosen.
+    pub(crate) fn all(self, holds: impl Fn(Kind) -> bool) -> bool {
+        match self {
+            Self::Auto => Kind::ALL.into_iter().all(holds),
+            Self::Named(kind) => holds(kind),
+        }
+    }
+}
+
+const AUTO: &str = "auto";
+
+const NAMES: [&str; Kind::ALL.len() + 1] = {
+    let mut names = [AUTO; Kind::ALL.len() + 1];
+    let mut index = 0;
+    while index < Kind::ALL.len() {
+        names[index] = Kind::ALL[index].name();
+        index += 1;
+    }
+    names
+};
+
+impl From<Kind> for ModelChoice {
+    fn from(kind: Kind) -> Self {
+        Self::Named(kind)
+    }
+}
+
+impl serde::Serialize for ModelChoice {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for ModelChoice {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Name;
+        impl serde::de::Visitor<'_> for Name {
+            type Value = ModelChoice;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("the name of a local model")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<ModelChoice, E> {
+                ModelChoice::from_name(name).ok_or_else(|| E::unknown_variant(name, ModelChoice::NAMES))
+            }
+        }
+        deserializer.deserialize_str(Name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_is_that_of_one_choice_and_auto_is_no_model() {
+        for name in ModelChoice::NAMES {
+            assert_eq!(ModelChoice::from_name(name).map(ModelChoice::name), Some(*name));
+        }
+        assert_eq!(ModelChoice::NAMES.len(), Kind::ALL.len() + 1);
+        assert_eq!(ModelChoice::default().named(), None);
+        assert_eq!(ModelChoice::from_name("boundary"), None);
+    }
 }

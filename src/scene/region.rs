@@ -1,8 +1,5 @@
 //! Regions of the body as a scene names them: layers and inclusions.
 
-use super::BodySpec;
-use crate::error::Error;
-use crate::model::ModelError;
 use crate::model::body::{Region, Shape};
 
 /// A part of the body that differs in material.
@@ -42,19 +39,13 @@ impl RegionSpec {
     }
 }
 
-/// Refuses regions that cannot be, or are nowhere.
-pub(super) fn validate(body: &BodySpec) -> Result<(), Error> {
-    let refuse = |error: ModelError| Error::scene(&format!("body.{}", error.place()), error.message());
-    body.builder().check_regions().map_err(refuse)
-}
-
 /// A shape as a table of one key, its kind.
 mod shape {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::{Serialize, Serializer};
 
-    use super::super::Axis;
-    use super::Shape;
+    use crate::devices::Axis;
+    use crate::model::body::Shape;
 
     #[derive(Default, serde::Deserialize, serde::Serialize)]
     #[serde(deny_unknown_fields, default)]

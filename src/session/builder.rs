@@ -2,9 +2,11 @@
 
 use super::parts::{OpenHaply, Parts};
 use crate::devices::{Device, ToolPath};
+use crate::model::blend::BlendKind;
 use crate::model::body::Body;
+use crate::model::local::Feedback;
 use crate::runtime::{Disturbance, Execution, RateGroup};
-use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, ModelChoice, SafetyStage, Scene, StepKind};
+use crate::scene::{BlendSpec, Friction, ModelChoice, SafetyStage, Scene, StepKind};
 
 /// Collects what a session is made of; fills the same [`Scene`] as a scene file and passes the same validation.
 #[derive(Debug)]

@@ -19,6 +19,7 @@ mod replay;
 mod running;
 mod wire;
 
+pub use crate::actors::{LOG_FAILURE, SurfaceView, ToolView};
 pub use builder::SessionBuilder;
 pub use prepare::Choice;
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};

@@ -119,11 +119,7 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    pub(super) fn new(
-        body: &Surface,
-        surface: OutletReader<SurfaceView>,
-        tools: Vec<OutletReader<ToolView>>,
-    ) -> Self {
+    pub(super) fn new(body: &Surface, surface: OutletReader<SurfaceView>, tools: Vec<OutletReader<ToolView>>) -> Self {
         Self { triangles: body.triangles.as_slice().into(), surface, tools }
     }
 

@@ -115,8 +115,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     scene.local.patch = Some(sized_patch.as_ref().map_or(scene.local.patch_size(), |choice| choice.size));
 
     let mut as_run = as_run(&scene, Some((&start.attached, &start.probes)));
-    let making =
-        tools::Making { scene: &scene, start: &mut start, haptic: rates[0], execution, open_haply, is_replay };
+    let making = tools::Making { scene: &scene, start: &mut start, haptic: rates[0], execution, open_haply, is_replay };
     let tools;
     // The safety section with what it left to the device.
     (tools, as_run.safety) = tools::tools(devices, making)?;
@@ -171,9 +170,7 @@ fn template(kind: Kind, scene: &Scene, start: &Start, timing: Timing) -> Result<
     let is_implicit = match scene.local.step {
         StepKind::Explicit => false,
         StepKind::Implicit => true,
-        StepKind::Auto => {
-            scene.contact.equations != Equations::Paper && start.stable_substeps > MOST_EXPLICIT_STEPS
-        }
+        StepKind::Auto => scene.contact.equations != Equations::Paper && start.stable_substeps > MOST_EXPLICIT_STEPS,
     };
     // The longer one where periods alternate, 33 and 34 ticks at 30 Hz.
     let ticks = (timing.haptic.as_hz() / timing.global.as_hz() - 1e-6).ceil().min(f64::from(u32::MAX)) as u32;

@@ -2,8 +2,8 @@
 
 use super::super::parts::{OpenHaply, Parts};
 use super::body::Start;
-use super::limits::{self, check_capabilities, check_ramp};
 use super::device;
+use super::limits::{self, check_capabilities, check_ramp};
 use crate::devices::Device;
 use crate::error::Error;
 use crate::model::body::Body;

@@ -10,7 +10,8 @@ use crate::model::local::{LocalModel, PatchGeometry};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{
-    Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RateGroup, RecorderPort, Restart, RuntimeBuilder, Stopwatch,
+    Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RateGroup, RecorderPort, Restart, RuntimeBuilder,
+    Stopwatch,
 };
 
 /// Between the local actor of a tool and the global one.

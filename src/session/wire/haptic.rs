@@ -61,8 +61,7 @@ pub(super) fn actors(
             recorder: graph.recorder(ticks * (RECORDS_PER_TICK + plan.probes.len())),
         };
         let succession = Succession::new(models, plan.blend, Vec3::zeros());
-        let local =
-            LocalActor::new(succession, plan.timing.haptic, plan.timing.global, plan.probes.clone(), ports);
+        let local = LocalActor::new(succession, plan.timing.haptic, plan.timing.global, plan.probes.clone(), ports);
         let local = match &tool.coupling {
             Some(design) => local.coupled(CoupledTool::new(design)),
             None => local,

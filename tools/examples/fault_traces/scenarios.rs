@@ -9,7 +9,8 @@ use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::mesh::Face;
 use palpate::prelude::*;
-use palpate::scene::{LocalModelKind, SafetyStage};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::SafetyStage;
 #[cfg(feature = "log")]
 use palpate::session::SessionBuilder;
 use palpate::session::Summary;

@@ -4,11 +4,22 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use super::fault::{Fault, plain_key};
-use super::locate::{exact_offset_of, line_of, offset_of, table_at};
-use super::validate_device::tool;
-use super::{Scene, ToolPath, device_field, numbered, reader};
+mod fault;
+mod locate;
+mod reader;
+mod suggest;
+
+use super::Scene;
+use super::device::{field as device_field, numbered};
+use super::validate::tool;
+use crate::devices::ToolPath;
 use crate::error::{Error, ErrorKind};
+use fault::{Fault, plain_key};
+use locate::{exact_offset_of, line_of, offset_of, table_at};
+
+/// The scene that `palpate` alone runs, part of the program.
+const DEMO_TOML: &str = include_str!("../../../scenes/demo.toml");
+const DEMO_PATH_CSV: &str = include_str!("../../../scenes/paths/demo.csv");
 
 impl Scene {
     /// Reads, completes and validates a scene file; the tool's path is found relative to it.
@@ -41,8 +52,16 @@ impl Scene {
         Ok(scene)
     }
 
-    /// As [`from_toml`](Self::from_toml), with the tool's path fetched by `read_path`.
-    pub(super) fn from_toml_with(
+    /// The built-in demo: five seconds of pressing, dragging, circling and tapping. Reads no file.
+    pub fn demo() -> Self {
+        Self::from_toml_with(DEMO_TOML, "demo.toml", |path_csv| {
+            ToolPath::from_csv(DEMO_PATH_CSV, &path_csv.display().to_string())
+        })
+        .expect("the built-in scene is valid")
+    }
+
+    /// The scene in `text`, with the tool's path fetched by `read_path`.
+    fn from_toml_with(
         text: &str,
         name: &str,
         read_path: impl Fn(&Path) -> Result<ToolPath, Error>,

@@ -1,12 +1,12 @@
 //! The predictive model against `full`, in virtual time: what it is held to on the reference scenes, with results that
 //! arrive in time, one, one and a half and two periods late.
-#![cfg(feature = "scene")]
 
 use std::path::Path;
 
 use palpate::Session;
-use palpate::log::{ForceTrace, ModelError};
-use palpate::scene::{LocalModelKind, Prediction, Scene};
+use palpate_cli::compare::{ForceTrace, ModelError};
+use palpate::model::local::{Kind as LocalModelKind, Prediction};
+use palpate::scene::Scene;
 
 const IN_TIME: f64 = 0.0;
 /// A period of 30 Hz is 33.33 ms.
@@ -19,7 +19,7 @@ struct Case {
 
 impl Case {
     fn new(name: &str) -> Self {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(format!("{name}.toml"));
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(format!("{name}.toml"));
         let scene = Scene::load(&path).expect("a scene of the project");
         let full = forces(scene.clone().with_model(LocalModelKind::Full)).0;
         Self { scene, full }

@@ -1,6 +1,6 @@
 //! Materials and shapes.
 
-use palpate::scene::LocalModelKind::{LinearBoundary, Patch, Predictive};
+use palpate::model::local::Kind::{LinearBoundary, Patch, Predictive};
 
 use super::{Case, Setup, case, run};
 

@@ -1,13 +1,23 @@
 //! The one validation that builder and scene files pass through.
 
-use super::check::{inside, lengths_within, movable, not_negative, on_surface, positive};
-use super::{
-    BlendKind, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, GlobalSpec, InitialSpec, LocalModelKind,
-    LocalSpec, ModelChoice, Scene, StepKind, devices, region, safety,
-};
+mod check;
+mod devices;
+mod safety;
+
+pub(crate) use devices::MAX_DEVICES;
+pub(super) use devices::tool;
+
+use super::device::numbered;
+use super::{BlockSpec, BodySpec, Friction, GlobalSpec, InitialSpec, LocalSpec, ModelChoice, Scene, StepKind};
 use crate::error::Error;
+use crate::model::ModelError;
+use crate::model::blend::BlendKind;
+use crate::model::contact::Equations;
+use crate::model::local::{Feedback, Kind};
+use crate::model::mesh::Face;
 use crate::model::surroundings::LEAST_PCT;
 use crate::runtime::Rate;
+use check::{inside, lengths_within, movable, not_negative, on_surface, positive};
 
 /// Largest body; a million nodes have 13 million springs, minutes of work for a second of simulation.
 const MAX_NODES: usize = 1_000_000;
@@ -26,7 +36,17 @@ const MAX_LATENCY_MS: f64 = 60_000.0;
 /// Eleven days.
 const MAX_DURATION_S: f64 = 1e6;
 
-pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
+impl Scene {
+    /// Refuses what cannot work, naming the field and what would be right.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`](crate::ErrorKind::Scene), with the field's dotted path as its place.
+    pub fn validate(&self) -> Result<(), Error> {
+        validate(self)
+    }
+}
+
+fn validate(scene: &Scene) -> Result<(), Error> {
     if let Some(spec) = &scene.body {
         body(spec)?;
     }
@@ -43,7 +63,7 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
             "\"implicit\" has the corrected contact equations only, leave it out or use equations = \"corrected\"";
         return Err(Error::scene("local.step", message));
     }
-    devices::validate(scene)?;
+    devices::validate(&scene.devices, scene.contact.equations)?;
     safety::validate(&scene.safety)?;
     if let Some(spec) = &scene.initial {
         lengths_within("initial.pull.offset_m", spec.pull.offset_m, MAX_LENGTH_M)?;
@@ -59,14 +79,14 @@ pub(super) fn validate(scene: &Scene) -> Result<(), Error> {
 fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
     // A body too small for the default patch is fine for the models that have none, and for the choice among them; a patch
     // that was asked for is not.
-    if scene.local.model.named().is_some_and(LocalModelKind::has_patch)
+    if scene.local.model.named().is_some_and(Kind::has_patch)
         || scene.local.patch_size() != LocalSpec::default().patch_size()
     {
         patch(scene.local.patch_size(), block)?;
     }
     for (index, device) in scene.devices.iter().enumerate() {
         if let Some(node) = device.attach_node {
-            attached(node, block).map_err(|error| devices::numbered(error, index, &scene.devices))?;
+            attached(node, block).map_err(|error| numbered(error, index, &scene.devices))?;
         }
     }
     if let Some(spec) = &scene.initial {
@@ -82,7 +102,7 @@ fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
 fn on_no_lattice(scene: &Scene) -> Result<(), Error> {
     const WHY: &str = "names nodes of a block, and the body is the program's own";
     if let Some(index) = scene.devices.iter().position(|device| device.attach_node.is_some()) {
-        return Err(devices::numbered(Error::scene("device.attach_node", WHY), index, &scene.devices));
+        return Err(numbered(Error::scene("device.attach_node", WHY), index, &scene.devices));
     }
     let named = [("initial", scene.initial.is_some()), ("probe", !scene.probes.is_empty())];
     match named.iter().find(|(_, is_used)| *is_used) {
@@ -103,7 +123,9 @@ fn body(body: &BodySpec) -> Result<(), Error> {
         let message = "stiffness or damping over mass is beyond all numbers, check the units (kg, N/m)";
         return Err(Error::scene("body.material", message));
     }
-    region::validate(body)
+    // Regions that cannot be, or are nowhere.
+    let refuse = |error: ModelError| Error::scene(&format!("body.{}", error.place()), error.message());
+    body.builder().check_regions().map_err(refuse)
 }
 
 fn lattice(block: &BlockSpec) -> Result<(), Error> {
@@ -186,7 +208,7 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
     {
         return Err(Error::scene("local.feedback", misfit(feedback, local.model)));
     }
-    if local.step == StepKind::Implicit && !local.model.all(LocalModelKind::is_linear) {
+    if local.step == StepKind::Implicit && !local.model.all(Kind::is_linear) {
         let message =
             format!("\"implicit\" needs a linear patch and the model is {:?}, leave it out", local.model.name());
         return Err(Error::scene("local.step", message));
@@ -213,7 +235,7 @@ fn error_budget(local: &LocalSpec) -> Result<(), Error> {
     positive("local.error_pct", error_pct)?;
     // Without a basis there is nothing to size a patch by.
     let sizes = local.basis.is_none() || local.patch.is_none() && local.basis != Some(0);
-    if sizes && local.model.named() == Some(LocalModelKind::Predictive) && error_pct < LEAST_PCT {
+    if sizes && local.model.named() == Some(Kind::Predictive) && error_pct < LEAST_PCT {
         let message = format!(
             "is {error_pct}, and \"predictive\" keeps {LEAST_PCT} % at best: use that or more, numbers (local.patch and \
              local.basis), or model = \"full\""
@@ -225,10 +247,10 @@ fn error_budget(local: &LocalSpec) -> Result<(), Error> {
 
 fn misfit(feedback: Feedback, model: ModelChoice) -> String {
     let (fed, name) = (feedback.name(), model.name());
-    if matches!(model.named(), Some(LocalModelKind::Condensed | LocalModelKind::ScaledBoundary)) {
+    if matches!(model.named(), Some(Kind::Condensed | Kind::ScaledBoundary)) {
         return format!("{fed:?} with model = {name:?} would count the surroundings' compliance twice, leave it out");
     }
-    let fitting = LocalModelKind::ALL.into_iter().filter(|&model| feedback.fits(model));
+    let fitting = Kind::ALL.into_iter().filter(|&model| feedback.fits(model));
     let fitting = fitting.map(|model| format!("{:?}", model.name())).collect::<Vec<_>>().join(" or ");
     format!("{fed:?} needs model = {fitting} and the model is {name:?}, leave it out")
 }

@@ -4,11 +4,13 @@ use std::path::Path;
 
 use palpate::Error;
 use palpate::devices::ToolPath;
-use palpate::log::{ForceTrace, LogRecord, ModelError};
+use palpate::log::LogRecord;
+use palpate_cli::compare::{ForceTrace, ModelError};
 use palpate::model::body::{Block, Body, Spring, SpringNetwork};
 use palpate::model::mesh::Face;
 use palpate::runtime::{Disturbance, RateGroup};
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 use palpate::session::{Session, SessionBuilder};
 use palpate::runtime::Nanos;
 
@@ -92,7 +94,7 @@ fn session(case: &Case, model: LocalModelKind, late: f64, bases: Option<&Path>) 
     let late_ms = late * PERIOD.as_secs_f64() * 1e3;
     match case.body {
         Setup::Scene(name) => {
-            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
             let mut scene = Scene::load(&folder.join(name).with_extension("toml"))?.with_model(model);
             scene.global.compute_latency_ms = late_ms;
             scene.safety.max_force_n = Some(MAX_FORCE_N);
@@ -136,7 +138,7 @@ fn unequal_masses() -> Result<SpringNetwork, Error> {
         .springs(springs.collect::<Vec<_>>())
         .surface(block.surface().triangles.clone());
     let held = (0..nodes).filter(|&node| block.inverse_masses()[node as usize] == 0.0);
-    held.fold(network, |network, node| network.fix(node)).build()
+    Ok(held.fold(network, |network, node| network.fix(node)).build()?)
 }
 
 fn traced(session: SessionBuilder) -> Result<Traced, Error> {

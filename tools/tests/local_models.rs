@@ -1,16 +1,18 @@
 //! Each local model against `full`, in virtual time: the error that is known for it, no more and no less.
 //!
 //! `cargo test --test local_models -- --nocapture` prints the table of the README.
-#![cfg(feature = "scene")]
 
 use std::path::Path;
 
 use palpate::Session;
-use palpate::log::{ForceTrace, LogRecord, ModelError};
-use palpate::scene::{BlendKind, BlendSpec, Feedback, LocalModelKind, Scene, StepKind};
+use palpate::log::LogRecord;
+use palpate_cli::compare::{ForceTrace, ModelError};
+use palpate::model::blend::BlendKind;
+use palpate::model::local::{Feedback, Kind as LocalModelKind};
+use palpate::scene::{BlendSpec, Scene, StepKind};
 
 fn scene(name: &str) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(format!("{name}.toml"));
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(format!("{name}.toml"));
     Scene::load(&path).expect("a scene of the project")
 }
 

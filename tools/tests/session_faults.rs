@@ -132,7 +132,6 @@ fn faults_of_the_global_model_leave_the_haptic_side_alone() {
 }
 
 #[test]
-#[cfg(feature = "log")]
 fn faults_of_the_log_leave_the_force_alone() {
     for fault in [Fault::DiskFull, Fault::LoggerStuck] {
         let trace = run(fault);

@@ -1,6 +1,6 @@
 //! Results that come late, get lost, or stop coming.
 
-use palpate::scene::LocalModelKind::{LinearBoundary, Patch, Predictive};
+use palpate::model::local::Kind::{LinearBoundary, Patch, Predictive};
 
 use super::{Case, Upset, case, run};
 

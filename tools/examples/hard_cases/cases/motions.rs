@@ -1,6 +1,6 @@
 //! Fast and deep motions, and laws of friction.
 
-use palpate::scene::LocalModelKind::{LinearBoundary, Patch, Predictive};
+use palpate::model::local::Kind::{LinearBoundary, Patch, Predictive};
 
 use super::{Case, case, run};
 

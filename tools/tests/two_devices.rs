@@ -1,5 +1,4 @@
 //! Two devices on one body: each with its own contact and its own local model, its own topics, its own limits.
-#![cfg(all(feature = "log", feature = "scene"))]
 
 #[path = "../src/model/tests/common/mod.rs"]
 mod common;
@@ -9,10 +8,12 @@ use std::path::Path;
 use common::{STD, block, drag_path, minjerk, simulation};
 use palpate::Session;
 use palpate::devices::{Scripted, ToolPath};
-use palpate::log::{ForceTrace, LogEntry, LogReader, ModelError, ToolSample};
+use palpate::log::{LogEntry, LogReader, ToolSample};
+use palpate_cli::compare::{ForceTrace, ModelError};
 use palpate::model::Vec3;
 use palpate::model::contact::{Contact, ToolMotion};
-use palpate::scene::{DeviceKind, DeviceSpec, LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::{DeviceKind, DeviceSpec, Scene};
 use palpate::session::{SessionBuilder, Summary};
 use palpate::runtime::Nanos;
 
@@ -49,7 +50,7 @@ fn reference(paths: [fn(f64) -> Vec3; 2]) -> [Vec<Vec3>; 2] {
 }
 
 fn builder(model: LocalModelKind, late_ms: f64) -> SessionBuilder {
-    let mut scene = Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two_hands.toml")).unwrap();
+    let mut scene = Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/two_hands.toml")).unwrap();
     scene.devices.truncate(1);
     scene.devices[0] = DeviceSpec::default();
     scene.global.compute_latency_ms = late_ms;
@@ -149,7 +150,7 @@ fn each_device_has_its_topics_and_its_part_of_the_report_and_replays() {
 }
 
 fn two_hands() -> Scene {
-    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two_hands.toml")).unwrap()
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/two_hands.toml")).unwrap()
 }
 
 /// Check devices that are not alike, where every number of the pipeline and of the coupling is each one's own.

@@ -1,6 +1,6 @@
 //! Degenerate places, and rest.
 
-use palpate::scene::LocalModelKind::{LinearBoundary, Patch, Predictive};
+use palpate::model::local::Kind::{LinearBoundary, Patch, Predictive};
 
 use super::{Case, case, run};
 

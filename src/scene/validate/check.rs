@@ -1,7 +1,8 @@
 //! The small questions that validation asks again and again.
 
-use super::{BlockSpec, Face};
+use super::super::BlockSpec;
 use crate::error::Error;
+use crate::model::mesh::Face;
 
 /// A finite number above zero.
 pub(super) fn positive(field: &str, value: f64) -> Result<(), Error> {

@@ -1,6 +1,6 @@
 //! The hard cases: what is simulated, what goes wrong with it, and how far each model may be from `full`.
 
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 
 pub mod late;
 pub mod materials;

@@ -1,5 +1,4 @@
 //! Whole sessions in situations in which simulations usually fail: each local model against `full`, in virtual time.
-#![cfg(feature = "scene")]
 
 #[path = "../examples/hard_cases/cases/mod.rs"]
 #[allow(dead_code, reason = "what is hard about a case is for the table")]
@@ -16,10 +15,11 @@ use palpate::model::contact::{Contact, Law, ToolMotion};
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
 use palpate::prelude::*;
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 
 fn scene(name: &str) -> Scene {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hard");
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/hard");
     Scene::load(&folder.join(name).with_extension("toml")).unwrap()
 }
 
@@ -114,7 +114,7 @@ fn a_tool_at_1_m_s_is_felt_as_soon_as_it_is_inside() {
     for model in [LocalModelKind::Full, LocalModelKind::Patch, LocalModelKind::Predictive] {
         let session = Session::from_scene(scene("impact")).model(model).virtual_time().keep_records().build().unwrap();
         let summary = session.run().unwrap();
-        let forces = palpate::log::ForceTrace::of(&summary.records).forces_n;
+        let forces = palpate_cli::compare::ForceTrace::of(&summary.records).forces_n;
         // From 30 mm above, 1 mm per tick; then it stays inside.
         assert!(forces[..29].iter().all(|force| *force == [0.0; 3]), "{model:?}");
         // It is felt in the first tick that ends inside; then the surface may run ahead of it for a while.
@@ -137,7 +137,7 @@ fn a_tool_that_teleports_is_clamped_and_slewed() {
             _ => None,
         })
         .collect();
-    let computed = palpate::log::ForceTrace::of(&summary.records).peak_n();
+    let computed = palpate_cli::compare::ForceTrace::of(&summary.records).peak_n();
     assert!(computed > 3.0 * limit, "the case is no case: {computed} N");
     assert!(commands.iter().all(|force| force.norm() <= limit * (1.0 + 1e-12)));
     assert!(commands.windows(2).all(|pair| (pair[1] - pair[0]).norm() <= slew * (1.0 + 1e-9)));
