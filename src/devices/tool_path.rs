@@ -11,6 +11,17 @@ const HEADER: &str = "t_s,x_m,y_m,z_m";
 const FARTHEST_M: f64 = 1e6;
 
 /// Tool positions over time, linear in between, held after the last and before the first.
+///
+/// ```
+/// use palpate::devices::ToolPath;
+///
+/// # fn main() -> Result<(), palpate::Error> {
+/// let down = ToolPath::new(vec![0.0, 0.5], vec![[0.0, 0.0, 0.12], [0.0, 0.0, 0.10]])?;
+/// assert_eq!(down.at(0.25), [0.0, 0.0, 0.11]);
+/// assert_eq!(down.at(9.0), [0.0, 0.0, 0.10]);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToolPath {
     /// Strictly increasing times (s).

@@ -1,11 +1,11 @@
 //! Stage 6: a local model that nobody renews is trusted less and less.
 
-/// When a model is too old.
+/// The age at which a local model is too old to be trusted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelAge {
-    /// Up to here it is trusted (ticks of the local group).
+    /// Age up to which the model is trusted (ticks of the local group).
     pub max_ticks: f64,
-    /// Over so many more the force fades to zero (ticks of the local group).
+    /// Further age over which the force fades to zero (ticks of the local group).
     pub fade_ticks: f64,
 }
 

@@ -13,7 +13,7 @@
 
 use super::force::{Force, dot, norm};
 
-/// The controller's limits.
+/// The limits of the passivity controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passivity {
     /// Energy that the environment stores at the start (J).

@@ -2,14 +2,14 @@
 
 use super::force::{Force, norm};
 
-/// When the force engages, and how.
+/// The conditions under which the force engages after a start, and how slowly it comes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartUp {
-    /// It engages once the computed force has been below this (N) ...
+    /// Computed force below which it has to be before it engages (N).
     pub engage_force_n: f64,
-    /// ... for so many ticks.
+    /// Number of ticks in a row for which it has to be below that.
     pub engage_ticks: u32,
-    /// Then it ramps in over this time (s).
+    /// Time over which the force ramps in once it has engaged (s).
     pub ramp_s: f64,
 }
 

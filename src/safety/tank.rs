@@ -8,14 +8,14 @@
 
 use super::force::{Force, dot, norm};
 
-/// The tank's limits.
+/// The limits of the energy tank that pays for steps of model swaps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tank {
-    /// What it holds at the start, and at most (J).
+    /// Energy that the tank holds at the start, and at most (J).
     pub capacity_j: f64,
-    /// Below this nothing active passes (J).
+    /// Energy below which nothing active passes (J).
     pub min_j: f64,
-    /// Over this time a step is blended that cannot be paid (s).
+    /// Time over which a step is blended that cannot be paid (s).
     pub blend_s: f64,
 }
 

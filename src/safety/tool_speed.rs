@@ -1,11 +1,11 @@
 //! Stage 4: a tool that moves too fast to be held feels less and less.
 
-/// Between which speeds the force fades.
+/// The speeds of the tool between which the force fades.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolSpeed {
-    /// Up to here the force passes as it is (m/s).
+    /// Speed up to which the force passes as it is (m/s).
     pub fade_m_s: f64,
-    /// From here on there is none (m/s).
+    /// Speed from which on there is no force (m/s).
     pub stop_m_s: f64,
 }
 

@@ -3,10 +3,10 @@
 use super::force::{Force, slew};
 use super::start_up::Ramp;
 
-/// Counts how long a device has been silent.
+/// The limit on how long a device may be silent before its force goes to zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Watchdog {
-    /// Ticks without a new state after which it acts.
+    /// Number of ticks without a new state after which it acts.
     pub max_stale_ticks: u32,
 }
 

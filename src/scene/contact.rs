@@ -7,24 +7,24 @@ use serde::ser::{Serialize, Serializer};
 
 use crate::model::contact::{Equations, Normals};
 
-/// How the tool touches the body.
+/// The contact of the tools with the body: friction, normals, equations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactSpec {
-    /// Coulomb friction.
+    /// Coulomb friction between tool and body.
     pub friction: Friction,
-    /// Which normal a contact uses.
+    /// The normal that a contact uses: of the face, or interpolated between nodes.
     pub normals: Normals,
-    /// Which equations resolve it.
+    /// The equations that resolve a contact.
     pub equations: Equations,
 }
 
-/// Coulomb friction.
+/// Coulomb friction between tool and body, in a scene file a number or the word "stick".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Friction {
     /// The coefficient mu >= 0.
     Coefficient(f64),
-    /// Unbounded: a touching tool sticks until it is pulled off.
+    /// Unbounded friction: a touching tool sticks until it is pulled off.
     Stick,
 }
 

@@ -6,37 +6,49 @@ use crate::model::Vec3;
 use crate::model::body::Body;
 use crate::model::local::Kind;
 
-/// Everything a run needs to know.
+/// Everything a run needs to know, as plain data that the builder and scene files both fill.
+///
+/// ```
+/// use palpate::prelude::*;
+///
+/// # fn main() -> Result<(), Error> {
+/// let mut scene = Scene::demo();
+/// scene.run.duration_s = 0.05;
+/// let summary = Session::from_scene(scene).virtual_time().build()?.run()?;
+/// assert_eq!(summary.report.devices[0].force.ticks, 50);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// The soft body; a scene file must have one, `None` stands for a program's own.
     pub body: Option<BodySpec>,
-    /// How the tool touches it.
+    /// The contact of the tools with the body.
     #[serde(default)]
     pub contact: ContactSpec,
-    /// The slow, detailed simulation.
+    /// The global model: the slow, detailed simulation.
     #[serde(default)]
     pub global: GlobalSpec,
-    /// The fast, small one.
+    /// The local model: the fast, small simulation around each tool.
     #[serde(default)]
     pub local: LocalSpec,
-    /// What moves a tool and feels its force: one device, or several with names.
+    /// The devices, which move a tool and feel its force: one, or several with names.
     #[serde(rename = "device", with = "one_or_many", default = "one_device")]
     pub devices: Vec<DeviceSpec>,
-    /// Limits on what reaches the device.
+    /// Limits on the forces that reach the devices.
     #[serde(default)]
     pub safety: SafetySpec,
-    /// A deformed state to start from; at rest if absent.
+    /// A deformed state that the run starts from; at rest if absent.
     #[serde(default)]
     pub initial: Option<InitialSpec>,
     /// Nodes whose position is logged every tick.
     #[serde(default, rename = "probe")]
     pub probes: Vec<ProbeSpec>,
-    /// What the log has beside the records.
+    /// The log's contents beside the records of every tick.
     #[serde(default)]
     pub log: LogSpec,
-    /// How long.
+    /// The length of the run.
     #[serde(default)]
     pub run: RunSpec,
     /// The file that the scene was read from, as text; it is attached to the log.
@@ -55,33 +67,33 @@ pub struct InitialSpec {
     pub hold: Vec<[usize; 3]>,
 }
 
-/// One pulled node.
+/// A node that is pulled from its rest position.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PullSpec {
-    /// Which.
+    /// Place of the node in the lattice.
     pub node: [usize; 3],
-    /// From its rest position (m).
+    /// Way of the node from its rest position (m).
     pub offset_m: [f64; 3],
 }
 
-/// One probed node.
+/// A node whose position is logged every tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeSpec {
-    /// Which.
+    /// Place of the node in the lattice.
     pub node: [usize; 3],
 }
 
-/// What a log has beside the records of every tick.
+/// The contents of a log beside the records of every tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LogSpec {
-    /// The topic `/scene`: surface, tools and forces for viewers, 30 times a second.
+    /// True for the topic `/scene`: surface, tools and forces for viewers, 30 times a second.
     pub scene: bool,
 }
 
-/// How long a run lasts.
+/// The length of a run.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunSpec {
@@ -101,7 +113,7 @@ fn one_device() -> Vec<DeviceSpec> {
 }
 
 impl Scene {
-    /// The defaults around a program's own body: default rates, frictionless, `auto`, nothing moves the tool yet.
+    /// A scene around a program's own body: default rates, frictionless, `auto`, nothing moves the tool yet.
     pub fn of_program() -> Self {
         Self {
             body: None,
@@ -118,7 +130,7 @@ impl Scene {
         }
     }
 
-    /// The same scene with another local model, without a feedback and a step that the model, or one that `auto` may choose,
+    /// Changes the local model, and takes out a feedback and a step that the model, or one that `auto` may choose,
     /// cannot have.
     #[must_use]
     pub fn with_model(mut self, model: impl Into<ModelChoice>) -> Self {

@@ -6,11 +6,11 @@ use super::{FaultSpec, HaplySpec};
 use crate::devices::{Capabilities, HandSpec, PlantSpec, ToolPath};
 use crate::error::Error;
 
-/// What moves the tool.
+/// A device of a scene: what moves the tool, and what limits its force.
 #[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeviceSpec {
-    /// Its name: each of several devices has one.
+    /// Name of the device: each of several has one.
     pub name: Option<String>,
     /// The kind of device.
     pub kind: DeviceKind,
@@ -18,9 +18,9 @@ pub struct DeviceSpec {
     pub path_csv: Option<PathBuf>,
     /// The log whose device is replayed; in a scene file relative to that.
     pub log: Option<PathBuf>,
-    /// The tool is glued to this node.
+    /// The node that the tool is glued to, by its place in the lattice.
     pub attach_node: Option<[usize; 3]>,
-    /// Whose limits it has.
+    /// The product whose limits the device has.
     #[serde(skip_serializing_if = "is_default")]
     pub profile: DeviceProfile,
     /// The simulated device (`hand`).
@@ -29,7 +29,7 @@ pub struct DeviceSpec {
     /// The simulated hand (`hand`).
     #[serde(skip_serializing_if = "is_default")]
     pub hand: HandSpec,
-    /// How it fails, and when.
+    /// Faults of the device, with their times.
     #[serde(rename = "fault", skip_serializing_if = "is_default")]
     pub faults: Vec<FaultSpec>,
     /// The service of a `haply` device.
@@ -64,7 +64,7 @@ pub enum DeviceKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DeviceProfile {
-    /// The paper's.
+    /// Phantom Premium 1.5, the paper's device.
     #[default]
     PhantomPremium,
     /// Touch, earlier Omni.
@@ -79,7 +79,7 @@ pub enum DeviceProfile {
 }
 
 impl DeviceProfile {
-    /// What such a device can do.
+    /// The capabilities of such a device.
     pub fn capabilities(self) -> Capabilities {
         match self {
             Self::PhantomPremium => Capabilities::PHANTOM_PREMIUM,
@@ -109,14 +109,14 @@ pub(super) mod one_or_many {
 
     use super::DeviceSpec;
 
-    pub(in crate::scene) fn serialize<S: Serializer>(devices: &[DeviceSpec], to: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<S: Serializer>(devices: &[DeviceSpec], to: S) -> Result<S::Ok, S::Error> {
         match devices {
             [one] => one.serialize(to),
             many => many.serialize(to),
         }
     }
 
-    pub(in crate::scene) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DeviceSpec>, D::Error> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DeviceSpec>, D::Error> {
         struct OneOrMany;
 
         impl<'de> Visitor<'de> for OneOrMany {

@@ -8,22 +8,22 @@ use crate::runtime::Nanos;
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct FaultSpec {
-    /// What fails.
+    /// The kind of the fault.
     pub kind: FaultKind,
-    /// The first scheduled time at which it does (s).
+    /// The first scheduled time at which the device fails (s).
     pub from_s: f64,
-    /// The first at which it does not any more (s).
+    /// The first scheduled time at which it does not fail any more (s).
     pub to_s: f64,
-    /// How many reads a state is behind (`late`).
+    /// Number of reads that a state is behind (`late`).
     #[serde(default = "one_read")]
     pub reads: u32,
-    /// How probable a loss is (`lost`).
+    /// Probability of the loss of a frame, 0 to 1 (`lost`).
     #[serde(default = "certain")]
     pub probability: f64,
-    /// Which frames: the same seed loses the same (`lost`).
+    /// Seed that decides which frames are lost: equal seeds lose equal frames (`lost`).
     #[serde(default)]
     pub seed: u64,
-    /// Why the device stopped (`safety_stop`).
+    /// Reason for which the device stopped itself (`safety_stop`).
     #[serde(default = "unknown")]
     pub stop: SafetyStop,
 }
@@ -64,8 +64,8 @@ impl FaultSpec {
         Self { kind, from_s, to_s, reads: 1, probability: 1.0, seed: 0, stop: SafetyStop::Other }
     }
 
-    /// The same for a device.
-    pub fn window(&self) -> FaultWindow {
+    /// The fault as a device takes it.
+    pub(crate) fn window(&self) -> FaultWindow {
         let fault = match self.kind {
             FaultKind::Late => InjectedFault::Late { reads: self.reads as usize },
             FaultKind::Lost => InjectedFault::Lost { probability: self.probability, seed: self.seed },

@@ -1,18 +1,18 @@
 //! A Haply device in a scene: where its service is, and what it may do.
 
-/// How to reach a Haply Inverse service, and what its device may do.
+/// A Haply device of a scene: the service that drives it, and the force that it may exert.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct HaplySpec {
-    /// Largest force (N): what the device may exert, which no page of the vendor's says.
+    /// Largest force that the device may exert (N), which no page of the vendor's says.
     pub max_force_n: f64,
-    /// The simulation channel, `host:port`.
+    /// Address of the service's simulation channel, `host:port`.
     #[serde(default = "HaplySpec::address")]
     pub address: String,
-    /// The events channel; `""` for a service without one.
+    /// Address of the service's events channel; `""` for a service without one.
     #[serde(default = "HaplySpec::events_address")]
     pub events_address: String,
-    /// The device; the first that the service lists if absent.
+    /// Id of the device; the first that the service lists if absent.
     #[serde(default)]
     pub device_id: Option<String>,
     /// The name of the session's profile.
@@ -21,16 +21,16 @@ pub struct HaplySpec {
     /// Order and signs of the axes, as the service takes it.
     #[serde(default = "HaplySpec::basis")]
     pub basis: String,
-    /// Where the device's base is in the scene (m).
+    /// Position of the device's base in the scene (m).
     #[serde(default)]
     pub origin_m: [f64; 3],
-    /// Without a reply for this long the clock releases the haptic group in place of the device (ms).
+    /// Time without a reply after which the clock releases the haptic group in place of the device (ms).
     #[serde(default = "HaplySpec::watchdog_ms")]
     pub watchdog_ms: f64,
 }
 
 impl HaplySpec {
-    /// The first device of a service on this machine, with at most `max_force_n` newtons.
+    /// Describes the first device of a service on this machine, with at most `max_force_n` newtons.
     pub fn new(max_force_n: f64) -> Self {
         Self {
             max_force_n,

@@ -6,7 +6,7 @@ use crate::model::blend::BlendKind;
 use crate::model::local::{Feedback, Kind, Prediction};
 use crate::model::surroundings::{LEAST_PCT, Size};
 
-/// The slow, detailed simulation.
+/// The global model of a scene: the slow, detailed simulation.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GlobalSpec {
@@ -14,9 +14,9 @@ pub struct GlobalSpec {
     pub rate_hz: f64,
     /// Explicit steps per millisecond; chosen from the stability limit if absent.
     pub substeps_per_ms: Option<u32>,
-    /// Virtual time: how long after its release a result becomes visible (ms).
+    /// Time after its release at which a result becomes visible, in virtual time (ms).
     pub compute_latency_ms: f64,
-    /// Virtual time: the same for the reduced surroundings of a patch (ms).
+    /// Time after its release at which reduced surroundings of a patch become visible, in virtual time (ms).
     pub basis_latency_ms: f64,
 }
 
@@ -26,13 +26,13 @@ impl Default for GlobalSpec {
     }
 }
 
-/// The fast, small simulation.
+/// The local model of a scene: the fast, small simulation around a tool.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LocalSpec {
     /// Releases per second.
     pub rate_hz: f64,
-    /// Which local model.
+    /// Name of the local model, or `auto`.
     pub model: ModelChoice,
     /// The largest expected error (rms, % of the peak force, see DESIGN.md): of a model that `auto` may choose, 1 if absent;
     /// and of `predictive`, whose `patch` and `basis` become that large if they are absent. It sizes no other model.
@@ -43,17 +43,17 @@ pub struct LocalSpec {
     /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted. If absent, what
     /// `error_pct` needs, or 50 without that.
     pub basis: Option<usize>,
-    /// Bases are kept in this folder from run to run; relative to the current one.
+    /// Folder in which bases are kept from run to run; relative to the current one.
     pub basis_folder: Option<PathBuf>,
-    /// How `predictive` looks ahead.
+    /// The way in which `predictive` looks ahead.
     pub prediction: Prediction,
-    /// What the global model learns from the local one; what the model is best with if absent.
+    /// The data that the global model takes over from the local one; if absent, those that the model is best with.
     pub feedback: Option<Feedback>,
-    /// How a linear patch is stepped.
+    /// The way in which a linear patch is stepped.
     pub step: StepKind,
-    /// How a resync's discontinuity is spread.
+    /// The way in which a resync's discontinuity is spread over time.
     pub blend: BlendSpec,
-    /// The tool hangs on the device by a spring and damper whose gains follow from the device and the body.
+    /// True for a tool that hangs on the device by a spring and damper whose gains follow from the device and the body.
     pub coupling: bool,
 }
 
@@ -95,7 +95,7 @@ impl LocalSpec {
         }
     }
 
-    /// How large a basis is to be: a number of states that is given counts, then the budget.
+    /// The size that a basis is to have: a number of states that is given counts, then the budget.
     pub fn basis_size(&self) -> Size {
         match (self.basis, self.error_pct) {
             (Some(states), _) => Size::States(states),
@@ -106,7 +106,7 @@ impl LocalSpec {
     }
 }
 
-/// How a linear patch is stepped through a haptic tick.
+/// The way in which a linear patch is stepped through a haptic tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StepKind {
@@ -119,13 +119,13 @@ pub enum StepKind {
     Implicit,
 }
 
-/// How a resync's discontinuity is spread over time.
+/// The way in which a resync's discontinuity is spread over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlendSpec {
-    /// The way.
+    /// The kind of blend.
     pub kind: BlendKind,
-    /// How long (ms); not used by `none`.
+    /// Length of the blend (ms); not used by `none`.
     #[serde(default)]
     pub ms: f64,
 }
@@ -137,7 +137,7 @@ pub enum ModelChoice {
     /// session is built.
     #[default]
     Auto,
-    /// This one.
+    /// The model of this name.
     Named(Kind),
 }
 
@@ -145,7 +145,7 @@ impl ModelChoice {
     /// Every choice by name: the models in order of cost, then `auto`.
     pub const NAMES: &'static [&'static str] = &NAMES;
 
-    /// Its name in scene files.
+    /// The name of the choice in scene files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => AUTO,
@@ -153,7 +153,7 @@ impl ModelChoice {
         }
     }
 
-    /// The choice with this name.
+    /// The choice that is called `name`.
     pub fn from_name(name: &str) -> Option<Self> {
         let named = || Kind::ALL.into_iter().find(|kind| kind.name() == name).map(Self::Named);
         if name == AUTO { Some(Self::Auto) } else { named() }

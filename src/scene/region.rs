@@ -10,16 +10,16 @@ use crate::model::body::{Region, Shape};
 #[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegionSpec {
-    /// What it stands for, for the reader.
+    /// Name of the region, for the reader.
     #[serde(default)]
     pub name: Option<String>,
-    /// Where it is.
+    /// The shape that holds its nodes.
     #[serde(with = "shape")]
     pub shape: Shape,
     /// Stiffness k of its springs (N/m); as it was if absent.
     #[serde(default)]
     pub stiffness_n_per_m: Option<f64>,
-    /// zeta in b = zeta sqrt(2 m k), with the region's m and k; as it was if absent.
+    /// Damping ratio zeta in b = zeta sqrt(2 m k), with the region's m and k; as it was if absent.
     #[serde(default)]
     pub damping_ratio: Option<f64>,
     /// Mass of each of its nodes (kg); as it was if absent.
@@ -28,8 +28,8 @@ pub struct RegionSpec {
 }
 
 impl RegionSpec {
-    /// The same for a block.
-    pub fn region(&self) -> Region {
+    /// The region as a block takes it.
+    pub(super) fn region(&self) -> Region {
         Region {
             shape: self.shape,
             stiffness: self.stiffness_n_per_m,

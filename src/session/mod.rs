@@ -32,18 +32,29 @@ use crate::scene::Scene;
 use prepare::{Prepared, prepare};
 
 /// A session that has passed every check and can start.
+///
+/// ```
+/// use palpate::prelude::*;
+///
+/// # fn main() -> Result<(), Error> {
+/// let session = Session::from_scene(Scene::demo()).duration_s(0.1).virtual_time().build()?;
+/// println!("{}", session.plan()?); // who needs how much of which core
+/// println!("{}", session.run()?); // the timing report
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Session {
     prepared: Prepared,
 }
 
 impl Session {
-    /// A session with a program's own or a built body.
+    /// Begins a session with a program's own body or one that was built.
     pub fn builder(body: impl Body + 'static) -> SessionBuilder {
         SessionBuilder::new(Some(Box::new(body)), Scene::of_program())
     }
 
-    /// A session as a scene describes it; the builder can still change it.
+    /// Begins a session as a scene describes it; the builder can still change it.
     pub fn from_scene(scene: Scene) -> SessionBuilder {
         SessionBuilder::new(None, scene)
     }
@@ -74,7 +85,7 @@ impl Session {
         Replay::of_scene(log)
     }
 
-    /// Starts it: threads are up and the first local model is built when this returns.
+    /// Starts the session: threads are up and the first local model is built when this returns.
     ///
     /// # Errors
     /// If the log cannot be created, the device gives no first state or a thread cannot be started.
@@ -82,10 +93,10 @@ impl Session {
         wire::start(self.prepared, None)
     }
 
-    /// Runs it to its end, see [`SessionBuilder::duration_s`].
+    /// Runs the session to its end, see [`SessionBuilder::duration_s`].
     ///
     /// # Errors
-    /// As [`start`](Self::start).
+    /// If it cannot be started, see [`start`](Self::start).
     pub fn run(self) -> Result<Summary, Error> {
         let running = self.start()?;
         running.wait();
@@ -100,7 +111,7 @@ impl SessionBuilder {
     /// [`attach_node`](Self::attach_node) belongs to the one given last.
     ///
     /// # Errors
-    /// As [`Session::replay`]; also [`ErrorKind::Log`](crate::ErrorKind::Log) if the log is one of another session.
+    /// Those of [`Session::replay`]; also [`ErrorKind::Log`](crate::ErrorKind::Log) if the log is one of another session.
     pub fn replay(self, log: &std::path::Path) -> Result<Replay, Error> {
         Replay::of_parts(self.parts, log)
     }
@@ -108,7 +119,7 @@ impl SessionBuilder {
     /// Checks everything and makes the session ready to start.
     ///
     /// # Errors
-    /// Whatever cannot work, naming the field and what would be right.
+    /// If something cannot work, naming the field and what would be right.
     pub fn build(self) -> Result<Session, Error> {
         if self.parts.options.measures_cost && self.parts.options.execution == Execution::Threaded {
             return Err(Error::new(ErrorKind::Runtime, "cost is measured in virtual time only: use virtual_time()"));

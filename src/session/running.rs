@@ -14,9 +14,22 @@ use crate::runtime::{GroupLive, Nanos, OutletReader, Running as RuntimeRunning, 
 /// A session that runs. Dropping it commands zero force and joins its threads, within
 /// [`STOP_BOUND`](crate::runtime::STOP_BOUND) per group.
 ///
+/// ```
+/// use palpate::prelude::*;
+/// use std::time::Duration;
+///
+/// # fn main() -> Result<(), Error> {
+/// let running = Session::from_scene(Scene::demo()).virtual_time().build()?.start()?;
+/// running.wait_for(Duration::from_millis(50));
+/// assert!(!running.finished() && running.elapsed() >= Nanos::from_secs_f64(0.05));
+/// let summary = running.stop();
+/// assert!(summary.runtime.fault.is_none());
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Real-time
-/// As [`runtime::Running`](crate::runtime::Running): not for actors and devices, which stop a run by its
-/// [`stop_handle`](Self::stop_handle).
+/// Not for actors and devices, which stop a run by its [`stop_handle`](Self::stop_handle).
 #[derive(Debug)]
 pub struct Running {
     runtime: RuntimeRunning,
@@ -56,17 +69,17 @@ impl Running {
         self.runtime.elapsed()
     }
 
-    /// When the run ends by itself.
+    /// The time at which the run ends by itself; `None` if it does not.
     pub fn until(&self) -> Option<Nanos> {
         self.until
     }
 
-    /// True once it has ended, by itself or by a fault.
+    /// True once the run has ended, by itself or by a fault.
     pub fn finished(&self) -> bool {
         self.runtime.finished()
     }
 
-    /// Every rate group as it is now: counts, lateness and execution time since the start.
+    /// Tells of every rate group how it stands now: counts, lateness and execution time since the start.
     ///
     /// # Real-time
     /// Never disturbs a tick: wait-free on both sides. It allocates: for threads that show it.
@@ -74,12 +87,12 @@ impl Running {
         self.runtime.live()
     }
 
-    /// Stops the run from another thread or a signal handler's.
+    /// A handle that stops the run from another thread or from that of a signal handler.
     pub fn stop_handle(&self) -> StopHandle {
         self.runtime.stop_handle()
     }
 
-    /// The newest surface, tool and force, for a program that draws; there is one, for one thread.
+    /// Takes the viewer, which shows the newest surface, tool and force to a program that draws; there is one, for one thread.
     pub fn take_viewer(&mut self) -> Option<Viewer> {
         self.viewer.take()
     }
@@ -109,7 +122,24 @@ impl Memory {
     }
 }
 
-/// What a program that draws can see, without disturbing a tick.
+/// A view of a running session for a program that draws: the newest surface, tools and forces, without disturbing a tick.
+///
+/// ```
+/// use palpate::prelude::*;
+/// use std::time::Duration;
+///
+/// # fn main() -> Result<(), Error> {
+/// let mut running = Session::from_scene(Scene::demo()).virtual_time().build()?.start()?;
+/// let mut viewer = running.take_viewer().expect("there is one");
+/// running.wait_for(Duration::from_millis(100));
+/// for [a, b, c] in viewer.triangles().iter().map(|nodes| nodes.map(|node| node as usize)) {
+///     let corners = &viewer.surface().positions;
+///     let _ = (corners[a], corners[b], corners[c]); // draw it
+/// }
+/// println!("{} N at {} m", viewer.tool().force, viewer.tool().position);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Viewer {
     triangles: Arc<[[u32; 3]]>,
@@ -157,16 +187,29 @@ impl Viewer {
     }
 }
 
-/// How a run went.
+/// An account of a run: its figures, its faults, and its records if they were kept.
+///
+/// ```
+/// use palpate::prelude::*;
+///
+/// # fn main() -> Result<(), Error> {
+/// let session = Session::from_scene(Scene::demo()).virtual_time().duration_s(0.1).keep_records();
+/// let summary = session.build()?.run()?;
+/// assert!(summary.runtime.fault.is_none() && summary.log_error.is_none());
+/// assert_eq!(summary.report.devices[0].force.ticks, 100);
+/// println!("{summary}{} records", summary.records.len());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Summary {
     /// Timing, resyncs, force, contact, limits and events.
     pub report: RunReport,
-    /// What the runtime counted, what the system granted, and the fault that ended the run, if any.
+    /// The runtime's own counts, the rights that the system granted, and the fault that ended the run, if any.
     pub runtime: RuntimeReport,
-    /// Why the log ended before its time, if it did.
+    /// The error that ended the log before its time, if one did.
     pub log_error: Option<Error>,
-    /// Every record, if they were kept.
+    /// All records, if they were [kept](super::SessionBuilder::keep_records).
     pub records: Vec<LogRecord>,
     /// CPU time of building each local model, if [cost was measured](super::SessionBuilder::measure_cost); none for
     /// `full`, which is never built anew.

@@ -91,7 +91,7 @@ fn device(device: &DeviceSpec) -> Result<(), Error> {
 }
 
 /// A scene file must move its tool itself; a program may bring a device of its own.
-pub(in super::super) fn tool(device: &DeviceSpec) -> Result<(), Error> {
+pub(crate) fn tool(device: &DeviceSpec) -> Result<(), Error> {
     let message = match device.kind {
         DeviceKind::Scripted if device.path.is_none() && device.attach_node.is_none() => {
             "has no tool, give path_csv (a file t_s,x_m,y_m,z_m), attach_node or both"

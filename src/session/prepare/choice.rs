@@ -15,9 +15,9 @@ use crate::scene::{ModelChoice, Scene};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Choice {
-    /// The model.
+    /// The model that was chosen.
     pub model: Kind,
-    /// Why, and what falls short if something does.
+    /// The reason for the choice, and what falls short if something does.
     pub reason: ModelReason,
 }
 
@@ -29,7 +29,7 @@ impl fmt::Display for Choice {
 }
 
 /// `reason` with what else was decided, and what that misses.
-pub(in super::super) fn extended(reason: Option<ModelReason>, why: String, missed: Option<String>) -> ModelReason {
+pub(crate) fn extended(reason: Option<ModelReason>, why: String, missed: Option<String>) -> ModelReason {
     match reason {
         Some(ModelReason { why: first, warning }) => {
             ModelReason { why: format!("{first}; {why}"), warning: warning.or(missed) }

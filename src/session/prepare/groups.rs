@@ -8,7 +8,7 @@ use crate::runtime::{Execution, Nanos, OverrunPolicy, Rate, RateGroup, Release};
 use crate::scene::{DeviceKind, DeviceSpec, GlobalSpec};
 
 /// The name of the group that reduces surroundings.
-pub(in super::super) const BASIS: &str = "basis";
+pub(crate) const BASIS: &str = "basis";
 /// How often records are taken to the log.
 const LOGGER: Rate = Rate::hz(20);
 /// How often they are taken to a log with `/scene`: a picture per release.

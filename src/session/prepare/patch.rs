@@ -13,7 +13,7 @@ const SIZES: [[usize; 3]; 5] = [[4, 4, 2], [4, 4, 3], [5, 5, 2], [6, 6, 2], [6, 
 
 /// A patch that was chosen, and what is expected of it.
 #[derive(Clone, Debug, PartialEq)]
-pub(in super::super) struct PatchChoice {
+pub(crate) struct PatchChoice {
     /// Nodes along the surface, along it, into depth.
     pub(super) size: [usize; 3],
     /// Of the reduced surroundings that the error is expected with.
@@ -26,7 +26,7 @@ pub(in super::super) struct PatchChoice {
 
 impl PatchChoice {
     /// The reason for the model, with that for the patch.
-    pub(in super::super) fn reason(&self, of_model: Option<ModelReason>) -> ModelReason {
+    pub(crate) fn reason(&self, of_model: Option<ModelReason>) -> ModelReason {
         let Self { size: [a, b, c], states, expected_pct, budget_pct, place } = self;
         let why = format!(
             "error_pct = {budget_pct} takes patch {a} x {b} x {c} ({expected_pct:.2} % expected with {states} states at \

@@ -12,12 +12,12 @@ const LATE_WORK: f64 = 2.0;
 
 /// How often the whole body's forces are evaluated: `substeps` times per haptic tick; and for how many ticks ahead.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Timing {
-    pub(in super::super) haptic: Rate,
-    pub(in super::super) global: Rate,
+pub(crate) struct Timing {
+    pub(crate) haptic: Rate,
+    pub(crate) global: Rate,
     pub(super) substeps: u32,
     /// Haptic ticks that a local model may have to reach ahead.
-    pub(in super::super) horizon: u32,
+    pub(crate) horizon: u32,
 }
 
 impl Timing {

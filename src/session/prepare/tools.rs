@@ -17,15 +17,15 @@ const _: () = assert!(crate::scene::MAX_DEVICES == crate::log::MAX_DEVICES as us
 
 /// A tool before the start.
 #[derive(Debug)]
-pub(in super::super) struct Tool {
+pub(crate) struct Tool {
     /// Its name; empty for the only one.
-    pub(in super::super) name: String,
-    pub(in super::super) device: Box<dyn Device>,
+    pub(crate) name: String,
+    pub(crate) device: Box<dyn Device>,
     /// How it touches the body at the start.
-    pub(in super::super) contact: Contact,
-    pub(in super::super) limits: Limits,
+    pub(crate) contact: Contact,
+    pub(crate) limits: Limits,
     /// Between device and simulated tool.
-    pub(in super::super) coupling: Option<Design>,
+    pub(crate) coupling: Option<Design>,
 }
 
 /// What tools are made from.

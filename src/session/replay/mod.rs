@@ -111,10 +111,10 @@ impl Replay {
         self.run_with(|_| ())
     }
 
-    /// As [`run`](Self::run), and tells `progress` from time to time how much has been executed.
+    /// Does what [`run`](Self::run) does, and tells `progress` from time to time how much has been executed.
     ///
     /// # Errors
-    /// As [`run`](Self::run).
+    /// If the session cannot be started again.
     pub fn run_with(self, mut progress: impl FnMut(Nanos)) -> Result<ReplayReport, Error> {
         let Self { prepared, recording, comparison, ends, cut } = self;
         let compared = comparison.clone();
