@@ -6,11 +6,12 @@ mod common;
 use std::path::Path;
 
 use common::{reference, rms_percent};
+use palpate::devices::{FaultKind, FaultSpec};
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::Session;
-use palpate::scene::{FaultKind, FaultSpec, Scene};
+use palpate::scene::Scene;
 use palpate::session::Summary;
 
 fn load(name: &str) -> Scene {

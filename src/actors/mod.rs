@@ -14,7 +14,6 @@ mod basis_store;
 mod cause;
 mod device;
 mod global;
-mod granted;
 mod local;
 mod log_file;
 mod log_sink;

@@ -34,9 +34,6 @@ pub struct SceneWatch {
 
 impl SceneWatch {
     /// Watches `surface`, whose triangles have these nodes.
-    ///
-    /// # Real-time
-    /// Not real-time safe: allocates. For the time before a run.
     pub fn new(surface: OutletReader<SurfaceView>, triangles: &[[u32; 3]]) -> Self {
         let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
         nodes.sort_unstable();

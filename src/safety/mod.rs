@@ -1,6 +1,7 @@
 //! What stands between a computed force and a device: one stage per file, pure functions of state and time.
 //!
 //! The order, the promises and the test of each are in `docs/safety.md`. Every action is reported as a bit of [`Actions`].
+//! All of it is bounded, allocates nothing and is real-time safe.
 
 mod actions;
 pub(crate) mod coupling;

@@ -39,25 +39,16 @@ pub struct TankState {
 
 impl TankState {
     /// A full tank.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub fn new(limits: &Tank) -> Self {
         Self { energy_j: limits.capacity_j, held_back: [0.0; 3], rate: 0.0 }
     }
 
     /// What is in it (J).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub fn energy_j(&self) -> f64 {
         self.energy_j
     }
 
     /// Adds what was dissipated (J).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub fn fill(&mut self, limits: &Tank, dissipated_j: f64) {
         // Also refuses what is no number.
         if dissipated_j > 0.0 {
@@ -67,9 +58,6 @@ impl TankState {
 
     /// The force in place of `force` (N), which contains a step of `step` (N) from a swap, for a tool of `velocity` (m/s);
     /// and whether something is held back of it.
-    ///
-    /// # Real-time
-    /// Bounded, real-time safe.
     pub fn pass(&mut self, limits: &Tank, force: Force, step: Force, velocity: [f64; 3], dt: f64) -> (Force, bool) {
         let size = norm(self.held_back);
         let left = if size > self.rate * dt { 1.0 - self.rate * dt / size } else { 0.0 };

@@ -19,10 +19,14 @@ impl Default for Watchdog {
 impl Watchdog {
     /// The command in place of `command` (N), and whether it acted: towards zero as fast as `limit` (N) from the command
     /// `last` allows, and back by `ramp` once the device speaks again.
-    ///
-    /// # Real-time
-    /// Bounded, real-time safe.
-    pub fn guard(self, stale_ticks: u32, last: Force, command: Force, limit: f64, ramp: &mut Ramp) -> (Force, bool) {
+    pub(super) fn guard(
+        self,
+        stale_ticks: u32,
+        last: Force,
+        command: Force,
+        limit: f64,
+        ramp: &mut Ramp,
+    ) -> (Force, bool) {
         if stale_ticks <= self.max_stale_ticks {
             return (command, false);
         }

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::{FaultSpec, HaplySpec};
-use crate::devices::{Capabilities, HandSpec, PlantSpec, ToolPath};
+use super::HaplySpec;
+use crate::devices::{Capabilities, FaultSpec, HandSpec, PlantSpec, ToolPath};
 use crate::error::Error;
 
 /// A device of a scene: what moves the tool, and what limits its force.

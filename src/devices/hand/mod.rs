@@ -11,6 +11,7 @@ mod plant;
 mod spec;
 mod transport;
 
+pub(crate) use spec::SpecFault;
 pub use spec::{Axis, HandSpec, PlantSpec};
 
 use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};

@@ -87,7 +87,10 @@ fn device(device: &DeviceSpec) -> Result<(), Error> {
         return Err(Error::scene(&format!("device.hand.{field}"), message));
     }
     haply(device)?;
-    device.faults.iter().enumerate().try_for_each(|(index, fault)| fault.check(&format!("device.fault[{index}]")))
+    let fault = device.faults.iter().enumerate().find_map(|(index, spec)| Some((index, spec.fault()?)));
+    fault.map_or(Ok(()), |(index, (field, message))| {
+        Err(Error::scene(&format!("device.fault[{index}].{field}"), message))
+    })
 }
 
 /// A scene file must move its tool itself; a program may bring a device of its own.

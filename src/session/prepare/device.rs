@@ -44,7 +44,7 @@ pub(super) fn with_faults(device: Box<dyn Device>, spec: &DeviceSpec) -> Box<dyn
     if spec.faults.is_empty() {
         return device;
     }
-    Box::new(Faulty::new(device, spec.faults.iter().map(|fault| fault.window()).collect()))
+    Box::new(Faulty::new(device, spec.faults.clone()))
 }
 
 /// Connects to the service of a Haply device that is driven every `tick` seconds.
