@@ -9,7 +9,7 @@
 //!
 //! | module | what it is |
 //! | --- | --- |
-//! | [`session`] | the way in: a builder or a scene becomes a running session, and a [`Summary`] at its end |
+//! | [`session`] | the way in: a builder or a scene becomes a running session, and a [`Summary`](session::Summary) at its end |
 //! | [`scene`] | what is simulated, as plain data, and its TOML files |
 //! | `actors` | global, local, device, logger: the glue between the layers below, nothing that a program calls |
 //! | [`model`] | physics without threads or clocks: [bodies](model::body), [contact](model::contact), [local models](model::local) |

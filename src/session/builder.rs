@@ -213,7 +213,7 @@ impl SessionBuilder {
     /// number; see [`RuntimeBuilder::disturb`](crate::runtime::RuntimeBuilder::disturb). The groups are `local`, `global`
     /// (not with `full`, which has none), `basis` (with reduced surroundings only) and `logger`.
     ///
-    /// [`Session::start`] refuses it on threads, for a group that is not there, and twice for the same group.
+    /// [`Session::start`](super::Session::start) refuses it on threads, for a group that is not there, and twice for the same group.
     #[must_use]
     pub fn disturb(
         mut self,

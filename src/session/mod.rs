@@ -78,7 +78,7 @@ impl Session {
     /// compared with. A run with a fault is repeated up to it.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read; [`ErrorKind::Log`](crate::ErrorKind::Log) if it is
+    /// [`ErrorKind::Io`] if it cannot be read; [`ErrorKind::Log`] if it is
     /// damaged, if a record is missing, if it holds no force before its first fault, if it was made with another
     /// instruction set, or if the body was a program's own.
     pub fn replay(log: &std::path::Path) -> Result<Replay, Error> {
@@ -111,7 +111,7 @@ impl SessionBuilder {
     /// [`attach_node`](Self::attach_node) belongs to the one given last.
     ///
     /// # Errors
-    /// Those of [`Session::replay`]; also [`ErrorKind::Log`](crate::ErrorKind::Log) if the log is one of another session.
+    /// Those of [`Session::replay`]; also [`ErrorKind::Log`] if the log is one of another session.
     pub fn replay(self, log: &std::path::Path) -> Result<Replay, Error> {
         Replay::of_parts(self.parts, log)
     }

@@ -25,7 +25,7 @@ use logged::Logged;
 /// Simulated time between two reports of progress.
 const STEP: Duration = Duration::from_millis(200);
 
-/// A log that has passed every check and can be replayed; made by [`Session::replay`] or
+/// A log that has passed every check and can be replayed; made by [`Session::replay`](super::Session::replay) or
 /// [`SessionBuilder::replay`](super::SessionBuilder::replay).
 #[derive(Debug)]
 pub struct Replay {
