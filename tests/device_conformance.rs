@@ -3,8 +3,8 @@
 
 use palpate::devices::conformance::{Conformance, Verdict, check, check_disconnecting};
 use palpate::devices::{
-    Axis, Calibration, Capabilities, Device, DeviceFault, DeviceState, FaultKind, FaultSpec, Faulty, ForceCommand, Hand,
-    HandSpec, PlantSpec, Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
+    Axis, Calibration, Capabilities, Device, DeviceFault, DeviceState, FaultKind, FaultSpec, Faulty, ForceCommand,
+    Hand, HandSpec, PlantSpec, Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
 };
 use palpate::model::Vec3;
 use palpate::runtime::Nanos;

@@ -1,6 +1,6 @@
 //! Two devices on one body: each with its own contact and its own local model, its own topics, its own limits.
 
-#[path = "../src/model/tests/common/mod.rs"]
+#[path = "../../src/model/tests/common/mod.rs"]
 mod common;
 
 use std::path::Path;
