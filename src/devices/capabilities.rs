@@ -37,8 +37,8 @@ pub struct Capabilities {
     pub max_stiffness_n_per_m: f64,
     /// Largest damping that it renders without a limit cycle (N s/m).
     pub max_damping_n_s_per_m: f64,
-    /// Mechanical damping of the device itself (N s/m), which keeps a rendered spring passive. Where it is unknown it is taken to be K T / 2
-    /// for the stiffness K that it renders, which a sampled wall asks for at least.
+    /// Mechanical damping of the device itself (N s/m), which keeps a rendered spring passive. Where it is unknown it
+    /// is taken to be K T / 2 for the stiffness K that it renders, which a sampled wall asks for at least.
     pub damping_n_s_per_m: Option<f64>,
     /// Dry friction of the device itself (N).
     pub friction_n: Option<f64>,

@@ -62,7 +62,8 @@ pub trait Device: Send + std::fmt::Debug {
     /// Asked before the run, not in a tick.
     fn capabilities(&self) -> Capabilities;
 
-    /// Whether the device exerts the forces that it is given: false for one whose [`write`](Self::write) moves nothing: nobody needs to wait for its force to fade.
+    /// Whether the device exerts the forces that it is given: false for one whose [`write`](Self::write) moves nothing:
+    /// nobody needs to wait for its force to fade.
     ///
     /// # Real-time
     /// Asked before the run, not in a tick.

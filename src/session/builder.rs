@@ -111,23 +111,25 @@ impl SessionBuilder {
     }
 
     /// Sets the largest expected error (rms, % of the peak force): of a model that may be chosen, 1 without; and of
-    /// `predictive`, whose patch and basis become as large as it needs, unless [`patch`](Self::patch) and [`basis`](Self::basis) say how large.
-    /// Sizing a patch takes a few factorisations of the body when the session is built.
+    /// `predictive`, whose patch and basis become as large as it needs, unless [`patch`](Self::patch) and
+    /// [`basis`](Self::basis) say how large. Sizing a patch takes a few factorisations of the body when the session is
+    /// built.
     #[must_use]
     pub fn error_pct(mut self, error_pct: f64) -> Self {
         self.parts.scene.local.error_pct = Some(error_pct);
         self
     }
 
-    /// Sets the number of states of the reduced surroundings of `predictive`; without, what the [`error_pct`](Self::error_pct) needs or 50.
+    /// Sets the number of states of the reduced surroundings of `predictive`; without, what the
+    /// [`error_pct`](Self::error_pct) needs or 50.
     #[must_use]
     pub fn basis(mut self, states: usize) -> Self {
         self.parts.scene.local.basis = Some(states);
         self
     }
 
-    /// Sets the nodes of a patch: along the surface, along it, into depth; without, what the [`error_pct`](Self::error_pct) needs with
-    /// `predictive`, or 4 x 4 x 2.
+    /// Sets the nodes of a patch: along the surface, along it, into depth; without, what the
+    /// [`error_pct`](Self::error_pct) needs with `predictive`, or 4 x 4 x 2.
     #[must_use]
     pub fn patch(mut self, size: [usize; 3]) -> Self {
         self.parts.scene.local.patch = Some(size);
@@ -209,11 +211,12 @@ impl SessionBuilder {
         self
     }
 
-    /// Makes, in virtual time and for tests of robustness, the releases of a rate group late, as `disturbance` says of each by its
-    /// number; see [`RuntimeBuilder::disturb`](crate::runtime::RuntimeBuilder::disturb). The groups are `local`, `global`
-    /// (not with `full`, which has none), `basis` (with reduced surroundings only) and `logger`.
+    /// Makes, in virtual time and for tests of robustness, the releases of a rate group late, as `disturbance` says of
+    /// each by its number; see [`RuntimeBuilder::disturb`](crate::runtime::RuntimeBuilder::disturb). The groups are
+    /// `local`, `global` (not with `full`, which has none), `basis` (with reduced surroundings only) and `logger`.
     ///
-    /// [`Session::start`](super::Session::start) refuses it on threads, for a group that is not there, and twice for the same group.
+    /// [`Session::start`](super::Session::start) refuses it on threads, for a group that is not there, and twice for
+    /// the same group.
     #[must_use]
     pub fn disturb(
         mut self,
