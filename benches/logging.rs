@@ -21,10 +21,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use palpate::log::{CommandSample, ContactSample, ForceSample, LogRecord, ToolSample};
+use palpate::runtime::Nanos;
 use palpate::runtime::{
     Actor, ActorTimes, Execution, Outcome, RateGroup, Recorder, Running, Runtime, TickContext, TickTiming, actor_fn,
 };
-use palpate::runtime::Nanos;
 
 const MS: u64 = 1_000_000;
 const PAIRS: usize = 100_000;

@@ -16,9 +16,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use forces::{Difference, forces, peak};
 use palpate::model::body::{Body, Spring, State, TangentBlock};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::model::mesh::Surface;
 use palpate::prelude::*;
-use palpate::scene::LocalModelKind;
 use palpate::session::SessionBuilder;
 
 /// Radius of the skin, and of the flesh's nodes below it (m).

@@ -16,8 +16,9 @@ use std::path::{Path, PathBuf};
 use palpate::devices::ToolPath;
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::scene::Scene;
 use palpate::session::Summary;
 
 /// Ticks this long after a skipped period are counted apart (s).

@@ -7,9 +7,9 @@
 
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State, TangentBlock};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::model::mesh::{Face, Surface};
 use palpate::prelude::*;
-use palpate::scene::LocalModelKind;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 

@@ -8,7 +8,7 @@ use std::fmt;
 use palpate_model::ModelError;
 use palpate_runtime::{GraphError, GraphErrorKind};
 
-/// What went wrong, as far as a program can act on it.
+/// The kind of an error: the cause, and whether a retry can help.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ErrorKind {
@@ -39,7 +39,18 @@ impl ErrorKind {
     }
 }
 
-/// The error of every fallible operation in palpate.
+/// The error of every fallible operation in palpate: a kind, a place and one line that says what would be right.
+///
+/// ```
+/// use palpate::ErrorKind;
+/// use palpate::scene::Scene;
+///
+/// let mut scene = Scene::demo();
+/// scene.local.rate_hz = -1.0;
+/// let error = scene.validate().unwrap_err();
+/// assert_eq!((error.kind(), error.place()), (ErrorKind::Scene, "local.rate_hz"));
+/// assert!(error.to_string().starts_with("local.rate_hz: is -1, must be"));
+/// ```
 #[derive(Debug)]
 pub struct Error {
     kind: ErrorKind,
@@ -67,7 +78,7 @@ impl Error {
         error
     }
 
-    /// The same error with its place put in front: `place: earlier place: message`.
+    /// Puts `place` in front of the error's own: `place: earlier place: message`.
     #[must_use]
     pub fn at(mut self, place: impl AsRef<str>) -> Self {
         let place = place.as_ref();
@@ -75,7 +86,7 @@ impl Error {
         self
     }
 
-    /// The same error with the field `from` at the start of its place called `to`.
+    /// Calls the field `from` at the start of the error's place `to`.
     #[must_use]
     pub(crate) fn with_place_of(mut self, from: &str, to: &str) -> Self {
         if let Some(rest) = self.place.strip_prefix(from)
@@ -86,12 +97,12 @@ impl Error {
         self
     }
 
-    /// The kind, for programs.
+    /// The kind of the error, for programs that decide by it.
     pub fn kind(&self) -> ErrorKind {
         self.kind
     }
 
-    /// Where it happened; may be empty.
+    /// The file and line, field or topic at which it happened; may be empty.
     pub fn place(&self) -> &str {
         &self.place
     }

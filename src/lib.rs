@@ -9,14 +9,14 @@
 //!
 //! | module | what it is |
 //! | --- | --- |
-//! | [`session`] | the way in: a builder or a scene becomes a running session, and a [`Summary`] at its end |
-//! | [`scene`] | what is simulated, as plain data; TOML files with feature `scene` |
-//! | [`actors`] | global, local, device, logger: the glue between the layers below |
+//! | [`session`] | the way in: a builder or a scene becomes a running session, and a [`Summary`](session::Summary) at its end |
+//! | [`scene`] | what is simulated, as plain data, and its TOML files |
+//! | `actors` | global, local, device, logger: the glue between the layers below, nothing that a program calls |
 //! | [`model`] | physics without threads or clocks: [bodies](model::body), [contact](model::contact), [local models](model::local) |
 //! | [`runtime`] | actors, rate groups, ports, real and virtual time; without physics, usable on its own |
 //! | [`devices`] | what moves the tool: a path, a simulated hand, a log, or a program's own [`Device`] |
 //! | [`safety`] | what stands between a computed force and a device |
-//! | [`log`], [`report`] | records, MCAP files with feature `log`, and what they say about a run |
+//! | [`log`], [`report`] | records, MCAP files, and what they say about a run |
 //!
 //! # Example
 //!
@@ -49,15 +49,16 @@
 //!
 //! # Features
 //!
-//! `cli` (default): the `palpate` command, implies `scene`. `log` (default): MCAP logs. `scene`: TOML scene files. Without
-//! any: models, contact, runtime and sessions by builder.
+//! `parallel`: the forces of one large body on several cores.
 //!
 //! Words with a fixed meaning in all docs, such as *wait-free* and *real-time safe*, are defined in [`runtime`].
 
+#[doc(hidden)]
 pub mod actors;
 pub mod devices;
-pub mod error;
+mod error;
 pub mod log;
+#[doc(hidden)]
 pub mod random;
 pub mod report;
 pub mod safety;
@@ -67,11 +68,11 @@ pub mod session;
 pub use palpate_model as model;
 pub use palpate_runtime as runtime;
 
-pub use devices::{Device, DeviceFault, DeviceState, ForceCommand};
+pub use devices::Device;
 pub use error::{Error, ErrorKind};
-pub use session::{Running, Session, SessionBuilder, Summary, Viewer};
+pub use session::Session;
 
-/// What most programs need.
+/// The names that most programs need.
 pub mod prelude {
     pub use crate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
     pub use crate::error::Error;
@@ -81,8 +82,8 @@ pub mod prelude {
     pub use crate::model::body::Body as _;
     pub use crate::model::mesh::Face;
     pub use crate::runtime::{Nanos, RateGroup};
-    pub use crate::session::Session;
-    
+    pub use crate::scene::Scene;
+    pub use crate::session::{Running, Session, SessionBuilder, Summary, Viewer};
 }
 
 /// The README's program must compile.

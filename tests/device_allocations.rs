@@ -6,8 +6,8 @@
 mod allocator;
 
 use palpate::devices::{
-    Capabilities, Device, DeviceState, FaultWindow, Faulty, ForceCommand, Hand, HandSpec, InjectedFault, PlantSpec,
-    Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
+    Capabilities, Device, DeviceState, FaultKind, FaultSpec, Faulty, ForceCommand, Hand, HandSpec, PlantSpec, Replayed,
+    ReplayedSample, Scripted, ToolPath,
 };
 use palpate::model::Vec3;
 use palpate::runtime::Nanos;
@@ -47,19 +47,19 @@ fn no_device_touches_the_heap_in_a_tick() {
     let samples: Vec<_> = (0..2000).map(sample).collect();
     let mut scripted = Scripted::new(ToolPath::constant([0.0; 3]).unwrap());
     let mut replayed = Replayed::new(DeviceState::default(), samples, Capabilities::TOUCH).at_any_rate();
-    let faults = [
-        InjectedFault::Late { reads: 200 },
-        InjectedFault::Lost { probability: 0.5, seed: 0 },
-        InjectedFault::Frozen,
-        InjectedFault::NotFinite,
-        InjectedFault::Disconnected,
-        InjectedFault::SafetyStop(SafetyStop::Stall),
+    let kinds = [
+        FaultKind::Late,
+        FaultKind::Lost,
+        FaultKind::Frozen,
+        FaultKind::NotFinite,
+        FaultKind::Disconnected,
+        FaultKind::SafetyStop,
     ];
-    let windows = faults.into_iter().zip(1..).map(|(fault, n)| {
-        let from = Nanos(n * 400 * MS);
-        FaultWindow { fault, from, to: from + Nanos(300 * MS) }
+    let faults = kinds.into_iter().zip(1..).map(|(kind, n)| {
+        let from_s = 0.4 * f64::from(n);
+        FaultSpec { reads: 200, probability: 0.5, ..FaultSpec::new(kind, from_s, from_s + 0.3) }
     });
-    let mut faulty = Faulty::new(hand(), windows.collect());
+    let mut faulty = Faulty::new(hand(), faults.collect());
     let devices: [&mut dyn Device; 4] = [&mut scripted, &mut replayed, &mut hand(), &mut faulty];
     for device in devices {
         // Check that they were at work.

@@ -3,8 +3,8 @@
 
 use palpate::devices::conformance::{Conformance, Verdict, check, check_disconnecting};
 use palpate::devices::{
-    Axis, Calibration, Capabilities, Device, DeviceFault, DeviceState, FaultWindow, Faulty, ForceCommand, Hand,
-    HandSpec, InjectedFault, PlantSpec, Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
+    Axis, Calibration, Capabilities, Device, DeviceFault, DeviceState, FaultKind, FaultSpec, Faulty, ForceCommand,
+    Hand, HandSpec, PlantSpec, Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
 };
 use palpate::model::Vec3;
 use palpate::runtime::Nanos;
@@ -58,25 +58,21 @@ fn a_replayed_tool_conforms_at_its_own_times_and_at_others() {
     assert_passed(&check(|| Replayed::new(samples()[0].state, samples(), Capabilities::FALCON).at_any_rate()));
 }
 
-fn failing(fault: InjectedFault) -> Faulty<Box<dyn Device>> {
-    let window = FaultWindow { fault, from: Nanos(10 * MS), to: Nanos(400 * MS) };
-    Faulty::new(Box::new(hand(PlantSpec::default())), vec![window])
+fn failing(kind: FaultKind) -> Faulty<Box<dyn Device>> {
+    let stop = SafetyStop::Stall;
+    let fault = FaultSpec { reads: 5, probability: 0.5, seed: 1, stop, ..FaultSpec::new(kind, 0.010, 0.4) };
+    Faulty::new(Box::new(hand(PlantSpec::default())), vec![fault])
 }
 
 #[test]
 fn a_device_that_fails_in_order_conforms() {
-    for fault in [
-        InjectedFault::Late { reads: 5 },
-        InjectedFault::Lost { probability: 0.5, seed: 1 },
-        InjectedFault::Frozen,
-        InjectedFault::Disconnected,
-        InjectedFault::SafetyStop(SafetyStop::Stall),
-    ] {
-        println!("{fault:?}");
-        assert_passed(&check(|| failing(fault)));
+    use FaultKind::{Disconnected, Frozen, Late, Lost, SafetyStop};
+    for kind in [Late, Lost, Frozen, Disconnected, SafetyStop] {
+        println!("{kind:?}");
+        assert_passed(&check(|| failing(kind)));
     }
     // Its cable comes off after 10 ms, as the suite's own.
-    let report = check_disconnecting(|| failing(InjectedFault::Disconnected), |_| {});
+    let report = check_disconnecting(|| failing(FaultKind::Disconnected), |_| {});
     assert_passed(&report);
     assert_eq!(report.checks.last().map(|check| check.verdict), Some(Verdict::Passed));
 }
@@ -204,7 +200,7 @@ fn each_fault_of_a_device_fails_the_check_that_is_about_it() {
 
 #[test]
 fn a_device_that_gives_states_that_are_no_numbers_is_caught() {
-    let report = check(|| failing(InjectedFault::NotFinite));
+    let report = check(|| failing(FaultKind::NotFinite));
     let verdict = report.verdict("its states are finite, and what is none is a fault");
     assert_eq!(verdict, Some(Verdict::Failed), "{report}");
 }

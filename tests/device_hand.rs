@@ -1,5 +1,4 @@
 //! Simulated device and hand in a session: against an independent implementation, repeated, replayed, and failing.
-#![cfg(feature = "scene")]
 
 #[path = "../src/model/tests/common/mod.rs"]
 mod common;
@@ -7,10 +6,12 @@ mod common;
 use std::path::Path;
 
 use common::{reference, rms_percent};
+use palpate::devices::{FaultKind, FaultSpec};
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::Session;
-use palpate::scene::{FaultKind, FaultSpec, LocalModelKind, Scene};
+use palpate::scene::Scene;
 use palpate::session::Summary;
 
 fn load(name: &str) -> Scene {
@@ -87,7 +88,6 @@ fn faults_act_on_the_scripted_tool_too_and_only_while_they_last() {
     assert_eq!(differing, (200..210).collect::<Vec<_>>());
 }
 
-#[cfg(feature = "log")]
 mod logged {
     use super::*;
     use palpate::actors::Cause;

@@ -3,12 +3,12 @@
 //!
 //! Each session runs in a process of its own, on real threads; its device calls the guards from the real-time thread.
 //! Every guard has a control that commits the offence and must be caught.
-#![cfg(all(feature = "log", target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+#![cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
 
 mod hot_path_support;
 
 use hot_path_support::{Case, Ended, Found, GUARDED, Guard, Offence, allocator, child};
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 
 #[global_allocator]
 static ALLOCATOR: allocator::Guarded = allocator::Guarded;

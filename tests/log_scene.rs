@@ -5,9 +5,10 @@
 use std::path::{Path, PathBuf};
 
 use palpate::log::{LogEntry, LogReader, LogRecord};
-use palpate::scene::{LocalModelKind, Scene};
-use palpate::session::{Session, SessionBuilder};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::{Nanos, Rate};
+use palpate::scene::Scene;
+use palpate::session::{Session, SessionBuilder};
 use prost::Message;
 
 /// `foxglove.Vector3` and `foxglove.Point3`.

@@ -4,27 +4,27 @@
 //!
 //! The short form is part of the tests. The long one, 10,000 scenes:
 //! `cargo test --release --test random_scenes -- --ignored --nocapture`.
-#![cfg(feature = "scene")]
 
 mod random;
 
 use std::sync::{Arc, Mutex};
 
+use palpate::ErrorKind;
 use palpate::Session;
 use palpate::devices::{
-    Capabilities, Device, DeviceFault, DeviceState, FaultWindow, Faulty, ForceCommand, Hand, HandSpec, InjectedFault,
+    Capabilities, Device, DeviceFault, DeviceState, FaultKind, FaultSpec, Faulty, ForceCommand, Hand, HandSpec,
     PlantSpec, SafetyStop, Scripted, ToolPath,
 };
-use palpate::error::ErrorKind;
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
+use palpate::model::blend::BlendKind;
+use palpate::model::mesh::Face;
 use palpate::runtime::Disturbance;
+use palpate::runtime::Nanos;
 use palpate::safety::Passivity;
 use palpate::scene::{
-    BlendKind, BlendSpec, BlockSpec, BodySpec, DeviceProfile, Face, Friction, MaterialSpec, ModelChoice, SafetySpec,
-    SafetyStage, Scene,
+    BlendSpec, BlockSpec, BodySpec, DeviceProfile, Friction, MaterialSpec, ModelChoice, SafetySpec, SafetyStage, Scene,
 };
-use palpate::runtime::Nanos;
 use random::Random;
 
 /// After so long nobody knows what the device did, and the force starts from zero (s).
@@ -138,22 +138,28 @@ fn path(random: &mut Random, size_m: [f64; 3], seconds: f64, most_m_s2: f64) -> 
     ToolPath::new(times, places).unwrap()
 }
 
-fn faults(random: &mut Random, seconds: f64) -> Vec<FaultWindow> {
+fn faults(random: &mut Random, seconds: f64) -> Vec<FaultSpec> {
     let number = 1 + (random.next() * 4.0) as usize;
-    let window = |_| {
-        let from = random.within(0.0, seconds);
+    let fault = |_| {
+        let from_s = random.within(0.0, seconds);
+        let of = |kind| FaultSpec::new(kind, from_s, from_s);
         let fault = match (random.next() * 6.0) as u32 {
-            0 => InjectedFault::Late { reads: 1 + (random.next() * 40.0) as usize },
-            1 => InjectedFault::Lost { probability: random.next(), seed: (random.next() * 1e9) as u64 },
-            2 => InjectedFault::Frozen,
-            3 => InjectedFault::NotFinite,
-            4 => InjectedFault::Disconnected,
-            _ => InjectedFault::SafetyStop(random.one_of(&[SafetyStop::EmergencyBrake, SafetyStop::Stall])),
+            0 => FaultSpec { reads: 1 + (random.next() * 40.0) as u32, ..of(FaultKind::Late) },
+            1 => {
+                let (probability, seed) = (random.next(), (random.next() * 1e9) as u64);
+                FaultSpec { probability, seed, ..of(FaultKind::Lost) }
+            }
+            2 => of(FaultKind::Frozen),
+            3 => of(FaultKind::NotFinite),
+            4 => of(FaultKind::Disconnected),
+            _ => {
+                let stop = random.one_of(&[SafetyStop::EmergencyBrake, SafetyStop::Stall]);
+                FaultSpec { stop, ..of(FaultKind::SafetyStop) }
+            }
         };
-        let to = from + random.sized(1e-3, 0.2);
-        FaultWindow { fault, from: Nanos::from_secs_f64(from), to: Nanos::from_secs_f64(to) }
+        FaultSpec { to_s: from_s + random.sized(1e-3, 0.2), ..fault }
     };
-    (0..number).map(window).collect()
+    (0..number).map(fault).collect()
 }
 
 fn safety(random: &mut Random) -> SafetySpec {

@@ -194,10 +194,7 @@ proptest! {
                 place -= part * (roots[row] * roots[column]);
             }
         });
-        let [stiffness, damping] = scaled.map(|matrix| {
-            let matrix = faer::Mat::from_fn(3 * count, 3 * count, |row, column| matrix[(row, column)]);
-            matrix.self_adjoint_eigenvalues(faer::Side::Lower).unwrap().into_iter().fold(0.0, f64::max)
-        });
+        let [stiffness, damping] = scaled.map(|matrix| matrix.symmetric_eigenvalues().max());
         let (found, exact) = (Spectrum::estimate(&mut block.clone()), Spectrum { stiffness, damping });
         // The substeps have a margin of 1.3.
         let share = found.stable_step() / exact.stable_step();
@@ -270,10 +267,10 @@ fn several_cores_give_the_same_forces() {
 }
 
 /// Time (s) and magnitude (N) of every tick of a scene with the whole body at 1 kHz.
-#[cfg(feature = "scene")]
 fn felt(name: &str) -> Vec<(f64, f64)> {
     use palpate::log::LogRecord;
-    use palpate::scene::{LocalModelKind, Scene};
+    use palpate::model::local::Kind as LocalModelKind;
+    use palpate::scene::Scene;
 
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
     let scene = Scene::load(&file).unwrap().with_model(LocalModelKind::Full);
@@ -285,7 +282,6 @@ fn felt(name: &str) -> Vec<(f64, f64)> {
     session.run().unwrap().records.iter().filter_map(magnitude).collect()
 }
 
-#[cfg(feature = "scene")]
 #[test]
 fn the_scenes_keep_their_contact_and_stay_below_two_newtons() {
     // Until the lift begins.
@@ -297,7 +293,6 @@ fn the_scenes_keep_their_contact_and_stay_below_two_newtons() {
     }
 }
 
-#[cfg(feature = "scene")]
 #[test]
 fn a_tool_that_slides_over_the_nodule_feels_it() {
     let felt = felt("nodule");

@@ -1,6 +1,5 @@
 //! A logged run is executed again to the same forces, bit for bit, whatever happened to its threads; a log that does not
 //! hold everything is refused, and a force or a tool sample that was changed is found.
-#![cfg(all(feature = "log", feature = "scene"))]
 
 mod session_support;
 
@@ -8,10 +7,11 @@ use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceComm
 use palpate::log::{ContactMode, Environment, Level, LogEntry, LogReader, LogRecord, McapWriter, TextEvent};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
-use palpate::runtime::{PortUseKind, RateGroup};
-use palpate::scene::{Feedback, LocalModelKind, Scene};
-use palpate::session::{Compared, ReplayReport, Session, SessionBuilder, Summary};
+use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::runtime::Nanos;
+use palpate::runtime::{PortUseKind, RateGroup};
+use palpate::scene::Scene;
+use palpate::session::{Compared, ReplayReport, Session, SessionBuilder, Summary};
 use palpate::{Error, ErrorKind};
 use session_support::{AlteredBlock, block, pressing, top, wiggling};
 use std::path::{Path, PathBuf};

@@ -1,5 +1,4 @@
 //! Bad scene files are refused with one line: file, line, field and what would be right.
-#![cfg(feature = "scene")]
 
 use palpate::scene::Scene;
 use palpate::{Error, ErrorKind};

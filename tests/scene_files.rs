@@ -1,10 +1,14 @@
 //! The scenes that come with palpate.
-#![cfg(feature = "scene")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use palpate::scene::{BlendKind, Equations, Face, Feedback, Friction, LocalModelKind, Normals, Scene, ToolPath};
+use palpate::devices::ToolPath;
+use palpate::model::blend::BlendKind;
+use palpate::model::contact::{Equations, Normals};
+use palpate::model::local::{Feedback, Kind as LocalModelKind};
+use palpate::model::mesh::Face;
+use palpate::scene::{Friction, Scene};
 
 #[path = "../examples/scene_paths.rs"]
 #[allow(dead_code, reason = "its main function writes the files that are only compared here")]
@@ -63,10 +67,10 @@ fn every_scene_loads_and_says_what_it_shows() {
 }
 
 #[test]
-#[cfg(not(feature = "haply"))]
-fn a_device_that_this_build_lacks_is_refused_with_the_feature_that_has_it() {
+fn a_device_that_this_program_does_not_open_is_refused_with_what_opens_it() {
     let error = palpate::Session::from_scene(load("haply")).build().unwrap_err();
-    let message = "device.kind: is \"haply\", which this build does not have: build it with `--features haply`";
+    let message =
+        "device.kind: is \"haply\", which this program does not open: give `palpate_haply::open` to its session";
     assert_eq!(error.to_string(), message);
 }
 

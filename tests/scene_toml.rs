@@ -1,11 +1,15 @@
 //! A scene is written as TOML and read back as the same scene, every number to its last bit.
-#![cfg(feature = "scene")]
 
 use std::path::Path;
 
+use palpate::model::blend::BlendKind;
+use palpate::model::body::Shape;
+use palpate::model::contact::{Equations, Normals};
+use palpate::model::local::Feedback;
+use palpate::model::mesh::Face;
 use palpate::scene::{
-    BlendKind, BlendSpec, BlockSpec, BodySpec, Equations, Face, Feedback, Friction, InitialSpec, MaterialSpec,
-    ModelChoice, Normals, ProbeSpec, PullSpec, RegionSpec, Scene, Shape, StepKind,
+    BlendSpec, BlockSpec, BodySpec, Friction, InitialSpec, MaterialSpec, ModelChoice, ProbeSpec, PullSpec, RegionSpec,
+    Scene, StepKind,
 };
 use proptest::prelude::*;
 

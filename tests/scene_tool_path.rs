@@ -1,6 +1,6 @@
 //! Tool paths: interpolation and the CSV form.
 
-use palpate::scene::ToolPath;
+use palpate::devices::ToolPath;
 use palpate::runtime::Nanos;
 use proptest::prelude::*;
 

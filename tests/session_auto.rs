@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
-use palpate::scene::{LocalModelKind, ModelChoice, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::{ModelChoice, Scene};
 use palpate::session::{Choice, Session, SessionBuilder};
 use session_support::*;
 
@@ -38,7 +39,6 @@ fn auto_is_the_default_of_programs_and_a_named_model_is_not_questioned() {
     assert_eq!(choice(session(block()).model(ModelChoice::Auto).virtual_time()).model, LocalModelKind::Full);
 }
 
-#[cfg(feature = "scene")]
 #[test]
 fn auto_is_the_default_of_scenes() {
     let text = "[body.block]\nnodes = [6, 6, 6]\nsize_m = [0.1, 0.1, 0.1]\n[body.material]\nnode_mass_kg = 0.0005\n\
@@ -96,7 +96,6 @@ fn on_threads_the_cost_is_measured_and_what_is_missed_is_a_warning_in_the_report
 }
 
 /// Check that the log says what was chosen and why, and that a replay takes it: in virtual time this body would be run whole.
-#[cfg(all(feature = "log", feature = "scene"))]
 #[test]
 fn a_replay_takes_the_model_of_the_log_and_does_not_choose_again() {
     use palpate::log::{Environment, LogEntry, LogReader};

@@ -3,10 +3,10 @@
 mod session_support;
 
 use palpate::ErrorKind;
-use palpate::runtime::{Execution, Outcome, RateGroup, Runtime, actor_fn};
-use palpate::scene::LocalModelKind;
-use palpate::session::{Session, SessionBuilder};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
+use palpate::runtime::{Execution, GraphErrorKind, Outcome, RateGroup, Runtime, actor_fn};
+use palpate::session::{Session, SessionBuilder};
 use session_support::*;
 use std::time::Duration;
 
@@ -40,7 +40,7 @@ fn nothing_is_measured_unless_it_is_asked_for_and_never_on_threads() {
     let idle = || actor_fn("idle", |_| Outcome::Continue);
     let mut graph = Runtime::builder(Execution::Threaded);
     let refused = graph.group(RateGroup::hz(100), vec![idle()]).measure_cost().build().unwrap_err();
-    assert_eq!(refused.kind(), ErrorKind::Runtime);
+    assert_eq!(refused.kind(), GraphErrorKind::Refused);
     let refused = Session::builder(block()).path(pressing()).measure_cost().build().unwrap_err();
     assert!(refused.kind() == ErrorKind::Runtime && refused.to_string().contains("virtual_time"), "{refused}");
 }

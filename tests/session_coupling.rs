@@ -1,11 +1,11 @@
 //! The virtual coupling in whole sessions: it must not swing, whatever the body, the model and the rate.
-#![cfg(feature = "scene")]
 
 use std::path::Path;
 
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 use palpate::session::{Session, Summary};
 
 const MODELS: [LocalModelKind; 3] = [LocalModelKind::Full, LocalModelKind::Patch, LocalModelKind::Predictive];

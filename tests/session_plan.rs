@@ -5,10 +5,10 @@ mod session_support;
 use palpate::ErrorKind;
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
-use palpate::runtime::{Execution, RateGroup};
-use palpate::scene::LocalModelKind;
-use palpate::session::{Session, SessionBuilder};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
+use palpate::runtime::{Execution, RateGroup};
+use palpate::session::{Session, SessionBuilder};
 use session_support::*;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -93,7 +93,6 @@ fn budgets_above_a_core_are_refused_with_their_sum_before_a_log_is_made() {
         session.global(RateGroup::hz(30).pin(0).budget(Nanos(10 * MS)))
     };
     let session = groups(session(block()));
-    #[cfg(feature = "log")]
     let session = session.log(&log);
     let error = session.build().unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Runtime);

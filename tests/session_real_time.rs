@@ -9,10 +9,10 @@ use device_clock::DeviceClock;
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
-use palpate::runtime::{OverrunPolicy, RateGroup, SlipCause};
-use palpate::scene::LocalModelKind;
-use palpate::session::{Session, SessionBuilder, Summary};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::{Nanos, Rate};
+use palpate::runtime::{OverrunPolicy, RateGroup, SlipCause};
+use palpate::session::{Session, SessionBuilder, Summary};
 use session_support::*;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -306,7 +306,6 @@ fn a_device_without_a_first_state_is_refused_at_the_start_and_leaves_no_log() {
     });
     for (device, words) in [(gone, "disconnected"), (wild, "not finite")] {
         let session = session(device);
-        #[cfg(feature = "log")]
         let session = session.log(&log);
         let error = session.build().unwrap().start().unwrap_err();
         assert_eq!(error.kind(), palpate::ErrorKind::Device);
@@ -434,7 +433,7 @@ fn a_run_without_an_end_stops_from_another_thread() {
 }
 
 #[test]
-#[cfg(all(feature = "log", target_os = "linux"))]
+#[cfg(target_os = "linux")]
 fn a_log_that_cannot_be_written_does_not_end_the_run() {
     let (device, written) = Probing::new(pressing(), |_, state| Ok(state));
     let summary = run(session(device).log("/dev/full"), 0.8);
@@ -449,7 +448,6 @@ fn a_log_that_cannot_be_written_does_not_end_the_run() {
 }
 
 #[test]
-#[cfg(feature = "log")]
 fn the_log_holds_what_the_run_reported() {
     use palpate::log::{Analysis, LogReader};
     let folder = tempfile::tempdir().unwrap();

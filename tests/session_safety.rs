@@ -5,11 +5,12 @@ mod session_support;
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use palpate::log::{ForceSample, LogRecord, ToolSample};
 use palpate::model::Vec3;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Disturbance;
-use palpate::safety::Actions;
-use palpate::scene::{LocalModelKind, SafetyStage};
-use palpate::session::{Session, SessionBuilder, Summary};
 use palpate::runtime::Nanos;
+use palpate::safety::Actions;
+use palpate::scene::SafetyStage;
+use palpate::session::{Session, SessionBuilder, Summary};
 use session_support::*;
 
 fn session() -> SessionBuilder {

@@ -2,7 +2,6 @@
 
 mod session_support;
 
-use palpate::actors::{DeviceSample, ForceCommand, LocalActor, LocalPorts, ModelSource, SurfaceView, ToolView};
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
 use palpate::log::{ForceSample, LogRecord};
 use palpate::model::Vec3;
@@ -10,12 +9,11 @@ use palpate::model::local::Blend;
 use palpate::model::body::{Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
 use palpate::model::integrator::Spectrum;
-use palpate::model::local::{Full, Hold, LocalModel, Succession};
+use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::model::simulation::{Simulation, Stepping};
-use palpate::runtime::{Actor, Execution, Outcome, OverrunPolicy, RateGroup, Runtime, TickContext};
-use palpate::scene::{Feedback, LocalModelKind};
-use palpate::session::{Session, SessionBuilder, Summary};
 use palpate::runtime::{Nanos, Rate};
+use palpate::runtime::{OverrunPolicy, RateGroup};
+use palpate::session::{Session, SessionBuilder, Summary};
 use session_support::*;
 
 const HAPTIC: Rate = Rate::hz(1000);
@@ -269,7 +267,7 @@ impl Device for Claims {
         Ok(DeviceState::default())
     }
 
-    fn write(&mut self, _: palpate::ForceCommand) -> Result<(), DeviceFault> {
+    fn write(&mut self, _: palpate::devices::ForceCommand) -> Result<(), DeviceFault> {
         Ok(())
     }
 }
@@ -326,93 +324,4 @@ fn a_renderer_sees_the_newest_surface_tool_and_force() {
     let summary = running.stop();
     let row = forces(&summary).into_iter().find(|row| row.time == tool.time).unwrap();
     assert_eq!((tool.time, <[f64; 3]>::from(tool.force)), (Nanos(150_000_000), row.force_n));
-}
-
-/// A local actor driven by hand, so that periods can be skipped at will.
-struct ByHand {
-    actor: LocalActor,
-    samples: palpate::runtime::Writer<DeviceSample>,
-    view: palpate::runtime::OutletReader<ToolView>,
-    drain: palpate::runtime::RecordDrain,
-    /// The same body, ticked directly.
-    simulation: Simulation,
-}
-
-fn glued_simulation() -> Simulation {
-    let (body, node) = (block(), top());
-    let triangle = body.surface().at_node(node)[0];
-    let corners = body.surface().triangles[triangle as usize];
-    let contact = Contact::glued(triangle, corners.map(|corner| f64::from(u8::from(corner == node))));
-    let state = State::at_rest(body.rest());
-    Simulation::new(Box::new(body), state, contact, Law::default(), Stepping { tick: 1e-3, substeps: 2 }).unwrap()
-}
-
-impl ByHand {
-    fn new() -> Self {
-        let mut graph = Runtime::builder(Execution::Virtual);
-        let drain = graph.drain();
-        let (samples, sample_reader) = graph.exchange(DeviceSample::default);
-        let (commands, _) = graph.exchange(ForceCommand::default);
-        let (surface, _) = graph.outlet(SurfaceView::default);
-        let (view_writer, view) = graph.outlet(ToolView::default);
-        let ports = LocalPorts {
-            samples: sample_reader,
-            commands,
-            source: ModelSource::Alone(vec![surface]),
-            view: view_writer,
-            recorder: graph.recorder(256),
-        };
-        let spare = || Box::new(Hold::default()) as Box<dyn LocalModel>;
-        let full = Box::new(Full::new(glued_simulation()));
-        let models = Succession::new([full, spare(), spare()], Blend::default(), Vec3::zeros());
-        let actor = LocalActor::new(models, HAPTIC, Rate::hz(30), Vec::new(), ports);
-        Self { actor, samples, view, drain, simulation: glued_simulation() }
-    }
-
-    /// Release `n` with the tool at `position`; gives the force row that it wrote.
-    fn release(&mut self, n: u64, position: Vec3) -> Option<ForceSample> {
-        let ctx = TickContext::by_hand(HAPTIC, n);
-        *self.samples.buffer() = DeviceSample { id: 1, state: DeviceState { position, ..DeviceState::default() } };
-        self.samples.publish(&ctx);
-        assert_eq!(self.actor.tick(&ctx), Outcome::Continue);
-        let mut records = Vec::new();
-        self.drain.drain(&mut records);
-        let rows: Vec<ForceSample> = records
-            .iter()
-            .filter_map(|record| match LogRecord::from_record(record) {
-                Some(LogRecord::Force(row)) => Some(row),
-                _ => None,
-            })
-            .collect();
-        assert!(rows.len() <= 1, "one row per release at most");
-        rows.first().copied()
-    }
-}
-
-#[test]
-fn skipped_periods_are_made_up_with_the_tool_interpolated_and_eight_ticks_a_release_at_most() {
-    let mut hand = ByHand::new();
-    let rest = block().rest()[top() as usize];
-    let tool = |n: u64| rest - Vec3::z() * (n as f64 * 1e-4);
-    assert_eq!(hand.release(0, tool(0)), None);
-    let mut simulated = 0;
-    let mut at = rest;
-    // Releases that come on time, after 4 skipped periods, after 20, and then on time until all is made up.
-    for n in [1, 2, 3, 8, 9, 30, 31, 32, 33, 34, 60, 61, 62, 63, 64] {
-        let row = hand.release(n, tool(n)).unwrap();
-        let ticks = (n - simulated).min(8);
-        let mut force = Vec3::zeros();
-        for k in 0..ticks {
-            let next = at + (tool(n) - at) / (n - simulated - k) as f64;
-            force = hand.simulation.tick(ToolMotion { from: at, to: next });
-            at = next;
-        }
-        simulated += ticks;
-        assert_eq!(row.time, HAPTIC.release(simulated), "release {n}");
-        assert_eq!(bits(row.force_n), bits(force.into()), "release {n}");
-        assert!(hand.view.refresh());
-        assert_eq!((hand.view.get().time, hand.view.get().position), (row.time, at), "release {n}");
-    }
-    assert_eq!(simulated, 64, "simulated time has caught up");
-    assert!((at - tool(64)).norm() < 1e-12);
 }

@@ -13,8 +13,8 @@ mod map;
 use map::Map;
 use palpate::log::LogRecord;
 use palpate::model::body::{Region, Shape};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate::scene::LocalModelKind;
 
 /// The block: 12 nodes along each edge (m).
 const EDGE_M: f64 = 0.1;

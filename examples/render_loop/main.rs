@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 use palpate::log::GroupReport;
 use palpate::prelude::*;
 use palpate::scene::Scene;
-use palpate::{Summary, Viewer};
+use palpate::session::{Summary, Viewer};
 
 /// Frames per second.
 const FRAME_RATE: u32 = 60;

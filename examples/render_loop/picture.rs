@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use palpate::actors::ToolView;
 use palpate::model::Vec3;
+use palpate::session::ToolView;
 
 use crate::camera::{Camera, Seen};
 use crate::shading::{Facet, facets};

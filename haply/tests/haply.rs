@@ -431,7 +431,7 @@ fn a_session_is_released_by_the_service_and_feels_the_block() {
     let body = Block::builder([8; 3], [0.1; 3]).build().unwrap();
     let session = Session::builder(body)
         .device(device)
-        .model(palpate::scene::LocalModelKind::Patch)
+        .model(palpate::model::local::Kind::Patch)
         .local(RateGroup::hz(1000).realtime(80).device_paced(Nanos(3_000_000)))
         .duration_s(3.0)
         .keep_records()

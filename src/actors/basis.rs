@@ -43,9 +43,6 @@ pub struct BasisActor {
 
 impl BasisActor {
     /// Of a body with `springs`; bases come from `store`, and `bases` are there already.
-    ///
-    /// # Real-time
-    /// Not real-time safe: allocates.
     pub fn new(springs: Arc<SpringGraph>, store: BasisStore, bases: Bases, pace: Pace, ports: BasisPorts) -> Self {
         Self { springs, store, pace, bases, begun: None, hopeless: Vec::new(), ports }
     }

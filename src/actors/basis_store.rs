@@ -20,9 +20,6 @@ impl BasisStore {
     ///
     /// # Errors
     /// If nothing holds the surroundings together.
-    ///
-    /// # Real-time
-    /// Not real-time safe: reads and writes files, and computes for seconds.
     pub fn get(&self, springs: &SpringGraph, patch: &[u32]) -> Result<Option<Basis>, Error> {
         if let Some(basis) = self.read(springs, patch) {
             return Ok(Some(basis));
@@ -35,9 +32,6 @@ impl BasisStore {
     }
 
     /// The basis of `patch`, if it was kept.
-    ///
-    /// # Real-time
-    /// Not real-time safe: reads a file.
     pub fn read(&self, springs: &SpringGraph, patch: &[u32]) -> Option<Basis> {
         let key = self.key(springs, patch);
         let stored = Basis::from_bytes(&std::fs::read(self.file(key)?).ok()?, key);
@@ -45,9 +39,6 @@ impl BasisStore {
     }
 
     /// Keeps `basis`, if there is a folder for it.
-    ///
-    /// # Real-time
-    /// Not real-time safe: writes a file.
     pub fn keep(&self, springs: &SpringGraph, basis: &Basis) {
         let key = self.key(springs, basis.patch());
         let (Some(folder), Some(file)) = (&self.folder, self.file(key)) else { return };

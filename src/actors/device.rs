@@ -4,14 +4,14 @@
 //! within the ramp time; after a gap in which nobody drove the device it starts from zero.
 
 use super::cause::Cause;
-use super::messages::{DeviceSample, ForceCommand};
-use crate::devices::{self, Calibration, Device, DeviceFault, DeviceState};
+use super::messages::{ComputedForce, DeviceSample};
+use crate::devices::{Calibration, Device, DeviceFault, DeviceState, ForceCommand};
 use crate::error::{Error, ErrorKind};
 use crate::log::{CommandSample, ToolSample};
 use crate::model::Vec3;
+use crate::runtime::Nanos;
 use crate::runtime::{Actor, Mode, Outcome, Reader, Recorder, TickContext, Writer};
 use crate::safety::{Input, Output, Pipeline, Request};
-use crate::runtime::Nanos;
 
 /// Releases without a new command after which the force goes to rest.
 const COMMAND_EXPIRES: u32 = 2;
@@ -27,7 +27,7 @@ pub(crate) const GAP_S: f64 = 0.1;
 pub struct DeviceActor {
     device: Box<dyn Device>,
     samples: Writer<DeviceSample>,
-    commands: Reader<ForceCommand>,
+    commands: Reader<ComputedForce>,
     safety: Pipeline,
     recorder: Recorder,
     /// Its number in the log.
@@ -46,7 +46,7 @@ impl DeviceActor {
         device: Box<dyn Device>,
         first: DeviceState,
         samples: Writer<DeviceSample>,
-        commands: Reader<ForceCommand>,
+        commands: Reader<ComputedForce>,
         safety: Pipeline,
         recorder: Recorder,
     ) -> Self {
@@ -84,7 +84,7 @@ impl DeviceActor {
 }
 
 impl DeviceActor {
-    fn safety_output(&mut self, ctx: &TickContext, command: &ForceCommand) -> Output {
+    fn safety_output(&mut self, ctx: &TickContext, command: &ComputedForce) -> Output {
         let dt = ctx.dt_nominal * (f64::from(ctx.slips) + 1.0);
         if dt >= GAP_S {
             return self.safety.release();
@@ -141,7 +141,7 @@ impl Actor for DeviceActor {
         let Output { force, actions, energy_j, tank_j } = self.safety_output(ctx, &command);
         // As long as the force would be taken up where it was, and no longer.
         let expires = ctx.scheduled + Nanos::from_secs_f64(GAP_S);
-        let exerted = devices::ForceCommand::until(Vec3::from(force), expires);
+        let exerted = ForceCommand::until(Vec3::from(force), expires);
         let outcome = self.device.write(exerted).map_or_else(degraded, |()| Outcome::Continue);
         let time = if self.missed_commands == 0 { command.time } else { ctx.scheduled };
         let (limits, device) = (actions.0, self.number);
@@ -156,7 +156,7 @@ impl Actor for DeviceActor {
 
     fn stop(&mut self, _: &TickContext) {
         // A device that is gone cannot be told; there is nobody left to report to.
-        let _ = self.device.write(devices::ForceCommand::ZERO);
+        let _ = self.device.write(ForceCommand::ZERO);
     }
 }
 

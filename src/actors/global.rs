@@ -12,7 +12,8 @@ use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, wider};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{
-    Actor, ActorError, Nanos, Outcome, OutletWriter, QueueReader, Rate, Reader, Recorder, Stopwatch, TickContext, Writer,
+    Actor, ActorError, Nanos, Outcome, OutletWriter, QueueReader, Rate, Reader, Recorder, Stopwatch, TickContext,
+    Writer,
 };
 
 /// The ports of a [`GlobalActor`].

@@ -1,7 +1,7 @@
 //! The local actor: turns the newest tool sample into a force at the haptic rate.
 
 use super::cause::Cause;
-use super::messages::{DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
+use super::messages::{ComputedForce, DeviceSample, SurfaceView, ToolTick, ToolView};
 use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync, ServedBy};
 use crate::model::Vec3;
 use crate::model::contact::Contact;
@@ -9,8 +9,8 @@ use crate::model::local::{Kind, LocalModel, PatchGeometry, Resynced, Served, Suc
 use crate::runtime::{
     Actor, Mode as RunMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
 };
-use crate::safety::coupling::CoupledTool;
 use crate::runtime::{Nanos, Rate};
+use crate::safety::coupling::CoupledTool;
 
 /// Haptic ticks that one release advances at most. After a long stall the rest is made up by the releases that follow:
 /// simulated time never stretches, and no release takes longer than this many ticks.
@@ -42,7 +42,7 @@ pub struct LocalPorts {
     /// The device's newest state.
     pub samples: Reader<DeviceSample>,
     /// The newest force for it.
-    pub commands: Writer<ForceCommand>,
+    pub commands: Writer<ComputedForce>,
     /// Where local models come from.
     pub source: ModelSource,
     /// The newest tool and force for a program that draws.
@@ -247,7 +247,7 @@ impl Actor for LocalActor {
         let force = finite_or_zero(computed);
         let time = self.haptic.release(self.models.now());
         let age_ticks = u32::try_from(self.age_ticks()).unwrap_or(u32::MAX);
-        *self.ports.commands.buffer() = ForceCommand { time, force, age_ticks, swap_step, dissipated_j };
+        *self.ports.commands.buffer() = ComputedForce { time, force, age_ticks, swap_step, dissipated_j };
         self.ports.commands.publish(ctx);
         let mode = self.models.serving().contact().mode;
         *self.ports.view.buffer() = ToolView { time, position: self.models.tool(), force, mode };
@@ -301,3 +301,7 @@ fn contact_sample(time: Nanos, contact: &Contact, force: Vec3) -> ContactSample 
         device: 0,
     }
 }
+
+#[cfg(test)]
+#[path = "tests/local.rs"]
+mod tests;

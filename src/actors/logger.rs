@@ -1,17 +1,19 @@
 //! The logger actor: takes the records of all threads, keeps statistics and writes the log.
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::cause::Cause;
-use super::granted::granted;
 use super::log_sink::{LogSink, Loss};
 use super::scene_watch::SceneWatch;
 use crate::error::{Error, ErrorKind};
 use crate::log::{Analysis, Environment, Level, LogRecord, RunReport, StatsCounter, TextEvent};
-use crate::runtime::record::Event;
-use crate::runtime::{Actor, GrantHandle, Outcome, Record, RecordDrain, RecordGap, TickContext};
 use crate::runtime::Nanos;
+use crate::runtime::record::Event;
+use crate::runtime::{
+    Actor, GrantHandle, GroupGrant, Outcome, Record, RecordDrain, RecordGap, SystemGrant, TickContext,
+};
 
 /// The target of the event that says that a log could not be written, for programs that report the summary's
 /// `log_error` instead.
@@ -287,4 +289,29 @@ fn in_words(event: &Event, group: &str) -> TextEvent {
         text.message = format!("{group}: {cause}");
     }
     text
+}
+
+/// The grant as text: the machine, what the process got, and a line per rate group.
+fn granted(grant: &SystemGrant) -> BTreeMap<String, String> {
+    let machine = format!("{}, clock {}, {} cores", kernel(&grant.kernel), grant.clock_source, grant.cores);
+    let mut map: BTreeMap<String, String> = [("machine".to_owned(), machine)].into();
+    if !grant.virtual_time {
+        map.insert("memory".to_owned(), format!("mlockall {}", grant.mlock));
+        map.insert("timer slack".to_owned(), grant.timer_slack.clone());
+        map.insert("idle states".to_owned(), grant.idle_states.clone());
+        map.extend(grant.groups.iter().map(|group| (group.name.clone(), group_in_words(group))));
+    }
+    map
+}
+
+/// System and release, without the build's own story.
+fn kernel(kernel: &str) -> String {
+    kernel.split_whitespace().take(2).collect::<Vec<_>>().join(" ")
+}
+
+fn group_in_words(group: &GroupGrant) -> String {
+    let priority = if group.priority > 0 { format!(" {}", group.priority) } else { String::new() };
+    let cpu = group.cpu.map_or("any cpu".to_owned(), |cpu| format!("cpu {cpu}"));
+    let refused = if group.refused.is_empty() { String::new() } else { format!("; {}", group.refused) };
+    format!("{}{priority} on {cpu}, {}{refused}", group.policy, group.wait)
 }

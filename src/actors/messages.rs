@@ -25,12 +25,12 @@ pub struct ToolTick {
 }
 
 /// The newest force for the device, as the local model computed it. What is written is a
-/// [`devices::ForceCommand`](crate::devices::ForceCommand), after the safety pipeline and with an expiry.
+/// [`ForceCommand`](crate::devices::ForceCommand), after the safety pipeline and with an expiry.
 ///
 /// # Real-time
 /// A plain value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ForceCommand {
+pub struct ComputedForce {
     /// End of the tick that it belongs to.
     pub time: Nanos,
     /// Mean force over that tick (N).

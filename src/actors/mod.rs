@@ -1,9 +1,9 @@
 //! The actors of a haptic session: thin glue between models, devices, logs and the runtime.
 //!
 //! ```text
-//! device --DeviceSample--> local --ToolTick, PatchGeometry--> global
-//!        <--ForceCommand--       <--local model--              --Wishes--> basis
-//!                                                              <--Bases--
+//! device --DeviceSample---> local --ToolTick, PatchGeometry--> global
+//!        <--ComputedForce--       <--local model--              --Wishes--> basis
+//!                                                               <--Bases--
 //! every actor --records--> logger
 //! ```
 //!
@@ -14,7 +14,6 @@ mod basis_store;
 mod cause;
 mod device;
 mod global;
-mod granted;
 mod local;
 mod log_file;
 mod log_sink;
@@ -22,15 +21,20 @@ mod logger;
 mod messages;
 mod scene_watch;
 
-pub use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
-pub use basis_store::BasisStore;
+pub(crate) use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
+pub(crate) use basis_store::BasisStore;
+pub(crate) use device::{DeviceActor, GAP_S, first_state};
+pub(crate) use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
+pub(crate) use local::{LocalActor, LocalPorts, ModelSource};
+pub(crate) use messages::{Checkpoint, ComputedForce, DeviceSample, ToolTick};
+pub(crate) use scene_watch::SceneWatch;
+
+// Part of what a session shows.
+pub use logger::LOG_FAILURE;
+pub use messages::{SurfaceView, ToolView};
+
+// For the tests of this package.
 pub use cause::Cause;
-pub(crate) use device::GAP_S;
-pub use device::{DeviceActor, first_state};
-pub use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
-pub use local::{LocalActor, LocalPorts, ModelSource};
 pub use log_file::{LAST_WAIT, LogFile, MOST_WAITING};
 pub use log_sink::{LogSink, Loss};
-pub use logger::{LOG_FAILURE, LoggerActor, LoggerOutcome};
-pub use messages::{Checkpoint, DeviceSample, ForceCommand, SurfaceView, ToolTick, ToolView};
-pub use scene_watch::SceneWatch;
+pub use logger::{LoggerActor, LoggerOutcome};

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use super::messages::SurfaceView;
 use crate::log::{Environment, LogRecord, SceneFrame, SceneTool};
 use crate::model::Vec3;
-use crate::runtime::{OutletReader, TickContext};
 use crate::runtime::Nanos;
+use crate::runtime::{OutletReader, TickContext};
 
 /// Diameter of a drawn tool, in the largest extent of the body.
 const TOOL_SIZE: f64 = 0.04;
@@ -34,9 +34,6 @@ pub struct SceneWatch {
 
 impl SceneWatch {
     /// Watches `surface`, whose triangles have these nodes.
-    ///
-    /// # Real-time
-    /// Not real-time safe: allocates. For the time before a run.
     pub fn new(surface: OutletReader<SurfaceView>, triangles: &[[u32; 3]]) -> Self {
         let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
         nodes.sort_unstable();

@@ -1,6 +1,6 @@
 //! What a device can do: the numbers that limits, gains and simulated devices are derived from.
 
-/// What a device can do. A program's own device names what it knows and takes the rest from
+/// The abilities of a device. A program's own device names what it knows and takes the rest from
 /// [`default`](Self::default), which is weaker and softer than any device of the table below.
 ///
 /// The constants hold the limits that CHAI3D ships for these devices. What no source confirms is `None`.
@@ -14,13 +14,22 @@
 /// | [`FALCON`](Self::FALCON) | 8 N | 3000 N/m | 20 N s/m | 0.04 m |
 /// | [`OMEGA_3`](Self::OMEGA_3) | 12 N | 5000 N/m | 30 N s/m | 0.075 m |
 ///
+/// ```
+/// use palpate::devices::Capabilities;
+///
+/// let own = Capabilities { max_force_n: 6.0, native_rate_hz: Some(4000.0), ..Capabilities::default() };
+/// assert_eq!(own.fault(), None);
+/// let no_size = Capabilities { workspace_radius_m: 0.0, ..Capabilities::TOUCH };
+/// assert_eq!(no_size.fault(), Some("workspace_radius_m must be a finite number above 0"));
+/// ```
+///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capabilities {
-    /// Axes along which it moves and exerts force: 1 to 3.
+    /// Number of axes along which the device moves and exerts force: 1 to 3.
     pub degrees_of_freedom: u8,
-    /// Largest force that it can or may exert (N).
+    /// Largest force that the device can or may exert (N).
     pub max_force_n: f64,
     /// Largest force that it exerts for as long as it is asked to (N), if its motors grow hot above.
     pub continuous_force_n: Option<f64>,
@@ -28,18 +37,18 @@ pub struct Capabilities {
     pub max_stiffness_n_per_m: f64,
     /// Largest damping that it renders without a limit cycle (N s/m).
     pub max_damping_n_s_per_m: f64,
-    /// Its own mechanical damping (N s/m): what keeps a rendered spring passive. Where it is unknown it is taken to be K T / 2
-    /// for the stiffness K that it renders, which a sampled wall asks for at least.
+    /// Mechanical damping of the device itself (N s/m), which keeps a rendered spring passive. Where it is unknown it
+    /// is taken to be K T / 2 for the stiffness K that it renders, which a sampled wall asks for at least.
     pub damping_n_s_per_m: Option<f64>,
-    /// Its own dry friction (N).
+    /// Dry friction of the device itself (N).
     pub friction_n: Option<f64>,
-    /// From a command to the force of its motors (s), beyond the hold until the next command.
+    /// Delay from a command to the force of the motors (s), beyond the hold until the next command.
     pub delay_s: Option<f64>,
     /// Radius of a ball in its workspace (m).
     pub workspace_radius_m: f64,
     /// Smallest change of position that it tells (m).
     pub position_resolution_m: Option<f64>,
-    /// How often it makes a new state (Hz), if it has a clock of its own.
+    /// Rate at which the device makes new states (Hz), if it has a clock of its own.
     pub native_rate_hz: Option<f64>,
 }
 
@@ -79,7 +88,7 @@ impl Capabilities {
         }
     }
 
-    /// What is impossible about them, in words; `None` if nothing is.
+    /// Names the first number that is impossible, with what would be right; `None` if none is.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

@@ -13,20 +13,57 @@ use crate::runtime::Nanos;
 /// zero. Times never go backwards; releases may be skipped.
 ///
 /// [`conformance::check`](super::conformance::check) tells whether an implementation keeps to all of this.
+///
+/// ```
+/// use palpate::prelude::*;
+///
+/// /// Sways from side to side; nothing pushes it.
+/// #[derive(Debug)]
+/// struct Pendulum;
+///
+/// impl Device for Pendulum {
+///     fn name(&self) -> &str {
+///         "pendulum"
+///     }
+///
+///     fn capabilities(&self) -> Capabilities {
+///         Capabilities::of_force(2.0)
+///     }
+///
+///     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
+///         let (t, amplitude, rate) = (time.as_secs_f64(), 0.02, 6.0);
+///         let position = Vec3::new(amplitude * (rate * t).sin(), 0.0, 0.1);
+///         let velocity = Vec3::new(amplitude * rate * (rate * t).cos(), 0.0, 0.0);
+///         Ok(DeviceState { position, velocity, buttons: 0 })
+///     }
+///
+///     fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {
+///         if command.is_finite() { Ok(()) } else { Err(DeviceFault::Refused) }
+///     }
+/// }
+///
+/// # fn main() -> Result<(), Error> {
+/// let body = Block::builder([6, 6, 6], [0.05; 3]).fix(Face::ZMin).build()?;
+/// let session = Session::builder(body).device(Pendulum).virtual_time().duration_s(0.02);
+/// assert!(session.build()?.run()?.runtime.fault.is_none());
+/// # Ok(())
+/// # }
+/// ```
 pub trait Device: Send + std::fmt::Debug {
-    /// Its name in reports and logs.
+    /// The name of the device in reports and logs.
     ///
     /// # Real-time
     /// Not called in a tick.
     fn name(&self) -> &str;
 
-    /// What it can do.
+    /// The abilities of the device, from which limits and gains follow.
     ///
     /// # Real-time
     /// Asked before the run, not in a tick.
     fn capabilities(&self) -> Capabilities;
 
-    /// False for a device whose [`write`](Self::write) moves nothing: nobody needs to wait for its force to fade.
+    /// Whether the device exerts the forces that it is given: false for one whose [`write`](Self::write) moves nothing:
+    /// nobody needs to wait for its force to fade.
     ///
     /// # Real-time
     /// Asked before the run, not in a tick.
@@ -34,7 +71,7 @@ pub trait Device: Send + std::fmt::Debug {
         true
     }
 
-    /// Whether it knows where it is. A session is not started on one that does not.
+    /// Whether the device knows where it is. A session is not started on one that does not.
     ///
     /// # Real-time
     /// Asked before the run, not in a tick.
@@ -57,7 +94,7 @@ pub trait Device: Send + std::fmt::Debug {
         false
     }
 
-    /// The state at `time`, the scheduled time of the release.
+    /// Reads the state at `time`, the scheduled time of the release.
     ///
     /// # Errors
     /// A [`DeviceFault`]; the run goes on with the last state. Whatever the fault, the next read is allowed.
@@ -76,7 +113,7 @@ pub trait Device: Send + std::fmt::Debug {
     /// none behind; one above the limit is refused or shortened.
     ///
     /// # Real-time
-    /// As [`read`](Self::read).
+    /// Called in the haptic tick: must neither allocate nor block.
     fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault>;
 
     /// The force that it exerts at the time of the last read (N), if it measures or simulates that: what the

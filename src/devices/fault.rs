@@ -1,6 +1,14 @@
 //! Why a device could not be read or written.
 
-/// Why a device could not be read or written. `Copy`, so that a real-time tick can pass it on.
+/// A reason for which a device could not be read or written. `Copy`, so that a real-time tick can pass it on.
+///
+/// ```
+/// use palpate::devices::DeviceFault;
+///
+/// let fault = DeviceFault::Disconnected;
+/// assert_eq!(DeviceFault::from_code(fault.code()), Some(fault), "records hold the code");
+/// assert_eq!(fault.to_string(), fault.words());
+/// ```
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
@@ -9,19 +17,19 @@
 pub enum DeviceFault {
     /// No new state since the last read; the last one is used again. A retry helps.
     Stale,
-    /// It is not calibrated or not ready. A retry helps once the user has made it ready.
+    /// The device is not calibrated or not ready. A retry helps once the user has made it ready.
     NotReady,
-    /// It is gone. A retry does not help until it is connected again.
+    /// The device is gone. A retry does not help until it is connected again.
     Disconnected,
-    /// It does not take this command, which is not finite or above its limit; it exerts none of it. Another one may do.
+    /// The device does not take this command, which is not finite or above its limit; it exerts none of it. Another one may do.
     Refused,
     /// Another program uses it. A retry helps once that one is done.
     Busy,
-    /// It stopped by itself and exerts nothing. A retry helps once the user has released it.
+    /// The device stopped by itself and exerts nothing. A retry helps once the user has released it.
     SafetyStop(SafetyStop),
 }
 
-/// Why a device stopped by itself.
+/// A reason for which a device stopped by itself.
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
@@ -29,25 +37,25 @@ pub enum DeviceFault {
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum SafetyStop {
-    /// Its emergency brake was pulled.
+    /// The emergency brake of the device was pulled.
     EmergencyBrake,
     /// A motor is blocked.
     Stall,
-    /// It found itself unstable.
+    /// The device found itself unstable.
     Unstable,
     /// A motor is too hot.
     Overheated,
-    /// It gave another reason, or none.
+    /// The device gave another reason, or none.
     Other,
 }
 
 impl SafetyStop {
-    /// Every kind, in the order of their codes.
+    /// All reasons, in the order of their codes.
     pub const ALL: [Self; 5] = [Self::EmergencyBrake, Self::Stall, Self::Unstable, Self::Overheated, Self::Other];
 }
 
 impl DeviceFault {
-    /// Every fault, in the order of their codes.
+    /// All faults, in the order of their codes.
     pub const ALL: [Self; 10] = [
         Self::Stale,
         Self::NotReady,
@@ -78,7 +86,7 @@ impl DeviceFault {
         Self::ALL.into_iter().find(|fault| fault.code() == code)
     }
 
-    /// In words.
+    /// The fault in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Stale => "the device had no new state",

@@ -11,7 +11,7 @@ pub struct ReplayedSample {
     pub time: Nanos,
     /// Counts the successful reads; unchanged if this one failed and the state before was used again.
     pub id: u32,
-    /// What was read.
+    /// The state that was read.
     pub state: DeviceState,
 }
 
@@ -37,7 +37,7 @@ impl Replayed {
         Self { first: Some(first), samples, next: 0, last_id: 0, capabilities, is_exact: true }
     }
 
-    /// The same for other releases: between two samples the tool moves in a straight line, after the last it stays.
+    /// Answers other releases too: between two samples the tool moves in a straight line, after the last it stays.
     #[must_use]
     pub fn at_any_rate(self) -> Self {
         Self { is_exact: false, ..self }

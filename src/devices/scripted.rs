@@ -5,7 +5,7 @@ use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPa
 use crate::model::Vec3;
 use crate::runtime::Nanos;
 
-/// Follows a path; exerts nothing.
+/// A tool that follows a path and exerts nothing.
 ///
 /// # Real-time
 /// Real-time safe; bounded by a binary search over the samples of the path.
@@ -22,7 +22,7 @@ impl Scripted {
         Self { path, capabilities: Capabilities::PHANTOM_PREMIUM, last: None }
     }
 
-    /// The same with the limits of another device.
+    /// Takes the limits of another device.
     #[must_use]
     pub fn with_capabilities(self, capabilities: Capabilities) -> Self {
         Self { capabilities, ..self }

@@ -1,8 +1,13 @@
 //! What the pipeline is told before a run.
 
-use super::{ModelAge, Passivity, StartUp, Tank, ToolSpeed, Watchdog};
+use super::model_age::ModelAge;
+use super::passivity::Passivity;
+use super::start_up::StartUp;
+use super::tank::Tank;
+use super::tool_speed::ToolSpeed;
+use super::watchdog::Watchdog;
 
-/// What the pipeline needs to know of a device.
+/// The properties of a device that limits and gains follow from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeviceLimits {
     /// Largest force (N).
@@ -11,13 +16,13 @@ pub struct DeviceLimits {
     pub max_stiffness_n_per_m: f64,
     /// Largest damping that it renders stably (N s/m).
     pub max_damping_n_s_per_m: f64,
-    /// Its own mechanical damping (N s/m).
+    /// Mechanical damping of the device itself (N s/m).
     pub damping_n_s_per_m: f64,
-    /// Its own dry friction (N).
+    /// Dry friction of the device itself (N); 0 if it is not known.
     pub friction_n: f64,
-    /// Smallest step of its position (m).
+    /// Smallest step of the position that it tells (m); 0 if it is not known.
     pub resolution_m: f64,
-    /// From a force that is computed to one that is felt, beyond the hold of one tick (s).
+    /// Delay from a computed force to a felt one, beyond the hold of one tick (s).
     pub delay_s: f64,
 }
 
@@ -41,7 +46,7 @@ impl DeviceLimits {
     }
 }
 
-/// The limits of the pipeline; a stage without is off.
+/// The limits of the safety pipeline; a stage that has none is off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Largest force (N).
@@ -52,22 +57,22 @@ pub struct Limits {
     pub ramp_s: f64,
     /// Period of the local group (s).
     pub tick_s: f64,
-    /// A tool that is too fast.
+    /// Limits of the stage that lets the force of a fast tool fade.
     pub tool_speed: Option<ToolSpeed>,
-    /// Steps of model swaps.
+    /// Limits of the tank that pays for steps of model swaps.
     pub tank: Option<Tank>,
-    /// Energy.
+    /// Limits of the passivity controller.
     pub passivity: Option<Passivity>,
-    /// A model that is too old.
+    /// Limits of the stage that lets the force of an old model fade.
     pub model_age: Option<ModelAge>,
-    /// The first seconds.
+    /// Limits of the start-up.
     pub start_up: Option<StartUp>,
-    /// A silent device.
+    /// Limits of the watchdog over a silent device.
     pub watchdog: Option<Watchdog>,
 }
 
 impl Limits {
-    /// Every stage with its default, at 1 kHz, for a `device` in an environment that stores nothing at the start.
+    /// Limits with every stage at its default, at 1 kHz, for a `device` in an environment that stores nothing at the start.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -88,7 +93,7 @@ impl Limits {
         }
     }
 
-    /// Finite check, clamp to `max_force_n` (N), slew limit and ramp alone.
+    /// Limits with finite check, clamp to `max_force_n` (N), slew limit and ramp alone.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

@@ -1,45 +1,28 @@
 //! What stands between a computed force and a device: one stage per file, pure functions of state and time.
 //!
 //! The order, the promises and the test of each are in `docs/safety.md`. Every action is reported as a bit of [`Actions`].
+//! All of it is bounded, allocates nothing and is real-time safe.
 
 mod actions;
-mod clamp;
-mod controller;
-pub mod coupling;
-mod finite;
-mod ledger;
+pub(crate) mod coupling;
+mod force;
 mod limits;
 mod model_age;
+mod passivity;
 mod pipeline;
-mod ramp;
-mod slew;
 mod start_up;
 mod tank;
 mod tool_speed;
 mod watchdog;
 
 pub use actions::Actions;
-pub use clamp::clamp;
-pub use controller::{Controlled, Passivity, control};
-pub use finite::finite;
-pub use ledger::Ledger;
+pub use coupling::sampled_wall;
+pub use force::Force;
 pub use limits::{DeviceLimits, Limits};
-pub use model_age::{AgeFade, ModelAge};
+pub use model_age::ModelAge;
+pub use passivity::Passivity;
 pub use pipeline::{Input, Output, Pipeline, Request};
-pub use ramp::Ramp;
-pub use slew::slew;
-pub use start_up::{Engagement, StartUp};
-pub use tank::{Tank, TankState};
-pub use tool_speed::{ToolSpeed, speed_gain};
+pub use start_up::StartUp;
+pub use tank::Tank;
+pub use tool_speed::ToolSpeed;
 pub use watchdog::Watchdog;
-
-/// A force in space (N).
-pub type Force = [f64; 3];
-
-fn norm(force: Force) -> f64 {
-    dot(force, force).sqrt()
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}

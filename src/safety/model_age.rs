@@ -1,11 +1,11 @@
 //! Stage 6: a local model that nobody renews is trusted less and less.
 
-/// When a model is too old.
+/// The age at which a local model is too old to be trusted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelAge {
-    /// Up to here it is trusted (ticks of the local group).
+    /// Age up to which the model is trusted (ticks of the local group).
     pub max_ticks: f64,
-    /// Over so many more the force fades to zero (ticks of the local group).
+    /// Further age over which the force fades to zero (ticks of the local group).
     pub fade_ticks: f64,
 }
 
@@ -31,9 +31,6 @@ impl Default for AgeFade {
 impl AgeFade {
     /// The gain with a model `age` ticks old, `ticks` after the last: both are counted, not measured, so that a run can be
     /// repeated.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub fn advance(&mut self, limits: ModelAge, age: u32, ticks: f64) -> f64 {
         let trusted = (1.0 - (f64::from(age) - limits.max_ticks) / limits.fade_ticks).clamp(0.0, 1.0);
         self.gain = trusted.min(self.gain + ticks / limits.fade_ticks);

@@ -1,35 +1,39 @@
 //! The stages in their order, with what they remember.
 
-use super::{
-    Actions, AgeFade, Engagement, Force, Ledger, Limits, Ramp, TankState, clamp, control, dot, finite, norm, slew,
-    speed_gain,
-};
+use super::actions::Actions;
+use super::force::{Force, clamp, dot, finite, norm, slew};
+use super::limits::Limits;
+use super::model_age::AgeFade;
+use super::passivity::{Ledger, control};
+use super::start_up::{Engagement, Ramp};
+use super::tank::TankState;
+use super::tool_speed::speed_gain;
 
-/// What is asked of the device.
+/// The force that a tick asks of the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// This force (N), ramped in if there was none before.
+    /// A computed force (N), ramped in if there was none before.
     Force(Force),
     /// The last force, ramped out: nothing computes a new one.
     Rest,
 }
 
-/// All that the stages look at in one tick.
+/// The input of the safety pipeline in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
-    /// What is asked.
+    /// The force that is asked for.
     pub request: Request,
     /// Time since the tick before (s).
     pub dt: f64,
-    /// Where the tool is (m), as the device said last.
+    /// Position of the tool (m), as the device said last.
     pub position: [f64; 3],
-    /// Ticks since the device said something new.
+    /// Number of ticks since the device said something new.
     pub stale_ticks: u32,
     /// Age of the local model (ticks of the local group).
     pub model_age_ticks: u32,
-    /// What a swap of local models added to the force in this tick (N).
+    /// Step that a swap of local models added to the force in this tick (N).
     pub swap_step: Force,
-    /// What the contact dissipated in this tick (J).
+    /// Energy that the contact dissipated in this tick (J).
     pub dissipated_j: f64,
 }
 
@@ -44,16 +48,16 @@ impl Input {
     }
 }
 
-/// What comes out.
+/// The output of the safety pipeline in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output {
     /// The force for the device (N).
     pub force: Force,
     /// The stages that acted.
     pub actions: Actions,
-    /// The ledger: what the environment has taken in less what it gave out, and what it stored at the start (J).
+    /// Balance of the ledger: what the environment has taken in less what it gave out, and what it stored at the start (J).
     pub energy_j: f64,
-    /// What is in the tank (J).
+    /// Energy in the tank (J).
     pub tank_j: f64,
 }
 

@@ -1,15 +1,15 @@
-//! Start-up: nobody is pushed by a device that has just been switched on.
+//! How the force comes and goes: it engages late after a start, and ramps within a declared time.
 
-use super::{Force, norm};
+use super::force::{Force, norm};
 
-/// When the force engages, and how.
+/// The conditions under which the force engages after a start, and how slowly it comes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartUp {
-    /// It engages once the computed force has been below this (N) ...
+    /// Computed force below which it has to be before it engages (N).
     pub engage_force_n: f64,
-    /// ... for so many ticks.
+    /// Number of ticks in a row for which it has to be below that.
     pub engage_ticks: u32,
-    /// Then it ramps in over this time (s).
+    /// Time over which the force ramps in once it has engaged (s).
     pub ramp_s: f64,
 }
 
@@ -29,9 +29,6 @@ pub struct Engagement {
 
 impl Engagement {
     /// The gain for a computed `force` (N), `dt` seconds after the one before.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub fn advance(&mut self, limits: StartUp, force: Force, dt: f64) -> f64 {
         if self.calm_ticks < limits.engage_ticks {
             self.calm_ticks = if norm(force) < limits.engage_force_n { self.calm_ticks + 1 } else { 0 };
@@ -42,9 +39,41 @@ impl Engagement {
     }
 }
 
+/// A gain between 0 (at rest) and 1 (the force passes as it is).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ramp {
+    gain: f64,
+    /// Time from one end to the other (s).
+    time_s: f64,
+}
+
+/// Below this a gain is zero: rounding must not keep a device from coming to rest.
+const SMALLEST_GAIN: f64 = 1e-9;
+
+impl Ramp {
+    /// A ramp that is fully in.
+    pub fn new(time_s: f64) -> Self {
+        Self { gain: 1.0, time_s }
+    }
+
+    /// Moves towards 1 (`on`) or towards 0 for `dt` seconds and gives the gain.
+    pub fn advance(&mut self, on: bool, dt: f64) -> f64 {
+        let step = dt / self.time_s;
+        let gain = if on { self.gain + step } else { self.gain - step }.clamp(0.0, 1.0);
+        self.gain = if gain < SMALLEST_GAIN { 0.0 } else { gain };
+        self.gain
+    }
+
+    /// Goes to 0 at once.
+    pub fn release(&mut self) {
+        self.gain = 0.0;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn it_waits_for_four_calm_ticks_in_a_row_and_then_ramps_in_over_two_seconds() {
@@ -54,5 +83,25 @@ mod tests {
         let gains: Vec<f64> = (0..2001).map(|_| gain(3.0)).collect();
         assert!(gains.windows(2).all(|pair| pair[1] >= pair[0] && pair[1] - pair[0] < 6e-4));
         assert!((gains[999] - 0.5).abs() < 1e-9 && gains[1990] < 1.0 && gains[2000] == 1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn a_ramp_ends_within_its_time_and_never_leaves_its_range(
+            time_s in 1e-3..1.0_f64,
+            steps in prop::collection::vec((any::<bool>(), 1e-4..0.02_f64), 0..100),
+        ) {
+            let mut ramp = Ramp::new(time_s);
+            let mut last = 1.0;
+            for (on, dt) in steps {
+                let gain = ramp.advance(on, dt);
+                prop_assert!((0.0..=1.0).contains(&gain));
+                prop_assert!((gain - last).abs() <= dt / time_s * (1.0 + 1e-9) + SMALLEST_GAIN);
+                last = gain;
+            }
+            let ticks = (time_s / 1e-3).ceil() as usize;
+            let off = (0..ticks).fold(last, |_, _| ramp.advance(false, 1e-3));
+            prop_assert_eq!(off, 0.0);
+        }
     }
 }

@@ -6,16 +6,16 @@
 //! than one that is blended over the time t: the work J v t / 2 on a tool that moves with v, and J^2 t^2 / (4 m) on one
 //! that it sets in motion itself. A step that the tank cannot pay is blended.
 
-use super::{Force, dot, norm};
+use super::force::{Force, dot, norm};
 
-/// The tank's limits.
+/// The limits of the energy tank that pays for steps of model swaps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tank {
-    /// What it holds at the start, and at most (J).
+    /// Energy that the tank holds at the start, and at most (J).
     pub capacity_j: f64,
-    /// Below this nothing active passes (J).
+    /// Energy below which nothing active passes (J).
     pub min_j: f64,
-    /// Over this time a step is blended that cannot be paid (s).
+    /// Time over which a step is blended that cannot be paid (s).
     pub blend_s: f64,
 }
 
@@ -39,25 +39,16 @@ pub struct TankState {
 
 impl TankState {
     /// A full tank.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub fn new(limits: &Tank) -> Self {
         Self { energy_j: limits.capacity_j, held_back: [0.0; 3], rate: 0.0 }
     }
 
     /// What is in it (J).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub fn energy_j(&self) -> f64 {
         self.energy_j
     }
 
     /// Adds what was dissipated (J).
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
     pub fn fill(&mut self, limits: &Tank, dissipated_j: f64) {
         // Also refuses what is no number.
         if dissipated_j > 0.0 {
@@ -67,9 +58,6 @@ impl TankState {
 
     /// The force in place of `force` (N), which contains a step of `step` (N) from a swap, for a tool of `velocity` (m/s);
     /// and whether something is held back of it.
-    ///
-    /// # Real-time
-    /// Bounded, real-time safe.
     pub fn pass(&mut self, limits: &Tank, force: Force, step: Force, velocity: [f64; 3], dt: f64) -> (Force, bool) {
         let size = norm(self.held_back);
         let left = if size > self.rate * dt { 1.0 - self.rate * dt / size } else { 0.0 };

@@ -1,11 +1,11 @@
 //! Stage 4: a tool that moves too fast to be held feels less and less.
 
-/// Between which speeds the force fades.
+/// The speeds of the tool between which the force fades.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolSpeed {
-    /// Up to here the force passes as it is (m/s).
+    /// Speed up to which the force passes as it is (m/s).
     pub fade_m_s: f64,
-    /// From here on there is none (m/s).
+    /// Speed from which on there is no force (m/s).
     pub stop_m_s: f64,
 }
 
@@ -16,9 +16,6 @@ impl Default for ToolSpeed {
 }
 
 /// The gain at `speed` (m/s): 1 up to the first limit, 0 from the second on, linear in between.
-///
-/// # Real-time
-/// Wait-free, real-time safe.
 pub fn speed_gain(limits: ToolSpeed, speed: f64) -> f64 {
     if speed <= limits.fade_m_s {
         return 1.0;

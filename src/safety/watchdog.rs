@@ -1,11 +1,12 @@
 //! The last stage: a device that says nothing new is not pushed.
 
-use super::{Force, Ramp, slew};
+use super::force::{Force, slew};
+use super::start_up::Ramp;
 
-/// Counts how long a device has been silent.
+/// The limit on how long a device may be silent before its force goes to zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Watchdog {
-    /// Ticks without a new state after which it acts.
+    /// Number of ticks without a new state after which it acts.
     pub max_stale_ticks: u32,
 }
 
@@ -18,10 +19,14 @@ impl Default for Watchdog {
 impl Watchdog {
     /// The command in place of `command` (N), and whether it acted: towards zero as fast as `limit` (N) from the command
     /// `last` allows, and back by `ramp` once the device speaks again.
-    ///
-    /// # Real-time
-    /// Bounded, real-time safe.
-    pub fn guard(self, stale_ticks: u32, last: Force, command: Force, limit: f64, ramp: &mut Ramp) -> (Force, bool) {
+    pub(super) fn guard(
+        self,
+        stale_ticks: u32,
+        last: Force,
+        command: Force,
+        limit: f64,
+        ramp: &mut Ramp,
+    ) -> (Force, bool) {
         if stale_ticks <= self.max_stale_ticks {
             return (command, false);
         }

@@ -12,20 +12,20 @@ pub struct BodySpec {
     /// The kind of body; `mass_spring` is the only one in scene files.
     #[serde(default)]
     pub kind: BodyKind,
-    /// Its shape.
+    /// The block's lattice: nodes, edge lengths, fixed faces.
     pub block: BlockSpec,
-    /// What it is made of.
+    /// The material of all nodes and springs outside of regions.
     pub material: MaterialSpec,
-    /// Parts that differ from that, in order: later ones win.
+    /// Parts of the body that differ in material, in order: later ones win.
     #[serde(default, rename = "region", skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<RegionSpec>,
 }
 
 impl BodySpec {
-    /// Makes this body.
+    /// Makes the body that this describes.
     ///
     /// # Errors
-    /// If a number of it is impossible, or a region is nowhere.
+    /// If one of its numbers is impossible, or a region is nowhere.
     pub fn build(&self) -> Result<Block, Error> {
         Ok(self.builder().build().map_err(|error| error.at("body"))?)
     }
@@ -58,7 +58,7 @@ pub struct BlockSpec {
     pub nodes: [usize; 3],
     /// Edge lengths (m).
     pub size_m: [f64; 3],
-    /// Faces held stationary.
+    /// Faces of the block that are held stationary.
     #[serde(default = "default_fixed")]
     pub fixed: Vec<Face>,
 }
@@ -75,6 +75,6 @@ pub struct MaterialSpec {
     pub node_mass_kg: f64,
     /// Stiffness k of a spring (N/m).
     pub stiffness_n_per_m: f64,
-    /// zeta in b = zeta sqrt(2 m k), the paper's definition.
+    /// Damping ratio zeta in b = zeta sqrt(2 m k), the paper's definition.
     pub damping_ratio: f64,
 }

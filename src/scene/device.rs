@@ -2,14 +2,15 @@
 
 use std::path::PathBuf;
 
-use super::{FaultSpec, HaplySpec, ToolPath};
-use crate::devices::{Capabilities, HandSpec, PlantSpec};
+use super::HaplySpec;
+use crate::devices::{Capabilities, FaultSpec, HandSpec, PlantSpec, ToolPath};
+use crate::error::Error;
 
-/// What moves the tool.
+/// A device of a scene: what moves the tool, and what limits its force.
 #[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeviceSpec {
-    /// Its name: each of several devices has one.
+    /// Name of the device: each of several has one.
     pub name: Option<String>,
     /// The kind of device.
     pub kind: DeviceKind,
@@ -17,9 +18,9 @@ pub struct DeviceSpec {
     pub path_csv: Option<PathBuf>,
     /// The log whose device is replayed; in a scene file relative to that.
     pub log: Option<PathBuf>,
-    /// The tool is glued to this node.
+    /// The node that the tool is glued to, by its place in the lattice.
     pub attach_node: Option<[usize; 3]>,
-    /// Whose limits it has.
+    /// The product whose limits the device has.
     #[serde(skip_serializing_if = "is_default")]
     pub profile: DeviceProfile,
     /// The simulated device (`hand`).
@@ -28,7 +29,7 @@ pub struct DeviceSpec {
     /// The simulated hand (`hand`).
     #[serde(skip_serializing_if = "is_default")]
     pub hand: HandSpec,
-    /// How it fails, and when.
+    /// Faults of the device, with their times.
     #[serde(rename = "fault", skip_serializing_if = "is_default")]
     pub faults: Vec<FaultSpec>,
     /// The service of a `haply` device.
@@ -55,7 +56,7 @@ pub enum DeviceKind {
     Hand,
     /// A tool that moves as in a log and ignores the force.
     Replay,
-    /// An Inverse3 behind the Haply Inverse service; needs feature `haply`.
+    /// An Inverse3 behind the Haply Inverse service; the crate `palpate-haply` opens it.
     Haply,
 }
 
@@ -63,7 +64,7 @@ pub enum DeviceKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DeviceProfile {
-    /// The paper's.
+    /// Phantom Premium 1.5, the paper's device.
     #[default]
     PhantomPremium,
     /// Touch, earlier Omni.
@@ -78,7 +79,7 @@ pub enum DeviceProfile {
 }
 
 impl DeviceProfile {
-    /// What such a device can do.
+    /// The capabilities of such a device.
     pub fn capabilities(self) -> Capabilities {
         match self {
             Self::PhantomPremium => Capabilities::PHANTOM_PREMIUM,
@@ -87,5 +88,57 @@ impl DeviceProfile {
             Self::Falcon => Capabilities::FALCON,
             Self::Omega3 => Capabilities::OMEGA_3,
         }
+    }
+}
+
+/// `error` about `device`, which is the `index`-th of `devices`: with its number if there are several.
+pub(crate) fn numbered(error: Error, index: usize, devices: &[DeviceSpec]) -> Error {
+    error.with_place_of("device", &field(index, devices.len()))
+}
+
+/// Where the `index`-th of `count` devices stands in a scene: its number is given if there are several.
+pub(crate) fn field(index: usize, count: usize) -> String {
+    if count < 2 { "device".to_owned() } else { format!("device[{index}]") }
+}
+
+/// One table `[device]`, or several `[[device]]`.
+pub(super) mod one_or_many {
+    use serde::de::value::MapAccessDeserializer;
+    use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+    use serde::ser::{Serialize, Serializer};
+
+    use super::DeviceSpec;
+
+    pub(crate) fn serialize<S: Serializer>(devices: &[DeviceSpec], to: S) -> Result<S::Ok, S::Error> {
+        match devices {
+            [one] => one.serialize(to),
+            many => many.serialize(to),
+        }
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DeviceSpec>, D::Error> {
+        struct OneOrMany;
+
+        impl<'de> Visitor<'de> for OneOrMany {
+            type Value = Vec<DeviceSpec>;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a table [device], or several [[device]]")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                Ok(vec![DeviceSpec::deserialize(MapAccessDeserializer::new(map))?])
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Self::Value, A::Error> {
+                let mut devices = Vec::new();
+                while let Some(device) = items.next_element()? {
+                    devices.push(device);
+                }
+                Ok(devices)
+            }
+        }
+
+        from.deserialize_any(OneOrMany)
     }
 }

@@ -1,22 +1,18 @@
 //! A Haply device in a scene: where its service is, and what it may do.
 
-use super::check::{lengths_within, positive};
-use super::{DeviceKind, DeviceProfile, DeviceSpec};
-use crate::error::Error;
-
-/// How to reach a Haply Inverse service, and what its device may do.
+/// A Haply device of a scene: the service that drives it, and the force that it may exert.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct HaplySpec {
-    /// Largest force (N): what the device may exert, which no page of the vendor's says.
+    /// Largest force that the device may exert (N), which no page of the vendor's says.
     pub max_force_n: f64,
-    /// The simulation channel, `host:port`.
+    /// Address of the service's simulation channel, `host:port`.
     #[serde(default = "HaplySpec::address")]
     pub address: String,
-    /// The events channel; `""` for a service without one.
+    /// Address of the service's events channel; `""` for a service without one.
     #[serde(default = "HaplySpec::events_address")]
     pub events_address: String,
-    /// The device; the first that the service lists if absent.
+    /// Id of the device; the first that the service lists if absent.
     #[serde(default)]
     pub device_id: Option<String>,
     /// The name of the session's profile.
@@ -25,16 +21,16 @@ pub struct HaplySpec {
     /// Order and signs of the axes, as the service takes it.
     #[serde(default = "HaplySpec::basis")]
     pub basis: String,
-    /// Where the device's base is in the scene (m).
+    /// Position of the device's base in the scene (m).
     #[serde(default)]
     pub origin_m: [f64; 3],
-    /// Without a reply for this long the clock releases the haptic group in place of the device (ms).
+    /// Time without a reply after which the clock releases the haptic group in place of the device (ms).
     #[serde(default = "HaplySpec::watchdog_ms")]
     pub watchdog_ms: f64,
 }
 
 impl HaplySpec {
-    /// The first device of a service on this machine, with at most `max_force_n` newtons.
+    /// Describes the first device of a service on this machine, with at most `max_force_n` newtons.
     pub fn new(max_force_n: f64) -> Self {
         Self {
             max_force_n,
@@ -68,46 +64,4 @@ impl HaplySpec {
     fn watchdog_ms() -> f64 {
         3.0
     }
-}
-
-/// Longer than any operator would wait to see that a cable is out (ms).
-const LONGEST_WATCHDOG_MS: f64 = 1000.0;
-
-/// A base that is farther away is a wrong unit (m).
-const FARTHEST_M: f64 = 1e3;
-
-/// What can be wrong with it.
-pub(super) fn validate(device: &DeviceSpec) -> Result<(), Error> {
-    let Some(spec) = &device.haply else {
-        return match device.kind {
-            DeviceKind::Haply => {
-                let message = "is missing: a haply device needs the table [device.haply] with max_force_n";
-                Err(Error::scene("device.haply", message))
-            }
-            _ => Ok(()),
-        };
-    };
-    if device.kind != DeviceKind::Haply {
-        return Err(Error::scene("device.haply", "belongs to kind = \"haply\", set that or leave it out"));
-    }
-    if device.path_csv.is_some() || device.path.is_some() {
-        let message = "moves a simulated tool, and a haply device is moved by a hand: leave it out";
-        return Err(Error::scene("device.path_csv", message));
-    }
-    if device.attach_node.is_some() {
-        let message = "glues a tool that starts at its node, and a hand starts anywhere: leave it out";
-        return Err(Error::scene("device.attach_node", message));
-    }
-    if device.profile != DeviceProfile::default() {
-        let message = "names the limits of a simulated device, those of this one are in device.haply: leave it out";
-        return Err(Error::scene("device.profile", message));
-    }
-    positive("device.haply.max_force_n", spec.max_force_n)?;
-    lengths_within("device.haply.origin_m", spec.origin_m, FARTHEST_M)?;
-    positive("device.haply.watchdog_ms", spec.watchdog_ms)?;
-    if spec.watchdog_ms > LONGEST_WATCHDOG_MS {
-        let message = format!("is {}, must be at most {LONGEST_WATCHDOG_MS} ms", spec.watchdog_ms);
-        return Err(Error::scene("device.haply.watchdog_ms", message));
-    }
-    Ok(())
 }

@@ -2,16 +2,10 @@
 
 use std::path::PathBuf;
 
-pub use crate::model::local::BlendKind;
-pub use crate::model::local::{Feedback, Kind as LocalModelKind};
+use crate::model::local::{BlendKind, Feedback, Kind, Prediction};
+use crate::model::surroundings::{LEAST_PCT, Size};
 
-pub use crate::model::local::Prediction;
-use crate::model::surroundings::LEAST_PCT;
-pub use crate::model::surroundings::Size as BasisSize;
-
-use super::ModelChoice;
-
-/// The slow, detailed simulation.
+/// The global model of a scene: the slow, detailed simulation.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GlobalSpec {
@@ -19,9 +13,9 @@ pub struct GlobalSpec {
     pub rate_hz: f64,
     /// Explicit steps per millisecond; chosen from the stability limit if absent.
     pub substeps_per_ms: Option<u32>,
-    /// Virtual time: how long after its release a result becomes visible (ms).
+    /// Time after its release at which a result becomes visible, in virtual time (ms).
     pub compute_latency_ms: f64,
-    /// Virtual time: the same for the reduced surroundings of a patch (ms).
+    /// Time after its release at which reduced surroundings of a patch become visible, in virtual time (ms).
     pub basis_latency_ms: f64,
 }
 
@@ -31,13 +25,13 @@ impl Default for GlobalSpec {
     }
 }
 
-/// The fast, small simulation.
+/// The local model of a scene: the fast, small simulation around a tool.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LocalSpec {
     /// Releases per second.
     pub rate_hz: f64,
-    /// Which local model.
+    /// Name of the local model, or `auto`.
     pub model: ModelChoice,
     /// The largest expected error (rms, % of the peak force, see DESIGN.md): of a model that `auto` may choose, 1 if absent;
     /// and of `predictive`, whose `patch` and `basis` become that large if they are absent. It sizes no other model.
@@ -48,17 +42,17 @@ pub struct LocalSpec {
     /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted. If absent, what
     /// `error_pct` needs, or 50 without that.
     pub basis: Option<usize>,
-    /// Bases are kept in this folder from run to run; relative to the current one.
+    /// Folder in which bases are kept from run to run; relative to the current one.
     pub basis_folder: Option<PathBuf>,
-    /// How `predictive` looks ahead.
+    /// The way in which `predictive` looks ahead.
     pub prediction: Prediction,
-    /// What the global model learns from the local one; what the model is best with if absent.
+    /// The data that the global model takes over from the local one; if absent, those that the model is best with.
     pub feedback: Option<Feedback>,
-    /// How a linear patch is stepped.
+    /// The way in which a linear patch is stepped.
     pub step: StepKind,
-    /// How a resync's discontinuity is spread.
+    /// The way in which a resync's discontinuity is spread over time.
     pub blend: BlendSpec,
-    /// The tool hangs on the device by a spring and damper whose gains follow from the device and the body.
+    /// True for a tool that hangs on the device by a spring and damper whose gains follow from the device and the body.
     pub coupling: bool,
 }
 
@@ -93,25 +87,25 @@ impl LocalSpec {
 
     /// Names the model that `auto` chose: a budget below what `predictive` keeps was met with a warning, and what it keeps is
     /// asked of it.
-    pub(crate) fn name_chosen(&mut self, kind: LocalModelKind) {
+    pub(crate) fn name_chosen(&mut self, kind: Kind) {
         self.model = kind.into();
-        if kind == LocalModelKind::Predictive {
+        if kind == Kind::Predictive {
             self.error_pct = self.error_pct.map(|error_pct| error_pct.max(LEAST_PCT));
         }
     }
 
-    /// How large a basis is to be: a number of states that is given counts, then the budget.
-    pub fn basis_size(&self) -> BasisSize {
+    /// The size that a basis is to have: a number of states that is given counts, then the budget.
+    pub fn basis_size(&self) -> Size {
         match (self.basis, self.error_pct) {
-            (Some(states), _) => BasisSize::States(states),
+            (Some(states), _) => Size::States(states),
             // `auto` may choose a model that does not meet less, and says so.
-            (None, Some(error_pct)) => BasisSize::ErrorPct(error_pct.max(LEAST_PCT)),
-            (None, None) => BasisSize::States(50),
+            (None, Some(error_pct)) => Size::ErrorPct(error_pct.max(LEAST_PCT)),
+            (None, None) => Size::States(50),
         }
     }
 }
 
-/// How a linear patch is stepped through a haptic tick.
+/// The way in which a linear patch is stepped through a haptic tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StepKind {
@@ -124,13 +118,116 @@ pub enum StepKind {
     Implicit,
 }
 
-/// How a resync's discontinuity is spread over time.
+/// The way in which a resync's discontinuity is spread over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlendSpec {
-    /// The way.
+    /// The kind of blend.
     pub kind: BlendKind,
-    /// How long (ms); not used by `none`.
+    /// Length of the blend (ms); not used by `none`.
     #[serde(default)]
     pub ms: f64,
+}
+
+/// A local model by name, or the choice of one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ModelChoice {
+    /// The cheapest that fits the rates and meets [`LocalSpec::error_pct`], chosen when a
+    /// session is built.
+    #[default]
+    Auto,
+    /// The model of this name.
+    Named(Kind),
+}
+
+impl ModelChoice {
+    /// Every choice by name: the models in order of cost, then `auto`.
+    pub const NAMES: &'static [&'static str] = &NAMES;
+
+    /// The name of the choice in scene files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => AUTO,
+            Self::Named(kind) => kind.name(),
+        }
+    }
+
+    /// The choice that is called `name`.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let named = || Kind::ALL.into_iter().find(|kind| kind.name() == name).map(Self::Named);
+        if name == AUTO { Some(Self::Auto) } else { named() }
+    }
+
+    /// The model, if it is named.
+    pub fn named(self) -> Option<Kind> {
+        match self {
+            Self::Auto => None,
+            Self::Named(kind) => Some(kind),
+        }
+    }
+
+    /// True if `holds` is true of the model, or of every one that could be chosen.
+    pub(crate) fn all(self, holds: impl Fn(Kind) -> bool) -> bool {
+        match self {
+            Self::Auto => Kind::ALL.into_iter().all(holds),
+            Self::Named(kind) => holds(kind),
+        }
+    }
+}
+
+const AUTO: &str = "auto";
+
+const NAMES: [&str; Kind::ALL.len() + 1] = {
+    let mut names = [AUTO; Kind::ALL.len() + 1];
+    let mut index = 0;
+    while index < Kind::ALL.len() {
+        names[index] = Kind::ALL[index].name();
+        index += 1;
+    }
+    names
+};
+
+impl From<Kind> for ModelChoice {
+    fn from(kind: Kind) -> Self {
+        Self::Named(kind)
+    }
+}
+
+impl serde::Serialize for ModelChoice {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for ModelChoice {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Name;
+        impl serde::de::Visitor<'_> for Name {
+            type Value = ModelChoice;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("the name of a local model")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<ModelChoice, E> {
+                ModelChoice::from_name(name).ok_or_else(|| E::unknown_variant(name, ModelChoice::NAMES))
+            }
+        }
+        deserializer.deserialize_str(Name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_is_that_of_one_choice_and_auto_is_no_model() {
+        for name in ModelChoice::NAMES {
+            assert_eq!(ModelChoice::from_name(name).map(ModelChoice::name), Some(*name));
+        }
+        assert_eq!(ModelChoice::NAMES.len(), Kind::ALL.len() + 1);
+        assert_eq!(ModelChoice::default().named(), None);
+        assert_eq!(ModelChoice::from_name("boundary"), None);
+    }
 }

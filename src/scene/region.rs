@@ -1,8 +1,5 @@
 //! Regions of the body as a scene names them: layers and inclusions.
 
-use super::BodySpec;
-use crate::error::Error;
-use crate::model::ModelError;
 use crate::model::body::{Region, Shape};
 
 /// A part of the body that differs in material.
@@ -13,16 +10,16 @@ use crate::model::body::{Region, Shape};
 #[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegionSpec {
-    /// What it stands for, for the reader.
+    /// Name of the region, for the reader.
     #[serde(default)]
     pub name: Option<String>,
-    /// Where it is.
+    /// The shape that holds its nodes.
     #[serde(with = "shape")]
     pub shape: Shape,
     /// Stiffness k of its springs (N/m); as it was if absent.
     #[serde(default)]
     pub stiffness_n_per_m: Option<f64>,
-    /// zeta in b = zeta sqrt(2 m k), with the region's m and k; as it was if absent.
+    /// Damping ratio zeta in b = zeta sqrt(2 m k), with the region's m and k; as it was if absent.
     #[serde(default)]
     pub damping_ratio: Option<f64>,
     /// Mass of each of its nodes (kg); as it was if absent.
@@ -31,8 +28,8 @@ pub struct RegionSpec {
 }
 
 impl RegionSpec {
-    /// The same for a block.
-    pub fn region(&self) -> Region {
+    /// The region as a block takes it.
+    pub(super) fn region(&self) -> Region {
         Region {
             shape: self.shape,
             stiffness: self.stiffness_n_per_m,
@@ -42,19 +39,13 @@ impl RegionSpec {
     }
 }
 
-/// Refuses regions that cannot be, or are nowhere.
-pub(super) fn validate(body: &BodySpec) -> Result<(), Error> {
-    let refuse = |error: ModelError| Error::scene(&format!("body.{}", error.place()), error.message());
-    body.builder().check_regions().map_err(refuse)
-}
-
 /// A shape as a table of one key, its kind.
 mod shape {
     use serde::de::{Deserialize, Deserializer, Error};
     use serde::ser::{Serialize, Serializer};
 
-    use super::super::Axis;
-    use super::Shape;
+    use crate::devices::Axis;
+    use crate::model::body::Shape;
 
     #[derive(Default, serde::Deserialize, serde::Serialize)]
     #[serde(deny_unknown_fields, default)]

@@ -1,9 +1,6 @@
 //! What stands between the computed force and the device.
 
-use super::check::{not_negative, positive};
-use crate::error::Error;
-
-/// Limits on what reaches the device. What is left out follows from the device and the rates.
+/// Limits on the forces that reach a device. What a scene leaves out follows from the device and the rates.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SafetySpec {
@@ -15,13 +12,13 @@ pub struct SafetySpec {
     pub ramp_ms: f64,
     /// Tool speed from which on the force fades (m/s).
     pub fade_speed_m_s: f64,
-    /// Tool speed from which on there is none (m/s).
+    /// Tool speed from which on there is no force (m/s).
     pub stop_speed_m_s: f64,
-    /// What the energy tank of model swaps holds at the start, and at most (J).
+    /// Energy that the tank of model swaps holds at the start, and at most (J).
     pub tank_j: f64,
-    /// Below this no step of a swap passes unblended (J).
+    /// Energy in the tank below which no step of a swap passes unblended (J).
     pub tank_min_j: f64,
-    /// Over this time a step is blended that the tank cannot pay (ms).
+    /// Time over which a step is blended that the tank cannot pay (ms).
     pub swap_blend_ms: f64,
     /// Energy deficit at which no force is left (J).
     pub energy_tolerance_j: f64,
@@ -31,22 +28,22 @@ pub struct SafetySpec {
     pub max_stiffness_n_per_m: Option<f64>,
     /// The device's own mechanical damping (N s/m); what the device says if absent.
     pub device_damping_n_s_per_m: Option<f64>,
-    /// Its dry friction (N); what the device says if absent.
+    /// The device's own dry friction (N); what the device says if absent.
     pub device_friction_n: Option<f64>,
-    /// Smallest step of its position (m); what the device says if absent.
+    /// Smallest step of the device's position (m); what the device says if absent.
     pub device_resolution_m: Option<f64>,
-    /// From a command to its motors (ms); what the device says if absent.
+    /// Delay from a command to the device's motors (ms); what the device says if absent.
     pub device_delay_ms: Option<f64>,
     /// Tool speed that may be nothing but noise (m/s); a step of the device's resolution per tick if absent.
     pub noise_m_s: Option<f64>,
     /// Age of the local model from which on the force fades (ms); three periods of the global model and its declared latency
     /// if absent, at least 100.
     pub max_age_ms: Option<f64>,
-    /// The time in which it fades (ms).
+    /// Time in which the force of an old local model fades (ms).
     pub age_fade_ms: f64,
-    /// The force engages once the computed one has been below this for four ticks (N).
+    /// Computed force (N) below which it has to be for four ticks before the device engages.
     pub engage_force_n: f64,
-    /// Then it ramps in over this time (ms).
+    /// Time over which the force ramps in once the device has engaged (ms).
     pub start_up_ms: f64,
     /// Ticks without a new state of the device after which its force goes to zero.
     pub watchdog_ticks: u32,
@@ -90,90 +87,32 @@ impl Default for SafetySpec {
     }
 }
 
-/// A force that fades longer than this is no stop any more (ms).
-const LONGEST_RAMP_MS: f64 = 2000.0;
-/// A minute: longer is a wrong unit (ms).
-const LONGEST_MS: f64 = 60_000.0;
-
-pub(super) fn validate(safety: &SafetySpec) -> Result<(), Error> {
-    if let Some(force_n) = safety.max_force_n {
-        positive("safety.max_force_n", force_n)?;
-    }
-    positive("safety.max_slew_n_per_ms", safety.max_slew_n_per_ms)?;
-    positive("safety.ramp_ms", safety.ramp_ms)?;
-    if safety.ramp_ms > LONGEST_RAMP_MS {
-        let message = format!("is {}, a stop may take {LONGEST_RAMP_MS} ms at most", safety.ramp_ms);
-        return Err(Error::scene("safety.ramp_ms", message));
-    }
-    not_negative("safety.fade_speed_m_s", safety.fade_speed_m_s)?;
-    positive("safety.stop_speed_m_s", safety.stop_speed_m_s)?;
-    if safety.stop_speed_m_s <= safety.fade_speed_m_s {
-        let (stop, fade) = (safety.stop_speed_m_s, safety.fade_speed_m_s);
-        let message = format!("is {stop}, must be above safety.fade_speed_m_s, which is {fade}");
-        return Err(Error::scene("safety.stop_speed_m_s", message));
-    }
-    positive("safety.tank_j", safety.tank_j)?;
-    not_negative("safety.tank_min_j", safety.tank_min_j)?;
-    positive("safety.energy_tolerance_j", safety.energy_tolerance_j)?;
-    for (field, value) in [
-        ("safety.max_damping_n_s_per_m", safety.max_damping_n_s_per_m),
-        ("safety.device_friction_n", safety.device_friction_n),
-        ("safety.device_resolution_m", safety.device_resolution_m),
-        ("safety.device_delay_ms", safety.device_delay_ms),
-        ("safety.noise_m_s", safety.noise_m_s),
-    ] {
-        not_negative(field, value.unwrap_or(0.0))?;
-    }
-    positive("safety.max_stiffness_n_per_m", safety.max_stiffness_n_per_m.unwrap_or(1.0))?;
-    positive("safety.device_damping_n_s_per_m", safety.device_damping_n_s_per_m.unwrap_or(1.0))?;
-    positive("safety.engage_force_n", safety.engage_force_n)?;
-    for (field, ms) in [
-        ("safety.swap_blend_ms", safety.swap_blend_ms),
-        ("safety.max_age_ms", safety.max_age_ms.unwrap_or(1.0)),
-        ("safety.age_fade_ms", safety.age_fade_ms),
-        ("safety.start_up_ms", safety.start_up_ms),
-    ] {
-        positive(field, ms)?;
-        if ms > LONGEST_MS {
-            return Err(Error::scene(field, format!("is {ms}, must be at most {LONGEST_MS} ms")));
-        }
-    }
-    match safety.off.iter().find(|stage| !stage.can_be_off()) {
-        None => Ok(()),
-        Some(stage) => {
-            let message =
-                format!("names {:?}, which no device may be without: it cannot be switched off", stage.name());
-            Err(Error::scene("safety.off", message))
-        }
-    }
-}
-
 /// A stage of the safety pipeline, in its order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SafetyStage {
     /// Numbers that are not finite become zero. Cannot be switched off.
     Finite,
-    /// The largest force. Cannot be switched off.
+    /// A force above the largest is shortened. Cannot be switched off.
     Clamp,
-    /// The largest change of the force, at both places.
+    /// A change of the force above the largest is shortened, at both places of the pipeline.
     Slew,
-    /// A tool that is too fast.
+    /// The force fades for a tool that is too fast.
     ToolSpeed,
-    /// Steps of model swaps.
+    /// Steps of model swaps are paid from a tank, or blended.
     Tank,
-    /// Energy that the environment gives out beyond what it had.
+    /// Energy that the environment gives out beyond what it had is damped, or its force withdrawn.
     Passivity,
-    /// A local model that nobody renews.
+    /// The force of a local model that nobody renews fades.
     ModelAge,
     /// No force until the computed one was near zero, then a ramp.
     StartUp,
-    /// A silent device.
+    /// The force of a silent device goes to zero.
     Watchdog,
 }
 
 impl SafetyStage {
-    /// All, in the order of the pipeline.
+    /// All stages, in the order of the pipeline.
     pub const ALL: [Self; 9] = [
         Self::Finite,
         Self::Clamp,
@@ -186,7 +125,7 @@ impl SafetyStage {
         Self::Watchdog,
     ];
 
-    /// Its name in scenes, logs and reports.
+    /// The name of the stage in scenes, logs and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Finite => "finite",

@@ -1,18 +1,34 @@
 //! Collects what a session is made of.
 
-use super::hardware::OpenHaply;
-use super::Session;
-use super::prepare::{Parts, prepare};
+use super::parts::{OpenHaply, Parts};
 use crate::devices::{Device, ToolPath};
-use crate::error::{Error, ErrorKind};
+use crate::model::blend::BlendKind;
 use crate::model::body::Body;
+use crate::model::local::Feedback;
 use crate::runtime::{Disturbance, Execution, RateGroup};
-use crate::scene::{BlendKind, BlendSpec, Feedback, Friction, ModelChoice, SafetyStage, Scene, StepKind};
+use crate::scene::{BlendSpec, Friction, ModelChoice, SafetyStage, Scene, StepKind};
 
-/// Collects what a session is made of; fills the same [`Scene`] as a scene file and passes the same validation.
+/// Collects the parts of a session; fills a [`Scene`] as a scene file does, and passes the same validation.
+///
+/// ```
+/// use palpate::prelude::*;
+///
+/// # fn main() -> Result<(), Error> {
+/// let body = Block::builder([6, 6, 6], [0.05; 3]).fix(Face::ZMin).build()?;
+/// let session = Session::builder(body)
+///     .path(ToolPath::constant([0.02, 0.02, 0.049])?)
+///     .friction(0.5)
+///     .local(RateGroup::hz(2000))
+///     .crossfade_ms(10.0)
+///     .virtual_time()
+///     .duration_s(0.05);
+/// assert_eq!(session.build()?.run()?.report.devices[0].force.ticks, 100);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct SessionBuilder {
-    parts: Parts,
+    pub(super) parts: Parts,
 }
 
 impl SessionBuilder {
@@ -20,9 +36,9 @@ impl SessionBuilder {
         Self { parts: Parts::new(body, scene) }
     }
 
-    /// The device; without one the tool follows the scene's path.
+    /// Adds a device of the program's own; without one the tool follows the scene's path.
     ///
-    /// Called again, it adds a device. Each of several has its own contact and local model, and needs a name: see
+    /// Each of several devices has its own contact and local model, and needs a name: see
     /// [`named_device`](Self::named_device).
     #[must_use]
     pub fn device(mut self, device: impl Device + 'static) -> Self {
@@ -30,14 +46,14 @@ impl SessionBuilder {
         self
     }
 
-    /// A device among several: its records are in the topics `/NAME/force` and so on.
+    /// Adds a device among several; its records are in the topics `/NAME/force` and so on.
     #[must_use]
     pub fn named_device(mut self, name: impl Into<String>, device: impl Device + 'static) -> Self {
         self.parts.devices.push((Some(name.into()), Box::new(device)));
         self
     }
 
-    /// A scripted tool that follows `path`: the scene's first.
+    /// Lets the scene's first device, if it is a scripted tool or a simulated hand, follow `path`.
     #[must_use]
     pub fn path(mut self, path: ToolPath) -> Self {
         if let Some(first) = self.parts.scene.devices.first_mut() {
@@ -46,7 +62,7 @@ impl SessionBuilder {
         self
     }
 
-    /// Glues the tool to a surface node, by id: the tool of the device given last.
+    /// Glues the tool of the device given last to a surface node, by id.
     #[must_use]
     pub fn attach_node(mut self, node: u32) -> Self {
         let device = self.parts.devices.len().saturating_sub(1);
@@ -63,14 +79,15 @@ impl SessionBuilder {
         self
     }
 
-    /// How the device of a scene with `kind = "haply"` is opened: `palpate_haply::open`, of the crate that drives it.
+    /// Says how the device of a scene with `kind = "haply"` is opened, for ticks of so many seconds: by
+    /// `palpate_haply::open`, of the crate that drives it.
     #[must_use]
     pub fn open_haply_with(mut self, open: OpenHaply) -> Self {
         self.parts.open_haply = Some(open);
         self
     }
 
-    /// The global model's rate group: rate, pinning, priority, compute latency (unless the scene gives one).
+    /// Sets the global model's rate group: rate, pinning, priority, compute latency (unless the scene gives one).
     #[must_use]
     pub fn global(mut self, group: RateGroup) -> Self {
         self.parts.scene.global.rate_hz = group.rate().as_hz();
@@ -78,7 +95,7 @@ impl SessionBuilder {
         self
     }
 
-    /// The haptic rate group, with device and local model in it.
+    /// Sets the haptic rate group, in which devices and local models tick.
     #[must_use]
     pub fn local(mut self, group: RateGroup) -> Self {
         self.parts.scene.local.rate_hz = group.rate().as_hz();
@@ -86,38 +103,40 @@ impl SessionBuilder {
         self
     }
 
-    /// Which local model; without, the choice of one.
+    /// Names the local model; without, the session chooses one that fits body and machine.
     #[must_use]
     pub fn model(mut self, model: impl Into<ModelChoice>) -> Self {
         self.parts.scene = self.parts.scene.with_model(model);
         self
     }
 
-    /// The largest expected error (rms, % of the peak force): of a model that may be chosen, 1 without; and of `predictive`,
-    /// whose patch and basis become as large as it needs, unless [`patch`](Self::patch) and [`basis`](Self::basis) say how large.
-    /// Sizing a patch takes a few factorisations of the body when the session is built.
+    /// Sets the largest expected error (rms, % of the peak force): of a model that may be chosen, 1 without; and of
+    /// `predictive`, whose patch and basis become as large as it needs, unless [`patch`](Self::patch) and
+    /// [`basis`](Self::basis) say how large. Sizing a patch takes a few factorisations of the body when the session is
+    /// built.
     #[must_use]
     pub fn error_pct(mut self, error_pct: f64) -> Self {
         self.parts.scene.local.error_pct = Some(error_pct);
         self
     }
 
-    /// States of the reduced surroundings of `predictive`; without, what the [`error_pct`](Self::error_pct) needs or 50.
+    /// Sets the number of states of the reduced surroundings of `predictive`; without, what the
+    /// [`error_pct`](Self::error_pct) needs or 50.
     #[must_use]
     pub fn basis(mut self, states: usize) -> Self {
         self.parts.scene.local.basis = Some(states);
         self
     }
 
-    /// Nodes of a patch: along the surface, along it, into depth; without, what the [`error_pct`](Self::error_pct) needs with
-    /// `predictive`, or 4 x 4 x 2.
+    /// Sets the nodes of a patch: along the surface, along it, into depth; without, what the
+    /// [`error_pct`](Self::error_pct) needs with `predictive`, or 4 x 4 x 2.
     #[must_use]
     pub fn patch(mut self, size: [usize; 3]) -> Self {
         self.parts.scene.local.patch = Some(size);
         self
     }
 
-    /// What the global model takes over from the local one.
+    /// Chooses the data that the global model takes over from the local one.
     #[must_use]
     pub fn feedback(mut self, feedback: Feedback) -> Self {
         self.parts.scene.local.feedback = Some(feedback);
@@ -138,14 +157,14 @@ impl SessionBuilder {
         self
     }
 
-    /// How a linear patch is stepped; without, chosen from the stability limit.
+    /// Steps a linear patch explicitly or implicitly; without, the stability limit decides.
     #[must_use]
     pub fn local_step(mut self, step: StepKind) -> Self {
         self.parts.scene.local.step = step;
         self
     }
 
-    /// Coulomb coefficient; infinite for a tool that sticks until it is pulled off.
+    /// Sets the Coulomb coefficient; infinite for a tool that sticks until it is pulled off.
     #[must_use]
     pub fn friction(mut self, mu: f64) -> Self {
         self.parts.scene.contact.friction =
@@ -153,7 +172,7 @@ impl SessionBuilder {
         self
     }
 
-    /// Explicit steps per millisecond; without, chosen from the stability limit.
+    /// Sets the explicit steps per millisecond; without, they are chosen from the stability limit.
     #[must_use]
     pub fn substeps_per_ms(mut self, substeps: u32) -> Self {
         self.parts.scene.global.substeps_per_ms = Some(substeps);
@@ -168,7 +187,8 @@ impl SessionBuilder {
         self
     }
 
-    /// Hangs the tool on the device by a virtual coupling, see [`safety::coupling`](crate::safety::coupling).
+    /// Hangs the tool on the device by a virtual coupling: a spring and a damper whose gains keep what is felt within what
+    /// the device renders stably, see `docs/safety.md`.
     #[must_use]
     pub fn coupling(mut self) -> Self {
         self.parts.scene.local.coupling = true;
@@ -186,34 +206,35 @@ impl SessionBuilder {
     /// Runs in simulated time, on one thread, as fast as the machine allows and bit-identically every time.
     #[must_use]
     pub fn virtual_time(mut self) -> Self {
-        self.parts.execution = Execution::Virtual;
-        self.parts.in_real_time = false;
+        self.parts.options.execution = Execution::Virtual;
+        self.parts.options.in_real_time = false;
         self
     }
 
-    /// Virtual time, for tests of robustness: makes the releases of a rate group late, as `disturbance` says of each by its
-    /// number; see [`RuntimeBuilder::disturb`](crate::runtime::RuntimeBuilder::disturb). The groups are `local`, `global`
-    /// (not with `full`, which has none), `basis` (with reduced surroundings only) and `logger`.
+    /// Makes, in virtual time and for tests of robustness, the releases of a rate group late, as `disturbance` says of
+    /// each by its number; see [`RuntimeBuilder::disturb`](crate::runtime::RuntimeBuilder::disturb). The groups are
+    /// `local`, `global` (not with `full`, which has none), `basis` (with reduced surroundings only) and `logger`.
     ///
-    /// [`Session::start`] refuses it on threads, for a group that is not there, and twice for the same group.
+    /// [`Session::start`](super::Session::start) refuses it on threads, for a group that is not there, and twice for
+    /// the same group.
     #[must_use]
     pub fn disturb(
         mut self,
         group: impl Into<String>,
         disturbance: impl FnMut(u64) -> Disturbance + Send + 'static,
     ) -> Self {
-        self.parts.disturbed.add(group.into(), disturbance);
+        self.parts.options.disturbed.add(group.into(), disturbance);
         self
     }
 
     /// Writes a log to `path`, overwriting what is there.
     #[must_use]
     pub fn log(mut self, path: impl Into<std::path::PathBuf>) -> Self {
-        self.parts.log = Some(path.into());
+        self.parts.options.log = Some(path.into());
         self
     }
 
-    /// The log also has the topic `/scene`: surface, tools and forces for viewers, 30 times a second.
+    /// Adds the topic `/scene` to the log: surface, tools and forces for viewers, 30 times a second.
     #[must_use]
     pub fn log_scene(mut self) -> Self {
         self.parts.scene.log.scene = true;
@@ -223,37 +244,15 @@ impl SessionBuilder {
     /// Keeps every record in memory, for [`Summary::records`](super::Summary::records).
     #[must_use]
     pub fn keep_records(mut self) -> Self {
-        self.parts.keep_records = true;
+        self.parts.options.keep_records = true;
         self
     }
 
-    /// Virtual time: measures the CPU time of every release and of every build of a local model, for
+    /// Measures, in virtual time, the CPU time of every release and of every build of a local model, for
     /// [`RuntimeReport::costs`](crate::runtime::RuntimeReport::costs) and [`Summary::builds`](super::Summary::builds).
     #[must_use]
     pub fn measure_cost(mut self) -> Self {
-        self.parts.measures_cost = true;
+        self.parts.options.measures_cost = true;
         self
-    }
-
-    /// Reads the log of an earlier run of this session, to execute it again in simulated time, as
-    /// [`Session::replay`] does for a scene. The builder must be filled as it was for that run, a body of the program's own is not
-    /// in the log. Devices may be left out, those of the log are used; where several are glued give any in their places, as
-    /// [`attach_node`](Self::attach_node) belongs to the one given last.
-    ///
-    /// # Errors
-    /// As [`Session::replay`]; also [`ErrorKind::Log`](crate::ErrorKind::Log) if the log is one of another session.
-    pub fn replay(self, log: &std::path::Path) -> Result<super::Replay, Error> {
-        super::Replay::of_parts(self.parts, log)
-    }
-
-    /// Checks everything and makes the session ready to start.
-    ///
-    /// # Errors
-    /// Whatever cannot work, naming the field and what would be right.
-    pub fn build(self) -> Result<Session, Error> {
-        if self.parts.measures_cost && self.parts.execution == Execution::Threaded {
-            return Err(Error::new(ErrorKind::Runtime, "cost is measured in virtual time only: use virtual_time()"));
-        }
-        Ok(Session { prepared: prepare(self.parts)? })
     }
 }

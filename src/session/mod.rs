@@ -12,53 +12,49 @@
 //! # }
 //! ```
 
-mod basis;
-mod budget;
 mod builder;
-mod checks;
-mod choice;
-mod device;
-mod disturbed;
-mod global;
-mod graph;
-mod hardware;
-mod horizon;
-mod patch;
+mod parts;
 mod prepare;
-mod rate_groups;
 mod replay;
 mod running;
-mod safety;
-mod sink;
-mod situation;
-mod substeps;
-mod tools;
+mod wire;
 
+pub use crate::actors::{LOG_FAILURE, SurfaceView, ToolView};
 pub use builder::SessionBuilder;
-pub use hardware::OpenHaply;
-pub use choice::Choice;
+pub use prepare::Choice;
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};
 pub use running::{Running, Summary, Viewer};
 
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::model::body::Body;
-use crate::runtime::Plan;
+use crate::runtime::{Execution, Plan};
 use crate::scene::Scene;
-use prepare::Prepared;
+use prepare::{Prepared, prepare};
 
 /// A session that has passed every check and can start.
+///
+/// ```
+/// use palpate::prelude::*;
+///
+/// # fn main() -> Result<(), Error> {
+/// let session = Session::from_scene(Scene::demo()).duration_s(0.1).virtual_time().build()?;
+/// println!("{}", session.plan()?); // who needs how much of which core
+/// println!("{}", session.run()?); // the timing report
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Session {
     prepared: Prepared,
 }
 
 impl Session {
-    /// A session with a program's own or a built body.
+    /// Begins a session with a program's own body or one that was built.
     pub fn builder(body: impl Body + 'static) -> SessionBuilder {
         SessionBuilder::new(Some(Box::new(body)), Scene::of_program())
     }
 
-    /// A session as a scene describes it; the builder can still change it.
+    /// Begins a session as a scene describes it; the builder can still change it.
     pub fn from_scene(scene: Scene) -> SessionBuilder {
         SessionBuilder::new(None, scene)
     }
@@ -74,7 +70,7 @@ impl Session {
     /// # Errors
     /// If the process has been moved to fewer cores since the session was built and no longer fits.
     pub fn plan(&self) -> Result<Plan, Error> {
-        Ok(Plan::of(self.prepared.execution, &graph::groups(&self.prepared))?)
+        Ok(Plan::of(self.prepared.options.execution, &self.prepared.groups())?)
     }
 
     /// Reads the log of a scene's run, in real or in simulated time, to execute it again in simulated time from what was
@@ -82,28 +78,52 @@ impl Session {
     /// compared with. A run with a fault is repeated up to it.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read; [`ErrorKind::Log`](crate::ErrorKind::Log) if it is
+    /// [`ErrorKind::Io`] if it cannot be read; [`ErrorKind::Log`] if it is
     /// damaged, if a record is missing, if it holds no force before its first fault, if it was made with another
     /// instruction set, or if the body was a program's own.
     pub fn replay(log: &std::path::Path) -> Result<Replay, Error> {
         Replay::of_scene(log)
     }
 
-    /// Starts it: threads are up and the first local model is built when this returns.
+    /// Starts the session: threads are up and the first local model is built when this returns.
     ///
     /// # Errors
     /// If the log cannot be created, the device gives no first state or a thread cannot be started.
     pub fn start(self) -> Result<Running, Error> {
-        graph::start(self.prepared)
+        wire::start(self.prepared, None)
     }
 
-    /// Runs it to its end, see [`SessionBuilder::duration_s`].
+    /// Runs the session to its end, see [`SessionBuilder::duration_s`].
     ///
     /// # Errors
-    /// As [`start`](Self::start).
+    /// If it cannot be started, see [`start`](Self::start).
     pub fn run(self) -> Result<Summary, Error> {
         let running = self.start()?;
         running.wait();
         Ok(running.stop())
+    }
+}
+
+impl SessionBuilder {
+    /// Reads the log of an earlier run of this session, to execute it again in simulated time, as
+    /// [`Session::replay`] does for a scene. The builder must be filled as it was for that run, a body of the program's own is not
+    /// in the log. Devices may be left out, those of the log are used; where several are glued give any in their places, as
+    /// [`attach_node`](Self::attach_node) belongs to the one given last.
+    ///
+    /// # Errors
+    /// Those of [`Session::replay`]; also [`ErrorKind::Log`] if the log is one of another session.
+    pub fn replay(self, log: &std::path::Path) -> Result<Replay, Error> {
+        Replay::of_parts(self.parts, log)
+    }
+
+    /// Checks everything and makes the session ready to start.
+    ///
+    /// # Errors
+    /// If something cannot work, naming the field and what would be right.
+    pub fn build(self) -> Result<Session, Error> {
+        if self.parts.options.measures_cost && self.parts.options.execution == Execution::Threaded {
+            return Err(Error::new(ErrorKind::Runtime, "cost is measured in virtual time only: use virtual_time()"));
+        }
+        Ok(Session { prepared: prepare(self.parts)? })
     }
 }

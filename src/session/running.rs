@@ -1,23 +1,35 @@
 //! A session that runs, and what is left of it afterwards.
 
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use super::sink::Memory;
 use crate::actors::{LoggerOutcome, SurfaceView, ToolView};
 use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
+use crate::model::mesh::Surface;
 use crate::runtime::histogram::{HistogramReader, Snapshot};
-use crate::runtime::{GroupLive, OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
-use crate::runtime::Nanos;
+use crate::runtime::{GroupLive, Nanos, OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
 
 /// A session that runs. Dropping it commands zero force and joins its threads, within
 /// [`STOP_BOUND`](crate::runtime::STOP_BOUND) per group.
 ///
+/// ```
+/// use palpate::prelude::*;
+/// use std::time::Duration;
+///
+/// # fn main() -> Result<(), Error> {
+/// let running = Session::from_scene(Scene::demo()).virtual_time().build()?.start()?;
+/// running.wait_for(Duration::from_millis(50));
+/// assert!(!running.finished() && running.elapsed() >= Nanos::from_secs_f64(0.05));
+/// let summary = running.stop();
+/// assert!(summary.runtime.fault.is_none());
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Real-time
-/// As [`runtime::Running`](crate::runtime::Running): not for actors and devices, which stop a run by its
-/// [`stop_handle`](Self::stop_handle).
+/// Not for actors and devices, which stop a run by its [`stop_handle`](Self::stop_handle).
 #[derive(Debug)]
 pub struct Running {
     runtime: RuntimeRunning,
@@ -35,14 +47,9 @@ impl Running {
         memory: Option<Memory>,
         viewer: Viewer,
         until: Option<Nanos>,
+        builds: Option<HistogramReader>,
     ) -> Self {
-        Self { runtime, outcome, memory, viewer: Some(viewer), until, builds: None }
-    }
-
-    /// Reports what `builds` has counted.
-    pub(super) fn measuring(mut self, builds: Option<HistogramReader>) -> Self {
-        self.builds = builds;
-        self
+        Self { runtime, outcome, memory, viewer: Some(viewer), until, builds }
     }
 
     /// Waits for `span`, or until the run has ended; in virtual time, runs that much of it.
@@ -62,17 +69,17 @@ impl Running {
         self.runtime.elapsed()
     }
 
-    /// When the run ends by itself.
+    /// The time at which the run ends by itself; `None` if it does not.
     pub fn until(&self) -> Option<Nanos> {
         self.until
     }
 
-    /// True once it has ended, by itself or by a fault.
+    /// True once the run has ended, by itself or by a fault.
     pub fn finished(&self) -> bool {
         self.runtime.finished()
     }
 
-    /// Every rate group as it is now: counts, lateness and execution time since the start.
+    /// Tells of every rate group how it stands now: counts, lateness and execution time since the start.
     ///
     /// # Real-time
     /// Never disturbs a tick: wait-free on both sides. It allocates: for threads that show it.
@@ -80,12 +87,12 @@ impl Running {
         self.runtime.live()
     }
 
-    /// Stops the run from another thread or a signal handler's.
+    /// A handle that stops the run from another thread or from that of a signal handler.
     pub fn stop_handle(&self) -> StopHandle {
         self.runtime.stop_handle()
     }
 
-    /// The newest surface, tool and force, for a program that draws; there is one, for one thread.
+    /// Takes the viewer, which shows the newest surface, tool and force to a program that draws; there is one, for one thread.
     pub fn take_viewer(&mut self) -> Option<Viewer> {
         self.viewer.take()
     }
@@ -101,7 +108,38 @@ impl Running {
     }
 }
 
-/// What a program that draws can see, without disturbing a tick.
+/// Records kept in memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory(Arc<Mutex<Vec<LogRecord>>>);
+
+impl Memory {
+    fn take(&self) -> Vec<LogRecord> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    pub(super) fn push(&self, record: LogRecord) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(record);
+    }
+}
+
+/// A view of a running session for a program that draws: the newest surface, tools and forces, without disturbing a tick.
+///
+/// ```
+/// use palpate::prelude::*;
+/// use std::time::Duration;
+///
+/// # fn main() -> Result<(), Error> {
+/// let mut running = Session::from_scene(Scene::demo()).virtual_time().build()?.start()?;
+/// let mut viewer = running.take_viewer().expect("there is one");
+/// running.wait_for(Duration::from_millis(100));
+/// for [a, b, c] in viewer.triangles().iter().map(|nodes| nodes.map(|node| node as usize)) {
+///     let corners = &viewer.surface().positions;
+///     let _ = (corners[a], corners[b], corners[c]); // draw it
+/// }
+/// println!("{} N at {} m", viewer.tool().force, viewer.tool().position);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Viewer {
     triangles: Arc<[[u32; 3]]>,
@@ -111,12 +149,8 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    pub(super) fn new(
-        triangles: Vec<[u32; 3]>,
-        surface: OutletReader<SurfaceView>,
-        tools: Vec<OutletReader<ToolView>>,
-    ) -> Self {
-        Self { triangles: triangles.into(), surface, tools }
+    pub(super) fn new(body: &Surface, surface: OutletReader<SurfaceView>, tools: Vec<OutletReader<ToolView>>) -> Self {
+        Self { triangles: body.triangles.as_slice().into(), surface, tools }
     }
 
     /// Node ids of the surface triangles, counter-clockwise seen from outside; they never change.
@@ -153,16 +187,29 @@ impl Viewer {
     }
 }
 
-/// How a run went.
+/// An account of a run: its figures, its faults, and its records if they were kept.
+///
+/// ```
+/// use palpate::prelude::*;
+///
+/// # fn main() -> Result<(), Error> {
+/// let session = Session::from_scene(Scene::demo()).virtual_time().duration_s(0.1).keep_records();
+/// let summary = session.build()?.run()?;
+/// assert!(summary.runtime.fault.is_none() && summary.log_error.is_none());
+/// assert_eq!(summary.report.devices[0].force.ticks, 100);
+/// println!("{summary}{} records", summary.records.len());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Summary {
     /// Timing, resyncs, force, contact, limits and events.
     pub report: RunReport,
-    /// What the runtime counted, what the system granted, and the fault that ended the run, if any.
+    /// The runtime's own counts, the rights that the system granted, and the fault that ended the run, if any.
     pub runtime: RuntimeReport,
-    /// Why the log ended before its time, if it did.
+    /// The error that ended the log before its time, if one did.
     pub log_error: Option<Error>,
-    /// Every record, if they were kept.
+    /// All records, if they were [kept](super::SessionBuilder::keep_records).
     pub records: Vec<LogRecord>,
     /// CPU time of building each local model, if [cost was measured](super::SessionBuilder::measure_cost); none for
     /// `full`, which is never built anew.

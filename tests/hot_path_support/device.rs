@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
 use palpate::model::Vec3;
-use palpate::runtime::exchange::ExchangeWriter;
 use palpate::runtime::Nanos;
+use palpate::runtime::exchange::ExchangeWriter;
 
 use super::{Guard, Offence, allocator, kernel};
 

@@ -13,12 +13,13 @@ use std::time::Duration;
 
 use palpate::log::{ContactMode, LogEntry, LogReader, LogRecord};
 use palpate::model::body::Block;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::model::mesh::Face;
+use palpate::runtime::Nanos;
 use palpate::runtime::RateGroup;
 use palpate::runtime::exchange::exchange;
-use palpate::scene::{LocalModelKind, StepKind};
+use palpate::scene::StepKind;
 use palpate::session::Session;
-use palpate::runtime::Nanos;
 
 pub use device::GUARDED;
 use device::{GuardedDevice, Progress};

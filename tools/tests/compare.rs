@@ -4,7 +4,7 @@
 mod support;
 
 use support::{Called, Folder};
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 use serde_json::Value;
 
 fn compared(folder: &Folder, args: &[&str]) -> Value {

@@ -5,7 +5,7 @@ mod support;
 
 use support::{Called, Folder, PATH, rows};
 use palpate::log::{LogEntry, LogReader, LogRecord};
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 
 /// Check that it is a refusal: exit code 2, one line on standard error that has `words` in it, and nothing else.
 #[track_caller]

@@ -3,7 +3,8 @@
 
 use palpate::ErrorKind;
 use palpate_cli::reduce::findings::{Locality, ReductionStudy};
-use palpate::scene::{Scene, Shape};
+use palpate::model::body::Shape;
+use palpate::scene::Scene;
 use palpate::session::{ReduceOptions, reduce_scene};
 
 fn study(name: &str, options: &ReduceOptions) -> ReductionStudy {

@@ -18,12 +18,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::Device;
 
-/// How a check ended.
+/// The result of one check of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Verdict {
     /// The device keeps to it.
     Passed,
-    /// It does not.
+    /// The device does not keep to it.
     Failed,
     /// Nobody can see from outside whether it does: it tells no force that it exerts, or the suite cannot disconnect it.
     NotObservable,
@@ -32,15 +32,15 @@ pub enum Verdict {
 /// One check and what came of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Check {
-    /// What is checked, as a sentence about the device.
+    /// The rule that is checked, as a sentence about the device.
     pub name: &'static str,
-    /// How it ended.
+    /// The result of the check.
     pub verdict: Verdict,
-    /// What was seen, where it did not pass; empty otherwise.
+    /// An account of what was seen where the device did not pass; empty otherwise.
     pub message: String,
 }
 
-/// Every check, in their order.
+/// The results of all checks of a device, in their order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Conformance {
     /// The device's name; empty if it never gave one.
@@ -99,7 +99,7 @@ pub fn check<D: Device>(make: impl FnMut() -> D) -> Conformance {
     run(make, None::<fn(&mut D)>)
 }
 
-/// As [`check`], with a way to cut a device off, so that the suite sees what it does then.
+/// Runs every check of [`check`], and one more: what the device does when it is cut off.
 ///
 /// # Real-time
 /// Not called in a tick.

@@ -11,6 +11,7 @@ mod plant;
 mod spec;
 mod transport;
 
+pub(crate) use spec::SpecFault;
 pub use spec::{Axis, HandSpec, PlantSpec};
 
 use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
@@ -53,7 +54,7 @@ impl Hand {
     /// A `plant` with these `capabilities`, in a `hand` that wants to follow the path `intended`.
     ///
     /// # Errors
-    /// [`ErrorKind::Scene`](crate::error::ErrorKind::Scene) with the name of a parameter that cannot be.
+    /// [`ErrorKind::Scene`](crate::ErrorKind::Scene) with the name of a parameter that cannot be.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.

@@ -5,15 +5,15 @@ use super::super::Capabilities;
 /// What is wrong with a parameter: its name and what would be right.
 pub(crate) type SpecFault = (&'static str, String);
 
-/// An axis of space.
+/// An axis of space, in scenes `x`, `y` or `z`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
-    /// The first.
+    /// The first axis.
     X,
-    /// The second.
+    /// The second axis.
     Y,
-    /// The third.
+    /// The third axis.
     Z,
 }
 
@@ -31,16 +31,16 @@ pub struct PlantSpec {
     pub bias_n: [f64; 3],
     /// The axes along which it moves; it stands still along the others.
     pub axes: Vec<Axis>,
-    /// Where it starts, at rest (m); where the hand wants to be if absent.
+    /// Position at which the device starts, at rest (m); where the hand wants to be if absent.
     pub start_m: Option<[f64; 3]>,
     /// Step of the position that it tells (m); 0 for none.
     pub encoder_step_m: f64,
     /// Cut-off of the low-pass filter over the differences of position that it tells as velocity (Hz); none if `None`. A scene
     /// that leaves it out has 100.
     pub velocity_cutoff_hz: Option<f64>,
-    /// From a command to the motors (ms). A delay on the way of the state has the same effect on a loop: add it.
+    /// Delay from a command to the motors (ms). A delay on the way of the state has the same effect on a loop: add it.
     pub delay_ms: f64,
-    /// What is added to the delay of each command at most (ms), evenly spread; no command overtakes another.
+    /// Largest random addition to the delay of a command (ms), evenly spread; no command overtakes another.
     pub jitter_ms: f64,
     /// Seed of the jitter.
     pub seed: u64,
@@ -74,11 +74,8 @@ const LONGEST_DELAY_MS: f64 = 100.0;
 const STEP_MS: std::ops::RangeInclusive<f64> = 0.001..=10.0;
 
 impl PlantSpec {
-    /// What such a device can do: of the plant what it has, of the rest what `profile` says.
-    ///
-    /// # Real-time
-    /// Not called in a tick.
-    pub fn capabilities(&self, profile: Capabilities) -> Capabilities {
+    /// The abilities of such a device: of the plant what it has, of the rest what `profile` says.
+    pub(crate) fn capabilities(&self, profile: Capabilities) -> Capabilities {
         let known = |value: f64| Some(value).filter(|value| *value > 0.0);
         let degrees_of_freedom = [Axis::X, Axis::Y, Axis::Z].iter().filter(|axis| self.axes.contains(axis)).count();
         Capabilities {
@@ -136,14 +133,14 @@ impl PlantSpec {
 pub struct HandSpec {
     /// Mass of hand and arm that moves with the device (kg).
     pub mass_kg: f64,
-    /// Its damping, against rest (N s/m).
+    /// Damping of the hand, against rest (N s/m).
     pub damping_n_s_per_m: f64,
     /// Stiffness of the spring to the intended place (N/m).
     pub stiffness_n_per_m: f64,
-    /// How firmly it holds over time: rows of time (s) and level. The level multiplies mass, damping and stiffness; linear
+    /// Firmness of the grip over time: rows of time (s) and level. The level multiplies mass, damping and stiffness; linear
     /// in between, held outside; 1 throughout if empty.
     pub grip: Vec<[f64; 2]>,
-    /// When it lets go for good (s); never if absent.
+    /// Time at which the hand lets go for good (s); never if absent.
     pub release_s: Option<f64>,
 }
 

@@ -5,9 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use super::fields::{first_difference, in_words};
 use super::report::{Compared, Difference};
 use crate::log::LogRecord;
-use crate::runtime::{Actor, Outcome, Record, RecordDrain, TickContext};
+use crate::runtime::{Actor, Nanos, Outcome, Record, RecordDrain, TickContext};
 use crate::scene::MAX_DEVICES;
-use crate::runtime::Nanos;
 
 /// The topics whose samples are computed, and whether the local group makes them.
 const TOPICS: [(&str, bool); 6] = [
@@ -110,7 +109,7 @@ impl Topic {
 
 /// The logged samples, shared by the actor that compares and the replay that reports.
 #[derive(Clone, Debug)]
-pub(crate) struct Comparison(Arc<Mutex<[Topic; TOPICS.len()]>>);
+pub(super) struct Comparison(Arc<Mutex<[Topic; TOPICS.len()]>>);
 
 impl Comparison {
     pub(super) fn new() -> Self {
@@ -156,14 +155,14 @@ impl Comparison {
 
 /// Takes the place of the logger.
 #[derive(Debug)]
-pub(crate) struct Comparer {
+pub(super) struct Comparer {
     drain: RecordDrain,
     comparison: Comparison,
     records: Vec<Record>,
 }
 
 impl Comparer {
-    pub(crate) fn new(drain: RecordDrain, comparison: Comparison) -> Self {
+    pub(super) fn new(drain: RecordDrain, comparison: Comparison) -> Self {
         Self { drain, comparison, records: Vec::new() }
     }
 }

@@ -6,8 +6,7 @@
 //! cut must have woken behind it too.
 
 use super::report::{LoggedFault, Unrepeated, UnrepeatedRelease};
-use crate::runtime::{RuntimeFault, RuntimeReport, TickTiming};
-use crate::runtime::Nanos;
+use crate::runtime::{Nanos, RuntimeFault, RuntimeReport, TickTiming};
 
 /// The end of what can be repeated.
 #[derive(Debug)]
@@ -80,8 +79,7 @@ impl Cut {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::GroupReport;
-    use crate::runtime::Rate;
+    use crate::runtime::{GroupReport, Rate};
 
     /// Due every 10 ns; each with the times at which it woke and ended.
     fn group(ran: &[[u64; 2]]) -> Vec<TickTiming> {

@@ -12,9 +12,8 @@ use crate::log::{
     Environment, EventSum, Execution, GroupStats, Level, LogEntry, LogReader, LogRecord, TextEvent, ToolSample,
 };
 use crate::model::body::Block;
-use crate::runtime::{Recording, TickTiming};
+use crate::runtime::{Nanos, Recording, TickTiming};
 use crate::scene::{MAX_DEVICES, Scene};
-use crate::runtime::Nanos;
 
 /// The rate group that is no part of what is repeated.
 const LOGGER: &str = "logger";

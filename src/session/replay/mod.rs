@@ -6,38 +6,31 @@ mod fields;
 mod logged;
 mod report;
 
-pub(super) use compare::{Comparer, Comparison};
 pub use report::{Compared, Difference, LoggedFault, ReplayReport, Unrepeated, UnrepeatedRelease};
 
 use std::path::Path;
 use std::time::Duration;
 
-use super::Session;
-use super::prepare::{Parts, as_run, prepare};
+use super::parts::Parts;
+use super::prepare::{Prepared, as_run, prepare};
+use super::wire::{Rerun, start};
 use crate::devices::{Capabilities, Device, DeviceState, Replayed, ReplayedSample};
 use crate::error::{Error, ErrorKind};
-use crate::runtime::{Execution, Recording, RuntimeReport};
+use crate::runtime::{Actor, Execution, Nanos, Recording, RuntimeReport};
 use crate::scene::{DeviceKind, DeviceSpec, ModelChoice};
-use crate::runtime::Nanos;
-use compare::End;
+use compare::{Comparer, Comparison, End};
 use cut::Cut;
 use logged::Logged;
 
 /// Simulated time between two reports of progress.
 const STEP: Duration = Duration::from_millis(200);
 
-/// What a session executes again, and what it is compared with.
-#[derive(Debug)]
-pub(super) struct Reexecuted {
-    pub(super) recording: Recording,
-    pub(super) comparison: Comparison,
-}
-
-/// A log that has passed every check and can be replayed; made by [`Session::replay`] or
+/// A log that has passed every check and can be replayed; made by [`Session::replay`](super::Session::replay) or
 /// [`SessionBuilder::replay`](super::SessionBuilder::replay).
 #[derive(Debug)]
 pub struct Replay {
-    session: Session,
+    prepared: Prepared,
+    recording: Recording,
     comparison: Comparison,
     /// Of what is repeated, and of the log.
     ends: [Nanos; 2],
@@ -89,21 +82,19 @@ impl Replay {
         };
         parts.devices = logged.scene.devices.iter().zip(logged.tools).map(device).collect();
         parts.is_replay = true;
-        parts.execution = Execution::Virtual;
+        parts.options.execution = Execution::Virtual;
         // How far models reach ahead, and the bases that were wished for, are part of the recording.
-        parts.in_real_time = logged.in_real_time;
-        parts.log = None;
-        parts.keep_records = false;
-        let mut prepared = prepare(parts).map_err(|error| error.at(&place))?;
-        let difference = first_difference(&prepared.as_run.to_toml()?, &as_run(&logged.scene, None).to_toml()?);
+        parts.options.in_real_time = logged.in_real_time;
+        parts.options.log = None;
+        parts.options.keep_records = false;
+        let prepared = prepare(parts).map_err(|error| error.at(&place))?;
+        let difference = first_difference(&prepared.scene.to_toml()?, &as_run(&logged.scene, None).to_toml()?);
         if let Some((here, there)) = difference {
             let message = format!("it is the log of another session: `{there}` was run, this one has `{here}`");
             return Err(Error::new(ErrorKind::Log, message).at(place));
         }
-        let comparison = logged.comparison;
-        let ends = [logged.recording.end(), logged.end];
-        prepared.reexecuted = Some(Reexecuted { recording: logged.recording, comparison: comparison.clone() });
-        Ok(Self { session: Session { prepared }, comparison, ends, cut: logged.cut })
+        let Logged { recording, comparison, end, cut, .. } = logged;
+        Ok(Self { prepared, ends: [recording.end(), end], recording, comparison, cut })
     }
 
     /// The scheduled time of the last release that is repeated.
@@ -120,17 +111,20 @@ impl Replay {
         self.run_with(|_| ())
     }
 
-    /// As [`run`](Self::run), and tells `progress` from time to time how much has been executed.
+    /// Does what [`run`](Self::run) does, and tells `progress` from time to time how much has been executed.
     ///
     /// # Errors
-    /// As [`run`](Self::run).
+    /// If the session cannot be started again.
     pub fn run_with(self, mut progress: impl FnMut(Nanos)) -> Result<ReplayReport, Error> {
-        let running = self.session.start()?;
+        let Self { prepared, recording, comparison, ends, cut } = self;
+        let compared = comparison.clone();
+        let taker = Box::new(|drain| Box::new(Comparer::new(drain, compared)) as Box<dyn Actor>);
+        let running = start(prepared, Some(Rerun { recording, taker }))?;
         while !running.finished() {
             running.wait_for(STEP);
-            progress(running.elapsed().min(self.ends[0]));
+            progress(running.elapsed().min(ends[0]));
         }
-        Ok(report(&self.comparison, self.ends[1], self.cut, running.stop().runtime))
+        Ok(report(&comparison, ends[1], cut, running.stop().runtime))
     }
 }
 

@@ -2,13 +2,12 @@
 
 use std::fmt;
 
-use crate::runtime::RuntimeFault;
-use crate::runtime::Nanos;
+use crate::runtime::{Nanos, RuntimeFault};
 
-/// How the samples of one topic compare.
+/// A count of the samples of one topic that a replay found identical with the log, and of those that it did not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compared {
-    /// The topic.
+    /// Name of the topic.
     pub topic: &'static str,
     /// Samples in the log that are to be compared.
     pub logged: u64,
@@ -27,18 +26,18 @@ impl Compared {
     }
 }
 
-/// A sample that is not the same.
+/// A sample that a replay computed differently from the log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// Its time: the logged one, or the computed one if there is none in the log.
+    /// The logged time of the sample, or the computed one if there is none in the log.
     pub time: Nanos,
-    /// Its topic.
+    /// Name of the topic of the sample.
     pub topic: &'static str,
-    /// What differs: the name of the field, or `count` if only one side has the sample.
+    /// Name of the field that differs, or `count` if only one side has the sample.
     pub what: &'static str,
-    /// The sample in the log.
+    /// The sample in the log, in words.
     pub logged: Option<String>,
-    /// The sample that was computed.
+    /// The sample that was computed, in words.
     pub computed: Option<String>,
 }
 
@@ -56,12 +55,12 @@ impl fmt::Display for Difference {
     }
 }
 
-/// The first fault of the logged run. What came after it cannot be repeated.
+/// The first fault of a logged run; what came after it cannot be repeated.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LoggedFault {
-    /// When the release that failed was due: what was due before is compared, nothing else.
+    /// The time at which the failed release was due: what was due before is compared, nothing else.
     pub time: Nanos,
-    /// What happened.
+    /// A description of the fault.
     pub what: String,
     /// True if a new global model served after it; else the run ended.
     pub restarted: bool,
@@ -70,41 +69,41 @@ pub struct LoggedFault {
 /// A release that was due before a fault and still ran when the failed one began.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnrepeatedRelease {
-    /// Its rate group.
+    /// Name of the rate group of the release.
     pub group: String,
-    /// Its number.
+    /// Number of the release.
     pub tick: u64,
-    /// When it was due.
+    /// The time at which the release was due.
     pub time: Nanos,
 }
 
 /// Releases before a fault that need what only came after it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unrepeated {
-    /// All of them.
+    /// All releases that could not be repeated.
     pub releases: Vec<UnrepeatedRelease>,
-    /// What the first of them waits for.
+    /// The reason: the thing that the first of them waits for.
     pub why: String,
 }
 
-/// What a replay found.
+/// The result of a replay: how much of the log it computed again, and where it differs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReplayReport {
-    /// `/force`: before the safety pipeline.
+    /// The comparison of `/force`: forces before the safety pipeline.
     pub force: Compared,
-    /// `/force_commanded`: after it.
+    /// The comparison of `/force_commanded`: forces after the safety pipeline.
     pub commanded: Compared,
-    /// The other computed topics: `/contact`, `/resync`, `/global` and `/probe`.
+    /// The comparisons of the other computed topics: `/contact`, `/resync`, `/global` and `/probe`.
     pub others: Vec<Compared>,
     /// The earliest sample that differs.
     pub first_difference: Option<Difference>,
-    /// When the last release of the log was due.
+    /// The time at which the last release of the log was due.
     pub end: Nanos,
     /// The first fault of the logged run: everything before it was compared, nothing after.
     pub logged_fault: Option<LoggedFault>,
     /// Releases before that fault that cannot be repeated.
     pub unrepeated: Option<Unrepeated>,
-    /// Why the re-execution did not get to the end, if it did not.
+    /// The fault that kept the re-execution from getting to the end, if one did.
     pub fault: Option<RuntimeFault>,
 }
 
@@ -115,12 +114,12 @@ impl ReplayReport {
         self.fault.is_none() && self.first_difference.is_none() && self.force.identical > 0
     }
 
-    /// Every topic.
+    /// The comparisons of all topics.
     pub fn topics(&self) -> impl Iterator<Item = &Compared> {
         [&self.force, &self.commanded].into_iter().chain(&self.others)
     }
 
-    /// Up to when samples were compared.
+    /// The time up to which samples were compared.
     pub fn compared_up_to(&self) -> Nanos {
         self.logged_fault.as_ref().map_or(self.end, |fault| fault.time)
     }

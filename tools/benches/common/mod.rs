@@ -6,10 +6,11 @@
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use palpate::error::Error;
+use palpate::Error;
 use palpate::log::{Comparison, Measured, ModelCost, RunOutcome};
 use palpate::model::body::InstructionSet;
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 use palpate::session::{CompareOptions, compare};
 use palpate::runtime::Nanos;
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use palpate::error::{Error, ErrorKind};
+use palpate::{Error, ErrorKind};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};

@@ -13,7 +13,7 @@ mod verdict;
 
 use std::process::ExitCode;
 
-use palpate::error::Error;
+use palpate::Error;
 
 use costs::{BasisCost, Costs};
 

@@ -3,9 +3,10 @@
 use std::time::Instant;
 
 use palpate::devices::ToolPath;
-use palpate::error::Error;
+use palpate::Error;
 use palpate::log::{ForceTrace, ModelError};
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 use palpate::session::{Session, Summary, one_period};
 use palpate::runtime::{Nanos, Rate};
 

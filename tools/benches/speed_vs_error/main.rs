@@ -11,7 +11,7 @@ mod sizes;
 
 use std::process::ExitCode;
 
-use palpate::error::Error;
+use palpate::Error;
 
 /// A part of the document: its text, and its pictures by name.
 struct Part {

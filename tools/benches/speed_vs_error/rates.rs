@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use palpate::error::Error;
+use palpate::Error;
 use palpate::log::{Comparison, Measured};
 use palpate_cli::drawing::{Picture, Series};
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::session::{CompareOptions, one_period};
 use palpate::runtime::Rate;
 

@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use palpate::error::Error;
+use palpate::Error;
 use palpate::log::{Comparison, Measured};
 use palpate_cli::compare::conclusions;
 use palpate_cli::drawing::{Picture, Series};
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::session::CompareOptions;
 use palpate::runtime::Nanos;
 

@@ -1,9 +1,10 @@
 //! Patch sizes, basis sizes, substeps and the two predictions, results one period late.
 
-use palpate::error::Error;
+use palpate::Error;
 use palpate::log::{Comparison, Measured};
 use palpate_cli::drawing::{Picture, Series};
-use palpate::scene::{LocalModelKind, Prediction, Scene};
+use palpate::model::local::{Kind as LocalModelKind, Prediction};
+use palpate::scene::Scene;
 use palpate::session::{CompareOptions, one_period};
 use palpate::runtime::Rate;
 

@@ -1,6 +1,6 @@
 //! One run per fault: what is injected, and the force that reached the device all the while.
 
-#[path = "../common/altered_block.rs"]
+#[path = "../../../examples/common/altered_block.rs"]
 mod altered_block;
 
 use altered_block::AlteredBlock;
@@ -9,7 +9,8 @@ use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::mesh::Face;
 use palpate::prelude::*;
-use palpate::scene::{LocalModelKind, SafetyStage};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::SafetyStage;
 #[cfg(feature = "log")]
 use palpate::session::SessionBuilder;
 use palpate::session::Summary;

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use palpate::log::{LogRecord, ProbeSample};
 use palpate::prelude::*;
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 
 use crate::delay::Delay;
 use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet, TIME};

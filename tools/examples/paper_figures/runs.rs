@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use palpate::Summary;
+use palpate::session::Summary;
 use palpate::log::LogRecord;
 use palpate::prelude::*;
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::scene::Scene;
 
 use crate::forces::{Difference, forces, peak};

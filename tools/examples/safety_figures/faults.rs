@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use palpate::Summary;
+use palpate::session::Summary;
 use palpate::log::LogRecord;
 use palpate::prelude::*;
 use palpate::scene::Scene;

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use palpate::Summary;
+use palpate::session::Summary;
 use palpate::log::LogRecord;
 use palpate::prelude::*;
-use palpate::scene::{LocalModelKind, SafetySpec, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::{SafetySpec, Scene};
 
 use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet, TIME};
 use crate::{GREEN, RED};

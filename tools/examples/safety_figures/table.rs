@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 use palpate::prelude::*;
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 
 use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet};
 use crate::z_width::{STIFFNESS, Sweep, theory};

@@ -8,7 +8,8 @@ use std::path::Path;
 use palpate::log::LogRecord;
 use palpate::model::equilibrium::static_equilibrium;
 use palpate::prelude::*;
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 
 /// The last part of a run, over which the tool has to rest (s).
 const WATCHED_S: f64 = 0.5;
@@ -101,5 +102,5 @@ impl Sweep {
 /// The stiffness (N/m) up to which a sampled wall is passive: b > K (T / 2 + t_d) + |B|, b the damping of the device (N s/m) and
 /// t_d a delay in ticks.
 pub fn theory(device_damping: f64, rate_hz: f64, damping: f64, delay_ticks: f64) -> f64 {
-    palpate::safety::coupling::sampled_wall(device_damping, damping, 1.0 / rate_hz, delay_ticks / rate_hz)
+    palpate::safety::sampled_wall(device_damping, damping, 1.0 / rate_hz, delay_ticks / rate_hz)
 }

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::compare::{to_html, to_json, to_text};
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 use crate::compare::{CompareOptions, CompareProgress, compare};
 use palpate::{Error, ErrorKind};
 

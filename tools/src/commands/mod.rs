@@ -21,7 +21,7 @@ mod window;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use palpate::actors::LOG_FAILURE;
+use palpate::session::LOG_FAILURE;
 use palpate::{Error, ErrorKind};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;

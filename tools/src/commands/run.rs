@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use palpate::scene::{LocalModelKind, ModelChoice, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::{ModelChoice, Scene};
 use palpate::session::{Session, SessionBuilder};
 use palpate::{Error, ErrorKind};
 

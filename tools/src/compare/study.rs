@@ -8,7 +8,8 @@ use super::figures::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, M
 use palpate::model::body::Block;
 use palpate::runtime::Stopwatch;
 use palpate::runtime::histogram::Snapshot;
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 use palpate::runtime::{Nanos, Rate};
 
 /// How much of a run passes between two calls of the progress callback.

@@ -8,7 +8,9 @@ use palpate::log::LogRecord;
 use crate::reduce::findings::MeasuredLocality;
 use palpate::model::body::{Block, Body};
 use crate::reduction::{ContactStiffness, Response, StiffnessError};
-use palpate::scene::{BlendKind, BlendSpec, Feedback, LocalModelKind, Scene};
+use palpate::model::blend::BlendKind;
+use palpate::model::local::{Feedback, Kind as LocalModelKind};
+use palpate::scene::{BlendSpec, Scene};
 use palpate::session::Session;
 
 /// Haptic rate (Hz): four samples of the fastest oscillation.

@@ -1,0 +1,178 @@
+//! Stage 5, passivity: an observer keeps the energy that the virtual environment has taken in through the tool, and a
+//! controller pays back what the environment has given out beyond what it had.
+//!
+//! Hannaford and Ryu, "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation 18 (2002).
+//! The device holds f(k-1) until release k, so what it did on the way from x(k-1) to x(k) is exactly f(k-1) . (x(k) -
+//! x(k-1)): nothing is estimated. f is the force on the tool that was really commanded, so whatever a later stage cut from
+//! the answer of the controller is not forgotten.
+//!
+//! The damper is theirs: with the balance E + E(0) < 0 it adds -alpha v, alpha = -(E + E(0)) / (dt
+//! |v|^2), no more than the device renders stably. What that cap leaves is carried: the balance stays negative. The cap also
+//! means that the damper alone guarantees nothing, so the deficit withdraws the force as well, in two steps: first the
+//! part along the motion, which is what gives energy out, then all of it. Both only shorten the force.
+
+use super::force::{Force, dot, norm};
+
+/// The limits of the passivity controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passivity {
+    /// Energy that the environment stores at the start (J).
+    pub stored_j: f64,
+    /// Deficit at which no force is left (J).
+    pub tolerance_j: f64,
+    /// Largest damping (N s/m): what the device renders stably.
+    pub max_damping_n_s_per_m: f64,
+    /// Speed up to which a motion may be nothing but noise: no damping (m/s).
+    pub noise_m_s: f64,
+}
+
+impl Passivity {
+    /// The deficit that can stand in the ledger after all (J), for commands up to `max_force_n` that change by
+    /// `max_slew_n_per_s` at most and a tool no faster than `speed_m_s`: the tolerance, and what the force does in the tick
+    /// `dt` (s) before it is noticed and while the slew limit still lets it go.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn bound_j(&self, max_force_n: f64, max_slew_n_per_s: f64, speed_m_s: f64, dt: f64) -> f64 {
+        self.tolerance_j + max_force_n * speed_m_s * (dt + max_force_n / (2.0 * max_slew_n_per_s))
+    }
+}
+
+/// What the controller made of a force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Controlled {
+    /// The force (N).
+    pub force: Force,
+    /// Damping that was added (N s/m).
+    pub damping: f64,
+    /// The force was shortened.
+    pub withdrew: bool,
+}
+
+/// The force in place of `force` (N) with `balance_j` = E + E(0) in the ledger, for a tool that moves with `velocity` (m/s).
+pub fn control(limits: &Passivity, balance_j: f64, force: Force, velocity: [f64; 3], dt: f64) -> Controlled {
+    // Also what is no number: an unknown balance is no surplus.
+    if balance_j >= 0.0 {
+        return Controlled { force, damping: 0.0, withdrew: false };
+    }
+    let deficit = if balance_j.is_finite() { -balance_j / limits.tolerance_j } else { 1.0 };
+    let speed_squared = dot(velocity, velocity);
+    let moves = speed_squared > limits.noise_m_s * limits.noise_m_s;
+    let mut kept = force;
+    if moves {
+        // Along the motion less and less, none from half of the tolerance on.
+        let outwards = dot(force, velocity).max(0.0) / speed_squared;
+        let share = outwards * (2.0 * deficit).min(1.0);
+        kept = std::array::from_fn(|i| kept[i] - share * velocity[i]);
+    }
+    // All of it, from half of the tolerance to the whole.
+    let gain = (2.0 - 2.0 * deficit).clamp(0.0, 1.0);
+    let kept = kept.map(|c| c * gain);
+    let wanted = deficit * limits.tolerance_j / (dt * speed_squared);
+    let damping = if moves { wanted.min(limits.max_damping_n_s_per_m) } else { 0.0 };
+    let damping = if damping.is_finite() { damping } else { 0.0 };
+    Controlled { force: std::array::from_fn(|i| kept[i] - damping * velocity[i]), damping, withdrew: kept != force }
+}
+
+/// No hand on a device is faster (m/s).
+const FASTEST_HAND_M_S: f64 = 10.0;
+
+/// The energy of one contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ledger {
+    /// E(k) + E(0): taken in less given out, and what was stored at the start (J).
+    balance_j: f64,
+    last: Option<[f64; 3]>,
+}
+
+impl Ledger {
+    /// A ledger of an environment that stores `stored_j` (J) at the start.
+    pub fn new(stored_j: f64) -> Self {
+        Self { balance_j: stored_j, last: None }
+    }
+
+    /// Books the motion of the tool to `position` (m) within `dt` (s) under the held force `held` (N), and gives the
+    /// velocity (m/s) and whether it was believed: a step that no hand makes is a fault of the measurement, not work.
+    pub fn book(&mut self, held: Force, position: [f64; 3], dt: f64) -> ([f64; 3], bool) {
+        let moved = self.last.map_or([0.0; 3], |last| std::array::from_fn(|i| position[i] - last[i]));
+        self.last = Some(position);
+        let velocity = moved.map(|c| c / dt);
+        let believed = norm(velocity) <= FASTEST_HAND_M_S;
+        if believed {
+            self.balance_j -= dot(held, moved);
+        }
+        (velocity, believed)
+    }
+
+    /// E(k) + E(0) (J): while it is not negative the environment is passive.
+    pub fn balance_j(&self) -> f64 {
+        self.balance_j
+    }
+
+    /// Forgets where the tool was: over a gap nobody knows what was exerted.
+    pub fn forget_position(&mut self) {
+        self.last = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Passivity =
+        Passivity { stored_j: 0.0, tolerance_j: 1e-3, max_damping_n_s_per_m: 5.0, noise_m_s: 0.01 };
+
+    #[test]
+    fn a_passive_environment_is_left_alone() {
+        let controlled = control(&LIMITS, 0.0, [1.0, 2.0, 3.0], [0.1; 3], 1e-3);
+        assert_eq!((controlled.force, controlled.damping, controlled.withdrew), ([1.0, 2.0, 3.0], 0.0, false));
+    }
+
+    // Check that the damper asks for exactly the deficit in one tick, where the cap allows it.
+    #[test]
+    fn the_damper_pays_the_deficit_back_in_one_tick_or_as_much_as_the_device_can() {
+        let (v, dt) = (0.2, 1e-3);
+        let paid = control(&LIMITS, -1e-5, [0.0; 3], [v, 0.0, 0.0], dt);
+        assert!((paid.force[0] * v * dt + 1e-5).abs() < 1e-18, "{paid:?}");
+        let capped = control(&LIMITS, -1e-3, [0.0; 3], [v, 0.0, 0.0], dt);
+        assert_eq!(capped.damping, 5.0);
+        assert_eq!(control(&LIMITS, -1e-4, [0.0; 3], [0.009, 0.0, 0.0], dt).damping, 0.0, "noise is not damped");
+    }
+
+    #[test]
+    fn a_deficit_takes_first_what_pushes_along_the_motion_then_everything() {
+        let limits = Passivity { max_damping_n_s_per_m: 0.0, ..LIMITS };
+        let force = |balance: f64, v: [f64; 3]| control(&limits, balance, [1.0, 0.0, 1.0], v, 1e-3).force;
+        let half = force(-0.25e-3, [0.1, 0.0, 0.0]);
+        assert!((half[0] - 0.5).abs() < 1e-12 && half[2] == 1.0, "{half:?}");
+        assert_eq!(force(-0.25e-3, [-0.1, 0.0, 0.0]), [1.0, 0.0, 1.0], "what holds against the motion stays");
+        assert_eq!(force(-1e-3, [-0.1, 0.0, 0.0]), [0.0; 3]);
+        assert_eq!(force(f64::NAN, [0.0; 3]), [0.0; 3]);
+    }
+
+    // Check that a sampled spring gives out exactly K T v x more than it takes in: the leak that the literature names.
+    #[test]
+    fn the_ledger_sees_the_leak_of_a_sampled_spring() {
+        let (k, v, ticks) = (500.0, 0.1, 100);
+        let mut ledger = Ledger::new(0.0);
+        let place = |n: i32| v * 1e-3 * f64::from(if n <= ticks { n } else { 2 * ticks - n });
+        let mut held = [0.0; 3];
+        for n in 0..=2 * ticks {
+            ledger.book(held, [-place(n), 0.0, 0.0], 1e-3);
+            held = [k * place(n), 0.0, 0.0];
+        }
+        let leak = k * (v * 1e-3) * (v * 1e-3) * f64::from(ticks);
+        assert!((ledger.balance_j() + leak).abs() < 1e-15, "{} J, not {leak}", ledger.balance_j());
+    }
+
+    #[test]
+    fn the_first_position_and_the_one_after_a_gap_cost_nothing() {
+        let mut ledger = Ledger::new(0.5);
+        assert_eq!(ledger.book([1.0; 3], [9.0; 3], 1e-3), ([0.0; 3], true));
+        ledger.forget_position();
+        assert_eq!(ledger.book([1.0; 3], [-9.0; 3], 1e-3), ([0.0; 3], true));
+        assert_eq!(ledger.balance_j(), 0.5);
+        assert!(!ledger.book([1.0; 3], [-9.02, -9.0, -9.0], 1e-3).1);
+        assert_eq!(ledger.balance_j(), 0.5, "a teleport is no work");
+    }
+}

@@ -1,0 +1,158 @@
+//! Scene files: TOML text to a validated [`Scene`], every error with its line and field.
+
+use std::path::Path;
+
+use toml::de::DeTable;
+
+mod fault;
+mod locate;
+mod reader;
+mod suggest;
+
+use super::Scene;
+use super::device::{field as device_field, numbered};
+use super::validate::tool;
+use crate::devices::ToolPath;
+use crate::error::{Error, ErrorKind};
+use fault::{Fault, plain_key};
+use locate::{exact_offset_of, line_of, offset_of, table_at};
+
+/// The scene that `palpate` alone runs, part of the program.
+const DEMO_TOML: &str = include_str!("../../../scenes/demo.toml");
+const DEMO_PATH_CSV: &str = include_str!("../../../scenes/paths/demo.csv");
+
+impl Scene {
+    /// Reads, completes and validates a scene file; the tool's path is found relative to it.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if a file cannot be read, [`ErrorKind::Scene`] with file, line, field and what would be right if
+    /// it cannot work.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let name = path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let line = line_of(error.as_bytes(), error.utf8_error().valid_up_to());
+            Error::new(ErrorKind::Scene, "is not UTF-8 text, save the file as UTF-8").at(format!("{name}:{line}"))
+        })?;
+        Self::from_toml(&text, &name, path.parent())
+    }
+
+    /// The scene in `text`; `name` stands for the file in errors, and `device.path_csv` and `device.log` are found in the
+    /// folder `base`, or in the current one.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn from_toml(text: &str, name: &str, base: Option<&Path>) -> Result<Self, Error> {
+        let found = |file: &Path| base.map_or_else(|| file.to_owned(), |base| base.join(file));
+        let mut scene = Self::from_toml_with(text, name, |path_csv| ToolPath::read_csv(&found(path_csv)))?;
+        // It is read when a session is built.
+        for device in &mut scene.devices {
+            device.log = device.log.take().map(|log| found(&log));
+        }
+        Ok(scene)
+    }
+
+    /// The built-in demo: five seconds of pressing, dragging, circling and tapping. Reads no file.
+    pub fn demo() -> Self {
+        Self::from_toml_with(DEMO_TOML, "demo.toml", |path_csv| {
+            ToolPath::from_csv(DEMO_PATH_CSV, &path_csv.display().to_string())
+        })
+        .expect("the built-in scene is valid")
+    }
+
+    /// The scene in `text`, with the tool's path fetched by `read_path`.
+    fn from_toml_with(
+        text: &str,
+        name: &str,
+        read_path: impl Fn(&Path) -> Result<ToolPath, Error>,
+    ) -> Result<Self, Error> {
+        let (document, _) = DeTable::parse_recoverable(text);
+        let root = document.get_ref();
+        let on_line = |error: Error, offset: usize| error.at(format!("{name}:{}", line_of(text, offset)));
+        let mut scene = Self::parse(text, name)?;
+        if scene.body.is_none() {
+            let message = "is missing, a scene needs the tables [body.block] and [body.material]";
+            return Err(on_line(Error::scene("body", message), 0));
+        }
+        scene.source = Some(text.to_owned());
+        let count = scene.devices.len();
+        for (index, device) in scene.devices.iter_mut().enumerate() {
+            let Some(path_csv) = &device.path_csv else { continue };
+            let field = format!("{}.path_csv", device_field(index, count));
+            let read = read_path(path_csv).map_err(|error| match error.kind() {
+                // A file that is there but wrong has a line of its own to name.
+                ErrorKind::Io => on_line(error.at(&field), offset_of(root, &field)),
+                _ => error,
+            })?;
+            device.path = Some(read);
+        }
+        let tools = || {
+            let mut devices = scene.devices.iter().enumerate();
+            devices.try_for_each(|(index, device)| tool(device).map_err(|error| numbered(error, index, &scene.devices)))
+        };
+        scene.validate().and_then(|()| tools()).map_err(|error| {
+            let offset = offset_of(root, error.place());
+            on_line(error, offset)
+        })?;
+        Ok(scene)
+    }
+
+    /// The scene in `text` as it stands: nothing is fetched, completed or validated.
+    fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        let (document, syntax) = DeTable::parse_recoverable(text);
+        let root = document.get_ref();
+        let refuse = |fault: Fault| {
+            let error = Error::new(ErrorKind::Scene, fault.message);
+            let error = if fault.field.is_empty() { error } else { error.at(fault.field) };
+            error.at(format!("{name}:{}", line_of(text, fault.offset.unwrap_or(0))))
+        };
+        if let Some(error) = syntax.first() {
+            return Err(refuse(syntax_fault(text, root, error)));
+        }
+        reader::read(root).map_err(refuse)
+    }
+
+    /// The scene as the text of a scene file, every number to its last bit. The tool's path itself is not part of it,
+    /// only the name of its file.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] if the name of the path's file is not UTF-8.
+    pub fn to_toml(&self) -> Result<String, Error> {
+        toml::to_string(self)
+            .map_err(|error| Error::new(ErrorKind::Scene, format!("cannot be written as TOML: {error}")))
+    }
+
+    /// The scene in the text that a log keeps of what was run: with a body or without, and without a tool, which is in the
+    /// log itself. `name` stands for the text in errors.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] if it is no scene or one that cannot work.
+    pub fn from_session_toml(text: &str, name: &str) -> Result<Self, Error> {
+        let scene = Self::parse(text, name)?;
+        scene.validate().map_err(|error| error.at(name))?;
+        Ok(scene)
+    }
+}
+
+/// toml's complaint in the form of ours; a key given twice is named with its table and its first line.
+fn syntax_fault(text: &str, root: &DeTable<'_>, error: &toml::de::Error) -> Fault {
+    let span = error.span().unwrap_or(0..0);
+    let at = |fault: Fault| fault.or_at(span.start);
+    if error.message() != "duplicate key" {
+        return at(Fault::new(format!("TOML syntax: {}", error.message())));
+    }
+    let line = line_of(text, span.start);
+    let header = text.lines().nth(line - 1).unwrap_or_default().trim_start().strip_prefix('[');
+    if let Some(header) = header {
+        let table = header.trim_start_matches('[').split(']').next().unwrap_or_default().trim();
+        let field = table.split('.').map(|key| plain_key(key.trim())).collect::<Vec<_>>().join(".");
+        return at(Fault { field, offset: None, message: "is given twice, keep one".to_owned() });
+    }
+    let key = plain_key(text.get(span.clone()).unwrap_or_default().trim_matches(['"', '\'']));
+    let table = table_at(root, span.start);
+    let field = if table.is_empty() { key } else { format!("{table}.{key}") };
+    let first = exact_offset_of(root, &field).map(|offset| line_of(text, offset)).filter(|&first| first < line);
+    let first = first.map(|first| format!(" first on line {first},")).unwrap_or_default();
+    let message = format!("is given twice,{first} keep one");
+    at(Fault { field, offset: None, message })
+}

@@ -1,0 +1,145 @@
+//! What can be wrong with the devices of a scene: each by itself, and several together.
+
+use super::super::device::{DeviceKind, DeviceProfile, DeviceSpec, field, numbered};
+use super::check::{lengths_within, positive};
+use crate::devices::{HandSpec, PlantSpec};
+use crate::error::Error;
+use crate::model::contact::Equations;
+
+/// More hands than two people have; the log numbers them in few bits.
+pub(crate) const MAX_DEVICES: usize = 8;
+
+/// Longer than any operator would wait to see that a cable is out (ms).
+const LONGEST_WATCHDOG_MS: f64 = 1000.0;
+
+/// A base that is farther away is a wrong unit (m).
+const FARTHEST_M: f64 = 1e3;
+
+/// First words of topics that a device's own would be mistaken for.
+const TAKEN: [&str; 5] = ["timing", "stats", "global", "ports", "log"];
+
+/// What can be wrong with them.
+pub(super) fn validate(devices: &[DeviceSpec], equations: Equations) -> Result<(), Error> {
+    if devices.is_empty() || devices.len() > MAX_DEVICES {
+        let message = format!("is given {} times, a scene has 1 to {MAX_DEVICES}", devices.len());
+        return Err(Error::scene("device", message));
+    }
+    for (index, device) in devices.iter().enumerate() {
+        self::device(device).map_err(|error| numbered(error, index, devices))?;
+    }
+    if devices.len() == 1 {
+        return Ok(());
+    }
+    if equations == Equations::Paper {
+        let message = "\"paper\" are equations for one tool, use \"corrected\" with several devices";
+        return Err(Error::scene("contact.equations", message));
+    }
+    devices.iter().enumerate().try_for_each(|(index, device)| name(index, device, devices))
+}
+
+fn name(index: usize, device: &DeviceSpec, devices: &[DeviceSpec]) -> Result<(), Error> {
+    let field = format!("{}.name", field(index, devices.len()));
+    let Some(name) = &device.name else {
+        return Err(Error::scene(
+            &field,
+            "is missing, each of several devices needs one for its topics and its report",
+        ));
+    };
+    let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    if name.is_empty() || !name.chars().all(is_plain) || TAKEN.contains(&name.as_str()) {
+        let taken = TAKEN.join(", ");
+        let message = format!("is {name:?}, must be of lower-case letters, digits and _, and none of {taken}");
+        return Err(Error::scene(&field, message));
+    }
+    if devices[..index].iter().any(|other| other.name == device.name) {
+        return Err(Error::scene(&field, format!("is {name:?}, as that of an earlier device, use another")));
+    }
+    Ok(())
+}
+
+/// What can be wrong with one of them.
+fn device(device: &DeviceSpec) -> Result<(), Error> {
+    if device.path_csv.is_some() && device.path.is_none() {
+        let message = "was not read, use Scene::load, or set device.path to a ToolPath";
+        return Err(Error::scene("device.path_csv", message));
+    }
+    // A key that does nothing is a mistake in the scene.
+    if device.kind != DeviceKind::Hand {
+        let unused = [
+            ("device.plant", device.plant != PlantSpec::default()),
+            ("device.hand", device.hand != HandSpec::default()),
+        ];
+        if let Some((field, _)) = unused.iter().find(|(_, is_set)| *is_set) {
+            return Err(Error::scene(field, "belongs to kind = \"hand\", set that or leave it out"));
+        }
+    }
+    if device.kind != DeviceKind::Replay && device.log.is_some() {
+        return Err(Error::scene("device.log", "belongs to kind = \"replay\", set that or leave it out"));
+    }
+    if device.kind == DeviceKind::Replay && device.path_csv.is_some() {
+        let message = "does nothing with kind = \"replay\", the tool moves as in the log: leave it out";
+        return Err(Error::scene("device.path_csv", message));
+    }
+    if let Some((field, message)) = device.plant.fault() {
+        return Err(Error::scene(&format!("device.plant.{field}"), message));
+    }
+    if let Some((field, message)) = device.hand.fault() {
+        return Err(Error::scene(&format!("device.hand.{field}"), message));
+    }
+    haply(device)?;
+    let fault = device.faults.iter().enumerate().find_map(|(index, spec)| Some((index, spec.fault()?)));
+    fault.map_or(Ok(()), |(index, (field, message))| {
+        Err(Error::scene(&format!("device.fault[{index}].{field}"), message))
+    })
+}
+
+/// A scene file must move its tool itself; a program may bring a device of its own.
+pub(crate) fn tool(device: &DeviceSpec) -> Result<(), Error> {
+    let message = match device.kind {
+        DeviceKind::Scripted if device.path.is_none() && device.attach_node.is_none() => {
+            "has no tool, give path_csv (a file t_s,x_m,y_m,z_m), attach_node or both"
+        }
+        DeviceKind::Hand if device.path.is_none() && device.attach_node.is_none() => {
+            "has a hand that wants nothing, give path_csv (a file t_s,x_m,y_m,z_m), attach_node or both"
+        }
+        DeviceKind::Replay if device.log.is_none() => "has no log to replay, give log (a file of `palpate run`)",
+        _ => return Ok(()),
+    };
+    Err(Error::scene("device", message))
+}
+
+/// What can be wrong with a device that is really there.
+fn haply(device: &DeviceSpec) -> Result<(), Error> {
+    let Some(spec) = &device.haply else {
+        return match device.kind {
+            DeviceKind::Haply => {
+                let message = "is missing: a haply device needs the table [device.haply] with max_force_n";
+                Err(Error::scene("device.haply", message))
+            }
+            _ => Ok(()),
+        };
+    };
+    if device.kind != DeviceKind::Haply {
+        return Err(Error::scene("device.haply", "belongs to kind = \"haply\", set that or leave it out"));
+    }
+    if device.path_csv.is_some() || device.path.is_some() {
+        let message = "moves a simulated tool, and a haply device is moved by a hand: leave it out";
+        return Err(Error::scene("device.path_csv", message));
+    }
+    if device.attach_node.is_some() {
+        let message = "glues a tool that starts at its node, and a hand starts anywhere: leave it out";
+        return Err(Error::scene("device.attach_node", message));
+    }
+    if device.profile != DeviceProfile::default() {
+        let message = "names the limits of a simulated device, those of this one are in device.haply: leave it out";
+        return Err(Error::scene("device.profile", message));
+    }
+    positive("device.haply.max_force_n", spec.max_force_n)?;
+    lengths_within("device.haply.origin_m", spec.origin_m, FARTHEST_M)?;
+    positive("device.haply.watchdog_ms", spec.watchdog_ms)?;
+    if spec.watchdog_ms > LONGEST_WATCHDOG_MS {
+        let message = format!("is {}, must be at most {LONGEST_WATCHDOG_MS} ms", spec.watchdog_ms);
+        return Err(Error::scene("device.haply.watchdog_ms", message));
+    }
+    Ok(())
+}

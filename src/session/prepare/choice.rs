@@ -1,0 +1,234 @@
+//! Which local model is right for a body on a machine: the decision behind `model = "auto"`.
+
+use std::fmt;
+
+use super::body::Start;
+use super::situation::Situation;
+use super::timing::Timing;
+use crate::error::Error;
+use crate::log::ModelReason;
+use crate::model::local::Kind;
+use crate::runtime::{Execution, Nanos};
+use crate::scene::{ModelChoice, Scene};
+
+/// A local model that was chosen, and why.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Choice {
+    /// The model that was chosen.
+    pub model: Kind,
+    /// The reason for the choice, and what falls short if something does.
+    pub reason: ModelReason,
+}
+
+impl fmt::Display for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.model.name(), self.reason.why)?;
+        self.reason.warning.iter().try_for_each(|warning| write!(f, "; warning: {warning}"))
+    }
+}
+
+/// `reason` with what else was decided, and what that misses.
+pub(crate) fn extended(reason: Option<ModelReason>, why: String, missed: Option<String>) -> ModelReason {
+    match reason {
+        Some(ModelReason { why: first, warning }) => {
+            ModelReason { why: format!("{first}; {why}"), warning: warning.or(missed) }
+        }
+        None => ModelReason { why, warning: missed },
+    }
+}
+
+/// What is to be expected of a model one global period late: force error rms in % of the peak, the worst of the scenes `hand`,
+/// `wave`, `drag_friction` and `drag_slip` (`palpate compare scenes/NAME.toml`).
+fn expected_error_pct(kind: Kind) -> f64 {
+    match kind {
+        Kind::Hold => 33.0,
+        Kind::Patch => 38.0,
+        Kind::LinearBoundary => 25.0,
+        Kind::ScaledBoundary => 59.0,
+        Kind::Condensed => 36.0,
+        Kind::Predicted => 5.0,
+        Kind::Predictive => 0.5,
+        Kind::Full => 0.0,
+    }
+}
+
+/// The model that `scene` names, or the one that is right for it, which it names then. With that the reason, and what a force
+/// evaluation takes if that was measured or taken to be.
+///
+/// # Errors
+/// If a model of the whole body would have to be each tool's own.
+pub(super) fn model(
+    scene: &mut Scene,
+    start: &mut Start,
+    timing: Timing,
+    execution: Execution,
+) -> Result<(Kind, Option<Choice>, Option<Nanos>), Error> {
+    let (kind, choice, evaluation) = match scene.local.model {
+        ModelChoice::Named(kind) => (kind, None, None),
+        ModelChoice::Auto => {
+            let situation = Situation::of(scene, &mut *start.body, &start.state, timing, execution);
+            let choice = choose(&situation);
+            // The log's scene names the model and what was asked of it.
+            scene.local.name_chosen(choice.model);
+            (choice.model, Some(choice), Some(situation.evaluation))
+        }
+    };
+    let devices = scene.devices.len();
+    if kind == Kind::Full && devices > 1 {
+        let message = format!(
+            "is `full`, which is one model of the whole body, and the {devices} devices need one each: use another, such as \
+             \"predictive\""
+        );
+        return Err(Error::scene("local.model", message));
+    }
+    Ok((kind, choice, evaluation))
+}
+
+/// The cheapest model that fits the rates and meets `error_pct`; if there is none, the best that fits.
+///
+/// `full` comes first: the others need the same work for their global model, and more. Then in order of cost. Where none
+/// meets the error, a tight `full` comes before a model that is wrong.
+fn choose(situation: &Situation) -> Choice {
+    let error = situation.error_pct;
+    let is_possible = |kind: &Kind| situation.possible.contains(kind);
+    if is_possible(&Kind::Full) && situation.load(Kind::Full) <= 1.0 {
+        let why = format!("{}, and nothing beats full where it fits", situation.full_in_words("takes"));
+        return Choice { model: Kind::Full, reason: ModelReason { why, warning: None } };
+    }
+    let fits = |kind: &Kind| situation.load(*kind) <= 1.0;
+    let others: Vec<Kind> = Kind::ALL.into_iter().filter(is_possible).filter(|kind| *kind != Kind::Full).collect();
+    let full = situation.full_in_words("would take");
+    if let Some(&model) = others.iter().filter(|kind| fits(kind)).find(|kind| expected_error_pct(**kind) <= error) {
+        let why = format!("{full}; {} meets {error} % (expected {} %)", model.name(), expected_error_pct(model));
+        return Choice { model, reason: ModelReason { why, warning: None } };
+    }
+    let by_error = |a: &&Kind, b: &&Kind| expected_error_pct(**a).total_cmp(&expected_error_pct(**b));
+    if let Some(share) = situation.tight_share().filter(|_| is_possible(&Kind::Full)) {
+        let why = format!("{}, and no other model that fits meets {error} %", situation.full_in_words("takes"));
+        let percent = 100.0 * share;
+        let warning = Some(format!("the typical tick takes {percent:.0} % of its period, some will be late"));
+        return Choice { model: Kind::Full, reason: ModelReason { why, warning } };
+    }
+    if let Some(&model) = others.iter().filter(|kind| fits(kind)).min_by(by_error) {
+        let name = model.name();
+        // The one that would have been nearest, if it only fitted.
+        let why = match others.iter().filter(|kind| !fits(kind)).min_by(by_error) {
+            Some(&better) if expected_error_pct(better) < expected_error_pct(model) => {
+                format!("{full}, and {}; {name} is the best that fits", situation.excess(better))
+            }
+            _ => format!("{full}; {name} is the best that fits this body"),
+        };
+        let expected = expected_error_pct(model);
+        let warning = Some(format!("error_pct = {error} is not met, {name} is expected to be {expected} % off"));
+        return Choice { model, reason: ModelReason { why, warning } };
+    }
+    let by_load = |a: &Kind, b: &Kind| situation.load(*a).total_cmp(&situation.load(*b));
+    let model = situation.possible.iter().copied().min_by(|a, b| by_load(a, b).then(by_error(&a, &b)));
+    let model = model.unwrap_or(Kind::Full);
+    let expected = expected_error_pct(model);
+    let why = format!("{full}, and {}; {} asks for least", situation.excess(model), model.name());
+    let warning = format!("no model fits this machine with a margin, and an error of {expected} % is expected");
+    Choice { model, reason: ModelReason { why, warning: Some(warning) } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two substeps at 1 kHz and 30 Hz on two cores, 42 ticks ahead, 20^3 nodes, 1 % wanted, every model possible.
+    fn situation(evaluation_us: u64) -> Situation {
+        Situation {
+            evaluation: Nanos(evaluation_us * 1000),
+            origin: "measured",
+            substeps: 2,
+            haptic_period_s: 1e-3,
+            global_period_s: 1.0 / 30.0,
+            ahead_ticks: 42,
+            nodes: 8000,
+            cores: 2,
+            error_pct: 1.0,
+            states: 50,
+            devices: 1,
+            possible: Kind::ALL.to_vec(),
+        }
+    }
+
+    #[track_caller]
+    fn assert_chosen(situation: &Situation, model: Kind, why: &[&str], warning: Option<&str>) {
+        let choice = choose(situation);
+        let text = choice.to_string();
+        assert_eq!(choice.model, model, "{text}");
+        assert!(why.iter().all(|words| choice.reason.why.contains(words)), "{why:?} in {text}");
+        match (&choice.reason.warning, warning) {
+            (None, None) => {}
+            (Some(given), Some(words)) => assert!(given.contains(words), "{words:?} in {text}"),
+            _ => panic!("{text}"),
+        }
+    }
+
+    #[test]
+    fn nothing_beats_full_where_it_fits_however_much_error_is_allowed() {
+        for error_pct in [0.1, 1.0, 50.0] {
+            let small = Situation { error_pct, ..situation(38) };
+            assert_chosen(&small, Kind::Full, &["takes 95 us of 1 ms (measured)", "nothing beats full"], None);
+        }
+    }
+
+    #[test]
+    fn predictive_is_chosen_where_full_does_not_fit_and_the_global_period_holds_the_prediction() {
+        let why = ["would take 525 us of 1 ms (measured)", "predictive meets 1 %", "expected 0.5 %"];
+        assert_chosen(&situation(210), Kind::Predictive, &why, None);
+    }
+
+    #[test]
+    fn a_cheaper_model_is_chosen_where_so_much_error_is_allowed() {
+        for (error_pct, model) in [(26.0, Kind::LinearBoundary), (40.0, Kind::Hold), (24.0, Kind::Predictive)] {
+            let choice = choose(&Situation { error_pct, ..situation(210) });
+            assert!(choice.model == model && choice.reason.warning.is_none(), "{choice}");
+        }
+    }
+
+    #[test]
+    fn a_tight_full_is_better_than_a_model_that_is_wrong() {
+        let why = ["takes 788 us of 1 ms", "no other model that fits meets 1 %"];
+        assert_chosen(&situation(315), Kind::Full, &why, Some("takes 79 % of its period, some will be late"));
+        // On a single core both rates would not fit for `predictive`.
+        assert_chosen(&Situation { cores: 1, ..situation(240) }, Kind::Full, &["takes 600 us"], Some("60 %"));
+    }
+
+    #[test]
+    fn what_misses_the_error_is_said_with_by_how_much_and_what_was_too_dear() {
+        let why = [
+            "would take 875 us of 1 ms",
+            "would need 37.5 ms of 33.3 ms for predictive",
+            "linear_boundary is the best",
+        ];
+        assert_chosen(&situation(350), Kind::LinearBoundary, &why, Some("linear_boundary is expected to be 25 % off"));
+        // A body that is not made of springs.
+        let possible = vec![Kind::Hold, Kind::Patch, Kind::LinearBoundary, Kind::ScaledBoundary, Kind::Full];
+        let own = Situation { possible, ..situation(350) };
+        assert_chosen(&own, Kind::LinearBoundary, &["the best that fits this body"], Some("error_pct = 1 is not met"));
+    }
+
+    #[test]
+    fn a_tick_of_a_patch_has_to_fit_too() {
+        // At 20 kHz and 4 substeps a predictive patch takes 30 us of 50 us.
+        let fast = Situation { haptic_period_s: 5e-5, ahead_ticks: 840, substeps: 4, error_pct: 10.0, ..situation(9) };
+        assert_chosen(
+            &fast,
+            Kind::LinearBoundary,
+            &["a tick of predictive would take 30 us of 50 us"],
+            Some("not met"),
+        );
+    }
+
+    #[test]
+    fn the_least_load_is_left_where_nothing_fits() {
+        for cores in [1, 2] {
+            let choice = choose(&Situation { cores, ..situation(5000) });
+            assert!(![Kind::Full, Kind::Predicted, Kind::Predictive].contains(&choice.model), "{choice}");
+            assert!(choice.reason.warning.is_some_and(|warning| warning.contains("no model fits")));
+        }
+    }
+}

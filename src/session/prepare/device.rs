@@ -1,0 +1,132 @@
+//! Makes the device that a scene describes.
+
+use std::path::Path;
+
+use super::super::parts::OpenHaply;
+use crate::devices::{Device, DeviceState, Faulty, Hand, Replayed, ReplayedSample, Scripted, ToolPath};
+use crate::error::{Error, ErrorKind};
+use crate::log::{LogEntry, LogReader, LogRecord, ToolSample};
+use crate::model::Vec3;
+use crate::runtime::Execution;
+use crate::scene::{DeviceKind, DeviceSpec};
+
+/// A glued tool that starts farther from its node would tear it there in the first tick (m).
+const LARGEST_START_GAP: f64 = 1e-3;
+
+/// The device of `spec` for ticks of `tick` (s); `glued_at` is where the node that the tool is glued to is at the start.
+pub(super) fn device(
+    spec: &DeviceSpec,
+    tick: f64,
+    glued_at: Option<Vec3>,
+    execution: Execution,
+    open_haply: Option<OpenHaply>,
+) -> Result<Box<dyn Device>, Error> {
+    let capabilities = spec.profile.capabilities();
+    match spec.kind {
+        DeviceKind::Scripted => {
+            let path = path(spec, glued_at)?;
+            check_start("device.path_csv", path.at(0.0).into(), glued_at)?;
+            Ok(Box::new(Scripted::new(path).with_capabilities(capabilities)))
+        }
+        DeviceKind::Hand => {
+            let path = path(spec, glued_at)?;
+            let start = spec.plant.start_m.unwrap_or_else(|| path.at(0.0));
+            check_start("device.plant.start_m", start.into(), glued_at)?;
+            Ok(Box::new(Hand::new(path, spec.plant.clone(), spec.hand.clone(), capabilities)?))
+        }
+        DeviceKind::Replay => replayed(spec, glued_at),
+        DeviceKind::Haply => haply(spec, tick, execution, open_haply),
+    }
+}
+
+/// `device` with the faults of `spec`.
+pub(super) fn with_faults(device: Box<dyn Device>, spec: &DeviceSpec) -> Box<dyn Device> {
+    if spec.faults.is_empty() {
+        return device;
+    }
+    Box::new(Faulty::new(device, spec.faults.clone()))
+}
+
+/// Connects to the service of a Haply device that is driven every `tick` seconds.
+fn haply(
+    device: &DeviceSpec,
+    tick: f64,
+    execution: Execution,
+    open: Option<OpenHaply>,
+) -> Result<Box<dyn Device>, Error> {
+    if execution == Execution::Virtual {
+        let message = "is \"haply\", a device that is really there: it cannot run in virtual time";
+        return Err(Error::scene("device.kind", message));
+    }
+    let spec = device.haply.as_ref().ok_or_else(|| Error::scene("device.haply", "is missing"))?;
+    let message = "is \"haply\", which this program does not open: give `palpate_haply::open` to its session";
+    open.ok_or_else(|| Error::scene("device.kind", message))?(spec, tick)
+}
+
+/// Where the tool, or the hand that holds it, goes; without a path it stays where the node is that it is glued to.
+fn path(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<ToolPath, Error> {
+    match (&spec.path, glued_at) {
+        (Some(path), _) => Ok(path.clone()),
+        (None, Some(position)) => ToolPath::constant(position.into()),
+        (None, None) => {
+            let message = "nothing moves the tool: give it a path_csv, an attach_node or a device of the program's own";
+            Err(Error::new(ErrorKind::Scene, message).at("device"))
+        }
+    }
+}
+
+fn check_start(field: &str, start: Vec3, glued_at: Option<Vec3>) -> Result<(), Error> {
+    let Some(node) = glued_at else { return Ok(()) };
+    let gap = (start - node).norm();
+    if gap <= LARGEST_START_GAP {
+        return Ok(());
+    }
+    let place: [f64; 3] = node.into();
+    let message = format!("starts {gap} m away from the node that the tool is glued to, must start at {place:?}");
+    Err(Error::scene(field, message))
+}
+
+fn replayed(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dyn Device>, Error> {
+    let Some(log) = &spec.log else {
+        return Err(Error::scene("device.log", "is missing, name the log whose device is replayed"));
+    };
+    let (first, samples) = recorded(log, spec.name.as_deref()).map_err(|error| error.at("device.log"))?;
+    check_start("device.log", first.position, glued_at)?;
+    Ok(Box::new(Replayed::new(first, samples, spec.profile.capabilities()).at_any_rate()))
+}
+
+/// The first state and the samples of the tool in a log, as far as it is whole: of the device called `name` if the log has
+/// several, where no name means the first.
+fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<ReplayedSample>), Error> {
+    let mut reader = LogReader::open(log)?;
+    let reader_place = reader.place().to_owned();
+    let (mut number, mut first, mut samples) = (0, None, Vec::new());
+    for entry in reader.by_ref() {
+        match entry {
+            LogEntry::Environment(environment) => {
+                let devices = &environment.devices;
+                let place = devices.iter().position(|device| Some(device.as_str()) == name);
+                if let (None, Some(name), false) = (place, name, devices.is_empty()) {
+                    let message = format!("it has no device {name:?}, but {}", devices.join(" and "));
+                    return Err(Error::new(ErrorKind::Log, message).at(reader_place));
+                }
+                number = place.unwrap_or_default() as u16;
+                first = environment.first_tools.get(usize::from(number)).map(state);
+            }
+            LogEntry::Record(LogRecord::Tool(sample)) if sample.device == number => {
+                samples.push(ReplayedSample { time: sample.time, id: sample.id, state: state(&sample) });
+            }
+            _ => {}
+        }
+    }
+    // Records of one actor are in order, chunks of a damaged log need not be.
+    samples.sort_by_key(|sample| sample.time);
+    match first.or_else(|| samples.first().map(|sample| sample.state)) {
+        Some(first) if !samples.is_empty() => Ok((first, samples)),
+        _ => Err(Error::new(ErrorKind::Log, "it holds no sample of a tool").at(reader.place())),
+    }
+}
+
+fn state(sample: &ToolSample) -> DeviceState {
+    DeviceState { position: sample.position_m.into(), velocity: sample.velocity_m_s.into(), buttons: sample.buttons }
+}

@@ -1,0 +1,196 @@
+//! From what a builder collected to parts that can start: everything is checked here, and nothing is started or written.
+//!
+//! The steps are those of [`prepare`], in the order of their checks: body, timing, local model, tools, rate groups.
+
+mod body;
+mod budget;
+mod choice;
+mod device;
+mod groups;
+mod limits;
+mod patch;
+mod situation;
+mod timing;
+mod tools;
+
+pub use choice::Choice;
+pub(super) use choice::extended;
+pub(super) use groups::BASIS;
+pub(super) use timing::Timing;
+pub(super) use tools::Tool;
+
+use super::parts::{Options, Parts};
+use crate::error::Error;
+use crate::model::blend::Blend;
+use crate::model::contact::{Equations, Law};
+use crate::model::local::{Feedback, Kind, MOST_EXPLICIT_STEPS, Template};
+use crate::model::mesh::Lattice;
+use crate::model::simulation::{Simulation, Stepping};
+use crate::model::surroundings::Size;
+use crate::runtime::{Execution, Nanos, RateGroup, admit_here};
+use crate::scene::{ProbeSpec, Scene, StepKind};
+use body::Start;
+use patch::PatchChoice;
+
+/// Everything that a session's actors are made of.
+#[derive(Debug)]
+pub(super) struct Prepared {
+    /// The scene as it is run, with everything that a program, the command line or a choice changed; without the paths and
+    /// files of its devices, which a log holds in other places.
+    pub(super) scene: Scene,
+    pub(super) simulation: Simulation,
+    /// In the order of their devices.
+    pub(super) tools: Vec<Tool>,
+    pub(super) plan: ModelPlan,
+    /// Why its model, if none was named.
+    pub(super) choice: Option<Choice>,
+    /// The patch, if an error budget chose it.
+    pub(super) sized_patch: Option<PatchChoice>,
+    pub(super) local: RateGroup,
+    pub(super) global: RateGroup,
+    pub(super) until: Option<Nanos>,
+    pub(super) options: Options,
+}
+
+/// How local models are made, followed by one another and watched.
+#[derive(Debug)]
+pub(super) struct ModelPlan {
+    pub(super) template: Template,
+    pub(super) timing: Timing,
+    pub(super) blend: Blend,
+    /// A basis takes its time here: bases are asked for ahead of the tool.
+    pub(super) prefetches: bool,
+    /// Logged nodes.
+    pub(super) probes: Vec<u32>,
+}
+
+impl Prepared {
+    /// True if the local models use reduced surroundings.
+    pub(super) fn reduces(&self) -> bool {
+        self.plan.template.kind == Kind::Predictive && self.scene.local.basis_size() != Size::States(0)
+    }
+
+    /// True if there is a global model beside the local ones.
+    pub(super) fn is_multi_rate(&self) -> bool {
+        self.plan.template.kind != Kind::Full
+    }
+
+    /// The rate groups, in graph order.
+    pub(super) fn groups(&self) -> Vec<RateGroup> {
+        let global = self.is_multi_rate().then(|| self.global.clone());
+        let basis = self.reduces().then(|| self.basis_group());
+        [self.local.clone()].into_iter().chain(basis).chain(global).chain([self.logger_group()]).collect()
+    }
+
+    /// The group that reduces surroundings: it looks for wishes as often as the global model makes them.
+    pub(super) fn basis_group(&self) -> RateGroup {
+        groups::basis_group(self.plan.timing.global, &self.scene.global)
+    }
+
+    /// The group that takes records to the log.
+    pub(super) fn logger_group(&self) -> RateGroup {
+        groups::logger_group(self.scene.log.scene)
+    }
+}
+
+/// Checks `parts` and makes everything that can be made before a start.
+///
+/// # Errors
+/// Whatever cannot work, naming the field and what would be right.
+pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
+    let mut scene = described(&parts)?;
+    let Parts { body, devices, attached, probes, global, local, open_haply, endless, is_replay, options, .. } = parts;
+    let execution = options.execution;
+    let rates = timing::rates(&scene)?;
+    let mut start = Start::new(body, &scene, &attached, probes, rates[0])?;
+    let global = groups::global_group(global, &scene.global, rates[1], execution)?;
+    let blend_ticks = (scene.local.blend.ms * 1e-3 / rates[0].period_s()).round().max(1.0) as u32;
+    let work = Nanos(budget::nominal_evaluation(&*start.body).0 * u64::from(start.substeps));
+    let lateness = timing::lateness(&global, rates[0], work, options.in_real_time);
+    let timing = Timing::new(rates, start.substeps, lateness, blend_ticks);
+
+    let (kind, choice, measured) = choice::model(&mut scene, &mut start, timing, execution)?;
+    let sized_patch = patch::choose(&scene, &*start.body, &start.attached);
+    // Named in the log's scene, so that a replay does not choose again.
+    scene.local.patch = Some(sized_patch.as_ref().map_or(scene.local.patch_size(), |choice| choice.size));
+
+    let mut as_run = as_run(&scene, Some((&start.attached, &start.probes)));
+    let making = tools::Making { scene: &scene, start: &mut start, haptic: rates[0], execution, open_haply, is_replay };
+    let tools;
+    // The safety section with what it left to the device.
+    (tools, as_run.safety) = tools::tools(devices, making)?;
+    let template = template(kind, &scene, &start, timing)?;
+
+    let local = groups::local_group(local, rates[0], &tools, &scene.devices, execution);
+    let evaluation = || measured.unwrap_or_else(|| budget::force_evaluation(&mut *start.body, &start.state));
+    let [local, global] = match execution {
+        Execution::Virtual => [local, global],
+        Execution::Threaded => budget::declare(evaluation, start.state.positions.len(), timing, kind, [local, global])?,
+    };
+    let blend = Blend::new(scene.local.blend.kind, blend_ticks);
+    let (probes, prefetches) = (std::mem::take(&mut start.probes), options.in_real_time);
+    let plan = ModelPlan { template, timing, blend, prefetches, probes };
+    let until = (!endless).then(|| Nanos::from_secs_f64(scene.run.duration_s));
+    let simulation = simulation(start, &scene, &tools)?;
+    let prepared =
+        Prepared { scene: as_run, simulation, tools, plan, choice, sized_patch, local, global, until, options };
+    admit_here(&prepared.groups(), execution)?;
+    Ok(prepared)
+}
+
+/// The scene with the devices that a program brings; it and the program's rate groups have been checked.
+fn described(parts: &Parts) -> Result<Scene, Error> {
+    let mut scene = parts.scene.clone();
+    tools::complete(&mut scene, parts);
+    scene.validate()?;
+    for (field, group) in [("local", &parts.local), ("global", &parts.global)] {
+        group.as_ref().map_or(Ok(()), |group| groups::check_group(field, group))?;
+    }
+    Ok(scene)
+}
+
+/// The scene without what a log holds in other places, and with the nodes that a program named, if it has a lattice.
+pub(super) fn as_run(scene: &Scene, named: Option<(&[Option<u32>], &[u32])>) -> Scene {
+    let mut scene = scene.clone();
+    for device in &mut scene.devices {
+        (device.path_csv, device.path, device.log) = (None, None, None);
+    }
+    if let (Some(body), Some((attached, probes))) = (&scene.body, named) {
+        let lattice = Lattice { nodes: body.block.nodes };
+        for (device, node) in scene.devices.iter_mut().zip(attached) {
+            device.attach_node = node.map(|node| lattice.place(node));
+        }
+        scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.place(node) }).collect();
+    }
+    scene
+}
+
+/// What every local model is made by.
+fn template(kind: Kind, scene: &Scene, start: &Start, timing: Timing) -> Result<Template, Error> {
+    let is_implicit = match scene.local.step {
+        StepKind::Explicit => false,
+        StepKind::Implicit => true,
+        StepKind::Auto => scene.contact.equations != Equations::Paper && start.stable_substeps > MOST_EXPLICIT_STEPS,
+    };
+    // The longer one where periods alternate, 33 and 34 ticks at 30 Hz.
+    let ticks = (timing.haptic.as_hz() / timing.global.as_hz() - 1e-6).ceil().min(f64::from(u32::MAX)) as u32;
+    let template = Template::new(kind, scene.local.patch_size(), &*start.body)?
+        .with_feedback(scene.local.feedback.unwrap_or(Feedback::of(kind)))
+        .with_prediction(scene.local.prediction)
+        .with_period(ticks);
+    Ok(if is_implicit { template.with_implicit_steps() } else { template })
+}
+
+/// The whole body with its tools, before the first tick.
+fn simulation(start: Start, scene: &Scene, tools: &[Tool]) -> Result<Simulation, Error> {
+    let law = Law {
+        friction: scene.contact.friction.coefficient(),
+        normals: scene.contact.normals,
+        equations: scene.contact.equations,
+    };
+    let Start { body, state, tick, substeps, .. } = start;
+    let mut contacts = tools.iter().map(|tool| tool.contact);
+    let first = contacts.next().unwrap_or_default();
+    let first = Simulation::new(body, state, first, law, Stepping { tick, substeps })?;
+    Ok(contacts.fold(first, Simulation::with_tool))
+}

@@ -1,0 +1,104 @@
+//! The tools of a session: each with its device, its contact, its limits.
+
+use super::super::parts::{OpenHaply, Parts};
+use super::body::Start;
+use super::device;
+use super::limits::{self, check_capabilities, check_ramp};
+use crate::devices::Device;
+use crate::error::Error;
+use crate::model::body::Body;
+use crate::model::contact::Contact;
+use crate::runtime::{Execution, Rate};
+use crate::safety::Limits;
+use crate::safety::coupling::Design;
+use crate::scene::{DeviceSpec, SafetySpec, Scene, numbered};
+
+const _: () = assert!(crate::scene::MAX_DEVICES == crate::log::MAX_DEVICES as usize, "the log numbers every device");
+
+/// A tool before the start.
+#[derive(Debug)]
+pub(crate) struct Tool {
+    /// Its name; empty for the only one.
+    pub(crate) name: String,
+    pub(crate) device: Box<dyn Device>,
+    /// How it touches the body at the start.
+    pub(crate) contact: Contact,
+    pub(crate) limits: Limits,
+    /// Between device and simulated tool.
+    pub(crate) coupling: Option<Design>,
+}
+
+/// What tools are made from.
+pub(super) struct Making<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) start: &'a mut Start,
+    pub(super) haptic: Rate,
+    pub(super) execution: Execution,
+    pub(super) open_haply: Option<OpenHaply>,
+    pub(super) is_replay: bool,
+}
+
+/// Fills in the scene's devices for those that a program brings: one each, with a name if there are several.
+pub(super) fn complete(scene: &mut Scene, parts: &Parts) {
+    let brought = parts.devices.len().max(parts.attached.len());
+    if brought > scene.devices.len() {
+        scene.devices.resize_with(brought, DeviceSpec::default);
+    }
+    for (spec, (name, _)) in scene.devices.iter_mut().zip(&parts.devices) {
+        if name.is_some() {
+            spec.name.clone_from(name);
+        }
+    }
+}
+
+/// The tools, in the order of the scene, and its safety section with what it left to the devices.
+///
+/// # Errors
+/// If a device cannot be made, or its limits and the scene's do not go together.
+pub(super) fn tools(
+    brought: Vec<(Option<String>, Box<dyn Device>)>,
+    making: Making<'_>,
+) -> Result<(Vec<Tool>, SafetySpec), Error> {
+    let Making { scene, start, haptic, execution, open_haply, is_replay } = making;
+    let (body, state, tick) = (&mut *start.body, &start.state, haptic.period_s());
+    // Both ledgers begin with a share of what is stored: together they give out no more than all of it.
+    let stored_j = limits::stored_energy(body, state) / scene.devices.len() as f64;
+    let mut brought = brought.into_iter();
+    let (mut tools, mut all_resolved) = (Vec::new(), Vec::new());
+    for (index, (spec, &node)) in scene.devices.iter().zip(&start.attached).enumerate() {
+        let of_this = |error: Error| numbered(error, index, &scene.devices);
+        let device = match brought.next() {
+            Some((_, device)) => device,
+            None => {
+                let glued_at = node.map(|node| state.positions[node as usize]);
+                device::device(spec, tick, glued_at, execution, open_haply).map_err(of_this)?
+            }
+        };
+        // What is executed again has met them already.
+        let device = if is_replay { device } else { device::with_faults(device, spec) };
+        let device_limits = limits::device_limits(&scene.safety, &device.capabilities());
+        let resolved = limits::resolved(scene, &device_limits);
+        let limits = limits::limits(&resolved, &device_limits, stored_j, tick);
+        check_ramp(&limits).map_err(of_this)?;
+        check_capabilities(device.capabilities(), &limits).map_err(of_this)?;
+        let coupling = match scene.local.coupling {
+            true => Some(limits::coupling(body, node, &device_limits, tick)?),
+            false => None,
+        };
+        let contact = node.map_or_else(Contact::default, |node| glued(body, node));
+        let name = spec.name.clone().filter(|_| scene.devices.len() > 1).unwrap_or_default();
+        tools.push(Tool { name, device, contact, limits, coupling });
+        all_resolved.push(resolved);
+    }
+    // What differs between devices stays theirs.
+    let agreed = all_resolved.windows(2).all(|pair| pair[0] == pair[1]);
+    let resolved = all_resolved.into_iter().next().filter(|_| agreed).unwrap_or_else(|| scene.safety.clone());
+    Ok((tools, resolved))
+}
+
+/// The contact that glues the tool to `node`.
+fn glued(body: &dyn Body, node: u32) -> Contact {
+    let triangle = body.surface().at_node(node)[0];
+    let weights = body.surface().triangles[triangle as usize].map(|corner| f64::from(u8::from(corner == node)));
+    Contact::glued(triangle, weights)
+}

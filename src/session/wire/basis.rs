@@ -1,0 +1,89 @@
+//! The background group that reduces surroundings, and what has to be there before a run begins.
+
+use std::sync::Arc;
+
+use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
+use crate::error::Error;
+use crate::log::ModelReason;
+use crate::model::Vec3;
+use crate::model::local::ToolForecast;
+use crate::model::local::{Aim, wider};
+use crate::model::surroundings::{Bases, Size, SpringGraph};
+use crate::runtime::{Actor, ExchangePort, RuntimeBuilder};
+use crate::session::prepare::{Prepared, extended};
+
+/// The basis actor's side of a session.
+pub(super) struct BasisSide {
+    pub(super) wishes: ExchangePort<Wishes>,
+    pub(super) bases: ExchangePort<Bases>,
+    /// Those that are there before the start.
+    pub(super) known: Bases,
+    springs: Arc<SpringGraph>,
+    store: BasisStore,
+    pace: BasisPace,
+}
+
+impl BasisSide {
+    /// Its ports, and the bases around each of `tools` (m).
+    ///
+    /// # Errors
+    /// If the surface cannot be searched.
+    pub(super) fn new(graph: &mut RuntimeBuilder, prepared: &Prepared, tools: &[Vec3]) -> Result<Option<Self>, Error> {
+        let Some(springs) = prepared.plan.template.springs.clone().filter(|_| prepared.reduces()) else {
+            return Ok(None);
+        };
+        let store =
+            BasisStore { size: prepared.scene.local.basis_size(), folder: prepared.scene.local.basis_folder.clone() };
+        let pace = if prepared.plan.prefetches { BasisPace::OneByOne } else { BasisPace::All };
+        Ok(Some(Self {
+            wishes: graph.exchange_port(Wishes::default),
+            bases: graph.exchange_port(Bases::default),
+            known: first_bases(prepared, &springs, &store, tools)?,
+            store,
+            springs,
+            pace,
+        }))
+    }
+
+    /// The reason for the model, with what the first basis came to if its states were chosen by a budget.
+    pub(super) fn reason(&self, of_model: Option<ModelReason>) -> Option<ModelReason> {
+        let Size::ErrorPct(budget) = self.store.size else { return of_model };
+        let Some(basis) = self.known.iter().max_by_key(|basis| basis.states()) else { return of_model };
+        let (states, Some(estimate)) = (basis.states(), basis.estimate()) else { return of_model };
+        let (linear, expected) = (estimate.linear_pct, estimate.expected_pct());
+        let sized = format!(
+            "error_pct = {budget} takes {states} states at the start, {expected:.2} % expected (linear force {linear:.2} %)"
+        );
+        let missed =
+            (expected > budget).then(|| format!("error_pct = {budget} is not met, {expected:.2} % is expected"));
+        Some(extended(of_model, sized, missed))
+    }
+
+    pub(super) fn actor(&self) -> Box<dyn Actor> {
+        let ports = BasisPorts { wishes: self.wishes.reader(), bases: self.bases.writer() };
+        Box::new(BasisActor::new(Arc::clone(&self.springs), self.store.clone(), self.known.clone(), self.pace, ports))
+    }
+}
+
+/// The basis where each tool is, and before a run on threads one that holds a cell more around it.
+fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, tools: &[Vec3]) -> Result<Bases, Error> {
+    let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
+    let aim = Aim::new(body.surface(), &state.positions)?;
+    let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
+    let size = prepared.plan.template.patch;
+    let sizes: &[[usize; 3]] = if prepared.plan.prefetches { &[size, wider(size)] } else { &[size] };
+    for (index, &tool) in tools.iter().enumerate() {
+        let contact = prepared.simulation.contact(index);
+        aim.triangles(Some(contact), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
+        for &size in sizes {
+            body.patch(&triangles[..1], size, &mut patch);
+            // What cannot be reduced is told by the actor, when it is wanted.
+            if bases.get(&patch).is_none()
+                && let Ok(Some(basis)) = store.get(springs, &patch)
+            {
+                bases.insert(Arc::new(basis));
+            }
+        }
+    }
+    Ok(bases)
+}

@@ -1,0 +1,96 @@
+//! What the log says of the run as a whole.
+
+use crate::devices::DeviceState;
+use crate::error::Error;
+use crate::log::{Environment, Execution as LogExecution, GroupInfo, ModelReason, ToolSample};
+use crate::model::body::Block;
+use crate::runtime::{Execution, Rate};
+use crate::safety::Actions;
+use crate::session::prepare::{BASIS, Prepared, Tool};
+
+/// The environment of a run whose devices gave these `first` states.
+pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment, Error> {
+    let session = Some(prepared.scene.to_toml()?);
+    let timing = &prepared.plan.timing;
+    Ok(Environment {
+        palpate_version: env!("CARGO_PKG_VERSION").to_owned(),
+        instruction_set: Block::instruction_set().to_owned(),
+        execution: match prepared.options.execution {
+            Execution::Virtual => LogExecution::Virtual,
+            Execution::Threaded => LogExecution::Threaded { start_unix_ns: unix_now_ns() },
+        },
+        model: prepared.plan.template.kind.name().to_owned(),
+        model_reason: model_reason(prepared),
+        haptic_hz: timing.haptic.as_hz(),
+        global_hz: if prepared.is_multi_rate() { timing.global.as_hz() } else { 0.0 },
+        groups: groups(prepared),
+        limit_stages: Actions::NAMES.map(str::to_owned).into(),
+        safety_off: prepared.scene.safety.off.iter().map(|stage| stage.name().to_owned()).collect(),
+        devices: match prepared.tools.as_slice() {
+            [_] => Vec::new(),
+            several => several.iter().map(|tool| tool.name.clone()).collect(),
+        },
+        // All of it: each device's ledger begins with an even share.
+        stored_j: prepared.tools.iter().filter_map(|tool| Some(tool.limits.passivity?.stored_j)).sum(),
+        coupling: couplings(&prepared.tools),
+        granted: Default::default(),
+        first_tools: (0..).zip(first).map(first_tool).collect(),
+        scene: prepared.scene.source.clone(),
+        session,
+    })
+}
+
+/// The rate groups, in graph order.
+fn groups(prepared: &Prepared) -> Vec<GroupInfo> {
+    let group = |name: &str, rate: Rate| GroupInfo::new(name, rate.as_hz());
+    let timing = &prepared.plan.timing;
+    let local = GroupInfo {
+        budget: prepared.local.declared_budget(),
+        actors: prepared.tools.iter().flat_map(|tool| haptic_actor_names(&tool.name)).collect(),
+        ..group("local", timing.haptic)
+    };
+    let basis = || GroupInfo { background: true, ..group(BASIS, timing.global) };
+    let global = || GroupInfo { budget: prepared.global.declared_budget(), ..group("global", timing.global) };
+    let logger = group("logger", prepared.logger_group().rate());
+    let optional = [prepared.reduces().then(basis), prepared.is_multi_rate().then(global)];
+    [local].into_iter().chain(optional.into_iter().flatten()).chain([logger]).collect()
+}
+
+/// Why model and patch are what they are, if that was left to the session.
+fn model_reason(prepared: &Prepared) -> Option<ModelReason> {
+    let of_model = prepared.choice.as_ref().map(|choice| choice.reason.clone());
+    match &prepared.sized_patch {
+        Some(patch) => Some(patch.reason(of_model)),
+        None => of_model,
+    }
+}
+
+/// The two actors that each tool has, in the order of their ticks; `tool` is empty for the only one.
+fn haptic_actor_names(tool: &str) -> [String; 2] {
+    ["device", "local"].map(|actor| if tool.is_empty() { actor.to_owned() } else { format!("{tool}/{actor}") })
+}
+
+fn first_tool((device, first): (u16, &DeviceState)) -> ToolSample {
+    ToolSample {
+        position_m: first.position.into(),
+        velocity_m_s: first.velocity.into(),
+        buttons: first.buttons,
+        device,
+        ..ToolSample::default()
+    }
+}
+
+/// The gains of each tool's coupling in words.
+fn couplings(tools: &[Tool]) -> Option<String> {
+    let named = |tool: &Tool| {
+        let design = tool.coupling?;
+        Some(if tool.name.is_empty() { design.to_string() } else { format!("{}: {design}", tool.name) })
+    };
+    let all: Vec<String> = tools.iter().filter_map(named).collect();
+    (!all.is_empty()).then(|| all.join("; "))
+}
+
+fn unix_now_ns() -> u64 {
+    let since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,73 @@
+//! The haptic group: a device and a local actor for each tool, with what they say to each other.
+
+use super::models::Source;
+use crate::actors::{ComputedForce, DeviceActor, DeviceSample, LocalActor, LocalPorts, ToolView};
+use crate::devices::DeviceState;
+use crate::model::Vec3;
+use crate::model::local::Succession;
+use crate::runtime::{Actor, OutletReader, OutletWriter, Reader, RuntimeBuilder, Writer};
+use crate::safety::Pipeline;
+use crate::safety::coupling::CoupledTool;
+use crate::session::prepare::{ModelPlan, Tool};
+
+/// Records of a local actor per haptic tick at most, besides one per probe.
+const RECORDS_PER_TICK: usize = 4;
+
+/// Both ends of what a tool's device and local actor say to each other and to a program that draws.
+pub(super) struct ToolEnds {
+    sample_writer: Writer<DeviceSample>,
+    samples: Reader<DeviceSample>,
+    force_writer: Writer<ComputedForce>,
+    forces: Reader<ComputedForce>,
+    view_writer: OutletWriter<ToolView>,
+    view: Option<OutletReader<ToolView>>,
+}
+
+impl ToolEnds {
+    pub(super) fn new(graph: &mut RuntimeBuilder) -> Self {
+        let (sample_writer, samples) = graph.exchange(DeviceSample::default);
+        let (force_writer, forces) = graph.exchange(ComputedForce::default);
+        let (view_writer, view) = graph.outlet(ToolView::default);
+        Self { sample_writer, samples, force_writer, forces, view_writer, view: Some(view) }
+    }
+
+    /// The end of a program that draws.
+    pub(super) fn take_view(&mut self) -> Option<OutletReader<ToolView>> {
+        self.view.take()
+    }
+}
+
+/// The actors of the group in the order of their ticks, with records of so many `ticks` waiting at most.
+pub(super) fn actors(
+    graph: &mut RuntimeBuilder,
+    plan: &ModelPlan,
+    tools: Vec<Tool>,
+    ends: Vec<ToolEnds>,
+    first: &[DeviceState],
+    sources: Vec<Source>,
+    ticks: usize,
+) -> Vec<Box<dyn Actor>> {
+    let mut actors: Vec<Box<dyn Actor>> = Vec::new();
+    let each = tools.into_iter().zip(ends).zip(first).zip(sources);
+    for (number, (((tool, ends), state), Source { models, source })) in (0..).zip(each) {
+        let safety = Pipeline::new(tool.limits);
+        let recorder = graph.recorder(ticks * 2);
+        let device = DeviceActor::new(tool.device, *state, ends.sample_writer, ends.forces, safety, recorder);
+        let ports = LocalPorts {
+            samples: ends.samples,
+            commands: ends.force_writer,
+            source,
+            view: ends.view_writer,
+            recorder: graph.recorder(ticks * (RECORDS_PER_TICK + plan.probes.len())),
+        };
+        let succession = Succession::new(models, plan.blend, Vec3::zeros());
+        let local = LocalActor::new(succession, plan.timing.haptic, plan.timing.global, plan.probes.clone(), ports);
+        let local = match &tool.coupling {
+            Some(design) => local.coupled(CoupledTool::new(design)),
+            None => local,
+        };
+        actors.push(Box::new(device.numbered(number)));
+        actors.push(Box::new(local.numbered(number)));
+    }
+    actors
+}

@@ -1,0 +1,113 @@
+//! From prepared parts to a running graph: actors, their ports and the runtime that executes them.
+//!
+//! [`start`] is the whole way. Ports are made in a fixed order, which numbers them in the log.
+
+mod basis;
+mod environment;
+mod global;
+mod haptic;
+mod models;
+mod sink;
+
+use super::prepare::{Prepared, Tool};
+use super::running::{Memory, Running, Viewer};
+use crate::actors::{LoggerActor, LoggerOutcome, SceneWatch, SurfaceView, first_state};
+use crate::devices::DeviceState;
+use crate::error::Error;
+use crate::model::Vec3;
+use crate::runtime::{Actor, OutletPort, RecordDrain, Recording, Runtime, RuntimeBuilder, Stopwatch};
+use basis::BasisSide;
+use haptic::ToolEnds;
+use sink::Sinks;
+
+/// A logger or a global model that is stuck for this long loses nothing.
+const SECONDS_BUFFERED: f64 = 4.0;
+/// However slow the haptic rate is: release 0 makes several records before the first drain.
+const MIN_TICKS_BUFFERED: usize = 64;
+
+/// A recording that is executed again in place of a run of its own.
+pub(super) struct Rerun {
+    pub(super) recording: Recording,
+    /// Makes the actor that takes the records in place of the logger.
+    pub(super) taker: Box<dyn FnOnce(RecordDrain) -> Box<dyn Actor>>,
+}
+
+/// Starts what was prepared, or executes a recording of it again.
+///
+/// # Errors
+/// If a device gives no first state, the log cannot be created or a thread cannot be started.
+pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Running, Error> {
+    let first: Vec<DeviceState> = prepared.tools.iter_mut().map(first_of).collect::<Result<_, _>>()?;
+    let places: Vec<Vec3> = first.iter().map(|state| state.position).collect();
+    let mut environment = environment::environment(&prepared, &first)?;
+    let memory = prepared.options.keep_records.then(Memory::default);
+    let sinks = Sinks::new(memory.clone(), prepared.options.log.as_deref(), &environment)?;
+    let (mut graph, taker) = match rerun {
+        Some(Rerun { recording, taker }) => (Runtime::reexecution(recording), Some(taker)),
+        None => (Runtime::builder(prepared.options.execution), None),
+    };
+    let build_cost = prepared.options.measures_cost.then(Stopwatch::new);
+    let builds = build_cost.as_ref().map(Stopwatch::reader);
+    if builds.is_some() {
+        graph.measure_cost();
+    }
+    std::mem::take(&mut prepared.options.disturbed).apply(&mut graph);
+
+    // Before the ports, so that they record what a replay needs. The order of the ports below numbers them in the log.
+    let drain = graph.drain();
+    let ticks = ((SECONDS_BUFFERED * prepared.plan.timing.haptic.as_hz()) as usize).max(MIN_TICKS_BUFFERED);
+    let (surfaces, scene) = surfaces(&mut graph, &prepared);
+    let mut ends: Vec<ToolEnds> = prepared.tools.iter().map(|_| ToolEnds::new(&mut graph)).collect();
+    let views = ends.iter_mut().filter_map(ToolEnds::take_view).collect();
+    let viewer = Viewer::new(prepared.simulation.body().surface(), surfaces[0].reader(), views);
+    let bases = BasisSide::new(&mut graph, &prepared, &places)?;
+    if let Some(bases) = &bases {
+        environment.model_reason = bases.reason(environment.model_reason.take());
+    }
+    let reducing = bases.as_ref().map(|bases| (prepared.basis_group(), bases.actor()));
+    let logger_group = prepared.logger_group();
+    let Prepared { simulation, tools, plan, local, global, until, .. } = prepared;
+    let (sources, maker) = models::models(&mut graph, &plan, simulation, &places, surfaces, bases, ticks);
+    let haptic = haptic::actors(&mut graph, &plan, tools, ends, &first, sources, ticks);
+
+    let outcome = LoggerOutcome::default();
+    let logger = match taker {
+        Some(taker) => taker(drain),
+        None => Box::new(LoggerActor::new(drain, sinks, environment, graph.grants(), outcome.clone()).watching(scene)),
+    };
+    graph.group(local, haptic);
+    if let Some((group, actor)) = reducing {
+        graph.group(group, vec![actor]);
+    }
+    if let Some(maker) = maker {
+        maker.measured_by(build_cost).join(&mut graph, global)?;
+    }
+    graph.group(logger_group, vec![logger]);
+    if let Some(until) = until {
+        graph.until(until);
+    }
+    Ok(Running::new(graph.build()?.start()?, outcome, memory, viewer, until, builds))
+}
+
+/// The first state of a tool's device, or why there is none.
+fn first_of(tool: &mut Tool) -> Result<DeviceState, Error> {
+    let Tool { name, device, .. } = tool;
+    first_state(&mut **device).map_err(|error| if name.is_empty() { error } else { error.at(&*name) })
+}
+
+/// Where the body's surface is seen: by a program that draws, and by the log if it has the topic `/scene`.
+fn surfaces(graph: &mut RuntimeBuilder, prepared: &Prepared) -> (Vec<OutletPort<SurfaceView>>, Option<SceneWatch>) {
+    let positions = &prepared.simulation.state().positions;
+    let mut outlet = || {
+        let positions = positions.clone();
+        graph.outlet_port(move || SurfaceView { positions: positions.clone(), ..SurfaceView::default() })
+    };
+    let mut ports = vec![outlet()];
+    let scene = prepared.scene.log.scene.then(|| {
+        let port = outlet();
+        let watch = SceneWatch::new(port.reader(), &prepared.simulation.body().surface().triangles);
+        ports.push(port);
+        watch
+    });
+    (ports, scene)
+}

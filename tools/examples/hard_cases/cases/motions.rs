@@ -1,0 +1,118 @@
+//! Fast and deep motions, and laws of friction.
+
+use palpate::model::local::Kind::{LinearBoundary, Patch, Predictive};
+
+use super::{Case, case, run};
+
+pub const CASES: &[Case] = &[
+    case(
+        "impact",
+        "hard/impact",
+        "the tool hits at 1 m/s",
+        &[
+            run(Patch, 0.0, [23.0, 113.0, 122.0, 42.0]),
+            run(LinearBoundary, 0.0, [16.0, 108.0, 122.0, 41.0]),
+            run(Predictive, 0.0, [1.2, 4.6, 121.0, 1.3]),
+            run(Predictive, 1.0, [1.6, 8.0, 121.0, 1.6]),
+        ],
+    ),
+    case(
+        "impact seen",
+        "hard/impact_seen",
+        "the same, after 0.1 s in which the tool was seen coming",
+        &[
+            run(Patch, 0.0, [19.0, 113.0, 122.0, 42.0]),
+            run(LinearBoundary, 0.0, [13.0, 108.0, 122.0, 41.0]),
+            run(Predictive, 0.0, [0.47, 3.8, 121.0, 1.3]),
+            run(Predictive, 1.0, [3.1, 13.0, 121.0, 1.6]),
+        ],
+    ),
+    case(
+        "teleport",
+        "hard/teleport",
+        "20 mm within one tick, and back",
+        &[
+            run(Patch, 0.0, [3.9, 38.0, 129.0, 8.5]),
+            run(LinearBoundary, 0.0, [5.1, 38.0, 129.0, 8.5]),
+            run(Predictive, 0.0, [0.41, 3.4, 121.0, 0.3]),
+            run(Predictive, 1.0, [0.6, 3.4, 121.0, 0.3]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "half the body",
+        "hard/half",
+        "pressed to half the height: cells invert",
+        &[
+            run(Patch, 0.0, [20.0, 76.0, 20.0, 89.0]),
+            run(LinearBoundary, 0.0, [11.0, 45.0, 7.7, 39.0]),
+            run(Predictive, 0.0, [1.6, 6.7, 7.7, 5.0]),
+            run(Predictive, 1.0, [4.7, 26.0, 7.8, 17.0]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "no friction",
+        "hard/drag_slip",
+        "friction 0, 0.1 m/s",
+        &[
+            run(Patch, 0.0, [13.0, 37.0, 11.0, 85.0]),
+            run(LinearBoundary, 0.0, [13.0, 59.0, 9.9, 52.0]),
+            run(Predictive, 0.0, [0.32, 1.3, 11.0, 2.2]),
+            run(Predictive, 1.0, [0.65, 3.4, 11.0, 5.1]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "drag 0.1 m/s",
+        "hard/drag_100",
+        "friction 0.3",
+        &[
+            run(Patch, 0.0, [19.0, 67.0, 15.0, 46.0]),
+            run(LinearBoundary, 0.0, [14.0, 70.0, 15.0, 29.0]),
+            run(Predictive, 0.0, [0.56, 7.5, 15.0, 1.2]),
+            run(Predictive, 1.0, [0.91, 6.7, 15.0, 2.6]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "drag 0.2 m/s",
+        "hard/drag_200",
+        "friction 0.3",
+        &[
+            run(Patch, 0.0, [21.0, 97.0, 21.0, 65.0]),
+            run(LinearBoundary, 0.0, [19.0, 78.0, 20.0, 45.0]),
+            run(Predictive, 0.0, [0.44, 2.1, 32.0, 1.4]),
+            run(Predictive, 1.0, [1.7, 21.0, 31.0, 3.2]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "drag 0.4 m/s",
+        "hard/drag_400",
+        "friction 0.3",
+        &[
+            run(Patch, 0.0, [23.0, 91.0, 26.0, 85.0]),
+            run(LinearBoundary, 0.0, [20.0, 110.0, 27.0, 74.0]),
+            run(Predictive, 1.0, [3.0, 26.0, 24.0, 1.9]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "drag 0.6 m/s",
+        "hard/drag_600",
+        "friction 0.3, stops within 30 ms",
+        &[run(LinearBoundary, 0.0, [14.0, 70.0, 36.0, 54.0]), run(Predictive, 1.0, [3.9, 29.0, 49.0, 1.9])],
+    )
+    .ends_free(),
+    case(
+        "stick",
+        "hard/drag_stick",
+        "unbounded friction: torn off late in the lift",
+        &[
+            run(Patch, 0.0, [17.0, 75.0, 75.0, 43.0]),
+            run(LinearBoundary, 0.0, [14.0, 75.0, 50.0, 11.0]),
+            run(Predictive, 1.0, [4.7, 32.0, 56.0, 4.1]),
+        ],
+    ),
+];

@@ -1,0 +1,78 @@
+//! Degenerate places, and rest.
+
+use palpate::model::local::Kind::{LinearBoundary, Patch, Predictive};
+
+use super::{Case, case, run};
+
+pub const CASES: &[Case] = &[
+    case(
+        "vertex",
+        "hard/vertex",
+        "contact exactly on a node",
+        &[
+            run(Patch, 0.0, [8.0, 29.0, 14.0, 36.0]),
+            run(LinearBoundary, 0.0, [6.5, 29.0, 14.0, 26.0]),
+            run(Predictive, 0.0, [0.31, 0.8, 14.0, 1.2]),
+            run(Predictive, 1.0, [0.66, 2.7, 14.0, 2.6]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "edge",
+        "hard/edge",
+        "contact exactly on an edge of the mesh",
+        &[
+            run(Patch, 0.0, [9.1, 28.0, 17.0, 42.0]),
+            run(LinearBoundary, 0.0, [6.3, 29.0, 17.0, 25.0]),
+            run(Predictive, 0.0, [0.39, 1.2, 17.0, 1.6]),
+            run(Predictive, 1.0, [0.91, 4.2, 17.0, 3.6]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "rim",
+        "hard/rim",
+        "contact exactly on the edge of the body",
+        &[
+            run(Patch, 0.0, [3.0, 11.0, 121.0, 5.6]),
+            run(LinearBoundary, 0.0, [2.7, 12.0, 121.0, 4.6]),
+            run(Predictive, 0.0, [0.2, 0.78, 121.0, 0.69]),
+            run(Predictive, 1.0, [0.83, 4.7, 121.0, 0.33]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "corner",
+        "hard/corner",
+        "contact exactly on a corner of the body",
+        &[
+            run(Patch, 0.0, [3.0, 13.0, 121.0, 6.2]),
+            run(LinearBoundary, 0.0, [1.4, 6.1, 121.0, 3.1]),
+            run(Predictive, 1.0, [0.61, 3.5, 121.0, 0.87]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "along an edge",
+        "hard/along_edge",
+        "dragged exactly through edges and nodes",
+        &[
+            run(Patch, 0.0, [9.4, 28.0, 14.0, 24.0]),
+            run(LinearBoundary, 0.0, [7.8, 32.0, 14.0, 14.0]),
+            run(Predictive, 0.0, [0.43, 1.5, 15.0, 1.3]),
+            run(Predictive, 1.0, [1.1, 4.2, 15.0, 2.0]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "over the rim",
+        "hard/over_rim",
+        "dragged off the top over the edge of the body",
+        &[
+            run(Patch, 0.0, [14.0, 93.0, 37.0, 14.0]),
+            run(LinearBoundary, 0.0, [7.6, 69.0, 42.0, 9.5]),
+            run(Predictive, 1.0, [0.68, 7.7, 45.0, 1.7]),
+        ],
+    ),
+    case("rest", "hard/rest", "two minutes without a motion", &[run(Predictive, 1.0, [0.22, 4.6, 8.2, 5.5])]),
+];

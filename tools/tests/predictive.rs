@@ -1,0 +1,145 @@
+//! The predictive model against `full`, in virtual time: what it is held to on the reference scenes, with results that
+//! arrive in time, one, one and a half and two periods late.
+
+use std::path::Path;
+
+use palpate::Session;
+use palpate_cli::compare::{ForceTrace, ModelError};
+use palpate::model::local::{Kind as LocalModelKind, Prediction};
+use palpate::scene::Scene;
+
+const IN_TIME: f64 = 0.0;
+/// A period of 30 Hz is 33.33 ms.
+const ONE_PERIOD_MS: f64 = 33.34;
+
+struct Case {
+    scene: Scene,
+    full: ForceTrace,
+}
+
+impl Case {
+    fn new(name: &str) -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(format!("{name}.toml"));
+        let scene = Scene::load(&path).expect("a scene of the project");
+        let full = forces(scene.clone().with_model(LocalModelKind::Full)).0;
+        Self { scene, full }
+    }
+
+    /// The error of `predictive`, and what `full` itself jumps.
+    fn error(&self, latency_ms: f64, change: impl Fn(&mut Scene)) -> (ModelError, f64) {
+        let mut scene = self.scene.clone().with_model(LocalModelKind::Predictive);
+        scene.global.compute_latency_ms = latency_ms;
+        change(&mut scene);
+        let (forces, served) = forces(scene);
+        assert_eq!(forces.forces_n.len(), self.full.forces_n.len());
+        let error = ModelError::between(&forces, &self.full);
+        let own_jump = ModelError::between(&self.full, &self.full).jump;
+        println!("{latency_ms} ms late: {error:.3?}, full jumps {own_jump:.2}; {served}");
+        (error, own_jump)
+    }
+}
+
+fn forces(scene: Scene) -> (ForceTrace, String) {
+    let session = Session::from_scene(scene).virtual_time().keep_records().build().expect("a valid scene");
+    let summary = session.run().expect("it runs");
+    assert_eq!(summary.runtime.fault, None);
+    let shares = summary.report.devices[0].force.shares().map(|(model, share)| format!("{} {share:.4}", model.name()));
+    let shares = shares.collect::<Vec<_>>().join(", ");
+    (ForceTrace::of(&summary.records), shares)
+}
+
+/// One period late: at most `rms` and `max`, and no jump more than 1 % above the reference's own.
+fn assert_late(case: &Case, [rms, max]: [f64; 2]) {
+    let (error, own_jump) = case.error(ONE_PERIOD_MS, |_| ());
+    assert!(error.rms <= rms && error.max <= max && error.jump <= own_jump + 1.0, "{error:?}");
+}
+
+#[test]
+fn a_hand_held_node() {
+    let case = Case::new("hand");
+    assert_late(&case, [0.45, 2.0]);
+    let (in_time, _) = case.error(IN_TIME, |_| ());
+    assert!(in_time.rms <= 0.2 && in_time.max <= 1.0, "{in_time:?}");
+    for periods in [1.5, 2.0] {
+        let (late, _) = case.error(periods * ONE_PERIOD_MS, |_| ());
+        assert!(late.rms <= 1.5, "{periods} periods: {late:?}");
+    }
+}
+
+#[test]
+fn a_wave() {
+    assert_late(&Case::new("wave"), [0.3, 1.0]);
+}
+
+#[test]
+fn a_drag_that_sticks_and_slips() {
+    let case = Case::new("drag_friction");
+    assert_late(&case, [0.5, 6.0]);
+    for periods in [1.5, 2.0] {
+        let (late, _) = case.error(periods * ONE_PERIOD_MS, |_| ());
+        assert!(late.rms <= 1.5, "{periods} periods: {late:?}");
+    }
+}
+
+#[test]
+fn a_frictionless_drag() {
+    assert_late(&Case::new("drag_slip"), [0.4, 3.0]);
+}
+
+/// Running the whole body ahead costs periods of simulation where the reduced prediction costs half of one. It is more
+/// exact, as the surroundings are linear around rest in the other.
+#[test]
+fn running_the_whole_body_ahead_is_more_exact() {
+    let case = Case::new("hand");
+    let (reduced, _) = case.error(ONE_PERIOD_MS, |_| ());
+    let (full, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.prediction = Prediction::Full);
+    assert!(full.rms <= 0.2 && full.max <= 1.0 && full.jump <= 2.0, "{full:?}");
+    assert!(full.rms < reduced.rms && reduced.rms <= 3.0 * full.rms, "{reduced:?} against {full:?}");
+}
+
+/// Without its basis the ring moves as predicted, whatever the tool does: that is a model too, and the next best.
+#[test]
+fn without_a_basis_the_prediction_alone_serves() {
+    let case = Case::new("hand");
+    let (with, _) = case.error(ONE_PERIOD_MS, |_| ());
+    let (without, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.basis = Some(0));
+    let (predicted, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.model = LocalModelKind::Predicted.into());
+    assert_eq!(without.rms, predicted.rms, "the same model by two names");
+    assert!(with.rms < 0.5 * without.rms && without.rms < 20.0, "{with:?} against {without:?}");
+}
+
+/// Check that the error stays within the budget that chose the basis, that less of it takes more states, and that the report
+/// says how many.
+#[test]
+fn an_error_budget_is_kept_with_as_many_states_as_it_needs() {
+    let case = Case::new("hand");
+    let states = [0.5, 2.0].map(|budget| {
+        let ask = |scene: &mut Scene| (scene.local.basis, scene.local.error_pct) = (None, Some(budget));
+        let (error, _) = case.error(ONE_PERIOD_MS, ask);
+        assert!(error.rms <= budget, "{budget}: {error:?}");
+        let mut scene = case.scene.clone().with_model(LocalModelKind::Predictive);
+        ask(&mut scene);
+        scene.run.duration_s = 0.1;
+        let run = || {
+            let session = Session::from_scene(scene.clone()).virtual_time().keep_records().build().unwrap();
+            session.run().unwrap()
+        };
+        let (first, again) = (run(), run());
+        assert_eq!(first.records, again.records, "the same bits every time");
+        let reason = first.report.environment.unwrap().model_reason.unwrap();
+        assert!(reason.why.contains(&format!("error_pct = {budget} takes")) && reason.warning.is_none(), "{reason:?}");
+        reason.why.split(" states").next().unwrap().rsplit(' ').next().unwrap().parse::<usize>().unwrap()
+    });
+    assert!(states[0] > states[1], "{states:?}");
+}
+
+/// A basis that comes late is a normal event: the prediction alone serves until it is there.
+#[test]
+fn a_late_basis_is_waited_for() {
+    let mut scene = Case::new("drag_slip").scene.with_model(LocalModelKind::Predictive);
+    scene.global.basis_latency_ms = 900.0;
+    scene.run.duration_s = 1.8;
+    let (late, shares) = forces(scene);
+    assert!(late.forces_n.iter().flatten().all(|c| c.is_finite()));
+    assert!(shares.contains("predicted") && shares.contains("predictive"), "{shares}");
+}
