@@ -1,13 +1,12 @@
 //! The topic `/scene`: pictures at 30 Hz, in the order of time, that agree with the records beside them; and a log that is
 //! never far behind its run.
-#![cfg(all(feature = "log", feature = "scene"))]
 
 use std::path::{Path, PathBuf};
 
 use palpate::log::{LogEntry, LogReader, LogRecord};
+use palpate::runtime::{Nanos, Rate};
 use palpate::scene::{LocalModelKind, Scene};
 use palpate::session::{Session, SessionBuilder};
-use palpate::runtime::{Nanos, Rate};
 use prost::Message;
 
 /// `foxglove.Vector3` and `foxglove.Point3`.

@@ -13,7 +13,7 @@ use crate::actors::{
 };
 use crate::devices::DeviceState;
 use crate::error::Error;
-use crate::log::{Environment, Execution as LogExecution, GroupInfo, ModelReason, SceneFrame, ToolSample};
+use crate::log::{Environment, LoggedExecution, GroupInfo, ModelReason, SceneFrame, ToolSample};
 use crate::model::Vec3;
 use crate::model::body::Block;
 use crate::model::local::{Full, Hold, Kind, LocalModel, PatchGeometry, Succession};
@@ -242,8 +242,8 @@ fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment
         palpate_version: env!("CARGO_PKG_VERSION").to_owned(),
         instruction_set: Block::instruction_set().to_owned(),
         execution: match prepared.execution {
-            Execution::Virtual => LogExecution::Virtual,
-            Execution::Threaded => LogExecution::Threaded { start_unix_ns: unix_now_ns() },
+            Execution::Virtual => LoggedExecution::Virtual,
+            Execution::Threaded => LoggedExecution::Threaded { start_unix_ns: unix_now_ns() },
         },
         model: prepared.template.kind.name().to_owned(),
         model_reason: model_reason(prepared),
