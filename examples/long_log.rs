@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use palpate::Error;
 use palpate::log::{
-    CommandSample, Environment, Execution, ForceSample, GlobalTick, GroupInfo, LogRecord, McapWriter, Resync, ServedBy,
+    CommandSample, Environment, LoggedExecution, ForceSample, GlobalTick, GroupInfo, LogRecord, McapWriter, Resync, ServedBy,
 };
 use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
 use palpate::runtime::{Nanos, Rate};
@@ -53,7 +53,7 @@ fn write(path: &std::path::Path, seconds: u64, faults: &[Fault]) -> Result<u64, 
     groups[0].cpu = Some(1);
     let environment = Environment {
         palpate_version: env!("CARGO_PKG_VERSION").to_owned(),
-        execution: Execution::Threaded { start_unix_ns: 1_790_000_000_000_000_000 },
+        execution: LoggedExecution::Threaded { start_unix_ns: 1_790_000_000_000_000_000 },
         model: "patch".to_owned(),
         haptic_hz: 1000.0,
         global_hz: 30.0,

@@ -1,5 +1,4 @@
 //! Logs come back as they were written, whole or damaged.
-#![cfg(feature = "log")]
 
 mod log_sample;
 
@@ -8,8 +7,8 @@ use std::io::{self, Write};
 use log_sample::{entries, environment, log_of, time_of};
 use palpate::ErrorKind;
 use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter, SceneFrame};
-use palpate::runtime::record::Record;
 use palpate::runtime::Nanos;
+use palpate::runtime::record::Record;
 use proptest::prelude::*;
 
 fn read(bytes: &[u8]) -> (Vec<LogEntry>, Option<String>) {

@@ -1,6 +1,5 @@
 //! The topic `/scene`: pictures at 30 Hz, in the order of time, that agree with the records beside them; and a log that is
 //! never far behind its run.
-#![cfg(all(feature = "log", feature = "scene"))]
 
 use std::path::{Path, PathBuf};
 

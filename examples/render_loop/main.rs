@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use palpate::log::GroupReport;
+use palpate::log::GroupSummary;
 use palpate::prelude::*;
 use palpate::scene::Scene;
 use palpate::session::{Summary, Viewer};
@@ -128,7 +128,7 @@ fn draw_readme() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn haptic(summary: &Summary) -> Option<&GroupReport> {
+fn haptic(summary: &Summary) -> Option<&GroupSummary> {
     summary.report.groups.iter().find(|group| group.name == "local")
 }
 

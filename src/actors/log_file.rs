@@ -12,7 +12,7 @@ use std::time::Duration;
 use super::log_sink::{LogSink, Loss};
 use crate::error::Error;
 use crate::log::{
-    Backlog, BacklogProgress, Environment, Execution, GroupStats, LogRecord, McapWriter, SceneFrame, TextEvent,
+    Backlog, BacklogProgress, Environment, LoggedExecution, GroupStats, LogRecord, McapWriter, SceneFrame, TextEvent,
 };
 use crate::runtime::Nanos;
 
@@ -80,7 +80,7 @@ impl LogFile {
             writer: Some(McapWriter::new(backlog, place, environment)?),
             disk,
             place: place.to_owned(),
-            waits: environment.execution == Execution::Virtual,
+            waits: environment.execution == LoggedExecution::Virtual,
             marks: VecDeque::new(),
             safe: Mark::default(),
             newest: Mark::default(),

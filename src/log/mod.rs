@@ -1,8 +1,13 @@
 //! What a run leaves behind: typed records, and MCAP files with protobuf messages.
 //!
-//! [`LogRecord`] is what actors record and [`Analysis`] reads; both are there without the `log` feature too, for
-//! programs that keep records in memory. With it, [`McapWriter`] and [`LogReader`] keep them in files that any MCAP
-//! viewer opens.
+//! | to | there is |
+//! | --- | --- |
+//! | hold what a tick did | [`LogRecord`] and the samples in it |
+//! | write a log | [`McapWriter`], after an [`Environment`] that says what was run |
+//! | read one | [`LogReader`], which gives a [`LogEntry`] after the other |
+//! | sum a run up | [`Analysis`], which gives a [`RunReport`] |
+//!
+//! Any MCAP viewer opens the files: they carry the descriptors of their messages.
 //!
 //! # Real-time
 //! The records are plain values: to make them and to convert them is wait-free and real-time safe. All else here
@@ -10,48 +15,31 @@
 
 mod analysis;
 mod entry;
-mod environment;
-mod event;
-pub mod group;
-mod haptics;
+mod messages;
 mod percentiles;
+mod reader;
 mod records;
-mod scene_frame;
 mod stats;
-mod vector;
-pub use vector::magnitude;
-mod window;
-
-mod backlog;
-pub mod chunk;
-mod convert;
-mod foreign;
-mod foxglove;
-pub mod framing;
-mod proto;
-pub mod reader;
-mod scene_update;
-mod schema;
-pub mod topic;
-mod viewer;
 mod writer;
 
-pub use analysis::{Analysis, RunReport};
-pub use entry::LogEntry;
-pub use environment::{Environment, Execution, GroupInfo, ModelReason};
-pub use event::{Level, TextEvent};
-pub use group::{CauseCounts, GroupCounter, GroupReport, TickFigures, TickGauge};
-pub use haptics::{ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport};
-pub use percentiles::{Distribution, Magnitudes, Percentiles};
-pub(crate) use records::MAX_DEVICES;
-pub use records::{
-    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync, ServedBy,
-    ToolSample,
+pub use self::analysis::{
+    Analysis, CauseCounts, ContactReport, DeviceReport, EnergyReport, ForceReport, GroupCounter, GroupSummary,
+    LimitReport, ResyncReport, RunReport, TickFigures, TickGauge, magnitude,
 };
-pub use scene_frame::{SceneFrame, SceneTool};
-pub use stats::{EventSum, GroupStats, StatsCounter};
-pub use window::Window;
+pub use self::entry::{LogEntry, Window};
+pub use self::percentiles::{Distribution, Magnitudes, Percentiles};
+pub use self::reader::{LogReader, TopicKind};
+pub(crate) use self::records::MAX_DEVICES;
+pub use self::records::{
+    CommandSample, ContactMode, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, Level, LogRecord,
+    LoggedExecution, ModelReason, ProbeSample, Resync, SceneFrame, SceneTool, ServedBy, TextEvent, ToolSample,
+};
+pub(crate) use self::stats::StatsCounter;
+pub use self::stats::{EventSum, GroupStats};
+pub use self::writer::McapWriter;
+pub(crate) use self::writer::{Backlog, BacklogProgress};
 
-pub use backlog::{Backlog, BacklogProgress};
-pub use reader::LogReader;
-pub use writer::McapWriter;
+/// A log as a file: its records as they are, for programs that check or recover one.
+pub mod file {
+    pub use super::reader::{ChunkHead, ChunkRecords, MAX_RECORD_BYTES, RecordStream, Section};
+}

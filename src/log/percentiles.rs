@@ -9,20 +9,20 @@
 pub struct Percentiles<T> {
     /// The number of samples.
     pub count: u64,
-    /// Half of the samples do not exceed this.
+    /// The median: half of the samples do not exceed it.
     pub p50: T,
-    /// 90 % do not.
+    /// The value that 90 % of the samples do not exceed.
     pub p90: T,
-    /// 99 % do not.
+    /// The value that 99 % of the samples do not exceed.
     pub p99: T,
-    /// 99.9 % do not.
+    /// The value that 99.9 % of the samples do not exceed.
     pub p999: T,
     /// The largest sample.
     pub max: T,
 }
 
 impl<T> Percentiles<T> {
-    /// The same percentiles in another unit.
+    /// Percentiles in another unit, each converted by `f`.
     pub fn map<U>(self, f: impl Fn(T) -> U) -> Percentiles<U> {
         let Self { count, p50, p90, p99, p999, max } = self;
         Percentiles { count, p50: f(p50), p90: f(p90), p99: f(p99), p999: f(p999), max: f(max) }

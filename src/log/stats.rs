@@ -1,48 +1,48 @@
 //! How a rate group keeps time, condensed once a second for the log and for a live display.
 
-use super::event::TextEvent;
 use super::percentiles::{Distribution, Percentiles};
-use crate::runtime::record::TickTiming;
+use super::records::TextEvent;
 use crate::runtime::Nanos;
+use crate::runtime::record::TickTiming;
 
 const SECOND: u64 = 1_000_000_000;
 
-/// The state of a group at one moment.
+/// The state of a rate group at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GroupStats {
-    /// When: the release that closed the second, or the end of the run.
+    /// The moment: the release that closed the second, or the end of the run.
     pub time: Nanos,
-    /// Which group.
+    /// The number of the group.
     pub group: u16,
-    /// Releases since the start.
+    /// The number of releases since the start.
     pub released: u64,
-    /// Periods skipped since the start.
+    /// The number of periods skipped since the start.
     pub skipped: u64,
-    /// Deadlines missed since the start.
+    /// The number of deadlines missed since the start.
     pub missed: u64,
-    /// Records lost since the start, because a ring was full: those of all threads together, kept by the first group.
+    /// The number of records lost since the start, because a ring was full: those of all threads together, kept by the first group.
     pub lost_records: u64,
-    /// Wake-up lateness since the start (ns).
+    /// The lateness of wake-ups since the start (ns).
     pub lateness: Percentiles<u64>,
-    /// Wake-up lateness in the last second (ns).
+    /// The lateness of wake-ups in the last second (ns).
     pub lateness_last_second: Percentiles<u64>,
-    /// Execution time since the start (ns).
+    /// The execution time since the start (ns).
     pub execution: Percentiles<u64>,
-    /// Execution time in the last second (ns).
+    /// The execution time in the last second (ns).
     pub execution_last_second: Percentiles<u64>,
-    /// Uses of ports recorded since the start: what `/ports` holds of this group.
+    /// The number of uses of ports recorded since the start, which `/ports` holds of this group.
     pub port_uses: u64,
-    /// Events of this group since the start, in number and as digests: what `/log` holds of it.
+    /// The events of this group since the start, in number and as digests, which `/log` holds of it.
     pub events: EventSum,
 }
 
-/// How many events there were, and the sum of their digests: the order does not matter, any change does.
+/// The number of events and the sum of their digests: the order does not matter, any change does.
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and bounded by the length of the message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EventSum {
-    /// Events.
+    /// The number of events.
     pub count: u64,
     /// The wrapping sum of a 64-bit digest (FNV-1a) of time, level and message of each.
     pub digest: u64,

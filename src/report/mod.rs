@@ -1,8 +1,9 @@
-//! What a run has to say when it is over, as text for a terminal.
+//! The report on a run that is over, as text for a terminal.
 
+mod page;
 pub mod text;
 pub mod units;
 mod verdict;
 
 pub use text::to_text;
-pub use verdict::{Verdict, verdict};
+pub use verdict::{RunVerdict, verdict};

@@ -10,7 +10,7 @@ pub fn duration(ns: u64) -> String {
     }
 }
 
-/// A duration in seconds.
+/// A duration in seconds, as [`duration`] writes it.
 pub fn seconds(s: f64) -> String {
     if s.is_finite() { duration((s * 1e9).round() as u64) } else { format!("{s} s") }
 }

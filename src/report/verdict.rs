@@ -3,9 +3,9 @@
 use super::units::plural;
 use crate::log::{Level, RunReport, TextEvent};
 
-/// How a run went, best first.
+/// The verdict on a run, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Verdict {
+pub enum RunVerdict {
     /// Every period kept, every deadline met, nothing lost.
     Ok,
     /// The timing is good, but records are missing.
@@ -18,8 +18,8 @@ pub enum Verdict {
     Failed,
 }
 
-impl Verdict {
-    /// Its name in reports.
+impl RunVerdict {
+    /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ok => "OK",
@@ -32,7 +32,7 @@ impl Verdict {
 }
 
 /// The verdict on a run and the reason in words.
-pub fn verdict(report: &RunReport) -> (Verdict, String) {
+pub fn verdict(report: &RunReport) -> (RunVerdict, String) {
     let time = match (report.is_virtual(), &report.environment) {
         (true, _) => "virtual time",
         (false, Some(_)) => "real time",
@@ -48,30 +48,30 @@ pub fn verdict(report: &RunReport) -> (Verdict, String) {
         {
             let (skipped, missed) = (plural(skipped, "period", "periods"), plural(missed, "deadline", "deadlines"));
             let restart = &restart.message;
-            return (Verdict::Restarted, format!("{restart}; {skipped} skipped and {missed} missed in {ran}"));
+            return (RunVerdict::Restarted, format!("{restart}; {skipped} skipped and {missed} missed in {ran}"));
         }
         let reason = first.map_or("an actor failed".to_owned(), |event| event.message.clone());
-        return (Verdict::Failed, format!("{reason}, in {ran}"));
+        return (RunVerdict::Failed, format!("{reason}, in {ran}"));
     }
     if skipped > 0 || missed > 0 {
         let skipped = plural(skipped, "period", "periods");
         let missed = plural(missed, "deadline", "deadlines");
-        return (Verdict::Late, format!("{skipped} skipped and {missed} missed in {ran}"));
+        return (RunVerdict::Late, format!("{skipped} skipped and {missed} missed in {ran}"));
     }
     if lost > 0 {
-        return (Verdict::Incomplete, format!("{} lost in {ran}", plural(lost, "record", "records")));
+        return (RunVerdict::Incomplete, format!("{} lost in {ran}", plural(lost, "record", "records")));
     }
     if report.damage.is_some() {
-        return (Verdict::Incomplete, format!("the log is damaged after {ran}"));
+        return (RunVerdict::Incomplete, format!("the log is damaged after {ran}"));
     }
     if report.groups.iter().all(|group| group.released == 0) {
-        return (Verdict::Incomplete, "the log holds no ticks".to_owned());
+        return (RunVerdict::Incomplete, "the log holds no ticks".to_owned());
     }
     if report.groups.iter().all(|group| group.execution.count == 0) {
         let released: u64 = report.groups.iter().map(|group| group.released).sum();
-        return (Verdict::Ok, format!("the lateness of {released} wake-ups, and nothing else, is known"));
+        return (RunVerdict::Ok, format!("the lateness of {released} wake-ups, and nothing else, is known"));
     }
-    (Verdict::Ok, format!("{ran}, every period kept, every deadline met"))
+    (RunVerdict::Ok, format!("{ran}, every period kept, every deadline met"))
 }
 
 /// The restart that answered a fault: the first of the same group at its time or later.
@@ -87,8 +87,8 @@ fn restart_after<'a>(report: &'a RunReport, fault: &TextEvent) -> Option<&'a Tex
 mod tests {
     use super::*;
     use crate::log::{Analysis, Environment, LogRecord};
-    use crate::runtime::record::{SlipCause, TickTiming};
     use crate::runtime::Nanos;
+    use crate::runtime::record::{SlipCause, TickTiming};
 
     fn report(slips: u32) -> RunReport {
         let mut analysis = Analysis::default();
@@ -106,14 +106,14 @@ mod tests {
 
     #[test]
     fn the_gravest_finding_decides() {
-        let good = (Verdict::Ok, "1.500 s of virtual time, every period kept, every deadline met".to_owned());
+        let good = (RunVerdict::Ok, "1.500 s of virtual time, every period kept, every deadline met".to_owned());
         assert_eq!(verdict(&report(0)), good);
         let late = verdict(&report(3));
-        assert_eq!(late, (Verdict::Late, "3 periods skipped and 0 deadlines missed in 1.500 s of virtual time".into()));
+        assert_eq!(late, (RunVerdict::Late, "3 periods skipped and 0 deadlines missed in 1.500 s of virtual time".into()));
         let cut = RunReport { damage: Some("cut".into()), ..report(0) };
-        assert_eq!(verdict(&cut).0, Verdict::Incomplete);
+        assert_eq!(verdict(&cut).0, RunVerdict::Incomplete);
         let both = RunReport { worst_event: Some(Level::Error), ..report(3) };
-        assert_eq!(verdict(&both).0, Verdict::Failed);
+        assert_eq!(verdict(&both).0, RunVerdict::Failed);
     }
 
     #[test]
@@ -123,11 +123,11 @@ mod tests {
         let with = |events: Vec<TextEvent>| RunReport { worst_event: Some(Level::Error), events, ..report(3) };
         let panicked = |s, group: &str| event(s, Level::Error, &format!("{group}: actor 0 panicked"));
         let (found, why) = verdict(&with(vec![panicked(5, "global"), restarted.clone()]));
-        assert_eq!(found, Verdict::Restarted);
+        assert_eq!(found, RunVerdict::Restarted);
         assert!(why.starts_with("global: restarted after a fault, restart 1; 3 periods skipped"), "{why}");
         // Check that neither another group's restart nor an earlier one answers a fault
         for fault in [panicked(5, "local"), panicked(7, "global")] {
-            assert_eq!(verdict(&with(vec![fault, restarted.clone()])).0, Verdict::Failed);
+            assert_eq!(verdict(&with(vec![fault, restarted.clone()])).0, RunVerdict::Failed);
         }
     }
 }

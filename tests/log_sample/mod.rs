@@ -1,8 +1,9 @@
 //! A small run for the log tests: every kind of record, at the rates of a real one.
 
 use palpate::log::{
-    CommandSample, ContactMode, ContactSample, Environment, Execution, ForceSample, GlobalTick, GroupInfo, GroupStats,
-    Level, LogEntry, LogRecord, McapWriter, Percentiles, ProbeSample, Resync, ServedBy, TextEvent, ToolSample,
+    CommandSample, ContactMode, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, GroupStats, Level,
+    LogEntry, LogRecord, LoggedExecution, McapWriter, Percentiles, ProbeSample, Resync, ServedBy, TextEvent,
+    ToolSample,
 };
 use palpate::runtime::record::{Event, SlipCause, TickTiming};
 use palpate::runtime::{Mode, PortUse};
@@ -13,7 +14,7 @@ pub fn environment() -> Environment {
     Environment {
         palpate_version: "0.1.0".into(),
         instruction_set: "avx2".into(),
-        execution: Execution::Threaded { start_unix_ns: 1_700_000_000_000_000_000 },
+        execution: LoggedExecution::Threaded { start_unix_ns: 1_700_000_000_000_000_000 },
         model: "patch".into(),
         haptic_hz: 1000.0,
         global_hz: 30.0,

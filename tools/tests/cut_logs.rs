@@ -1,11 +1,12 @@
 //! A real run's log cut at any byte: `export` and `timing` work up to the damage, and say so.
-#![cfg(all(feature = "cli", feature = "log"))]
 
 mod support;
 
-use support::Folder;
 use palpate::log::{Analysis, LogEntry, LogReader, LogRecord};
-use palpate::report::{Format, export, to_json, to_text};
+use palpate::report::to_text;
+use palpate_cli::export::{Format, export};
+use palpate_cli::timing::to_json;
+use support::Folder;
 
 const MAGIC: usize = 8;
 /// A prime, so that cuts fall on every kind of boundary in turn.

@@ -1,12 +1,14 @@
 //! What is reported about a log equals what was logged.
-#![cfg(all(feature = "log", feature = "cli"))]
 
+#[path = "../../tests/log_sample/mod.rs"]
 mod log_sample;
 
 use log_sample::{entries, log_of, time_of};
 use palpate::ErrorKind;
 use palpate::log::{Analysis, LogEntry, LogReader, LogRecord, RunReport};
-use palpate::report::{Format, export, to_json, to_text};
+use palpate::report::to_text;
+use palpate_cli::export::{Format, export};
+use palpate_cli::timing::to_json;
 
 fn analyse(bytes: &[u8]) -> RunReport {
     let mut reader = LogReader::new(bytes, "memory").unwrap();

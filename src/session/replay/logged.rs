@@ -9,7 +9,7 @@ use super::report::LoggedFault;
 use crate::devices::{DeviceState, ReplayedSample};
 use crate::error::{Error, ErrorKind};
 use crate::log::{
-    Environment, EventSum, Execution, GroupStats, Level, LogEntry, LogReader, LogRecord, TextEvent, ToolSample,
+    Environment, EventSum, LoggedExecution, GroupStats, Level, LogEntry, LogReader, LogRecord, TextEvent, ToolSample,
 };
 use crate::model::body::Block;
 use crate::runtime::{Nanos, Recording, TickTiming};
@@ -160,7 +160,7 @@ impl Gathered {
             self.check_samples(&environment, samples, first)?;
         }
         let Self { recording, samples, comparison, .. } = self;
-        let in_real_time = environment.execution != Execution::Virtual;
+        let in_real_time = environment.execution != LoggedExecution::Virtual;
         let tools = environment.first_tools.iter().map(state).zip(samples).collect();
         Ok(Logged { scene, recording, in_real_time, tools, comparison, end, cut })
     }
@@ -181,7 +181,7 @@ impl Gathered {
         self.recording = std::mem::take(&mut self.recording).before(time);
         self.samples.iter_mut().for_each(|samples| samples.retain(|sample| sample.time < time));
         let fault = LoggedFault { restarted: self.restarted.is_some_and(|restarted| restarted >= time), ..fault };
-        let is_virtual = environment.execution == Execution::Virtual;
+        let is_virtual = environment.execution == LoggedExecution::Virtual;
         // Observers are not repeated.
         let repeated = self.timings.iter().filter(|(group, _)| environment.group_name(**group) != LOGGER);
         let groups = repeated.map(|(group, timings)| (environment.group_name(*group), timings.as_slice()));

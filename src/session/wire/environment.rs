@@ -2,7 +2,7 @@
 
 use crate::devices::DeviceState;
 use crate::error::Error;
-use crate::log::{Environment, Execution as LogExecution, GroupInfo, ModelReason, ToolSample};
+use crate::log::{Environment, LoggedExecution, GroupInfo, ModelReason, ToolSample};
 use crate::model::body::Block;
 use crate::runtime::{Execution, Rate};
 use crate::safety::Actions;
@@ -16,8 +16,8 @@ pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<
         palpate_version: env!("CARGO_PKG_VERSION").to_owned(),
         instruction_set: Block::instruction_set().to_owned(),
         execution: match prepared.options.execution {
-            Execution::Virtual => LogExecution::Virtual,
-            Execution::Threaded => LogExecution::Threaded { start_unix_ns: unix_now_ns() },
+            Execution::Virtual => LoggedExecution::Virtual,
+            Execution::Threaded => LoggedExecution::Threaded { start_unix_ns: unix_now_ns() },
         },
         model: prepared.plan.template.kind.name().to_owned(),
         model_reason: model_reason(prepared),

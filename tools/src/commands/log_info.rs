@@ -1,7 +1,7 @@
 //! What `palpate log` prints: a log's contents as text and as JSON.
 
 use crate::log_file::LogInfo;
-use palpate::log::{Environment, Execution};
+use palpate::log::{Environment, LoggedExecution};
 use serde_json::{Value, json};
 
 /// A number of bytes in words.
@@ -89,8 +89,8 @@ fn run(environment: &Environment) -> Vec<String> {
 
 fn execution(environment: &Environment) -> &'static str {
     match environment.execution {
-        Execution::Virtual => "virtual",
-        Execution::Threaded { .. } => "threaded",
+        LoggedExecution::Virtual => "virtual",
+        LoggedExecution::Threaded { .. } => "threaded",
     }
 }
 

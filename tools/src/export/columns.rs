@@ -1,6 +1,6 @@
 //! The columns of each topic, and its entries as cells: what every table format writes, each in its own way.
 
-use palpate::log::topic::Kind;
+use palpate::log::TopicKind;
 use palpate::log::{ContactMode, ContactSample, GroupStats, LogEntry, LogRecord, TextEvent};
 
 /// The type of a column.
@@ -33,10 +33,10 @@ pub(super) enum Cell {
 pub(super) type Column = (&'static str, Type);
 
 /// The columns of a topic of this kind.
-pub(super) fn columns(kind: Kind) -> &'static [Column] {
+pub(super) fn columns(kind: TopicKind) -> &'static [Column] {
     use Type::{F32, F64, OptionalU32, Text, U32, U64};
     match kind {
-        Kind::Timing => &[
+        TopicKind::Timing => &[
             ("tick", U64),
             ("scheduled_ns", U64),
             ("woke_ns", U64),
@@ -48,8 +48,8 @@ pub(super) fn columns(kind: Kind) -> &'static [Column] {
             ("given_up", U32),
             ("mode", Text),
         ],
-        Kind::Actors => &[("scheduled_ns", U64), ("actor", U32), ("spent_ns", U64)],
-        Kind::Stats => &[
+        TopicKind::Actors => &[("scheduled_ns", U64), ("actor", U32), ("spent_ns", U64)],
+        TopicKind::Stats => &[
             ("t_s", F64),
             ("released", U64),
             ("skipped", U64),
@@ -63,8 +63,8 @@ pub(super) fn columns(kind: Kind) -> &'static [Column] {
             ("execution_max_ns", U64),
             ("port_uses", U64),
         ],
-        Kind::Force | Kind::ForceCommanded => &[("t_s", F64), ("fx_n", F64), ("fy_n", F64), ("fz_n", F64)],
-        Kind::Tool => &[
+        TopicKind::Force | TopicKind::ForceCommanded => &[("t_s", F64), ("fx_n", F64), ("fy_n", F64), ("fz_n", F64)],
+        TopicKind::Tool => &[
             ("t_s", F64),
             ("x_m", F64),
             ("y_m", F64),
@@ -75,7 +75,7 @@ pub(super) fn columns(kind: Kind) -> &'static [Column] {
             ("sample_id", U32),
             ("buttons", U32),
         ],
-        Kind::Contact => &[
+        TopicKind::Contact => &[
             ("t_s", F64),
             ("mode", Text),
             ("triangle", OptionalU32),
@@ -88,7 +88,7 @@ pub(super) fn columns(kind: Kind) -> &'static [Column] {
             ("normal_force_n", F32),
             ("tangential_force_n", F32),
         ],
-        Kind::Resync => &[
+        TopicKind::Resync => &[
             ("t_s", F64),
             ("version", U32),
             ("age_s", F64),
@@ -96,8 +96,8 @@ pub(super) fn columns(kind: Kind) -> &'static [Column] {
             ("jump_after_n", F64),
             ("energy_j", F64),
         ],
-        Kind::Global => &[("t_s", F64), ("version", U32), ("first_tick", U64), ("last_tick", U64)],
-        Kind::Ports => &[
+        TopicKind::Global => &[("t_s", F64), ("version", U32), ("first_tick", U64), ("last_tick", U64)],
+        TopicKind::Ports => &[
             ("t_s", F64),
             ("group", U32),
             ("port", U32),
@@ -106,7 +106,7 @@ pub(super) fn columns(kind: Kind) -> &'static [Column] {
             ("count", U64),
             ("sequence", U64),
         ],
-        Kind::Probe => &[
+        TopicKind::Probe => &[
             ("t_s", F64),
             ("node", U32),
             ("local_x_m", F64),
@@ -117,8 +117,8 @@ pub(super) fn columns(kind: Kind) -> &'static [Column] {
             ("global_z_m", F64),
         ],
         // For viewers; refused before anything is asked of it.
-        Kind::Scene => &[],
-        Kind::Log => &[("t_s", F64), ("level", Text), ("message", Text)],
+        TopicKind::Scene => &[],
+        TopicKind::Log => &[("t_s", F64), ("level", Text), ("message", Text)],
     }
 }
 

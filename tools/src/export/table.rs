@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use super::columns::{self, Cell, Column};
 use super::{csv, output_error, unknown};
 use palpate::{Error, ErrorKind};
-use palpate::log::topic::Kind;
+use palpate::log::TopicKind;
 use palpate::log::{LogEntry, LogReader, Window};
 
 /// The formats of a table.
@@ -78,7 +78,7 @@ fn write_table<R: Read, T: Table>(
         let topics: Vec<&str> = reader.topics().into_keys().collect();
         unknown(reader, "topic", topic, &topics)
     })?;
-    if kind == Kind::Scene {
+    if kind == TopicKind::Scene {
         let why = format!("{topic} is for viewers (3D), it makes no table");
         return Err(Error::new(ErrorKind::Log, why).at(reader.place()));
     }
@@ -109,9 +109,9 @@ fn next_of<R: Read>(reader: &mut LogReader<R>, topic: &str, window: &Window) -> 
 }
 
 /// A log that is cut before its first message may have lost what declares its topics.
-pub(super) fn lost_topic<R: Read>(reader: &LogReader<R>, topic: &str) -> Option<Kind> {
+pub(super) fn lost_topic<R: Read>(reader: &LogReader<R>, topic: &str) -> Option<TopicKind> {
     let is_empty = reader.topics().values().all(|&messages| messages == 0);
-    (reader.damage().is_some() && is_empty).then(|| Kind::of_topic(topic)).flatten()
+    (reader.damage().is_some() && is_empty).then(|| TopicKind::of_topic(topic)).flatten()
 }
 
 struct CsvTable<W>(W);

@@ -5,39 +5,34 @@ use std::io::{Read, Seek};
 
 use mcap::records::{ChunkIndex, MessageHeader, Record, Statistics, op};
 
-use palpate::log::Analysis;
-use palpate::log::LogEntry;
-use palpate::log::Environment;
-use super::message::{Span, message};
-use palpate::log::reader::{cannot_open, decode_data, kind_of};
-use palpate::log::LogRecord;
+use super::Span;
 use super::salvage::{Found, Salvage};
-use palpate::log::topic::Kind;
 use palpate::Error;
+use palpate::log::{Analysis, Environment, LogEntry, LogRecord, TopicKind};
 
 /// Findings that are kept in words; the others are only counted.
 const FINDINGS_KEPT: usize = 1000;
 /// Findings of one topic that are kept in words: a topic that is wrong throughout says so once and a few times more.
 const PER_TOPIC: u64 = 5;
 
-/// What [`check`] found.
+/// The findings of [`check`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CheckReport {
-    /// What is wrong, a line each: first in the order of the file, then of the log as a whole.
+    /// The faults, a line each: first in the order of the file, then of the log as a whole.
     pub findings: Vec<String>,
     /// The number of all findings.
     pub count: u64,
-    /// Messages read, and how many of them were palpate's and were decoded.
+    /// The number of messages read.
     pub messages: u64,
-    /// Decoded messages.
+    /// The number of messages that were palpate's and were decoded.
     pub decoded: u64,
-    /// Chunks read, those with a checksum among them.
+    /// The number of chunks read.
     pub chunks: u64,
-    /// Chunks whose checksum was verified.
+    /// The number of chunks whose checksum was verified.
     pub checksummed_chunks: u64,
     /// True if the data as a whole has a checksum and fits it.
     pub is_checksummed: bool,
-    /// Log times of the first and the last message (ns).
+    /// The log times of the first and the last message (ns).
     pub span: Option<(u64, u64)>,
 }
 
@@ -61,7 +56,7 @@ impl CheckReport {
 /// [`ErrorKind::Io`](palpate::ErrorKind::Io) if it cannot be read, [`ErrorKind::Log`](palpate::ErrorKind::Log) if it is no MCAP
 /// file.
 pub fn check(source: impl Read + Seek, place: &str, progress: impl FnMut(u64, u64)) -> Result<CheckReport, Error> {
-    let records = Salvage::new(source).map_err(|e| cannot_open(place, e))?;
+    let records = Salvage::new(source, place)?;
     Ok(Checker::default().run(records, progress))
 }
 
@@ -69,7 +64,7 @@ pub fn check(source: impl Read + Seek, place: &str, progress: impl FnMut(u64, u6
 #[derive(Default)]
 struct Channel {
     topic: String,
-    kind: Option<Kind>,
+    kind: Option<TopicKind>,
     messages: u64,
     next_sequence: u32,
     newest: u64,
@@ -79,7 +74,7 @@ struct Channel {
 #[derive(Default)]
 struct Checker {
     report: CheckReport,
-    schemas: HashMap<u16, Option<Kind>>,
+    schemas: HashMap<u16, Option<TopicKind>>,
     channels: BTreeMap<u16, Channel>,
     analysis: Analysis,
     environment: Environment,
@@ -99,17 +94,16 @@ impl Checker {
     fn run<R: Read + Seek>(mut self, mut records: Salvage<R>, mut progress: impl FnMut(u64, u64)) -> CheckReport {
         let mut chunk = None;
         let mut damaged = false;
+        let length = records.length();
         while let Some(found) = records.next() {
-            let opcode = match found {
-                Found::Record(opcode) => opcode,
+            let (opcode, stream) = match found {
+                Found::Record(opcode, stream) => (opcode, stream),
                 Found::Damage(damage) => {
                     damaged = true;
                     self.report.find(damage.what);
                     continue;
                 }
             };
-            let (length, offset) = (records.length(), records.offset());
-            let Some(stream) = records.stream() else { break };
             if let Some((start, head)) = stream.chunk().filter(|(start, _)| chunk != Some(*start)) {
                 chunk = Some(start);
                 self.report.chunks += 1;
@@ -125,7 +119,7 @@ impl Checker {
                     compressed_size: 0,
                     uncompressed_size: head.unpacked,
                 });
-                progress(offset, length);
+                progress(stream.offset(), length);
             }
             let in_chunk = stream.chunk().map(|(_, head)| (head.first_time, head.last_time));
             self.record(opcode, stream.body(), in_chunk);
@@ -140,15 +134,10 @@ impl Checker {
     }
 
     fn record(&mut self, opcode: u8, body: &[u8], in_chunk: Option<(u64, u64)>) {
-        if opcode == op::MESSAGE {
-            return match message(body) {
-                Some((header, data)) => self.message(&header, data, in_chunk),
-                None => self.report.find("a message without its header".into()),
-            };
-        }
         match mcap::parse_record(opcode, body) {
+            Ok(Record::Message { header, data }) => self.message(&header, &data, in_chunk),
             Ok(Record::Schema { header, data }) => {
-                self.schemas.insert(header.id, kind_of(&header.name, &data));
+                self.schemas.insert(header.id, TopicKind::of_schema(&header.name, &data));
             }
             Ok(Record::Channel(channel)) => {
                 let kind = self.schemas.get(&channel.schema_id).copied().flatten();
@@ -173,6 +162,7 @@ impl Checker {
             Ok(Record::MetadataIndex(_)) => self.counts[0].1 += 1,
             Ok(Record::AttachmentIndex(_)) => self.counts[1].1 += 1,
             Ok(_) => {}
+            Err(_) if opcode == op::MESSAGE => self.report.find("a message without its header".into()),
             Err(error) => self.report.find(format!("a record does not decode: {error}")),
         }
     }
@@ -195,10 +185,10 @@ impl Checker {
             if header.sequence != due {
                 found.push(format!("has sequence number {} where {due} is due", header.sequence));
             }
-            if header.log_time < channel.newest && !matches!(kind, Kind::Log | Kind::Ports) {
+            if header.log_time < channel.newest && !matches!(kind, TopicKind::Log | TopicKind::Ports) {
                 found.push(format!("goes back in time by {} ns", channel.newest - header.log_time));
             }
-            match decode_data(kind, data) {
+            match LogEntry::decode(kind, data) {
                 Ok(entry) => {
                     self.report.decoded += 1;
                     match &entry {

@@ -8,31 +8,30 @@ use std::path::Path;
 use mcap::Summary;
 use mcap::records::{Record, op};
 
-use palpate::log::Environment;
-use super::message::{Span, message};
-use palpate::log::reader::cannot_open;
+use super::Span;
 use super::salvage::{Found, Salvage};
 use super::summary::{read_summary, record_at};
 use palpate::Error;
+use palpate::log::Environment;
 
-/// What is in a log.
+/// The contents of a log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LogInfo {
-    /// Size of the file (bytes).
+    /// The size of the file (bytes).
     pub bytes: u64,
     /// True if there is an index; otherwise all of it was read.
     pub has_index: bool,
-    /// What is wrong, as far as it was noticed: only [`check`](super::check) reads everything.
+    /// The damage, as far as it was noticed: only [`check`](super::check) reads everything.
     pub damage: Vec<String>,
-    /// The program and the profile that the file names.
+    /// The program that the file names.
     pub library: String,
-    /// Profile, often empty.
+    /// The profile that the file names, often empty.
     pub profile: String,
-    /// Log times of the first and the last message (ns).
+    /// The log times of the first and the last message (ns).
     pub span: Option<(u64, u64)>,
-    /// Number of messages.
+    /// The number of messages.
     pub messages: u64,
-    /// Chunks by their compression; `none` for chunks that are not packed.
+    /// The chunks by their compression; `none` for chunks that are not packed.
     pub chunks: BTreeMap<String, ChunkInfo>,
     /// The topics by name.
     pub topics: BTreeMap<String, TopicInfo>,
@@ -40,40 +39,40 @@ pub struct LogInfo {
     pub environment: Option<Environment>,
     /// The attachments in their order.
     pub attachments: Vec<AttachmentInfo>,
-    /// Names of the metadata records in their order.
+    /// The names of the metadata records in their order.
     pub metadata: Vec<String>,
 }
 
-/// Chunks of one kind.
+/// The chunks of one compression.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChunkInfo {
-    /// How many.
+    /// The number of them.
     pub count: u64,
-    /// As they are in the file (bytes).
+    /// Their size in the file (bytes).
     pub packed: u64,
-    /// Unpacked (bytes).
+    /// Their size once unpacked (bytes).
     pub unpacked: u64,
 }
 
-/// One topic.
+/// A topic of a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TopicInfo {
     /// The name of the message type; empty without one.
     pub schema: String,
-    /// How the messages are encoded, such as `protobuf`.
+    /// The encoding of the messages, such as `protobuf`.
     pub encoding: String,
-    /// How many.
+    /// The number of them.
     pub messages: u64,
 }
 
-/// One attachment.
+/// An attachment of a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AttachmentInfo {
-    /// Its name.
+    /// The name of the attachment.
     pub name: String,
-    /// Its media type.
+    /// The media type of the attachment.
     pub media_type: String,
-    /// Its size (bytes).
+    /// The size of the attachment (bytes).
     pub bytes: u64,
 }
 
@@ -89,18 +88,18 @@ impl LogInfo {
         Self::of(BufReader::new(file), &path.display().to_string(), progress)
     }
 
-    /// As [`open`](Self::open), for any source; `place` names it in errors.
+    /// Looks into the log in `source`; `place` names it in errors, `progress` is told how many bytes of how many were read.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// [`ErrorKind::Io`](palpate::ErrorKind::Io) if it cannot be read, [`ErrorKind::Log`](palpate::ErrorKind::Log) if it is no
+    /// MCAP file.
     pub fn of(mut source: impl Read + Seek, place: &str, progress: impl FnMut(u64, u64)) -> Result<Self, Error> {
         if let Some(summary) = read_summary(&mut source)
             && let Some(info) = Self::of_index(&mut source, &summary)
         {
             return Ok(info);
         }
-        source.seek(SeekFrom::Start(0)).map_err(|e| Error::io(Path::new(place), e))?;
-        let records = Salvage::new(source).map_err(|e| cannot_open(place, e))?;
+        let records = Salvage::new(source, place)?;
         Ok(Self::scanned(records, progress))
     }
 
@@ -159,31 +158,28 @@ impl LogInfo {
         let (mut schemas, mut channels) = (HashMap::new(), HashMap::<u16, (String, TopicInfo)>::new());
         let (mut span, mut chunk) = (Span::default(), None);
         while let Some(found) = records.next() {
-            let opcode = match found {
-                Found::Record(opcode) => opcode,
+            let (opcode, stream) = match found {
+                Found::Record(opcode, stream) => (opcode, stream),
                 Found::Damage(damage) => {
                     info.damage.push(damage.what);
                     continue;
                 }
             };
-            let (length, offset) = (records.length(), records.offset());
-            let Some(stream) = records.stream() else { break };
             if let Some((start, head)) = stream.chunk().filter(|(start, _)| chunk != Some(*start)) {
                 chunk = Some(start);
                 info.chunk(&head.compression, head.length, head.unpacked);
-                progress(offset, length);
+                progress(stream.offset(), info.bytes);
             }
             let body = stream.body();
             match opcode {
                 op::HEADER => info.header(body),
                 op::METADATA | op::ATTACHMENT => info.metadata(opcode, body),
-                op::MESSAGE => {
-                    let Some((header, _)) = message(body) else { continue };
-                    info.messages += 1;
-                    span.push(header.log_time);
-                    channels.entry(header.channel_id).or_default().1.messages += 1;
-                }
                 _ => match mcap::parse_record(opcode, body) {
+                    Ok(Record::Message { header, .. }) => {
+                        info.messages += 1;
+                        span.push(header.log_time);
+                        channels.entry(header.channel_id).or_default().1.messages += 1;
+                    }
                     Ok(Record::Schema { header, .. }) => {
                         schemas.insert(header.id, header.name);
                     }

@@ -2,7 +2,6 @@
 
 mod check;
 mod info;
-mod message;
 mod recover;
 mod salvage;
 mod summary;
@@ -11,3 +10,14 @@ pub use check::{CheckReport, check};
 pub use info::{AttachmentInfo, ChunkInfo, LogInfo, TopicInfo};
 pub use recover::{Lost, Recovered, recover};
 pub use salvage::Damage;
+
+/// First and last of the times seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Span(pub(super) Option<(u64, u64)>);
+
+impl Span {
+    pub(super) fn push(&mut self, time: u64) {
+        let (first, last) = self.0.unwrap_or((time, time));
+        self.0 = Some((first.min(time), last.max(time)));
+    }
+}

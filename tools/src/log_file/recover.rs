@@ -7,54 +7,53 @@ use std::collections::{HashMap, HashSet};
 use std::io::{Read, Seek, Write};
 use std::path::Path;
 
-use mcap::records::{AttachmentHeader, Channel, Record, op};
+use mcap::records::{AttachmentHeader, Channel, MessageHeader, Record, op};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, Summary, WriteOptions};
 
-use super::message::{Span, message};
-use palpate::log::reader::cannot_open;
+use super::Span;
 use super::salvage::{Damage, Found, Salvage};
 use super::summary::{read_summary, record_at};
 use palpate::{Error, ErrorKind};
 
-/// What was saved and what was lost.
+/// The yield of [`recover`]: what was saved and what was lost.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recovered {
-    /// Size of the damaged file (bytes).
+    /// The size of the damaged file (bytes).
     pub bytes: u64,
-    /// Messages in the new log.
+    /// The number of messages in the new log.
     pub messages: u64,
-    /// Chunks, attachments and metadata records in it.
+    /// The number of chunks in the new log.
     pub chunks: u64,
-    /// Attachments.
+    /// The number of attachments in the new log.
     pub attachments: u64,
-    /// Metadata records.
+    /// The number of metadata records in the new log.
     pub metadata: u64,
-    /// Log times of the first and the last message saved (ns).
+    /// The log times of the first and the last message saved (ns).
     pub span: Option<(u64, u64)>,
-    /// What was damaged, in the order of the file.
+    /// The damaged stretches, in the order of the file.
     pub lost: Vec<Lost>,
-    /// Messages whose channel is not known any more.
+    /// The number of messages whose channel is not known any more.
     pub without_channel: u64,
-    /// Messages that the index counts, if it is there: what is missing is lost.
+    /// The number of messages that the index counts, if it is there: what is missing is lost.
     pub counted: Option<u64>,
 }
 
-/// A stretch that is lost.
+/// A stretch of a log that is lost.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lost {
-    /// Where, and what is wrong.
+    /// The stretch of the file, and what is wrong with it.
     pub damage: Damage,
-    /// Log time of the last message before it (ns).
+    /// The log time of the last message before it (ns).
     pub after: Option<u64>,
-    /// Log time of the first message behind it (ns).
+    /// The log time of the first message behind it (ns).
     pub before: Option<u64>,
-    /// Messages saved from the damaged record itself: of the last chunk of a cut file.
+    /// The number of messages saved from the damaged record itself: of the last chunk of a cut file.
     pub saved: u64,
 }
 
 impl Recovered {
-    /// Bytes of the file that gave nothing.
+    /// The number of bytes of the file that gave nothing.
     pub fn lost_bytes(&self) -> u64 {
         self.lost.iter().filter(|lost| lost.saved == 0).map(|lost| lost.damage.to - lost.damage.from).sum()
     }
@@ -74,48 +73,50 @@ pub fn recover<W: Write>(
 ) -> Result<(Recovered, W), Error> {
     let index = read_summary(&mut source);
     let mut late = Late::of(&mut source, index.as_ref());
-    let mut records = Salvage::new(source).map_err(|e| cannot_open(place, e))?;
+    let mut records = Salvage::new(source, place)?;
     let failed = |e| cannot_write(new_place, e);
     let mut copy = Copy::new(index.unwrap_or_default());
     copy.report.bytes = records.length();
-    let mut output = Output::Header(output);
+    let (mut output, mut new) = (Some(output), None);
     let mut chunk = None;
     while let Some(found) = records.next() {
-        let (length, offset) = (records.length(), records.offset());
-        let Found::Record(opcode) = found else {
-            if let Found::Damage(damage) = found {
+        let (opcode, stream) = match found {
+            Found::Record(opcode, stream) => (opcode, stream),
+            Found::Damage(damage) => {
                 copy.note(damage);
+                continue;
             }
-            continue;
         };
-        let Some(stream) = records.stream() else { break };
         let start = stream.chunk().map(|(start, _)| start);
         let (record_start, _) = stream.record_start();
-        if opcode == op::HEADER {
-            output.begin(stream.body()).map_err(failed)?;
-            continue;
+        if let Some(output) = output.take() {
+            new = Some(begin(output, if opcode == op::HEADER { stream.body() } else { &[] }).map_err(failed)?);
         }
-        let writer = output.begun().map_err(failed)?;
+        let Some(writer) = new.as_mut().filter(|_| opcode != op::HEADER) else { continue };
         if start != chunk {
             // The new log has the chunks of the old one.
             writer.flush().map_err(failed)?;
             copy.report.chunks += u64::from(start.is_some());
             copy.since_chunk = 0;
             chunk = start;
-            progress(offset, length);
+            progress(stream.offset(), copy.report.bytes);
         }
         late.forget(record_start);
         copy.record(writer, opcode, stream.body()).map_err(failed)?;
     }
-    let writer = output.begun().map_err(failed)?;
+    let mut writer = match (output, new) {
+        (Some(output), _) => begin(output, &[]).map_err(failed)?,
+        (None, Some(new)) => new,
+        (None, None) => unreachable!("the output is in one of the two"),
+    };
     // What the index knows of and a damage hid.
     for (opcode, body) in std::mem::take(&mut late.bodies).into_values() {
-        copy.record(writer, opcode, &body).map_err(failed)?;
+        copy.record(&mut writer, opcode, &body).map_err(failed)?;
     }
-    copy.declare_all(writer).map_err(failed)?;
+    copy.declare_all(&mut writer).map_err(failed)?;
     writer.finish().map_err(failed)?;
     progress(copy.report.bytes, copy.report.bytes);
-    let mut inner = output.into_inner().map_err(failed)?;
+    let mut inner = writer.into_inner().into_inner();
     inner.flush().map_err(|e| Error::io(Path::new(new_place), e))?;
     Ok((copy.report, inner))
 }
@@ -127,48 +128,23 @@ fn cannot_write(place: &str, error: McapError) -> Error {
     }
 }
 
-/// The new log, which begins with what the header of the old one says.
-enum Output<W: Write> {
-    Header(W),
-    Body(Box<mcap::Writer<NoSeek<W>>>),
-    Gone,
-}
+/// The new log, in which all that is copied goes.
+type NewLog<W> = mcap::Writer<NoSeek<W>>;
 
-impl<W: Write> Output<W> {
-    fn begin(&mut self, header: &[u8]) -> mcap::McapResult<()> {
-        let Self::Header(output) = std::mem::replace(self, Self::Gone) else { return Ok(()) };
-        let (profile, library) = match mcap::parse_record(op::HEADER, header) {
-            Ok(Record::Header(header)) => (header.profile, header.library),
-            _ => (String::new(), String::new()),
-        };
-        let options = WriteOptions::new()
-            .profile(profile)
-            .library(library)
-            .compression(Some(Compression::Lz4))
-            .calculate_data_section_crc(true)
-            .calculate_summary_section_crc(true)
-            .disable_seeking(true);
-        *self = Self::Body(Box::new(options.create(NoSeek::new(output))?));
-        Ok(())
-    }
-
-    fn begun(&mut self) -> mcap::McapResult<&mut mcap::Writer<NoSeek<W>>> {
-        if matches!(self, Self::Header(_)) {
-            self.begin(&[])?;
-        }
-        match self {
-            Self::Body(writer) => Ok(writer),
-            _ => Err(std::io::Error::other("the new log could not be begun").into()),
-        }
-    }
-
-    fn into_inner(self) -> mcap::McapResult<W> {
-        match self {
-            Self::Body(writer) => Ok(writer.into_inner().into_inner()),
-            Self::Header(output) => Ok(output),
-            Self::Gone => Err(std::io::Error::other("the new log could not be begun").into()),
-        }
-    }
+/// Begins the new log, with what the header of the old one says.
+fn begin<W: Write>(output: W, header: &[u8]) -> mcap::McapResult<NewLog<W>> {
+    let (profile, library) = match mcap::parse_record(op::HEADER, header) {
+        Ok(Record::Header(header)) => (header.profile, header.library),
+        _ => (String::new(), String::new()),
+    };
+    let options = WriteOptions::new()
+        .profile(profile)
+        .library(library)
+        .compression(Some(Compression::Lz4))
+        .calculate_data_section_crc(true)
+        .calculate_summary_section_crc(true)
+        .disable_seeking(true);
+    options.create(NoSeek::new(output))
 }
 
 /// Attachments and metadata that the index lists, until they are met in the file itself.
@@ -225,20 +201,13 @@ impl Copy {
         self.since_chunk = 0;
     }
 
-    fn record<W: Write>(
-        &mut self,
-        writer: &mut mcap::Writer<NoSeek<W>>,
-        opcode: u8,
-        body: &[u8],
-    ) -> mcap::McapResult<()> {
-        if opcode == op::MESSAGE {
-            return self.message(writer, body);
-        }
+    fn record<W: Write>(&mut self, writer: &mut NewLog<W>, opcode: u8, body: &[u8]) -> mcap::McapResult<()> {
         // What cannot be parsed is not there: where there is a checksum it has been looked at.
         match mcap::parse_record(opcode, body) {
             Ok(Record::Schema { header, data }) => {
                 self.schemas.insert(header.id, (header.name, header.encoding, data.into_owned()));
             }
+            Ok(Record::Message { header, data }) => self.message(writer, &header, &data)?,
             Ok(Record::Channel(channel)) => self.declare(writer, &channel)?,
             Ok(Record::Metadata(metadata)) => {
                 writer.write_metadata(&metadata)?;
@@ -254,8 +223,12 @@ impl Copy {
         Ok(())
     }
 
-    fn message<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>, body: &[u8]) -> mcap::McapResult<()> {
-        let Some((header, data)) = message(body) else { return Ok(()) };
+    fn message<W: Write>(
+        &mut self,
+        writer: &mut NewLog<W>,
+        header: &MessageHeader,
+        data: &[u8],
+    ) -> mcap::McapResult<()> {
         if !self.declared.contains(&header.channel_id) {
             self.declare_from_index(writer, header.channel_id)?;
         }
@@ -263,7 +236,7 @@ impl Copy {
             self.report.without_channel += 1;
             return Ok(());
         }
-        writer.write_to_known_channel(&header, data)?;
+        writer.write_to_known_channel(header, data)?;
         self.report.messages += 1;
         self.since_chunk += 1;
         self.span.push(header.log_time);
@@ -275,7 +248,7 @@ impl Copy {
     }
 
     /// Declares a channel under its own number; a second one of that number that differs is left out.
-    fn declare<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>, channel: &Channel) -> mcap::McapResult<()> {
+    fn declare<W: Write>(&mut self, writer: &mut NewLog<W>, channel: &Channel) -> mcap::McapResult<()> {
         let id = channel.schema_id;
         if !self.schemas.contains_key(&id)
             && let Some(schema) = self.index.schemas.get(&id)
@@ -298,7 +271,7 @@ impl Copy {
         }
     }
 
-    fn declare_from_index<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>, id: u16) -> mcap::McapResult<()> {
+    fn declare_from_index<W: Write>(&mut self, writer: &mut NewLog<W>, id: u16) -> mcap::McapResult<()> {
         let Some(channel) = self.index.channels.get(&id) else { return Ok(()) };
         let channel = Channel {
             id,
@@ -311,7 +284,7 @@ impl Copy {
     }
 
     /// Topics without a message are part of a log too.
-    fn declare_all<W: Write>(&mut self, writer: &mut mcap::Writer<NoSeek<W>>) -> mcap::McapResult<()> {
+    fn declare_all<W: Write>(&mut self, writer: &mut NewLog<W>) -> mcap::McapResult<()> {
         let mut ids: Vec<u16> = self.index.channels.keys().copied().filter(|id| !self.declared.contains(id)).collect();
         ids.sort_unstable();
         ids.into_iter().try_for_each(|id| self.declare_from_index(writer, id))

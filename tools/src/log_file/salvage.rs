@@ -4,11 +4,12 @@
 //! file, which ends before its records do, cannot be checked.
 
 use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
 
 use mcap::records::op;
 
-use palpate::log::chunk::{ChunkRecords, is_readable, read_header};
-use palpate::log::framing::{MAX_RECORD_BYTES, RecordStream, Section};
+use palpate::Error;
+use palpate::log::file::{ChunkHead, ChunkRecords, MAX_RECORD_BYTES, RecordStream, Section};
 
 /// How much is looked at at once in the search for a chunk (bytes).
 const WINDOW_BYTES: usize = 1 << 20;
@@ -27,10 +28,10 @@ pub struct Damage {
 }
 
 /// The next thing that was found.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) enum Found {
+#[derive(Debug)]
+pub(super) enum Found<'a, R> {
     /// A record with this opcode; its body is in the stream.
-    Record(u8),
+    Record(u8, &'a RecordStream<R>),
     Damage(Damage),
 }
 
@@ -46,26 +47,16 @@ impl<R: Read + Seek> Salvage<R> {
     /// Reads the leading magic.
     ///
     /// # Errors
-    /// As [`RecordStream::new`].
-    pub(super) fn new(mut source: R) -> io::Result<Self> {
-        let length = source.seek(SeekFrom::End(0))?;
-        source.seek(SeekFrom::Start(0))?;
-        Ok(Self { stream: Some(RecordStream::new(source)?), length, damaged: false })
+    /// If the source cannot be read, or is no MCAP file; `place` names it.
+    pub(super) fn new(mut source: R, place: &str) -> Result<Self, Error> {
+        let length = source.seek(SeekFrom::End(0)).and_then(|length| source.rewind().map(|()| length));
+        let length = length.map_err(|e| Error::io(Path::new(place), e))?;
+        Ok(Self { stream: Some(RecordStream::new(source, place)?), length, damaged: false })
     }
 
     /// The size of the file (bytes).
     pub(super) fn length(&self) -> u64 {
         self.length
-    }
-
-    /// Bytes read so far.
-    pub(super) fn offset(&self) -> u64 {
-        self.stream.as_ref().map_or(self.length, RecordStream::offset)
-    }
-
-    /// The stream that the last record came from; `None` at the end.
-    pub(super) fn stream(&self) -> Option<&RecordStream<R>> {
-        self.stream.as_ref()
     }
 
     /// True if all of the data was read and fits its checksum.
@@ -74,11 +65,11 @@ impl<R: Read + Seek> Salvage<R> {
     }
 
     /// The next record or damage; `None` at the end of the file.
-    pub(super) fn next(&mut self) -> Option<Found> {
-        let stream = self.stream.as_mut()?;
-        if let Some(opcode) = stream.next() {
-            return Some(Found::Record(opcode));
+    pub(super) fn next(&mut self) -> Option<Found<'_, R>> {
+        if let Some(opcode) = self.stream.as_mut()?.read_next() {
+            return Some(Found::Record(opcode, self.stream.as_ref()?));
         }
+        let stream = self.stream.as_ref()?;
         let what = stream.damage()?.to_owned();
         self.damaged = true;
         let (start, opcode) = stream.record_start();
@@ -127,7 +118,7 @@ impl<R: Read + Seek> Salvage<R> {
         let head = &bytes[9..bytes.len().min(HEAD_BYTES)];
         length <= MAX_RECORD_BYTES
             && place + 9 + length <= self.length
-            && read_header(head, length, false).is_ok_and(|head| is_readable(&head.compression))
+            && ChunkHead::of(head, length, false).is_ok_and(|head| head.is_readable())
     }
 
     /// True if there is a chunk at `place` that has a checksum and fits it.
@@ -140,7 +131,7 @@ impl<R: Read + Seek> Salvage<R> {
         source.by_ref().take(length).read_to_end(&mut body)?;
         let Ok(mut chunk) = ChunkRecords::new(body, length) else { return Ok(false) };
         let mut record = Vec::new();
-        Ok(chunk.head().checksum != 0 && matches!(chunk.next(&mut record), Ok(Some(_))))
+        Ok(chunk.head().checksum != 0 && matches!(chunk.read_next(&mut record), Ok(Some(_))))
     }
 }
 

@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom};
 use crc32fast::Hasher;
 use mcap::sans_io::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 
-use palpate::log::framing::MAX_RECORD_BYTES;
+use palpate::log::file::MAX_RECORD_BYTES;
 
 /// What follows the start of the index in the footer and is under its checksum, the checksum itself, and the magic (bytes).
 const FOOTER_END: u64 = 8 + 4 + mcap::MAGIC.len() as u64;

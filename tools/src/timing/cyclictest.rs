@@ -5,7 +5,7 @@ use std::path::Path;
 use super::analysis::{TimingAnalysis, TimingReport};
 use super::selection::Selection;
 use palpate::{Error, ErrorKind};
-use palpate::log::{Environment, Execution, GroupInfo, LogEntry, TextEvent, Window};
+use palpate::log::{Environment, LoggedExecution, GroupInfo, LogEntry, TextEvent, Window};
 use palpate::runtime::Nanos;
 use serde_json::Value;
 
@@ -33,7 +33,7 @@ pub fn read_cyclictest(text: &str, place: &Path, selection: Selection) -> Result
     let system = &file["sysinfo"];
     let said = |key: &str| system[key].as_str().unwrap_or("-").to_owned();
     analysis.push_entry(&LogEntry::Environment(Environment {
-        execution: Execution::Threaded { start_unix_ns: 0 },
+        execution: LoggedExecution::Threaded { start_unix_ns: 0 },
         palpate_version: "-".to_owned(),
         model: "none, cyclictest".to_owned(),
         instruction_set: said("machine"),

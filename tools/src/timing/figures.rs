@@ -18,7 +18,7 @@
 //! the name of the device comes first: `left.resync.age.p99`.
 
 use super::analysis::TimingReport;
-use palpate::log::{CauseCounts, DeviceReport, GroupReport, Percentiles};
+use palpate::log::{CauseCounts, DeviceReport, GroupSummary, Percentiles};
 use palpate::runtime::record::SlipCause;
 
 /// What a figure is measured in.
@@ -154,7 +154,7 @@ impl Figures {
         }
     }
 
-    fn group(&mut self, group: &GroupReport) {
+    fn group(&mut self, group: &GroupSummary) {
         let name = |figure: &str| format!("{}.{figure}", group.name);
         self.count(&name("released"), group.released);
         if group.released > 0 && group.execution.count == 0 {

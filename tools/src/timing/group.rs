@@ -56,7 +56,7 @@ pub struct ActorTiming {
     pub execution: Shape,
 }
 
-/// How one rate group kept time, in detail; the sums are in [`GroupReport`](palpate::log::GroupReport).
+/// How one rate group kept time, in detail; the sums are in [`GroupReport`](palpate::log::GroupSummary).
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroupTiming {
     /// Its name.

@@ -33,14 +33,14 @@
 use serde_json::{Map, Value, json};
 
 use super::text::in_words;
-use palpate::report::verdict;
 use crate::timing::{
     Against, ComparedFigure, CoreUse, Figure, TimingReport, Value as FigureValue, WorstTick, cause_name,
 };
 use palpate::log::{
-    CauseCounts, DeviceReport, Environment, Execution, ForceReport, GroupReport, Level, Percentiles, RunReport,
+    CauseCounts, DeviceReport, Environment, ForceReport, GroupSummary, Level, LoggedExecution, Percentiles, RunReport,
     TextEvent,
 };
+use palpate::report::verdict;
 use palpate::runtime::record::TickTiming;
 
 /// The report as one JSON document.
@@ -225,8 +225,8 @@ fn environment(environment: &Environment) -> Value {
         "palpate_version": environment.palpate_version,
         "instruction_set": environment.instruction_set,
         "execution": match environment.execution {
-            Execution::Virtual => "virtual",
-            Execution::Threaded { .. } => "threaded",
+            LoggedExecution::Virtual => "virtual",
+            LoggedExecution::Threaded { .. } => "threaded",
         },
         "start_unix_ns": environment.epoch_ns(),
         "model": environment.model,
@@ -241,7 +241,7 @@ fn environment(environment: &Environment) -> Value {
     })
 }
 
-fn group(group: &GroupReport) -> Value {
+fn group(group: &GroupSummary) -> Value {
     json!({
         "name": group.name,
         "rate_hz": group.rate_hz,
@@ -278,8 +278,8 @@ fn event(event: &TextEvent) -> Value {
 mod tests {
     use super::*;
     use palpate::log::{Analysis, LogRecord};
-    use palpate::runtime::record::TickTiming;
     use palpate::runtime::Nanos;
+    use palpate::runtime::record::TickTiming;
 
     #[test]
     fn integers_survive_beyond_the_precision_of_doubles() {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::numbers::{Numbers, grouped};
-use palpate::log::{Environment, Execution, RunReport};
+use palpate::log::{Environment, LoggedExecution, RunReport};
 use crate::drawing::html::escaped;
 
 /// Events that the page lists.
@@ -38,8 +38,8 @@ fn about(environment: &Environment, facts: &mut Vec<(String, String)>) {
         }
     };
     let execution = match environment.execution {
-        Execution::Virtual => "virtual time",
-        Execution::Threaded { .. } => "real time, on threads",
+        LoggedExecution::Virtual => "virtual time",
+        LoggedExecution::Threaded { .. } => "real time, on threads",
     };
     fact("execution", execution.to_owned());
     // Logs of other programs have no version of palpate's.

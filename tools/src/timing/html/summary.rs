@@ -7,7 +7,7 @@ use super::numbers::Numbers;
 use crate::timing::{TimingReport, WorstTick};
 use crate::drawing::html::{escaped, sentence};
 use crate::units::{duration, force, plural};
-use palpate::report::{Verdict, verdict};
+use palpate::report::{RunVerdict, verdict};
 
 /// Groups that get a card of their own.
 const GROUP_CARDS: usize = 2;
@@ -19,9 +19,9 @@ const CHAPTERS: &str = "<nav aria-label=\"Chapters\"><a href=\"#groups\">Groups<
 pub(crate) fn summary(report: &TimingReport, name: &str, numbers: &Numbers) -> String {
     let (verdict, reason) = verdict(&report.run);
     let class = match verdict {
-        Verdict::Ok => "good",
-        Verdict::Incomplete | Verdict::Restarted => "fair",
-        Verdict::Late | Verdict::Failed => "bad",
+        RunVerdict::Ok => "good",
+        RunVerdict::Incomplete | RunVerdict::Restarted => "fair",
+        RunVerdict::Late | RunVerdict::Failed => "bad",
     };
     let mut out = format!(
         "<header>\n<p class=\"faint\">Timing of <code>{}</code></p>\n\

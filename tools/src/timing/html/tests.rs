@@ -1,8 +1,8 @@
 use super::timing_html;
 use crate::timing::{Selection, TimingAnalysis, TimingReport};
-use palpate::log::{CommandSample, Environment, Execution, ForceSample, GroupInfo, LogEntry, LogRecord, Resync};
-use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+use palpate::log::{CommandSample, Environment, ForceSample, GroupInfo, LogEntry, LogRecord, LoggedExecution, Resync};
 use palpate::runtime::Nanos;
+use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
 
 const MS: u64 = 1_000_000;
 
@@ -27,7 +27,7 @@ fn tick(group: u16, tick: u64, period: u64, late: u64, work: u64, slips: u32, ca
 fn troubled() -> TimingReport {
     let mut analysis = TimingAnalysis::new(Selection::default());
     let environment = Environment {
-        execution: Execution::Threaded { start_unix_ns: 1 },
+        execution: LoggedExecution::Threaded { start_unix_ns: 1 },
         model: "<patch>".into(),
         groups: vec![
             GroupInfo {

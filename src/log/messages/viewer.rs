@@ -1,10 +1,9 @@
 //! Tool samples, events and scenes as the messages that viewers know, and back bit for bit.
 
-use super::event::{Level, TextEvent};
 use super::foxglove::{self, Log, Pose, PoseInFrame, Quaternion, Timestamp, Vector3};
-use super::records::ToolSample;
-use crate::runtime::record::Event;
+use crate::log::records::{Level, TextEvent, ToolSample};
 use crate::runtime::Nanos;
+use crate::runtime::record::Event;
 
 /// The one frame of reference, world coordinates.
 pub(super) const FRAME: &str = "world";
@@ -28,11 +27,6 @@ fn array(v: Vector3) -> [f64; 3] {
     [v.x, v.y, v.z]
 }
 
-// Numbers that do not fit come only from a damaged or foreign log; they saturate.
-fn narrow(value: u32) -> u16 {
-    u16::try_from(value).unwrap_or(u16::MAX)
-}
-
 impl PoseInFrame {
     /// The sample of a run that started at `epoch_ns`.
     pub(crate) fn of(r: &ToolSample, epoch_ns: u64) -> Self {
@@ -40,11 +34,11 @@ impl PoseInFrame {
             timestamp: timestamp(epoch_ns, r.time),
             frame_id: FRAME.into(),
             pose: Pose { position: vector(r.position_m), orientation: UPRIGHT },
-            time_ns: r.time.0,
+            time_ns: r.time,
             id: r.id,
             velocity_m_s: vector(r.velocity_m_s),
-            buttons: r.buttons.into(),
-            device: r.device.into(),
+            buttons: r.buttons,
+            device: r.device,
         }
     }
 }
@@ -52,12 +46,12 @@ impl PoseInFrame {
 impl From<PoseInFrame> for ToolSample {
     fn from(m: PoseInFrame) -> Self {
         Self {
-            time: Nanos(m.time_ns),
+            time: m.time_ns,
             id: m.id,
             position_m: array(m.pose.position),
             velocity_m_s: array(m.velocity_m_s),
-            buttons: narrow(m.buttons),
-            device: narrow(m.device),
+            buttons: m.buttons,
+            device: m.device,
         }
     }
 }
@@ -80,10 +74,10 @@ impl Log {
     pub(crate) fn text(event: &TextEvent, epoch_ns: u64) -> Self {
         Self {
             timestamp: timestamp(epoch_ns, event.time),
-            level: foxglove::Level::from(event.level) as i32,
+            level: event.level.into(),
             message: event.message.clone(),
             name: SESSION.into(),
-            time_ns: event.time.0,
+            time_ns: event.time,
             ..Self::default()
         }
     }
@@ -93,7 +87,7 @@ impl Log {
         Self {
             name: group.into(),
             coded: true,
-            group: event.group.into(),
+            group: event.group,
             code: event.code,
             detail: event.detail,
             ..Self::text(&TextEvent::describe(event, group), epoch_ns)
@@ -102,27 +96,19 @@ impl Log {
 
     /// The event record it came from; `None` if it never was one.
     pub(crate) fn event(&self) -> Option<Event> {
-        self.coded.then(|| Event {
-            stamp: Nanos(self.time_ns),
-            group: narrow(self.group),
-            code: self.code,
-            detail: self.detail,
-        })
+        self.coded.then(|| Event { stamp: self.time_ns, group: self.group, code: self.code, detail: self.detail })
     }
 }
 
 impl From<Log> for TextEvent {
     fn from(m: Log) -> Self {
-        let is = |level: foxglove::Level| m.level == level as i32;
-        // An unknown level reads as an error, so that nothing grave goes unseen.
-        let level = if is(foxglove::Level::Info) || is(foxglove::Level::Debug) {
-            Level::Info
-        } else if is(foxglove::Level::Warning) {
-            Level::Warning
-        } else {
-            Level::Error
+        let level = match m.level {
+            foxglove::Level::Debug | foxglove::Level::Info => Level::Info,
+            foxglove::Level::Warning => Level::Warning,
+            // An unknown level reads as an error, so that nothing grave goes unseen.
+            foxglove::Level::Unknown | foxglove::Level::Error | foxglove::Level::Fatal => Level::Error,
         };
-        Self { time: Nanos(m.time_ns), level, message: m.message }
+        Self { time: m.time_ns, level, message: m.message }
     }
 }
 
@@ -137,7 +123,7 @@ mod tests {
         let sample = ToolSample { time: Nanos(1_900_000_000), ..ToolSample::default() };
         let message = PoseInFrame::of(&sample, EPOCH);
         assert_eq!((message.timestamp.seconds, message.timestamp.nanos), (1_700_000_002, 23_456_789));
-        assert_eq!(message.time_ns, 1_900_000_000);
+        assert_eq!(message.time_ns, sample.time);
     }
 
     #[test]
@@ -145,7 +131,7 @@ mod tests {
         for (level, number) in [(Level::Info, 2), (Level::Warning, 3), (Level::Error, 4)] {
             let event = TextEvent { time: Nanos(7), level, message: "something".into() };
             let message = Log::text(&event, EPOCH);
-            assert_eq!((message.level, message.name.as_str()), (number, "session"));
+            assert_eq!((message.level as i32, message.name.as_str()), (number, "session"));
             assert_eq!(TextEvent::from(message), event);
         }
     }

@@ -1,9 +1,9 @@
 //! The timing of one rate group over a run.
 
-use super::percentiles::{Distribution, Percentiles};
+use crate::log::percentiles::{Distribution, Percentiles};
 use crate::runtime::Mode;
-use crate::runtime::record::{SlipCause, TickTiming};
 use crate::runtime::Nanos;
+use crate::runtime::record::{SlipCause, TickTiming};
 
 /// How often each cause of a slip or a missed deadline occurred.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,7 +19,7 @@ impl CauseCounts {
         self.0[cause as usize]
     }
 
-    /// Every cause with its count, those without a recorded cause last.
+    /// Every cause with its count; those without a recorded cause are last.
     pub fn iter(&self) -> impl Iterator<Item = (SlipCause, u64)> {
         SlipCause::ALL[1..].iter().chain(&SlipCause::ALL[..1]).map(|&cause| (cause, self.of(cause)))
     }
@@ -30,40 +30,40 @@ impl CauseCounts {
     }
 }
 
-/// How one rate group kept time.
+/// The timing of one rate group over a run.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct GroupReport {
-    /// The group's name.
+pub struct GroupSummary {
+    /// The name of the group.
     pub name: String,
-    /// Its rate, if the environment of the run is known (Hz).
+    /// The rate of the group, if the environment of the run is known (Hz).
     pub rate_hz: Option<f64>,
-    /// Releases that ran.
+    /// The number of releases that ran.
     pub released: u64,
-    /// Periods skipped, by cause.
+    /// The number of periods skipped, by cause.
     pub skipped: CauseCounts,
-    /// Deadlines missed, by cause.
+    /// The number of deadlines missed, by cause.
     pub missed: CauseCounts,
-    /// Periods between the first and the last release, both counted: `released + skipped` unless records were lost.
+    /// The number of periods between the first and the last release, both counted: `released + skipped` unless records were lost.
     pub elapsed_periods: u64,
-    /// Releases in degraded mode, which an overrun policy sets.
+    /// The number of releases in degraded mode, which an overrun policy sets.
     pub in_degraded_mode: u64,
-    /// Records that were lost because a ring was full.
+    /// The number of records that were lost because a ring was full.
     pub lost_records: u64,
-    /// Wake-up lateness, woke - scheduled (ns).
+    /// The lateness of wake-ups, woke - scheduled (ns).
     pub lateness: Percentiles<u64>,
-    /// Execution time, end - start (ns).
+    /// The execution time, end - start (ns).
     pub execution: Percentiles<u64>,
-    /// Magnitude of the difference between the time from wake-up to wake-up and the time that was scheduled (ns).
+    /// The magnitude of the difference between the time from wake-up to wake-up and the time that was scheduled (ns).
     pub period_error: Percentiles<u64>,
-    /// Cycle-to-cycle jitter: magnitude of the difference between one period error and the next, with their signs (ns).
+    /// The cycle-to-cycle jitter: magnitude of the difference between one period error and the next, with their signs (ns).
     pub jitter: Percentiles<u64>,
-    /// Execution time of all releases together.
+    /// The execution time of all releases together.
     pub busy: Nanos,
     /// The scheduled time of the last release.
     pub last_release: Nanos,
 }
 
-/// Gathers a [`GroupReport`].
+/// Gathers a [`GroupSummary`].
 #[derive(Clone, Debug, Default)]
 pub struct GroupCounter {
     released: u64,
@@ -75,9 +75,13 @@ pub struct GroupCounter {
     lost_records: u64,
     busy: Nanos,
     gauge: TickGauge,
+    /// The lateness of every release (ns).
     pub lateness: Distribution,
+    /// The execution time of every release (ns).
     pub execution: Distribution,
+    /// The magnitude of the period error of every release but the first (ns).
     pub period_error: Distribution,
+    /// The jitter of every release but the first two (ns).
     pub jitter: Distribution,
 }
 
@@ -116,17 +120,18 @@ impl TickGauge {
 /// The figures of one release (ns).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TickFigures {
-    /// Woke - scheduled.
+    /// The lateness of the wake-up, woke - scheduled (ns).
     pub lateness: u64,
-    /// End - start.
+    /// The execution time, end - start (ns).
     pub execution: u64,
-    /// Time since the wake-up before less the time that was scheduled; `None` for the first release.
+    /// The time since the wake-up before less the time that was scheduled (ns); `None` for the first release.
     pub period_error: Option<i64>,
-    /// Change of the period error; `None` for the first two.
+    /// The change of the period error (ns); `None` for the first two releases.
     pub jitter: Option<u64>,
 }
 
 impl GroupCounter {
+    /// Counts one release. Allocates.
     pub fn push(&mut self, timing: &TickTiming) {
         for (cause, slips) in timing.slips_by_cause() {
             self.skipped.add(cause, slips.into());
@@ -165,9 +170,10 @@ impl GroupCounter {
         self.lost_records = self.lost_records.max(total);
     }
 
-    pub fn report(&self, name: String, rate_hz: Option<f64>) -> GroupReport {
+    /// The sums so far, for the group with this name and rate (Hz).
+    pub fn report(&self, name: String, rate_hz: Option<f64>) -> GroupSummary {
         let elapsed = self.last.tick.wrapping_sub(self.first_tick).wrapping_add(1);
-        GroupReport {
+        GroupSummary {
             name,
             rate_hz,
             released: self.released,

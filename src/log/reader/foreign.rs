@@ -23,8 +23,8 @@ use prost::encoding::{WireType, decode_key, decode_varint};
 use prost_types::FileDescriptorSet;
 use prost_types::field_descriptor_proto::Type;
 
-use crate::runtime::record::{SlipCause, TickTiming};
 use crate::runtime::Nanos;
+use crate::runtime::record::{SlipCause, TickTiming};
 
 const SECOND: u64 = 1_000_000_000;
 
@@ -238,7 +238,7 @@ fn cause_by_name(name: &str) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::schema;
+    use crate::log::messages::{self, LogMessage as _};
 
     fn json(text: &str) -> Values {
         of_json(text.as_bytes()).unwrap()
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn protobuf_is_read_by_its_descriptors() {
         let name = "palpate.TickTiming";
-        let descriptors = schema::descriptor_set(name);
+        let descriptors = messages::descriptor_set(name);
         let mut channel = channel("protobuf", Some((name, &descriptors)), "").unwrap();
         let timing = TickTiming {
             group: 2,
@@ -287,7 +287,8 @@ mod tests {
             cause: SlipCause::LongTick,
             ..TickTiming::default()
         };
-        let message = schema::TickTiming::from(&timing).encode_to_vec();
+        let mut message = Vec::new();
+        timing.encode(&mut message);
         assert_eq!(channel.tick(&message, &mut None), Ok(timing));
         for cut in 1..message.len() {
             // Check that a cut message is an error or a message, never a panic
@@ -319,7 +320,7 @@ mod tests {
 
     #[test]
     fn channels_without_the_fields_are_left_alone() {
-        let descriptors = schema::descriptor_set("palpate.Force");
+        let descriptors = messages::descriptor_set("palpate.Force");
         assert!(channel("protobuf", Some(("palpate.Force", &descriptors)), "").is_none());
         assert!(channel("ros1", None, "").is_none());
         assert!(ForeignChannel::of("/pose", "json", None, &BTreeMap::new()).is_none());

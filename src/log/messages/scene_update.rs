@@ -4,8 +4,9 @@ use super::foxglove::{
     ArrowPrimitive, Color, Duration, KeyValuePair, Point3, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive,
     TriangleListPrimitive, Vector3,
 };
-use super::scene_frame::{SceneFrame, SceneTool};
 use super::viewer::{FRAME, UPRIGHT, timestamp, vector};
+use super::wire::Fixed32s;
+use crate::log::records::{SceneFrame, SceneTool};
 use crate::runtime::Nanos;
 
 const FLESH: Color = Color { r: 0.85, g: 0.55, b: 0.48, a: 1.0 };
@@ -30,7 +31,7 @@ impl SceneUpdate {
                 entities.push(arrow(tool, force_n, frame.tool_size_m, epoch_ns));
             }
         }
-        Self { deletions: Vec::new(), entities, time_ns: frame.time.0 }
+        Self { deletions: Vec::new(), entities, time_ns: frame.time }
     }
 }
 
@@ -51,7 +52,7 @@ fn surface(frame: &SceneFrame, epoch_ns: u64) -> SceneEntity {
         points: frame.points.iter().map(|&[x, y, z]| Point3 { x, y, z }).collect(),
         color: FLESH,
         colors: Vec::new(),
-        indices: frame.triangles.iter().flatten().copied().collect(),
+        indices: Fixed32s(frame.triangles.iter().flatten().copied().collect()),
     };
     SceneEntity { triangles: vec![mesh], ..entity("surface".into(), frame.surface_time, epoch_ns) }
 }

@@ -1,9 +1,9 @@
 //! Text events: what a reader of the log should be told in words.
 
-use crate::runtime::record::Event;
 use crate::runtime::Nanos;
+use crate::runtime::record::Event;
 
-/// How grave an event is.
+/// The gravity of an event.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u16)]
 pub enum Level {
@@ -17,15 +17,6 @@ pub enum Level {
 }
 
 impl Level {
-    /// The level with this number; unknown numbers read as an error, so that nothing grave goes unseen.
-    pub fn from_code(code: u16) -> Self {
-        match code {
-            0 => Self::Info,
-            1 => Self::Warning,
-            _ => Self::Error,
-        }
-    }
-
     /// A short name for tables and logs.
     pub fn name(self) -> &'static str {
         match self {
@@ -39,11 +30,11 @@ impl Level {
 /// One event in words.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TextEvent {
-    /// When.
+    /// The moment of the event, since the start of the run.
     pub time: Nanos,
-    /// How grave.
+    /// The gravity of the event.
     pub level: Level,
-    /// One line.
+    /// The event in one line.
     pub message: String,
 }
 

@@ -1,8 +1,12 @@
 //! What a run did to the force: resyncs, contact, limits.
 
-use super::percentiles::{Distribution, Magnitudes, Percentiles};
-use super::records::{CommandSample, ContactMode, ContactSample, ForceSample, Resync, ServedBy};
-use super::vector::magnitude;
+use crate::log::percentiles::{Distribution, Magnitudes, Percentiles};
+use crate::log::records::{CommandSample, ContactMode, ContactSample, ForceSample, Resync, ServedBy};
+
+/// The length of a vector, in its own unit.
+pub fn magnitude([x, y, z]: [f64; 3]) -> f64 {
+    (x * x + y * y + z * z).sqrt()
+}
 
 /// The bits of [`CommandSample::limits`].
 const LIMIT_BITS: usize = 16;
@@ -10,28 +14,28 @@ const LIMIT_BITS: usize = 16;
 /// The resyncs of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ResyncReport {
-    /// Jump of the force at the swap, before blending (N); its count is the number of resyncs.
+    /// The jump of the force at the swap, before blending (N); its count is the number of resyncs.
     pub jump_before_n: Percentiles<f64>,
-    /// Largest one-tick change that blending leaves of it (N).
+    /// The largest one-tick change that blending leaves of the jump (N).
     pub jump_after_n: Percentiles<f64>,
-    /// Age of the new model's state on arrival (ns).
+    /// The age of the new model's state on arrival (ns).
     pub age_ns: Percentiles<u64>,
 }
 
 /// The force of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ForceReport {
-    /// Haptic ticks with a force.
+    /// The number of haptic ticks with a force.
     pub ticks: u64,
-    /// Largest finite magnitude before the safety pipeline (N).
+    /// The largest finite magnitude before the safety pipeline (N).
     pub peak_n: f64,
-    /// Largest finite magnitude after it (N).
+    /// The largest finite magnitude after the safety pipeline (N).
     pub peak_commanded_n: f64,
-    /// Forces before the safety pipeline that were not finite.
+    /// The number of forces before the safety pipeline that were not finite.
     pub not_finite: u64,
-    /// Ticks that each local model served, by [`ServedBy`]'s number.
+    /// The number of ticks that each local model served, by [`ServedBy`]'s number.
     pub served: [u64; ServedBy::ALL.len()],
-    /// Age of the local model's last resync at each tick (s).
+    /// The age of the local model's last resync at each tick (s).
     pub model_age_s: Percentiles<f64>,
 }
 
@@ -43,7 +47,7 @@ impl ForceReport {
     }
 }
 
-/// Haptic ticks in each contact mode.
+/// The number of haptic ticks in each contact mode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct ContactReport {
@@ -53,27 +57,27 @@ pub struct ContactReport {
     pub lost: u64,
 }
 
-/// What the safety pipeline did.
+/// The actions of the safety pipeline in a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LimitReport {
-    /// Commands that passed the pipeline.
+    /// The number of commands that passed the pipeline.
     pub ticks: u64,
-    /// Commands that at least one stage changed.
+    /// The number of commands that at least one stage changed.
     pub limited: u64,
     /// The stages that acted, with the number of ticks on which they did.
     pub stages: Vec<(String, u64)>,
-    /// Ledger and tank.
+    /// The passivity ledger and the energy tank.
     pub energy: EnergyReport,
 }
 
 /// The passivity ledger and the energy tank; all zero without a command.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergyReport {
-    /// The least that stood in the ledger (J): negative is a deficit.
+    /// The least balance of the ledger (J): negative is a deficit.
     pub least_j: f64,
-    /// What stood in it at the end (J).
+    /// The balance of the ledger at the end (J).
     pub last_j: f64,
-    /// The least that was in the tank (J).
+    /// The least energy in the tank (J).
     pub least_tank_j: f64,
 }
 
@@ -84,18 +88,18 @@ impl LimitReport {
     }
 }
 
-/// All of it for one device.
+/// The haptics of one device over a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DeviceReport {
-    /// Its name; empty for the only one.
+    /// The name of the device; empty for the only one.
     pub name: String,
-    /// Resyncs of its local model.
+    /// The resyncs of its local model.
     pub resyncs: ResyncReport,
-    /// Its force.
+    /// The force on its tool.
     pub force: ForceReport,
-    /// Its contact.
+    /// The contact of its tool.
     pub contact: ContactReport,
-    /// Its safety pipeline.
+    /// The actions of its safety pipeline.
     pub limits: LimitReport,
 }
 
@@ -163,30 +167,23 @@ impl HapticsCounter {
 
     /// `names` are those of the limit bits, lowest first.
     pub(super) fn report(&self, name: String, names: &[String]) -> DeviceReport {
-        let (resyncs, force, contact) = (self.resyncs(), self.force(), self.contact);
-        DeviceReport { name, resyncs, force, contact, limits: self.limits(names) }
-    }
-
-    fn resyncs(&self) -> ResyncReport {
-        ResyncReport {
-            jump_before_n: self.jump_before.percentiles(),
-            jump_after_n: self.jump_after.percentiles(),
-            age_ns: self.resync_age.percentiles(),
-        }
-    }
-
-    fn force(&self) -> ForceReport {
-        ForceReport { model_age_s: self.model_age.percentiles(), ..self.force }
-    }
-
-    fn limits(&self, names: &[String]) -> LimitReport {
-        let name = |bit: usize| names.get(bit).cloned().unwrap_or_else(|| format!("bit {bit}"));
+        let stage = |bit: usize| names.get(bit).cloned().unwrap_or_else(|| format!("bit {bit}"));
         let acted = self.limits.iter().enumerate().filter(|&(_, &count)| count > 0);
-        LimitReport {
-            ticks: self.commands,
-            limited: self.limited,
-            stages: acted.map(|(bit, &count)| (name(bit), count)).collect(),
-            energy: self.energy,
+        DeviceReport {
+            name,
+            resyncs: ResyncReport {
+                jump_before_n: self.jump_before.percentiles(),
+                jump_after_n: self.jump_after.percentiles(),
+                age_ns: self.resync_age.percentiles(),
+            },
+            force: ForceReport { model_age_s: self.model_age.percentiles(), ..self.force },
+            contact: self.contact,
+            limits: LimitReport {
+                ticks: self.commands,
+                limited: self.limited,
+                stages: acted.map(|(bit, &count)| (stage(bit), count)).collect(),
+                energy: self.energy,
+            },
         }
     }
 }

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::records::ToolSample;
+use super::ToolSample;
 use crate::runtime::GroupGrant;
 use crate::runtime::Nanos;
 
-/// How a run was executed.
+/// The kind of time that a logged run was executed in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Execution {
+pub enum LoggedExecution {
     /// In simulated time, as fast as the machine allows: lateness is zero by construction.
     #[default]
     Virtual,
@@ -22,17 +22,17 @@ pub enum Execution {
 /// A rate group, in the order that [`TickTiming::group`](crate::runtime::record::TickTiming::group) counts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GroupInfo {
-    /// Its name; its topics are `/timing/NAME` and `/stats/NAME`.
+    /// The name of the group; its topics are `/timing/NAME` and `/stats/NAME`.
     pub name: String,
-    /// Releases per second.
+    /// The number of releases per second (Hz).
     pub rate_hz: f64,
-    /// Its releases take as long as they take: no run is late for its sake.
+    /// True if its releases take as long as they take: no run is late for its sake.
     pub background: bool,
     /// The computing time that was declared for a release.
     pub budget: Option<Nanos>,
     /// The core that its thread is pinned to, once the system has granted it.
     pub cpu: Option<usize>,
-    /// Its actors in the order of [`ActorTimes`](crate::runtime::ActorTimes); empty if there is one.
+    /// The names of its actors in the order of [`ActorTimes`](crate::runtime::ActorTimes); empty if there is one.
     pub actors: Vec<String>,
 }
 
@@ -48,27 +48,35 @@ impl GroupInfo {
     }
 }
 
-/// Why a run has the local model that it has, if nobody named one.
+/// The reason for the local model of a run, if nobody named one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ModelReason {
     /// The costs and the error that decided, in one line.
     pub why: String,
-    /// What falls short, if something does.
+    /// The shortcoming of the choice, if it has one.
     pub warning: Option<String>,
 }
 
 /// Everything about a run that is not a record.
+///
+/// ```
+/// use palpate::log::{Environment, GroupInfo};
+///
+/// let environment = Environment { groups: vec![GroupInfo::new("haptic", 1000.0)], ..Environment::default() };
+/// assert_eq!(environment.group_name(0), "haptic");
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Environment {
     /// The version of palpate that wrote the log.
     pub palpate_version: String,
     /// The instruction set that the vector kernels used.
     pub instruction_set: String,
-    /// Virtual or threaded.
-    pub execution: Execution,
-    /// The local model.
+    /// The kind of time that the run was executed in.
+    pub execution: LoggedExecution,
+    /// The name of the local model.
     pub model: String,
-    /// Why it is that one, if it was chosen, and why its patch and basis are that large, if a budget said so; else `None`.
+    /// The reason for the local model if it was chosen, and for the size of its patch and basis if a budget said so; `None`
+    /// otherwise.
     pub model_reason: Option<ModelReason>,
     /// The haptic rate (Hz).
     pub haptic_hz: f64,
@@ -76,24 +84,24 @@ pub struct Environment {
     pub global_hz: f64,
     /// The rate groups.
     pub groups: Vec<GroupInfo>,
-    /// Names of the devices, if there are several: the topics of each are `/NAME/force` and so on.
+    /// The names of the devices, if there are several: the topics of each are `/NAME/force` and so on.
     pub devices: Vec<String>,
-    /// Names of the bits in [`CommandSample::limits`](super::CommandSample::limits), lowest first.
+    /// The names of the bits in [`CommandSample::limits`](crate::log::CommandSample::limits), lowest first.
     pub limit_stages: Vec<String>,
-    /// Stages of the safety pipeline that the scene switched off.
+    /// The names of the safety stages that the scene switched off.
     pub safety_off: Vec<String>,
-    /// Energy that the scene stores at the start (J): where the ledger in
-    /// [`CommandSample::energy_j`](super::CommandSample::energy_j) begins.
+    /// The energy that the scene stores at the start (J): where the ledger in
+    /// [`CommandSample::energy_j`](crate::log::CommandSample::energy_j) begins.
     pub stored_j: f64,
     /// The gains of the virtual coupling and the margin that they leave; `None` without one.
     pub coupling: Option<String>,
-    /// What the system granted: policy, priority, cpu, mlock, ...
+    /// The grants of the system by name: policy, priority, cpu, mlock, ...
     pub granted: BTreeMap<String, String>,
     /// The first state that each device gave, before the start.
     pub first_tools: Vec<ToolSample>,
     /// The scene file as text. It travels as the attachment [`SCENE`](Self::SCENE); a reader leaves it empty.
     pub scene: Option<String>,
-    /// What was run, as a scene file: the scene with everything that a program or the command line changed. It travels as
+    /// The run as a scene file: the scene with everything that a program or the command line changed. It travels as
     /// the attachment [`SESSION`](Self::SESSION); a reader leaves it empty.
     pub session: Option<String>,
 }
@@ -128,7 +136,7 @@ impl Environment {
         }
     }
 
-    /// What the topics of device `device` begin with: its name, or nothing if it is the only one.
+    /// The beginning of the topics of device `device`: a slash and its name, or nothing if it is the only one.
     pub fn device_prefix(&self, device: u16) -> String {
         match self.devices.get(usize::from(device)) {
             Some(name) => format!("/{name}"),
@@ -137,19 +145,19 @@ impl Environment {
         }
     }
 
-    /// The Unix time of the start (ns): what is added to the time of a record to give its log time.
+    /// The Unix time of the start (ns), which is added to the time of a record to give its log time.
     pub fn epoch_ns(&self) -> u64 {
         match self.execution {
-            Execution::Virtual => 0,
-            Execution::Threaded { start_unix_ns } => start_unix_ns,
+            LoggedExecution::Virtual => 0,
+            LoggedExecution::Threaded { start_unix_ns } => start_unix_ns,
         }
     }
 
-    /// As keys and values: the metadata record `environment`.
+    /// The environment as keys and values: the metadata record `environment` of a log.
     pub fn to_map(&self, schema_version: u32) -> BTreeMap<String, String> {
         let execution = match self.execution {
-            Execution::Virtual => "virtual",
-            Execution::Threaded { .. } => "threaded",
+            LoggedExecution::Virtual => "virtual",
+            LoggedExecution::Threaded { .. } => "threaded",
         };
         let mut map: BTreeMap<String, String> = [
             (SCHEMA_VERSION_KEY, schema_version.to_string()),
@@ -173,19 +181,11 @@ impl Environment {
             map.insert(format!("group.{i}.background"), group.background.to_string());
             map.extend(group.budget.map(|budget| (format!("group.{i}.budget_ns"), budget.0.to_string())));
             map.extend(group.cpu.map(|cpu| (format!("group.{i}.cpu"), cpu.to_string())));
-            for (k, actor) in group.actors.iter().enumerate() {
-                map.insert(format!("group.{i}.actor.{k}"), actor.clone());
-            }
+            map.extend(numbered(&format!("group.{i}.actor"), &group.actors));
         }
-        for (i, device) in self.devices.iter().enumerate() {
-            map.insert(format!("device.{i}"), device.clone());
-        }
-        for (i, stage) in self.limit_stages.iter().enumerate() {
-            map.insert(format!("limit_stage.{i}"), stage.clone());
-        }
-        for (i, stage) in self.safety_off.iter().enumerate() {
-            map.insert(format!("safety_off.{i}"), stage.clone());
-        }
+        map.extend(numbered("device", &self.devices));
+        map.extend(numbered("limit_stage", &self.limit_stages));
+        map.extend(numbered("safety_off", &self.safety_off));
         map.insert("stored_j".to_owned(), self.stored_j.to_string());
         map.extend(self.coupling.iter().map(|design| ("coupling".to_owned(), design.clone())));
         for (device, first) in self.first_tools.iter().enumerate() {
@@ -206,8 +206,8 @@ impl Environment {
         let listed =
             |key: &str| -> Vec<String> { (0..).map_while(|i| map.get(&format!("{key}.{i}")).cloned()).collect() };
         let execution = match text("execution").as_str() {
-            "threaded" => Execution::Threaded { start_unix_ns: text("start_unix_ns").parse().unwrap_or(0) },
-            _ => Execution::Virtual,
+            "threaded" => LoggedExecution::Threaded { start_unix_ns: text("start_unix_ns").parse().unwrap_or(0) },
+            _ => LoggedExecution::Virtual,
         };
         let groups = (0..)
             .map_while(|i| map.get(&format!("group.{i}.name")).map(|name| (i, name)))
@@ -249,7 +249,12 @@ impl Environment {
 }
 
 /// The key of the schema's version.
-pub(super) const SCHEMA_VERSION_KEY: &str = "schema_version";
+pub(in crate::log) const SCHEMA_VERSION_KEY: &str = "schema_version";
+/// A list as keys and values.
+fn numbered(key: &str, list: &[String]) -> impl Iterator<Item = (String, String)> {
+    list.iter().enumerate().map(move |(i, item)| (format!("{key}.{i}"), item.clone()))
+}
+
 /// The keys of a choice.
 const MODEL_REASON: &str = "model_reason";
 const MODEL_WARNING: &str = "model_warning";
@@ -289,7 +294,7 @@ mod tests {
         let environment = Environment {
             palpate_version: "0.1.0".into(),
             instruction_set: "avx2".into(),
-            execution: Execution::Threaded { start_unix_ns: 1_700_000_000_123_456_789 },
+            execution: LoggedExecution::Threaded { start_unix_ns: 1_700_000_000_123_456_789 },
             model: "patch".into(),
             model_reason: Some(ModelReason { why: "it is cheap".into(), warning: Some("it is wrong".into()) }),
             haptic_hz: 1000.0,

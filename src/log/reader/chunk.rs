@@ -5,7 +5,8 @@ use std::io::Read;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use ruzstd::decoding::StreamingDecoder;
 
-use super::framing::MAX_RECORD_BYTES;
+/// The size of the largest record or unpacked chunk that is read (bytes).
+pub const MAX_RECORD_BYTES: u64 = 1 << 26;
 
 /// Bytes of the fixed part of a chunk's header before the name of its compression.
 const NAME_LENGTH_AT: usize = 28;
@@ -13,12 +14,9 @@ const NAME_LENGTH_AT: usize = 28;
 /// Usual in logs of other programs; palpate's own are packed with lz4.
 const ZSTD: &str = "zstd";
 
-/// True for a compression that can be unpacked.
-pub fn is_readable(compression: &str) -> bool {
-    matches!(compression, "" | "lz4" | ZSTD)
-}
-
 /// Unpacks one chunk record by record.
+///
+/// A chunk that is complete is verified before anything of it is given out; a cut one cannot be.
 pub struct ChunkRecords {
     reader: LinearReader,
     /// The chunk as it would stand alone in a file, opcode and length included.
@@ -28,21 +26,66 @@ pub struct ChunkRecords {
     head: ChunkHead,
 }
 
-/// What the header of a chunk says of it.
+/// What the header of a chunk says about it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ChunkHead {
+    /// The log time of the earliest message (ns).
     pub first_time: u64,
+    /// The log time of the latest message (ns).
     pub last_time: u64,
-    /// Unpacked (bytes).
+    /// The size of the records in it (bytes).
     pub unpacked: u64,
-    /// Of what is unpacked; 0 if the writer made none.
+    /// The CRC-32 of the unpacked records; 0 if the writer made none.
     pub checksum: u32,
-    /// `lz4`, `zstd`, or empty for none.
+    /// The name of the compression: `lz4`, `zstd`, or empty for none.
     pub compression: String,
-    /// The whole record in the file, opcode and length included (bytes).
+    /// The size of the chunk in the file, opcode and length included (bytes).
     pub length: u64,
-    /// The file ends inside of it: its checksum cannot be verified.
+    /// True if the file ends inside of the chunk: its checksum cannot be verified.
     pub is_cut: bool,
+}
+
+impl ChunkHead {
+    /// Reads the header in a record of `length` bytes that begins with `body`; an empty one if the file ends in it.
+    ///
+    /// # Errors
+    /// If it is too short, or if its sizes contradict each other: the decoder trusts them.
+    pub fn of(body: &[u8], length: u64, cut: bool) -> Result<Self, String> {
+        let bytes = |at: usize, count: usize| body.get(at..at.checked_add(count)?);
+        let word = |at: usize| Some(u64::from_le_bytes(bytes(at, 8)?.try_into().ok()?));
+        let half = |at: usize| Some(u32::from_le_bytes(bytes(at, 4)?.try_into().ok()?));
+        let header = || {
+            let name_length = half(NAME_LENGTH_AT)? as usize;
+            let name = bytes(NAME_LENGTH_AT + 4, name_length)?;
+            let size_at = NAME_LENGTH_AT.checked_add(4)?.checked_add(name_length)?;
+            let head = Self {
+                first_time: word(0)?,
+                last_time: word(8)?,
+                unpacked: word(16)?,
+                checksum: half(24)?,
+                compression: String::from_utf8_lossy(name).into_owned(),
+                length: length.checked_add(9)?,
+                is_cut: cut,
+            };
+            Some((head, word(size_at)?, (size_at as u64).checked_add(8)?))
+        };
+        match header() {
+            None if cut => Ok(Self { is_cut: true, ..Self::default() }),
+            None => Err("its header is too short".into()),
+            Some((head, _, _)) if head.unpacked > MAX_RECORD_BYTES => {
+                Err(format!("it claims {} unpacked bytes", head.unpacked))
+            }
+            Some((_, packed, header)) if header.checked_add(packed) != Some(length) => {
+                Err("its sizes contradict each other".into())
+            }
+            Some((head, _, _)) => Ok(head),
+        }
+    }
+
+    /// True for a compression that can be unpacked.
+    pub fn is_readable(&self) -> bool {
+        matches!(self.compression.as_str(), "" | "lz4" | ZSTD)
+    }
 }
 
 impl ChunkRecords {
@@ -52,8 +95,8 @@ impl ChunkRecords {
     /// What is wrong with its header.
     pub fn new(body: Vec<u8>, length: u64) -> Result<Self, String> {
         let cut = (body.len() as u64) < length;
-        let head = read_header(&body, length, cut)?;
-        if !is_readable(&head.compression) {
+        let head = ChunkHead::of(&body, length, cut)?;
+        if !head.is_readable() {
             return Err(format!(
                 "it is packed with `{}`, which palpate does not read",
                 head.compression.escape_default()
@@ -72,6 +115,7 @@ impl ChunkRecords {
         Ok(Self { reader: LinearReader::new_with_options(options), bytes, fed: 0, cut, head })
     }
 
+    /// The header of the chunk.
     pub fn head(&self) -> &ChunkHead {
         &self.head
     }
@@ -85,7 +129,7 @@ impl ChunkRecords {
     ///
     /// # Errors
     /// What is wrong, or that a cut chunk goes no further.
-    pub fn next(&mut self, record: &mut Vec<u8>) -> Result<Option<u8>, String> {
+    pub fn read_next(&mut self, record: &mut Vec<u8>) -> Result<Option<u8>, String> {
         loop {
             match self.reader.next_event() {
                 None => return Ok(None),
@@ -132,36 +176,9 @@ fn unpacked_zstd(body: &[u8], head: &ChunkHead) -> Result<(Vec<u8>, u64), String
     }
 }
 
-/// The header, or an empty one if the file ends in it. Refuses sizes that contradict each other: the decoder trusts them.
-pub fn read_header(body: &[u8], length: u64, cut: bool) -> Result<ChunkHead, String> {
-    let bytes = |at: usize, count: usize| body.get(at..at.checked_add(count)?);
-    let word = |at: usize| Some(u64::from_le_bytes(bytes(at, 8)?.try_into().ok()?));
-    let half = |at: usize| Some(u32::from_le_bytes(bytes(at, 4)?.try_into().ok()?));
-    let header = || {
-        let name_length = half(NAME_LENGTH_AT)? as usize;
-        let name = bytes(NAME_LENGTH_AT + 4, name_length)?;
-        let size_at = NAME_LENGTH_AT.checked_add(4)?.checked_add(name_length)?;
-        let head = ChunkHead {
-            first_time: word(0)?,
-            last_time: word(8)?,
-            unpacked: word(16)?,
-            checksum: half(24)?,
-            compression: String::from_utf8_lossy(name).into_owned(),
-            length: length.checked_add(9)?,
-            is_cut: cut,
-        };
-        Some((head, word(size_at)?, (size_at as u64).checked_add(8)?))
-    };
-    match header() {
-        None if cut => Ok(ChunkHead { is_cut: true, ..ChunkHead::default() }),
-        None => Err("its header is too short".into()),
-        Some((head, _, _)) if head.unpacked > MAX_RECORD_BYTES => {
-            Err(format!("it claims {} unpacked bytes", head.unpacked))
-        }
-        Some((_, packed, header)) if header.checked_add(packed) != Some(length) => {
-            Err("its sizes contradict each other".into())
-        }
-        Some((head, _, _)) => Ok(head),
+impl std::fmt::Debug for ChunkRecords {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ChunkRecords").field("head", &self.head).field("fed", &self.fed).finish_non_exhaustive()
     }
 }
 
@@ -194,18 +211,18 @@ mod tests {
         let mut chunk = ChunkRecords::new(body.clone(), length).unwrap();
         let mut record = Vec::new();
         for _ in 0..100 {
-            assert_eq!(chunk.next(&mut record), Ok(Some(mcap::records::op::MESSAGE)));
+            assert_eq!(chunk.read_next(&mut record), Ok(Some(mcap::records::op::MESSAGE)));
             assert_eq!(record, b"12345678");
         }
-        assert_eq!(chunk.next(&mut record), Ok(None));
+        assert_eq!(chunk.read_next(&mut record), Ok(None));
         let mut wrong = ChunkRecords::new(packed(&records, checksum ^ 1), length).unwrap();
-        assert!(wrong.next(&mut record).is_err());
+        assert!(wrong.read_next(&mut record).is_err());
         // Check that a wrong or missing byte is an error or the truth, never a panic
         for at in 0..body.len() {
             let mut wrong = body.clone();
             wrong[at] ^= 4;
             let read =
-                |body: Vec<u8>, length| ChunkRecords::new(body, length).and_then(|mut c| c.next(&mut Vec::new()));
+                |body: Vec<u8>, length| ChunkRecords::new(body, length).and_then(|mut c| c.read_next(&mut Vec::new()));
             let _ = (read(wrong, length), read(body[..at].to_vec(), length));
         }
     }

@@ -7,16 +7,16 @@
 //! of the whole data section follows it, the one of the index ends the file, and a wrong bit anywhere is damage.
 
 use std::io::{self, Read};
+use std::path::Path;
 
 use crc32fast::Hasher;
 use mcap::records::op;
 
-use super::chunk::{ChunkHead, ChunkRecords};
-
-/// The largest record or unpacked chunk that is read (bytes).
-pub const MAX_RECORD_BYTES: u64 = 1 << 26;
+use super::chunk::{ChunkHead, ChunkRecords, MAX_RECORD_BYTES};
+use crate::error::{Error, ErrorKind};
 
 /// The records of a file one after the other, those inside chunks included.
+#[derive(Debug)]
 pub struct RecordStream<R> {
     source: R,
     /// Bytes read so far.
@@ -37,12 +37,14 @@ pub struct RecordStream<R> {
     ended: bool,
 }
 
-/// The two parts of a file.
+/// One of the two parts of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Section {
+    /// Everything that was logged.
     Data,
-    /// The index; the data had a checksum that fits, or none.
+    /// The index behind the data.
     Index {
+        /// True if the data has a checksum, which fits; false if it has none.
         data_has_checksum: bool,
     },
 }
@@ -51,36 +53,24 @@ impl<R: Read> RecordStream<R> {
     /// Reads the leading magic.
     ///
     /// # Errors
-    /// If the source cannot be read; [`io::ErrorKind::InvalidData`] if it is no MCAP.
-    pub fn new(mut source: R) -> io::Result<Self> {
+    /// [`ErrorKind::Io`] if the source cannot be read, [`ErrorKind::Log`] if it is no MCAP file; `place` names it.
+    pub fn new(mut source: R, place: &str) -> Result<Self, Error> {
         let mut magic = [0; mcap::MAGIC.len()];
-        source.read_exact(&mut magic).map_err(|e| match e.kind() {
-            io::ErrorKind::UnexpectedEof => io::ErrorKind::InvalidData.into(),
-            _ => e,
-        })?;
-        if magic != mcap::MAGIC {
-            return Err(io::ErrorKind::InvalidData.into());
+        match source.read_exact(&mut magic) {
+            Err(e) if e.kind() != io::ErrorKind::UnexpectedEof => return Err(Error::io(Path::new(place), e)),
+            Ok(()) if magic == mcap::MAGIC => {}
+            _ => {
+                let what = "no MCAP file: it does not begin with the MCAP magic";
+                return Err(Error::new(ErrorKind::Log, what).at(place));
+            }
         }
-        let offset = magic.len() as u64;
-        let mut checksum = Hasher::new();
-        checksum.update(&magic);
-        Ok(Self {
-            source,
-            offset,
-            record: Vec::new(),
-            chunk: None,
-            has_chunks: false,
-            checksum,
-            section: Section::Data,
-            record_start: offset,
-            record_opcode: 0,
-            resumed: false,
-            damage: None,
-            ended: false,
-        })
+        let mut stream = Self::resume(source, magic.len() as u64, Section::Data);
+        stream.checksum.update(&magic);
+        (stream.has_chunks, stream.resumed) = (false, false);
+        Ok(stream)
     }
 
-    /// Goes on behind a damage: `source` is at `offset`, where a record of `section` begins.
+    /// A stream that goes on behind a damage: `source` is at `offset`, where a record of `section` begins.
     pub fn resume(source: R, offset: u64, section: Section) -> Self {
         Self {
             source,
@@ -103,21 +93,22 @@ impl<R: Read> RecordStream<R> {
         self.source
     }
 
-    /// Bytes read so far.
+    /// The number of bytes read so far.
     pub fn offset(&self) -> u64 {
         self.offset
     }
 
+    /// The part of the file that is being read.
     pub fn section(&self) -> Section {
         self.section
     }
 
-    /// Where the record of the file begins that was read last, and its opcode: for records inside a chunk, the chunk.
+    /// The place of the record of the file that was read last, and its opcode: for records inside a chunk, the chunk's.
     pub fn record_start(&self) -> (u64, u8) {
         (self.record_start, self.record_opcode)
     }
 
-    /// Where the chunk begins that the last record was in, and its header; `None` for one that was in none.
+    /// The place of the chunk that the last record was in, and its header; `None` for one that was in none.
     pub fn chunk(&self) -> Option<(u64, &ChunkHead)> {
         self.chunk.as_ref().map(|(chunk, start)| (*start, chunk.head()))
     }
@@ -127,7 +118,7 @@ impl<R: Read> RecordStream<R> {
         self.damage.is_none() && self.section == Section::Index { data_has_checksum: true }
     }
 
-    /// What is wrong with the file, as far as it has been read.
+    /// The first damage of the file, as far as it has been read, in one line.
     pub fn damage(&self) -> Option<&str> {
         self.damage.as_deref()
     }
@@ -139,17 +130,17 @@ impl<R: Read> RecordStream<R> {
         self.damage.get_or_insert(what);
     }
 
-    /// The body of the record that [`next`](Self::next) found.
+    /// The body of the record that [`read_next`](Self::read_next) found.
     pub fn body(&self) -> &[u8] {
         &self.record
     }
 
     /// Reads the next record and gives its opcode; `None` at the end of the file or of what is readable.
-    pub fn next(&mut self) -> Option<u8> {
+    pub fn read_next(&mut self) -> Option<u8> {
         loop {
             if let Some((chunk, start)) = &mut self.chunk {
                 let start = *start;
-                match chunk.next(&mut self.record) {
+                match chunk.read_next(&mut self.record) {
                     Ok(Some(opcode)) => return Some(opcode),
                     Ok(None) => self.chunk = None,
                     Err(_) if chunk.is_cut() => {

@@ -55,7 +55,7 @@ pub struct Backlog {
     own: Vec<u8>,
 }
 
-/// How far the writing is.
+/// The progress of the thread that writes a [`Backlog`].
 #[derive(Clone, Debug)]
 pub struct BacklogProgress(Arc<Shared>);
 
@@ -73,7 +73,7 @@ impl Backlog {
         Ok(Self { shared, own: Vec::new() })
     }
 
-    /// Tells how far the writing is, now and after `self` was given away.
+    /// A view of the progress of the writing, which stays valid after `self` was given away.
     pub fn progress(&self) -> BacklogProgress {
         BacklogProgress(Arc::clone(&self.shared))
     }
@@ -108,18 +108,18 @@ impl Drop for Backlog {
 }
 
 impl BacklogProgress {
-    /// Bytes given that are not written yet.
+    /// The number of bytes given that are not written yet.
     pub fn waiting(&self) -> u64 {
         let state = self.0.lock();
         state.given - state.written
     }
 
-    /// Bytes given so far.
+    /// The number of bytes given so far.
     pub fn given(&self) -> u64 {
         self.0.lock().given
     }
 
-    /// Bytes that the output has taken.
+    /// The number of bytes that the output has taken.
     pub fn written(&self) -> u64 {
         self.0.lock().written
     }
@@ -135,7 +135,7 @@ impl BacklogProgress {
     }
 
     /// Waits until the writing thread has ended, which it does after the [`Backlog`] was dropped and all was written. False
-    /// as in [`wait_for`](Self::wait_for).
+    /// if nothing was written for `stalled`, or if `total` has passed.
     pub fn wait_for_end(&self, stalled: Duration, total: Duration) -> bool {
         self.wait_until(stalled, total, |state| state.ended)
     }

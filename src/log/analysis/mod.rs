@@ -1,28 +1,30 @@
 //! What happened in a run, from its records, in one pass.
 
+mod group;
+mod haptics;
+
 use std::collections::BTreeMap;
 
+pub use self::group::{CauseCounts, GroupCounter, GroupSummary, TickFigures, TickGauge};
+use self::haptics::HapticsCounter;
+pub use self::haptics::{ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport, magnitude};
 use super::entry::LogEntry;
-use super::environment::{Environment, Execution};
-use super::event::{Level, TextEvent};
-use super::group::{GroupCounter, GroupReport, TickFigures};
-use super::haptics::{DeviceReport, HapticsCounter};
-use super::records::LogRecord;
-use crate::runtime::record::{Event, TickTiming};
+use super::records::{Environment, Level, LogRecord, LoggedExecution, TextEvent};
 use crate::runtime::Nanos;
+use crate::runtime::record::{Event, TickTiming};
 
 /// Events that a report lists; the others are only counted.
 const EVENTS_KEPT: usize = 100;
 
-/// What [`Analysis`] found.
+/// The findings of an [`Analysis`]; as text by [`Display`](std::fmt::Display).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunReport {
-    /// About the run as a whole, if it is known.
+    /// The environment of the run, if it is known.
     pub environment: Option<Environment>,
     /// The time of the last record.
     pub duration: Nanos,
     /// The rate groups in their order.
-    pub groups: Vec<GroupReport>,
+    pub groups: Vec<GroupSummary>,
     /// The devices in their order; there is always one.
     pub devices: Vec<DeviceReport>,
     /// The first events, in words.
@@ -31,14 +33,14 @@ pub struct RunReport {
     pub event_count: u64,
     /// The gravest event.
     pub worst_event: Option<Level>,
-    /// What is wrong with the log that the records came from; set by whoever read it.
+    /// The damage of the log that the records came from; set by whoever read it.
     pub damage: Option<String>,
-    /// Messages in that log by topic; set by whoever read it.
+    /// The number of messages in the log by topic; set by whoever read it.
     pub messages: BTreeMap<String, u64>,
 }
 
 impl Default for RunReport {
-    /// Of a run of which nothing is known.
+    /// The report of a run of which nothing is known.
     fn default() -> Self {
         Analysis::default().report()
     }
@@ -47,20 +49,20 @@ impl Default for RunReport {
 impl RunReport {
     /// True if the run was in simulated time, where lateness is zero by construction.
     pub fn is_virtual(&self) -> bool {
-        self.environment.as_ref().is_some_and(|environment| environment.execution == Execution::Virtual)
+        self.environment.as_ref().is_some_and(|environment| environment.execution == LoggedExecution::Virtual)
     }
 
-    /// Records lost because a ring was full, all groups together.
+    /// The number of records lost because a ring was full, all groups together.
     pub fn lost_records(&self) -> u64 {
         self.groups.iter().map(|group| group.lost_records).sum()
     }
 
-    /// Periods skipped, all groups together but those in the background.
+    /// The number of periods skipped, all groups together but those in the background.
     pub fn skipped(&self) -> u64 {
         self.foreground().map(|group| group.skipped.total()).sum()
     }
 
-    /// Deadlines missed, all groups together but those in the background.
+    /// The number of deadlines missed, all groups together but those in the background.
     pub fn missed(&self) -> u64 {
         self.foreground().map(|group| group.missed.total()).sum()
     }
@@ -71,7 +73,7 @@ impl RunReport {
         groups.into_iter().any(|group| group.background && group.name == name)
     }
 
-    fn foreground(&self) -> impl Iterator<Item = &GroupReport> {
+    fn foreground(&self) -> impl Iterator<Item = &GroupSummary> {
         self.groups.iter().filter(|group| !self.is_background(&group.name))
     }
 }
@@ -154,7 +156,7 @@ impl Analysis {
         self.groups.entry(group).or_default().set_lost(total);
     }
 
-    /// What the run is about, if it is known.
+    /// The environment of the run, if it is known.
     pub fn environment(&self) -> Option<&Environment> {
         self.environment.as_ref()
     }
@@ -182,7 +184,7 @@ impl Analysis {
         groups
     }
 
-    /// What has been found so far.
+    /// The findings so far.
     pub fn report(&self) -> RunReport {
         let groups = self.groups();
         let unknown = Environment::default();

@@ -2,16 +2,12 @@
 //!
 //! It fits a screen of 80 columns and 40 lines for a run of up to four rate groups.
 
-mod haptics;
-mod page;
-
 use std::fmt;
 
-pub use self::haptics::haptics;
-pub use self::page::Page;
-use super::units::duration;
+pub use super::page::Page;
+use super::units::{duration, force, seconds};
 use super::verdict::verdict;
-use crate::log::{CauseCounts, Execution, GroupReport, Percentiles, RunReport};
+use crate::log::{CauseCounts, DeviceReport, GroupSummary, LoggedExecution, Percentiles, RunReport};
 
 const EVENTS_SHOWN: usize = 4;
 /// Lines for what the system granted.
@@ -47,8 +43,8 @@ pub fn about(page: &mut Page, report: &RunReport) {
     let Some(environment) = &report.environment else { return };
     page.line(String::new());
     let execution = match environment.execution {
-        Execution::Virtual => "virtual",
-        Execution::Threaded { .. } => "threaded",
+        LoggedExecution::Virtual => "virtual",
+        LoggedExecution::Threaded { .. } => "threaded",
     };
     page.named(
         "run",
@@ -90,7 +86,7 @@ pub fn groups(page: &mut Page, report: &RunReport) {
         ));
     }
     for (what, of) in
-        [("skipped", (|group| group.skipped) as fn(&GroupReport) -> CauseCounts), ("missed", |group| group.missed)]
+        [("skipped", (|group| group.skipped) as fn(&GroupSummary) -> CauseCounts), ("missed", |group| group.missed)]
     {
         for group in report.groups.iter().filter(|group| of(group).total() > 0) {
             page.line(format!("  {} {what}: {}", group.name, causes(of(group))));
@@ -120,6 +116,55 @@ fn percentiles(page: &mut Page, group: &str, what: &str, p: Percentiles<u64>) {
     page.line(format!("{group:<11}{what:<13}{:>8}{p50:>9}{p90:>10}{p99:>10}{p999:>10}{max:>9}", p.count));
 }
 
+/// Adds the haptics of one device: resyncs, model age, contact, force, energy and limits.
+pub fn haptics(page: &mut Page, run: &RunReport, report: &DeviceReport) {
+    if run.devices.len() > 1 {
+        page.named("DEVICE", report.name.clone());
+    }
+    let resyncs = &report.resyncs;
+    page.named("resyncs", resyncs.jump_before_n.count.to_string());
+    if resyncs.jump_before_n.count > 0 {
+        let of = |p: Percentiles<f64>, show: fn(f64) -> String| {
+            format!("p50 {:>9}   p99 {:>9}   max {:>9}", show(p.p50), show(p.p99), show(p.max))
+        };
+        page.named("  jump", format!("before blending  {}", of(resyncs.jump_before_n, force)));
+        page.named("", format!("after blending   {}", of(resyncs.jump_after_n, force)));
+        page.named("  age", format!("on arrival       {}", of(resyncs.age_ns.map(|ns| ns as f64 / 1e9), seconds)));
+        page.named("", format!("at each tick     {}", of(report.force.model_age_s, seconds)));
+    }
+    let shares: Vec<String> =
+        report.force.shares().map(|(model, share)| format!("{} {:.2} %", model.name(), 100.0 * share)).collect();
+    if !shares.is_empty() {
+        page.named("served by", shares.join(", "));
+    }
+    let contact = report.contact;
+    page.named(
+        "contact",
+        format!(
+            "free {}, stick {}, slip {}, lost {} (haptic ticks)",
+            contact.free, contact.stick, contact.slip, contact.lost
+        ),
+    );
+    let not_finite = match report.force.not_finite {
+        0 => String::new(),
+        count => format!(", {count} not finite"),
+    };
+    page.named(
+        "force",
+        format!("peak {}, commanded {}{not_finite}", force(report.force.peak_n), force(report.force.peak_commanded_n)),
+    );
+    if report.limits.ticks > 0 {
+        let energy = report.limits.energy;
+        let [least, last, tank] = [energy.least_j, energy.last_j, energy.least_tank_j].map(|j| 1e3 * j);
+        page.named("energy", format!("ledger least {least:.3} mJ, end {last:.3} mJ; tank least {tank:.3} mJ"));
+    }
+    if report.limits.limited > 0 {
+        let stages = report.limits.stages.iter().map(|(name, count)| format!("{name} {count}"));
+        let share = 100.0 * report.limits.share();
+        page.wrapped("limits", &format!("{} ({share:.2} % of ticks)", stages.collect::<Vec<_>>().join(", ")));
+    }
+}
+
 /// Adds the first events, and what is wrong with the log.
 pub fn events(page: &mut Page, report: &RunReport) {
     for (i, event) in report.events.iter().take(EVENTS_SHOWN).enumerate() {
@@ -147,17 +192,17 @@ fn short(name: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
-    use super::page::WIDTH;
     use super::*;
-    use crate::log::{Analysis, GroupInfo, Level, LogRecord, Resync, TextEvent};
-    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::log::{Analysis, Environment, GroupInfo, Level, LogRecord, Resync, TextEvent};
+    use crate::report::page::WIDTH;
     use crate::runtime::Nanos;
+    use crate::runtime::record::{SlipCause, TickTiming};
 
     fn busy_report() -> RunReport {
         let mut analysis = Analysis::default();
         let names = ["haptic", "global", "a_rather_long_name", "device"];
         analysis.set_environment(&Environment {
-            execution: Execution::Threaded { start_unix_ns: 1 },
+            execution: LoggedExecution::Threaded { start_unix_ns: 1 },
             model: "patch".into(),
             groups: names.map(|name| GroupInfo::new(name, 29.97)).into(),
             granted: (0..30).map(|i| (format!("grant_{i}"), "refused by the system".into())).collect(),

@@ -3,6 +3,8 @@
 //! Messages are collected for up to 500 ms, put in time order and written as one lz4 chunk with a single sequential
 //! write: a killed process loses less than a second, and what is on disk is never patched afterwards.
 
+mod backlog;
+
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -12,14 +14,12 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, WriteOptions};
 
-use super::environment::Environment;
-use super::event::TextEvent;
-use super::foxglove::{Log, PoseInFrame, SceneUpdate};
-use super::records::LogRecord;
-use super::scene_frame::SceneFrame;
-use super::schema::{self, SCHEMA_VERSION};
+pub use self::backlog::{Backlog, BacklogProgress};
+use super::messages::foxglove::{Log, PoseInFrame, SceneUpdate};
+use super::messages::topic::{Topic, TopicKind};
+use super::messages::{ActorTimes, LogMessage, SCHEMA_VERSION, descriptor_set};
+use super::records::{Environment, LogRecord, SceneFrame, TextEvent};
 use super::stats::GroupStats;
-use super::topic::Topic;
 use crate::error::{Error, ErrorKind};
 use crate::runtime::Nanos;
 
@@ -43,6 +43,18 @@ struct Pending {
 ///
 /// # Real-time
 /// Every method allocates and may block: this is for the logger's thread.
+///
+/// ```
+/// use palpate::log::{Environment, LogRecord, McapWriter, ToolSample};
+/// use palpate::runtime::Nanos;
+///
+/// # fn main() -> Result<(), palpate::Error> {
+/// let mut writer = McapWriter::new(Vec::new(), "memory", &Environment::default())?;
+/// writer.write(&LogRecord::Tool(ToolSample { time: Nanos(1_000_000), ..ToolSample::default() }))?;
+/// assert!(writer.finish()?.starts_with(b"\x89MCAP"));
+/// # Ok(())
+/// # }
+/// ```
 pub struct McapWriter<W: Write> {
     /// Gone after an error: what is on disk stays as it is.
     output: Option<mcap::Writer<NoSeek<W>>>,
@@ -112,52 +124,52 @@ impl<W: Write> McapWriter<W> {
         let topic = Topic::of(record);
         let time = record.time();
         match record {
-            LogRecord::Tick(r) => self.push(topic, time, &schema::TickTiming::from(r)),
-            LogRecord::Actors(r) => self.push(topic, time, &schema::ActorTimes::from(r)),
+            LogRecord::Tick(r) => self.push(topic, time, r),
+            LogRecord::Actors(r) => self.push(topic, time, &ActorTimes::from(r)),
             LogRecord::Event(r) => {
                 let group = self.environment.group_name(r.group);
                 self.push(topic, time, &Log::coded(r, &group, self.environment.epoch_ns()))
             }
-            LogRecord::Force(r) => self.push(topic, time, &schema::Force::from(r)),
-            LogRecord::Command(r) => self.push(topic, time, &schema::CommandedForce::from(r)),
+            LogRecord::Force(r) => self.push(topic, time, r),
+            LogRecord::Command(r) => self.push(topic, time, r),
             LogRecord::Tool(r) => self.push(topic, time, &PoseInFrame::of(r, self.environment.epoch_ns())),
-            LogRecord::Contact(r) => self.push(topic, time, &schema::Contact::from(r)),
-            LogRecord::Resync(r) => self.push(topic, time, &schema::Resync::from(r)),
-            LogRecord::Global(r) => self.push(topic, time, &schema::GlobalTick::from(r)),
-            LogRecord::Port(r) => self.push(topic, time, &schema::PortUse::from(r)),
-            LogRecord::Probe(r) => self.push(topic, time, &schema::Probe::from(r)),
+            LogRecord::Contact(r) => self.push(topic, time, r),
+            LogRecord::Resync(r) => self.push(topic, time, r),
+            LogRecord::Global(r) => self.push(topic, time, r),
+            LogRecord::Port(r) => self.push(topic, time, r),
+            LogRecord::Probe(r) => self.push(topic, time, r),
         }
     }
 
     /// Adds an event in words.
     ///
     /// # Errors
-    /// As [`write`](Self::write).
+    /// [`ErrorKind::Io`] if a chunk could not be written, see [`write`](Self::write).
     pub fn write_text(&mut self, event: &TextEvent) -> Result<(), Error> {
-        self.push(Topic::Log, event.time, &Log::text(event, self.environment.epoch_ns()))
+        self.push(Topic(TopicKind::Log, 0), event.time, &Log::text(event, self.environment.epoch_ns()))
     }
 
     /// Adds a picture of the run.
     ///
     /// # Errors
-    /// As [`write`](Self::write).
+    /// [`ErrorKind::Io`] if a chunk could not be written, see [`write`](Self::write).
     pub fn write_scene(&mut self, frame: &SceneFrame) -> Result<(), Error> {
-        self.push(Topic::Scene, frame.time, &SceneUpdate::of(frame, self.environment.epoch_ns()))
+        self.push(Topic(TopicKind::Scene, 0), frame.time, &SceneUpdate::of(frame, self.environment.epoch_ns()))
     }
 
     /// Adds the statistics of a group.
     ///
     /// # Errors
-    /// As [`write`](Self::write).
+    /// [`ErrorKind::Io`] if a chunk could not be written, see [`write`](Self::write).
     pub fn write_stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
-        self.push(Topic::Stats(stats.group), stats.time, &schema::Stats::from(stats))
+        self.push(Topic(TopicKind::Stats, stats.group), stats.time, stats)
     }
 
     /// Writes a chunk if 500 ms of log time or of wall time have passed since the last one. `wall` counts from any
     /// fixed moment.
     ///
     /// # Errors
-    /// As [`write`](Self::write).
+    /// [`ErrorKind::Io`] if a chunk could not be written, see [`write`](Self::write).
     pub fn flush_if_due(&mut self, log_time: Nanos, wall: Nanos) -> Result<(), Error> {
         let (last_log_time, last_wall) = self.flushed_at;
         let due = |now: Nanos, last: Nanos| now.saturating_sub(last) >= FLUSH_INTERVAL;
@@ -171,7 +183,7 @@ impl<W: Write> McapWriter<W> {
     /// Writes what has been collected as one chunk and hands it to the operating system.
     ///
     /// # Errors
-    /// As [`write`](Self::write).
+    /// [`ErrorKind::Io`] if a chunk could not be written, see [`write`](Self::write).
     pub fn flush(&mut self) -> Result<(), Error> {
         let Some(mut output) = self.output.take() else {
             return Err(Error::new(ErrorKind::Io, "the log was given up after an earlier write error").at(&self.place));
@@ -192,7 +204,7 @@ impl<W: Write> McapWriter<W> {
     /// Writes the last chunk and the index, and gives the output back.
     ///
     /// # Errors
-    /// As [`write`](Self::write).
+    /// [`ErrorKind::Io`] if a chunk could not be written, see [`write`](Self::write).
     pub fn finish(mut self) -> Result<W, Error> {
         self.flush()?;
         let place = std::mem::take(&mut self.place);
@@ -203,9 +215,9 @@ impl<W: Write> McapWriter<W> {
         Ok(inner)
     }
 
-    fn push(&mut self, topic: Topic, time: Nanos, message: &impl prost::Message) -> Result<(), Error> {
+    fn push(&mut self, topic: Topic, time: Nanos, message: &impl LogMessage) -> Result<(), Error> {
         let start = self.bytes.len();
-        message.encode_raw(&mut self.bytes);
+        message.encode(&mut self.bytes);
         self.pending.push(Pending { time, topic, start, end: self.bytes.len() });
         if self.bytes.len() >= CHUNK_BYTES { self.flush() } else { Ok(()) }
     }
@@ -261,8 +273,8 @@ impl<W: Write> McapWriter<W> {
             *sequence = sequence.wrapping_add(1);
             return Ok((*id, *sequence));
         }
-        let name = topic.kind().schema();
-        let schema = output.add_schema(name, "protobuf", &schema::descriptor_set(name))?;
+        let name = topic.0.schema();
+        let schema = output.add_schema(name, "protobuf", &descriptor_set(name))?;
         let id = output.add_channel(schema, &topic.name(&self.environment), "protobuf", &BTreeMap::new())?;
         self.channels.insert(topic, (id, 0));
         Ok((id, 0))

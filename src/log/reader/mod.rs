@@ -1,32 +1,54 @@
 //! Reads a log from front to back, a chunk at a time, to its end or to the first damage.
 
+mod chunk;
+mod foreign;
+mod framing;
+
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use mcap::records::{Record, op};
 
+pub use self::chunk::{ChunkHead, ChunkRecords, MAX_RECORD_BYTES};
+use self::foreign::ForeignChannel;
+pub use self::framing::{RecordStream, Section};
 use super::entry::LogEntry;
-use super::environment::{Environment, Execution, GroupInfo, SCHEMA_VERSION_KEY};
-use super::foreign::ForeignChannel;
-use super::foxglove;
-use super::framing::RecordStream;
-use super::records::LogRecord;
-use super::schema;
-use super::topic::Kind;
-use crate::error::{Error, ErrorKind};
+pub use super::messages::topic::TopicKind;
+use super::messages::{self, LogMessage, foxglove};
+use super::records::{Environment, GroupInfo, LogRecord, LoggedExecution, SCHEMA_VERSION_KEY};
+use crate::error::Error;
 
 /// Logs before it have other messages on `/tool` and `/log`.
 const OLDEST_SCHEMA: u32 = 2;
 const READ_BUFFER_BYTES: usize = 1 << 18;
-/// Channel id, sequence number, log time and publish time in front of every message.
-pub const MESSAGE_HEADER_BYTES: usize = 22;
 
 /// The entries of a log, as an iterator.
 ///
 /// A damaged or truncated log gives everything before the damage and then ends; [`damage`](Self::damage) says what
 /// and where. Memory is bounded by one chunk.
+///
+/// ```
+/// use palpate::log::{Environment, ForceSample, LogEntry, LogReader, LogRecord, McapWriter};
+///
+/// # fn main() -> Result<(), palpate::Error> {
+/// let mut writer = McapWriter::new(Vec::new(), "memory", &Environment::default())?;
+/// writer.write(&LogRecord::Force(ForceSample { force_n: [0.0, 0.0, -1.5], ..ForceSample::default() }))?;
+/// let log = writer.finish()?;
+///
+/// let mut reader = LogReader::new(log.as_slice(), "memory")?;
+/// let forces: Vec<f64> = reader
+///     .by_ref()
+///     .filter_map(|entry| match entry {
+///         LogEntry::Record(LogRecord::Force(sample)) => Some(sample.force_n[2]),
+///         _ => None,
+///     })
+///     .collect();
+/// assert_eq!((forces, reader.damage()), (vec![-1.5], None));
+/// # Ok(())
+/// # }
+/// ```
 pub struct LogReader<R> {
     records: RecordStream<R>,
     place: String,
@@ -42,7 +64,7 @@ pub struct LogReader<R> {
 struct Channel {
     topic: String,
     /// `None` for messages that are not palpate's.
-    kind: Option<Kind>,
+    kind: Option<TopicKind>,
     foreign: Option<ForeignChannel>,
     messages: u64,
 }
@@ -51,7 +73,8 @@ impl LogReader<BufReader<File>> {
     /// Opens the log at `path`.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] if it cannot be read, [`ErrorKind::Log`] if it is no MCAP file.
+    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read, [`ErrorKind::Log`](crate::ErrorKind::Log) if it is no
+    /// MCAP file.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
         Self::new(BufReader::with_capacity(READ_BUFFER_BYTES, file), &path.display().to_string())
@@ -62,9 +85,10 @@ impl<R: Read> LogReader<R> {
     /// Reads a log from `source`; `place` names it in errors. `source` should be buffered.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] if it cannot be read, [`ErrorKind::Log`] if it is no MCAP file.
+    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read, [`ErrorKind::Log`](crate::ErrorKind::Log) if it is no
+    /// MCAP file.
     pub fn new(source: R, place: &str) -> Result<Self, Error> {
-        let records = RecordStream::new(source).map_err(|e| cannot_open(place, e))?;
+        let records = RecordStream::new(source, place)?;
         Ok(Self {
             records,
             place: place.to_owned(),
@@ -77,7 +101,7 @@ impl<R: Read> LogReader<R> {
         })
     }
 
-    /// What is wrong with the log and where, in one line; known only once the iterator has ended.
+    /// The damage of the log and its place, in one line; known only once the iterator has ended.
     pub fn damage(&self) -> Option<&str> {
         self.records.damage()
     }
@@ -107,10 +131,10 @@ impl<R: Read> LogReader<R> {
         topics
     }
 
-    /// What `topic` carries, if the log has declared it and its messages are palpate's.
-    pub fn kind(&self, topic: &str) -> Option<Kind> {
+    /// The kind of `topic`, if the log has declared it and its messages are palpate's.
+    pub fn kind(&self, topic: &str) -> Option<TopicKind> {
         let channel = self.channels.values().find(|channel| channel.topic == topic)?;
-        channel.kind.or(channel.foreign.as_ref().map(|_| Kind::Timing))
+        channel.kind.or(channel.foreign.as_ref().map(|_| TopicKind::Timing))
     }
 
     /// The entry in the record just read: `Ok(None)` if it holds none.
@@ -153,7 +177,7 @@ impl<R: Read> LogReader<R> {
     /// Takes in a channel; if it is one of another program's with tick timing, says which groups there are now.
     fn declare(&mut self, channel: mcap::records::Channel) -> Option<LogEntry> {
         let schema = self.schemas.get(&channel.schema_id).map(|(name, data)| (name.as_str(), data.as_slice()));
-        let kind = schema.and_then(|(name, data)| kind_of(name, data));
+        let kind = schema.and_then(|(name, data)| TopicKind::of_schema(name, data));
         let mut foreign = None;
         let mut known = None;
         if let Some(environment) = self.foreign.as_mut() {
@@ -174,10 +198,10 @@ impl<R: Read> LogReader<R> {
 
     fn decode_message(&mut self) -> Result<Option<LogEntry>, String> {
         let body = self.records.body();
-        let Some((header, data)) = body.split_at_checked(MESSAGE_HEADER_BYTES) else {
+        let Ok(Record::Message { header, data }) = mcap::parse_record(op::MESSAGE, body) else {
             return Err("a message without its header".into());
         };
-        let id = u16::from_le_bytes([header[0], header[1]]);
+        let id = header.channel_id;
         let Some(channel) = self.channels.get_mut(&id) else {
             return Err(format!("a message on channel {id}, which was never declared"));
         };
@@ -188,16 +212,14 @@ impl<R: Read> LogReader<R> {
             // What palpate wrote says all of itself, whether or not the environment came through beside it.
             (Some(kind), _) => kind,
             (None, Some(foreign)) => {
-                let tick = foreign.tick(data, &mut self.foreign_base);
+                let tick = foreign.tick(&data, &mut self.foreign_base);
                 let tick = tick.map_err(|e| format!("a message on {} is no tick timing: {e}", channel.topic))?;
                 return Ok(Some(LogEntry::Record(LogRecord::Tick(tick))));
             }
             (None, None) => return Ok(None),
         };
-        match decode_data(kind, data) {
-            Ok(entry) => Ok(entry),
-            Err(e) => Err(format!("a message on {} does not decode: {e}", channel.topic)),
-        }
+        let entry = LogEntry::decode(kind, &data);
+        entry.map_err(|e| format!("a message on {} does not decode: {e}", channel.topic))
     }
 }
 
@@ -206,7 +228,7 @@ impl<R: Read> Iterator for LogReader<R> {
 
     fn next(&mut self) -> Option<LogEntry> {
         loop {
-            let opcode = self.records.next()?;
+            let opcode = self.records.read_next()?;
             match self.decode(opcode) {
                 Ok(Some(entry)) => return Some(entry),
                 Ok(None) => {}
@@ -227,7 +249,7 @@ impl<R> std::fmt::Debug for LogReader<R> {
 
 /// What is known of a run of another program.
 fn foreign_environment() -> Environment {
-    let execution = Execution::Threaded { start_unix_ns: 0 };
+    let execution = LoggedExecution::Threaded { start_unix_ns: 0 };
     Environment {
         execution,
         model: "unknown".into(),
@@ -237,49 +259,36 @@ fn foreign_environment() -> Environment {
     }
 }
 
-/// What messages with this schema carry, if palpate has written them. Those with well-known names may be another
-/// program's: they lack palpate's own fields, and so does their descriptor.
-pub fn kind_of(schema: &str, descriptor: &[u8]) -> Option<Kind> {
-    const OWN_FIELD: &[u8] = b"time_ns";
-    let is_ours =
-        !schema.starts_with("foxglove.") || descriptor.windows(OWN_FIELD.len()).any(|window| window == OWN_FIELD);
-    Kind::from_schema(schema).filter(|_| is_ours)
-}
-
-/// Why a file cannot be read as a log.
-pub fn cannot_open(place: &str, error: io::Error) -> Error {
-    match error.kind() {
-        io::ErrorKind::InvalidData => {
-            Error::new(ErrorKind::Log, "no MCAP file: it does not begin with the MCAP magic").at(place)
-        }
-        _ => Error::io(Path::new(place), error),
+impl LogEntry {
+    /// Reads the entry in the data of a message of this kind; `None` for what is there to be seen only.
+    ///
+    /// # Errors
+    /// What is damaged, in a line.
+    pub fn decode(kind: TopicKind, data: &[u8]) -> Result<Option<Self>, String> {
+        Self::of_message(kind, data).map_err(|error| error.to_string())
     }
-}
 
-/// The entry in a message of this kind; `None` for what is there to be seen only.
-pub fn decode_data(kind: Kind, data: &[u8]) -> Result<Option<LogEntry>, prost::DecodeError> {
-    fn parse<M: prost::Message + Default>(data: &[u8]) -> Result<M, prost::DecodeError> {
-        M::decode(data)
-    }
-    Ok(Some(LogEntry::Record(match kind {
-        Kind::Timing => LogRecord::Tick(parse::<schema::TickTiming>(data)?.into()),
-        Kind::Actors => LogRecord::Actors(parse::<schema::ActorTimes>(data)?.into()),
-        Kind::Force => LogRecord::Force(parse::<schema::Force>(data)?.into()),
-        Kind::ForceCommanded => LogRecord::Command(parse::<schema::CommandedForce>(data)?.into()),
-        Kind::Tool => LogRecord::Tool(parse::<foxglove::PoseInFrame>(data)?.into()),
-        Kind::Contact => LogRecord::Contact(parse::<schema::Contact>(data)?.into()),
-        Kind::Resync => LogRecord::Resync(parse::<schema::Resync>(data)?.into()),
-        Kind::Global => LogRecord::Global(parse::<schema::GlobalTick>(data)?.into()),
-        Kind::Ports => LogRecord::Port(parse::<schema::PortUse>(data)?.into()),
-        Kind::Probe => LogRecord::Probe(parse::<schema::Probe>(data)?.into()),
-        Kind::Stats => return Ok(Some(LogEntry::Stats(parse::<schema::Stats>(data)?.into()))),
-        Kind::Scene => return Ok(None),
-        Kind::Log => {
-            let message = parse::<foxglove::Log>(data)?;
-            match message.event() {
-                Some(event) => LogRecord::Event(event),
-                None => return Ok(Some(LogEntry::Text(message.into()))),
+    fn of_message(kind: TopicKind, data: &[u8]) -> Result<Option<Self>, prost::DecodeError> {
+        Ok(Some(Self::Record(match kind {
+            TopicKind::Timing => LogRecord::Tick(LogMessage::decode(data)?),
+            TopicKind::Actors => LogRecord::Actors(messages::ActorTimes::decode(data)?.into()),
+            TopicKind::Force => LogRecord::Force(LogMessage::decode(data)?),
+            TopicKind::ForceCommanded => LogRecord::Command(LogMessage::decode(data)?),
+            TopicKind::Tool => LogRecord::Tool(foxglove::PoseInFrame::decode(data)?.into()),
+            TopicKind::Contact => LogRecord::Contact(LogMessage::decode(data)?),
+            TopicKind::Resync => LogRecord::Resync(LogMessage::decode(data)?),
+            TopicKind::Global => LogRecord::Global(LogMessage::decode(data)?),
+            TopicKind::Ports => LogRecord::Port(LogMessage::decode(data)?),
+            TopicKind::Probe => LogRecord::Probe(LogMessage::decode(data)?),
+            TopicKind::Stats => return Ok(Some(Self::Stats(LogMessage::decode(data)?))),
+            TopicKind::Scene => return Ok(None),
+            TopicKind::Log => {
+                let message = foxglove::Log::decode(data)?;
+                match message.event() {
+                    Some(event) => LogRecord::Event(event),
+                    None => return Ok(Some(Self::Text(message.into()))),
+                }
             }
-        }
-    })))
+        })))
+    }
 }
