@@ -1,10 +1,10 @@
 //! `palpate log info|check|recover`: what they print, what they leave behind and how they exit.
-#![cfg(all(feature = "cli", feature = "log"))]
 
 mod support;
 
-use support::{Called, Folder};
 use serde_json::Value;
+
+use support::{Called, Folder};
 
 const BOUNDARY: usize = 4096;
 

@@ -1,15 +1,17 @@
 //! A damaged log is read up to the damage and recovered behind it: cut at every 4 KiB boundary, and with wrong bits anywhere.
-#![cfg(feature = "log")]
 
+#[path = "../../tests/log_sample/mod.rs"]
 mod log_sample;
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 
-use log_sample::log_of;
-use palpate::log::{GroupStats, LogEntry, LogInfo, LogReader, LogRecord, Recovered, check, recover};
+use palpate::log::{GroupStats, LogEntry, LogReader, LogRecord};
 use palpate::runtime::record::{Record, TickTiming};
+use palpate_cli::log_file::{LogInfo, Recovered, check, recover};
 use proptest::prelude::*;
+
+use log_sample::log_of;
 
 const BOUNDARY: usize = 4096;
 

@@ -3,7 +3,10 @@
 //!
 //! A scan of plain text, in the shape that rustfmt gives it: items begin in column 0, methods in column 4.
 
-use std::path::{Path, PathBuf};
+#[path = "support/repository.rs"]
+mod repository;
+
+use std::path::PathBuf;
 
 /// Where such functions are, below `src/`. Nothing public in there is left out.
 const SCANNED: [&str; 7] = ["actors", "devices", "log/records.rs", "model", "runtime", "safety", "time.rs"];
@@ -100,7 +103,7 @@ fn scan(path: PathBuf) -> Vec<Item> {
 
 #[test]
 fn whatever_a_tick_may_call_says_what_it_costs() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let root = repository::in_repository("src");
     let items: Vec<Item> = SCANNED.iter().flat_map(|place| scan(root.join(place))).collect();
     let faults = faults(&items, USED_BY_TICKS, SPEAK_FOR_ALL);
     assert!(faults.is_empty(), "{faults:#?}");

@@ -3,11 +3,10 @@
 use std::fmt::Write;
 
 use palpate::error::Error;
-use palpate::log::{Comparison, Measured};
-use palpate_cli::drawing::{Picture, Series};
-use palpate::scene::LocalModelKind;
-use palpate::session::{CompareOptions, one_period};
 use palpate::runtime::Rate;
+use palpate::scene::LocalModelKind;
+use palpate_cli::compare::{CompareOptions, Comparison, Measured, one_period};
+use palpate_cli::drawing::{Picture, Series};
 
 use crate::Part;
 use crate::common::{HEADS, cells, colour, compared, figure, scene, table, us};

@@ -1,10 +1,11 @@
 //! The plots of a comparison: force and error over time, and speed against error.
 
-use super::milliseconds;
-use super::figures::{ComparedRun, Comparison, Measured};
 use palpate::log::magnitude;
-use crate::drawing::svg::{Axis, Chart, Line, Mark, Point};
 use palpate::runtime::Nanos;
+
+use super::figures::{ComparedRun, Comparison, Measured};
+use super::milliseconds;
+use crate::drawing::svg::{Axis, Chart, Line, Mark, Point};
 
 const WIDE: f64 = 960.0;
 /// A force below this part of the peak is no contact to look at.

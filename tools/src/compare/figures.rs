@@ -1,8 +1,6 @@
 //! What local models cost and how far their forces are from `full`'s: plain data, and the error of one run against another.
 
-use palpate::log::Magnitudes;
-use palpate::log::{LogRecord, Resync};
-use palpate::log::magnitude;
+use palpate::log::{LogRecord, Magnitudes, Resync, magnitude};
 use palpate::runtime::Nanos;
 
 /// What a comparison needs of one run: force and energy of every haptic tick, and the resyncs.
@@ -58,7 +56,7 @@ impl ForceTrace {
 ///
 /// All but `energy` in percent of the largest force of `full`. Not a number where `full` has no force, or no energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ModelError {
+pub struct ForceDeviation {
     /// Root of the mean square of the force's error over all ticks.
     pub rms: f64,
     /// Its largest error in one tick.
@@ -73,7 +71,7 @@ pub struct ModelError {
     pub energy: f64,
 }
 
-impl ModelError {
+impl ForceDeviation {
     /// The error of `run` against `full`; both have the same ticks.
     pub fn between(run: &ForceTrace, full: &ForceTrace) -> Self {
         let percent_of = |whole: f64| if whole > 0.0 { 100.0 / whole } else { f64::NAN };
@@ -130,7 +128,7 @@ impl ModelCost {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measured {
     /// How far it is from `full`.
-    pub error: ModelError,
+    pub error: ForceDeviation,
     /// What it costs.
     pub cost: ModelCost,
     /// Haptic and global releases that reported a degraded result, such as a force that was not finite.
@@ -240,8 +238,8 @@ mod tests {
     #[test]
     fn a_run_against_itself_has_its_own_jumps_and_no_error() {
         let full = trace(&[0.0, 1.0, -4.0], &[0.0, 2.0, 1.0]);
-        let error = ModelError::between(&full, &full);
-        assert_eq!(error, ModelError { jump: 125.0, ..ModelError::default() });
+        let error = ForceDeviation::between(&full, &full);
+        assert_eq!(error, ForceDeviation { jump: 125.0, ..ForceDeviation::default() });
     }
 
     #[test]
@@ -249,7 +247,7 @@ mod tests {
         let full = trace(&[0.0, 0.0, 5.0, -10.0], &[0.0, -8.0, -4.0, -2.0]);
         let mut run = trace(&[0.0, 2.0, 5.0, -10.0], &[0.0, 0.0, 0.0, 2.0]);
         run.forces_n[1] = [1.2, 0.0, 1.6];
-        let error = ModelError::between(&run, &full);
+        let error = ForceDeviation::between(&run, &full);
         // One tick of four is wrong by 2 N of 10 N; the last change is 15 N.
         assert_eq!((error.rms, error.max, error.jump), (10.0, 20.0, 150.0));
         assert_eq!(error.energy, 50.0);
@@ -262,13 +260,13 @@ mod tests {
         let mut run = full.clone();
         let resync = |n: u32| Resync { jump_before_n: n.into(), jump_after_n: 0.1 * f64::from(n), ..Resync::default() };
         run.resyncs = (1..=200).map(resync).collect();
-        let error = ModelError::between(&run, &full);
+        let error = ForceDeviation::between(&run, &full);
         assert!((error.resync_before_p99 - 1980.0).abs() < 1e-9 && (error.resync_after_p99 - 198.0).abs() < 1e-9);
     }
 
     #[test]
     fn without_a_force_of_full_there_is_no_percentage() {
-        let error = ModelError::between(&trace(&[1.0], &[1.0]), &trace(&[0.0], &[0.0]));
+        let error = ForceDeviation::between(&trace(&[1.0], &[1.0]), &trace(&[0.0], &[0.0]));
         assert!(error.rms.is_nan() && error.max.is_nan() && error.jump.is_nan() && error.energy.is_nan());
     }
 

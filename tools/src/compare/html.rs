@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use super::charts::{Plots, colour, latencies, models};
 use super::conclusions::conclusions;
+use super::figures::{Comparison, Measured};
 use super::milliseconds;
 use super::table::{COLUMNS, cell, clock, facts};
-use super::figures::{Comparison, Measured};
 use crate::drawing::html::{escaped, page, sentence};
 
 /// The comparison as an HTML page that needs nothing else: no network, no script.
@@ -108,8 +108,8 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::figures::{ComparedRun, RunOutcome};
     use super::*;
-    use super::figures::{ComparedRun, RunOutcome};
     use palpate::runtime::Nanos;
 
     #[test]

@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
+use palpate::model::body::Block;
+use palpate::runtime::histogram::Snapshot;
+use palpate::runtime::{Nanos, Rate, Stopwatch};
+use palpate::scene::{LocalModelKind, Scene};
 use palpate::session::{Session, Summary};
 use palpate::{Error, ErrorKind};
-use super::figures::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, ModelError, RunOutcome};
-use palpate::model::body::Block;
-use palpate::runtime::Stopwatch;
-use palpate::runtime::histogram::Snapshot;
-use palpate::scene::{LocalModelKind, Scene};
-use palpate::runtime::{Nanos, Rate};
+
+use super::figures::{ComparedRun, Comparison, ForceDeviation, ForceTrace, Measured, ModelCost, RunOutcome};
 
 /// How much of a run passes between two calls of the progress callback.
 const STEP: Duration = Duration::from_millis(50);
@@ -156,7 +156,7 @@ fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
 /// What a run says, against `full` if it is not `full` itself.
 fn measured(summary: &Summary, full: Option<&ForceTrace>) -> Measured {
     let trace = ForceTrace::of(&summary.records);
-    let error = ModelError::between(&trace, full.unwrap_or(&trace));
+    let error = ForceDeviation::between(&trace, full.unwrap_or(&trace));
     let degraded = summary.runtime.groups.iter().map(|group| group.degraded).sum();
     Measured { error, cost: cost(summary), degraded, trace }
 }

@@ -9,7 +9,7 @@ const ROOM: f64 = 1.6;
 /// Of the width, to the right of lines that have their labels at their ends.
 const LABELS: f64 = 0.18;
 /// The colours of a page in the light; the first is the reference's.
-const STYLE: &str = "\
+pub(super) const STYLE: &str = "\
 text { font: 11px Helvetica, Arial, sans-serif; fill: #626b79; }
 .title { font-size: 13px; font-weight: 600; fill: #1d232d; }
 .paper { fill: #ffffff; }
@@ -103,7 +103,7 @@ impl Picture {
 }
 
 /// From below the least to above the largest of those above zero.
-fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
+pub(super) fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let shown = values.filter(|value| value.is_finite() && *value > 0.0);
     let [low, high] = shown.fold([f64::INFINITY, 0.0], |[low, high], value| [value.min(low), value.max(high)]);
     if low <= high { [low / ROOM, high * ROOM] } else { [0.1, 10.0] }

@@ -17,9 +17,10 @@
 //! `P` is `count`, `p50`, `p90`, `p99`, `p999` or `max`; without a sample there is only the count. With several devices
 //! the name of the device comes first: `left.resync.age.p99`.
 
-use super::analysis::TimingReport;
 use palpate::log::{CauseCounts, DeviceReport, GroupReport, Percentiles};
 use palpate::runtime::record::SlipCause;
+
+use super::analysis::TimingReport;
 
 /// What a figure is measured in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,14 +41,14 @@ pub enum Unit {
 
 /// The value of a figure: integers stay exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value {
+pub enum FigureValue {
     /// A count or nanoseconds.
     Integer(u64),
     /// All else.
     Real(f64),
 }
 
-impl Value {
+impl FigureValue {
     /// As a double, which is exact below 2^53.
     pub fn as_f64(self) -> f64 {
         match self {
@@ -63,7 +64,7 @@ pub struct Figure {
     /// Its name.
     pub name: String,
     /// How much.
-    pub value: Value,
+    pub value: FigureValue,
     /// Of what.
     pub unit: Unit,
 }
@@ -118,27 +119,27 @@ pub(crate) fn cause_name(cause: SlipCause) -> &'static str {
 struct Figures(Vec<Figure>);
 
 impl Figures {
-    fn add(&mut self, name: &str, unit: Unit, value: Value) {
+    fn add(&mut self, name: &str, unit: Unit, value: FigureValue) {
         self.0.push(Figure { name: name.to_owned(), value, unit });
     }
 
     fn count(&mut self, name: &str, count: u64) {
-        self.add(name, Unit::Count, Value::Integer(count));
+        self.add(name, Unit::Count, FigureValue::Integer(count));
     }
 
     fn real(&mut self, name: &str, unit: Unit, value: f64) {
-        self.add(name, unit, Value::Real(value));
+        self.add(name, unit, FigureValue::Real(value));
     }
 
     fn durations(&mut self, name: &str, percentiles: Percentiles<u64>) {
-        self.percentiles(name, Unit::Nanoseconds, percentiles.map(Value::Integer));
+        self.percentiles(name, Unit::Nanoseconds, percentiles.map(FigureValue::Integer));
     }
 
     fn reals(&mut self, name: &str, unit: Unit, percentiles: Percentiles<f64>) {
-        self.percentiles(name, unit, percentiles.map(Value::Real));
+        self.percentiles(name, unit, percentiles.map(FigureValue::Real));
     }
 
-    fn percentiles(&mut self, name: &str, unit: Unit, p: Percentiles<Value>) {
+    fn percentiles(&mut self, name: &str, unit: Unit, p: Percentiles<FigureValue>) {
         self.count(&format!("{name}.count"), p.count);
         if p.count > 0 {
             for (which, value) in [("p50", p.p50), ("p90", p.p90), ("p99", p.p99), ("p999", p.p999), ("max", p.max)] {

@@ -30,18 +30,16 @@
 //! Distributions are `{count, p50, p90, p99, p999, max}`, nearest-rank, all zero if `count` is zero. Causes are
 //! `late_wake`, `long_tick`, `stalled_peer`, `policy`, `fault` and `unattributed`.
 
-use serde_json::{Map, Value, json};
-
-use super::text::in_words;
-use palpate::report::verdict;
-use crate::timing::{
-    Against, ComparedFigure, CoreUse, Figure, TimingReport, Value as FigureValue, WorstTick, cause_name,
-};
 use palpate::log::{
     CauseCounts, DeviceReport, Environment, Execution, ForceReport, GroupReport, Level, Percentiles, RunReport,
     TextEvent,
 };
+use palpate::report::verdict;
 use palpate::runtime::record::TickTiming;
+use serde_json::{Map, Value, json};
+
+use super::text::in_words;
+use crate::timing::{Against, ComparedFigure, CoreUse, Figure, FigureValue, TimingReport, WorstTick, cause_name};
 
 /// The report as one JSON document.
 pub fn to_json(report: &RunReport) -> String {
@@ -278,8 +276,8 @@ fn event(event: &TextEvent) -> Value {
 mod tests {
     use super::*;
     use palpate::log::{Analysis, LogRecord};
-    use palpate::runtime::record::TickTiming;
     use palpate::runtime::Nanos;
+    use palpate::runtime::record::TickTiming;
 
     #[test]
     fn integers_survive_beyond_the_precision_of_doubles() {

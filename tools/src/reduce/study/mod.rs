@@ -7,7 +7,6 @@ mod figures;
 mod measure;
 mod mesh;
 mod paper;
-mod published;
 mod scene;
 
 pub use mesh::reduce_mesh;

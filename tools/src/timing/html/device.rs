@@ -2,14 +2,15 @@
 
 use std::fmt::Write;
 
-use super::numbers::Numbers;
-use super::over_time::{Troubles, signs, troubles};
-use super::shapes::short;
-use super::{BROAD, NARROW, chart_figure_in_two};
 use palpate::log::DeviceReport;
-use crate::timing::{DeviceTiming, ForceBin, ResyncBin, TimingReport};
+
+use super::distributions::short;
+use super::named_figures::Numbers;
+use super::over_time::{Troubles, signs, troubles};
+use super::{BROAD, NARROW, chart_figure_in_two};
 use crate::drawing::html::escaped;
 use crate::drawing::svg::{Axis, Chart, Line, Mark};
+use crate::timing::{DeviceTiming, ForceBin, ResyncBin, TimingReport};
 use crate::units::{duration, force, trimmed};
 
 const PERCENTILES: [(&str, &str); 6] =

@@ -1,12 +1,13 @@
 //! Lateness over the run, with what was skipped and missed above it.
 
-use super::causes::{CAUSES, class, legend, name, sign};
-use super::shapes::short;
-use super::{BROAD, NARROW, chart_figure_in_two};
-use crate::timing::GroupTiming;
-use crate::drawing::svg::{Axis, Chart, Line, Mark, Signs};
-use crate::units::duration;
 use palpate::runtime::record::SlipCause;
+
+use super::causes::{CAUSES, class, legend, name, sign};
+use super::distributions::short;
+use super::{BROAD, NARROW, chart_figure_in_two};
+use crate::drawing::svg::{Axis, Chart, Line, Mark, Signs};
+use crate::timing::GroupTiming;
+use crate::units::duration;
 
 /// The rows of signs, below the upper edge of the plot, and what they need of it.
 const ROWS: [f64; 2] = [9.0, 22.0];

@@ -1,17 +1,64 @@
 //! One pass over a log.
 
+mod blocks;
+mod cyclictest;
+mod device;
+mod distribution;
+mod group;
+mod over_time;
+mod recent;
+mod worst;
+
 use std::collections::BTreeMap;
 
-use super::cores::CoreUse;
-use super::group::{GroupDetail, GroupTiming};
-use super::haptics::DeviceTiming;
-use super::recent::Recent;
-use super::selection::Selection;
-use super::worst::{Worst, WorstTick};
-use palpate::log::Environment;
-use palpate::log::{Analysis, LogEntry, LogRecord, RunReport};
-use palpate::runtime::record::TickTiming;
+use palpate::log::{Analysis, Environment, LogEntry, LogRecord, RunReport, Window};
 use palpate::runtime::Nanos;
+use palpate::runtime::record::TickTiming;
+
+pub use blocks::{Block, Buckets};
+pub use cyclictest::read_cyclictest;
+pub use device::{DeviceTiming, ForceBin, ResyncBin};
+pub use distribution::Shape;
+pub use group::{GroupTiming, TickBin};
+pub use recent::{ForcePoint, Moment};
+pub use worst::WorstTick;
+
+use group::GroupDetail;
+use recent::Recent;
+use worst::Worst;
+
+/// A span of log time and some of the rate groups.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// The span.
+    pub window: Window,
+    /// Names of the groups that are looked at; all if empty.
+    pub groups: Vec<String>,
+}
+
+impl Selection {
+    /// True if the group `name` is looked at.
+    pub fn has_group(&self, name: &str) -> bool {
+        self.groups.is_empty() || self.groups.iter().any(|group| group == name)
+    }
+}
+
+/// The groups on one core.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CoreUse {
+    /// The core; `None` for groups that the system may put anywhere.
+    pub cpu: Option<usize>,
+    /// Each group with the share of the time (0 to 1) in which it was at work, from the start of a release to its end.
+    /// That is elapsed time: what took the core away meanwhile is in it.
+    pub groups: Vec<(String, f64)>,
+}
+
+impl CoreUse {
+    /// The share of all its groups together.
+    pub fn share(&self) -> f64 {
+        self.groups.iter().map(|(_, share)| share).sum()
+    }
+}
 
 /// What a log says about the timing of its run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,15 +66,15 @@ pub struct TimingReport {
     /// The sums, as at the end of a run.
     pub run: RunReport,
     /// Each group in detail, in the order of [`RunReport::groups`].
-    pub groups: Vec<GroupTiming>,
+    pub(crate) groups: Vec<GroupTiming>,
     /// Each device over time, in the order of [`RunReport::devices`].
-    pub devices: Vec<DeviceTiming>,
+    pub(crate) devices: Vec<DeviceTiming>,
     /// Processor cores with the groups on them; those that may run anywhere come last.
-    pub cores: Vec<CoreUse>,
+    pub(crate) cores: Vec<CoreUse>,
     /// The worst ticks, the worst first.
     pub worst: Vec<WorstTick>,
     /// The time of the first record and of the last.
-    pub span: [Nanos; 2],
+    pub(crate) span: [Nanos; 2],
 }
 
 impl TimingReport {

@@ -3,9 +3,10 @@
 //! How bad a tick was is how long its work was overdue in periods of its deadline: from when the first of the periods that
 //! it stands for was due (its own, or the first that was skipped before it) until it was done. One is just in time.
 
-use super::recent::{ForcePoint, Moment, Recent, is_of};
-use palpate::runtime::record::{SlipCause, TickTiming};
 use palpate::runtime::Nanos;
+use palpate::runtime::record::{SlipCause, TickTiming};
+
+use super::recent::{ForcePoint, Moment, Recent, is_of};
 
 /// How many are kept.
 const KEPT: usize = 10;
