@@ -73,9 +73,6 @@ fn against_full(comparison: &Comparison) -> [String; 3] {
 
 /// The cheapest per haptic tick within an error, for each latency.
 fn nearest(comparison: &Comparison, limit: f64) -> String {
-    let mut latencies: Vec<Nanos> = comparison.runs.iter().map(|run| run.latency).collect();
-    latencies.sort_unstable();
-    latencies.dedup();
     let at = |latency: Nanos| {
         let within =
             |run: &&ComparedRun| run.latency == latency && run.measured().is_some_and(|run| run.error.rms <= limit);
@@ -86,7 +83,7 @@ fn nearest(comparison: &Comparison, limit: f64) -> String {
         });
         format!("{} {}", in_words(latency), found.unwrap_or_else(|| "none".to_owned()))
     };
-    let found: Vec<String> = latencies.into_iter().map(at).collect();
+    let found: Vec<String> = comparison.latencies().into_iter().map(at).collect();
     format!("cheapest tick within {limit} % rms of `full`: {}", found.join("; "))
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::charts::{Plots, colour, latencies, models};
+use super::charts::{Plots, colour, models};
 use super::conclusions::conclusions;
 use super::figures::{Comparison, Measured};
 use super::milliseconds;
@@ -88,7 +88,7 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
         &plots.speed_against_error(),
         "Left is cheaper, down is nearer to `full`. Filled: results of the global model are there at once; hollow: late.",
     );
-    for (number, latency) in latencies(comparison).into_iter().enumerate() {
+    for (number, latency) in comparison.latencies().into_iter().enumerate() {
         let [whole, near] = plots.forces(latency);
         figure(
             &format!("force-{number}"),

@@ -16,7 +16,8 @@ const STEP: Duration = Duration::from_millis(50);
 /// A latency of one period is rounded up to a multiple of this, so that it can be written in a scene file.
 const LATENCY_GRAIN: u64 = 10_000;
 
-/// What is compared; by default every model, with results of the global model that are there at once and one period late.
+/// The choice of what is compared; by default every model, with results of the global model that are there at once and one
+/// period late.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CompareOptions {
     /// Models beside `full`, which always runs; all of them if empty.
@@ -34,9 +35,9 @@ pub struct CompareProgress {
     pub run: usize,
     /// Runs in all.
     pub runs: usize,
-    /// Its model.
+    /// Model of the run that is at work.
     pub model: LocalModelKind,
-    /// Its compute latency.
+    /// Compute latency of the run that is at work.
     pub latency: Nanos,
     /// Simulated time that has passed in it.
     pub elapsed: Nanos,

@@ -85,7 +85,7 @@ pub struct Sheet {
     pub title: String,
     /// The second line, in small print.
     pub subtitle: String,
-    /// What has which colour.
+    /// Names of the curves with the colour of each.
     pub legend: Vec<(String, usize)>,
     /// Panels from top to bottom, those of a row from left to right.
     pub rows: Vec<Vec<Panel>>,

@@ -5,13 +5,13 @@ use serde::Serialize;
 /// One invocation's results; what was not asked for is empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ReductionStudy {
-    /// What was studied: `table1`, `fig4`, or a scene's file.
+    /// Name of the subject: `table1`, `fig4`, or a scene's file.
     pub subject: String,
     /// The paper's tables.
     pub tables: Vec<ReductionTable>,
     /// Frequency responses.
     pub responses: Vec<ResponseFigure>,
-    /// Where the reduced states live.
+    /// The places at which the reduced states move the body.
     pub shapes: Vec<StateShapes>,
     /// Hankel singular values and what a truncation costs.
     pub hankel: Vec<HankelDecay>,
@@ -67,7 +67,7 @@ pub struct ReductionRow {
 /// Responses of several models over the same frequencies.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ResponseFigure {
-    /// What it shows.
+    /// Title of the figure.
     pub title: String,
     /// Names of the channels, such as `tangential`: from a displacement along an axis to the force along it.
     pub channels: Vec<String>,
@@ -108,7 +108,7 @@ pub struct ModelResponse {
 /// The places at which the states of a balanced model move the body.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StateShapes {
-    /// What it shows.
+    /// Title of the figure.
     pub title: String,
     /// Places of the nodes (m), z up; y = 0 in 2D.
     #[serde(rename = "nodes_m")]
@@ -144,7 +144,7 @@ pub struct HankelDecay {
     pub values: Vec<f64>,
     /// Unit of the values.
     pub unit: String,
-    /// What a truncation costs, by its order.
+    /// Errors of truncations, by their order.
     pub truncations: Vec<Truncation>,
 }
 
@@ -170,10 +170,10 @@ pub struct Locality {
     pub spacing_m: [f64; 3],
     /// Least and largest frequency of what happens between resyncs (Hz).
     pub band_hz: [f64; 2],
-    /// What the error in the band may be at the contact for the patch to count as local (%).
+    /// Largest error in the band at the contact for the patch to count as local (%).
     #[serde(rename = "band_limit_percent")]
     pub band_limit_pct: f64,
-    /// What the error at rest may be at the contact for the patch to count as local (%).
+    /// Largest error at rest at the contact for the patch to count as local (%).
     #[serde(rename = "at_rest_limit_percent")]
     pub at_rest_limit_pct: f64,
     /// How far two models of the whole body, one twice as fine, are apart in the band at the contact (%): what the errors are uncertain by.
@@ -189,7 +189,7 @@ pub struct Locality {
     pub sizes: Vec<PatchError>,
     /// Reduced surroundings (`predictive`) at the scene's contact by their number of states.
     pub bases: Vec<BasisError>,
-    /// What an error budget needs, if one was given.
+    /// The patch and the states that an error budget needs, if one was given.
     pub budget: Option<Budget>,
     /// Predicted and measured, if it was measured.
     pub measured: Option<MeasuredLocality>,
@@ -221,7 +221,7 @@ pub struct FaceMap {
 pub struct ContactLocality {
     /// The node that the tool touches.
     pub node: u32,
-    /// Where it is at rest (m).
+    /// Place of the node at rest (m).
     pub position_m: [f64; 3],
     /// Stiffness of the whole body along the surface's normal at rest (N/m).
     pub stiffness_n_per_m: f64,
@@ -260,7 +260,7 @@ pub struct BasisError {
     pub error_pct: f64,
 }
 
-/// What an error budget needs.
+/// The patch and the states that an error budget needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Budget {
     /// The budget (%).

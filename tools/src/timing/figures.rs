@@ -22,7 +22,7 @@ use palpate::runtime::record::SlipCause;
 
 use super::analysis::TimingReport;
 
-/// What a figure is measured in.
+/// The unit of a [`Figure`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// A number of things.
@@ -44,12 +44,12 @@ pub enum Unit {
 pub enum FigureValue {
     /// A count or nanoseconds.
     Integer(u64),
-    /// All else.
+    /// Any other value.
     Real(f64),
 }
 
 impl FigureValue {
-    /// As a double, which is exact below 2^53.
+    /// The value as a double, which is exact below 2^53.
     pub fn as_f64(self) -> f64 {
         match self {
             Self::Integer(value) => value as f64,
@@ -61,11 +61,11 @@ impl FigureValue {
 /// One number of a report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Its name.
+    /// Name of the figure, such as `local.lateness.p99`.
     pub name: String,
-    /// How much.
+    /// Value of the figure in its unit.
     pub value: FigureValue,
-    /// Of what.
+    /// Unit of the value.
     pub unit: Unit,
 }
 

@@ -27,10 +27,10 @@ use group::GroupDetail;
 use recent::Recent;
 use worst::Worst;
 
-/// A span of log time and some of the rate groups.
+/// The part of a log that is looked at: a span of log time and some of the rate groups.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
-    /// The span.
+    /// Span of log time.
     pub window: Window,
     /// Names of the groups that are looked at; all if empty.
     pub groups: Vec<String>,
@@ -60,10 +60,10 @@ impl CoreUse {
     }
 }
 
-/// What a log says about the timing of its run.
+/// The timing of a run, as its log tells it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TimingReport {
-    /// The sums, as at the end of a run.
+    /// Sums over the run, as they are printed at its end.
     pub run: RunReport,
     /// Each group in detail, in the order of [`RunReport::groups`].
     pub(crate) groups: Vec<GroupTiming>,
@@ -108,12 +108,12 @@ pub struct TimingAnalysis {
 }
 
 impl TimingAnalysis {
-    /// Looks at what `selection` leaves.
+    /// An analysis of the part of a log that `selection` names.
     pub fn new(selection: Selection) -> Self {
         Self { selection, ..Self::default() }
     }
 
-    /// Reads one entry.
+    /// Takes in one entry of the log, in the log's order.
     pub fn push_entry(&mut self, entry: &LogEntry) {
         match entry {
             LogEntry::Record(record) => self.push(record),
@@ -181,7 +181,7 @@ impl TimingAnalysis {
         self.selection.has_group(&environment.group_name(group)) && !(is_background && self.selection.groups.is_empty())
     }
 
-    /// What has been found.
+    /// The report on all entries that were read.
     pub fn report(self) -> TimingReport {
         let mut run = self.sums.report();
         let span = self.span.unwrap_or_default();

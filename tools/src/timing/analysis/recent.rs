@@ -33,13 +33,13 @@ pub struct ForcePoint {
 /// All groups and forces in a short span of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moment {
-    /// Where it begins.
+    /// Time at which the moment begins.
     pub from: Nanos,
-    /// Where it ends.
+    /// Time at which the moment ends.
     pub to: Nanos,
     /// Releases that were due or at work in it, in the order of their groups and times.
     pub ticks: Vec<TickTiming>,
-    /// What actors took of them, where the log says.
+    /// Times that actors took of the ticks, if the log has them.
     pub actors: Vec<ActorTimes>,
     /// Forces.
     pub forces: Vec<ForcePoint>,

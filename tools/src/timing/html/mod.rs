@@ -63,11 +63,11 @@ fn chart_figure(svg: &str, caption: &str) -> String {
     format!("<figure class=\"chart\">\n{svg}<figcaption>{}</figcaption></figure>\n", escaped(caption))
 }
 
-/// A chart for a broad page and for a narrow one; `legend` is HTML.
-fn chart_figure_in_two(svgs: &[String; 2], legend: &str) -> String {
+/// A chart as `draw` makes it for a broad page and for a narrow one; `legend` is HTML.
+fn chart_figure_in_two(draw: impl Fn([f64; 2]) -> String, legend: &str) -> String {
     let mut out = String::from("<figure class=\"chart across\">\n");
-    for (class, svg) in ["broad", "narrow"].into_iter().zip(svgs) {
-        let _ = writeln!(out, "<div class=\"{class}\">{svg}</div>");
+    for (class, size) in [("broad", BROAD), ("narrow", NARROW)] {
+        let _ = writeln!(out, "<div class=\"{class}\">{}</div>", draw(size));
     }
     let _ = writeln!(out, "{legend}</figure>");
     out

@@ -3,8 +3,8 @@
 use palpate::runtime::record::SlipCause;
 
 use super::causes::{CAUSES, class, legend, name, sign};
+use super::chart_figure_in_two;
 use super::distributions::short;
-use super::{BROAD, NARROW, chart_figure_in_two};
 use crate::drawing::svg::{Axis, Chart, Line, Mark, Signs};
 use crate::timing::GroupTiming;
 use crate::units::duration;
@@ -108,5 +108,5 @@ pub(crate) fn lateness(group: &GroupTiming, range: [f64; 2]) -> String {
     if !causes.is_empty() {
         caption.push_str(&legend(&causes));
     }
-    chart_figure_in_two(&[draw(BROAD), draw(NARROW)], &caption)
+    chart_figure_in_two(draw, &caption)
 }
