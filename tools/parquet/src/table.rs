@@ -18,10 +18,6 @@ use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type as SchemaType};
 
-use super::columns::{Cell, Column, Type};
-use super::output_error;
-use super::table::Table;
-
 /// Rows of a row group: some megabytes in memory.
 const GROUP_ROWS: usize = 1 << 17;
 
