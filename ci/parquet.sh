@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Parquet files hold what the CSVs of the same topics hold, as pyarrow reads them.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
-build_programs
+# With the Parquet writer, which is not among the default members of the workspace: its crate takes a minute to build. All
+# together, so that no shared dependency is compiled with a second set of features.
+cargo build --locked --profile test --workspace --bins --examples
 need_component clippy clippy
-# Not among the default members of the workspace: its crate takes a minute to build.
 cargo clippy --locked -p palpate-parquet --all-targets -- -D warnings
-cargo build --locked --profile test -p palpate-parquet
 palpate="$CARGO_TARGET_DIR/debug/palpate"
 
 python_venv parquet "numpy, pyarrow" numpy pyarrow
