@@ -108,7 +108,7 @@ impl Table {
             Panel {
                 caption: format!("{rate_hz} Hz"),
                 x_label: "damping of the wall B (N s/m)",
-                y_label: "its stiffness K (N/m)",
+                y_label: "stiffness of the wall K (N/m)",
                 shown: 0.0..1.0 + 1e-9,
                 is_log: true,
                 curves,
