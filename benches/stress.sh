@@ -10,7 +10,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 seconds=${1:-600}
 target=${CARGO_TARGET_DIR:-$PWD/target}
 if [ -z "${PALPATE:-}" ]; then
-    cargo build --locked --release --bin palpate
+    cargo build --locked --release -p palpate-cli
     PALPATE=$target/release/palpate
 fi
 folder=$(mktemp -d)

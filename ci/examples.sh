@@ -5,10 +5,12 @@ build_programs
 
 shopt -s nullglob
 names=()
-for path in examples/*.rs examples/*/main.rs; do
-    name=${path#examples/}
-    name=${name%/main.rs}
-    names+=("${name%.rs}")
+for folder in examples src/runtime/examples tools/examples haply/examples; do
+    for path in "$folder"/*.rs "$folder"/*/main.rs; do
+        name=${path#"$folder"/}
+        name=${name%/main.rs}
+        names+=("${name%.rs}")
+    done
 done
 [ ${#names[@]} -gt 0 ] || { echo "no example found" >&2; exit 1; }
 

@@ -33,7 +33,7 @@ command -v cc >/dev/null || install_packages "a C compiler" gcc libc6-dev
 # Builds the command and the examples as the tests need them, with the features that tests add to shared dependencies: so all
 # jobs compile them once, in the folder `debug`.
 build_programs() {
-    cargo build --locked --profile test --features haply --bins --examples
+    cargo build --locked --profile test --bins --examples
 }
 
 # A folder of Python packages: python_venv NAME MODULES PACKAGE... sets `venv` to its path. It is made again if MODULES, a list with

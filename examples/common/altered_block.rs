@@ -1,9 +1,10 @@
 //! A block whose evaluation of forces is the program's own: it counts, stalls or fails, and is a block in all the rest.
 
+use std::fmt;
+
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State, TangentBlock};
 use palpate::model::mesh::Surface;
-use std::fmt;
 
 /// A [`Block`] with other `forces`.
 #[derive(Clone)]

@@ -3,8 +3,8 @@
 
 use std::time::{Duration, Instant};
 
+use palpate_cli::reduce::{PaperStudy, reduce_paper};
 use palpate_cli::reduction::{Balanced, Modal, PaperMesh, low_rank, one_shift};
-use palpate::session::{PaperStudy, reduce_paper};
 
 /// Frequencies that the low-rank path matches.
 const SHIFTS: usize = 16;

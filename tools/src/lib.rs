@@ -6,7 +6,7 @@
 //! | [`compare`] | runs every local model on a scene and measures error and cost against `full` |
 //! | [`reduce`] | reduces a body's model and says where a local model may be trusted |
 //! | [`reduction`] | the numerics of that: balanced truncation, Krylov spaces, condensation |
-//! | [`export`] | writes topics of a log as CSV, Parquet, percentile files and Chrome traces |
+//! | [`export`] | writes topics of a log as CSV, percentile files and Chrome traces; its rows for other formats |
 //! | [`log_file`] | looks into a log file, checks it, and saves what is readable of a damaged one |
 //! | [`drawing`] | charts as SVG, pages as HTML |
 
@@ -20,4 +20,4 @@ pub mod reduction;
 pub mod timing;
 mod units;
 
-pub use commands::main;
+pub use commands::{WindowArgs, main, refuse_to_overwrite};

@@ -2,7 +2,7 @@
 
 pub(crate) use palpate::report::units::{duration, force, plural, seconds};
 
-use crate::timing::{Unit, Value};
+use crate::timing::{FigureValue, Unit};
 
 /// A share, 0 to 1, in percent.
 pub(crate) fn share(share: f64) -> String {
@@ -14,16 +14,16 @@ pub(crate) fn share(share: f64) -> String {
 }
 
 /// A figure of a report with its unit.
-pub(crate) fn figure(value: Value, unit: Unit) -> String {
+pub(crate) fn figure(value: FigureValue, unit: Unit) -> String {
     match (unit, value) {
-        (Unit::Nanoseconds, Value::Integer(ns)) => duration(ns),
-        (Unit::Nanoseconds, Value::Real(ns)) => seconds(ns / 1e9),
+        (Unit::Nanoseconds, FigureValue::Integer(ns)) => duration(ns),
+        (Unit::Nanoseconds, FigureValue::Real(ns)) => seconds(ns / 1e9),
         (Unit::Seconds, value) => seconds(value.as_f64()),
         (Unit::Newtons, value) => force(value.as_f64()),
         (Unit::Joules, value) => format!("{:.3} mJ", 1e3 * value.as_f64()),
         (Unit::Share, value) => share(value.as_f64()),
-        (Unit::Count, Value::Integer(count)) => count.to_string(),
-        (Unit::Count, Value::Real(count)) => count.to_string(),
+        (Unit::Count, FigureValue::Integer(count)) => count.to_string(),
+        (Unit::Count, FigureValue::Real(count)) => count.to_string(),
     }
 }
 
@@ -45,6 +45,6 @@ mod tests {
     fn figures_have_their_unit_and_axes_no_zeros_at_the_end() {
         assert_eq!([0.5, 0.0321, 0.000_04].map(share), ["50.0 %", "3.21 %", "0.004 %"]);
         assert_eq!(["10.0 us", "850 ns", "1.20 N"].map(|text| trimmed(text.to_owned())), ["10 us", "850 ns", "1.2 N"]);
-        assert_eq!(figure(Value::Real(0.0321), Unit::Seconds), "32.1 ms");
+        assert_eq!(figure(FigureValue::Real(0.0321), Unit::Seconds), "32.1 ms");
     }
 }

@@ -1,11 +1,11 @@
 //! `palpate compare`: the table, the JSON document and the page, on a short scene.
-#![cfg(all(feature = "cli", feature = "log"))]
 
 mod support;
 
-use support::{Called, Folder};
-use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::LocalModelKind;
 use serde_json::Value;
+
+use support::{Called, Folder};
 
 fn compared(folder: &Folder, args: &[&str]) -> Value {
     let out = folder.succeed(&[&["compare", "scene.toml", "--json"], args].concat());

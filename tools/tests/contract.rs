@@ -1,11 +1,11 @@
 //! The contract of the command line: exit codes, one line per error, what is printed and which files are written.
-#![cfg(all(feature = "cli", feature = "log"))]
 
 mod support;
 
-use support::{Called, Folder, PATH, rows};
 use palpate::log::{LogEntry, LogReader, LogRecord};
 use palpate::model::local::Kind as LocalModelKind;
+
+use support::{Called, Folder, PATH, rows};
 
 /// Check that it is a refusal: exit code 2, one line on standard error that has `words` in it, and nothing else.
 #[track_caller]

@@ -2,10 +2,11 @@
 
 mod support;
 
-use palpate::log::{Analysis, LogEntry, LogReader, LogRecord};
+use palpate::log::{Analysis, LogEntry, LogReader, LogRecord, Window};
 use palpate::report::to_text;
-use palpate_cli::export::{Format, export};
+use palpate_cli::export::export_table;
 use palpate_cli::timing::to_json;
+
 use support::Folder;
 
 const MAGIC: usize = 8;
@@ -22,7 +23,7 @@ fn log(folder: &Folder) -> Vec<u8> {
 fn exported(bytes: &[u8], topic: &str) -> (String, Option<String>) {
     let mut reader = LogReader::new(bytes, "cut.mcap").expect("it begins with the magic");
     let mut out = Vec::new();
-    export(&mut reader, topic, Format::Csv, &mut out).unwrap_or_else(|error| panic!("{topic}: {error}"));
+    export_table(&mut reader, topic, &Window::default(), &mut out).unwrap_or_else(|error| panic!("{topic}: {error}"));
     (String::from_utf8(out).unwrap(), reader.damage().map(str::to_owned))
 }
 

@@ -1,10 +1,12 @@
 //! Virtual runs are the same to the last bit every time, in every topic, for every scene and compute latency.
-#![cfg(all(feature = "cli", feature = "log"))]
 
+#[path = "support/repository.rs"]
+mod repository;
 mod support;
 
+use std::path::PathBuf;
+
 use support::{Folder, rows};
-use std::path::{Path, PathBuf};
 
 /// Nine global periods: long enough for eight resyncs, short enough for a test.
 const SECONDS: &str = "0.3";
@@ -29,7 +31,7 @@ const TOPICS: [&str; 15] = [
 ];
 
 fn scenes() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let folder = repository::in_repository("scenes");
     let entries = std::fs::read_dir(folder).expect("scenes/").map(|entry| entry.expect("readable").path());
     let mut scenes: Vec<_> = entries.filter(|path| path.extension().is_some_and(|ending| ending == "toml")).collect();
     // A device that is really there has no virtual time.

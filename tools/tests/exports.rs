@@ -1,29 +1,30 @@
 //! A log in other formats: what each holds, what belongs together, and how wrong options are refused.
-#![cfg(all(feature = "log", feature = "cli"))]
 
-mod support;
+#[path = "../../tests/log_sample/mod.rs"]
 mod log_sample;
+mod support;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use support::Folder;
-use log_sample::{entries, log_of};
 use palpate::ErrorKind;
 use palpate::log::{LogEntry, LogReader, LogRecord, Window};
-use palpate::report::{Figure, Format, export_percentiles, export_table, export_trace};
-use palpate::runtime::record::TickTiming;
 use palpate::runtime::Nanos;
+use palpate::runtime::record::TickTiming;
+use palpate_cli::export::{TickDuration, export_percentiles, export_table, export_trace};
 use serde_json::Value;
+
+use log_sample::{entries, log_of};
+use support::Folder;
 
 const ALL: Window = Window { from: Nanos::ZERO, to: Nanos(u64::MAX) };
 
 fn table(bytes: &[u8], topic: &str, window: &Window) -> String {
     let mut out = Vec::new();
-    export_table(&mut reader(bytes), topic, Format::Csv, window, &mut out).unwrap();
+    export_table(&mut reader(bytes), topic, window, &mut out).unwrap();
     String::from_utf8(out).unwrap()
 }
 
-fn percentiles(bytes: &[u8], group: &str, figure: Figure, window: &Window) -> String {
+fn percentiles(bytes: &[u8], group: &str, figure: TickDuration, window: &Window) -> String {
     let mut out = Vec::new();
     export_percentiles(&mut reader(bytes), group, figure, window, &mut out).unwrap();
     String::from_utf8(out).unwrap()
@@ -82,11 +83,11 @@ fn each_line_of_a_percentile_file_is_a_nearest_rank_of_the_sorted_values() {
     let timings = timings(&sent, 0);
     let periods: Vec<u64> = timings.windows(2).map(|pair| pair[1].woke.0 - pair[0].woke.0).collect();
     let scheduled = timings.windows(2).map(|pair| pair[1].scheduled.0 - pair[0].scheduled.0);
-    let expected: [(Figure, Vec<u64>); 4] = [
-        (Figure::Lateness, timings.iter().map(|t| t.woke.0 - t.scheduled.0).collect()),
-        (Figure::Execution, timings.iter().map(|t| t.end.0 - t.start.0).collect()),
-        (Figure::PeriodError, periods.iter().zip(scheduled).map(|(period, due)| period.abs_diff(due)).collect()),
-        (Figure::Jitter, periods.windows(2).map(|pair| pair[1].abs_diff(pair[0])).collect()),
+    let expected: [(TickDuration, Vec<u64>); 4] = [
+        (TickDuration::Lateness, timings.iter().map(|t| t.woke.0 - t.scheduled.0).collect()),
+        (TickDuration::Execution, timings.iter().map(|t| t.end.0 - t.start.0).collect()),
+        (TickDuration::PeriodError, periods.iter().zip(scheduled).map(|(period, due)| period.abs_diff(due)).collect()),
+        (TickDuration::Jitter, periods.windows(2).map(|pair| pair[1].abs_diff(pair[0])).collect()),
     ];
     for (figure, mut values) in expected {
         values.sort_unstable();
@@ -116,7 +117,8 @@ fn each_line_of_a_percentile_file_is_a_nearest_rank_of_the_sorted_values() {
 fn a_percentile_file_of_a_part_has_the_samples_of_that_part() {
     let bytes = log_of(&entries(300), 1000);
     let part = Window { from: Nanos(100_000_000), to: Nanos(150_000_000) };
-    for (figure, samples) in [(Figure::Lateness, 50), (Figure::PeriodError, 49), (Figure::Jitter, 48)] {
+    for (figure, samples) in [(TickDuration::Lateness, 50), (TickDuration::PeriodError, 49), (TickDuration::Jitter, 48)]
+    {
         let text = percentiles(&bytes, "haptic", figure, &part);
         assert!(text.contains(&format!("Total count    = {samples:>12}]")), "{text}");
     }
@@ -126,7 +128,7 @@ fn a_percentile_file_of_a_part_has_the_samples_of_that_part() {
 fn an_unknown_group_is_an_error_that_lists_the_groups() {
     let bytes = log_of(&entries(3), 1000);
     let mut out = Vec::new();
-    let error = export_percentiles(&mut reader(&bytes), "locale", Figure::Lateness, &ALL, &mut out).unwrap_err();
+    let error = export_percentiles(&mut reader(&bytes), "locale", TickDuration::Lateness, &ALL, &mut out).unwrap_err();
     assert_eq!((error.kind(), out.len()), (ErrorKind::Log, 0));
     assert_eq!(error.to_string(), "run.mcap: the log has no rate group \"locale\"; it has global, haptic");
 }
@@ -252,8 +254,7 @@ fn options_that_do_not_belong_together_are_refused_in_one_line() {
         (&["--topic", "/force", "--from", "-1"], &["--from", "-1"]),
         (&["--topic", "/force", "--to", "nan"], &["--to", "NaN"]),
         (&["--topic", "/force", "--to", "soon"], &["--to", "soon"]),
-        #[cfg(not(feature = "parquet"))]
-        (&["--topic", "/force", "--format", "parquet"], &["--features parquet"]),
+        (&["--topic", "/force", "--format", "parquet"], &["palpate-parquet", "export CSV"]),
     ];
     for (options, words) in cases {
         let called = folder.call(&[&["export", "good.mcap", "--out", "new.file"], *options].concat());

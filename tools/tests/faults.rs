@@ -1,11 +1,12 @@
 //! What the system does to a run of the command: signals, a stopped process, a full disk, a log that nobody takes.
-#![cfg(all(target_os = "linux", feature = "cli", feature = "log"))]
+#![cfg(target_os = "linux")]
 
 mod support;
 
-use support::{Folder, rows};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
+
+use support::{Folder, rows};
 
 /// The scene's default ramp (s).
 const RAMP_S: f64 = 0.1;

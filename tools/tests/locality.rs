@@ -1,14 +1,15 @@
 //! When a local model may be trusted: the check of whole scenes against the non-linear simulation.
-#![cfg(feature = "scene")]
+
+#[path = "support/repository.rs"]
+mod repository;
 
 use palpate::ErrorKind;
+use palpate::scene::{Scene, Shape};
 use palpate_cli::reduce::findings::{Locality, ReductionStudy};
-use palpate::model::body::Shape;
-use palpate::scene::Scene;
-use palpate::session::{ReduceOptions, reduce_scene};
+use palpate_cli::reduce::{ReduceOptions, reduce_scene};
 
 fn study(name: &str, options: &ReduceOptions) -> ReductionStudy {
-    let path = format!("{}/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let path = repository::in_repository(&format!("scenes/{name}.toml"));
     reduce_scene(&Scene::load(path.as_ref()).unwrap(), options, |_| {}).unwrap()
 }
 
@@ -46,7 +47,7 @@ fn soft_tissue_under_a_stiff_skin_is_flagged_as_predicted_and_measured() {
 // Check a nodule that the patch cuts through: its other half, held, holds the half in the patch.
 #[test]
 fn a_stiff_nodule_that_reaches_out_of_the_patch_is_flagged() {
-    let path = format!("{}/scenes/nodule.toml", env!("CARGO_MANIFEST_DIR"));
+    let path = repository::in_repository("scenes/nodule.toml");
     let mut scene = Scene::load(path.as_ref()).unwrap();
     let nodule = &mut scene.body.as_mut().unwrap().regions[0];
     nodule.shape = Shape::Sphere { centre: [0.06, 0.05, 0.085], radius: 0.0175 };
@@ -80,7 +81,7 @@ fn a_budget_names_what_meets_it() {
 
 #[test]
 fn a_contact_that_is_none_is_refused() {
-    let path = format!("{}/scenes/drag_friction.toml", env!("CARGO_MANIFEST_DIR"));
+    let path = repository::in_repository("scenes/drag_friction.toml");
     let scene = Scene::load(path.as_ref()).unwrap();
     for node in [[5, 5, 5], [5, 5, 0], [99, 0, 0]] {
         let error =

@@ -5,6 +5,8 @@ mod support;
 use serde_json::Value;
 use support::{Called, Folder};
 
+use support::{Called, Folder};
+
 const BOUNDARY: usize = 4096;
 
 /// A folder with the log of a run of some seconds in virtual time, `run.mcap`.

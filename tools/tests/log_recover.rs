@@ -6,11 +6,12 @@ mod log_sample;
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 
-use log_sample::log_of;
 use palpate::log::{GroupStats, LogEntry, LogReader, LogRecord};
 use palpate::runtime::record::{Record, TickTiming};
 use palpate_cli::log_file::{LogInfo, Recovered, check, recover};
 use proptest::prelude::*;
+
+use log_sample::log_of;
 
 const BOUNDARY: usize = 4096;
 

@@ -3,12 +3,13 @@
 #[path = "../../tests/log_sample/mod.rs"]
 mod log_sample;
 
-use log_sample::{entries, log_of, time_of};
 use palpate::ErrorKind;
-use palpate::log::{Analysis, LogEntry, LogReader, LogRecord, RunReport};
+use palpate::log::{Analysis, LogEntry, LogReader, LogRecord, RunReport, Window};
 use palpate::report::to_text;
-use palpate_cli::export::{Format, export};
+use palpate_cli::export::export_table;
 use palpate_cli::timing::to_json;
+
+use log_sample::{entries, log_of, time_of};
 
 fn analyse(bytes: &[u8]) -> RunReport {
     let mut reader = LogReader::new(bytes, "memory").unwrap();
@@ -19,7 +20,7 @@ fn analyse(bytes: &[u8]) -> RunReport {
 
 fn table(bytes: &[u8], topic: &str) -> String {
     let mut out = Vec::new();
-    export(&mut LogReader::new(bytes, "run.mcap").unwrap(), topic, Format::Csv, &mut out).unwrap();
+    export_table(&mut LogReader::new(bytes, "run.mcap").unwrap(), topic, &Window::default(), &mut out).unwrap();
     String::from_utf8(out).unwrap()
 }
 
@@ -138,7 +139,7 @@ fn a_topic_without_messages_is_a_header_and_an_unknown_one_an_error_that_lists_t
     for unknown in ["/forces", "force", "", "/timing/device"] {
         let mut out = Vec::new();
         let mut reader = LogReader::new(bytes.as_slice(), "run.mcap").unwrap();
-        let error = export(&mut reader, unknown, Format::Csv, &mut out).unwrap_err();
+        let error = export_table(&mut reader, unknown, &Window::default(), &mut out).unwrap_err();
         assert_eq!((error.kind(), out.len()), (ErrorKind::Log, 0));
         let text = error.to_string();
         assert!(

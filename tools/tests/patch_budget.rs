@@ -1,17 +1,17 @@
 //! The patch of `predictive` by an error budget, in whole sessions: what the report and the log say, and that a run with it
 //! is the run with its numbers.
-#![cfg(all(feature = "log", feature = "scene"))]
 
+#[path = "../../tests/session_support/mod.rs"]
 mod session_support;
 
 use std::path::Path;
 
 use palpate::devices::{Scripted, ToolPath};
 use palpate::log::{Environment, LogEntry, LogReader};
-use palpate_cli::timing::to_json;
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::{ModelChoice, Scene};
+use palpate::scene::{LocalModelKind, ModelChoice, Scene};
 use palpate::session::{Session, SessionBuilder, Summary};
+use palpate_cli::timing::to_json;
+
 use session_support::*;
 
 const TEXT: &str = "[body.block]\nnodes = [6, 6, 6]\nsize_m = [0.1, 0.1, 0.1]\n[body.material]\nnode_mass_kg = 0.0005\n\

@@ -1,5 +1,4 @@
 //! `palpate run --plan`: the schedule is printed, nothing runs, and a scene that cannot fit is refused before it starts.
-#![cfg(all(feature = "cli", feature = "log"))]
 
 mod support;
 

@@ -3,12 +3,13 @@
 //! The real binary runs in a child process whose privileges are taken away by `setpriv` and `prlimit`, or which
 //! `taskset` keeps on one core (all three: util-linux). Nothing is skipped: where the tests themselves have no privileges
 //! there is less to take away, and the child has as few.
-#![cfg(all(target_os = "linux", feature = "cli", feature = "log"))]
+#![cfg(target_os = "linux")]
 
 mod support;
 
-use support::Folder;
 use std::process::Command;
+
+use support::Folder;
 
 /// No right to real-time priorities and 64 kB of lockable memory.
 const NO_RIGHTS: &str = "prlimit --rtprio=0:0 --memlock=65536:65536";

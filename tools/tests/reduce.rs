@@ -1,10 +1,10 @@
 //! `palpate reduce`: which of its words go together, the report, the JSON document and the page.
-#![cfg(all(feature = "cli", feature = "log"))]
 
 mod support;
 
-use support::{Called, Folder};
 use serde_json::Value;
+
+use support::{Called, Folder};
 
 /// The document that a call prints.
 #[track_caller]

@@ -2,8 +2,9 @@
 
 #[path = "../../src/model/tests/common/mod.rs"]
 mod common;
+#[path = "support/repository.rs"]
+mod repository;
 
-use common::*;
 use nalgebra::Complex;
 use palpate_cli::reduction::{
     Balanced, Congruence, ErrorBound, LinearBody, LocalityCheck, Modal, PaperMesh, Ports, Projection, Response,
@@ -14,11 +15,13 @@ use palpate_model::Vec3;
 use palpate_model::body::{Body, State};
 use palpate_model::contact::Contact;
 
+use common::*;
+
 /// k of the paper's meshes (N/m): the references are in units of it.
 const K: f64 = 100.0;
 
 fn json(name: &str) -> serde_json::Value {
-    let path = format!("{}/../tests/reference/reduction/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let path = repository::in_repository(&format!("tests/reference/reduction/{name}.json"));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

@@ -1,11 +1,11 @@
 //! `palpate replay`: what it prints and how it exits.
-#![cfg(all(feature = "cli", feature = "log"))]
 
 mod support;
 
-use support::{Folder, SCENE};
 use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter};
 use palpate::runtime::Nanos;
+
+use support::{Folder, SCENE};
 
 /// Records a run and gives the number of its forces.
 fn recorded(folder: &Folder, more: &[&str]) -> usize {

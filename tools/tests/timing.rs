@@ -1,12 +1,12 @@
 //! `palpate timing`: conditions, comparisons, parts of a log, logs of other programs.
-#![cfg(feature = "cli")]
 
 mod support;
 
 use std::collections::BTreeMap;
 
-use support::Folder;
 use serde_json::Value;
+
+use support::Folder;
 
 fn run(folder: &Folder, log: &str) {
     folder.succeed(&["run", "scene.toml", "--virtual", "--out", log]);

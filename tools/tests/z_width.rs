@@ -1,11 +1,13 @@
 //! The sweep of `examples/safety_figures` in short: where a sampled wall must rest, it rests, and far above it swings.
-#![cfg(feature = "scene")]
 #![allow(dead_code)]
 
+#[path = "support/repository.rs"]
+mod repository;
 #[path = "../examples/safety_figures/z_width.rs"]
 mod z_width;
 
-use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::LocalModelKind;
+
 use z_width::{LIMIT_CYCLE_M, Sweep, Wall, theory};
 
 const DAMPING: f64 = 0.1;

@@ -3,16 +3,16 @@
 // Each bench uses its part.
 #![allow(dead_code)]
 
-use std::path::{Path, PathBuf};
+#[path = "../../tests/support/repository.rs"]
+mod repository;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use palpate::Error;
-use palpate::log::{Comparison, Measured, ModelCost, RunOutcome};
+use palpate::error::Error;
 use palpate::model::body::InstructionSet;
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::Scene;
-use palpate::session::{CompareOptions, compare};
 use palpate::runtime::Nanos;
+use palpate::scene::{LocalModelKind, Scene};
+use palpate_cli::compare::{CompareOptions, Comparison, Measured, ModelCost, RunOutcome, compare};
+pub use repository::in_repository;
 
 /// What the command line asks for.
 pub struct Arguments {
@@ -26,11 +26,6 @@ pub struct Arguments {
 pub fn arguments() -> Option<Arguments> {
     let asked = |flag: &str| std::env::args().any(|argument| argument == flag);
     asked("--bench").then(|| Arguments { is_quick: asked("--quick"), only_errors: asked("--only-errors") })
-}
-
-/// A file of the repository.
-pub fn in_repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
 /// A scene of the repository by name.

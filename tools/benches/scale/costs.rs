@@ -13,9 +13,8 @@ use palpate::model::local::{Kind, LocalModel, Prediction, ResyncView, Template};
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
 use palpate::model::surroundings::{Bases, Basis, SpringGraph};
+use palpate::runtime::{Nanos, Stopwatch};
 use palpate_cli::drawing::{Picture, Series};
-use palpate::runtime::Stopwatch;
-use palpate::runtime::Nanos;
 
 use crate::common::{colour, figure, table, us};
 
@@ -38,7 +37,7 @@ fn tool(t: f64) -> Vec3 {
 
 fn block(nodes: usize) -> Result<Block, Error> {
     let builder = Block::builder([nodes; 3], [0.1; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
-    builder.fix(Face::ZMin).build()
+    Ok(builder.fix(Face::ZMin).build()?)
 }
 
 /// What a basis takes (s); `None` if it was left out.

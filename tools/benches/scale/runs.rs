@@ -3,12 +3,11 @@
 use std::time::Instant;
 
 use palpate::devices::ToolPath;
-use palpate::Error;
-use palpate::log::{ForceTrace, ModelError};
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::Scene;
-use palpate::session::{Session, Summary, one_period};
+use palpate::error::Error;
 use palpate::runtime::{Nanos, Rate};
+use palpate::scene::{LocalModelKind, Scene};
+use palpate::session::{Session, Summary};
+use palpate_cli::compare::{ForceDeviation, ForceTrace, one_period};
 
 use crate::common::{figure, scene, table, us};
 
@@ -52,7 +51,7 @@ pub struct Run {
 }
 
 struct Outcome {
-    error: ModelError,
+    error: ForceDeviation,
     tick: [Nanos; 3],
     haptic: f64,
     global: f64,
@@ -133,7 +132,7 @@ fn measured(summary: &Summary, full: &ForceTrace) -> Outcome {
         .shares()
         .map(|(model, share)| format!("{} {:.1} %", model.name(), 100.0 * share));
     Outcome {
-        error: ModelError::between(&trace(summary), full),
+        error: ForceDeviation::between(&trace(summary), full),
         tick: [0.5, 0.99, 1.0].map(|q| haptic.map_or(Nanos::ZERO, |cpu| cpu.percentile(q))),
         haptic: total("local") / seconds,
         global: total("global") / seconds,

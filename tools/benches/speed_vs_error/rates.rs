@@ -2,12 +2,11 @@
 
 use std::fmt::Write;
 
-use palpate::Error;
-use palpate::log::{Comparison, Measured};
-use palpate_cli::drawing::{Picture, Series};
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::session::{CompareOptions, one_period};
+use palpate::error::Error;
 use palpate::runtime::Rate;
+use palpate::scene::LocalModelKind;
+use palpate_cli::compare::{CompareOptions, Comparison, Measured, one_period};
+use palpate_cli::drawing::{Picture, Series};
 
 use crate::Part;
 use crate::common::{HEADS, cells, colour, compared, figure, scene, table, us};

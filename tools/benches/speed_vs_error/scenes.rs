@@ -2,13 +2,11 @@
 
 use std::fmt::Write;
 
-use palpate::Error;
-use palpate::log::{Comparison, Measured};
-use palpate_cli::compare::conclusions;
-use palpate_cli::drawing::{Picture, Series};
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::session::CompareOptions;
+use palpate::error::Error;
 use palpate::runtime::Nanos;
+use palpate::scene::LocalModelKind;
+use palpate_cli::compare::{CompareOptions, Comparison, Measured, conclusions};
+use palpate_cli::drawing::{Picture, Series};
 
 use crate::Part;
 use crate::common::{HEADS, cells, colour, compared, scene, table, us};

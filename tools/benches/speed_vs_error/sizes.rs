@@ -1,12 +1,10 @@
 //! Patch sizes, basis sizes, substeps and the two predictions, results one period late.
 
-use palpate::Error;
-use palpate::log::{Comparison, Measured};
-use palpate_cli::drawing::{Picture, Series};
-use palpate::model::local::{Kind as LocalModelKind, Prediction};
-use palpate::scene::Scene;
-use palpate::session::{CompareOptions, one_period};
+use palpate::error::Error;
 use palpate::runtime::Rate;
+use palpate::scene::{LocalModelKind, Prediction, Scene};
+use palpate_cli::compare::{CompareOptions, Comparison, Measured, one_period};
+use palpate_cli::drawing::{Picture, Series};
 
 use crate::Part;
 use crate::common::{HEADS, cells, colour, compared, figure, scene, table, us};

@@ -5,14 +5,14 @@
 //!
 //! `tests/session_faults.rs` runs the same scenarios and checks them.
 
-#[path = "../common/drawing.rs"]
-mod drawing;
 mod scenarios;
 
-use drawing::{BLUE, Curve, ORANGE, Panel, Sheet, TIME};
-use palpate::log::LogRecord;
-use scenarios::{FAULT_S, Fault, RAMP_S, Trace};
 use std::path::Path;
+
+use palpate::log::LogRecord;
+use palpate_cli::drawing::{BLUE, Curve, ORANGE, Panel, Sheet};
+
+use scenarios::{FAULT_S, Fault, RAMP_S, Trace};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("Fault injected at {FAULT_S} s; declared ramp time {} ms.\n", RAMP_S * 1e3);
@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for folder in folders {
         std::fs::create_dir_all(folder)?;
         let path = Path::new(folder).join("fault_traces.svg");
-        sheet.write(&path)?;
+        std::fs::write(&path, sheet.to_svg())?;
         println!("\n{}", path.display());
     }
     Ok(())
@@ -106,11 +106,11 @@ fn panel(fault: Fault, trace: &Trace) -> Panel {
     let (times, values): (Vec<f64>, Vec<f64>) = trace.magnitudes().unzip();
     Panel {
         caption: title(fault).to_owned(),
-        x_label: TIME,
-        y_label: "N",
-        times: 0.3..end,
-        curves: vec![Curve::new(&times, values, if fault.leaves_the_force() { ORANGE } else { BLUE }, 1.5)],
+        x_label: "time (s)",
+        y_label: "force (N)",
+        shown: 0.3..end,
+        curves: vec![Curve::new(&times, values, if fault.leaves_the_force() { ORANGE } else { BLUE })],
         marks: vec![FAULT_S],
-        zoomed: None,
+        ..Panel::default()
     }
 }

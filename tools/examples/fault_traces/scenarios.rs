@@ -3,20 +3,19 @@
 #[path = "../../../examples/common/altered_block.rs"]
 mod altered_block;
 
-use altered_block::AlteredBlock;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::mesh::Face;
 use palpate::prelude::*;
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::SafetyStage;
-#[cfg(feature = "log")]
-use palpate::session::SessionBuilder;
-use palpate::session::Summary;
 use palpate::runtime::Nanos;
-use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use palpate::scene::{LocalModelKind, SafetyStage};
+use palpate::session::{SessionBuilder, Summary};
+
+use altered_block::AlteredBlock;
 
 /// The declared ramp time: the scene's default `safety.ramp_ms`.
 pub const RAMP_S: f64 = 0.1;
@@ -233,7 +232,6 @@ pub fn run(fault: Fault) -> Result<Trace, Error> {
         .safety_off([SafetyStage::StartUp])
         .keep_records()
         .duration_s(fault.duration_s());
-    #[cfg(feature = "log")]
     let (builder, _log) = logged(builder, fault)?;
     let session = builder.build()?;
     let running = session.start()?;
@@ -257,10 +255,8 @@ pub fn run(fault: Fault) -> Result<Trace, Error> {
 }
 
 /// Whoever reads the log, for as long as it is needed.
-#[cfg(feature = "log")]
 struct Log(Option<std::process::Child>);
 
-#[cfg(feature = "log")]
 impl Drop for Log {
     fn drop(&mut self) {
         if let Some(reader) = &mut self.0 {
@@ -271,7 +267,6 @@ impl Drop for Log {
 }
 
 /// The session with a log that fails, if that is the fault.
-#[cfg(feature = "log")]
 fn logged(builder: SessionBuilder, fault: Fault) -> Result<(SessionBuilder, Log), Error> {
     match fault {
         Fault::DiskFull => Ok((builder.log("/dev/full"), Log(None))),

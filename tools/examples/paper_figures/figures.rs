@@ -5,9 +5,9 @@ use std::ops::Range;
 use std::path::Path;
 
 use palpate::model::Vec3;
-use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::LocalModelKind;
+use palpate_cli::drawing::{BLUE, Curve, INK, ORANGE, Panel, Sheet};
 
-use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet, TIME};
 use crate::runs::{ForceRun, ForceRuns};
 
 /// A component of the force on the tool.
@@ -99,12 +99,11 @@ impl ForceFigure {
         let (closer, zoomed) = (self.closer.0, self.closer.1.clone());
         let component = |component: Component, times: Range<f64>| Panel {
             caption: String::new(),
-            x_label: TIME,
+            x_label: "time (s)",
             y_label: component.label(),
-            times,
+            shown: times,
             curves: drawing_order(runs).map(|run| curve(runs, run, |f, _| component.of(f))).into(),
-            marks: Vec::new(),
-            zoomed: None,
+            ..Panel::default()
         };
         let overview = self.components.iter().map(|&which| {
             let zoomed = std::mem::discriminant(&which) == std::mem::discriminant(&closer);
@@ -118,7 +117,7 @@ impl ForceFigure {
         };
         let error = Panel {
             caption: "off the reference: |F - F of full|".to_owned(),
-            x_label: TIME,
+            x_label: "time (s)",
             y_label: "difference (N)",
             curves: [&runs.hold, &runs.patch].map(|run| curve(runs, run, |f, full| (f - full).norm())).into(),
             ..component(closer, whole.clone())
@@ -126,10 +125,10 @@ impl ForceFigure {
         let sheet = Sheet {
             title: format!("Fig. {}: {} (scene {})", self.number, self.title, self.scene),
             subtitle: format!("12 x 12 x 12 nodes, virtual time; peak of full {:.3} N; {}", runs.peak, self.note),
-            legend: runs.all().map(|run| (legend(runs, run), color(run.model))).into(),
+            legend: runs.all().map(|run| (legend(runs, run), colour(run.model))).into(),
             rows: overview.chain([vec![detail, error]]).collect(),
         };
-        sheet.write(path)
+        Ok(std::fs::write(path, sheet.to_svg())?)
     }
 }
 
@@ -148,7 +147,7 @@ fn legend(runs: &ForceRuns, run: &ForceRun) -> String {
     }
 }
 
-fn color(model: LocalModelKind) -> RGBColor {
+fn colour(model: LocalModelKind) -> usize {
     match model {
         LocalModelKind::Full => INK,
         LocalModelKind::Hold => ORANGE,
@@ -159,6 +158,6 @@ fn color(model: LocalModelKind) -> RGBColor {
 /// `value` of each force of `run` and the reference's force at the same tick.
 fn curve(runs: &ForceRuns, run: &ForceRun, value: impl Fn(&Vec3, &Vec3) -> f64) -> Curve {
     let values = run.forces.iter().zip(&runs.full.forces).map(|(force, full)| value(force, full));
-    let width = if run.model == LocalModelKind::Full { 2.2 } else { 1.5 };
-    Curve::new(&runs.times, values, color(run.model), width)
+    let curve = Curve::new(&runs.times, values, colour(run.model));
+    if run.model == LocalModelKind::Full { curve.wide() } else { curve }
 }

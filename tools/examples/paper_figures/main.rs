@@ -10,10 +10,10 @@
 //! `cargo run --release --example paper_figures [-- [--readme] [FOLDER]]`; FOLDER is `out/paper_figures` if not given.
 //! `--readme` also renews the two plots in `docs/img/`.
 
-#[path = "../common/drawing.rs"]
-mod drawing;
 #[path = "../../../examples/common/forces.rs"]
 mod forces;
+#[path = "../../tests/support/repository.rs"]
+mod repository;
 
 mod delay;
 mod figures;
@@ -63,7 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::write(folder.join("summary.md"), &page)?;
     print!("{page}");
     if readme {
-        let images = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/img");
+        let images = repository::in_repository("docs/img");
         fs::create_dir_all(&images)?;
         for name in IN_README {
             fs::copy(folder.join(name), images.join(name))?;

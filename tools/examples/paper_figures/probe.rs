@@ -7,10 +7,10 @@ use std::path::Path;
 
 use palpate::log::{LogRecord, ProbeSample};
 use palpate::prelude::*;
-use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::LocalModelKind;
+use palpate_cli::drawing::{BLUE, Curve, GREEN, INK, ORANGE, Panel, Sheet};
 
 use crate::delay::Delay;
-use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet, TIME};
 use crate::forces::{Difference, peak};
 use crate::runs::{resyncs, run};
 use crate::table::{Row, Table};
@@ -18,7 +18,6 @@ use crate::table::{Row, Table};
 const SCENE: &str = "wave_probe";
 /// Where the plot looks closer (s): the wave's first trough with a few resyncs in it.
 const CLOSER: std::ops::Range<f64> = 0.15..0.30;
-const TEAL: RGBColor = RGBColor(0, 158, 115);
 
 /// Positions (m) of the probed node, one per haptic tick.
 pub struct Probe {
@@ -92,27 +91,24 @@ impl Probe {
 
     /// Writes the plot: heights against the height at which they end up at rest, in mm.
     pub fn draw(&self, path: &Path, delays: &Delays) -> Result<(), Box<dyn AnyError>> {
-        let height = |positions: &[Vec3], color, width| {
-            Curve::new(&self.times, positions.iter().map(|x| 1e3 * (x.z - REST_HEIGHT_M)), color, width)
+        let height = |positions: &[Vec3], colour| {
+            Curve::new(&self.times, positions.iter().map(|x| 1e3 * (x.z - REST_HEIGHT_M)), colour)
         };
-        let curves =
-            || vec![height(&self.global, ORANGE, 1.5), height(&self.local, BLUE, 1.7), height(&self.full, INK, 2.2)];
+        let curves = || vec![height(&self.global, ORANGE), height(&self.local, BLUE), height(&self.full, INK).wide()];
         let whole = 0.0..self.times.last().copied().unwrap_or_default() + 1e-9;
         let panel = |times, caption: &str| Panel {
             caption: caption.to_owned(),
-            x_label: TIME,
+            x_label: "time (s)",
             y_label: "height above rest (mm)",
-            times,
+            shown: times,
             curves: curves(),
-            marks: Vec::new(),
-            zoomed: None,
+            ..Panel::default()
         };
         let undone = |ticks: f64| {
             let shifted: Vec<f64> = self.times.iter().map(|time| time - 1e-3 * ticks).collect();
-            let moved =
-                |color| Curve::new(&shifted, self.local.iter().map(|x| 1e3 * (x.z - REST_HEIGHT_M)), color, 1.7);
+            let moved = self.local.iter().map(|x| 1e3 * (x.z - REST_HEIGHT_M));
             Panel {
-                curves: vec![moved(TEAL), height(&self.full, INK, 2.2)],
+                curves: vec![Curve::new(&shifted, moved, GREEN), height(&self.full, INK).wide()],
                 ..panel(whole.clone(), &format!("the local model's node {ticks:.1} ms earlier (green)"))
             }
         };
@@ -136,7 +132,7 @@ impl Probe {
                 vec![closer, undone(delays.local.ticks)],
             ],
         };
-        sheet.write(path)
+        Ok(std::fs::write(path, sheet.to_svg())?)
     }
 
     /// Adds a row per signal, in % of the largest distance that the node of `full` has from its place at rest.

@@ -1,19 +1,18 @@
 //! Runs a scene with every local model and keeps its forces.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
 use palpate::session::Summary;
 use palpate::log::LogRecord;
 use palpate::prelude::*;
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::Scene;
+use palpate::scene::{LocalModelKind, Scene};
 
 use crate::forces::{Difference, forces, peak};
+use crate::repository::in_repository;
 
 /// Runs a scene of this repository in virtual time and keeps every record.
 pub fn run(scene: &str, model: LocalModelKind) -> Result<Summary, Error> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{scene}.toml"));
+    let path = in_repository(&format!("scenes/{scene}.toml"));
     Session::from_scene(Scene::load(&path)?).model(model).virtual_time().keep_records().build()?.run()
 }
 

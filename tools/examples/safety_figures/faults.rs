@@ -1,13 +1,12 @@
 //! The force through each fault of `scenes/device_faults.toml`.
 
-use std::path::Path;
-
-use palpate::session::Summary;
+use palpate::Summary;
 use palpate::log::LogRecord;
 use palpate::prelude::*;
 use palpate::scene::Scene;
+use palpate_cli::drawing::{BLUE, Curve, ORANGE, Panel, Sheet};
 
-use crate::drawing::{BLUE, Curve, ORANGE, Panel, Sheet, TIME};
+use crate::repository::in_repository;
 
 /// What fails, from when to when (s).
 const FAULTS: [(&str, f64, f64); 6] = [
@@ -28,7 +27,7 @@ fn magnitude(summary: &Summary, pick: impl Fn(&LogRecord) -> Option<(Nanos, [f64
 /// Runs the scene and draws it.
 pub fn sheet() -> Result<Sheet, Error> {
     eprintln!("device_faults");
-    let mut scene = Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/device_faults.toml"))?;
+    let mut scene = Scene::load(&in_repository("scenes/device_faults.toml"))?;
     // In full from the start: the faults come before the start-up ramp is over.
     scene.safety.start_up_ms = 100.0;
     let summary = Session::from_scene(scene).virtual_time().keep_records().build()?.run()?;
@@ -40,15 +39,15 @@ pub fn sheet() -> Result<Sheet, Error> {
         LogRecord::Command(command) => Some((command.time, command.force_n)),
         _ => None,
     });
-    let curve = |points: &[(f64, f64)], color, width| Curve { points: points.to_vec(), color, width };
+    let curve = |points: &[(f64, f64)], colour| Curve { points: points.to_vec(), colour, is_wide: colour == ORANGE };
     let panel = |caption: &str, times, marks| Panel {
         caption: caption.to_owned(),
-        x_label: TIME,
-        y_label: "N",
-        times,
-        curves: vec![curve(&computed, ORANGE, 3.0), curve(&commanded, BLUE, 1.5)],
+        x_label: "time (s)",
+        y_label: "force (N)",
+        shown: times,
+        curves: vec![curve(&computed, ORANGE), curve(&commanded, BLUE)],
         marks,
-        zoomed: None,
+        ..Panel::default()
     };
     let bounds = FAULTS.iter().flat_map(|&(_, from, to)| [from, to]).collect();
     let mut rows = vec![vec![panel("all of them", 0.0..2.5, bounds)]];

@@ -1,18 +1,15 @@
 //! The paper's Fig. 17: a hand that presses and lets go, with each model and without any safety stage; and `hold` with all.
 
-use std::path::Path;
-
-use palpate::session::Summary;
+use palpate::Summary;
 use palpate::log::LogRecord;
 use palpate::prelude::*;
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::{SafetySpec, Scene};
+use palpate::scene::{LocalModelKind, SafetySpec, Scene};
+use palpate_cli::drawing::{BLUE, Curve, GREEN, INK, ORANGE, Panel, RED, Sheet};
 
-use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet, TIME};
-use crate::{GREEN, RED};
+use crate::repository::in_repository;
 
 /// The models shown, in the order of the legend.
-const MODELS: [(LocalModelKind, RGBColor); 4] = [
+const MODELS: [(LocalModelKind, usize); 4] = [
     (LocalModelKind::Full, BLUE),
     (LocalModelKind::Predictive, GREEN),
     (LocalModelKind::Patch, ORANGE),
@@ -25,7 +22,7 @@ const TOP_M: f64 = 0.1;
 
 /// A run of the scene: with every stage that it switches off, or with the defaults.
 fn run(model: LocalModelKind, defaults: bool) -> Result<Summary, Error> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hand_release.toml");
+    let path = in_repository("scenes/hand_release.toml");
     let mut scene = Scene::load(&path)?.with_model(model);
     if defaults {
         scene.safety = SafetySpec::default();
@@ -44,7 +41,7 @@ fn height(summary: &Summary) -> Vec<(f64, f64)> {
 
 /// The reference's, if it is there: a clone has it, a package does not.
 fn reference() -> Vec<(f64, f64)> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/hand_release.csv");
+    let path = in_repository("tests/reference/hand_release.csv");
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let point = |line: &str| {
         let mut cells = line.split(',').map_while(|cell| cell.parse::<f64>().ok());
@@ -53,17 +50,16 @@ fn reference() -> Vec<(f64, f64)> {
     text.lines().filter_map(point).collect()
 }
 
-fn curve(points: Vec<(f64, f64)>, color: RGBColor, width: f64) -> Curve {
-    let (times, values): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
-    Curve::new(&times, values, color, width)
+fn curve(points: Vec<(f64, f64)>, colour: usize) -> Curve {
+    Curve { points, colour, ..Curve::default() }
 }
 
 /// Runs everything and draws it.
 pub fn sheet() -> Result<Sheet, Error> {
     let mut bare = Vec::new();
-    for (model, color) in MODELS {
+    for (model, colour) in MODELS {
         eprintln!("hand_release: {}", model.name());
-        bare.push((model, color, height(&run(model, false)?)));
+        bare.push((model, colour, height(&run(model, false)?)));
     }
     eprintln!("hand_release: hold with the defaults");
     let guarded = run(LocalModelKind::Hold, true)?;
@@ -72,23 +68,23 @@ pub fn sheet() -> Result<Sheet, Error> {
     println!("hand_release, hold with the safety defaults, ticks in which a stage acted: {}\n", acted.join(", "));
     // Before it leaves the picture.
     let shown = |points: &[(f64, f64)]| points.iter().copied().take_while(|point| point.1.abs() < 30.0).collect();
-    let reference = || curve(reference(), INK, 3.5);
+    let reference = || curve(reference(), INK).wide();
     let mut whole = vec![reference()];
-    whole.extend(bare.iter().rev().map(|(_, color, points)| curve(shown(points), *color, 1.5)));
+    whole.extend(bare.iter().rev().map(|(_, colour, points)| curve(shown(points), *colour)));
     let mut closer = vec![reference()];
     let quiet = bare.iter().rev().filter(|(model, ..)| *model != LocalModelKind::Hold);
-    closer.extend(quiet.map(|(_, color, points)| curve(points.clone(), *color, 1.5)));
+    closer.extend(quiet.map(|(_, colour, points)| curve(points.clone(), *colour)));
     let panel = |caption: &str, times, curves| Panel {
         caption: caption.to_owned(),
-        x_label: TIME,
+        x_label: "time (s)",
         y_label: "tool over the surface (mm)",
-        times,
+        shown: times,
         curves,
         marks: vec![RELEASE_S],
-        zoomed: None,
+        ..Panel::default()
     };
     let mut legend = vec![("reference".to_owned(), INK)];
-    legend.extend(MODELS.map(|(model, color)| (model.name().to_owned(), color)));
+    legend.extend(MODELS.map(|(model, colour)| (model.name().to_owned(), colour)));
     Ok(Sheet {
         title: "hand_release: a hand presses 9 mm deep and lets go at 1 s".to_owned(),
         subtitle: "a device of 75 g that gives way to the force; the height of the tool; hold with a force of 30 Hz"
@@ -100,7 +96,7 @@ pub fn sheet() -> Result<Sheet, Error> {
             vec![panel(
                 "hold with the safety defaults: the passivity controller bounds it",
                 0.0..2.4,
-                vec![curve(height(&guarded), RED, 1.5)],
+                vec![curve(height(&guarded), RED)],
             )],
         ],
     })

@@ -6,23 +6,16 @@
 //! Look for: `hold` diverging without safety stages and bounded with them; the force through each fault; the table of the
 //! stiffness that each model holds at each rate. Files are in `out/safety_figures/`.
 
-#[path = "../common/drawing.rs"]
-mod drawing;
 mod faults;
 mod hand_release;
+#[path = "../../tests/support/repository.rs"]
+mod repository;
 mod table;
 mod z_width;
 
 use std::path::Path;
 
-use drawing::{RGBColor, Sheet};
-
-/// More colours that all people tell apart from blue and orange.
-pub const GREEN: RGBColor = RGBColor(0, 158, 115);
-/// For what is drawn beside a theory.
-pub const GREY: RGBColor = RGBColor(150, 156, 166);
-/// For what diverges.
-pub const RED: RGBColor = RGBColor(204, 51, 17);
+use palpate_cli::drawing::Sheet;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let is_whole = std::env::args().any(|argument| argument == "--docs");
@@ -31,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for folder in folders {
             std::fs::create_dir_all(folder)?;
             let path = Path::new(folder).join(name);
-            sheet.write(&path)?;
+            std::fs::write(&path, sheet.to_svg())?;
             println!("{}", path.display());
         }
         Ok(())

@@ -1,17 +1,15 @@
 //! All borders of the sweep: measured on all cores, as a table and as a picture.
 
-use std::fmt;
 use std::sync::{Mutex, PoisonError};
-use std::thread;
+use std::{fmt, thread};
 
 use palpate::prelude::*;
-use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::LocalModelKind;
+use palpate_cli::drawing::{BLUE, Curve, GREEN, GREY, INK, ORANGE, Panel, RED, Sheet};
 
-use crate::drawing::{BLUE, Curve, INK, ORANGE, Panel, RGBColor, Sheet};
 use crate::z_width::{STIFFNESS, Sweep, theory};
-use crate::{GREEN, GREY, RED};
 
-const MODELS: [(LocalModelKind, RGBColor); 4] = [
+const MODELS: [(LocalModelKind, usize); 4] = [
     (LocalModelKind::Hold, RED),
     (LocalModelKind::Patch, ORANGE),
     (LocalModelKind::Predictive, GREEN),
@@ -85,10 +83,9 @@ impl Table {
 
     /// A panel per rate.
     pub fn sheet(&self) -> Sheet {
-        // Straight axes only: decades are their logarithms.
         let panel = |&rate_hz: &f64| {
             let points = |border: &dyn Fn(f64) -> Option<f64>, dampings: &[f64]| -> Vec<(f64, f64)> {
-                let at = |&damping: &f64| Some((damping, border(damping)?.log10()));
+                let at = |&damping: &f64| Some((damping, border(damping)?));
                 dampings.iter().filter_map(at).collect()
             };
             let fine: Vec<f64> = (0..=200).map(|n| f64::from(n) * 5e-3).collect();
@@ -100,26 +97,26 @@ impl Table {
                 points(&within, &fine)
             };
             let mut curves = vec![
-                Curve { points: passive(0.0), color: INK, width: 3.0 },
-                Curve { points: passive(0.5), color: GREY, width: 3.0 },
+                Curve { points: passive(0.0), colour: INK, is_wide: true },
+                Curve { points: passive(0.5), colour: GREY, is_wide: true },
             ];
-            curves.extend(MODELS.map(|(model, color)| Curve {
+            curves.extend(MODELS.map(|(model, colour)| Curve {
                 points: points(&|damping| self.border(model, rate_hz, damping), &self.dampings),
-                color,
-                width: 1.5,
+                colour,
+                is_wide: false,
             }));
             Panel {
                 caption: format!("{rate_hz} Hz"),
                 x_label: "damping of the wall B (N s/m)",
-                y_label: "log10 of its stiffness K (N/m)",
-                times: 0.0..1.0 + 1e-9,
+                y_label: "stiffness of the wall K (N/m)",
+                shown: 0.0..1.0 + 1e-9,
+                is_log: true,
                 curves,
-                marks: Vec::new(),
-                zoomed: None,
+                ..Panel::default()
             }
         };
         let mut legend = vec![("b > K T/2 + |B|".to_owned(), INK), ("b > K T + |B|".to_owned(), GREY)];
-        legend.extend(MODELS.map(|(model, color)| (model.name().to_owned(), color)));
+        legend.extend(MODELS.map(|(model, colour)| (model.name().to_owned(), colour)));
         Sheet {
             title: "z_width: the stiffest wall without a sustained limit cycle".to_owned(),
             subtitle: format!(

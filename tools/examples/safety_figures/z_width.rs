@@ -3,13 +3,13 @@
 //! The body is a wall of stiffness K and damping B at the contact. Both are those of its springs times one number, which its
 //! shape alone determines, since every damper is parallel to a spring: K = c k, B = c b.
 
-use std::path::Path;
-
 use palpate::log::LogRecord;
 use palpate::model::equilibrium::static_equilibrium;
 use palpate::prelude::*;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::scene::Scene;
+
+use crate::repository::in_repository;
 
 /// The last part of a run, over which the tool has to rest (s).
 const WATCHED_S: f64 = 0.5;
@@ -42,7 +42,7 @@ pub struct Sweep {
 impl Sweep {
     /// Of the scene in this repository.
     pub fn new() -> Result<Self, Error> {
-        let scene = Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/z_width.toml"))?;
+        let scene = Scene::load(&in_repository("scenes/z_width.toml"))?;
         let spring = 30.0;
         let mut block = Block::builder([6; 3], [0.1; 3]).stiffness(spring).fix(Face::ZMin).build()?;
         let node = block.lattice().id([3, 3, 5]);

@@ -2,13 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::compare::{to_html, to_json, to_text};
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::Scene;
-use crate::compare::{CompareOptions, CompareProgress, compare};
+use palpate::scene::{LocalModelKind, Scene};
 use palpate::{Error, ErrorKind};
 
-use super::{output, progress, run};
+use super::{progress, run, shared};
+use crate::compare::{CompareOptions, CompareProgress, compare, to_html, to_json, to_text};
 
 /// The arguments of `palpate compare`.
 #[derive(Debug, clap::Args)]
@@ -37,10 +35,10 @@ pub struct CompareArgs {
 pub fn run(args: &CompareArgs) -> Result<(), Error> {
     let scene = Scene::load(&args.scene)?;
     if let Some(html) = &args.html {
-        output::refuse_to_overwrite(&args.scene, html)?;
+        shared::refuse_to_overwrite(&args.scene, html)?;
         for path_csv in scene.devices.iter().filter_map(|device| device.path_csv.as_ref()) {
             let folder = args.scene.parent().unwrap_or(Path::new(""));
-            output::refuse_to_overwrite(&folder.join(path_csv), html)?;
+            shared::refuse_to_overwrite(&folder.join(path_csv), html)?;
         }
     }
     let name = args.scene.display().to_string();
@@ -55,8 +53,8 @@ pub fn run(args: &CompareArgs) -> Result<(), Error> {
         std::fs::write(html, to_html(&comparison)).map_err(|error| Error::io(html, error))?;
     }
     match args.json {
-        true => output::print(&format!("{}\n", to_json(&comparison)))?,
-        false => output::print(&to_text(&comparison))?,
+        true => shared::print(&format!("{}\n", to_json(&comparison)))?,
+        false => shared::print(&to_text(&comparison))?,
     }
     match comparison.faults().next() {
         Some((model, fault)) => Err(Error::new(ErrorKind::Fault, format!("the run of `{model}`: {fault}"))),

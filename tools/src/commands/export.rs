@@ -1,16 +1,15 @@
 //! `palpate export LOG`: a log in the formats of other programs.
 
 use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal, Read, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use palpate::log::{LogReader, Window};
-use crate::export::{Figure, Format, export_percentiles, export_table, export_trace};
 use palpate::{Error, ErrorKind};
 
-use super::output::{forgive_closed_pipe, refuse_to_overwrite, warn_of_damage};
 use super::progress::ReadBar;
-use super::window::WindowArgs;
+use super::shared::{WindowArgs, forgive_closed_pipe, refuse_to_overwrite, warn_of_damage};
+use crate::export::{TickDuration, export_percentiles, export_table, export_trace};
 
 /// The formats of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -41,7 +40,7 @@ pub struct ExportArgs {
     pub group: Option<String>,
     /// For hgrm: the figure.
     #[arg(long, value_enum)]
-    pub figure: Option<Figure>,
+    pub figure: Option<TickDuration>,
     #[command(flatten)]
     pub window: WindowArgs,
     /// The file to write; standard output if left out.
@@ -51,8 +50,8 @@ pub struct ExportArgs {
 
 /// What is to be written, with everything that it needs.
 enum What<'a> {
-    Table(&'a str, Format),
-    Percentiles(&'a str, Figure),
+    Table(&'a str),
+    Percentiles(&'a str, TickDuration),
     Trace,
 }
 
@@ -91,9 +90,6 @@ fn write_file<R: Read>(
 }
 
 fn write_standard_output<R: Read>(what: &What<'_>, reader: &mut LogReader<R>, window: &Window) -> Result<(), Error> {
-    if matches!(what, What::Table(_, Format::Parquet)) && io::stdout().is_terminal() {
-        return Err(usage("Parquet is not text: name a file with --out"));
-    }
     let mut out = BufWriter::new(io::stdout());
     forgive_closed_pipe(write(what, reader, window, &mut out))?;
     // What is left in the buffer has no reader any more, and dropping it would try once again.
@@ -101,14 +97,14 @@ fn write_standard_output<R: Read>(what: &What<'_>, reader: &mut LogReader<R>, wi
     Ok(())
 }
 
-fn write<R: Read, W: Write + Send>(
+fn write<R: Read, W: Write>(
     what: &What<'_>,
     reader: &mut LogReader<R>,
     window: &Window,
     out: &mut W,
 ) -> Result<(), Error> {
     match *what {
-        What::Table(topic, format) => export_table(reader, topic, format, window, out),
+        What::Table(topic) => export_table(reader, topic, window, out),
         What::Percentiles(group, figure) => export_percentiles(reader, group, figure, window, out),
         What::Trace => export_trace(reader, window, out),
     }
@@ -116,11 +112,7 @@ fn write<R: Read, W: Write + Send>(
 
 /// What the options ask for together.
 fn what(args: &ExportArgs) -> Result<What<'_>, Error> {
-    let table = |format: Format| {
-        let topic =
-            args.topic.as_deref().ok_or_else(|| usage("name the topic with --topic, such as --topic /force"))?;
-        Ok(What::Table(topic, format))
-    };
+    let topic = || args.topic.as_deref().ok_or_else(|| usage("name the topic with --topic, such as --topic /force"));
     let (needs_topic, needs_figure, name) = match args.format {
         ExportFormat::Csv => (true, false, "csv"),
         ExportFormat::Parquet => (true, false, "parquet"),
@@ -136,8 +128,14 @@ fn what(args: &ExportArgs) -> Result<What<'_>, Error> {
         return Err(usage(&format!("{option} belongs to --format {fits}, not to {name}: leave one of them out")));
     }
     match args.format {
-        ExportFormat::Csv => table(Format::Csv),
-        ExportFormat::Parquet => table(Format::Parquet),
+        ExportFormat::Csv => Ok(What::Table(topic()?)),
+        ExportFormat::Parquet => {
+            let topic = topic()?;
+            let message = format!(
+                "Parquet has a program of its own: `palpate-parquet LOG --topic {topic} --out FILE`, or export CSV"
+            );
+            Err(Error::new(ErrorKind::Usage, message))
+        }
         ExportFormat::Hgrm => match (&args.group, args.figure) {
             (Some(group), Some(figure)) => Ok(What::Percentiles(group, figure)),
             _ => Err(usage("hgrm needs a rate group and a figure: add --group local --figure lateness")),

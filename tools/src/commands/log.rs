@@ -4,12 +4,12 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter};
 use std::path::PathBuf;
 
-use crate::log_file::{CheckReport, LogInfo, Lost, Recovered, check, recover};
 use palpate::{Error, ErrorKind};
 
 use super::log_info::{bytes, count, seconds, span, to_json, to_text};
-use super::output::{print, refuse_to_overwrite, warn_of_damage};
 use super::progress::ReadBar;
+use super::shared::{print, refuse_to_overwrite, warn_of_damage};
+use crate::log_file::{CheckReport, LogInfo, Lost, Recovered, check, recover};
 
 /// The arguments of `palpate log`.
 #[derive(Debug, clap::Args)]

@@ -1,8 +1,9 @@
 //! What `palpate log` prints: a log's contents as text and as JSON.
 
-use crate::log_file::LogInfo;
-use palpate::log::{Environment, LoggedExecution};
+use palpate::log::{Environment, Execution};
 use serde_json::{Value, json};
+
+use crate::log_file::LogInfo;
 
 /// A number of bytes in words.
 pub fn bytes(bytes: u64) -> String {

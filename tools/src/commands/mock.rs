@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use palpate::{Error, ErrorKind};
 use palpate_haply::mock::{MockFault, MockFaultKind, MockOptions, MockService};
 
-use super::{interrupt, output};
+use super::shared;
 
 /// The arguments of `palpate mock`.
 #[derive(Debug, clap::Args)]
@@ -63,8 +63,8 @@ pub fn run(args: &MockArgs) -> Result<(), Error> {
         device_id: args.device_id.clone(),
         fault: kind.map(|kind| MockFault { kind, after: args.after }),
     })?;
-    let interrupt = interrupt::waits()?;
-    output::print(&format!(
+    let interrupt = shared::waits()?;
+    shared::print(&format!(
         "haply mock: device {}, simulation ws://{}, events ws://{}; Ctrl-C ends it\n",
         args.device_id,
         service.address(),
@@ -75,7 +75,7 @@ pub fn run(args: &MockArgs) -> Result<(), Error> {
         std::thread::sleep(Duration::from_millis(20));
     }
     let seen = service.counts();
-    output::print(&format!(
+    shared::print(&format!(
         "connections {}, messages {}, replies {}, commands {}, probes {}, conflicts {}, malformed {}, events {}\n",
         seen.connections,
         seen.messages,

@@ -12,13 +12,13 @@ pub mod replay;
 pub mod run;
 pub mod timing;
 
-mod interrupt;
 mod log_info;
-mod output;
 mod progress;
-mod window;
+mod shared;
 
 use std::process::ExitCode;
+
+pub use shared::{WindowArgs, refuse_to_overwrite};
 
 use clap::{CommandFactory, Parser, Subcommand};
 use palpate::session::LOG_FAILURE;
@@ -89,7 +89,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.kind() == ErrorKind::Interrupted => {
             eprintln!("{error}");
-            ExitCode::from(interrupt::EXIT_CODE)
+            ExitCode::from(shared::EXIT_CODE)
         }
         Err(error) => {
             eprintln!("error: {error}");
@@ -99,7 +99,7 @@ pub fn main() -> ExitCode {
 }
 
 fn print_help(help: &clap::Error) -> ExitCode {
-    match output::print(&help.to_string()) {
+    match shared::print(&help.to_string()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) => ExitCode::from(2),
     }

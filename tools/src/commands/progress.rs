@@ -8,9 +8,8 @@ use std::time::Duration;
 use indicatif::{MultiProgress, ProgressBar, ProgressBarIter, ProgressDrawTarget, ProgressStyle};
 use palpate::Error;
 use palpate::log::LogReader;
-use palpate::runtime::GroupLive;
+use palpate::runtime::{GroupLive, Nanos};
 use palpate::session::Running;
-use palpate::runtime::Nanos;
 
 /// How much of the run passes between two drawings.
 const STEP: Duration = Duration::from_millis(50);

@@ -2,14 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::reduce::findings::ReductionStudy;
-use crate::reduce::{locality_verdict, to_html, to_json, to_text};
 use palpate::scene::Scene;
-use crate::reduce::{MeshStudy, PaperStudy, ReduceOptions, reduce_mesh, reduce_paper, reduce_scene};
 use palpate::{Error, ErrorKind};
 
-use super::output;
 use super::progress::StepBar;
+use super::shared;
+use crate::reduce::findings::ReductionStudy;
+use crate::reduce::{
+    MeshStudy, PaperStudy, ReduceOptions, locality_verdict, reduce_mesh, reduce_paper, reduce_scene, to_html, to_json,
+    to_text,
+};
 
 /// The arguments of `palpate reduce`.
 #[derive(Debug, clap::Args)]
@@ -86,8 +88,8 @@ pub fn run(args: &ReduceArgs) -> Result<(), Error> {
         std::fs::write(html, to_html(&study)).map_err(|error| Error::io(html, error))?;
     }
     match args.json {
-        true => output::print(&format!("{}\n", to_json(&study)))?,
-        false => output::print(&to_text(&study))?,
+        true => shared::print(&format!("{}\n", to_json(&study)))?,
+        false => shared::print(&to_text(&study))?,
     }
     match &study.locality {
         Some(locality) if args.fail_if_not_local && !locality.is_local => {
@@ -123,10 +125,10 @@ fn study(args: &ReduceArgs, shown: &mut StepBar) -> Result<ReductionStudy, Error
 
 /// Refuses a page that would overwrite what is read.
 fn keep_inputs(path: &Path, scene: &Scene, html: &Path) -> Result<(), Error> {
-    output::refuse_to_overwrite(path, html)?;
+    shared::refuse_to_overwrite(path, html)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut paths = scene.devices.iter().filter_map(|device| device.path_csv.as_ref());
-    paths.try_for_each(|path_csv| output::refuse_to_overwrite(&folder.join(path_csv), html))
+    paths.try_for_each(|path_csv| shared::refuse_to_overwrite(&folder.join(path_csv), html))
 }
 
 fn options(args: &ReduceArgs) -> ReduceOptions {

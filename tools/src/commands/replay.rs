@@ -7,7 +7,7 @@ use palpate::session::{Compared, Difference, ReplayReport, Session};
 use palpate::{Error, ErrorKind};
 use serde_json::{Value, json};
 
-use super::{output, progress};
+use super::{progress, shared};
 
 /// The arguments of `palpate replay`.
 #[derive(Debug, clap::Args)]
@@ -35,7 +35,7 @@ pub fn run(args: &ReplayArgs) -> Result<(), Error> {
     bar.clear();
     let report = report?;
     let text = if args.json { format!("{}\n", to_json(&report)) } else { report.to_string() };
-    output::print(&text)?;
+    shared::print(&text)?;
     if report.is_identical() {
         return Ok(());
     }

@@ -7,7 +7,7 @@ use palpate::scene::{ModelChoice, Scene};
 use palpate::session::{Session, SessionBuilder};
 use palpate::{Error, ErrorKind};
 
-use super::{interrupt, output, progress};
+use super::{progress, shared};
 
 /// Where the log goes if nothing is said.
 const DEFAULT_LOG: &str = "palpate-run.mcap";
@@ -51,13 +51,13 @@ pub fn demo() -> Result<(), Error> {
 /// Input errors of the scene, or a failed run.
 pub fn run(args: &RunArgs) -> Result<(), Error> {
     let mut scene = Scene::load(&args.scene)?;
-    output::refuse_to_overwrite(&args.scene, &args.out)?;
+    shared::refuse_to_overwrite(&args.scene, &args.out)?;
     for path_csv in scene.devices.iter().filter_map(|device| device.path_csv.as_ref()) {
         let folder = args.scene.parent().unwrap_or(Path::new(""));
-        output::refuse_to_overwrite(&folder.join(path_csv), &args.out)?;
+        shared::refuse_to_overwrite(&folder.join(path_csv), &args.out)?;
     }
     for log in scene.devices.iter().filter_map(|device| device.log.as_ref()) {
-        output::refuse_to_overwrite(log, &args.out)?;
+        shared::refuse_to_overwrite(log, &args.out)?;
     }
     let name = args.scene.display().to_string();
     if let Some(model) = args.model {
@@ -77,10 +77,13 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
 }
 
 fn plan(builder: SessionBuilder, name: &str) -> Result<(), Error> {
-    let planned = builder.open_haply_with(palpate_haply::open).build().and_then(|session| Ok((session.plan()?, session.choice().cloned())));
+    let planned = builder
+        .open_haply_with(palpate_haply::open)
+        .build()
+        .and_then(|session| Ok((session.plan()?, session.choice().cloned())));
     let (plan, choice) = planned.map_err(|error| error.at(name))?;
     let choice = choice.map_or(String::new(), |choice| format!("model      {choice}\n"));
-    output::print(&format!("{name}: {plan}{choice}"))
+    shared::print(&format!("{name}: {plan}{choice}"))
 }
 
 fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error> {
@@ -88,12 +91,12 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
     let session = builder.open_haply_with(palpate_haply::open).log(log).build().map_err(|error| error.at(name));
     preparing.finish_and_clear();
     let running = session?.start()?;
-    let interrupt = interrupt::stops(&running)?;
+    let interrupt = shared::stops(&running)?;
     progress::wait(&running, name);
     let ended = running.elapsed();
     let until = running.until();
     let summary = running.stop();
-    output::print(&summary.to_string())?;
+    shared::print(&summary.to_string())?;
     if let Some(fault) = summary.runtime.fault {
         return Err(Error::new(ErrorKind::Fault, fault.to_string()).at(name));
     }
@@ -103,7 +106,7 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
     }
     let first = summary.report.devices.first().map(|device| device.name.as_str()).filter(|name| !name.is_empty());
     let topic = first.map_or("/force".to_owned(), |name| format!("/{name}/force"));
-    output::print(&format!("log: {0} (`palpate timing {0}`, `palpate export {0} --topic {topic}`)\n", log.display()))?;
+    shared::print(&format!("log: {0} (`palpate timing {0}`, `palpate export {0} --topic {topic}`)\n", log.display()))?;
     match until.filter(|_| interrupt.came()) {
         Some(until) if ended < until => {
             let (ended, until) = (ended.as_secs_f64(), until.as_secs_f64());

@@ -4,13 +4,14 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use crate::timing::{Against, Condition, Selection, TimingAnalysis, TimingReport, read_cyclictest};
-use crate::timing::{against_to_json, against_to_text, figure_to_text, timing_html, timing_to_json, timing_to_text};
 use palpate::{Error, ErrorKind};
 
-use super::output::{print, refuse_to_overwrite, warn_of_damage};
 use super::progress::ReadBar;
-use super::window::WindowArgs;
+use super::shared::{WindowArgs, print, refuse_to_overwrite, warn_of_damage};
+use crate::timing::{
+    Against, Condition, Selection, TimingAnalysis, TimingReport, against_to_json, against_to_text, figure_to_text,
+    read_cyclictest, timing_html, timing_to_json, timing_to_text,
+};
 
 /// The arguments of `palpate timing`.
 #[derive(Debug, clap::Args)]

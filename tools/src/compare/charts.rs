@@ -1,10 +1,11 @@
 //! The plots of a comparison: force and error over time, and speed against error.
 
-use super::milliseconds;
-use super::figures::{ComparedRun, Comparison, Measured};
 use palpate::log::magnitude;
-use crate::drawing::svg::{Axis, Chart, Line, Mark, Point};
 use palpate::runtime::Nanos;
+
+use super::figures::{ComparedRun, Comparison, Measured};
+use super::milliseconds;
+use crate::drawing::svg::{Axis, Chart, Line, Mark, Point};
 
 const WIDE: f64 = 960.0;
 /// A force below this part of the peak is no contact to look at.
@@ -33,14 +34,6 @@ pub(super) fn models(comparison: &Comparison) -> Vec<&str> {
 /// The colour of a model.
 pub(super) fn colour(model: usize) -> usize {
     if model == 0 { 0 } else { (model - 1) % COLOURS + 1 }
-}
-
-/// The latencies that were compared, least first.
-pub(super) fn latencies(comparison: &Comparison) -> Vec<Nanos> {
-    let mut latencies: Vec<Nanos> = comparison.runs.iter().map(|run| run.latency).collect();
-    latencies.sort_unstable();
-    latencies.dedup();
-    latencies
 }
 
 /// Draws the plots of one comparison.
@@ -116,18 +109,8 @@ impl<'a> Plots<'a> {
         let y_whole = Axis::from_zero("force (N)", shown(self.whole())[1]);
         let y_near = Axis::around("force (N)", shown(zoom));
         let chart = |title: String, range: [f64; 2], y: Axis| Chart {
-            title,
-            width: WIDE,
-            height: 270.0,
-            x: Axis::linear("t (s)", range),
-            y,
-            band: None,
-            marks: Vec::new(),
-            levels: Vec::new(),
             lines: lines.clone(),
-            points: Vec::new(),
-            bars: Vec::new(),
-            signs: Vec::new(),
+            ..Chart::new(title, [WIDE, 270.0], Axis::linear("t (s)", range), y)
         };
         let mut whole = chart(format!("Force, {}", in_words(latency)), self.whole(), y_whole);
         whole.band = Some(zoom);
@@ -149,21 +132,10 @@ impl<'a> Plots<'a> {
             .collect();
         let values = lines.iter().flat_map(|line| &line.points).map(|(_, error)| *error);
         let largest = values.filter(|error| error.is_finite()).fold(1.0, f64::max).min(LARGEST_ERROR);
-        Chart {
-            title: format!("Error, {}", in_words(latency)),
-            width: WIDE,
-            height: 250.0,
-            x: Axis::linear("t (s)", self.whole()),
-            y: Axis::log("error (% of peak)", [SMALLEST_ERROR, largest * 1.2]),
-            band: Some(self.zoom(latency)),
-            marks: Vec::new(),
-            levels: Vec::new(),
-            lines,
-            points: Vec::new(),
-            bars: Vec::new(),
-            signs: Vec::new(),
-        }
-        .to_svg()
+        let y = Axis::log("error (% of peak)", [SMALLEST_ERROR, largest * 1.2]);
+        let title = format!("Error, {}", in_words(latency));
+        let chart = Chart::new(title, [WIDE, 250.0], Axis::linear("t (s)", self.whole()), y);
+        Chart { band: Some(self.zoom(latency)), lines, ..chart }.to_svg()
     }
 
     /// Cost of a haptic tick against the error: every model and latency is a point, `full` lies on the bottom.
@@ -191,19 +163,11 @@ impl<'a> Plots<'a> {
             is_hollow: late != Nanos::ZERO,
         };
         let runs = measured.iter().map(|(run, measured)| point(&run.model, run.latency, measured));
+        let x = Axis::log("CPU per haptic tick, p50 (us)", range);
         Chart {
-            title: "Speed against error".to_owned(),
-            width: WIDE,
-            height: 400.0,
-            x: Axis::log("CPU per haptic tick, p50 (us)", range),
-            y,
-            band: None,
             marks: vec![Mark { at: period_us, label: "haptic period".to_owned() }],
-            levels: Vec::new(),
-            lines: Vec::new(),
-            bars: Vec::new(),
-            signs: Vec::new(),
             points: [point("full", Nanos::ZERO, &self.comparison.full)].into_iter().chain(runs).collect(),
+            ..Chart::new("Speed against error", [WIDE, 400.0], x, y)
         }
         .to_svg()
     }

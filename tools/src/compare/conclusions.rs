@@ -1,16 +1,16 @@
 //! What a comparison comes to, in sentences: where `full` is enough, where another model is worth it, and where none is.
 
-use super::table::figure;
-use super::{milliseconds, name};
-use super::figures::{ComparedRun, Comparison, Measured};
-use crate::units::duration;
 use palpate::runtime::Nanos;
+
+use super::figures::{ComparedRun, Comparison, Measured};
+use super::{figure, milliseconds, name};
+use crate::units::duration;
 
 /// Costs that differ by less are called the same: they are measured, and differ from run to run.
 const MARGIN: f64 = 0.1;
 
 /// Errors (% rms) that a model is asked to stay within.
-pub const NEAR: [f64; 2] = [1.0, 5.0];
+const NEAR: [f64; 2] = [1.0, 5.0];
 
 /// The conclusions, one line each.
 ///
@@ -73,9 +73,6 @@ fn against_full(comparison: &Comparison) -> [String; 3] {
 
 /// The cheapest per haptic tick within an error, for each latency.
 fn nearest(comparison: &Comparison, limit: f64) -> String {
-    let mut latencies: Vec<Nanos> = comparison.runs.iter().map(|run| run.latency).collect();
-    latencies.sort_unstable();
-    latencies.dedup();
     let at = |latency: Nanos| {
         let within =
             |run: &&ComparedRun| run.latency == latency && run.measured().is_some_and(|run| run.error.rms <= limit);
@@ -86,7 +83,7 @@ fn nearest(comparison: &Comparison, limit: f64) -> String {
         });
         format!("{} {}", in_words(latency), found.unwrap_or_else(|| "none".to_owned()))
     };
-    let found: Vec<String> = latencies.into_iter().map(at).collect();
+    let found: Vec<String> = comparison.latencies().into_iter().map(at).collect();
     format!("cheapest tick within {limit} % rms of `full`: {}", found.join("; "))
 }
 
@@ -119,14 +116,14 @@ fn two_digits(count: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::figures::{ForceDeviation, ForceTrace, ModelCost, RunOutcome};
     use super::*;
-    use super::figures::{ForceTrace, ModelCost, ModelError, RunOutcome};
 
     fn measured(rms: f64, tick_us: u64, total: f64) -> Measured {
         let tick = Nanos(tick_us * 1000);
         let cost = ModelCost { tick_p50: tick, tick_p99: tick, haptic_load: total, ..ModelCost::default() };
         let trace = ForceTrace { forces_n: vec![[0.0, 0.0, 1.0]], ..ForceTrace::default() };
-        Measured { error: ModelError { rms, ..ModelError::default() }, cost, trace, ..Measured::default() }
+        Measured { error: ForceDeviation { rms, ..ForceDeviation::default() }, cost, trace, ..Measured::default() }
     }
 
     fn comparison(full_us: u64, runs: &[(&str, u64, Measured)]) -> Comparison {

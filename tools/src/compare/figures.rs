@@ -1,11 +1,9 @@
 //! What local models cost and how far their forces are from `full`'s: plain data, and the error of one run against another.
 
-use palpate::log::Magnitudes;
-use palpate::log::{LogRecord, Resync};
-use palpate::log::magnitude;
+use palpate::log::{LogRecord, Magnitudes, Resync, magnitude};
 use palpate::runtime::Nanos;
 
-/// What a comparison needs of one run: force and energy of every haptic tick, and the resyncs.
+/// The part of a run that a comparison needs: force and energy of every haptic tick, and the resyncs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForceTrace {
     /// Force on the tool, tick by tick: mean over the tick, after blending, before safety (N).
@@ -17,12 +15,12 @@ pub struct ForceTrace {
 }
 
 impl ForceTrace {
-    /// Takes it from the records of a run, of its first device.
+    /// The trace of the first device of a run, from its records.
     pub fn of(records: &[LogRecord]) -> Self {
         Self::of_device(records, 0)
     }
 
-    /// Takes that of one of several devices from the records of a run.
+    /// The trace of one of several devices of a run, from its records.
     pub fn of_device(records: &[LogRecord], device: u16) -> Self {
         let mut trace = Self::default();
         for record in records.iter().filter(|record| record.device() == device) {
@@ -58,7 +56,7 @@ impl ForceTrace {
 ///
 /// All but `energy` in percent of the largest force of `full`. Not a number where `full` has no force, or no energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ModelError {
+pub struct ForceDeviation {
     /// Root of the mean square of the force's error over all ticks.
     pub rms: f64,
     /// Its largest error in one tick.
@@ -73,7 +71,7 @@ pub struct ModelError {
     pub energy: f64,
 }
 
-impl ModelError {
+impl ForceDeviation {
     /// The error of `run` against `full`; both have the same ticks.
     pub fn between(run: &ForceTrace, full: &ForceTrace) -> Self {
         let percent_of = |whole: f64| if whole > 0.0 { 100.0 / whole } else { f64::NAN };
@@ -98,55 +96,55 @@ impl ModelError {
     }
 }
 
-/// What a run costs: CPU time of the thread, everything else on the machine left out.
+/// The cost of a run: CPU time of the thread, everything else on the machine left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ModelCost {
-    /// Half of the haptic ticks take no longer.
+    /// CPU time that half of the haptic ticks stay within.
     pub tick_p50: Nanos,
-    /// 99 % of the haptic ticks do not.
+    /// CPU time that 99 % of the haptic ticks stay within.
     pub tick_p99: Nanos,
-    /// The longest haptic tick.
+    /// CPU time of the longest haptic tick.
     pub tick_max: Nanos,
-    /// The haptic group, per second of simulated time (s/s).
+    /// CPU time of the haptic group per second of simulated time (s/s).
     pub haptic_load: f64,
-    /// The global group, per second of simulated time (s/s); zero for `full`, which has none.
+    /// CPU time of the global group per second of simulated time (s/s); zero for `full`, which has none.
     pub global_load: f64,
-    /// Local models that were built.
+    /// Number of local models that were built.
     pub builds: u64,
-    /// Half of them took no longer to build.
+    /// CPU time that half of the builds of a local model stay within.
     pub build_p50: Nanos,
-    /// 99 % of them did not.
+    /// CPU time that 99 % of the builds of a local model stay within.
     pub build_p99: Nanos,
 }
 
 impl ModelCost {
-    /// Haptic and global group together, per second of simulated time (s/s).
+    /// CPU time of haptic and global group together per second of simulated time (s/s).
     pub fn total_load(&self) -> f64 {
         self.haptic_load + self.global_load
     }
 }
 
-/// A run that came to its end.
+/// The measurement of a run that came to its end.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measured {
-    /// How far it is from `full`.
-    pub error: ModelError,
-    /// What it costs.
+    /// Distance of the run's forces from those of `full`.
+    pub error: ForceDeviation,
+    /// CPU time that the run took.
     pub cost: ModelCost,
     /// Haptic and global releases that reported a degraded result, such as a force that was not finite.
     pub degraded: u64,
-    /// What it was measured on.
+    /// Forces and energies of the run.
     pub trace: ForceTrace,
 }
 
 /// How the run of one model went.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RunOutcome {
-    /// To its end.
+    /// The run came to its end.
     Measured(Box<Measured>),
     /// The model cannot run on this scene: why.
     Refused(String),
-    /// It stopped before its end: the fault.
+    /// The run stopped before its end: the fault.
     Failed(String),
 }
 
@@ -157,12 +155,12 @@ pub struct ComparedRun {
     pub model: String,
     /// How long after its release a result of the global model becomes visible.
     pub latency: Nanos,
-    /// How it went.
+    /// Whether the run came to its end, and its measurement.
     pub outcome: RunOutcome,
 }
 
 impl ComparedRun {
-    /// What was measured, if the run came to its end.
+    /// The measurement, if the run came to its end.
     pub fn measured(&self) -> Option<&Measured> {
         match &self.outcome {
             RunOutcome::Measured(measured) => Some(measured),
@@ -170,7 +168,7 @@ impl ComparedRun {
         }
     }
 
-    /// Why nothing was measured.
+    /// The reason for which nothing was measured.
     pub fn missing(&self) -> Option<&str> {
         match &self.outcome {
             RunOutcome::Measured(_) => None,
@@ -182,7 +180,7 @@ impl ComparedRun {
 /// Local models against `full` on one scene, in virtual time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Comparison {
-    /// What was compared, for titles.
+    /// Name of the scene, for titles.
     pub scene: String,
     /// Nodes of the body.
     pub nodes: usize,
@@ -190,14 +188,14 @@ pub struct Comparison {
     pub haptic_period: Nanos,
     /// Time from one release of the global model to the next.
     pub global_period: Nanos,
-    /// Simulated time.
+    /// Simulated time of each run.
     pub duration: Nanos,
-    /// What the reading of the clock adds to each tick and each build.
+    /// Time that reading the clock adds to each tick and each build.
     pub clock: Nanos,
     /// True if the program was built without optimisation or with debug assertions: costs are then several times those
     /// of a release build.
     pub is_debug_build: bool,
-    /// The crate's version.
+    /// Version of palpate.
     pub palpate_version: String,
     /// Instructions that the force kernel used.
     pub instruction_set: String,
@@ -208,6 +206,14 @@ pub struct Comparison {
 }
 
 impl Comparison {
+    /// The latencies that were compared, least first.
+    pub fn latencies(&self) -> Vec<Nanos> {
+        let mut latencies: Vec<Nanos> = self.runs.iter().map(|run| run.latency).collect();
+        latencies.sort_unstable();
+        latencies.dedup();
+        latencies
+    }
+
     /// The runs that stopped before their end: the model and the fault.
     pub fn faults(&self) -> impl Iterator<Item = (&str, &str)> {
         self.runs.iter().filter_map(|run| match &run.outcome {
@@ -240,8 +246,8 @@ mod tests {
     #[test]
     fn a_run_against_itself_has_its_own_jumps_and_no_error() {
         let full = trace(&[0.0, 1.0, -4.0], &[0.0, 2.0, 1.0]);
-        let error = ModelError::between(&full, &full);
-        assert_eq!(error, ModelError { jump: 125.0, ..ModelError::default() });
+        let error = ForceDeviation::between(&full, &full);
+        assert_eq!(error, ForceDeviation { jump: 125.0, ..ForceDeviation::default() });
     }
 
     #[test]
@@ -249,7 +255,7 @@ mod tests {
         let full = trace(&[0.0, 0.0, 5.0, -10.0], &[0.0, -8.0, -4.0, -2.0]);
         let mut run = trace(&[0.0, 2.0, 5.0, -10.0], &[0.0, 0.0, 0.0, 2.0]);
         run.forces_n[1] = [1.2, 0.0, 1.6];
-        let error = ModelError::between(&run, &full);
+        let error = ForceDeviation::between(&run, &full);
         // One tick of four is wrong by 2 N of 10 N; the last change is 15 N.
         assert_eq!((error.rms, error.max, error.jump), (10.0, 20.0, 150.0));
         assert_eq!(error.energy, 50.0);
@@ -262,13 +268,13 @@ mod tests {
         let mut run = full.clone();
         let resync = |n: u32| Resync { jump_before_n: n.into(), jump_after_n: 0.1 * f64::from(n), ..Resync::default() };
         run.resyncs = (1..=200).map(resync).collect();
-        let error = ModelError::between(&run, &full);
+        let error = ForceDeviation::between(&run, &full);
         assert!((error.resync_before_p99 - 1980.0).abs() < 1e-9 && (error.resync_after_p99 - 198.0).abs() < 1e-9);
     }
 
     #[test]
     fn without_a_force_of_full_there_is_no_percentage() {
-        let error = ModelError::between(&trace(&[1.0], &[1.0]), &trace(&[0.0], &[0.0]));
+        let error = ForceDeviation::between(&trace(&[1.0], &[1.0]), &trace(&[0.0], &[0.0]));
         assert!(error.rms.is_nan() && error.max.is_nan() && error.jump.is_nan() && error.energy.is_nan());
     }
 

@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use super::charts::{Plots, colour, latencies, models};
+use super::charts::{Plots, colour, models};
 use super::conclusions::conclusions;
+use super::figures::{Comparison, Measured};
 use super::milliseconds;
 use super::table::{COLUMNS, cell, clock, facts};
-use super::figures::{Comparison, Measured};
 use crate::drawing::html::{escaped, page, sentence};
 
 /// The comparison as an HTML page that needs nothing else: no network, no script.
@@ -88,7 +88,7 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
         &plots.speed_against_error(),
         "Left is cheaper, down is nearer to `full`. Filled: results of the global model are there at once; hollow: late.",
     );
-    for (number, latency) in latencies(comparison).into_iter().enumerate() {
+    for (number, latency) in comparison.latencies().into_iter().enumerate() {
         let [whole, near] = plots.forces(latency);
         figure(
             &format!("force-{number}"),
@@ -108,8 +108,8 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::figures::{ComparedRun, RunOutcome};
     use super::*;
-    use super::figures::{ComparedRun, RunOutcome};
     use palpate::runtime::Nanos;
 
     #[test]

@@ -78,8 +78,8 @@ fn model(name: &str, latency_ns: u64, run: Option<&Measured>, why_not: Option<&s
 
 #[cfg(test)]
 mod tests {
+    use super::super::figures::{ComparedRun, RunOutcome};
     use super::*;
-    use super::figures::{ComparedRun, RunOutcome};
     use palpate::runtime::Nanos;
 
     #[test]

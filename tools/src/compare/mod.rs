@@ -8,8 +8,8 @@ mod json;
 mod study;
 mod table;
 
-pub use conclusions::{NEAR, conclusions};
-pub use figures::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, ModelError, RunOutcome};
+pub use conclusions::conclusions;
+pub use figures::{ComparedRun, Comparison, ForceDeviation, ForceTrace, Measured, ModelCost, RunOutcome};
 pub use html::to_html;
 pub use json::to_json;
 pub use study::{CompareOptions, CompareProgress, compare, one_period};
@@ -27,5 +27,31 @@ fn name(run: &ComparedRun) -> String {
     match run.latency {
         Nanos::ZERO => run.model.clone(),
         late => format!("{} {} ms late", run.model, milliseconds(late)),
+    }
+}
+
+/// A figure of at most six characters: three digits, more before the point if it takes them.
+fn figure(value: f64) -> String {
+    match value.abs() {
+        _ if value.is_nan() => "-".to_owned(),
+        0.0 => "0".to_owned(),
+        ..1e-3 => format!("{value:.0e}"),
+        ..0.9995 => format!("{value:.3}"),
+        ..9.995 => format!("{value:.2}"),
+        ..99.95 => format!("{value:.1}"),
+        ..99_999.5 => format!("{value:.0}"),
+        _ => format!("{value:.0e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_short_and_keep_three_digits() {
+        let figures = [0.0, 2.34e-5, 0.0123, 0.9996, 6.543, 99.96, 1234.5, 2.5e7, f64::NAN].map(figure);
+        assert_eq!(figures, ["0", "2e-5", "0.012", "1.00", "6.54", "100", "1234", "2e7", "-"]);
+        assert!(figures.iter().all(|figure| figure.len() < 6));
     }
 }

@@ -2,22 +2,22 @@
 
 use std::time::Duration;
 
+use palpate::model::body::Block;
+use palpate::runtime::histogram::Snapshot;
+use palpate::runtime::{Nanos, Rate, Stopwatch};
+use palpate::scene::{LocalModelKind, Scene};
 use palpate::session::{Session, Summary};
 use palpate::{Error, ErrorKind};
-use super::figures::{ComparedRun, Comparison, ForceTrace, Measured, ModelCost, ModelError, RunOutcome};
-use palpate::model::body::Block;
-use palpate::runtime::Stopwatch;
-use palpate::runtime::histogram::Snapshot;
-use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::Scene;
-use palpate::runtime::{Nanos, Rate};
+
+use super::figures::{ComparedRun, Comparison, ForceDeviation, ForceTrace, Measured, ModelCost, RunOutcome};
 
 /// How much of a run passes between two calls of the progress callback.
 const STEP: Duration = Duration::from_millis(50);
 /// A latency of one period is rounded up to a multiple of this, so that it can be written in a scene file.
 const LATENCY_GRAIN: u64 = 10_000;
 
-/// What is compared; by default every model, with results of the global model that are there at once and one period late.
+/// The choice of what is compared; by default every model, with results of the global model that are there at once and one
+/// period late.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CompareOptions {
     /// Models beside `full`, which always runs; all of them if empty.
@@ -35,9 +35,9 @@ pub struct CompareProgress {
     pub run: usize,
     /// Runs in all.
     pub runs: usize,
-    /// Its model.
+    /// Model of the run that is at work.
     pub model: LocalModelKind,
-    /// Its compute latency.
+    /// Compute latency of the run that is at work.
     pub latency: Nanos,
     /// Simulated time that has passed in it.
     pub elapsed: Nanos,
@@ -157,7 +157,7 @@ fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
 /// What a run says, against `full` if it is not `full` itself.
 fn measured(summary: &Summary, full: Option<&ForceTrace>) -> Measured {
     let trace = ForceTrace::of(&summary.records);
-    let error = ModelError::between(&trace, full.unwrap_or(&trace));
+    let error = ForceDeviation::between(&trace, full.unwrap_or(&trace));
     let degraded = summary.runtime.groups.iter().map(|group| group.degraded).sum();
     Measured { error, cost: cost(summary), degraded, trace }
 }

@@ -1,8 +1,8 @@
 //! The table of a comparison: its columns, and the text for a terminal of 100 columns.
 
 use super::conclusions::conclusions;
-use super::milliseconds;
 use super::figures::{Comparison, Measured};
+use super::{figure, milliseconds};
 use crate::units::{duration, force};
 
 /// A column: three lines of head, its width in text, what it means, and its figure.
@@ -170,32 +170,11 @@ fn row(model: &str, latency: &str, cells: impl Iterator<Item = String>) -> Strin
     format!("{model:<MODEL_WIDTH$}{latency:>LATENCY_WIDTH$}{}", cells.collect::<String>())
 }
 
-/// A figure of at most six characters: three digits, more before the point if it takes them.
-pub(super) fn figure(value: f64) -> String {
-    match value.abs() {
-        _ if value.is_nan() => "-".to_owned(),
-        0.0 => "0".to_owned(),
-        ..1e-3 => format!("{value:.0e}"),
-        ..0.9995 => format!("{value:.3}"),
-        ..9.995 => format!("{value:.2}"),
-        ..99.95 => format!("{value:.1}"),
-        ..99_999.5 => format!("{value:.0}"),
-        _ => format!("{value:.0e}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::figures::{ComparedRun, RunOutcome};
     use super::*;
-    use super::figures::{ComparedRun, RunOutcome};
     use palpate::runtime::Nanos;
-
-    #[test]
-    fn figures_are_short_and_keep_three_digits() {
-        let figures = [0.0, 2.34e-5, 0.0123, 0.9996, 6.543, 99.96, 1234.5, 2.5e7, f64::NAN].map(figure);
-        assert_eq!(figures, ["0", "2e-5", "0.012", "1.00", "6.54", "100", "1234", "2e7", "-"]);
-        assert!(figures.iter().all(|figure| figure.len() < 6));
-    }
 
     #[test]
     fn the_table_fits_a_hundred_columns_and_a_refused_model_has_its_reason() {

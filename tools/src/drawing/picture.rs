@@ -9,7 +9,7 @@ const ROOM: f64 = 1.6;
 /// Of the width, to the right of lines that have their labels at their ends.
 const LABELS: f64 = 0.18;
 /// The colours of a page in the light; the first is the reference's.
-const STYLE: &str = "\
+pub(super) const STYLE: &str = "\
 text { font: 11px Helvetica, Arial, sans-serif; fill: #626b79; }
 .title { font-size: 13px; font-weight: 600; fill: #1d232d; }
 .paper { fill: #ffffff; }
@@ -24,43 +24,43 @@ text { font: 11px Helvetica, Arial, sans-serif; fill: #626b79; }
 .c4 { color: #aa4a94; } .c5 { color: #b58900; } .c6 { color: #2a9fd6; } .c7 { color: #7a5230; }
 ";
 
-/// The colours that a series can have.
+/// Number of colours that a series can have.
 pub const COLOURS: usize = 8;
 
-/// Points that belong together.
+/// Points of a [`Picture`] that belong together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
-    /// What it shows, read out where it is pointed at.
+    /// Name of the series, read out where it is pointed at.
     pub name: String,
-    /// Below [`COLOURS`]; 0 is for the reference.
+    /// Number of the colour, below [`COLOURS`]; 0 is for the reference.
     pub colour: usize,
-    /// Joined by a line, in the order given, which rises in x.
+    /// True if the points are joined by a line, in the order given, which rises in x.
     pub is_joined: bool,
-    /// Drawn as circles in place of discs.
+    /// True if the points are drawn as circles in place of discs.
     pub is_hollow: bool,
-    /// x, y and the label, which may be empty. What is not above zero lies on the edge.
+    /// Points by x, y and label, which may be empty. What is not above zero lies on the edge.
     pub points: Vec<(f64, f64, String)>,
 }
 
 /// A chart with two logarithmic axes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Picture {
-    /// Above it.
+    /// Line above the chart.
     pub title: String,
-    /// Below the horizontal axis.
+    /// Label below the horizontal axis.
     pub x: String,
-    /// Beside the vertical axis.
+    /// Label beside the vertical axis.
     pub y: String,
-    /// Vertical lines: where, and what they are.
+    /// Vertical lines: the place of each on the horizontal axis, and its label.
     pub marks: Vec<(f64, String)>,
-    /// Horizontal lines likewise.
+    /// Horizontal lines: the place of each on the vertical axis, and its label.
     pub levels: Vec<(f64, String)>,
-    /// What is shown.
+    /// The points and lines of the chart.
     pub series: Vec<Series>,
 }
 
 impl Picture {
-    /// The SVG document: light, without fonts or styles from elsewhere.
+    /// The chart as an SVG document: light, without fonts or styles from elsewhere.
     pub fn to_svg(&self) -> String {
         let points = || self.series.iter().flat_map(|series| &series.points);
         let class = |series: &Series| format!("c{}", series.colour % COLOURS);
@@ -84,26 +84,22 @@ impl Picture {
         let marks = |marks: &[(f64, String)]| {
             marks.iter().map(|(at, label)| Mark { at: *at, label: label.clone() }).collect::<Vec<_>>()
         };
+        let x = Axis::log(&self.x, [from, to]);
+        let y =
+            Axis::log(&self.y, around(points().map(|point| point.1).chain(self.levels.iter().map(|level| level.0))));
         let chart = Chart {
-            title: self.title.clone(),
-            width: WIDTH,
-            height: HEIGHT,
-            x: Axis::log(&self.x, [from, to]),
-            y: Axis::log(&self.y, around(points().map(|point| point.1).chain(self.levels.iter().map(|level| level.0)))),
-            band: None,
             marks: marks(&self.marks),
             levels: marks(&self.levels),
             lines: lines.collect(),
-            bars: Vec::new(),
-            signs: Vec::new(),
             points: discs.filter(|point| point.at.0.is_finite() && point.at.1.is_finite()).collect(),
+            ..Chart::new(&*self.title, [WIDTH, HEIGHT], x, y)
         };
         chart.to_file(STYLE)
     }
 }
 
 /// From below the least to above the largest of those above zero.
-fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
+pub(super) fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let shown = values.filter(|value| value.is_finite() && *value > 0.0);
     let [low, high] = shown.fold([f64::INFINITY, 0.0], |[low, high], value| [value.min(low), value.max(high)]);
     if low <= high { [low / ROOM, high * ROOM] } else { [0.1, 10.0] }

@@ -3,38 +3,48 @@
 use palpate::log::TopicKind;
 use palpate::log::{ContactMode, ContactSample, GroupStats, LogEntry, LogRecord, TextEvent};
 
-/// The type of a column.
+/// The type of a column of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Type {
+pub enum ColumnType {
+    /// Unsigned numbers of 64 bits.
     U64,
+    /// Unsigned numbers of 32 bits.
     U32,
-    /// A number that may be missing.
+    /// Unsigned numbers of 32 bits that may be missing.
     OptionalU32,
+    /// Doubles.
     F64,
+    /// Floats of 32 bits.
     F32,
+    /// Words and free text.
     Text,
 }
 
-/// One cell of a row.
+/// One cell of a row of a table.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Cell {
+pub enum Cell {
+    /// An unsigned number of 64 bits.
     U64(u64),
+    /// An unsigned number of 32 bits.
     U32(u32),
+    /// A double.
     F64(f64),
+    /// A float of 32 bits.
     F32(f32),
     /// One of a few fixed words.
     Word(&'static str),
     /// Free text.
     Text(String),
+    /// Nothing, in a column whose numbers may be missing.
     Missing,
 }
 
-/// A column: its name with the unit at its end, and its type.
-pub(super) type Column = (&'static str, Type);
+/// A column of a table: its name with the unit at its end, and its type.
+pub type Column = (&'static str, ColumnType);
 
 /// The columns of a topic of this kind.
 pub(super) fn columns(kind: TopicKind) -> &'static [Column] {
-    use Type::{F32, F64, OptionalU32, Text, U32, U64};
+    use ColumnType::{F32, F64, OptionalU32, Text, U32, U64};
     match kind {
         TopicKind::Timing => &[
             ("tick", U64),

@@ -5,14 +5,66 @@
 
 use std::io::{self, Read, Write};
 
-use super::figure::{Figure, Gauge};
+use palpate::Error;
+use palpate::log::{Distribution, LogEntry, LogReader, LogRecord, TickGauge, Window};
+use palpate::runtime::record::TickTiming;
+
 use super::table::lost_topic;
 use super::{Micros, output_error, unknown};
-use palpate::Error;
-use palpate::log::{Distribution, LogEntry, LogReader, LogRecord, Window};
 
 /// Lines from one half of the rest to the next: 0 %, 10 %, ... 50 %, 55 %, ... 75 %, 77.5 % and so on.
 const TICKS_PER_HALF: u128 = 5;
+
+/// A duration that each release of a rate group has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[non_exhaustive]
+pub enum TickDuration {
+    /// From when a release was due until its thread ran: woke - scheduled.
+    Lateness,
+    /// What its work took: end - start.
+    Execution,
+    /// How far a period was from what was scheduled: |(woke - woke before) - (scheduled - scheduled before)|.
+    PeriodError,
+    /// From cycle to cycle: the magnitude of the difference of two consecutive period errors, with their signs. Between
+    /// releases without a skipped period that is the difference of two periods, each from wake to wake.
+    Jitter,
+}
+
+impl TickDuration {
+    /// Its name in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lateness => "lateness",
+            Self::Execution => "execution time",
+            Self::PeriodError => "period error",
+            Self::Jitter => "cycle-to-cycle jitter",
+        }
+    }
+}
+
+/// Measures a figure release by release.
+#[derive(Clone, Copy, Debug)]
+struct Gauge {
+    figure: TickDuration,
+    releases: TickGauge,
+}
+
+impl Gauge {
+    fn new(figure: TickDuration) -> Self {
+        Self { figure, releases: TickGauge::default() }
+    }
+
+    /// The figure of this release (ns); `None` for the first ones of figures that compare releases.
+    fn measure(&mut self, timing: &TickTiming) -> Option<u64> {
+        let figures = self.releases.measure(timing);
+        match self.figure {
+            TickDuration::Lateness => Some(figures.lateness),
+            TickDuration::Execution => Some(figures.execution),
+            TickDuration::PeriodError => figures.period_error.map(i64::unsigned_abs),
+            TickDuration::Jitter => figures.jitter,
+        }
+    }
+}
 
 /// Writes the distribution of a figure of the rate group `group` within `window`, in microseconds with three decimals,
 /// which are the log's nanoseconds.
@@ -26,7 +78,7 @@ const TICKS_PER_HALF: u128 = 5;
 pub fn export_percentiles<R: Read, W: Write>(
     reader: &mut LogReader<R>,
     group: &str,
-    figure: Figure,
+    figure: TickDuration,
     window: &Window,
     out: &mut W,
 ) -> Result<(), Error> {
@@ -94,6 +146,7 @@ fn write(values: &Distribution, title: &str, out: &mut impl Write) -> io::Result
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate::runtime::Nanos;
 
     fn text(values: impl IntoIterator<Item = u64>) -> String {
         let mut distribution = Distribution::default();
@@ -147,5 +200,23 @@ mod tests {
         );
         assert_eq!(body(text([])), [""; 0]);
         assert!(text([]).contains("#[Mean    =        0.000, StdDeviation   =        0.000]"));
+    }
+
+    #[test]
+    fn each_figure_of_four_releases_is_what_its_definition_gives() {
+        let timings = [(0, 5, 9), (100, 130, 140), (300, 310, 316), (400, 400, 450)].map(|(scheduled, woke, end)| {
+            let (woke, start) = (Nanos(woke), Nanos(woke + 1));
+            TickTiming { scheduled: Nanos(scheduled), woke, start, end: Nanos(end), ..TickTiming::default() }
+        });
+        let measured = |figure| {
+            let mut gauge = Gauge::new(figure);
+            timings.iter().filter_map(|timing| gauge.measure(timing)).collect::<Vec<_>>()
+        };
+        assert_eq!(measured(TickDuration::Lateness), [5, 30, 10, 0]);
+        assert_eq!(measured(TickDuration::Execution), [3, 9, 5, 49]);
+        // Periods of 125, 180 and 90 ns where 100, 200 and 100 were scheduled.
+        assert_eq!(measured(TickDuration::PeriodError), [25, 20, 10]);
+        // Errors of 25, -20 and -10 ns.
+        assert_eq!(measured(TickDuration::Jitter), [45, 10]);
     }
 }

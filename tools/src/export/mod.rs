@@ -1,11 +1,7 @@
 //! A log in the formats of other programs: one file per format, and each reads the log once, a chunk at a time.
 
 mod columns;
-mod csv;
-mod figure;
 mod hgrm;
-pub(crate) mod json_string;
-mod parquet;
 mod table;
 mod trace;
 
@@ -13,13 +9,13 @@ use std::fmt::{self, Display, Formatter};
 use std::io::Read;
 use std::path::Path;
 
-pub use figure::Figure;
-pub use hgrm::export_percentiles;
-pub use table::{Format, export, export_table};
+pub use columns::{Cell, Column, ColumnType};
+pub use hgrm::{TickDuration, export_percentiles};
+pub use table::{TableWriter, export_rows, export_table};
 pub use trace::export_trace;
 
-use palpate::{Error, ErrorKind};
 use palpate::log::LogReader;
+use palpate::{Error, ErrorKind};
 
 /// Nanoseconds as microseconds, to the last digit.
 struct Micros(u64);

@@ -1,73 +1,60 @@
-//! One topic of a log as a table.
+//! One topic of a log as a table: its rows for any writer, and CSV.
 
 use std::io::{self, Read, Write};
 
-use super::columns::{self, Cell, Column};
-use super::{csv, output_error, unknown};
-use palpate::{Error, ErrorKind};
-use palpate::log::TopicKind;
+use palpate::log::topic::Kind;
 use palpate::log::{LogEntry, LogReader, Window};
+use palpate::{Error, ErrorKind};
 
-/// The formats of a table.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Format {
-    /// Comma-separated values with one header line; floats read back exactly.
-    #[default]
-    Csv,
-    /// Apache Parquet: typed columns with the names of the CSV.
-    Parquet,
-}
+use super::columns::{self, Cell, Column};
+use super::{output_error, unknown};
 
-/// Writes every message of `topic` to `out`, in the order of the log.
-///
-/// # Errors
-/// As [`export_table`].
-pub fn export<R: Read, W: Write + Send>(
-    reader: &mut LogReader<R>,
-    topic: &str,
-    format: Format,
-    out: &mut W,
-) -> Result<(), Error> {
-    export_table(reader, topic, format, &Window::default(), out)
-}
-
-/// Writes every message of `topic` within `window` to `out`, in the order of the log.
+/// Writes every message of `topic` within `window` to `out` as comma-separated values with one header line, in the order of the
+/// log.
 ///
 /// Nothing is written before the topic is known to exist. A topic that the log declares but never uses gives a table
-/// without rows. On a damaged log it writes what is readable; ask [`LogReader::damage`] afterwards. Memory is bounded: by
-/// one chunk of the log, and for Parquet by one row group.
+/// without rows. On a damaged log it writes what is readable; ask [`LogReader::damage`] afterwards. Floats are printed in the
+/// shortest form that reads back exactly; durations and times inside `/timing` stay integer nanoseconds. Memory is bounded by
+/// one chunk of the log.
 ///
 /// # Errors
-/// [`ErrorKind::Log`](palpate::ErrorKind::Log) if the log has no such topic, with the topics that it has;
-/// [`ErrorKind::Io`](palpate::ErrorKind::Io) if `out` cannot be written; [`ErrorKind::Usage`](palpate::ErrorKind::Usage) if
-/// this build has not the format.
-pub fn export_table<R: Read, W: Write + Send>(
+/// [`ErrorKind::Log`] if the log has no such topic, with the topics that it has; [`ErrorKind::Io`] if `out` cannot be written.
+pub fn export_table<R: Read, W: Write>(
     reader: &mut LogReader<R>,
     topic: &str,
-    format: Format,
     window: &Window,
     out: &mut W,
 ) -> Result<(), Error> {
-    match format {
-        Format::Csv => write_table(reader, topic, window, |columns| CsvTable::new(columns, &mut *out))?,
-        Format::Parquet => {
-            write_table(reader, topic, window, |columns| super::parquet::ParquetTable::new(columns, &mut *out))?;
-        }
-    }
+    export_rows(reader, topic, window, |columns| {
+        header(columns, out).map_err(output_error)?;
+        Ok(CsvTable(&mut *out))
+    })?;
     out.flush().map_err(output_error)
 }
 
-/// A table in the making.
-pub(super) trait Table {
-    /// Adds a row, one cell for each column.
+/// A table in the making, in any format.
+pub trait TableWriter {
+    /// Adds a row, one cell for each column, and empties `cells`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if it cannot be written.
     fn row(&mut self, cells: &mut Vec<Cell>) -> Result<(), Error>;
 
     /// Writes what is left.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] if it cannot be written.
     fn finish(self) -> Result<(), Error>;
 }
 
-fn write_table<R: Read, T: Table>(
+/// Gives every message of `topic` within `window` to the table that `begin` makes for its columns, in the order of the log.
+///
+/// `begin` is not called before the topic is known to exist.
+///
+/// # Errors
+/// [`ErrorKind::Log`] if the log has no such topic, with the topics that it has, or if the topic is for viewers only; what
+/// `begin` and the table say.
+pub fn export_rows<R: Read, T: TableWriter>(
     reader: &mut LogReader<R>,
     topic: &str,
     window: &Window,
@@ -116,20 +103,39 @@ pub(super) fn lost_topic<R: Read>(reader: &LogReader<R>, topic: &str) -> Option<
 
 struct CsvTable<W>(W);
 
-impl<W: Write> CsvTable<W> {
-    fn new(columns: &[Column], mut out: W) -> Result<Self, Error> {
-        csv::header(columns, &mut out).map_err(output_error)?;
-        Ok(Self(out))
-    }
-}
-
-impl<W: Write> Table for CsvTable<W> {
+impl<W: Write> TableWriter for CsvTable<W> {
     fn row(&mut self, cells: &mut Vec<Cell>) -> Result<(), Error> {
-        let written: io::Result<()> = csv::row(cells, &mut self.0);
-        written.map_err(output_error)
+        write_row(cells, &mut self.0).map_err(output_error)
     }
 
     fn finish(self) -> Result<(), Error> {
         Ok(())
     }
+}
+
+/// Writes the header line.
+fn header(columns: &[Column], out: &mut impl Write) -> io::Result<()> {
+    for (place, (name, _)) in columns.iter().enumerate() {
+        write!(out, "{}{name}", if place == 0 { "" } else { "," })?;
+    }
+    writeln!(out)
+}
+
+/// Writes one row.
+fn write_row(cells: &[Cell], out: &mut impl Write) -> io::Result<()> {
+    for (place, cell) in cells.iter().enumerate() {
+        if place > 0 {
+            out.write_all(b",")?;
+        }
+        match cell {
+            Cell::U64(value) => write!(out, "{value}")?,
+            Cell::U32(value) => write!(out, "{value}")?,
+            Cell::F64(value) => write!(out, "{value}")?,
+            Cell::F32(value) => write!(out, "{value}")?,
+            Cell::Word(word) => out.write_all(word.as_bytes())?,
+            Cell::Text(text) => write!(out, "\"{}\"", text.replace('"', "\"\""))?,
+            Cell::Missing => {}
+        }
+    }
+    out.write_all(b"\n")
 }

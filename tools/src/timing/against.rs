@@ -1,10 +1,8 @@
 //! Two logs side by side.
 
-use super::analysis::TimingReport;
-use super::blocks::{Block, Buckets};
+use super::analysis::{Block, Buckets, GroupTiming, TimingReport};
 use super::bootstrap::{percentile_ratios, share_ratio};
 use super::figures::Figure;
-use super::group::GroupTiming;
 
 /// One figure in both logs.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,8 +5,9 @@
 //! 95 % of the ratios that a thousand such pairs of runs give is the interval (Efron 1979). Blocks are counted in buckets
 //! 0.8 % wide, so an interval is no finer.
 
-use super::blocks::{Block, Buckets};
 use palpate::random::uniform;
+
+use super::analysis::{Block, Buckets};
 
 /// Pairs of runs that are drawn.
 const DRAWS: u64 = 1000;

@@ -3,8 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::figures::{Figure, Unit};
 use palpate::{Error, ErrorKind};
+
+use super::figures::{Figure, Unit};
 
 /// How a figure is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,18 +153,18 @@ impl Condition {
 
 #[cfg(test)]
 mod tests {
-    use super::super::figures::Value;
+    use super::super::figures::FigureValue;
     use super::*;
 
     fn figures() -> Vec<Figure> {
         let figure = |name: &str, unit, value| Figure { name: name.to_owned(), unit, value };
         vec![
-            figure("local.lateness.count", Unit::Count, Value::Integer(9)),
-            figure("local.lateness.p999", Unit::Nanoseconds, Value::Integer(200_000)),
-            figure("local.jitter.count", Unit::Count, Value::Integer(0)),
-            figure("force.model_age.p99", Unit::Seconds, Value::Real(0.05)),
-            figure("resync.jump_after.max", Unit::Newtons, Value::Real(f64::NAN)),
-            figure("core1.utilisation", Unit::Share, Value::Real(0.8)),
+            figure("local.lateness.count", Unit::Count, FigureValue::Integer(9)),
+            figure("local.lateness.p999", Unit::Nanoseconds, FigureValue::Integer(200_000)),
+            figure("local.jitter.count", Unit::Count, FigureValue::Integer(0)),
+            figure("force.model_age.p99", Unit::Seconds, FigureValue::Real(0.05)),
+            figure("resync.jump_after.max", Unit::Newtons, FigureValue::Real(f64::NAN)),
+            figure("core1.utilisation", Unit::Share, FigureValue::Real(0.8)),
         ]
     }
 

@@ -17,11 +17,12 @@
 //! `P` is `count`, `p50`, `p90`, `p99`, `p999` or `max`; without a sample there is only the count. With several devices
 //! the name of the device comes first: `left.resync.age.p99`.
 
-use super::analysis::TimingReport;
-use palpate::log::{CauseCounts, DeviceReport, GroupSummary, Percentiles};
+use palpate::log::{CauseCounts, DeviceReport, GroupReport, Percentiles};
 use palpate::runtime::record::SlipCause;
 
-/// What a figure is measured in.
+use super::analysis::TimingReport;
+
+/// The unit of a [`Figure`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// A number of things.
@@ -40,15 +41,15 @@ pub enum Unit {
 
 /// The value of a figure: integers stay exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value {
+pub enum FigureValue {
     /// A count or nanoseconds.
     Integer(u64),
-    /// All else.
+    /// Any other value.
     Real(f64),
 }
 
-impl Value {
-    /// As a double, which is exact below 2^53.
+impl FigureValue {
+    /// The value as a double, which is exact below 2^53.
     pub fn as_f64(self) -> f64 {
         match self {
             Self::Integer(value) => value as f64,
@@ -60,11 +61,11 @@ impl Value {
 /// One number of a report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Its name.
+    /// Name of the figure, such as `local.lateness.p99`.
     pub name: String,
-    /// How much.
-    pub value: Value,
-    /// Of what.
+    /// Value of the figure in its unit.
+    pub value: FigureValue,
+    /// Unit of the value.
     pub unit: Unit,
 }
 
@@ -118,27 +119,27 @@ pub(crate) fn cause_name(cause: SlipCause) -> &'static str {
 struct Figures(Vec<Figure>);
 
 impl Figures {
-    fn add(&mut self, name: &str, unit: Unit, value: Value) {
+    fn add(&mut self, name: &str, unit: Unit, value: FigureValue) {
         self.0.push(Figure { name: name.to_owned(), value, unit });
     }
 
     fn count(&mut self, name: &str, count: u64) {
-        self.add(name, Unit::Count, Value::Integer(count));
+        self.add(name, Unit::Count, FigureValue::Integer(count));
     }
 
     fn real(&mut self, name: &str, unit: Unit, value: f64) {
-        self.add(name, unit, Value::Real(value));
+        self.add(name, unit, FigureValue::Real(value));
     }
 
     fn durations(&mut self, name: &str, percentiles: Percentiles<u64>) {
-        self.percentiles(name, Unit::Nanoseconds, percentiles.map(Value::Integer));
+        self.percentiles(name, Unit::Nanoseconds, percentiles.map(FigureValue::Integer));
     }
 
     fn reals(&mut self, name: &str, unit: Unit, percentiles: Percentiles<f64>) {
-        self.percentiles(name, unit, percentiles.map(Value::Real));
+        self.percentiles(name, unit, percentiles.map(FigureValue::Real));
     }
 
-    fn percentiles(&mut self, name: &str, unit: Unit, p: Percentiles<Value>) {
+    fn percentiles(&mut self, name: &str, unit: Unit, p: Percentiles<FigureValue>) {
         self.count(&format!("{name}.count"), p.count);
         if p.count > 0 {
             for (which, value) in [("p50", p.p50), ("p90", p.p90), ("p99", p.p99), ("p999", p.p999), ("max", p.max)] {

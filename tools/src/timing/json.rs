@@ -30,18 +30,16 @@
 //! Distributions are `{count, p50, p90, p99, p999, max}`, nearest-rank, all zero if `count` is zero. Causes are
 //! `late_wake`, `long_tick`, `stalled_peer`, `policy`, `fault` and `unattributed`.
 
-use serde_json::{Map, Value, json};
-
-use super::text::in_words;
-use crate::timing::{
-    Against, ComparedFigure, CoreUse, Figure, TimingReport, Value as FigureValue, WorstTick, cause_name,
-};
 use palpate::log::{
     CauseCounts, DeviceReport, Environment, ForceReport, GroupSummary, Level, LoggedExecution, Percentiles, RunReport,
     TextEvent,
 };
 use palpate::report::verdict;
 use palpate::runtime::record::TickTiming;
+use serde_json::{Map, Value, json};
+
+use super::text::in_words;
+use crate::timing::{Against, ComparedFigure, CoreUse, Figure, FigureValue, TimingReport, WorstTick, cause_name};
 
 /// The report as one JSON document.
 pub fn to_json(report: &RunReport) -> String {

@@ -3,7 +3,6 @@
 use std::fmt::Write;
 
 use super::super::html::escaped;
-use super::area::Area;
 use super::axis::Axis;
 use super::sign::Sign;
 use super::thin::thinned;
@@ -105,23 +104,27 @@ impl Chart<'_> {
 
     /// The chart as an SVG element of a page.
     pub(crate) fn to_svg(&self) -> String {
-        let (width, height) = (self.width, self.height);
-        let mut svg = format!(
-            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n\
-             <text class=\"title\" x=\"{LEFT}\" y=\"16\">{0}</text>\n",
-            escaped(&self.title)
-        );
-        self.draw(&mut svg);
-        svg.push_str("</svg>\n");
-        svg
+        self.element("", "")
     }
 
-    /// The same as a document of its own, drawn on white with `style`.
+    /// The chart as an element of a larger picture, its left upper corner at `x`, `y`.
+    pub(crate) fn to_part(&self, [x, y]: [f64; 2]) -> String {
+        let (width, height) = (self.width, self.height);
+        self.element(&format!(" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\""), "")
+    }
+
+    /// The chart as a document of its own, drawn on white with `style`.
     pub(crate) fn to_file(&self, style: &str) -> String {
         let (width, height) = (self.width, self.height);
+        let paper =
+            format!("<style>\n{style}</style>\n<rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n");
+        self.element(" xmlns=\"http://www.w3.org/2000/svg\"", &paper)
+    }
+
+    fn element(&self, attributes: &str, below: &str) -> String {
+        let (width, height) = (self.width, self.height);
         let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n\
-             <style>\n{style}</style>\n<rect class=\"paper\" width=\"{width}\" height=\"{height}\"/>\n\
+            "<svg{attributes} viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n{below}\
              <text class=\"title\" x=\"{LEFT}\" y=\"16\">{0}</text>\n",
             escaped(&self.title)
         );
@@ -278,6 +281,28 @@ impl Chart<'_> {
                 at.0, at.1
             );
         }
+    }
+}
+
+/// A rectangle of the picture.
+struct Area {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+}
+
+impl Area {
+    fn around((x, y): (f64, f64), dx: f64, dy: f64) -> Self {
+        Self { left: x - dx, right: x + dx, top: y - dy, bottom: y + dy }
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
+    }
+
+    fn holds(&self, other: &Self) -> bool {
+        self.left <= other.left && other.right <= self.right && self.top <= other.top && other.bottom <= self.bottom
     }
 }
 

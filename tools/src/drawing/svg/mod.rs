@@ -3,18 +3,15 @@
 //! Drawn by hand in place of a library: classes make one picture serve light, dark and print, and long series are thinned
 //! out to what a screen can show.
 
-mod area;
 mod axis;
 mod chart;
-mod decades;
 mod heat;
 mod heat_map;
 mod sign;
 mod thin;
 
-pub(crate) use axis::{Axis, round_step};
+pub(crate) use axis::{Axis, power, round_step};
 pub(crate) use chart::{Bars, Chart, Line, Mark, Point, Signs};
-pub(crate) use decades::power;
 pub(crate) use heat::{HeatScale, heat_style};
 pub(crate) use heat_map::{HeatCell, HeatMap};
 pub(crate) use sign::Sign;

@@ -6,9 +6,10 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 
-use crate::export::Micros;
-use crate::export::json_string::JsonString;
 use palpate::runtime::Nanos;
+
+use crate::drawing::html::JsonString;
+use crate::export::Micros;
 
 /// The number of the one process that a run is.
 const PROCESS: u32 = 1;

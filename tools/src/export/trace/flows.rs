@@ -6,10 +6,11 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::events::Track;
 use palpate::log::{ForceSample, GlobalTick};
-use palpate::runtime::record::TickTiming;
 use palpate::runtime::Nanos;
+use palpate::runtime::record::TickTiming;
+
+use super::events::Track;
 
 /// Haptic releases that are remembered: sixteen seconds at 1 kHz.
 const RELEASES_KEPT: usize = 1 << 14;

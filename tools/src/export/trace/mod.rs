@@ -8,14 +8,15 @@ mod tracks;
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 
+use palpate::Error;
+use palpate::log::{Environment, ForceSample, LogEntry, LogReader, LogRecord, Resync, TextEvent, Window, magnitude};
+use palpate::runtime::record::{ActorTimes, TickTiming};
+
 use self::events::{Events, Phase, Scope, Track};
 use self::flows::{Flow, Flows, Placed};
 use self::tracks::Tracks;
 use super::{Micros, output_error};
-use palpate::Error;
-use palpate::log::{Environment, ForceSample, LogEntry, LogReader, LogRecord, Resync, TextEvent, Window, magnitude};
-use crate::export::json_string::JsonString;
-use palpate::runtime::record::{ActorTimes, TickTiming};
+use crate::drawing::html::JsonString;
 
 /// Writes what `window` holds of a log as one JSON document in the Trace Event Format.
 ///

@@ -4,10 +4,11 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-use super::events::{Events, Track};
 use palpate::log::Environment;
-use crate::export::json_string::JsonString;
 use palpate::runtime::Nanos;
+
+use super::events::{Events, Track};
+use crate::drawing::html::JsonString;
 
 /// Track numbers from one rate group to the next.
 const TRACKS_PER_GROUP: u32 = 1000;

@@ -1,10 +1,11 @@
 //! Which contacts of a scene are looked at.
 
 use palpate::Error;
-use crate::reduce::findings::FaceMap;
 use palpate::model::body::{Block, Body};
 use palpate::model::mesh::{Face, Lattice};
 use palpate::scene::Scene;
+
+use crate::reduce::findings::FaceMap;
 
 /// Without a wish, every node of the contact's face is looked at if there are no more than this.
 const MANY_CONTACTS: usize = 150;

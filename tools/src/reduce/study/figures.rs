@@ -3,9 +3,8 @@
 use std::time::Instant;
 
 use nalgebra::Complex;
-
-use super::paper::in_words;
 use palpate::Error;
+
 use crate::reduce::findings::{HankelDecay, ModelResponse, ResponseFigure, StateShape, StateShapes, Truncation};
 use crate::reduction::{
     Balanced, CMatrix, ErrorBound, Modal, PaperMesh, Projection, Response, SecondOrder, StateSpace, condensed,
@@ -23,6 +22,11 @@ const INNER_MODES: usize = 5;
 const SHOWN_STATES: usize = 8;
 /// Between the nodes of the paper's meshes (m): a picture needs one, the numbers do not depend on it.
 const SPACING_M: f64 = 0.01;
+
+/// Cells as in `12 x 12`.
+pub(super) fn in_words(mesh: &PaperMesh) -> String {
+    mesh.cells.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ")
+}
 
 /// A mesh with what its figures are made from.
 pub(super) struct Studied {

@@ -3,15 +3,14 @@
 use std::f64::consts::PI;
 
 use palpate::devices::ToolPath;
-use palpate::{Error, ErrorKind};
 use palpate::log::LogRecord;
-use crate::reduce::findings::MeasuredLocality;
 use palpate::model::body::{Block, Body};
-use crate::reduction::{ContactStiffness, Response, StiffnessError};
-use palpate::model::blend::BlendKind;
-use palpate::model::local::{Feedback, Kind as LocalModelKind};
-use palpate::scene::{BlendSpec, Scene};
+use palpate::scene::{BlendKind, BlendSpec, Feedback, LocalModelKind, Scene};
 use palpate::session::Session;
+use palpate::{Error, ErrorKind};
+
+use crate::reduce::findings::MeasuredLocality;
+use crate::reduction::{ContactStiffness, Response, StiffnessError};
 
 /// Haptic rate (Hz): four samples of the fastest oscillation.
 const RATE_HZ: f64 = 4000.0;

@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use super::figures::{Studied, all_models};
-use super::paper::in_words;
-use super::{MeshStudy, ReduceProgress, Steps};
 use palpate::Error;
+
+use super::figures::{Studied, all_models, in_words};
+use super::{MeshStudy, ReduceProgress, Steps};
 use crate::reduce::findings::ReductionStudy;
 use crate::reduction::PaperMesh;
 

@@ -7,7 +7,6 @@ mod figures;
 mod measure;
 mod mesh;
 mod paper;
-mod published;
 mod scene;
 
 pub use mesh::reduce_mesh;
@@ -30,10 +29,10 @@ pub enum PaperStudy {
 }
 
 impl PaperStudy {
-    /// All, in the paper's order.
+    /// All studies, in the paper's order.
     pub const ALL: [Self; 5] = [Self::Table1, Self::Table2, Self::Fig4, Self::Fig5, Self::Fig8];
 
-    /// Its name on the command line.
+    /// Name of the study on the command line.
     pub fn name(self) -> &'static str {
         ["table1", "table2", "fig4", "fig5", "fig8"][self as usize]
     }
@@ -44,11 +43,11 @@ impl PaperStudy {
 pub struct MeshStudy {
     /// Cells along each axis, two or three numbers.
     pub cells: Vec<usize>,
-    /// zeta.
+    /// Damping ratio zeta.
     pub damping_ratio: f64,
-    /// k of every spring (N/m).
+    /// Stiffness k of every spring (N/m).
     pub stiffness_n_per_m: f64,
-    /// m of every node (kg).
+    /// Mass m of every node (kg).
     pub node_mass_kg: f64,
     /// States of the reduced models.
     pub order: usize,
@@ -69,20 +68,20 @@ impl Default for MeshStudy {
     }
 }
 
-/// What is to be found out about a scene.
+/// The choice of what is to be found out about a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReduceOptions {
     /// Patch nodes along the surface, along it, into depth, in place of the scene's.
     pub patch: Option<[usize; 3]>,
     /// The contact that is looked at closely, a surface node; left out: where the scene's tool touches first.
     pub node: Option<[usize; 3]>,
-    /// Only every so many nodes of the surface along each axis; left out: all of a small surface, fewer of a large one.
+    /// Looks at every so many nodes only of the surface along each axis; left out: all of a small surface, fewer of a large one.
     pub every: Option<usize>,
     /// An error budget (%): which patch and which r it needs.
     pub error_pct: Option<f64>,
     /// States of the balanced model; left out: 20.
     pub order: Option<usize>,
-    /// Also measure the error at the contact, in the time domain and with the non-linear models.
+    /// True if the error at the contact is measured too, in the time domain and with the non-linear models.
     pub measure: bool,
 }
 
@@ -109,13 +108,13 @@ impl<'a> Steps<'a> {
     }
 }
 
-/// How far the work is.
+/// How far a reduction is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReduceProgress {
-    /// What is being done.
+    /// Name of the step that is being done.
     pub what: String,
-    /// Steps that are done.
+    /// Number of steps that are done.
     pub done: usize,
-    /// Of so many.
+    /// Number of steps in all.
     pub of: usize,
 }

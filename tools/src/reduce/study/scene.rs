@@ -2,21 +2,22 @@
 
 use std::time::Instant;
 
+use palpate::Error;
+use palpate::model::body::{Block, Body, State};
+use palpate::model::surroundings::{SpringGraph, errors_by_states};
+use palpate::scene::Scene;
+
 use super::contact::{FaceGrid, contact_node, outward};
 use super::figures::{FigureOf, hankel_decay};
 use super::measure::measure;
 use super::{ReduceOptions, ReduceProgress, Steps};
-use palpate::Error;
 use crate::reduce::findings::{
     BasisError, Budget, ContactLocality, HankelDecay, Locality, PatchError, ReductionStudy, ResponseFigure,
 };
-use palpate::model::body::{Block, Body, State};
 use crate::reduction::{
     ContactStiffness, LinearBody, LocalityCheck, Matrix, StateSpace, StiffnessError, gain_error, log_spaced, low_rank,
     one_shift, stiffness_along, typical_gain_error,
 };
-use palpate::model::surroundings::{SpringGraph, errors_by_states};
-use palpate::scene::Scene;
 
 /// What happens between two resyncs (Hz): 10 Hz is a third of the global model's rate, 1 kHz the haptic rate.
 const BAND_HZ: [f64; 2] = [10.0, 1000.0];

@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::drawing::svg::Sign;
 use palpate::runtime::record::SlipCause;
+
+use crate::drawing::svg::Sign;
 
 /// The causes in the order of a legend.
 pub(crate) const CAUSES: [SlipCause; 6] = [

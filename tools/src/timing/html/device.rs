@@ -2,14 +2,15 @@
 
 use std::fmt::Write;
 
-use super::numbers::Numbers;
-use super::over_time::{Troubles, signs, troubles};
-use super::shapes::short;
-use super::{BROAD, NARROW, chart_figure_in_two};
 use palpate::log::DeviceReport;
-use crate::timing::{DeviceTiming, ForceBin, ResyncBin, TimingReport};
+
+use super::chart_figure_in_two;
+use super::distributions::short;
+use super::named_figures::Numbers;
+use super::over_time::{Troubles, signs, troubles};
 use crate::drawing::html::escaped;
 use crate::drawing::svg::{Axis, Chart, Line, Mark};
+use crate::timing::{DeviceTiming, ForceBin, ResyncBin, TimingReport};
 use crate::units::{duration, force, trimmed};
 
 const PERCENTILES: [(&str, &str); 6] =
@@ -128,7 +129,7 @@ fn force_chart(device: &DeviceTiming, troubles: &[Troubles], range: [f64; 2]) ->
     if !causes.is_empty() {
         caption.push_str(&super::causes::legend(&causes));
     }
-    chart_figure_in_two(&[draw(BROAD), draw(NARROW)], &caption)
+    chart_figure_in_two(draw, &caption)
 }
 
 fn age_chart(device: &DeviceTiming, report: &TimingReport, range: [f64; 2]) -> String {
@@ -150,7 +151,7 @@ fn age_chart(device: &DeviceTiming, report: &TimingReport, range: [f64; 2]) -> S
     };
     let caption = "<p class=\"legend\"><span class=\"faint\">How old the state of the local model was, at most, in each bin: it \
                    rises until the global model delivers again.</span></p>\n";
-    chart_figure_in_two(&[draw(BROAD), draw(NARROW)], caption)
+    chart_figure_in_two(draw, caption)
 }
 
 fn resync_chart(device: &DeviceTiming, range: [f64; 2]) -> String {
@@ -178,7 +179,7 @@ fn resync_chart(device: &DeviceTiming, range: [f64; 2]) -> String {
     };
     let more = format!("largest of the resyncs in each {}", short(device.resyncs.width().0 as f64));
     let caption = key(&[("c1", "jump before blending"), ("c3 dashed", "largest step after blending")], &more);
-    chart_figure_in_two(&[draw(BROAD), draw(NARROW)], &caption)
+    chart_figure_in_two(draw, &caption)
 }
 
 /// A force as a label of an axis.

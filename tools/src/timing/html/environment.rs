@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
-use super::numbers::{Numbers, grouped};
-use palpate::log::{Environment, LoggedExecution, RunReport};
+use palpate::log::{Environment, Execution, RunReport};
+
+use super::named_figures::{Numbers, grouped};
 use crate::drawing::html::escaped;
 
 /// Events that the page lists.

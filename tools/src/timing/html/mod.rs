@@ -4,24 +4,20 @@
 //! number that the JSON report has too carries its name and its raw value in the attributes `data-figure` and `data-value`.
 
 mod causes;
-mod data;
 mod device;
+mod distributions;
 mod environment;
-mod moment;
-mod numbers;
+mod named_figures;
 mod over_time;
-mod shapes;
-mod still;
 mod summary;
 mod tables;
 mod worst;
 
 use std::fmt::Write;
 
-use numbers::Numbers;
-
-use crate::timing::{GroupTiming, TimingReport};
 use crate::drawing::html::{escaped, page};
+use crate::timing::{GroupTiming, TimingReport};
+use named_figures::Numbers;
 
 const STYLE: &str = include_str!("timing.css");
 /// Sizes of charts: two beside each other, one across the page, and the same on a narrow screen.
@@ -53,11 +49,11 @@ fn group_chapter(group: &GroupTiming, numbers: &Numbers, range: [f64; 2]) -> Str
         return out;
     }
     out.push_str(&tables::distributions(group, numbers));
-    if !shapes::is_measured(&group.lateness) && !shapes::is_measured(&group.execution) {
+    if !distributions::is_measured(&group.lateness) && !distributions::is_measured(&group.execution) {
         out.push_str("<p class=\"faint\">All of it is zero: in virtual time nothing is late and work takes no time, so there is nothing to draw.</p>\n");
     }
     out.push_str(&over_time::lateness(group, range));
-    out.push_str(&shapes::charts(group));
+    out.push_str(&distributions::charts(group));
     out.push_str("</section>\n");
     out
 }
@@ -67,11 +63,11 @@ fn chart_figure(svg: &str, caption: &str) -> String {
     format!("<figure class=\"chart\">\n{svg}<figcaption>{}</figcaption></figure>\n", escaped(caption))
 }
 
-/// A chart for a broad page and for a narrow one; `legend` is HTML.
-fn chart_figure_in_two(svgs: &[String; 2], legend: &str) -> String {
+/// A chart as `draw` makes it for a broad page and for a narrow one; `legend` is HTML.
+fn chart_figure_in_two(draw: impl Fn([f64; 2]) -> String, legend: &str) -> String {
     let mut out = String::from("<figure class=\"chart across\">\n");
-    for (class, svg) in ["broad", "narrow"].into_iter().zip(svgs) {
-        let _ = writeln!(out, "<div class=\"{class}\">{svg}</div>");
+    for (class, size) in [("broad", BROAD), ("narrow", NARROW)] {
+        let _ = writeln!(out, "<div class=\"{class}\">{}</div>", draw(size));
     }
     let _ = writeln!(out, "{legend}</figure>");
     out

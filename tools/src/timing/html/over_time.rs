@@ -1,12 +1,13 @@
 //! Lateness over the run, with what was skipped and missed above it.
 
-use super::causes::{CAUSES, class, legend, name, sign};
-use super::shapes::short;
-use super::{BROAD, NARROW, chart_figure_in_two};
-use crate::timing::GroupTiming;
-use crate::drawing::svg::{Axis, Chart, Line, Mark, Signs};
-use crate::units::duration;
 use palpate::runtime::record::SlipCause;
+
+use super::causes::{CAUSES, class, legend, name, sign};
+use super::chart_figure_in_two;
+use super::distributions::short;
+use crate::drawing::svg::{Axis, Chart, Line, Mark, Signs};
+use crate::timing::GroupTiming;
+use crate::units::duration;
 
 /// The rows of signs, below the upper edge of the plot, and what they need of it.
 const ROWS: [f64; 2] = [9.0, 22.0];
@@ -107,5 +108,5 @@ pub(crate) fn lateness(group: &GroupTiming, range: [f64; 2]) -> String {
     if !causes.is_empty() {
         caption.push_str(&legend(&causes));
     }
-    chart_figure_in_two(&[draw(BROAD), draw(NARROW)], &caption)
+    chart_figure_in_two(draw, &caption)
 }

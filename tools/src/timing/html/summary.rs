@@ -2,12 +2,13 @@
 
 use std::fmt::Write;
 
+use palpate::report::{Verdict, verdict};
+
 use super::causes::words;
-use super::numbers::Numbers;
-use crate::timing::{TimingReport, WorstTick};
+use super::named_figures::Numbers;
 use crate::drawing::html::{escaped, sentence};
+use crate::timing::{TimingReport, WorstTick};
 use crate::units::{duration, force, plural};
-use palpate::report::{RunVerdict, verdict};
 
 /// Groups that get a card of their own.
 const GROUP_CARDS: usize = 2;
@@ -153,8 +154,8 @@ fn cards(report: &TimingReport, numbers: &Numbers) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate::runtime::record::{SlipCause, TickTiming};
     use palpate::runtime::Nanos;
+    use palpate::runtime::record::{SlipCause, TickTiming};
 
     #[test]
     fn the_worst_is_told_with_its_cause_and_what_it_did() {

@@ -3,9 +3,9 @@
 use std::fmt::Write;
 
 use super::causes::{CAUSES, badge};
-use super::numbers::Numbers;
-use crate::timing::{GroupTiming, TimingReport, cause_name};
+use super::named_figures::Numbers;
 use crate::drawing::html::escaped;
+use crate::timing::{GroupTiming, TimingReport, cause_name};
 use crate::units::duration;
 
 /// What is measured of a group: the figure and its name for people.

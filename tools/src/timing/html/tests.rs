@@ -1,8 +1,9 @@
-use super::timing_html;
-use crate::timing::{Selection, TimingAnalysis, TimingReport};
-use palpate::log::{CommandSample, Environment, ForceSample, GroupInfo, LogEntry, LogRecord, LoggedExecution, Resync};
+use palpate::log::{CommandSample, Environment, Execution, ForceSample, GroupInfo, LogEntry, LogRecord, Resync};
 use palpate::runtime::Nanos;
 use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+
+use super::timing_html;
+use crate::timing::{Selection, TimingAnalysis, TimingReport};
 
 const MS: u64 = 1_000_000;
 

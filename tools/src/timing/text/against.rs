@@ -1,9 +1,10 @@
 //! Two logs side by side, for a terminal.
 
 use palpate::report::text::Page;
+use palpate::report::verdict;
+
 use crate::timing::{Against, ComparedFigure, Figure, TimingReport};
 use crate::units;
-use palpate::report::verdict;
 
 /// Beside what differs without doubt, what a table shows: the ends of names.
 const SHOWN: [&str; 5] = ["skipped", "missed", "lost_records", "jump_after.p99", "force.model_age.p99"];

@@ -5,8 +5,9 @@ mod worst;
 
 pub use self::against::{against_to_text, figure_to_text};
 pub(super) use self::worst::in_words;
-use super::{CoreUse, TimingReport};
 use palpate::report::text::{self, Page};
+
+use super::{CoreUse, TimingReport};
 
 /// The timing of a run in detail as text, every line ended by a newline.
 pub fn timing_to_text(report: &TimingReport) -> String {

@@ -1,9 +1,10 @@
 //! The worst ticks: who was late, why, and what it did to the force.
 
 use palpate::report::text::Page;
+use palpate::runtime::record::SlipCause;
+
 use crate::timing::{TimingReport, WorstTick};
 use crate::units::{duration, force, plural};
-use palpate::runtime::record::SlipCause;
 
 /// Periods shown on each side of a tick.
 const NEIGHBOURS: u64 = 4;
@@ -117,8 +118,8 @@ fn around(worst: &WorstTick) -> String {
 mod tests {
     use super::*;
     use crate::timing::Moment;
-    use palpate::runtime::record::TickTiming;
     use palpate::runtime::Nanos;
+    use palpate::runtime::record::TickTiming;
 
     const MS: u64 = 1_000_000;
 

@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use super::super::tables;
 use super::{Curve, SIZE, figure, heights, with_points};
-use crate::reduce::findings::HankelDecay;
 use crate::drawing::html::escaped;
 use crate::drawing::svg::{Axis, Bars, Chart};
+use crate::reduce::findings::HankelDecay;
 
 /// All decays.
 pub(super) fn decays(all: &[HankelDecay]) -> String {

@@ -6,9 +6,9 @@ use super::super::figures::{by, figure as number, hertz, percent};
 use super::super::table::prose;
 use super::super::{map, tables, words};
 use super::{Curve, SIZE, figure, heights, with_points};
-use crate::reduce::findings::{ContactLocality, FaceMap, Locality};
 use crate::drawing::html::escaped;
 use crate::drawing::svg::{Axis, Chart, HeatCell, HeatMap, HeatScale, Mark, power};
+use crate::reduce::findings::{ContactLocality, FaceMap, Locality};
 
 /// The least that the colours are spread over, from the largest error down.
 const SPREAD: f64 = 10.0;

@@ -10,9 +10,9 @@ use std::fmt::Write;
 
 use super::table::prose;
 use super::words;
-use crate::reduce::findings::ReductionStudy;
 use crate::drawing::html::{escaped, page};
 use crate::drawing::svg::{Chart, Line, Point, heat_style};
+use crate::reduce::findings::ReductionStudy;
 
 const STYLE: &str = include_str!("reduce.css");
 /// Charts stand three beside each other, or one on a narrow screen.

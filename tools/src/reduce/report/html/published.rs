@@ -5,9 +5,9 @@ use std::fmt::Write;
 use super::super::table::prose;
 use super::super::{tables, words};
 use super::{Curve, SIZE, heights, with_points};
-use crate::reduce::findings::{ReductionRow, ReductionTable};
 use crate::drawing::html::escaped;
 use crate::drawing::svg::{Axis, Chart, power};
+use crate::reduce::findings::{ReductionRow, ReductionTable};
 
 /// Errors that are not told apart (%): what is less is rounding of what is less.
 const SMALLEST_ERROR: f64 = 1e-16;

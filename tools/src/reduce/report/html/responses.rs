@@ -6,9 +6,9 @@ use super::super::figures::decibels;
 use super::super::table::prose;
 use super::super::{tables, words};
 use super::{SIZE, figure};
-use crate::reduce::findings::{ModelResponse, ResponseFigure};
 use crate::drawing::html::escaped;
 use crate::drawing::svg::{Axis, Chart, Line, power};
+use crate::reduce::findings::{ModelResponse, ResponseFigure};
 
 /// The colours of a page, besides the reference's.
 const COLOURS: usize = 7;

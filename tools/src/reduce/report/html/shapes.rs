@@ -5,9 +5,9 @@ use std::fmt::Write;
 
 use super::super::figures::{figure as number, percent};
 use super::super::tables;
-use crate::reduce::findings::{StateShape, StateShapes};
 use crate::drawing::html::escaped;
 use crate::drawing::svg::{Axis, HeatScale};
+use crate::reduce::findings::{StateShape, StateShapes};
 
 /// States that are drawn.
 const STATES: usize = 12;

@@ -1,33 +1,80 @@
 //! One pass over a log.
 
+mod blocks;
+mod cyclictest;
+mod device;
+mod distribution;
+mod group;
+mod over_time;
+mod recent;
+mod worst;
+
 use std::collections::BTreeMap;
 
-use super::cores::CoreUse;
-use super::group::{GroupDetail, GroupTiming};
-use super::haptics::DeviceTiming;
-use super::recent::Recent;
-use super::selection::Selection;
-use super::worst::{Worst, WorstTick};
-use palpate::log::Environment;
-use palpate::log::{Analysis, LogEntry, LogRecord, RunReport};
-use palpate::runtime::record::TickTiming;
+use palpate::log::{Analysis, Environment, LogEntry, LogRecord, RunReport, Window};
 use palpate::runtime::Nanos;
+use palpate::runtime::record::TickTiming;
 
-/// What a log says about the timing of its run.
+pub use blocks::{Block, Buckets};
+pub use cyclictest::read_cyclictest;
+pub use device::{DeviceTiming, ForceBin, ResyncBin};
+pub use distribution::Shape;
+pub use group::{GroupTiming, TickBin};
+pub use recent::{ForcePoint, Moment};
+pub use worst::WorstTick;
+
+use group::GroupDetail;
+use recent::Recent;
+use worst::Worst;
+
+/// The part of a log that is looked at: a span of log time and some of the rate groups.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// Span of log time.
+    pub window: Window,
+    /// Names of the groups that are looked at; all if empty.
+    pub groups: Vec<String>,
+}
+
+impl Selection {
+    /// True if the group `name` is looked at.
+    pub fn has_group(&self, name: &str) -> bool {
+        self.groups.is_empty() || self.groups.iter().any(|group| group == name)
+    }
+}
+
+/// The groups on one core.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CoreUse {
+    /// The core; `None` for groups that the system may put anywhere.
+    pub cpu: Option<usize>,
+    /// Each group with the share of the time (0 to 1) in which it was at work, from the start of a release to its end.
+    /// That is elapsed time: what took the core away meanwhile is in it.
+    pub groups: Vec<(String, f64)>,
+}
+
+impl CoreUse {
+    /// The share of all its groups together.
+    pub fn share(&self) -> f64 {
+        self.groups.iter().map(|(_, share)| share).sum()
+    }
+}
+
+/// The timing of a run, as its log tells it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TimingReport {
-    /// The sums, as at the end of a run.
+    /// Sums over the run, as they are printed at its end.
     pub run: RunReport,
     /// Each group in detail, in the order of [`RunReport::groups`].
-    pub groups: Vec<GroupTiming>,
+    pub(crate) groups: Vec<GroupTiming>,
     /// Each device over time, in the order of [`RunReport::devices`].
-    pub devices: Vec<DeviceTiming>,
+    pub(crate) devices: Vec<DeviceTiming>,
     /// Processor cores with the groups on them; those that may run anywhere come last.
-    pub cores: Vec<CoreUse>,
+    pub(crate) cores: Vec<CoreUse>,
     /// The worst ticks, the worst first.
     pub worst: Vec<WorstTick>,
     /// The time of the first record and of the last.
-    pub span: [Nanos; 2],
+    pub(crate) span: [Nanos; 2],
 }
 
 impl TimingReport {
@@ -61,12 +108,12 @@ pub struct TimingAnalysis {
 }
 
 impl TimingAnalysis {
-    /// Looks at what `selection` leaves.
+    /// An analysis of the part of a log that `selection` names.
     pub fn new(selection: Selection) -> Self {
         Self { selection, ..Self::default() }
     }
 
-    /// Reads one entry.
+    /// Takes in one entry of the log, in the log's order.
     pub fn push_entry(&mut self, entry: &LogEntry) {
         match entry {
             LogEntry::Record(record) => self.push(record),
@@ -134,7 +181,7 @@ impl TimingAnalysis {
         self.selection.has_group(&environment.group_name(group)) && !(is_background && self.selection.groups.is_empty())
     }
 
-    /// What has been found.
+    /// The report on all entries that were read.
     pub fn report(self) -> TimingReport {
         let mut run = self.sums.report();
         let span = self.span.unwrap_or_default();

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use super::analysis::{TimingAnalysis, TimingReport};
-use super::selection::Selection;
-use palpate::{Error, ErrorKind};
-use palpate::log::{Environment, LoggedExecution, GroupInfo, LogEntry, TextEvent, Window};
+use palpate::log::{Environment, Execution, GroupInfo, LogEntry, TextEvent, Window};
 use palpate::runtime::Nanos;
+use palpate::{Error, ErrorKind};
 use serde_json::Value;
+
+use super::{Selection, TimingAnalysis, TimingReport};
 
 /// The threads of `text`, which was read from `place`, as rate groups `thread0`, `thread1`, ... with their lateness.
 ///

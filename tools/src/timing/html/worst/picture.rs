@@ -2,12 +2,13 @@
 
 use std::fmt::Write;
 
-use super::causes::{class, sign};
-use super::moment::{Lane, Trace, View};
-use super::shapes::short;
+use palpate::runtime::Nanos;
+
+use super::super::causes::{class, sign};
+use super::super::distributions::short;
+use super::view::{Lane, Trace, View};
 use crate::drawing::html::escaped;
 use crate::drawing::svg::round_step;
-use palpate::runtime::Nanos;
 
 const WIDTH: f64 = 920.0;
 const LEFT: f64 = 84.0;

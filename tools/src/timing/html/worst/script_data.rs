@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use super::causes::{CAUSES, name, sign};
-use super::moment::{Bar, Lane, Trace, View};
-use super::summary::{at, what_happened};
-use crate::export::json_string::JsonString;
+use super::super::causes::{CAUSES, name, sign};
+use super::super::summary::{at, what_happened};
+use super::view::{Bar, Lane, Trace, View};
+use crate::drawing::html::JsonString;
 
 /// The moments as JSON that cannot end the script element around it.
 ///

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use palpate::log::{CommandSample, ForceSample};
-use palpate::runtime::record::{ActorTimes, TickTiming};
 use palpate::runtime::Nanos;
+use palpate::runtime::record::{ActorTimes, TickTiming};
 
 /// How far back it remembers. A slow group's release begins long before it ends, and a moment is looked at later still.
 const SPAN: Nanos = Nanos(1_000_000_000);
@@ -33,13 +33,13 @@ pub struct ForcePoint {
 /// All groups and forces in a short span of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moment {
-    /// Where it begins.
+    /// Time at which the moment begins.
     pub from: Nanos,
-    /// Where it ends.
+    /// Time at which the moment ends.
     pub to: Nanos,
     /// Releases that were due or at work in it, in the order of their groups and times.
     pub ticks: Vec<TickTiming>,
-    /// What actors took of them, where the log says.
+    /// Times that actors took of the ticks, if the log has them.
     pub actors: Vec<ActorTimes>,
     /// Forces.
     pub forces: Vec<ForcePoint>,

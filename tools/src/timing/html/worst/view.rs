@@ -1,9 +1,10 @@
 //! One of the worst moments as both pictures of it show it, the drawn one and that of the script: lanes and forces.
 
 use palpate::log::magnitude;
-use crate::timing::{ForcePoint, TimingReport, WorstTick};
-use palpate::runtime::record::{SlipCause, TickTiming};
 use palpate::runtime::Nanos;
+use palpate::runtime::record::{SlipCause, TickTiming};
+
+use crate::timing::{ForcePoint, TimingReport, WorstTick};
 
 /// What is shown of a lane and of a force, at most: the page stays small however fast the groups are.
 const MOST_TICKS: usize = 400;

@@ -1,10 +1,11 @@
 //! The charts of a distribution: histogram, percentile curve, execution by actor.
 
-use super::{HALF, chart_figure};
-use crate::timing::{GroupTiming, Shape};
-use crate::drawing::svg::{Axis, Bars, Chart, Line, Mark};
-use crate::units::{duration, trimmed};
 use palpate::runtime::Nanos;
+
+use super::{HALF, chart_figure};
+use crate::drawing::svg::{Axis, Bars, Chart, Line, Mark};
+use crate::timing::{GroupTiming, Shape};
+use crate::units::{duration, trimmed};
 
 /// A quarter of an octave: room on both sides of a logarithmic axis.
 const ROOM: f64 = 1.19;

@@ -5,8 +5,11 @@
 //! fill, so memory does not grow with the log.
 
 use std::io::Write;
+use std::path::Path;
 use std::sync::Arc;
 
+use palpate::{Error, ErrorKind};
+use palpate_cli::export::{Cell, Column, ColumnType, TableWriter};
 use parquet::basic::{Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
@@ -14,11 +17,6 @@ use parquet::errors::ParquetError;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type as SchemaType};
-
-use super::columns::{Cell, Column, Type};
-use super::output_error;
-use super::table::Table;
-use palpate::{Error, ErrorKind};
 
 /// Rows of a row group: some megabytes in memory.
 const GROUP_ROWS: usize = 1 << 17;
@@ -71,7 +69,7 @@ impl<W: Write + Send> ParquetTable<W> {
     }
 }
 
-impl<W: Write + Send> Table for ParquetTable<W> {
+impl<W: Write + Send> TableWriter for ParquetTable<W> {
     fn row(&mut self, cells: &mut Vec<Cell>) -> Result<(), Error> {
         for (values, cell) in self.columns.iter_mut().zip(cells.drain(..)) {
             values.push(cell);
@@ -89,13 +87,13 @@ impl<W: Write + Send> Table for ParquetTable<W> {
 fn field((name, kind): Column) -> Result<SchemaType, ParquetError> {
     let unsigned = |bit_width| Some(LogicalType::integer(bit_width, false));
     let (physical, logical) = match kind {
-        Type::U64 => (Physical::INT64, unsigned(64)),
-        Type::U32 | Type::OptionalU32 => (Physical::INT32, unsigned(32)),
-        Type::F64 => (Physical::DOUBLE, None),
-        Type::F32 => (Physical::FLOAT, None),
-        Type::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        ColumnType::U64 => (Physical::INT64, unsigned(64)),
+        ColumnType::U32 | ColumnType::OptionalU32 => (Physical::INT32, unsigned(32)),
+        ColumnType::F64 => (Physical::DOUBLE, None),
+        ColumnType::F32 => (Physical::FLOAT, None),
+        ColumnType::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
     };
-    let repetition = if kind == Type::OptionalU32 { Repetition::OPTIONAL } else { Repetition::REQUIRED };
+    let repetition = if kind == ColumnType::OptionalU32 { Repetition::OPTIONAL } else { Repetition::REQUIRED };
     SchemaType::primitive_type_builder(name, physical).with_repetition(repetition).with_logical_type(logical).build()
 }
 
@@ -103,23 +101,23 @@ fn field((name, kind): Column) -> Result<SchemaType, ParquetError> {
 fn encoded(properties: WriterPropertiesBuilder, &(name, kind): &Column) -> WriterPropertiesBuilder {
     let path = ColumnPath::from(name);
     match kind {
-        Type::U64 | Type::U32 | Type::OptionalU32 => properties
+        ColumnType::U64 | ColumnType::U32 | ColumnType::OptionalU32 => properties
             .set_column_dictionary_enabled(path.clone(), false)
             .set_column_encoding(path, Encoding::DELTA_BINARY_PACKED),
-        Type::F64 | Type::F32 => properties.set_column_dictionary_enabled(path, false),
-        Type::Text => properties,
+        ColumnType::F64 | ColumnType::F32 => properties.set_column_dictionary_enabled(path, false),
+        ColumnType::Text => properties,
     }
 }
 
 impl Values {
-    fn new(kind: Type) -> Self {
+    fn new(kind: ColumnType) -> Self {
         match kind {
-            Type::U64 => Self::I64(Vec::new()),
-            Type::U32 => Self::I32(Vec::new()),
-            Type::OptionalU32 => Self::OptionalI32(Vec::new(), Vec::new()),
-            Type::F64 => Self::F64(Vec::new()),
-            Type::F32 => Self::F32(Vec::new()),
-            Type::Text => Self::Text(Vec::new()),
+            ColumnType::U64 => Self::I64(Vec::new()),
+            ColumnType::U32 => Self::I32(Vec::new()),
+            ColumnType::OptionalU32 => Self::OptionalI32(Vec::new(), Vec::new()),
+            ColumnType::F64 => Self::F64(Vec::new()),
+            ColumnType::F32 => Self::F32(Vec::new()),
+            ColumnType::Text => Self::Text(Vec::new()),
         }
     }
 
@@ -174,7 +172,7 @@ impl Values {
 fn write_error(error: ParquetError) -> Error {
     match error {
         ParquetError::External(source) => match source.downcast::<std::io::Error>() {
-            Ok(error) => output_error(*error),
+            Ok(error) => Error::io(Path::new("output"), *error),
             Err(other) => Error::new(ErrorKind::Io, format!("the table cannot be written: {other}")),
         },
         other => Error::new(ErrorKind::Io, format!("the table cannot be written: {other}")),

@@ -1,15 +1,19 @@
 //! The worst ticks: a list to choose from, the place for the timeline that a script draws, and a picture of each without it.
 
+mod picture;
+mod script_data;
+mod view;
+
 use std::fmt::Write;
 
 use super::causes::{badge, hatches};
-use super::data::data;
-use super::moment::View;
-use super::still::still;
 use super::summary::{at, what_happened};
-use crate::timing::TimingReport;
 use crate::drawing::html::{escaped, sentence};
+use crate::timing::TimingReport;
 use crate::units::{duration, force, plural};
+use picture::still;
+use script_data::data;
+use view::View;
 
 const SCRIPT: &str = include_str!("timeline.js");
 

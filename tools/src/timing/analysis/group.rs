@@ -1,13 +1,12 @@
 //! One rate group in detail.
 
-use super::blocks::Block;
-use super::charts::Shape;
-use super::over_time::{Absorb, OverTime};
-use palpate::log::GroupInfo;
-use palpate::log::{GroupCounter, TickFigures};
-use palpate::log::Distribution;
-use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+use palpate::log::{Distribution, GroupCounter, GroupInfo, TickFigures};
 use palpate::runtime::Nanos;
+use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+
+use super::blocks::Block;
+use super::distribution::Shape;
+use super::over_time::{Absorb, OverTime};
 
 /// Bins of a chart over time, at most.
 const BINS: usize = 600;

@@ -1,8 +1,9 @@
 //! One device over the time of a run: force, model age and resyncs.
 
-use super::over_time::{Absorb, OverTime};
 use palpate::log::{CommandSample, ForceSample, Resync, magnitude};
 use palpate::runtime::Nanos;
+
+use super::over_time::{Absorb, OverTime};
 
 const BINS: usize = 600;
 const LEAST_BIN: Nanos = Nanos(1_000_000);

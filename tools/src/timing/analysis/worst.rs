@@ -3,9 +3,10 @@
 //! How bad a tick was is how long its work was overdue in periods of its deadline: from when the first of the periods that
 //! it stands for was due (its own, or the first that was skipped before it) until it was done. One is just in time.
 
-use super::recent::{ForcePoint, Moment, Recent, is_of};
-use palpate::runtime::record::{SlipCause, TickTiming};
 use palpate::runtime::Nanos;
+use palpate::runtime::record::{SlipCause, TickTiming};
+
+use super::recent::{ForcePoint, Moment, Recent, is_of};
 
 /// How many are kept.
 const KEPT: usize = 10;
@@ -29,11 +30,11 @@ pub struct WorstTick {
     pub period: Nanos,
     /// From when the first period that it stands for was due until its work was done.
     pub overdue: Nanos,
-    /// The same in deadlines: above one it was too late.
+    /// Time overdue in deadlines: above one the tick was too late.
     pub severity: f64,
     /// Why; [`SlipCause::None`] if it was in time.
     pub cause: SlipCause,
-    /// What its actors took, by name.
+    /// Time that each actor of the group took of the tick, by name.
     pub actors: Vec<(String, Nanos)>,
     /// Other groups that were at work while it was overdue and not yet running.
     pub meanwhile: Vec<String>,

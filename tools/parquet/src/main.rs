@@ -1,0 +1,60 @@
+//! `palpate-parquet LOG --topic TOPIC --out FILE`: one topic of a log as an Apache Parquet table.
+//!
+//! It is a program of its own because the `parquet` crate takes as long to build as half of palpate. Exit code 0 on success, 2 on
+//! a usage or input error (one line on standard error), as `palpate export` has it.
+
+mod table;
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use palpate::Error;
+use palpate::log::LogReader;
+use palpate_cli::WindowArgs;
+use palpate_cli::export::export_rows;
+
+use table::ParquetTable;
+
+/// Write one topic of a log as an Apache Parquet table, with the columns and units of `palpate export`
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Args {
+    /// The log to read
+    log: PathBuf,
+    /// The topic, such as /force or /timing/local
+    #[arg(long)]
+    topic: String,
+    /// The file to write
+    #[arg(long)]
+    out: PathBuf,
+    #[command(flatten)]
+    window: WindowArgs,
+}
+
+fn main() -> ExitCode {
+    match run(&Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(if error.kind().is_input() { 2 } else { 1 })
+        }
+    }
+}
+
+fn run(args: &Args) -> Result<(), Error> {
+    let window = args.window.window()?;
+    let mut reader = LogReader::open(&args.log)?;
+    // The file is created when the topic is known to exist.
+    export_rows(&mut reader, &args.topic, &window, |columns| {
+        palpate_cli::refuse_to_overwrite(&args.log, &args.out)?;
+        let file = File::create(&args.out).map_err(|error| Error::io(&args.out, error))?;
+        ParquetTable::new(columns, BufWriter::new(file))
+    })?;
+    if let Some(damage) = reader.damage() {
+        eprintln!("warning: {}: {damage}", reader.place());
+    }
+    Ok(())
+}
