@@ -15,7 +15,7 @@ use palpate::Error;
 use palpate::log::{
     CommandSample, Environment, LoggedExecution, ForceSample, GlobalTick, GroupInfo, LogRecord, McapWriter, Resync, ServedBy,
 };
-use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+use palpate::runtime::{ActorTimes, SlipCause, TickTiming};
 use palpate::runtime::{Nanos, Rate};
 
 const GROUPS: [(&str, u32); 3] = [("local", 1000), ("global", 30), ("logger", 20)];

@@ -8,7 +8,7 @@ use log_sample::{entries, environment, log_of, time_of};
 use palpate::ErrorKind;
 use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter, SceneFrame};
 use palpate::runtime::Nanos;
-use palpate::runtime::record::Record;
+use palpate::runtime::Record;
 use proptest::prelude::*;
 
 fn read(bytes: &[u8]) -> (Vec<LogEntry>, Option<String>) {

@@ -17,7 +17,7 @@ use palpate::devices::{
 };
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
-use palpate::model::blend::BlendKind;
+use palpate::model::local::BlendKind;
 use palpate::model::mesh::Face;
 use palpate::runtime::Disturbance;
 use palpate::runtime::Nanos;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use palpate::model::blend::BlendKind;
+use palpate::model::local::BlendKind;
 use palpate::model::body::Shape;
 use palpate::model::contact::{Equations, Normals};
 use palpate::model::local::Feedback;

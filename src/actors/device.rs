@@ -10,7 +10,7 @@ use crate::error::{Error, ErrorKind};
 use crate::log::{CommandSample, ToolSample};
 use crate::model::Vec3;
 use crate::runtime::Nanos;
-use crate::runtime::{Actor, Mode, Outcome, Reader, Recorder, TickContext, Writer};
+use crate::runtime::{Actor, GroupMode, Outcome, Reader, Recorder, TickContext, Writer};
 use crate::safety::{Input, Output, Pipeline, Request};
 
 /// Releases without a new command after which the force goes to rest.
@@ -89,7 +89,7 @@ impl DeviceActor {
         if dt >= GAP_S {
             return self.safety.release();
         }
-        let rests = ctx.mode == Mode::Stopping || self.missed_commands > COMMAND_EXPIRES;
+        let rests = ctx.mode == GroupMode::Stopping || self.missed_commands > COMMAND_EXPIRES;
         let request = if rests { Request::Rest } else { Request::Force(command.force.into()) };
         // What happened in a tick counts once, however often its command is used.
         let is_new = self.missed_commands == 0;

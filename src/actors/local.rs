@@ -7,7 +7,7 @@ use crate::model::Vec3;
 use crate::model::contact::Contact;
 use crate::model::local::{Kind, LocalModel, PatchGeometry, Resynced, Served, Succession};
 use crate::runtime::{
-    Actor, Mode as RunMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
+    Actor, GroupMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
 };
 use crate::runtime::{Nanos, Rate};
 use crate::safety::coupling::CoupledTool;
@@ -118,8 +118,8 @@ impl LocalActor {
         let (mut served, mut dissipated_j) = (Served::default(), 0.0);
         let owed = ctx.tick.saturating_sub(self.models.now());
         let most = match ctx.mode {
-            RunMode::Normal | RunMode::Stopping => MAX_TICKS_PER_RELEASE,
-            RunMode::Degraded => MAX_TICKS_WHEN_DEGRADED,
+            GroupMode::Normal | GroupMode::Stopping => MAX_TICKS_PER_RELEASE,
+            GroupMode::Degraded => MAX_TICKS_WHEN_DEGRADED,
         };
         for i in 0..owed.min(most) {
             // The tool is interpolated over all periods that are owed.
@@ -227,7 +227,7 @@ impl Actor for LocalActor {
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
-        if ctx.mode == RunMode::Stopping {
+        if ctx.mode == GroupMode::Stopping {
             // The device brings itself to rest.
             return Outcome::Continue;
         }

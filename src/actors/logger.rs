@@ -10,7 +10,7 @@ use super::scene_watch::SceneWatch;
 use crate::error::{Error, ErrorKind};
 use crate::log::{Analysis, Environment, Level, LogRecord, RunReport, StatsCounter, TextEvent};
 use crate::runtime::Nanos;
-use crate::runtime::record::Event;
+use crate::runtime::Event;
 use crate::runtime::{
     Actor, GrantHandle, GroupGrant, Outcome, Record, RecordDrain, RecordGap, SystemGrant, TickContext,
 };

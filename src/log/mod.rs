@@ -23,7 +23,7 @@ mod stats;
 mod writer;
 
 pub use self::analysis::{
-    Analysis, CauseCounts, ContactReport, DeviceReport, EnergyReport, ForceReport, GroupCounter, GroupSummary,
+    Analysis, ContactReport, DeviceReport, EnergyReport, ForceReport, GroupCounter, GroupSummary,
     LimitReport, ResyncReport, RunReport, TickFigures, TickGauge, magnitude,
 };
 pub use self::entry::{LogEntry, Window};
@@ -31,7 +31,7 @@ pub use self::percentiles::{Distribution, Magnitudes, Percentiles};
 pub use self::reader::{LogReader, TopicKind};
 pub(crate) use self::records::MAX_DEVICES;
 pub use self::records::{
-    CommandSample, ContactMode, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, Level, LogRecord,
+    CommandSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, Level, LogRecord,
     LoggedExecution, ModelReason, ProbeSample, Resync, SceneFrame, SceneTool, ServedBy, TextEvent, ToolSample,
 };
 pub(crate) use self::stats::StatsCounter;

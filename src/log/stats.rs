@@ -3,7 +3,7 @@
 use super::percentiles::{Distribution, Percentiles};
 use super::records::TextEvent;
 use crate::runtime::Nanos;
-use crate::runtime::record::TickTiming;
+use crate::runtime::TickTiming;
 
 const SECOND: u64 = 1_000_000_000;
 

@@ -7,7 +7,8 @@ use std::fmt;
 pub use super::page::Page;
 use super::units::{duration, force, seconds};
 use super::verdict::verdict;
-use crate::log::{CauseCounts, DeviceReport, GroupSummary, LoggedExecution, Percentiles, RunReport};
+use crate::runtime::SlipCounts;
+use crate::log::{DeviceReport, GroupSummary, LoggedExecution, Percentiles, RunReport};
 
 const EVENTS_SHOWN: usize = 4;
 /// Lines for what the system granted.
@@ -86,7 +87,7 @@ pub fn groups(page: &mut Page, report: &RunReport) {
         ));
     }
     for (what, of) in
-        [("skipped", (|group| group.skipped) as fn(&GroupSummary) -> CauseCounts), ("missed", |group| group.missed)]
+        [("skipped", (|group| group.skipped) as fn(&GroupSummary) -> SlipCounts), ("missed", |group| group.missed)]
     {
         for group in report.groups.iter().filter(|group| of(group).total() > 0) {
             page.line(format!("  {} {what}: {}", group.name, causes(of(group))));
@@ -180,7 +181,7 @@ pub fn events(page: &mut Page, report: &RunReport) {
     }
 }
 
-fn causes(counts: CauseCounts) -> String {
+fn causes(counts: SlipCounts) -> String {
     let named = counts.iter().filter(|&(_, count)| count > 0);
     named.map(|(cause, count)| format!("{} {count}", cause.name())).collect::<Vec<_>>().join(", ")
 }
@@ -196,7 +197,7 @@ mod tests {
     use crate::log::{Analysis, Environment, GroupInfo, Level, LogRecord, Resync, TextEvent};
     use crate::report::page::WIDTH;
     use crate::runtime::Nanos;
-    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::runtime::{SlipCause, TickTiming};
 
     fn busy_report() -> RunReport {
         let mut analysis = Analysis::default();

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use crate::log::{Analysis, Environment, LogRecord};
     use crate::runtime::Nanos;
-    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::runtime::{SlipCause, TickTiming};
 
     fn report(slips: u32) -> RunReport {
         let mut analysis = Analysis::default();

@@ -2,7 +2,7 @@
 
 use super::parts::{OpenHaply, Parts};
 use crate::devices::{Device, ToolPath};
-use crate::model::blend::BlendKind;
+use crate::model::local::BlendKind;
 use crate::model::body::Body;
 use crate::model::local::Feedback;
 use crate::runtime::{Disturbance, Execution, RateGroup};

@@ -8,8 +8,8 @@ use crate::actors::{LoggerOutcome, SurfaceView, ToolView};
 use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
 use crate::model::mesh::Surface;
-use crate::runtime::histogram::{HistogramReader, Snapshot};
-use crate::runtime::{GroupLive, Nanos, OutletReader, Running as RuntimeRunning, RuntimeReport, StopHandle};
+use crate::runtime::{Histogram, HistogramReader};
+use crate::runtime::{GroupLive, Nanos, OutletReader, RunningGraph, RuntimeReport, StopHandle};
 
 /// A session that runs. Dropping it commands zero force and joins its threads, within
 /// [`STOP_BOUND`](crate::runtime::STOP_BOUND) per group.
@@ -32,7 +32,7 @@ use crate::runtime::{GroupLive, Nanos, OutletReader, Running as RuntimeRunning, 
 /// Not for actors and devices, which stop a run by its [`stop_handle`](Self::stop_handle).
 #[derive(Debug)]
 pub struct Running {
-    runtime: RuntimeRunning,
+    runtime: RunningGraph,
     outcome: LoggerOutcome,
     memory: Option<Memory>,
     viewer: Option<Viewer>,
@@ -42,7 +42,7 @@ pub struct Running {
 
 impl Running {
     pub(super) fn new(
-        runtime: RuntimeRunning,
+        runtime: RunningGraph,
         outcome: LoggerOutcome,
         memory: Option<Memory>,
         viewer: Viewer,
@@ -213,7 +213,7 @@ pub struct Summary {
     pub records: Vec<LogRecord>,
     /// CPU time of building each local model, if [cost was measured](super::SessionBuilder::measure_cost); none for
     /// `full`, which is never built anew.
-    pub builds: Option<Snapshot>,
+    pub builds: Option<Histogram>,
 }
 
 impl fmt::Display for Summary {

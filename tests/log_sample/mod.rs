@@ -5,8 +5,8 @@ use palpate::log::{
     LogEntry, LogRecord, LoggedExecution, McapWriter, Percentiles, ProbeSample, Resync, ServedBy, TextEvent,
     ToolSample,
 };
-use palpate::runtime::record::{Event, SlipCause, TickTiming};
-use palpate::runtime::{Mode, PortUse};
+use palpate::runtime::{Event, SlipCause, TickTiming};
+use palpate::runtime::{GroupMode, PortUse};
 use palpate::runtime::{Nanos, Rate};
 
 /// An environment with two groups.
@@ -132,7 +132,7 @@ fn timing(group: u16, tick: u64, scheduled: Nanos, period: u64) -> TickTiming {
         slips: u32::from(after_long),
         cause: if long || after_long { SlipCause::LongTick } else { SlipCause::None },
         given_up: u8::from(after_long && tick.is_multiple_of(100)),
-        mode: if after_long { Mode::Degraded } else { Mode::Normal },
+        mode: if after_long { GroupMode::Degraded } else { GroupMode::Normal },
     }
 }
 

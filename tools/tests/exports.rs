@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use palpate::ErrorKind;
 use palpate::log::{LogEntry, LogReader, LogRecord, Window};
 use palpate::runtime::Nanos;
-use palpate::runtime::record::TickTiming;
+use palpate::runtime::TickTiming;
 use palpate_cli::export::{TickDuration, export_percentiles, export_table, export_trace};
 use serde_json::Value;
 

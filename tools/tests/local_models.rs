@@ -7,7 +7,7 @@ use std::path::Path;
 use palpate::Session;
 use palpate::log::LogRecord;
 use palpate_cli::compare::{ForceTrace, ModelError};
-use palpate::model::blend::BlendKind;
+use palpate::model::local::BlendKind;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::scene::{BlendSpec, Scene, StepKind};
 

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 
 use palpate::log::{GroupStats, LogEntry, LogReader, LogRecord};
-use palpate::runtime::record::{Record, TickTiming};
+use palpate::runtime::{Record, TickTiming};
 use palpate_cli::log_file::{LogInfo, Recovered, check, recover};
 use proptest::prelude::*;
 

@@ -6,7 +6,7 @@ mod repository;
 use std::path::Path;
 
 use palpate::log::LogReader;
-use palpate::runtime::record::SlipCause;
+use palpate::runtime::SlipCause;
 use palpate::runtime::{Disturbance, Nanos, RateGroup};
 use palpate::scene::Scene;
 use palpate::session::{Session, SessionBuilder};

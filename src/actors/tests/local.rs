@@ -3,7 +3,7 @@
 use super::*;
 use crate::devices::DeviceState;
 use crate::log::LogRecord;
-use crate::model::blend::Blend;
+use crate::model::local::Blend;
 use crate::model::body::{Block, Body, State};
 use crate::model::contact::{Law, ToolMotion};
 use crate::model::local::{Full, Hold};

@@ -1,34 +1,8 @@
 //! The timing of one rate group over a run.
 
 use crate::log::percentiles::{Distribution, Percentiles};
-use crate::runtime::Mode;
-use crate::runtime::Nanos;
-use crate::runtime::record::{SlipCause, TickTiming};
-
-/// How often each cause of a slip or a missed deadline occurred.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CauseCounts([u64; SlipCause::ALL.len()]);
-
-impl CauseCounts {
-    fn add(&mut self, cause: SlipCause, count: u64) {
-        self.0[cause as usize] += count;
-    }
-
-    /// The count of one cause; [`SlipCause::None`] counts those that no cause was recorded for.
-    pub fn of(&self, cause: SlipCause) -> u64 {
-        self.0[cause as usize]
-    }
-
-    /// Every cause with its count; those without a recorded cause are last.
-    pub fn iter(&self) -> impl Iterator<Item = (SlipCause, u64)> {
-        SlipCause::ALL[1..].iter().chain(&SlipCause::ALL[..1]).map(|&cause| (cause, self.of(cause)))
-    }
-
-    /// The sum of all causes.
-    pub fn total(&self) -> u64 {
-        self.0.iter().sum()
-    }
-}
+use crate::runtime::GroupMode;
+use crate::runtime::{Nanos, SlipCause, SlipCounts, TickTiming};
 
 /// The timing of one rate group over a run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,9 +14,9 @@ pub struct GroupSummary {
     /// The number of releases that ran.
     pub released: u64,
     /// The number of periods skipped, by cause.
-    pub skipped: CauseCounts,
+    pub skipped: SlipCounts,
     /// The number of deadlines missed, by cause.
-    pub missed: CauseCounts,
+    pub missed: SlipCounts,
     /// The number of periods between the first and the last release, both counted: `released + skipped` unless records were lost.
     pub elapsed_periods: u64,
     /// The number of releases in degraded mode, which an overrun policy sets.
@@ -67,8 +41,8 @@ pub struct GroupSummary {
 #[derive(Clone, Debug, Default)]
 pub struct GroupCounter {
     released: u64,
-    skipped: CauseCounts,
-    missed: CauseCounts,
+    skipped: SlipCounts,
+    missed: SlipCounts,
     in_degraded_mode: u64,
     first_tick: u64,
     last: TickTiming,
@@ -136,7 +110,7 @@ impl GroupCounter {
         for (cause, slips) in timing.slips_by_cause() {
             self.skipped.add(cause, slips.into());
         }
-        self.in_degraded_mode += u64::from(timing.mode == Mode::Degraded);
+        self.in_degraded_mode += u64::from(timing.mode == GroupMode::Degraded);
         if timing.missed() {
             self.missed.add(timing.cause, 1);
         }

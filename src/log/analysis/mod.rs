@@ -5,13 +5,13 @@ mod haptics;
 
 use std::collections::BTreeMap;
 
-pub use self::group::{CauseCounts, GroupCounter, GroupSummary, TickFigures, TickGauge};
+pub use self::group::{GroupCounter, GroupSummary, TickFigures, TickGauge};
 use self::haptics::HapticsCounter;
 pub use self::haptics::{ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport, magnitude};
 use super::entry::LogEntry;
 use super::records::{Environment, Level, LogRecord, LoggedExecution, TextEvent};
 use crate::runtime::Nanos;
-use crate::runtime::record::{Event, TickTiming};
+use crate::runtime::{Event, TickTiming};
 
 /// Events that a report lists; the others are only counted.
 const EVENTS_KEPT: usize = 100;
@@ -84,7 +84,7 @@ impl RunReport {
 ///
 /// ```
 /// use palpate::log::{Analysis, LogRecord};
-/// use palpate::runtime::record::TickTiming;
+/// use palpate::runtime::TickTiming;
 ///
 /// let mut analysis = Analysis::default();
 /// analysis.push(&LogRecord::Tick(TickTiming::default()));
@@ -233,8 +233,8 @@ impl Analysis {
 mod tests {
     use super::*;
     use crate::log::{CommandSample, ContactMode, ContactReport, ContactSample, ForceSample, GroupInfo, Resync};
-    use crate::runtime::Mode;
-    use crate::runtime::record::{SlipCause, TickTiming};
+    use crate::runtime::GroupMode;
+    use crate::runtime::{SlipCause, TickTiming};
 
     fn tick(tick: u64, late: u64, work: u64, slips: u32, cause: SlipCause) -> LogRecord {
         let scheduled = Nanos(tick * 1_000_000);
@@ -258,7 +258,7 @@ mod tests {
     fn slips_that_a_policy_gave_up_and_degraded_releases_are_counted_apart() {
         let mut analysis = Analysis::default();
         let timing = TickTiming { tick: 4, slips: 3, cause: SlipCause::LongTick, ..TickTiming::default() };
-        analysis.push(&LogRecord::Tick(TickTiming { given_up: 1, mode: Mode::Degraded, ..timing }));
+        analysis.push(&LogRecord::Tick(TickTiming { given_up: 1, mode: GroupMode::Degraded, ..timing }));
         let group = &analysis.report().groups[0];
         assert_eq!((group.skipped.of(SlipCause::LongTick), group.skipped.of(SlipCause::Policy)), (2, 1));
         assert_eq!(group.in_degraded_mode, 1);

@@ -14,18 +14,18 @@ pub(crate) use self::wire::LogMessage;
 use self::wire::{Uint64s, WireEnum, message, messages, wire_enum};
 use super::percentiles::Percentiles;
 use super::records::{
-    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy,
+    CommandSample, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy,
 };
 use super::stats::GroupStats;
-use crate::runtime::record::{self, SlipCause, TickTiming};
-use crate::runtime::{Mode, Nanos, PortUse, PortUseKind};
+use crate::model::contact::ContactMode;
+use crate::runtime::{self, GroupMode, Nanos, PortUse, PortUseKind, SlipCause, TickTiming};
 
 /// The version of the schema that this build writes.
 pub(crate) const SCHEMA_VERSION: u32 = 2;
 
 wire_enum! { "palpate.SlipCause" for SlipCause { None, LateWake, LongTick, StalledPeer, Policy, Fault } }
 wire_enum! { "palpate.PortUseKind" for PortUseKind { Took, Saw, Dropped } }
-wire_enum! { "palpate.Mode" for Mode { Normal, Degraded, Stopping } }
+wire_enum! { "palpate.Mode" for GroupMode { Normal, Degraded, Stopping } }
 wire_enum! { "palpate.ContactMode" for ContactMode { Free, Stick, Slip, Lost } }
 wire_enum! { "palpate.ServedBy" for ServedBy {
     Unknown, Full, Hold, Patch, LinearBoundary, ScaledBoundary, Condensed, Predicted, Predictive,
@@ -73,14 +73,14 @@ messages! {
     }
 }
 
-impl From<&record::ActorTimes> for ActorTimes {
-    fn from(r: &record::ActorTimes) -> Self {
+impl From<&runtime::ActorTimes> for ActorTimes {
+    fn from(r: &runtime::ActorTimes) -> Self {
         let spent_ns = Uint64s(r.spent().iter().map(|spent| spent.0).collect());
         Self { time_ns: r.scheduled, group: r.group, spent_ns }
     }
 }
 
-impl From<ActorTimes> for record::ActorTimes {
+impl From<ActorTimes> for runtime::ActorTimes {
     fn from(m: ActorTimes) -> Self {
         let mut spent = [Nanos::ZERO; Self::MAX];
         spent.iter_mut().zip(&m.spent_ns.0).for_each(|(to, from)| *to = Nanos(*from));
@@ -155,7 +155,7 @@ fn file() -> FileDescriptorProto {
         enum_type: vec![
             SlipCause::enum_descriptor(false),
             PortUseKind::enum_descriptor(false),
-            Mode::enum_descriptor(false),
+            GroupMode::enum_descriptor(false),
             ContactMode::enum_descriptor(false),
             ServedBy::enum_descriptor(false),
         ],

@@ -7,7 +7,7 @@ use crate::log::records::{
 };
 use crate::log::stats::GroupStats;
 use crate::runtime::PortUse;
-use crate::runtime::record::TickTiming;
+use crate::runtime::TickTiming;
 
 /// What the messages of a topic are about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -3,7 +3,7 @@
 use super::foxglove::{self, Log, Pose, PoseInFrame, Quaternion, Timestamp, Vector3};
 use crate::log::records::{Level, TextEvent, ToolSample};
 use crate::runtime::Nanos;
-use crate::runtime::record::Event;
+use crate::runtime::Event;
 
 /// The one frame of reference, world coordinates.
 pub(super) const FRAME: &str = "world";

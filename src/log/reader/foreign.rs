@@ -24,7 +24,7 @@ use prost_types::FileDescriptorSet;
 use prost_types::field_descriptor_proto::Type;
 
 use crate::runtime::Nanos;
-use crate::runtime::record::{SlipCause, TickTiming};
+use crate::runtime::{SlipCause, TickTiming};
 
 const SECOND: u64 = 1_000_000_000;
 

@@ -19,7 +19,7 @@ pub enum LoggedExecution {
     },
 }
 
-/// A rate group, in the order that [`TickTiming::group`](crate::runtime::record::TickTiming::group) counts.
+/// A rate group, in the order that [`TickTiming::group`](crate::runtime::TickTiming::group) counts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GroupInfo {
     /// The name of the group; its topics are `/timing/NAME` and `/stats/NAME`.

@@ -11,11 +11,11 @@ pub use self::environment::{Environment, GroupInfo, LoggedExecution, ModelReason
 pub use self::event::{Level, TextEvent};
 pub(crate) use self::packing::MAX_DEVICES;
 pub use self::samples::{
-    CommandSample, ContactMode, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy, ToolSample,
+    CommandSample, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy, ToolSample,
 };
 pub use self::scene::{SceneFrame, SceneTool};
 
-use crate::runtime::record::{ActorTimes, Channel, Event, Record, TickTiming};
+use crate::runtime::{ActorTimes, Channel, Event, Record, TickTiming};
 use crate::runtime::{Nanos, PortUse};
 
 /// Everything that a log can hold per tick.
@@ -25,7 +25,7 @@ use crate::runtime::{Nanos, PortUse};
 ///
 /// ```
 /// use palpate::log::{ForceSample, LogRecord};
-/// use palpate::runtime::record::Record;
+/// use palpate::runtime::Record;
 ///
 /// let sent = LogRecord::Force(ForceSample { force_n: [0.1, -0.2, 1e-300], ..ForceSample::default() });
 /// let record = Record::from(sent);

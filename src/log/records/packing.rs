@@ -4,7 +4,7 @@
 //! Wait-free and real-time safe: plain copies.
 
 use crate::runtime::Nanos;
-use crate::runtime::record::{Channel, Record};
+use crate::runtime::{Channel, Record};
 
 /// Channels of a device: each has its own of every kind.
 const CHANNELS: u16 = 16;

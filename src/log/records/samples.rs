@@ -2,8 +2,9 @@
 //! runtime's 64-byte records, and, unless viewers have a message of their own for it, its protobuf message.
 
 use super::packing::{packed, packed_field, record};
+use crate::model::contact::ContactMode;
 use crate::runtime::Nanos;
-use crate::runtime::record::Record;
+use crate::runtime::Record;
 
 /// The kind of local model that served a haptic tick, or what it fell back to.
 ///
@@ -125,36 +126,6 @@ pub struct ToolSample {
 }
 
 packed! { ToolSample on 1 { id, position_m, velocity_m_s, buttons } of device }
-
-/// The state of a contact.
-///
-/// # Real-time
-/// A plain value: its methods are wait-free and real-time safe.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[repr(u16)]
-pub enum ContactMode {
-    /// Not touching.
-    #[default]
-    Free = 0,
-    /// Touching, inside the friction cone.
-    Stick = 1,
-    /// Touching, sliding.
-    Slip = 2,
-    /// Touching nodes that cannot move: no force can be computed.
-    Lost = 3,
-}
-
-impl ContactMode {
-    /// The mode with this number; unknown numbers read as free.
-    pub fn from_code(code: u16) -> Self {
-        match code {
-            1 => Self::Stick,
-            2 => Self::Slip,
-            3 => Self::Lost,
-            _ => Self::Free,
-        }
-    }
-}
 
 /// The contact at the end of one haptic tick, on the topic `/contact`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -11,7 +11,7 @@ use super::device::numbered;
 use super::{BlockSpec, BodySpec, Friction, GlobalSpec, InitialSpec, LocalSpec, ModelChoice, Scene, StepKind};
 use crate::error::Error;
 use crate::model::ModelError;
-use crate::model::blend::BlendKind;
+use crate::model::local::BlendKind;
 use crate::model::contact::Equations;
 use crate::model::local::{Feedback, Kind};
 use crate::model::mesh::Face;

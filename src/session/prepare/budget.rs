@@ -27,7 +27,7 @@ pub(super) fn declare(
     [local, global]: [RateGroup; 2],
 ) -> Result<[RateGroup; 2], Error> {
     let at_work = if kind == Kind::Full { &local } else { &global };
-    if at_work.has_budget() {
+    if at_work.declared_budget().is_some() {
         return Ok([local, global]);
     }
     let cost = Cost { evaluation: evaluation(), timing, nodes, kind };

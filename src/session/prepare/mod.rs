@@ -21,13 +21,13 @@ pub(super) use tools::Tool;
 
 use super::parts::{Options, Parts};
 use crate::error::Error;
-use crate::model::blend::Blend;
+use crate::model::local::Blend;
 use crate::model::contact::{Equations, Law};
 use crate::model::local::{Feedback, Kind, MOST_EXPLICIT_STEPS, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::model::surroundings::Size;
-use crate::runtime::{Execution, Nanos, RateGroup, admit_here};
+use crate::runtime::{Execution, Nanos, Plan, RateGroup};
 use crate::scene::{ProbeSpec, Scene, StepKind};
 use body::Start;
 use patch::PatchChoice;
@@ -134,7 +134,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let simulation = simulation(start, &scene, &tools)?;
     let prepared =
         Prepared { scene: as_run, simulation, tools, plan, choice, sized_patch, local, global, until, options };
-    admit_here(&prepared.groups(), execution)?;
+    Plan::check(execution, &prepared.groups())?;
     Ok(prepared)
 }
 
@@ -158,9 +158,9 @@ pub(super) fn as_run(scene: &Scene, named: Option<(&[Option<u32>], &[u32])>) -> 
     if let (Some(body), Some((attached, probes))) = (&scene.body, named) {
         let lattice = Lattice { nodes: body.block.nodes };
         for (device, node) in scene.devices.iter_mut().zip(attached) {
-            device.attach_node = node.map(|node| lattice.place(node));
+            device.attach_node = node.map(|node| lattice.coordinates(node));
         }
-        scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.place(node) }).collect();
+        scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.coordinates(node) }).collect();
     }
     scene
 }

@@ -55,7 +55,7 @@ pub(super) fn choose(scene: &Scene, body: &dyn Body, attached: &[Option<u32>]) -
     let node = attached.first().copied().flatten().or_else(|| scene.first_touched(body))?;
     let triangle = *body.surface().at_node(node).first()?;
     let place = match &scene.body {
-        Some(spec) => format!("node {:?}", Lattice { nodes: spec.block.nodes }.place(node)),
+        Some(spec) => format!("node {:?}", Lattice { nodes: spec.block.nodes }.coordinates(node)),
         None => format!("node {node}"),
     };
     let fits = |size: &[usize; 3]| scene.body.as_ref().is_none_or(|spec| patch_fits(*size, &spec.block));
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn the_window_is_where_the_tool_is_glued_or_comes_first() {
         let block = block();
-        let at = |scene: &Scene| block.lattice().place(scene.first_touched(&block).unwrap());
+        let at = |scene: &Scene| block.lattice().coordinates(scene.first_touched(&block).unwrap());
         let mut moved = scene(0.5, None);
         assert_eq!(at(&moved), [3, 3, 5], "one of the four in the middle of the top");
         let path = |z: f64| ToolPath::new(vec![0.0, 1.0], vec![[0.02, 0.02, 0.12], [0.081, 0.06, z]]).unwrap();

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use palpate::model::body::Block;
-use palpate::runtime::histogram::Snapshot;
+use palpate::runtime::Histogram;
 use palpate::runtime::{Nanos, Rate, Stopwatch};
 use palpate::scene::{LocalModelKind, Scene};
 use palpate::session::{Session, Summary};

@@ -7,7 +7,7 @@ use std::io::{self, Read, Write};
 
 use palpate::Error;
 use palpate::log::{Distribution, LogEntry, LogReader, LogRecord, TickGauge, Window};
-use palpate::runtime::record::TickTiming;
+use palpate::runtime::TickTiming;
 
 use super::table::lost_topic;
 use super::{Micros, output_error, unknown};

@@ -18,7 +18,7 @@
 //! the name of the device comes first: `left.resync.age.p99`.
 
 use palpate::log::{CauseCounts, DeviceReport, GroupReport, Percentiles};
-use palpate::runtime::record::SlipCause;
+use palpate::runtime::SlipCause;
 
 use super::analysis::TimingReport;
 

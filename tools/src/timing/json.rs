@@ -35,7 +35,7 @@ use palpate::log::{
     TextEvent,
 };
 use palpate::report::verdict;
-use palpate::runtime::record::TickTiming;
+use palpate::runtime::TickTiming;
 use serde_json::{Map, Value, json};
 
 use super::text::in_words;
@@ -277,7 +277,7 @@ mod tests {
     use super::*;
     use palpate::log::{Analysis, LogRecord};
     use palpate::runtime::Nanos;
-    use palpate::runtime::record::TickTiming;
+    use palpate::runtime::TickTiming;
 
     #[test]
     fn integers_survive_beyond_the_precision_of_doubles() {

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use palpate::log::{ForceSample, GlobalTick};
 use palpate::runtime::Nanos;
-use palpate::runtime::record::TickTiming;
+use palpate::runtime::TickTiming;
 
 use super::events::Track;
 

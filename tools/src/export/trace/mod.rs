@@ -10,7 +10,7 @@ use std::io::{self, Read, Write};
 
 use palpate::Error;
 use palpate::log::{Environment, ForceSample, LogEntry, LogReader, LogRecord, Resync, TextEvent, Window, magnitude};
-use palpate::runtime::record::{ActorTimes, TickTiming};
+use palpate::runtime::{ActorTimes, TickTiming};
 
 use self::events::{Events, Phase, Scope, Track};
 use self::flows::{Flow, Flows, Placed};

@@ -2,7 +2,7 @@
 
 use palpate::log::{Distribution, GroupCounter, GroupInfo, TickFigures};
 use palpate::runtime::Nanos;
-use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+use palpate::runtime::{ActorTimes, SlipCause, TickTiming};
 
 use super::blocks::Block;
 use super::distribution::Shape;

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 use palpate::log::{Analysis, Environment, LogEntry, LogRecord, RunReport, Window};
 use palpate::runtime::Nanos;
-use palpate::runtime::record::TickTiming;
+use palpate::runtime::TickTiming;
 
 pub use blocks::{Block, Buckets};
 pub use cyclictest::read_cyclictest;

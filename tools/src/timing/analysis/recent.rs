@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use palpate::log::{CommandSample, ForceSample};
 use palpate::runtime::Nanos;
-use palpate::runtime::record::{ActorTimes, TickTiming};
+use palpate::runtime::{ActorTimes, TickTiming};
 
 /// How far back it remembers. A slow group's release begins long before it ends, and a moment is looked at later still.
 const SPAN: Nanos = Nanos(1_000_000_000);

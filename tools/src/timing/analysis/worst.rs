@@ -4,7 +4,7 @@
 //! it stands for was due (its own, or the first that was skipped before it) until it was done. One is just in time.
 
 use palpate::runtime::Nanos;
-use palpate::runtime::record::{SlipCause, TickTiming};
+use palpate::runtime::{SlipCause, TickTiming};
 
 use super::recent::{ForcePoint, Moment, Recent, is_of};
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use palpate::runtime::record::SlipCause;
+use palpate::runtime::SlipCause;
 
 use crate::drawing::svg::Sign;
 

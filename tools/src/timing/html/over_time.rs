@@ -1,6 +1,6 @@
 //! Lateness over the run, with what was skipped and missed above it.
 
-use palpate::runtime::record::SlipCause;
+use palpate::runtime::SlipCause;
 
 use super::causes::{CAUSES, class, legend, name, sign};
 use super::chart_figure_in_two;

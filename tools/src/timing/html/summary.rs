@@ -155,7 +155,7 @@ fn cards(report: &TimingReport, numbers: &Numbers) -> String {
 mod tests {
     use super::*;
     use palpate::runtime::Nanos;
-    use palpate::runtime::record::{SlipCause, TickTiming};
+    use palpate::runtime::{SlipCause, TickTiming};
 
     #[test]
     fn the_worst_is_told_with_its_cause_and_what_it_did() {

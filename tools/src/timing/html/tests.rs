@@ -1,6 +1,6 @@
 use palpate::log::{CommandSample, Environment, Execution, ForceSample, GroupInfo, LogEntry, LogRecord, Resync};
 use palpate::runtime::Nanos;
-use palpate::runtime::record::{ActorTimes, SlipCause, TickTiming};
+use palpate::runtime::{ActorTimes, SlipCause, TickTiming};
 
 use super::timing_html;
 use crate::timing::{Selection, TimingAnalysis, TimingReport};

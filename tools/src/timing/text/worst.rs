@@ -1,7 +1,7 @@
 //! The worst ticks: who was late, why, and what it did to the force.
 
 use palpate::report::text::Page;
-use palpate::runtime::record::SlipCause;
+use palpate::runtime::SlipCause;
 
 use crate::timing::{TimingReport, WorstTick};
 use crate::units::{duration, force, plural};
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
     use crate::timing::Moment;
     use palpate::runtime::Nanos;
-    use palpate::runtime::record::TickTiming;
+    use palpate::runtime::TickTiming;
 
     const MS: u64 = 1_000_000;
 

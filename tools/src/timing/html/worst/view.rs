@@ -2,7 +2,7 @@
 
 use palpate::log::magnitude;
 use palpate::runtime::Nanos;
-use palpate::runtime::record::{SlipCause, TickTiming};
+use palpate::runtime::{SlipCause, TickTiming};
 
 use crate::timing::{ForcePoint, TimingReport, WorstTick};
 
