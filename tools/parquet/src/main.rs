@@ -1,7 +1,7 @@
 //! `palpate-parquet LOG --topic TOPIC --out FILE`: one topic of a log as an Apache Parquet table.
 //!
-//! It is a program of its own because the `parquet` crate takes as long to build as half of palpate. Exit code 0 on success, 2 on
-//! a usage or input error (one line on standard error), as `palpate export` has it.
+//! It is a program of its own because the `parquet` crate takes a minute to build. Exit code 0 on success, 2 on a usage or input
+//! error, 1 if the table cannot be written.
 
 mod table;
 
