@@ -4,7 +4,8 @@
 //!
 //! Time simulated over time taken, the median of five runs. What the runtime alone does is in its own bench.
 
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 use palpate::session::Session;
 use std::time::{Duration, Instant};
 

@@ -13,7 +13,8 @@ use std::path::PathBuf;
 
 use palpate::Error;
 use palpate::log::{
-    CommandSample, Environment, LoggedExecution, ForceSample, GlobalTick, GroupInfo, LogRecord, McapWriter, Resync, ServedBy,
+    CommandSample, Environment, ForceSample, GlobalTick, GroupInfo, LogRecord, LoggedExecution, McapWriter, Resync,
+    ServedBy,
 };
 use palpate::runtime::{ActorTimes, SlipCause, TickTiming};
 use palpate::runtime::{Nanos, Rate};

@@ -80,7 +80,9 @@ fn no_module_of_the_engine_names_one_that_is_built_on_it() {
         let own = path.strip_prefix("src/").and_then(|path| path.split(['/', '.']).next());
         let Some((own, may)) = ORDER.into_iter().find(|(module, _)| Some(*module) == own) else { continue };
         let others = modules.iter().filter(|other| **other != own && !may.contains(other));
-        faults.extend(others.filter(|other| has_word(&code, &format!("crate::{other}"))).map(|other| (path.clone(), *other)));
+        faults.extend(
+            others.filter(|other| has_word(&code, &format!("crate::{other}"))).map(|other| (path.clone(), *other)),
+        );
     }
     assert!(faults.is_empty(), "{faults:#?}");
     for (place, (module, may)) in ORDER.iter().enumerate() {

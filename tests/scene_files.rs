@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use palpate::devices::ToolPath;
-use palpate::model::local::BlendKind;
 use palpate::model::contact::{Equations, Normals};
+use palpate::model::local::BlendKind;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::model::mesh::Face;
 use palpate::scene::{Friction, Scene};

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use palpate::model::local::BlendKind;
 use palpate::model::body::Shape;
 use palpate::model::contact::{Equations, Normals};
+use palpate::model::local::BlendKind;
 use palpate::model::local::Feedback;
 use palpate::model::mesh::Face;
 use palpate::scene::{

@@ -10,9 +10,10 @@ use crate::pulse::Pulse;
 use crate::watch::Watch;
 use crate::wire::Wire;
 use palpate::devices::{Calibration, Capabilities};
+use palpate::devices::{Device, DeviceFault, DeviceState, ForceCommand};
 use palpate::model::Vec3;
 use palpate::runtime::Nanos;
-use palpate::{Device, DeviceFault, DeviceState, Error, ErrorKind, ForceCommand};
+use palpate::{Error, ErrorKind};
 use std::time::{Duration, Instant};
 
 /// Replies that one look takes: the service sends one for each command, and few are under way.

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use palpate::ForceCommand;
+use palpate::devices::ForceCommand;
 use palpate::runtime::Nanos;
 
 /// One command between two writes.

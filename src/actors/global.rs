@@ -7,8 +7,8 @@ use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::body::Body;
 use crate::model::contact::ToolMotion;
-use crate::model::local::{ToolForecast, ToolHistory};
 use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, wider};
+use crate::model::local::{ToolForecast, ToolHistory};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{

@@ -2,13 +2,11 @@
 
 use super::cause::Cause;
 use super::messages::{ComputedForce, DeviceSample, SurfaceView, ToolTick, ToolView};
-use crate::log::{ContactMode, ContactSample, ForceSample, ProbeSample, Resync, ServedBy};
+use crate::log::{ContactSample, ForceSample, ProbeSample, Resync, ServedBy};
 use crate::model::Vec3;
-use crate::model::contact::Contact;
+use crate::model::contact::{Contact, ContactMode};
 use crate::model::local::{Kind, LocalModel, PatchGeometry, Resynced, Served, Succession};
-use crate::runtime::{
-    Actor, GroupMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer,
-};
+use crate::runtime::{Actor, GroupMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer};
 use crate::runtime::{Nanos, Rate};
 use crate::safety::coupling::CoupledTool;
 

@@ -12,7 +12,7 @@ use std::time::Duration;
 use super::log_sink::{LogSink, Loss};
 use crate::error::Error;
 use crate::log::{
-    Backlog, BacklogProgress, Environment, LoggedExecution, GroupStats, LogRecord, McapWriter, SceneFrame, TextEvent,
+    Backlog, BacklogProgress, Environment, GroupStats, LogRecord, LoggedExecution, McapWriter, SceneFrame, TextEvent,
 };
 use crate::runtime::Nanos;
 

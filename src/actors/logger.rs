@@ -9,8 +9,8 @@ use super::log_sink::{LogSink, Loss};
 use super::scene_watch::SceneWatch;
 use crate::error::{Error, ErrorKind};
 use crate::log::{Analysis, Environment, Level, LogRecord, RunReport, StatsCounter, TextEvent};
-use crate::runtime::Nanos;
 use crate::runtime::Event;
+use crate::runtime::Nanos;
 use crate::runtime::{
     Actor, GrantHandle, GroupGrant, Outcome, Record, RecordDrain, RecordGap, SystemGrant, TickContext,
 };

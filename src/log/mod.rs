@@ -23,16 +23,16 @@ mod stats;
 mod writer;
 
 pub use self::analysis::{
-    Analysis, ContactReport, DeviceReport, EnergyReport, ForceReport, GroupCounter, GroupSummary,
-    LimitReport, ResyncReport, RunReport, TickFigures, TickGauge, magnitude,
+    Analysis, ContactReport, DeviceReport, EnergyReport, ForceReport, GroupCounter, GroupSummary, LimitReport,
+    ResyncReport, RunReport, TickFigures, TickGauge, magnitude,
 };
 pub use self::entry::{LogEntry, Window};
 pub use self::percentiles::{Distribution, Magnitudes, Percentiles};
 pub use self::reader::{LogReader, TopicKind};
 pub(crate) use self::records::MAX_DEVICES;
 pub use self::records::{
-    CommandSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, Level, LogRecord,
-    LoggedExecution, ModelReason, ProbeSample, Resync, SceneFrame, SceneTool, ServedBy, TextEvent, ToolSample,
+    CommandSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, Level, LogRecord, LoggedExecution,
+    ModelReason, ProbeSample, Resync, SceneFrame, SceneTool, ServedBy, TextEvent, ToolSample,
 };
 pub(crate) use self::stats::StatsCounter;
 pub use self::stats::{EventSum, GroupStats};

@@ -7,8 +7,8 @@ use std::fmt;
 pub use super::page::Page;
 use super::units::{duration, force, seconds};
 use super::verdict::verdict;
-use crate::runtime::SlipCounts;
 use crate::log::{DeviceReport, GroupSummary, LoggedExecution, Percentiles, RunReport};
+use crate::runtime::SlipCounts;
 
 const EVENTS_SHOWN: usize = 4;
 /// Lines for what the system granted.

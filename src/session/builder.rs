@@ -2,8 +2,8 @@
 
 use super::parts::{OpenHaply, Parts};
 use crate::devices::{Device, ToolPath};
-use crate::model::local::BlendKind;
 use crate::model::body::Body;
+use crate::model::local::BlendKind;
 use crate::model::local::Feedback;
 use crate::runtime::{Disturbance, Execution, RateGroup};
 use crate::scene::{BlendSpec, Friction, ModelChoice, SafetyStage, Scene, StepKind};

@@ -8,8 +8,8 @@ use crate::actors::{LoggerOutcome, SurfaceView, ToolView};
 use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
 use crate::model::mesh::Surface;
-use crate::runtime::{Histogram, HistogramReader};
 use crate::runtime::{GroupLive, Nanos, OutletReader, RunningGraph, RuntimeReport, StopHandle};
+use crate::runtime::{Histogram, HistogramReader};
 
 /// A session that runs. Dropping it commands zero force and joins its threads, within
 /// [`STOP_BOUND`](crate::runtime::STOP_BOUND) per group.

@@ -11,8 +11,9 @@ use std::process::{Command, Output};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use palpate::log::{ContactMode, LogEntry, LogReader, LogRecord};
+use palpate::log::{LogEntry, LogReader, LogRecord};
 use palpate::model::body::Block;
+use palpate::model::contact::ContactMode;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::model::mesh::Face;
 use palpate::runtime::Nanos;

@@ -1,10 +1,10 @@
 //! A small run for the log tests: every kind of record, at the rates of a real one.
 
 use palpate::log::{
-    CommandSample, ContactMode, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, GroupStats, Level,
-    LogEntry, LogRecord, LoggedExecution, McapWriter, Percentiles, ProbeSample, Resync, ServedBy, TextEvent,
-    ToolSample,
+    CommandSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, GroupStats, Level, LogEntry,
+    LogRecord, LoggedExecution, McapWriter, Percentiles, ProbeSample, Resync, ServedBy, TextEvent, ToolSample,
 };
+use palpate::model::contact::ContactMode;
 use palpate::runtime::{Event, SlipCause, TickTiming};
 use palpate::runtime::{GroupMode, PortUse};
 use palpate::runtime::{Nanos, Rate};

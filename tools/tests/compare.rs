@@ -2,7 +2,7 @@
 
 mod support;
 
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 use serde_json::Value;
 
 use support::{Called, Folder};

@@ -12,10 +12,10 @@ use measure::{MAX_FORCE_N, Measured, Traced};
 use palpate::log::LogRecord;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
 use palpate::prelude::*;
-use palpate::model::local::Kind as LocalModelKind;
 use palpate::scene::Scene;
 
 fn scene(name: &str) -> Scene {

@@ -6,10 +6,10 @@ use std::path::Path;
 
 use palpate::Session;
 use palpate::log::LogRecord;
-use palpate_cli::compare::{ForceTrace, ModelError};
 use palpate::model::local::BlendKind;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::scene::{BlendSpec, Scene, StepKind};
+use palpate_cli::compare::{ForceTrace, ModelError};
 
 fn scene(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(format!("{name}.toml"));

@@ -4,7 +4,8 @@
 mod repository;
 
 use palpate::ErrorKind;
-use palpate::scene::{Scene, Shape};
+use palpate::model::body::Shape;
+use palpate::scene::Scene;
 use palpate_cli::reduce::findings::{Locality, ReductionStudy};
 use palpate_cli::reduce::{ReduceOptions, reduce_scene};
 

@@ -4,9 +4,9 @@
 use std::path::Path;
 
 use palpate::Session;
-use palpate_cli::compare::{ForceTrace, ModelError};
 use palpate::model::local::{Kind as LocalModelKind, Prediction};
 use palpate::scene::Scene;
+use palpate_cli::compare::{ForceTrace, ModelError};
 
 const IN_TIME: f64 = 0.0;
 /// A period of 30 Hz is 33.33 ms.

@@ -9,13 +9,13 @@ use common::{STD, block, drag_path, minjerk, simulation};
 use palpate::Session;
 use palpate::devices::{Scripted, ToolPath};
 use palpate::log::{LogEntry, LogReader, ToolSample};
-use palpate_cli::compare::{ForceTrace, ModelError};
 use palpate::model::Vec3;
 use palpate::model::contact::{Contact, ToolMotion};
 use palpate::model::local::Kind as LocalModelKind;
+use palpate::runtime::Nanos;
 use palpate::scene::{DeviceKind, DeviceSpec, Scene};
 use palpate::session::{SessionBuilder, Summary};
-use palpate::runtime::Nanos;
+use palpate_cli::compare::{ForceTrace, ModelError};
 
 const TICKS: u32 = 2500;
 

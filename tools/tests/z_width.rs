@@ -6,7 +6,7 @@ mod repository;
 #[path = "../examples/safety_figures/z_width.rs"]
 mod z_width;
 
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 
 use z_width::{LIMIT_CYCLE_M, Sweep, Wall, theory};
 

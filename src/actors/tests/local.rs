@@ -3,9 +3,9 @@
 use super::*;
 use crate::devices::DeviceState;
 use crate::log::LogRecord;
-use crate::model::local::Blend;
 use crate::model::body::{Block, Body, State};
 use crate::model::contact::{Law, ToolMotion};
+use crate::model::local::Blend;
 use crate::model::local::{Full, Hold};
 use crate::model::mesh::Face;
 use crate::model::simulation::{Simulation, Stepping};

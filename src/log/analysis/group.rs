@@ -2,7 +2,7 @@
 
 use crate::log::percentiles::{Distribution, Percentiles};
 use crate::runtime::GroupMode;
-use crate::runtime::{Nanos, SlipCause, SlipCounts, TickTiming};
+use crate::runtime::{Nanos, SlipCounts, TickTiming};
 
 /// The timing of one rate group over a run.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,8 +1,8 @@
 //! What a run did to the force: resyncs, contact, limits.
 
 use crate::log::percentiles::{Distribution, Magnitudes, Percentiles};
-use crate::model::contact::ContactMode;
 use crate::log::records::{CommandSample, ContactSample, ForceSample, Resync, ServedBy};
+use crate::model::contact::ContactMode;
 
 /// The length of a vector, in its own unit.
 pub fn magnitude([x, y, z]: [f64; 3]) -> f64 {

@@ -13,9 +13,7 @@ use prost_types::{FileDescriptorProto, FileDescriptorSet};
 pub(crate) use self::wire::LogMessage;
 use self::wire::{Uint64s, WireEnum, message, messages, wire_enum};
 use super::percentiles::Percentiles;
-use super::records::{
-    CommandSample, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy,
-};
+use super::records::{CommandSample, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy};
 use super::stats::GroupStats;
 use crate::model::contact::ContactMode;
 use crate::runtime::{self, GroupMode, Nanos, PortUse, PortUseKind, SlipCause, TickTiming};

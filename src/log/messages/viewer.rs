@@ -2,8 +2,8 @@
 
 use super::foxglove::{self, Log, Pose, PoseInFrame, Quaternion, Timestamp, Vector3};
 use crate::log::records::{Level, TextEvent, ToolSample};
-use crate::runtime::Nanos;
 use crate::runtime::Event;
+use crate::runtime::Nanos;
 
 /// The one frame of reference, world coordinates.
 pub(super) const FRAME: &str = "world";

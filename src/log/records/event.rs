@@ -1,7 +1,7 @@
 //! Text events: what a reader of the log should be told in words.
 
-use crate::runtime::Nanos;
 use crate::runtime::Event;
+use crate::runtime::Nanos;
 
 /// The gravity of an event.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -21,8 +21,8 @@ pub(super) use tools::Tool;
 
 use super::parts::{Options, Parts};
 use crate::error::Error;
-use crate::model::local::Blend;
 use crate::model::contact::{Equations, Law};
+use crate::model::local::Blend;
 use crate::model::local::{Feedback, Kind, MOST_EXPLICIT_STEPS, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};

@@ -9,7 +9,7 @@ use super::report::LoggedFault;
 use crate::devices::{DeviceState, ReplayedSample};
 use crate::error::{Error, ErrorKind};
 use crate::log::{
-    Environment, EventSum, LoggedExecution, GroupStats, Level, LogEntry, LogReader, LogRecord, TextEvent, ToolSample,
+    Environment, EventSum, GroupStats, Level, LogEntry, LogReader, LogRecord, LoggedExecution, TextEvent, ToolSample,
 };
 use crate::model::body::Block;
 use crate::runtime::{Nanos, Recording, TickTiming};

@@ -2,7 +2,7 @@
 
 use crate::devices::DeviceState;
 use crate::error::Error;
-use crate::log::{Environment, LoggedExecution, GroupInfo, ModelReason, ToolSample};
+use crate::log::{Environment, GroupInfo, LoggedExecution, ModelReason, ToolSample};
 use crate::model::body::Block;
 use crate::runtime::{Execution, Rate};
 use crate::safety::Actions;

@@ -9,8 +9,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use palpate::error::Error;
 use palpate::model::body::InstructionSet;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::scene::Scene;
 use palpate_cli::compare::{CompareOptions, Comparison, Measured, ModelCost, RunOutcome, compare};
 pub use repository::in_repository;
 

@@ -3,17 +3,17 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use palpate::{Error, ErrorKind};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
-use palpate::model::local::ToolForecast;
 use palpate::model::integrator::Spectrum;
+use palpate::model::local::ToolForecast;
 use palpate::model::local::{Kind, LocalModel, Prediction, ResyncView, Template};
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
 use palpate::model::surroundings::{Bases, Basis, SpringGraph};
 use palpate::runtime::{Nanos, Stopwatch};
+use palpate::{Error, ErrorKind};
 use palpate_cli::drawing::{Picture, Series};
 
 use crate::common::{colour, figure, table, us};

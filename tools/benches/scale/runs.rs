@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use palpate::devices::ToolPath;
 use palpate::error::Error;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::{Nanos, Rate};
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::scene::Scene;
 use palpate::session::{Session, Summary};
 use palpate_cli::compare::{ForceDeviation, ForceTrace, one_period};
 

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use palpate::error::Error;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Rate;
-use palpate::scene::LocalModelKind;
 use palpate_cli::compare::{CompareOptions, Comparison, Measured, one_period};
 use palpate_cli::drawing::{Picture, Series};
 

@@ -1,8 +1,10 @@
 //! Patch sizes, basis sizes, substeps and the two predictions, results one period late.
 
 use palpate::error::Error;
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::model::local::Prediction;
 use palpate::runtime::Rate;
-use palpate::scene::{LocalModelKind, Prediction, Scene};
+use palpate::scene::Scene;
 use palpate_cli::compare::{CompareOptions, Comparison, Measured, one_period};
 use palpate_cli::drawing::{Picture, Series};
 

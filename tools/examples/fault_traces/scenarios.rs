@@ -9,10 +9,11 @@ use std::time::Duration;
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::model::mesh::Face;
 use palpate::prelude::*;
 use palpate::runtime::Nanos;
-use palpate::scene::{LocalModelKind, SafetyStage};
+use palpate::scene::SafetyStage;
 use palpate::session::{SessionBuilder, Summary};
 
 use altered_block::AlteredBlock;

@@ -5,14 +5,14 @@ use std::path::Path;
 use palpate::Error;
 use palpate::devices::ToolPath;
 use palpate::log::LogRecord;
-use palpate_cli::compare::{ForceTrace, ModelError};
 use palpate::model::body::{Block, Body, Spring, SpringNetwork};
-use palpate::model::mesh::Face;
-use palpate::runtime::{Disturbance, RateGroup};
 use palpate::model::local::Kind as LocalModelKind;
+use palpate::model::mesh::Face;
+use palpate::runtime::Nanos;
+use palpate::runtime::{Disturbance, RateGroup};
 use palpate::scene::Scene;
 use palpate::session::{Session, SessionBuilder};
-use palpate::runtime::Nanos;
+use palpate_cli::compare::{ForceTrace, ModelError};
 
 use super::cases::{Case, Run, Setup, Upset};
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use palpate::model::Vec3;
-use palpate::scene::LocalModelKind;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate_cli::drawing::{BLUE, Curve, INK, ORANGE, Panel, Sheet};
 
 use crate::runs::{ForceRun, ForceRuns};

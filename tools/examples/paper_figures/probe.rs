@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use palpate::log::{LogRecord, ProbeSample};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate::scene::LocalModelKind;
 use palpate_cli::drawing::{BLUE, Curve, GREEN, INK, ORANGE, Panel, Sheet};
 
 use crate::delay::Delay;

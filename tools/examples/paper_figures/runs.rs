@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 
-use palpate::session::Summary;
 use palpate::log::LogRecord;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::scene::Scene;
+use palpate::session::Summary;
 
 use crate::forces::{Difference, forces, peak};
 use crate::repository::in_repository;

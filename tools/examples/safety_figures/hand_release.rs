@@ -2,8 +2,9 @@
 
 use palpate::Summary;
 use palpate::log::LogRecord;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate::scene::{LocalModelKind, SafetySpec, Scene};
+use palpate::scene::{SafetySpec, Scene};
 use palpate_cli::drawing::{BLUE, Curve, GREEN, INK, ORANGE, Panel, RED, Sheet};
 
 use crate::repository::in_repository;

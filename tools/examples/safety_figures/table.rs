@@ -3,8 +3,8 @@
 use std::sync::{Mutex, PoisonError};
 use std::{fmt, thread};
 
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate::scene::LocalModelKind;
 use palpate_cli::drawing::{BLUE, Curve, GREEN, GREY, INK, ORANGE, Panel, RED, Sheet};
 
 use crate::z_width::{STIFFNESS, Sweep, theory};

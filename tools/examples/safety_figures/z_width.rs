@@ -5,8 +5,8 @@
 
 use palpate::log::LogRecord;
 use palpate::model::equilibrium::static_equilibrium;
-use palpate::prelude::*;
 use palpate::model::local::Kind as LocalModelKind;
+use palpate::prelude::*;
 use palpate::scene::Scene;
 
 use crate::repository::in_repository;

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::Scene;
 use palpate::{Error, ErrorKind};
 
 use super::{progress, run, shared};

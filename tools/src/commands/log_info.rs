@@ -1,6 +1,6 @@
 //! What `palpate log` prints: a log's contents as text and as JSON.
 
-use palpate::log::{Environment, Execution};
+use palpate::log::{Environment, LoggedExecution};
 use serde_json::{Value, json};
 
 use crate::log_file::LogInfo;

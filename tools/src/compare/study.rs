@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use palpate::model::body::Block;
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Histogram;
 use palpate::runtime::{Nanos, Rate, Stopwatch};
-use palpate::scene::{LocalModelKind, Scene};
+use palpate::scene::Scene;
 use palpate::session::{Session, Summary};
 use palpate::{Error, ErrorKind};
 
@@ -165,16 +166,16 @@ fn measured(summary: &Summary, full: Option<&ForceTrace>) -> Measured {
 fn cost(summary: &Summary) -> ModelCost {
     let simulated_s = summary.report.duration.as_secs_f64();
     let of = |name: &str| summary.runtime.costs.iter().find(|cost| cost.name == name).map(|cost| &cost.cpu);
-    let load = |cpu: Option<&Snapshot>| cpu.map_or(0.0, |cpu| cpu.sum().as_secs_f64() / simulated_s);
-    let percentile = |cpu: Option<&Snapshot>, q: f64| cpu.map_or(Nanos::ZERO, |cpu| cpu.percentile(q));
+    let load = |cpu: Option<&Histogram>| cpu.map_or(0.0, |cpu| cpu.sum().as_secs_f64() / simulated_s);
+    let percentile = |cpu: Option<&Histogram>, q: f64| cpu.map_or(Nanos::ZERO, |cpu| cpu.percentile(q));
     let (haptic, builds) = (of("local"), summary.builds.as_ref());
     ModelCost {
         tick_p50: percentile(haptic, 0.5),
         tick_p99: percentile(haptic, 0.99),
-        tick_max: haptic.map_or(Nanos::ZERO, Snapshot::max),
+        tick_max: haptic.map_or(Nanos::ZERO, Histogram::max),
         haptic_load: load(haptic),
         global_load: load(of("global")),
-        builds: builds.map_or(0, Snapshot::count),
+        builds: builds.map_or(0, Histogram::count),
         build_p50: percentile(builds, 0.5),
         build_p99: percentile(builds, 0.99),
     }

@@ -1,7 +1,8 @@
 //! The columns of each topic, and its entries as cells: what every table format writes, each in its own way.
 
 use palpate::log::TopicKind;
-use palpate::log::{ContactMode, ContactSample, GroupStats, LogEntry, LogRecord, TextEvent};
+use palpate::log::{ContactSample, GroupStats, LogEntry, LogRecord, TextEvent};
+use palpate::model::contact::ContactMode;
 
 /// The type of a column of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Write};
 
-use palpate::log::topic::Kind;
+use palpate::log::TopicKind;
 use palpate::log::{LogEntry, LogReader, Window};
 use palpate::{Error, ErrorKind};
 

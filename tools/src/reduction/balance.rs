@@ -1,7 +1,7 @@
 //! Balanced truncation by the square-root method, and the first-order models that it gives.
 
 use nalgebra::Complex;
-use palpate_model::ModelError;
+use palpate::model::ModelError;
 
 use super::congruence::Congruence;
 use super::gramian;

@@ -1,6 +1,6 @@
 //! Static condensation, with and without modes of what is left out.
 
-use palpate_model::ModelError;
+use palpate::model::ModelError;
 
 use super::congruence::Congruence;
 use super::krylov::Projection;

@@ -1,7 +1,7 @@
 //! How wrong a congruence can be, from its residual alone.
 
 use nalgebra::Complex;
-use palpate_model::ModelError;
+use palpate::model::ModelError;
 
 use super::congruence::Congruence;
 use super::krylov::Projection;

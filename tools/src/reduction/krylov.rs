@@ -1,6 +1,6 @@
 //! Structure-preserving moment matching: a congruence whose basis answers like the whole around chosen frequencies.
 
-use palpate_model::ModelError;
+use palpate::model::ModelError;
 
 use super::balance::Balanced;
 use super::congruence::Congruence;

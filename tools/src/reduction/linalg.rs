@@ -1,9 +1,9 @@
-//! What reductions do with dense matrices, beside what [`palpate_model::linear_algebra`] does.
+//! What reductions do with dense matrices, beside what [`palpate::model::linear_algebra`] does.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-pub use palpate_model::linear_algebra::Matrix;
-pub(super) use palpate_model::linear_algebra::{
+pub use palpate::model::linear_algebra::Matrix;
+pub(super) use palpate::model::linear_algebra::{
     SparseFactor, cholesky, eigenvalues, lower_factor, product, product_t, solve_positive, svd, symmetric_eigen,
 };
 

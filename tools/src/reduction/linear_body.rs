@@ -1,9 +1,9 @@
 //! A deformable body, linear around a state, with a port wherever a tool may touch it.
 
-use palpate_model::ModelError;
-use palpate_model::Vec3;
-use palpate_model::body::{Body, State};
-use palpate_model::linear_algebra::dissection;
+use palpate::model::ModelError;
+use palpate::model::Vec3;
+use palpate::model::body::{Body, State};
+use palpate::model::linear_algebra::dissection;
 
 use super::linalg::Matrix;
 use super::system::{Assembly, Ports, SecondOrder};

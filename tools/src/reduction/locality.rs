@@ -1,7 +1,7 @@
 //! How much of what a tool feels at a contact a patch between held surroundings captures.
 
 use nalgebra::Complex;
-use palpate_model::ModelError;
+use palpate::model::ModelError;
 
 use super::congruence::Congruence;
 use super::krylov::many_shifts;

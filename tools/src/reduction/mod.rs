@@ -15,7 +15,7 @@
 //! ```
 //! use palpate_cli::reduction::{Balanced, Modal, PaperMesh, Response};
 //!
-//! # fn main() -> Result<(), palpate_model::ModelError> {
+//! # fn main() -> Result<(), palpate::model::ModelError> {
 //! let system = PaperMesh::square(5).system()?;
 //! let whole = Modal::new(&system).expect("its damping is proportional");
 //! let balanced = Balanced::modal(&whole)?;

@@ -1,7 +1,7 @@
 //! Modes of a proportionally damped system: its responses and Gramians in closed form; and the slowest ones of a large system.
 
 use nalgebra::Complex;
-use palpate_model::ModelError;
+use palpate::model::ModelError;
 
 use super::congruence::Congruence;
 use super::linalg::{CMatrix, Matrix, append_orthonormal, complex, pencil_eigen, product, symmetric_eigen};

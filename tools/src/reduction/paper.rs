@@ -1,6 +1,6 @@
 //! The meshes of the paper's section 2.2: squares and cubes of cells whose top-middle node is moved.
 
-use palpate_model::ModelError;
+use palpate::model::ModelError;
 
 use super::linalg::Matrix;
 use super::system::{Assembly, Ports, SecondOrder};

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use nalgebra::Complex;
-use palpate_model::ModelError;
+use palpate::model::ModelError;
 
 use super::linalg::{CMatrix, Matrix, SparseFactor, product_t, side_by_side, span};
 

@@ -17,8 +17,9 @@
 //! `P` is `count`, `p50`, `p90`, `p99`, `p999` or `max`; without a sample there is only the count. With several devices
 //! the name of the device comes first: `left.resync.age.p99`.
 
-use palpate::log::{CauseCounts, DeviceReport, GroupReport, Percentiles};
+use palpate::log::{DeviceReport, GroupSummary, Percentiles};
 use palpate::runtime::SlipCause;
+use palpate::runtime::SlipCounts;
 
 use super::analysis::TimingReport;
 
@@ -148,7 +149,7 @@ impl Figures {
         }
     }
 
-    fn causes(&mut self, name: &str, counts: CauseCounts) {
+    fn causes(&mut self, name: &str, counts: SlipCounts) {
         self.count(name, counts.total());
         for (cause, count) in counts.iter().filter(|&(_, count)| count > 0) {
             self.count(&format!("{name}.{}", cause_name(cause)), count);

@@ -31,10 +31,10 @@
 //! `late_wake`, `long_tick`, `stalled_peer`, `policy`, `fault` and `unattributed`.
 
 use palpate::log::{
-    CauseCounts, DeviceReport, Environment, ForceReport, GroupSummary, Level, LoggedExecution, Percentiles, RunReport,
-    TextEvent,
+    DeviceReport, Environment, ForceReport, GroupSummary, Level, LoggedExecution, Percentiles, RunReport, TextEvent,
 };
 use palpate::report::verdict;
+use palpate::runtime::SlipCounts;
 use palpate::runtime::TickTiming;
 use serde_json::{Map, Value, json};
 
@@ -259,7 +259,7 @@ fn group(group: &GroupSummary) -> Value {
     })
 }
 
-fn causes(counts: CauseCounts) -> Value {
+fn causes(counts: SlipCounts) -> Value {
     Value::Object(counts.iter().map(|(cause, count)| (cause_name(cause).to_owned(), json!(count))).collect())
 }
 

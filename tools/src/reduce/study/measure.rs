@@ -5,7 +5,10 @@ use std::f64::consts::PI;
 use palpate::devices::ToolPath;
 use palpate::log::LogRecord;
 use palpate::model::body::{Block, Body};
-use palpate::scene::{BlendKind, BlendSpec, Feedback, LocalModelKind, Scene};
+use palpate::model::local::BlendKind;
+use palpate::model::local::Feedback;
+use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::{BlendSpec, Scene};
 use palpate::session::Session;
 use palpate::{Error, ErrorKind};
 

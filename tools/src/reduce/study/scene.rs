@@ -15,8 +15,8 @@ use crate::reduce::findings::{
     BasisError, Budget, ContactLocality, HankelDecay, Locality, PatchError, ReductionStudy, ResponseFigure,
 };
 use crate::reduction::{
-    ContactStiffness, LinearBody, LocalityCheck, Matrix, StateSpace, StiffnessError, gain_error, log_spaced, low_rank,
-    one_shift, stiffness_along, typical_gain_error,
+    ContactStiffness, LinearBody, LocalityCheck, Matrix, Modal, StateSpace, StiffnessError, gain_error, log_spaced,
+    low_rank, one_shift, stiffness_along, typical_gain_error,
 };
 
 /// What happens between two resyncs (Hz): 10 Hz is a third of the global model's rate, 1 kHz the haptic rate.
@@ -169,7 +169,7 @@ impl Study<'_> {
     }
 
     fn patch_at(&self, node: u32, size: [usize; 3]) -> Result<ContactStiffness, Error> {
-        self.check.patch(&self.coordinates(node, size), &self.direction(node))
+        Ok(self.check.patch(&self.coordinates(node, size), &self.direction(node))?)
     }
 
     /// What a patch of `size` captures at `node`, and how many nodes move in it.
@@ -251,7 +251,7 @@ impl Study<'_> {
         orders.extend(order);
         orders.sort_unstable();
         orders.dedup();
-        let (model, modal) = (&reduced.projection.model, reduced.projection.model.modal());
+        let (model, modal) = (&reduced.projection.model, Modal::of(&reduced.projection.model));
         let hinf_pct = |truncated: &StateSpace| match &modal {
             Some(modal) => gain_error(modal, truncated),
             None => typical_gain_error(&system, model, truncated),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use palpate::log::{Environment, Execution, GroupInfo, LogEntry, TextEvent, Window};
+use palpate::log::{Environment, GroupInfo, LogEntry, LoggedExecution, TextEvent, Window};
 use palpate::runtime::Nanos;
 use palpate::{Error, ErrorKind};
 use serde_json::Value;

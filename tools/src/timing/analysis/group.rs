@@ -55,7 +55,7 @@ pub struct ActorTiming {
     pub execution: Shape,
 }
 
-/// How one rate group kept time, in detail; the sums are in [`GroupReport`](palpate::log::GroupSummary).
+/// How one rate group kept time, in detail; the sums are in [`GroupSummary`](palpate::log::GroupSummary).
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroupTiming {
     /// Its name.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use palpate::log::{Environment, Execution, RunReport};
+use palpate::log::{Environment, LoggedExecution, RunReport};
 
 use super::named_figures::{Numbers, grouped};
 use crate::drawing::html::escaped;

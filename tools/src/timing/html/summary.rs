@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use palpate::report::{Verdict, verdict};
+use palpate::report::{RunVerdict, verdict};
 
 use super::causes::words;
 use super::named_figures::Numbers;

@@ -1,4 +1,4 @@
-use palpate::log::{CommandSample, Environment, Execution, ForceSample, GroupInfo, LogEntry, LogRecord, Resync};
+use palpate::log::{CommandSample, Environment, ForceSample, GroupInfo, LogEntry, LogRecord, LoggedExecution, Resync};
 use palpate::runtime::Nanos;
 use palpate::runtime::{ActorTimes, SlipCause, TickTiming};
 
