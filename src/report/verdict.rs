@@ -109,7 +109,10 @@ mod tests {
         let good = (RunVerdict::Ok, "1.500 s of virtual time, every period kept, every deadline met".to_owned());
         assert_eq!(verdict(&report(0)), good);
         let late = verdict(&report(3));
-        assert_eq!(late, (RunVerdict::Late, "3 periods skipped and 0 deadlines missed in 1.500 s of virtual time".into()));
+        assert_eq!(
+            late,
+            (RunVerdict::Late, "3 periods skipped and 0 deadlines missed in 1.500 s of virtual time".into())
+        );
         let cut = RunReport { damage: Some("cut".into()), ..report(0) };
         assert_eq!(verdict(&cut).0, RunVerdict::Incomplete);
         let both = RunReport { worst_event: Some(Level::Error), ..report(3) };
