@@ -216,17 +216,18 @@ macro_rules! message {
             const NAME: &'static str = $message;
 
             fn descriptor() -> prost_types::DescriptorProto {
-                use $crate::log::messages::wire::{Wire, last_part, message_field};
+                use $crate::log::messages::wire::{Wire, last_part};
                 let value = &Self::default();
                 let field = vec![$(
-                    message_field!(@get value $of).describe(message_field!(@name $field $($name)?), $number)
+                    $crate::log::messages::wire::message_field!(@get value $of)
+                        .describe($crate::log::messages::wire::message_field!(@name $field $($name)?), $number)
                 ),+];
                 prost_types::DescriptorProto { name: Some(last_part($message).into()), field, ..Default::default() }
             }
 
             fn encode(&self, to: &mut Vec<u8>) {
-                use $crate::log::messages::wire::{Wire, message_field};
-                $( message_field!(@get self $of).encode_field($number, to); )+
+                use $crate::log::messages::wire::Wire;
+                $( $crate::log::messages::wire::message_field!(@get self $of).encode_field($number, to); )+
             }
 
             fn merge(
@@ -235,11 +236,11 @@ macro_rules! message {
                 wire: prost::encoding::WireType,
                 from: &mut &[u8],
             ) -> Result<(), prost::DecodeError> {
-                use $crate::log::messages::wire::{last_part, message_field};
+                use $crate::log::messages::wire::last_part;
                 let (merged, field) = match number {
                     $( $number => (
-                        message_field!(@merge self $of number wire from),
-                        message_field!(@name $field $($name)?),
+                        $crate::log::messages::wire::message_field!(@merge self $of number wire from),
+                        $crate::log::messages::wire::message_field!(@name $field $($name)?),
                     ), )+
                     _ => return prost::encoding::skip_field(wire, number, from, Default::default()),
                 };
@@ -420,7 +421,7 @@ mod tests {
     #[test]
     fn damage_is_named_with_message_and_field_and_an_unknown_enum_is_the_default() {
         let error = Sample::decode(&[9 << 3 | 2, 2, 1 << 3, 1]).unwrap_err().to_string();
-        assert!(error.contains("Sample.place: Point.x: invalid wire type"), "{error}");
+        assert!(error.contains("Point.x: Sample.place: invalid wire type"), "{error}");
         assert!(Sample::decode(&[9 << 3 | 2, 200]).is_err());
         assert_eq!(Sample::decode(&[6 << 3, 77, 100 << 1]).map(|sample| sample.level).ok(), None);
         assert_eq!(Sample::decode(&[6 << 3, 77, 12 << 3, 5]).map(|sample| sample.level), Ok(Level::Unknown));
