@@ -23,7 +23,8 @@ use std::time::{Duration, Instant};
 use palpate::log::{CommandSample, ContactSample, ForceSample, LogRecord, ToolSample};
 use palpate::runtime::Nanos;
 use palpate::runtime::{
-    Actor, ActorTimes, Execution, Outcome, RateGroup, Recorder, Running, Runtime, TickContext, TickTiming, actor_fn,
+    Actor, ActorTimes, Execution, Outcome, RateGroup, Recorder, RunningGraph, Runtime, TickContext, TickTiming,
+    actor_fn,
 };
 
 const MS: u64 = 1_000_000;
@@ -84,7 +85,7 @@ fn haptic(mut recorder: Option<Recorder>) -> Box<dyn Actor> {
     })
 }
 
-fn advance(running: &Running) -> f64 {
+fn advance(running: &RunningGraph) -> f64 {
     let begun = Instant::now();
     running.wait_for(Duration::from_millis(1));
     begun.elapsed().as_secs_f64() * 1e9

@@ -5,9 +5,9 @@ mod session_support;
 
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use palpate::log::{Environment, Level, LogEntry, LogReader, LogRecord, McapWriter, TextEvent};
-use palpate::model::contact::ContactMode;
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
+use palpate::model::contact::ContactMode;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::runtime::Nanos;
 use palpate::runtime::{PortUseKind, RateGroup};

@@ -1,7 +1,7 @@
 //! Small bodies, paths and records for tests of whole sessions.
 #![allow(dead_code)]
 
-#[path = "../../tools/examples/common/altered_block.rs"]
+#[path = "../../examples/common/altered_block.rs"]
 mod altered_block;
 
 #[allow(unused_imports)]

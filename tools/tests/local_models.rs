@@ -9,7 +9,7 @@ use palpate::log::LogRecord;
 use palpate::model::local::BlendKind;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::scene::{BlendSpec, Scene, StepKind};
-use palpate_cli::compare::{ForceTrace, ModelError};
+use palpate_cli::compare::{ForceDeviation, ForceTrace};
 
 fn scene(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(format!("{name}.toml"));
@@ -23,9 +23,9 @@ fn forces(scene: Scene) -> ForceTrace {
     ForceTrace::of(&summary.records)
 }
 
-fn error(run: &ForceTrace, full: &ForceTrace) -> ModelError {
+fn error(run: &ForceTrace, full: &ForceTrace) -> ForceDeviation {
     assert_eq!(run.forces_n.len(), full.forces_n.len());
-    ModelError::between(run, full)
+    ForceDeviation::between(run, full)
 }
 
 use Feedback::{ContactNodes, Geometry, Trajectory};

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use palpate::devices::{Scripted, ToolPath};
 use palpate::log::{Environment, LogEntry, LogReader};
-use palpate::scene::{ModelChoice, Scene};
 use palpate::model::local::Kind as LocalModelKind;
+use palpate::scene::{ModelChoice, Scene};
 use palpate::session::{Session, SessionBuilder, Summary};
 use palpate_cli::timing::to_json;
 

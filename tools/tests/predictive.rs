@@ -6,7 +6,7 @@ use std::path::Path;
 use palpate::Session;
 use palpate::model::local::{Kind as LocalModelKind, Prediction};
 use palpate::scene::Scene;
-use palpate_cli::compare::{ForceTrace, ModelError};
+use palpate_cli::compare::{ForceDeviation, ForceTrace};
 
 const IN_TIME: f64 = 0.0;
 /// A period of 30 Hz is 33.33 ms.
@@ -26,14 +26,14 @@ impl Case {
     }
 
     /// The error of `predictive`, and what `full` itself jumps.
-    fn error(&self, latency_ms: f64, change: impl Fn(&mut Scene)) -> (ModelError, f64) {
+    fn error(&self, latency_ms: f64, change: impl Fn(&mut Scene)) -> (ForceDeviation, f64) {
         let mut scene = self.scene.clone().with_model(LocalModelKind::Predictive);
         scene.global.compute_latency_ms = latency_ms;
         change(&mut scene);
         let (forces, served) = forces(scene);
         assert_eq!(forces.forces_n.len(), self.full.forces_n.len());
-        let error = ModelError::between(&forces, &self.full);
-        let own_jump = ModelError::between(&self.full, &self.full).jump;
+        let error = ForceDeviation::between(&forces, &self.full);
+        let own_jump = ForceDeviation::between(&self.full, &self.full).jump;
         println!("{latency_ms} ms late: {error:.3?}, full jumps {own_jump:.2}; {served}");
         (error, own_jump)
     }

@@ -1,6 +1,6 @@
 //! Faults of every part of a session, on real threads: the force that reaches the device through each of them.
 
-#[path = "../tools/examples/fault_traces/scenarios.rs"]
+#[path = "../examples/fault_traces/scenarios.rs"]
 mod scenarios;
 
 use palpate::log::{CommandSample, LogRecord};

@@ -15,7 +15,7 @@ use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
 use palpate::scene::{DeviceKind, DeviceSpec, Scene};
 use palpate::session::{SessionBuilder, Summary};
-use palpate_cli::compare::{ForceTrace, ModelError};
+use palpate_cli::compare::{ForceDeviation, ForceTrace};
 
 const TICKS: u32 = 2500;
 
@@ -94,12 +94,12 @@ fn tools_can_be_given_in_any_order() {
 }
 
 /// The errors of both tools, in % of each one's peak.
-fn errors(model: LocalModelKind, late_ms: f64, references: &[ForceTrace; 2]) -> [ModelError; 2] {
+fn errors(model: LocalModelKind, late_ms: f64, references: &[ForceTrace; 2]) -> [ForceDeviation; 2] {
     let summary = run(builder(model, late_ms));
     [0, 1].map(|device: u16| {
         let forces = ForceTrace::of_device(&summary.records, device);
         assert_eq!(forces.forces_n.len(), TICKS as usize);
-        let error = ModelError::between(&forces, &references[usize::from(device)]);
+        let error = ForceDeviation::between(&forces, &references[usize::from(device)]);
         println!("{} {late_ms} ms late, device {device}: {error:.3?}", model.name());
         error
     })

@@ -232,7 +232,8 @@ impl Analysis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::{CommandSample, ContactMode, ContactReport, ContactSample, ForceSample, GroupInfo, Resync};
+    use crate::log::{CommandSample, ContactReport, ContactSample, ForceSample, GroupInfo, Resync};
+    use crate::model::contact::ContactMode;
     use crate::runtime::GroupMode;
     use crate::runtime::{SlipCause, TickTiming};
 

@@ -149,7 +149,7 @@ mod tests {
             }),
             LogRecord::Contact(ContactSample {
                 time,
-                mode: ContactMode::Slip,
+                mode: crate::model::contact::ContactMode::Slip,
                 triangle: 42,
                 weights: [0.25, 0.5],
                 normal: [0.0, 0.0, 1.0],

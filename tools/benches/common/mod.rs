@@ -7,7 +7,7 @@
 mod repository;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use palpate::error::Error;
+use palpate::Error;
 use palpate::model::body::InstructionSet;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;

@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
+use palpate::Error;
 use palpate::devices::ToolPath;
-use palpate::error::Error;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::{Nanos, Rate};
 use palpate::scene::Scene;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use palpate::error::Error;
+use palpate::Error;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
 use palpate_cli::compare::{CompareOptions, Comparison, Measured, conclusions};

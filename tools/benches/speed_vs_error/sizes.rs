@@ -1,6 +1,6 @@
 //! Patch sizes, basis sizes, substeps and the two predictions, results one period late.
 
-use palpate::error::Error;
+use palpate::Error;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::model::local::Prediction;
 use palpate::runtime::Rate;

@@ -12,7 +12,7 @@ use palpate::runtime::Nanos;
 use palpate::runtime::{Disturbance, RateGroup};
 use palpate::scene::Scene;
 use palpate::session::{Session, SessionBuilder};
-use palpate_cli::compare::{ForceTrace, ModelError};
+use palpate_cli::compare::{ForceDeviation, ForceTrace};
 
 use super::cases::{Case, Run, Setup, Upset};
 
@@ -37,14 +37,14 @@ pub struct Traced {
 /// A model against `full`.
 #[derive(Debug)]
 pub struct Measured {
-    pub error: ModelError,
+    pub error: ForceDeviation,
     /// Its largest force, and that of `full` (N).
     pub peaks_n: [f64; 2],
 }
 
 impl Measured {
     pub fn between(run: &Traced, full: &Traced) -> Self {
-        let error = ModelError::between(&run.trace, &full.trace);
+        let error = ForceDeviation::between(&run.trace, &full.trace);
         Self { peaks_n: [run.trace.peak_n(), full.trace.peak_n()], error }
     }
 

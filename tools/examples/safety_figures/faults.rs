@@ -1,9 +1,9 @@
 //! The force through each fault of `scenes/device_faults.toml`.
 
-use palpate::Summary;
 use palpate::log::LogRecord;
 use palpate::prelude::*;
 use palpate::scene::Scene;
+use palpate::session::Summary;
 use palpate_cli::drawing::{BLUE, Curve, ORANGE, Panel, Sheet};
 
 use crate::repository::in_repository;

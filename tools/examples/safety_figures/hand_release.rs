@@ -1,10 +1,10 @@
 //! The paper's Fig. 17: a hand that presses and lets go, with each model and without any safety stage; and `hold` with all.
 
-use palpate::Summary;
 use palpate::log::LogRecord;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
 use palpate::scene::{SafetySpec, Scene};
+use palpate::session::Summary;
 use palpate_cli::drawing::{BLUE, Curve, GREEN, INK, ORANGE, Panel, RED, Sheet};
 
 use crate::repository::in_repository;
