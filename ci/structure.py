@@ -61,7 +61,9 @@ def items(doc, crate):
     page = (doc / crate / "all.html").read_text()
     for kind, body in re.findall(r'<h3 id="([a-z-]+)">[^<]*</h3><ul class="all-items">(.*?)</ul>', page, re.S):
         for link, name in re.findall(r'<li><a href="([^"]+)">([^<]+)</a>', body):
-            yield kind, html.unescape(name), doc / crate / link
+            # A prelude names what is counted where it is at home.
+            if not name.startswith("prelude::"):
+                yield kind, html.unescape(name), doc / crate / link
 
 
 def names(doc):

@@ -8,7 +8,6 @@ use palpate::model::Vec3;
 use palpate::model::body::{Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
 use palpate::model::integrator::Spectrum;
-use palpate::model::local::Blend;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::model::simulation::{Simulation, Stepping};
 use palpate::runtime::{Nanos, Rate};

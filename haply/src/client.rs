@@ -25,7 +25,7 @@ const LOOK_AGAIN: Duration = Duration::from_micros(20);
 /// A service that has just connected answers within this, or the first read fails.
 const FIRST_REPLY: Duration = Duration::from_millis(100);
 
-/// What has happened on the simulation channel so far.
+/// The counts of what has happened on the simulation channel so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HaplyCounts {
     /// Messages sent.

@@ -6,7 +6,7 @@ mod repository;
 use palpate::ErrorKind;
 use palpate::model::body::Shape;
 use palpate::scene::Scene;
-use palpate_cli::reduce::findings::{Locality, ReductionStudy};
+use palpate_cli::reduce::{Locality, ReductionStudy};
 use palpate_cli::reduce::{ReduceOptions, reduce_scene};
 
 fn study(name: &str, options: &ReduceOptions) -> ReductionStudy {

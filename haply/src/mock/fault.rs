@@ -3,6 +3,15 @@
 use serde_json::{Value, json};
 use std::time::Duration;
 
+/// A fault that a mock service has once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MockFault {
+    /// The kind of the fault.
+    pub kind: MockFaultKind,
+    /// The number of commands after which it begins; with 0 a status is so from the start, until some time after the first.
+    pub after: u64,
+}
+
 macro_rules! kinds {
     ($($(#[$doc:meta])* $kind:ident $name:literal)*) => {
         /// A way to fail.

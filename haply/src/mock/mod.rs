@@ -5,10 +5,12 @@
 //! a simulated hand. It can be told to fail.
 
 mod fault;
+mod options;
 mod plant;
 mod world;
 
-pub use fault::MockFaultKind;
+pub use fault::{MockFault, MockFaultKind};
+pub use options::{MockCounts, MockOptions};
 
 use crate::protocol::is_plain;
 use crate::wire::{Broken, Wire};
@@ -22,57 +24,6 @@ use world::World;
 
 /// How often waiting threads look whether they should end, or have something to say.
 const LOOK: Duration = Duration::from_millis(5);
-
-/// A fault, once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MockFault {
-    /// Which.
-    pub kind: MockFaultKind,
-    /// It begins with the command after so many; with 0 a status is so from the start, until some time after the first.
-    pub after: u64,
-}
-
-/// What kind of service.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MockOptions {
-    /// Port of the simulation channel on this machine; any free one if 0.
-    pub port: u16,
-    /// Port of the events channel; any free one if 0.
-    pub events_port: u16,
-    /// The id of its one Inverse3.
-    pub device_id: String,
-    /// What it does wrong.
-    pub fault: Option<MockFault>,
-}
-
-impl Default for MockOptions {
-    fn default() -> Self {
-        Self { port: 10001, events_port: 10020, device_id: "049D".to_owned(), fault: None }
-    }
-}
-
-/// What a mock service has seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MockCounts {
-    /// Connections to the simulation channel.
-    pub connections: u64,
-    /// Messages of clients.
-    pub messages: u64,
-    /// Messages that opened or changed a session.
-    pub sessions: u64,
-    /// Messages with a `set_*` command.
-    pub commands: u64,
-    /// Messages that asked for the state only.
-    pub probes: u64,
-    /// Messages with two `set_*` commands for one device.
-    pub conflicts: u64,
-    /// Messages that were not JSON of the documented shape.
-    pub malformed: u64,
-    /// Replies sent.
-    pub replies: u64,
-    /// Events sent.
-    pub events: u64,
-}
 
 /// A service on this machine; it ends when it is dropped.
 #[derive(Debug)]

@@ -1,8 +1,8 @@
 //! The mock's state, shared by its threads under one lock.
 
-use super::fault::MockFaultKind;
+use super::fault::{MockFault, MockFaultKind};
+use super::options::{MockCounts, MockOptions};
 use super::plant::Plant;
-use super::{MockCounts, MockFault, MockOptions};
 use crate::protocol::Vector;
 use crossbeam_channel::Sender;
 use serde::Deserialize;

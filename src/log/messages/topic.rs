@@ -9,7 +9,7 @@ use crate::log::stats::GroupStats;
 use crate::runtime::PortUse;
 use crate::runtime::TickTiming;
 
-/// What the messages of a topic are about.
+/// The kinds of messages that palpate logs, one for each kind of topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[allow(missing_docs)]
 pub enum TopicKind {

@@ -327,14 +327,14 @@ mod tests {
     use super::*;
 
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
-    enum Cause {
+    pub(crate) enum Cause {
         #[default]
         None,
         LateWake,
     }
 
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
-    enum Level {
+    pub(crate) enum Level {
         #[default]
         Unknown,
         Debug,

@@ -26,7 +26,7 @@ pub struct ChunkRecords {
     head: ChunkHead,
 }
 
-/// What the header of a chunk says about it.
+/// The header of a chunk: its times, sizes, compression and checksum.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ChunkHead {
     /// The log time of the earliest message (ns).

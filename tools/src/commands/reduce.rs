@@ -7,7 +7,7 @@ use palpate::{Error, ErrorKind};
 
 use super::progress::StepBar;
 use super::shared;
-use crate::reduce::findings::ReductionStudy;
+use crate::reduce::ReductionStudy;
 use crate::reduce::{
     MeshStudy, PaperStudy, ReduceOptions, locality_verdict, reduce_mesh, reduce_paper, reduce_scene, to_html, to_json,
     to_text,

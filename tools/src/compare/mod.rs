@@ -9,11 +9,13 @@ mod study;
 mod table;
 
 pub use conclusions::conclusions;
-pub use figures::{ComparedRun, Comparison, ForceDeviation, ForceTrace, Measured, ModelCost, RunOutcome};
-pub use html::to_html;
-pub use json::to_json;
-pub use study::{CompareOptions, CompareProgress, compare, one_period};
-pub use table::to_text;
+pub(crate) use figures::ComparedRun;
+pub use figures::{Comparison, ForceDeviation, ForceTrace, Measured, ModelCost, RunOutcome};
+pub(crate) use html::to_html;
+pub(crate) use json::to_json;
+pub(crate) use study::CompareProgress;
+pub use study::{CompareOptions, compare, one_period};
+pub(crate) use table::to_text;
 
 use palpate::runtime::Nanos;
 

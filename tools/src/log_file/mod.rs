@@ -6,10 +6,11 @@ mod recover;
 mod salvage;
 mod summary;
 
-pub use check::{CheckReport, check};
-pub use info::{AttachmentInfo, ChunkInfo, LogInfo, TopicInfo};
-pub use recover::{Lost, Recovered, recover};
-pub use salvage::Damage;
+pub(crate) use check::CheckReport;
+pub use check::check;
+pub use info::LogInfo;
+pub(crate) use recover::Lost;
+pub use recover::{Recovered, recover};
 
 /// First and last of the times seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

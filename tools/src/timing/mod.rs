@@ -12,15 +12,16 @@ mod html;
 mod json;
 mod text;
 
-pub use analysis::{ForcePoint, Moment, Selection, TimingAnalysis, TimingReport, WorstTick, read_cyclictest};
-pub use figures::{Figure, FigureValue, Unit};
-pub use html::timing_html;
-pub use json::{timing_to_json, to_json};
+pub use analysis::{Selection, TimingAnalysis, TimingReport, WorstTick};
+pub use json::to_json;
 pub use text::timing_to_text;
 
 pub(crate) use against::{Against, ComparedFigure};
-pub(crate) use analysis::{CoreUse, DeviceTiming, ForceBin, GroupTiming, ResyncBin, Shape, TickBin};
+pub(crate) use analysis::{
+    CoreUse, DeviceTiming, ForceBin, ForcePoint, GroupTiming, ResyncBin, Shape, TickBin, read_cyclictest,
+};
 pub(crate) use condition::Condition;
-pub(crate) use figures::cause_name;
-pub(crate) use json::against_to_json;
+pub(crate) use figures::{Figure, FigureValue, Unit, cause_name};
+pub(crate) use html::timing_html;
+pub(crate) use json::{against_to_json, timing_to_json};
 pub(crate) use text::{against_to_text, figure_to_text};

@@ -20,7 +20,9 @@ pub use cyclictest::read_cyclictest;
 pub use device::{DeviceTiming, ForceBin, ResyncBin};
 pub use distribution::Shape;
 pub use group::{GroupTiming, TickBin};
-pub use recent::{ForcePoint, Moment};
+pub use recent::ForcePoint;
+#[cfg(test)]
+pub use recent::Moment;
 pub use worst::WorstTick;
 
 use group::GroupDetail;

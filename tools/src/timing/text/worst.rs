@@ -117,7 +117,7 @@ fn around(worst: &WorstTick) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::timing::Moment;
+    use crate::timing::analysis::Moment;
     use palpate::runtime::Nanos;
     use palpate::runtime::TickTiming;
 
