@@ -3,7 +3,4 @@
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 # A folder of its own: the flag changes every dependency. What runs here takes a second: nothing is optimised.
 CARGO_TARGET_DIR="$CARGO_TARGET_DIR/loom" RUSTFLAGS="--cfg loom" \
-    cargo test --locked -p palpate-runtime --lib --config 'profile.dev.opt-level=0' \
-    --config 'profile.dev.package.palpate-runtime.opt-level=0' \
-    --config 'profile.test.package.palpate-runtime.opt-level=0' \
-    --config 'profile.dev.package.palpate-runtime.debug=false' loom
+    cargo test --locked -p palpate-runtime --lib --config 'profile.dev.opt-level=0' --config 'profile.dev.debug=false' loom

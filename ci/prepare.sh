@@ -30,8 +30,7 @@ command -v cargo >/dev/null || { echo "missing: cargo; install the Rust toolchai
 # lz4 is compiled from C.
 command -v cc >/dev/null || install_packages "a C compiler" gcc libc6-dev
 
-# Builds the command and the examples as the tests need them, with the features that tests add to shared dependencies: so all
-# jobs compile them once, in the folder `debug`.
+# Builds the command and the examples as the tests need them: so all jobs compile them once, in the folder `debug`.
 build_programs() {
     cargo build --locked --profile test --bins --examples
 }

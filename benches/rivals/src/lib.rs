@@ -4,9 +4,9 @@
 //! across invocations: the contestants take turns, A B C A B C ..., each ratio is taken between neighbours in time, and
 //! the table shows the median over the rounds.
 
-use palpate::Error;
-use palpate::runtime::{Execution, Outcome, RateGroup, Runtime, actor_fn};
-use palpate::time::Nanos;
+use palpate_runtime::GraphError;
+use palpate_runtime::{Execution, Outcome, RateGroup, Runtime, actor_fn};
+use palpate_runtime::Nanos;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -105,7 +105,7 @@ pub fn cores() -> usize {
 pub fn on_two_cores(
     first: impl FnOnce() + Send + 'static,
     second: impl FnOnce() + Send + 'static,
-) -> Result<(), Error> {
+) -> Result<(), GraphError> {
     let mut graph = Runtime::builder(Execution::Threaded);
     let mut group = |core: usize, work: Box<dyn FnOnce() + Send>| {
         let mut work = Some(work);

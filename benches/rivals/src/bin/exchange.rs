@@ -8,8 +8,8 @@
 //! thread and back through a second exchange and shows half of the round trip, which is mostly the cost of moving cache
 //! lines between cores; both threads have a core of their own and, where granted, a real-time priority.
 
-use palpate::runtime::exchange::{ExchangeReader, ExchangeWriter, exchange};
-use palpate::time::Nanos;
+use palpate_runtime::exchange::{ExchangeReader, ExchangeWriter, exchange};
+use palpate_runtime::Nanos;
 use palpate_rivals::{Contestant, Effort, compete, cores, on_two_cores, print_head, print_lines};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};

@@ -6,9 +6,9 @@
 //! on one thread, `32 pushes, 32 pops` fills and empties a part of the ring as a tick and its logger do, `two threads`
 //! streams through a ring of 1024 from one core to another (each with a real-time priority where granted). The time is that of one value.
 
-use palpate::runtime::ring::ring;
-use palpate::runtime::{Channel, Record};
-use palpate::time::Nanos;
+use palpate_runtime::ring::ring;
+use palpate_runtime::{Channel, Record};
+use palpate_runtime::Nanos;
 use palpate_rivals::{Contestant, Effort, compete, cores, on_two_cores, print_head, print_lines};
 use std::hint::black_box;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -49,17 +49,17 @@ trait Pop<T>: Send + 'static {
     fn pop(&mut self) -> Option<T>;
 }
 
-impl<T: Value> Push<T> for palpate::runtime::ring::Producer<T> {
+impl<T: Value> Push<T> for palpate_runtime::ring::Producer<T> {
     #[inline]
     fn push(&mut self, value: T) -> bool {
-        palpate::runtime::ring::Producer::push(self, value)
+        palpate_runtime::ring::Producer::push(self, value)
     }
 }
 
-impl<T: Value> Pop<T> for palpate::runtime::ring::Consumer<T> {
+impl<T: Value> Pop<T> for palpate_runtime::ring::Consumer<T> {
     #[inline]
     fn pop(&mut self) -> Option<T> {
-        palpate::runtime::ring::Consumer::pop(self)
+        palpate_runtime::ring::Consumer::pop(self)
     }
 }
 

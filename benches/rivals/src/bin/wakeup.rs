@@ -13,9 +13,9 @@
 //! The share of a core is the processor time of the group's thread over the wall time, by the kernel's books
 //! (`/proc/thread-self/schedstat`).
 
-use palpate::Error;
-use palpate::runtime::{Execution, Outcome, RateGroup, Runtime, TickTiming, Wait, actor_fn};
-use palpate::time::Nanos;
+use palpate_runtime::GraphError;
+use palpate_runtime::{Execution, Outcome, RateGroup, Runtime, TickTiming, Wait, actor_fn};
+use palpate_runtime::Nanos;
 use palpate_rivals::{cores, percentile, smoke, sorted, verdict};
 use std::process::{Command, ExitCode};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -115,7 +115,7 @@ fn busy_here() -> Duration {
     Duration::from_nanos(books.split(' ').next().and_then(|nanos| nanos.parse().ok()).unwrap_or(0))
 }
 
-fn palpate(plan: &Plan, wait: Wait) -> Result<Pool, Error> {
+fn palpate(plan: &Plan, wait: Wait) -> Result<Pool, GraphError> {
     let mut graph = Runtime::builder(Execution::Threaded);
     let mut drain = graph.drain();
     let lateness: Arc<Mutex<Vec<f64>>> = Arc::default();
