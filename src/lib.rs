@@ -11,7 +11,7 @@
 //! | --- | --- |
 //! | [`session`] | the way in: a builder or a scene becomes a running session, and a [`Summary`](session::Summary) at its end |
 //! | [`scene`] | what is simulated, as plain data, and its TOML files |
-//! | `actors` | global, local, device, logger: the glue between the layers below, nothing that a program calls |
+//! | [`actors`] | global, local, device, logger: the glue between the layers below; of it, only the log file is for programs |
 //! | [`model`] | physics without threads or clocks: [bodies](model::body), [contact](model::contact), [local models](model::local) |
 //! | [`runtime`] | actors, rate groups, ports, real and virtual time; without physics, usable on its own |
 //! | [`devices`] | what moves the tool: a path, a simulated hand, a log, or a program's own [`Device`] |
@@ -53,12 +53,10 @@
 //!
 //! Words with a fixed meaning in all docs, such as *wait-free* and *real-time safe*, are defined in [`runtime`].
 
-#[doc(hidden)]
 pub mod actors;
 pub mod devices;
 mod error;
 pub mod log;
-#[doc(hidden)]
 pub mod random;
 pub mod report;
 pub mod safety;

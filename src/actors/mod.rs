@@ -33,7 +33,7 @@ pub(crate) use scene_watch::SceneWatch;
 pub use logger::LOG_FAILURE;
 pub use messages::{SurfaceView, ToolView};
 
-// For the tests of this package.
+// A log file for programs that drive the logger themselves, and the causes in its records.
 pub use cause::Cause;
 pub use log_file::{LAST_WAIT, LogFile, MOST_WAITING};
 pub use log_sink::{LogSink, Loss};

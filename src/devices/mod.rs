@@ -23,14 +23,9 @@ mod tool_path;
 pub use capabilities::Capabilities;
 pub use device::Device;
 pub use fault::{DeviceFault, SafetyStop};
-pub use faulty::{FaultKind, FaultSpec};
+pub use faulty::{FaultKind, FaultSpec, Faulty};
 pub use hand::{Axis, Hand, HandSpec, PlantSpec};
+pub use replayed::{Replayed, ReplayedSample};
 pub use scripted::Scripted;
 pub use state::{Calibration, DeviceState, ForceCommand};
 pub use tool_path::ToolPath;
-
-// A scene names these two; the tests of this package take them by hand.
-#[doc(hidden)]
-pub use faulty::Faulty;
-#[doc(hidden)]
-pub use replayed::{Replayed, ReplayedSample};

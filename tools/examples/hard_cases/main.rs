@@ -4,9 +4,9 @@
 //! all, which takes minutes, and `-- --docs` also writes them to docs/hard_cases.md. `--bounds` prints what bounds are made from.
 //! Nothing in it depends on time, so it is the same on every machine up to rounding.
 
-#[allow(dead_code, reason = "the bounds are for tests/hard_cases.rs")]
+#[allow(dead_code, reason = "the bounds are for tools/tests/hard_cases.rs")]
 mod cases;
-#[allow(dead_code, reason = "what tests/hard_cases.rs checks is not in the table")]
+#[allow(dead_code, reason = "what tools/tests/hard_cases.rs checks is not in the table")]
 mod measure;
 
 use std::fmt::Write as _;
