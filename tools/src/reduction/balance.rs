@@ -16,9 +16,6 @@ pub const NUMERICAL_RANK: f64 = 1e-14;
 ///
 /// The square-root method (Laub, Heath, Paige and Ward 1987, IEEE Trans. Autom. Control 32; Tombs and Postlethwaite 1987,
 /// Int. J. Control 46) on factors of the Gramians, with a cut at [`NUMERICAL_RANK`]: what is below is never divided by.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug)]
 pub struct Balanced {
     /// Hankel singular values, in decreasing order: all of those that the factors of the Gramians hold.
@@ -145,9 +142,6 @@ fn unstable() -> ModelError {
 }
 
 /// x' = A x + B u, y = C x + D u.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateSpace {
     /// A (1/s), r x r.

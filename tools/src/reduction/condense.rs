@@ -13,9 +13,6 @@ use super::system::SecondOrder;
 ///
 /// # Errors
 /// If nothing holds the system.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn guyan(system: &SecondOrder, kept: &[usize]) -> Result<Projection, ModelError> {
     Ok(Projection::new(system, constraint_modes(system, kept)?))
 }
@@ -24,9 +21,6 @@ pub fn guyan(system: &SecondOrder, kept: &[usize]) -> Result<Projection, ModelEr
 ///
 /// # Errors
 /// If nothing holds the system.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn condensed(system: &SecondOrder, kept: &[usize]) -> Result<Projection, ModelError> {
     let Projection { basis, model } = guyan(system, kept)?;
     let mass = system.part(kept).mass();
@@ -37,9 +31,6 @@ pub fn condensed(system: &SecondOrder, kept: &[usize]) -> Result<Projection, Mod
 ///
 /// # Errors
 /// If nothing holds the system.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn craig_bampton(system: &SecondOrder, kept: &[usize], modes: usize) -> Result<Projection, ModelError> {
     let constraint = constraint_modes(system, kept)?;
     let others = others(system, kept);
@@ -54,9 +45,6 @@ pub fn craig_bampton(system: &SecondOrder, kept: &[usize], modes: usize) -> Resu
 }
 
 /// The coordinates in `kept` with all others held: the paper's local model, from any body.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn patch(system: &SecondOrder, kept: &[usize]) -> Projection {
     let basis = Matrix::from_fn(system.coordinates(), kept.len(), |row, column| f64::from(kept[column] == row));
     let model = Congruence::whole(&system.part(kept));

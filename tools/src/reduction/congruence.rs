@@ -10,9 +10,6 @@ use super::system::{Ports, Rayleigh, SecondOrder};
 ///
 /// A congruence keeps M_r and K_r positive definite and C_r positive semi-definite where M, K and C are: the reduced model is
 /// stable, and passive between a force and a velocity at the same place, whatever T is.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug)]
 pub struct Congruence {
     /// M_r, r x r.

@@ -20,9 +20,6 @@ const CLOSE: f64 = 0.99;
 /// ratio of the two over all frequencies that a mode can have, from the slowest one up: one factorisation serves all s, and the bound is
 /// rigorous. With other
 /// damping alpha = 0 and beta = trace C / trace K stand for it, and what comes out is an estimate.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug)]
 pub struct ErrorBound {
     /// Products of A^-1 between all of B, P, V, M T, C T and K T.

@@ -8,9 +8,6 @@ use super::linalg::{DEPENDENT, Matrix, append_orthonormal, orthogonal, push_colu
 use super::system::SecondOrder;
 
 /// A reduced model x = T z and its basis T.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug)]
 pub struct Projection {
     /// T, n x r.
@@ -35,9 +32,6 @@ impl Projection {
 ///
 /// # Errors
 /// If nothing holds the system.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn one_shift(system: &SecondOrder, shift: f64, moments: usize) -> Result<Projection, ModelError> {
     let factor = system.factorised(shift)?;
     let solve = |columns: Matrix| factor.solve(columns);
@@ -94,9 +88,6 @@ fn second_order_arnoldi(
 ///
 /// # Errors
 /// If nothing holds the system.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn many_shifts(system: &SecondOrder, shifts: &[f64]) -> Result<Projection, ModelError> {
     let directions = system.ports.directions();
     let mut basis = Matrix::zeros(system.coordinates(), 0);
@@ -108,9 +99,6 @@ pub fn many_shifts(system: &SecondOrder, shifts: &[f64]) -> Result<Projection, M
 
 /// Real frequencies that a response of `system` is matched at (rad/s): `count` of them, spread evenly over the logarithm from well below
 /// its slow modes to its fastest.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn spread_shifts(system: &SecondOrder, count: usize) -> Vec<f64> {
     let w = system.typical_frequency();
     let (low, high) = (SLOWEST * w, FASTEST * w);
@@ -123,9 +111,6 @@ const SLOWEST: f64 = 0.02;
 const FASTEST: f64 = 8.0;
 
 /// A balanced model of a large system by way of a small one: rational Krylov first, what it leaves is balanced.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug)]
 pub struct LowRank {
     /// The system in the span of its answers to real frequencies.
@@ -138,9 +123,6 @@ pub struct LowRank {
 ///
 /// # Errors
 /// If nothing holds the system or it is not damped.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn low_rank(system: &SecondOrder, count: usize) -> Result<LowRank, ModelError> {
     let projection = many_shifts(system, &spread_shifts(system, count))?;
     let balanced = Balanced::of(&projection.model)?;

@@ -12,9 +12,6 @@ use super::system::{Assembly, Ports, SecondOrder};
 ///
 /// The state is taken as an equilibrium: velocities count as zero. The tangent then is symmetric, and with the negative geometric
 /// stiffness of compressed springs left out it is positive definite, so that all that is made of it is stable.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug)]
 pub struct LinearBody {
     system: SecondOrder,

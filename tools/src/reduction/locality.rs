@@ -23,9 +23,6 @@ const TOGETHER: usize = 16;
 
 /// The dynamic stiffness at a contact, from a tool's displacement to the force on it: Z(s) = (G D(s)^-1 G^T)^-1, 3 x 3, with
 /// D = s^2 M + s C + K.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug)]
 pub struct ContactStiffness {
     compliance: Small,
@@ -60,9 +57,6 @@ impl Response for ContactStiffness {
 }
 
 /// Errors of one dynamic stiffness against another: norms of the difference over the norm of the reference.
-///
-/// # Real-time
-/// A plain value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StiffnessError {
     /// The error at rest.
@@ -93,9 +87,6 @@ impl StiffnessError {
 ///
 /// The whole body's is matched at twelve real frequencies (rational Krylov, Grimme 1997): it is factorised once for each, whatever the number of
 /// contacts.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Debug)]
 pub struct LocalityCheck<'a> {
     body: &'a LinearBody,
@@ -183,9 +174,6 @@ impl<'a> LocalityCheck<'a> {
 }
 
 /// The stiffness at rest along a direction (N/m).
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn stiffness_along(model: &dyn Response, direction: [f64; 3]) -> f64 {
     let Some(z) = model.at_hz(0.0) else { return f64::NAN };
     let direction = complex(&Matrix::from_column_slice(3, 1, &direction));

@@ -9,9 +9,6 @@ use super::response::{Response, largest_gain, log_spaced};
 use super::system::{Ports, Rayleigh, SecondOrder, not_held};
 
 /// q'' + c q' + w^2 q = Phi^T B u for each mode, with x = Phi q.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug)]
 pub struct Modal {
     /// w of each mode (rad/s), in increasing order.
@@ -129,9 +126,6 @@ impl Response for Modal {
 
 /// The infinity norm of `modal` minus `other` over that of `modal`, %: over frequencies from well below its slowest mode to well above
 /// the fastest, and at those of its modes that ring.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn gain_error(modal: &Modal, other: &dyn Response) -> f64 {
     let hz = |w: f64| w / (2.0 * std::f64::consts::PI);
     let (Some(&slow), Some(&fast)) = (modal.frequencies.first(), modal.frequencies.last()) else { return 0.0 };
@@ -143,9 +137,6 @@ pub fn gain_error(modal: &Modal, other: &dyn Response) -> f64 {
 }
 
 /// The error that [`gain_error`] measures, for a `model` of `system` that has no modes, %.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn typical_gain_error(system: &SecondOrder, model: &dyn Response, other: &dyn Response) -> f64 {
     let hz = system.typical_frequency() / (2.0 * std::f64::consts::PI);
     let frequencies = log_spaced(1e-3 * hz, 1e2 * hz, 240);

@@ -10,9 +10,6 @@ use super::system::{Assembly, Ports, SecondOrder};
 ///
 /// The paper's "n x n" counts cells: (n + 1)^d nodes; that is how all its orders come out. The node in the middle is at index
 /// n/2, (n + 1)/2 for an odd n.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperMesh {
     /// Cells along each axis, the last one upward: two or three.

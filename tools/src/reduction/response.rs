@@ -5,9 +5,6 @@ use nalgebra::Complex;
 use super::linalg::{CMatrix, Matrix};
 
 /// A linear model between m inputs and p outputs.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub trait Response {
     /// The transfer matrix G(s), p x m; `None` at a pole.
     fn at(&self, s: Complex<f64>) -> Option<CMatrix>;
@@ -19,9 +16,6 @@ pub trait Response {
 }
 
 /// Frequencies with even steps of the logarithm, both ends among them (Hz).
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn log_spaced(from_hz: f64, to_hz: f64, count: usize) -> Vec<f64> {
     let steps = count.saturating_sub(1).max(1) as f64;
     (0..count).map(|n| from_hz * (to_hz / from_hz).powf(n as f64 / steps)).collect()
@@ -30,9 +24,6 @@ pub fn log_spaced(from_hz: f64, to_hz: f64, count: usize) -> Vec<f64> {
 /// The largest gain of `model` minus `other` and of `model`, over rest and `frequencies` (Hz) and what lies between them: each of the
 /// largest values found is refined by a golden section. The infinity norms of the difference and of the model, up to the
 /// resolution of the grid. `other` = `None` stands for zero.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 pub fn largest_gain(model: &dyn Response, other: Option<&dyn Response>, frequencies: &[f64]) -> f64 {
     let gain = |hz: f64| -> f64 {
         let Some(of_model) = model.at_hz(hz) else { return f64::INFINITY };

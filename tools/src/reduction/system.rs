@@ -11,9 +11,6 @@ use super::linalg::{CMatrix, Matrix, SparseFactor, product_t, side_by_side, span
 const PROPORTIONAL: f64 = 1e-9;
 
 /// The ports of a system of n coordinates, what goes into it and what comes out: y = D u + P^T x + V^T x', with B u on the right-hand side.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ports {
     /// B, n x m.
@@ -74,9 +71,6 @@ impl Ports {
 }
 
 /// C = alpha M + beta K.
-///
-/// # Real-time
-/// A plain value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rayleigh {
     /// alpha (1/s).
@@ -87,9 +81,6 @@ pub struct Rayleigh {
 
 /// M x'' + C x' + K x = B u with symmetric sparse M, C and K, and y as [`Ports`] say. K has the sign of a stiffness: it is
 /// positive definite where the body is held.
-///
-/// # Real-time
-/// Not real-time safe: allocates. For the analysis of a scene, not for its run.
 #[derive(Clone, Debug)]
 pub struct SecondOrder {
     n: usize,
