@@ -3,7 +3,15 @@
 use std::fmt;
 use std::time::Duration;
 
-/// Nanoseconds since the start of a run.
+/// Nanoseconds since the start of a run, or between two of its moments.
+///
+/// ```
+/// use palpate_runtime::Nanos;
+///
+/// let tick = Nanos::from_secs_f64(0.003);
+/// assert_eq!(tick + Nanos(500), Nanos(3_000_500));
+/// assert_eq!((tick.as_secs_f64(), Nanos(1).saturating_sub(tick)), (0.003, Nanos::ZERO));
+/// ```
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
@@ -55,6 +63,14 @@ impl fmt::Display for Nanos {
 }
 
 /// A rate as a fraction: `releases` per `seconds`. 30 Hz is exact, and release n falls on `n * seconds / releases`.
+///
+/// ```
+/// use palpate_runtime::Rate;
+///
+/// let [global, haptic] = [30, 1000].map(Rate::hz);
+/// let resyncs = [0, 1, 2, 3].map(|n| haptic.last_release(global.release(n)));
+/// assert_eq!(resyncs, [0, 33, 66, 100]); // nothing drifts: 33 or 34 ticks apart
+/// ```
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.

@@ -46,8 +46,19 @@ pub struct Writer<T> {
     group: WriterGroup,
 }
 
-/// Reads the newest value of a state that a [`Writer`] publishes, as its example shows. The reader owns its buffer
-/// until the next successful refresh.
+/// Reads the newest value of a state that a [`Writer`] in another actor publishes. The reader owns its buffer until the
+/// next successful refresh.
+///
+/// ```
+/// use palpate_runtime::{Execution, Rate, Runtime, TickContext};
+///
+/// let (mut writer, mut reader) = Runtime::builder(Execution::Threaded).exchange(|| 0.0);
+/// let ctx = TickContext::by_hand(Rate::hz(1000), 4); // what the executor gives to a tick
+/// assert!(!reader.refresh(&ctx)); // nothing has been published: the initial value stays
+/// *writer.buffer() = 2.5;
+/// writer.publish(&ctx);
+/// assert!(reader.refresh(&ctx) && *reader.get() == 2.5);
+/// ```
 pub struct Reader<T> {
     kind: ReaderKind<T>,
     group: WriterGroup,

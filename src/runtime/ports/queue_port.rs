@@ -42,7 +42,17 @@ pub struct QueueWriter<T> {
     dropped: UseRecorder,
 }
 
-/// Receives the samples of a [`QueueWriter`] in the order they were sent, as its example shows.
+/// Receives the samples of a [`QueueWriter`] in the order in which they were sent.
+///
+/// ```
+/// use palpate_runtime::{Execution, Rate, Runtime, TickContext};
+///
+/// let (mut writer, mut reader) = Runtime::builder(Execution::Threaded).queue(8);
+/// let ctx = TickContext::by_hand(Rate::hz(1000), 4); // what the executor gives to a tick
+/// (0..3).for_each(|sample| assert!(writer.push(&ctx, sample)));
+/// let taken: Vec<i32> = std::iter::from_fn(|| reader.pop(&ctx)).collect();
+/// assert_eq!(taken, [0, 1, 2]);
+/// ```
 pub struct QueueReader<T> {
     kind: ReaderKind<T>,
     group: WriterGroup,
