@@ -43,7 +43,13 @@ pub struct BasisActor {
 
 impl BasisActor {
     /// Of a body with `springs`; bases come from `store`, and `bases` are there already.
-    pub fn new(springs: Arc<SpringGraph>, store: BasisStore, bases: Bases, pace: Pace, ports: BasisPorts) -> Self {
+    pub(crate) fn new(
+        springs: Arc<SpringGraph>,
+        store: BasisStore,
+        bases: Bases,
+        pace: Pace,
+        ports: BasisPorts,
+    ) -> Self {
         Self { springs, store, pace, bases, begun: None, hopeless: Vec::new(), ports }
     }
 

@@ -20,7 +20,7 @@ impl BasisStore {
     ///
     /// # Errors
     /// If nothing holds the surroundings together.
-    pub fn get(&self, springs: &SpringGraph, patch: &[u32]) -> Result<Option<Basis>, Error> {
+    pub(crate) fn get(&self, springs: &SpringGraph, patch: &[u32]) -> Result<Option<Basis>, Error> {
         if let Some(basis) = self.read(springs, patch) {
             return Ok(Some(basis));
         }
@@ -32,14 +32,14 @@ impl BasisStore {
     }
 
     /// The basis of `patch`, if it was kept.
-    pub fn read(&self, springs: &SpringGraph, patch: &[u32]) -> Option<Basis> {
+    pub(crate) fn read(&self, springs: &SpringGraph, patch: &[u32]) -> Option<Basis> {
         let key = self.key(springs, patch);
         let stored = Basis::from_bytes(&std::fs::read(self.file(key)?).ok()?, key);
         stored.filter(|basis| basis.patch() == patch)
     }
 
     /// Keeps `basis`, if there is a folder for it.
-    pub fn keep(&self, springs: &SpringGraph, basis: &Basis) {
+    pub(crate) fn keep(&self, springs: &SpringGraph, basis: &Basis) {
         let key = self.key(springs, basis.patch());
         let (Some(folder), Some(file)) = (&self.folder, self.file(key)) else { return };
         // Another run may read it meanwhile: it appears whole or not at all.

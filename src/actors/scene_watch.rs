@@ -34,7 +34,7 @@ pub struct SceneWatch {
 
 impl SceneWatch {
     /// Watches `surface`, whose triangles have these nodes.
-    pub fn new(surface: OutletReader<SurfaceView>, triangles: &[[u32; 3]]) -> Self {
+    pub(crate) fn new(surface: OutletReader<SurfaceView>, triangles: &[[u32; 3]]) -> Self {
         let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
         nodes.sort_unstable();
         nodes.dedup();

@@ -65,6 +65,9 @@ pub enum FaultKind {
 
 impl FaultSpec {
     /// A fault of `kind` from `from_s` to `to_s` (s), with the defaults of a scene file.
+    ///
+    /// # Real-time
+    /// Wait-free and real-time safe.
     pub fn new(kind: FaultKind, from_s: f64, to_s: f64) -> Self {
         Self { kind, from_s, to_s, reads: 1, probability: 1.0, seed: 0, stop: SafetyStop::Other }
     }

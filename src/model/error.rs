@@ -3,6 +3,9 @@
 use std::fmt;
 
 /// A value of a body, a mesh or a local model is impossible or inconsistent. Correct what it names; a retry does not help.
+///
+/// # Real-time
+/// Allocates: no tick makes one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ModelError {
     /// The field, such as `body.size_m`. Empty if the message says it all.

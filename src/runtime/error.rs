@@ -21,6 +21,9 @@ pub enum GraphErrorKind {
 ///
 /// # Real-time
 /// Not real-time safe: allocates. Before the run.
+///
+/// # Real-time
+/// Allocates: no tick makes one.
 #[derive(Debug)]
 pub struct GraphError {
     kind: GraphErrorKind,

@@ -60,7 +60,7 @@ pub fn sampled_wall(damping: f64, virtual_damping: f64, period_s: f64, delay_s: 
 
 /// The largest stiffness (N/m) that an encoder of step s (m) leaves passive: min(2 b / T, 2 F_c / s). A friction or a step
 /// of zero is one that is not known: its part says nothing.
-pub fn quantised_wall(damping: f64, friction_n: f64, step_m: f64, period_s: f64) -> f64 {
+pub(crate) fn quantised_wall(damping: f64, friction_n: f64, step_m: f64, period_s: f64) -> f64 {
     let by_friction = if friction_n > 0.0 && step_m > 0.0 { 2.0 * friction_n / step_m } else { f64::INFINITY };
     (2.0 * damping / period_s).min(by_friction)
 }
@@ -68,7 +68,7 @@ pub fn quantised_wall(damping: f64, friction_n: f64, step_m: f64, period_s: f64)
 /// The stiffest coupling of `device` to a body of stiffness `local_n_per_m` (N/m) that puts at most `body_kg` (kg) on the tool
 /// within a tick of `period_s` (s), that leaves [`MARGIN`]. A body that the device could render alone gets the stiffest
 /// spring that the device has.
-pub fn design(device: &DeviceLimits, local_n_per_m: f64, body_kg: f64, period_s: f64) -> Design {
+pub(crate) fn design(device: &DeviceLimits, local_n_per_m: f64, body_kg: f64, period_s: f64) -> Design {
     let b = device.damping_n_s_per_m;
     let damper = (DAMPER_SHARE * b).min(device.max_damping_n_s_per_m);
     let limit = sampled_wall(b / MARGIN, damper, period_s, device.delay_s)
@@ -124,14 +124,14 @@ pub struct CoupledTool {
 
 impl CoupledTool {
     /// A tool at the device.
-    pub fn new(design: &Design) -> Self {
+    pub(crate) fn new(design: &Design) -> Self {
         let zero = [0.0; 3];
         let Design { coupling: gains, tool_kg: mass_kg, .. } = *design;
         Self { gains, mass_kg, tool: zero, velocity: zero, device: zero, force: zero, felt: zero }
     }
 
     /// Puts device and tool at `position` (m), at rest and without a force.
-    pub fn begin(&mut self, position: [f64; 3]) {
+    pub(crate) fn begin(&mut self, position: [f64; 3]) {
         let zero = [0.0; 3];
         (self.tool, self.device) = (position, position);
         (self.velocity, self.force, self.felt) = (zero, zero, zero);
@@ -139,14 +139,14 @@ impl CoupledTool {
 
     /// As [`lead`](Self::lead), for a device that reaches `target` (m) after `ticks` ticks of `dt` (s): by an even part of
     /// the way.
-    pub fn follow(&mut self, target: [f64; 3], ticks: u64, dt: f64) -> [f64; 3] {
+    pub(crate) fn follow(&mut self, target: [f64; 3], ticks: u64, dt: f64) -> [f64; 3] {
         let part = ticks.max(1) as f64;
         let device = std::array::from_fn(|i| self.device[i] + (target[i] - self.device[i]) / part);
         self.lead(device, dt)
     }
 
     /// Where the simulated tool goes (m) while the device moves to `device` (m) within `dt` (s).
-    pub fn lead(&mut self, device: [f64; 3], dt: f64) -> [f64; 3] {
+    pub(crate) fn lead(&mut self, device: [f64; 3], dt: f64) -> [f64; 3] {
         let Coupling { stiffness_n_per_m: k, damping_n_s_per_m: b } = self.gains;
         for (i, &place) in device.iter().enumerate() {
             let device_velocity = (place - self.device[i]) / dt;
@@ -161,7 +161,7 @@ impl CoupledTool {
     }
 
     /// The force on the device (N), once the body has answered with `force` on the simulated tool (N).
-    pub fn feel(&mut self, force: Force) -> Force {
+    pub(crate) fn feel(&mut self, force: Force) -> Force {
         self.force = force;
         self.felt
     }

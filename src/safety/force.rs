@@ -12,12 +12,12 @@ pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// Stage 1: the force, or zero if any component is not finite; and whether it acted.
-pub fn finite(force: Force) -> (Force, bool) {
+pub(crate) fn finite(force: Force) -> (Force, bool) {
     if force.iter().all(|c| c.is_finite()) { (force, false) } else { ([0.0; 3], true) }
 }
 
 /// Stage 2: the force shortened to `limit` (N), direction kept; and whether it acted.
-pub fn clamp(force: Force, limit: f64) -> (Force, bool) {
+pub(crate) fn clamp(force: Force, limit: f64) -> (Force, bool) {
     // Scaled first: the square of a huge component overflows.
     let largest = force.iter().fold(0.0_f64, |largest, c| largest.max(c.abs()));
     if largest == 0.0 {
@@ -29,7 +29,7 @@ pub fn clamp(force: Force, limit: f64) -> (Force, bool) {
 }
 
 /// Stage 3, and again at the end: `to`, or as far towards it as `limit` (N) from `from` allows; and whether it acted.
-pub fn slew(from: Force, to: Force, limit: f64) -> (Force, bool) {
+pub(crate) fn slew(from: Force, to: Force, limit: f64) -> (Force, bool) {
     let change: Force = std::array::from_fn(|i| to[i] - from[i]);
     let length = norm(change);
     if length <= limit {

@@ -31,7 +31,7 @@ impl Default for AgeFade {
 impl AgeFade {
     /// The gain with a model `age` ticks old, `ticks` after the last: both are counted, not measured, so that a run can be
     /// repeated.
-    pub fn advance(&mut self, limits: ModelAge, age: u32, ticks: f64) -> f64 {
+    pub(crate) fn advance(&mut self, limits: ModelAge, age: u32, ticks: f64) -> f64 {
         let trusted = (1.0 - (f64::from(age) - limits.max_ticks) / limits.fade_ticks).clamp(0.0, 1.0);
         self.gain = trusted.min(self.gain + ticks / limits.fade_ticks);
         self.gain

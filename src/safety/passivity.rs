@@ -50,7 +50,7 @@ pub struct Controlled {
 }
 
 /// The force in place of `force` (N) with `balance_j` = E + E(0) in the ledger, for a tool that moves with `velocity` (m/s).
-pub fn control(limits: &Passivity, balance_j: f64, force: Force, velocity: [f64; 3], dt: f64) -> Controlled {
+pub(crate) fn control(limits: &Passivity, balance_j: f64, force: Force, velocity: [f64; 3], dt: f64) -> Controlled {
     // Also what is no number: an unknown balance is no surplus.
     if balance_j >= 0.0 {
         return Controlled { force, damping: 0.0, withdrew: false };
@@ -87,13 +87,13 @@ pub struct Ledger {
 
 impl Ledger {
     /// A ledger of an environment that stores `stored_j` (J) at the start.
-    pub fn new(stored_j: f64) -> Self {
+    pub(crate) fn new(stored_j: f64) -> Self {
         Self { balance_j: stored_j, last: None }
     }
 
     /// Books the motion of the tool to `position` (m) within `dt` (s) under the held force `held` (N), and gives the
     /// velocity (m/s) and whether it was believed: a step that no hand makes is a fault of the measurement, not work.
-    pub fn book(&mut self, held: Force, position: [f64; 3], dt: f64) -> ([f64; 3], bool) {
+    pub(crate) fn book(&mut self, held: Force, position: [f64; 3], dt: f64) -> ([f64; 3], bool) {
         let moved = self.last.map_or([0.0; 3], |last| std::array::from_fn(|i| position[i] - last[i]));
         self.last = Some(position);
         let velocity = moved.map(|c| c / dt);
@@ -105,12 +105,12 @@ impl Ledger {
     }
 
     /// E(k) + E(0) (J): while it is not negative the environment is passive.
-    pub fn balance_j(&self) -> f64 {
+    pub(crate) fn balance_j(&self) -> f64 {
         self.balance_j
     }
 
     /// Forgets where the tool was: over a gap nobody knows what was exerted.
-    pub fn forget_position(&mut self) {
+    pub(crate) fn forget_position(&mut self) {
         self.last = None;
     }
 }

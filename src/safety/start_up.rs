@@ -29,7 +29,7 @@ pub struct Engagement {
 
 impl Engagement {
     /// The gain for a computed `force` (N), `dt` seconds after the one before.
-    pub fn advance(&mut self, limits: StartUp, force: Force, dt: f64) -> f64 {
+    pub(crate) fn advance(&mut self, limits: StartUp, force: Force, dt: f64) -> f64 {
         if self.calm_ticks < limits.engage_ticks {
             self.calm_ticks = if norm(force) < limits.engage_force_n { self.calm_ticks + 1 } else { 0 };
         } else if self.gain < 1.0 {
@@ -52,12 +52,12 @@ const SMALLEST_GAIN: f64 = 1e-9;
 
 impl Ramp {
     /// A ramp that is fully in.
-    pub fn new(time_s: f64) -> Self {
+    pub(crate) fn new(time_s: f64) -> Self {
         Self { gain: 1.0, time_s }
     }
 
     /// Moves towards 1 (`on`) or towards 0 for `dt` seconds and gives the gain.
-    pub fn advance(&mut self, on: bool, dt: f64) -> f64 {
+    pub(crate) fn advance(&mut self, on: bool, dt: f64) -> f64 {
         let step = dt / self.time_s;
         let gain = if on { self.gain + step } else { self.gain - step }.clamp(0.0, 1.0);
         self.gain = if gain < SMALLEST_GAIN { 0.0 } else { gain };
@@ -65,7 +65,7 @@ impl Ramp {
     }
 
     /// Goes to 0 at once.
-    pub fn release(&mut self) {
+    pub(crate) fn release(&mut self) {
         self.gain = 0.0;
     }
 }

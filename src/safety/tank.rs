@@ -39,17 +39,17 @@ pub struct TankState {
 
 impl TankState {
     /// A full tank.
-    pub fn new(limits: &Tank) -> Self {
+    pub(crate) fn new(limits: &Tank) -> Self {
         Self { energy_j: limits.capacity_j, held_back: [0.0; 3], rate: 0.0 }
     }
 
     /// What is in it (J).
-    pub fn energy_j(&self) -> f64 {
+    pub(crate) fn energy_j(&self) -> f64 {
         self.energy_j
     }
 
     /// Adds what was dissipated (J).
-    pub fn fill(&mut self, limits: &Tank, dissipated_j: f64) {
+    pub(crate) fn fill(&mut self, limits: &Tank, dissipated_j: f64) {
         // Also refuses what is no number.
         if dissipated_j > 0.0 {
             self.energy_j = (self.energy_j + dissipated_j).min(limits.capacity_j);
@@ -58,7 +58,14 @@ impl TankState {
 
     /// The force in place of `force` (N), which contains a step of `step` (N) from a swap, for a tool of `velocity` (m/s);
     /// and whether something is held back of it.
-    pub fn pass(&mut self, limits: &Tank, force: Force, step: Force, velocity: [f64; 3], dt: f64) -> (Force, bool) {
+    pub(crate) fn pass(
+        &mut self,
+        limits: &Tank,
+        force: Force,
+        step: Force,
+        velocity: [f64; 3],
+        dt: f64,
+    ) -> (Force, bool) {
         let size = norm(self.held_back);
         let left = if size > self.rate * dt { 1.0 - self.rate * dt / size } else { 0.0 };
         self.held_back = self.held_back.map(|c| c * left);

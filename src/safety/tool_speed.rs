@@ -16,7 +16,7 @@ impl Default for ToolSpeed {
 }
 
 /// The gain at `speed` (m/s): 1 up to the first limit, 0 from the second on, linear in between.
-pub fn speed_gain(limits: ToolSpeed, speed: f64) -> f64 {
+pub(crate) fn speed_gain(limits: ToolSpeed, speed: f64) -> f64 {
     if speed <= limits.fade_m_s {
         return 1.0;
     }

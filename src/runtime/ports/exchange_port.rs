@@ -53,11 +53,11 @@ pub struct Writer<T> {
 /// use palpate_runtime::{Execution, Rate, Runtime, TickContext};
 ///
 /// let (mut writer, mut reader) = Runtime::builder(Execution::Threaded).exchange(|| 0.0);
-/// let ctx = TickContext::by_hand(Rate::hz(1000), 4); // what the executor gives to a tick
-/// assert!(!reader.refresh(&ctx)); // nothing has been published: the initial value stays
+/// let tick = |n| TickContext::by_hand(Rate::hz(1000), n); // what the executor gives to a tick
+/// assert!(!reader.refresh(&tick(4))); // nothing has been published: the initial value stays
 /// *writer.buffer() = 2.5;
-/// writer.publish(&ctx);
-/// assert!(reader.refresh(&ctx) && *reader.get() == 2.5);
+/// writer.publish(&tick(4));
+/// assert!(reader.refresh(&tick(5)) && *reader.get() == 2.5);
 /// ```
 pub struct Reader<T> {
     kind: ReaderKind<T>,

@@ -186,8 +186,10 @@ fn while_a_group_winds_down_an_actor_that_panicked_in_its_wait_is_not_asked_agai
     let report = running.stop();
     let group = &report.groups[0];
     assert!(report.fault.is_some());
-    // Check that the clock releases the others at once, without the watchdog's patience, until they are at rest
-    assert_eq!((group.elapsed_periods, group.watchdog_takeovers, *asked.lock().unwrap()), (30, 0, 1));
+    // Check that the clock releases the others at once, without the watchdog's patience, until they are at rest. A busy machine may
+    // wake them late, but nothing waits for the device any more.
+    assert_eq!((group.watchdog_takeovers, *asked.lock().unwrap()), (0, 1));
+    assert!(group.elapsed_periods >= 30 && group.released <= 30, "{report}");
     assert_eq!(*ticked.lock().unwrap(), group.released);
     assert!(group.released > 0, "{report}");
 }
