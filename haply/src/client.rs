@@ -5,12 +5,11 @@ use crate::guard::Guard;
 use crate::hold::Hold;
 use crate::link::{self, Link, Links, Lost};
 use crate::options::HaplyOptions;
-use crate::protocol::{self, Commands, Reply};
+use crate::protocol::{self, Commands, Inverse, Reply};
 use crate::pulse::Pulse;
 use crate::watch::Watch;
 use crate::wire::Wire;
-use palpate::devices::{Calibration, Capabilities};
-use palpate::devices::{Device, DeviceFault, DeviceState, ForceCommand};
+use palpate::devices::{Calibration, Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
 use palpate::model::Vec3;
 use palpate::runtime::Nanos;
 use palpate::{Error, ErrorKind};
@@ -69,13 +68,10 @@ pub struct Haply {
     is_first: bool,
     guard: Guard,
     pulse: Pulse,
-    state: DeviceState,
-    is_listed: bool,
-    is_calibrated: bool,
-    is_ready: bool,
-    is_powered: bool,
-    /// There is a state that was not read.
-    is_fresh: bool,
+    /// What the last reply says of the device, if it lists it.
+    device: Option<Inverse>,
+    /// What the last reply that lists it is to a read, until it was read.
+    fresh: Option<Result<DeviceState, DeviceFault>>,
     /// There is a reply that [`Device::wait`] has not told of.
     is_new: bool,
     /// From when on [`Device::wait`] may tell of a reply.
@@ -106,7 +102,7 @@ impl Haply {
                 format!("{what} at {address} {why}; is the service running? (`palpate mock haply` is one to try)");
             Error::new(ErrorKind::Device, message).at("haply")
         };
-        let (first, id) = link::connect(&options.address, options.device_id.as_deref())
+        let (first, second, id) = link::connect(&options.address, options.device_id.as_deref())
             .map_err(|why| fail("the service", &options.address, why))?;
         let events = options.events_address.as_ref().map(|address| {
             let missing =
@@ -117,7 +113,7 @@ impl Haply {
         let no_thread = |error| fail("the service", &options.address, format!("has no thread of its own: {error}"));
         let (watch, connections) = Watch::start(commands.clone()).map_err(no_thread)?;
         // There is room for the first.
-        let _ = connections.try_send(first.wire.second().map_err(no_thread)?);
+        let _ = connections.try_send(second);
         let links = Links::new(options.address.clone(), id.clone(), connections).map_err(no_thread)?;
         let mut haply = Self {
             name: format!("haply {id}"),
@@ -129,12 +125,8 @@ impl Haply {
             is_first: true,
             guard: Guard::default(),
             pulse: Pulse::new(options.period),
-            state: DeviceState::default(),
-            is_listed: false,
-            is_calibrated: false,
-            is_ready: false,
-            is_powered: false,
-            is_fresh: false,
+            device: None,
+            fresh: None,
             is_new: false,
             due: None,
             is_unread: true,
@@ -191,13 +183,11 @@ impl Haply {
     }
 
     fn accept(&mut self, reply: Reply) {
-        self.is_listed = reply.device.is_some();
+        self.device = reply.device;
         if let Some(device) = reply.device {
-            (self.is_calibrated, self.is_ready) = (device.is_calibrated, device.is_ready);
-            self.is_powered = device.is_powered;
             let position = Vec3::from(device.position_m) + self.options.origin_m;
-            self.state = DeviceState { position, velocity: device.velocity_m_s.into(), buttons: reply.buttons };
-            self.is_fresh = true;
+            let state = DeviceState { position, velocity: device.velocity_m_s.into(), buttons: reply.buttons };
+            self.fresh = Some(if device.is_ready { Ok(state) } else { Err(DeviceFault::NotReady) });
         }
         self.is_new = true;
     }
@@ -268,11 +258,8 @@ impl Haply {
 
     /// Why there is no force now.
     fn fault(&mut self, now: Instant) -> Option<DeviceFault> {
-        if self.link.is_none() || !self.is_listed {
-            return Some(DeviceFault::Disconnected);
-        }
-        let guarded = self.guard.fault(now);
-        guarded.or((!self.is_powered).then_some(DeviceFault::NotReady))
+        let Some(device) = self.device.filter(|_| self.link.is_some()) else { return Some(DeviceFault::Disconnected) };
+        self.guard.fault(now).or((!device.is_powered).then_some(DeviceFault::NotReady))
     }
 
     /// Sends a force, or only asks for the state.
@@ -316,11 +303,11 @@ impl Haply {
 
     /// Before the first tick the state may be of any age: asks for a new one.
     fn refresh(&mut self) {
-        self.is_fresh = false;
+        self.fresh = None;
         let now = Instant::now();
         self.send(now, None);
         let until = now + FIRST_REPLY;
-        while !self.is_fresh && self.link.is_some() && Instant::now() < until {
+        while self.fresh.is_none() && self.link.is_some() && Instant::now() < until {
             std::thread::sleep(LOOK_AGAIN);
             self.receive();
         }
@@ -355,7 +342,7 @@ impl Device for Haply {
     }
 
     fn calibration(&self) -> Calibration {
-        if self.is_listed && !self.is_calibrated { Calibration::Needed } else { Calibration::Done }
+        if self.device.is_some_and(|device| !device.is_calibrated) { Calibration::Needed } else { Calibration::Done }
     }
 
     fn wait(&mut self, timeout: Duration) -> bool {
@@ -391,10 +378,9 @@ impl Device for Haply {
             self.command();
         }
         self.is_driven = false;
-        if std::mem::take(&mut self.is_fresh) {
-            return if self.is_ready { Ok(self.state) } else { Err(DeviceFault::NotReady) };
-        }
-        Err(if self.link.is_none() || !self.is_listed { DeviceFault::Disconnected } else { DeviceFault::Stale })
+        let is_there = self.link.is_some() && self.device.is_some();
+        let missing = if is_there { DeviceFault::Stale } else { DeviceFault::Disconnected };
+        self.fresh.take().unwrap_or(Err(missing))
     }
 
     fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {

@@ -44,11 +44,12 @@ pub(crate) struct Links {
     made: Receiver<Link>,
 }
 
-/// Connects, reads the inventory and finds the device: the one of this id, or the first.
+/// Connects, reads the inventory and finds the device: the one of this id, or the first. Gives a second
+/// writer on the connection and the id too.
 ///
 /// # Errors
 /// What went wrong, as the end of a sentence that begins with the service and its address.
-pub(crate) fn connect(address: &str, wanted: Option<&str>) -> Result<(Link, String), String> {
+pub(crate) fn connect(address: &str, wanted: Option<&str>) -> Result<(Link, Wire, String), String> {
     let mut wire = Wire::connect(address).map_err(|error| format!("does not answer: {error}"))?;
     let received = wire.receive().map_err(|broken| broken.to_string())?;
     let frame = received.ok_or("sent no inventory within 2 s")?;
@@ -60,8 +61,8 @@ pub(crate) fn connect(address: &str, wanted: Option<&str>) -> Result<(Link, Stri
         Some(id) => return Err(format!("has no device {id:?}, it has {ids:?}")),
     };
     let first = protocol::reply(&frame, &id).ok_or(not_a_state)?;
-    wire.never_block().map_err(|error| error.to_string())?;
-    Ok((Link { wire, first }, id))
+    let second = wire.never_block().and_then(|()| wire.second()).map_err(|error| error.to_string())?;
+    Ok((Link { wire, first }, second, id))
 }
 
 impl Links {
@@ -76,7 +77,23 @@ impl Links {
                 // For every writer on it; then the words, which may have to wait for a reader.
                 wire.close();
                 warn!("haply: the service at {address} {why}: the force is zero, reconnecting");
-                if !reconnect(&address, &device, &losses, &sender, &watch) {
+                let mut last = String::new();
+                let (link, second) = loop {
+                    // Nothing is lost while there is nothing: what comes here is the end.
+                    if losses.recv_timeout(RETRY).is_err_and(|error| error.is_disconnected()) {
+                        return;
+                    }
+                    match connect(&address, Some(&device)) {
+                        Ok((link, second, _)) => break (link, second),
+                        Err(why) if why != last => {
+                            warn!("haply: the service at {address} {why}");
+                            last = why;
+                        }
+                        Err(_) => {}
+                    }
+                };
+                warn!("haply: connected to the service at {address} again, device {device}");
+                if watch.send(second).is_err() || sender.send(link).is_err() {
                     return;
                 }
             }
@@ -93,37 +110,5 @@ impl Links {
     /// The new connection, once it is there. Does not wait.
     pub(crate) fn take(&self) -> Option<Link> {
         self.made.try_recv().ok()
-    }
-}
-
-/// Tries until it has a connection; false if nobody wants one any more.
-fn reconnect(
-    address: &str,
-    device: &str,
-    losses: &Receiver<(Lost, Wire)>,
-    sender: &Sender<Link>,
-    watch: &Sender<Wire>,
-) -> bool {
-    let mut last = String::new();
-    loop {
-        // Nothing is lost while there is nothing: what comes here is the end.
-        if losses.recv_timeout(RETRY).is_err_and(|error| error.is_disconnected()) {
-            return false;
-        }
-        let made = connect(address, Some(device)).and_then(|(link, _)| {
-            let second = link.wire.second().map_err(|error| error.to_string())?;
-            Ok((link, second))
-        });
-        match made {
-            Ok((link, second)) => {
-                warn!("haply: connected to the service at {address} again, device {device}");
-                return watch.send(second).is_ok() && sender.send(link).is_ok();
-            }
-            Err(why) if why != last => {
-                warn!("haply: the service at {address} {why}");
-                last = why;
-            }
-            Err(_) => {}
-        }
     }
 }

@@ -43,12 +43,9 @@ pub(crate) struct Inverse {
 struct State<'a> {
     #[serde(borrow)]
     inverse3: SmallVec<[Entry<'a>; USUAL]>,
-    #[serde(borrow)]
-    verse_grip: SmallVec<[Grip<'a>; USUAL]>,
-    #[serde(borrow)]
-    wireless_verse_grip: SmallVec<[Grip<'a>; USUAL]>,
-    #[serde(borrow)]
-    custom_verse_grip: SmallVec<[Grip<'a>; USUAL]>,
+    verse_grip: SmallVec<[Grip; USUAL]>,
+    wireless_verse_grip: SmallVec<[Grip; USUAL]>,
+    custom_verse_grip: SmallVec<[Grip; USUAL]>,
 }
 
 #[derive(Default, Deserialize)]
@@ -99,18 +96,16 @@ struct Status {
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
-struct Grip<'a> {
-    #[serde(borrow)]
-    state: Held<'a>,
+struct Grip {
+    state: Held,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
-struct Held<'a> {
+struct Held {
     button: Option<bool>,
-    /// Of many shapes, not all of them known.
-    #[serde(borrow)]
-    buttons: Option<&'a RawValue>,
+    #[serde(deserialize_with = "if_known")]
+    buttons: Buttons,
     transform: Option<Nested>,
 }
 
@@ -122,11 +117,15 @@ struct Buttons {
     c: bool,
 }
 
-impl Grip<'_> {
+/// They are of many shapes, not all of them known.
+fn if_known<'de, D: serde::Deserializer<'de>>(raw: D) -> Result<Buttons, D::Error> {
+    Ok(serde_json::from_str(<&RawValue>::deserialize(raw)?.get()).unwrap_or_default())
+}
+
+impl Grip {
     fn pressed(&self) -> u16 {
-        let parsed = self.state.buttons.and_then(|raw| serde_json::from_str(raw.get()).ok());
-        let Buttons { a, b, c } = parsed.unwrap_or_default();
-        u16::from(a || self.state.button == Some(true)) | u16::from(b) << 1 | u16::from(c) << 2
+        let Held { button, buttons: Buttons { a, b, c }, .. } = self.state;
+        u16::from(a || button == Some(true)) | u16::from(b) << 1 | u16::from(c) << 2
     }
 }
 
@@ -134,7 +133,8 @@ impl Grip<'_> {
 pub(crate) fn reply(frame: &[u8], id: &str) -> Option<Reply> {
     let state: State<'_> = serde_json::from_slice(frame).ok()?;
     let device = match state.inverse3.iter().rfind(|entry| entry.device_id == id) {
-        Some(Entry { state, status: Some(status), .. }) => {
+        Some(Entry { state, status, .. }) => {
+            let status = status.as_ref()?;
             let is_ready = status.calibrated && status.started && status.ready;
             Some(Inverse {
                 position_m: state.cursor_position?.into(),
@@ -144,7 +144,6 @@ pub(crate) fn reply(frame: &[u8], id: &str) -> Option<Reply> {
                 is_powered: is_ready && status.power_supply != Some(false),
             })
         }
-        Some(_) => return None,
         None => None,
     };
     let mut grips = state.verse_grip.iter().chain(&state.wireless_verse_grip).chain(&state.custom_verse_grip);

@@ -27,7 +27,7 @@ const SILENT: Duration = Duration::from_millis(250);
 const TOO_MANY_LATE: u32 = 50;
 
 /// The state of the exchange of commands and replies over one connection.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pulse {
     late: Duration,
     /// When the commands without a reply were sent, oldest first.
@@ -46,17 +46,7 @@ pub(crate) struct Pulse {
 
 impl Pulse {
     pub(crate) fn new(period: Duration) -> Self {
-        Self {
-            late: period.mul_f64(LATE_TICKS),
-            sent: [None; SLOTS],
-            in_time: 0,
-            late_replies: 0,
-            is_stale: false,
-            is_oldest_late: false,
-            ramped: None,
-            gain: 0.0,
-            round_trip: None,
-        }
+        Self { late: period.mul_f64(LATE_TICKS), ..Self::default() }
     }
 
     /// Commands without a reply.
@@ -78,11 +68,8 @@ impl Pulse {
 
     /// A reply has come; it answers the oldest command.
     pub(crate) fn replied(&mut self, now: Instant) {
-        let Some(sent) = self.sent[0] else {
-            return;
-        };
+        let Some(sent) = self.sent[0].take() else { return };
         self.sent.rotate_left(1);
-        self.sent[SLOTS - 1] = None;
         self.round_trip = Some(now.saturating_duration_since(sent));
         // Late is what a look has missed: a late look at a reply that came in time is no fault of the service.
         if std::mem::take(&mut self.is_oldest_late) {
@@ -102,10 +89,8 @@ impl Pulse {
         if is_late {
             self.in_time = 0;
         }
-        let turns = is_late && !self.is_stale;
-        self.is_stale |= is_late;
         self.is_oldest_late = is_late;
-        turns
+        is_late && !std::mem::replace(&mut self.is_stale, true)
     }
 
     /// The reply is missing, or late ones have not been made up for.

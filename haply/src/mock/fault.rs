@@ -72,34 +72,35 @@ impl MockFaultKind {
     pub const LASTS: Duration = Duration::from_millis(500);
 
     /// The event that announces it, and the one that takes it back.
-    pub(super) fn events(self, id: &str) -> Option<(Value, Option<Value>)> {
-        let event = |name: &str, level: &str, data: Value, message: &str| json!({"name": name, "category": "device", "level": level, "data": data, "message": message});
-        let safety = |level, kind: &str, message| {
-            let data = json!({"device_family": "inverse", "device_id": id, "safety_type": kind});
-            event("device-safety-triggered", level, data, message)
-        };
-        let device =
-            |name, level, message| event(name, level, json!({"device_family": "inverse", "device_id": id}), message);
-        Some(match self {
-            Self::Silent | Self::Slow | Self::Garbage | Self::Vanish | Self::Uncalibrated | Self::Unready => {
-                return None;
+    pub(super) fn events(self, id: &str) -> [Option<Value>; 2] {
+        // Their levels, what they say of safety or of the device, and their messages.
+        let events: &[(&str, &str, &str)] = match self {
+            Self::Silent | Self::Slow | Self::Garbage | Self::Vanish | Self::Uncalibrated | Self::Unready => &[],
+            Self::Ebrake => &[
+                ("error", "ebrake_triggered", "Emergency brake engaged"),
+                ("notice", "ebrake_released", "Emergency brake released"),
+            ],
+            Self::Fod => &[
+                ("warning", "fod_stage_changed", "FOD stage changed: guard -> hard"),
+                ("info", "fod_stage_changed", "FOD stage changed: hard -> guard"),
+            ],
+            Self::Stall => &[("warning", "stall_detected", "Motor stall detected")],
+            Self::Ceiling => &[("warning", "stability_ceiling", "Stability ceiling reached")],
+            Self::Unknown => &[("critical", "not_in_any_page", "Something new")],
+            Self::Unplug => {
+                &[("warning", "device-disconnected", "Device lost"), ("info", "device-connected", "Device ready")]
             }
-            Self::Ebrake => (
-                safety("error", "ebrake_triggered", "Emergency brake engaged"),
-                Some(safety("notice", "ebrake_released", "Emergency brake released")),
-            ),
-            Self::Fod => (
-                safety("warning", "fod_stage_changed", "FOD stage changed: guard -> hard"),
-                Some(safety("info", "fod_stage_changed", "FOD stage changed: hard -> guard")),
-            ),
-            Self::Stall => (safety("warning", "stall_detected", "Motor stall detected"), None),
-            Self::Ceiling => (safety("warning", "stability_ceiling", "Stability ceiling reached"), None),
-            Self::Unknown => (safety("critical", "not_in_any_page", "Something new"), None),
-            Self::Unplug => (
-                device("device-disconnected", "warning", "Device lost"),
-                Some(device("device-connected", "info", "Device ready")),
-            ),
-            Self::Busy => (device("device-busy", "warning", "Device is in use by another session"), None),
+            Self::Busy => &[("warning", "device-busy", "Device is in use by another session")],
+        };
+        [0, 1].map(|index| {
+            let &(level, name, message) = events.get(index)?;
+            let mut data = json!({"device_family": "inverse", "device_id": id});
+            let is_safety = !name.starts_with("device-");
+            if is_safety {
+                data["safety_type"] = name.into();
+            }
+            let name = if is_safety { "device-safety-triggered" } else { name };
+            Some(json!({"name": name, "category": "device", "level": level, "data": data, "message": message}))
         })
     }
 }

@@ -54,19 +54,16 @@ pub(super) struct World {
     away_until: Option<Instant>,
     /// When the fault ends by itself.
     ends: Option<(Instant, Option<Value>)>,
-    is_braked: bool,
-    is_unplugged: bool,
-    is_calibrated: bool,
-    is_ready: bool,
+    /// The fault that the device has now.
+    active: Option<MockFaultKind>,
     pub(super) is_over: bool,
 }
 
 impl World {
     pub(super) fn new(options: MockOptions) -> Self {
-        let is_at_first = |kind| options.fault == Some(MockFault { kind, after: 0 });
+        let at_first = options.fault.filter(|fault| fault.after == 0 && is_status(fault.kind));
         Self {
-            is_calibrated: !is_at_first(MockFaultKind::Uncalibrated),
-            is_ready: !is_at_first(MockFaultKind::Unready),
+            active: at_first.map(|fault| fault.kind),
             options,
             counts: MockCounts::default(),
             forces_n: Vec::new(),
@@ -76,8 +73,6 @@ impl World {
             faulty: None,
             away_until: None,
             ends: None,
-            is_braked: false,
-            is_unplugged: false,
             is_over: false,
         }
     }
@@ -96,14 +91,8 @@ impl World {
     /// Fails with the next command.
     pub(super) fn fail(&mut self, kind: MockFaultKind) {
         self.options.fault = Some(MockFault { kind, after: self.counts.commands });
-        (self.faulty, self.away_until, self.ends) = (None, None, None);
-        self.recover();
+        (self.faulty, self.away_until, self.ends, self.active) = (None, None, None, None);
         self.forces_n.clear();
-    }
-
-    fn recover(&mut self) {
-        (self.is_braked, self.is_unplugged) = (false, false);
-        (self.is_calibrated, self.is_ready) = (true, true);
     }
 
     /// Time goes on, and with it the plant and a fault that ends by itself.
@@ -112,7 +101,7 @@ impl World {
         self.plant.advance(now - self.now);
         self.now = now;
         if let Some((_, event)) = self.ends.take_if(|(end, _)| now >= *end) {
-            self.recover();
+            self.active = None;
             if let Some(event) = event {
                 self.tell(&event);
             }
@@ -176,7 +165,8 @@ impl World {
         if self.faulty.is_some() && self.forces_n.len() < MOST_KEPT {
             self.forces_n.push(force_n);
         }
-        if !self.is_braked && !self.is_unplugged && self.is_calibrated && self.is_ready {
+        use MockFaultKind::{Ebrake, Uncalibrated, Unplug, Unready};
+        if !matches!(self.active, Some(Ebrake | Unplug | Uncalibrated | Unready)) {
             self.plant.command(force_n);
         }
     }
@@ -184,16 +174,13 @@ impl World {
     fn begin(&mut self, kind: MockFaultKind) {
         let now = Instant::now();
         self.away_until = (kind == MockFaultKind::Vanish).then(|| now + AWAY);
-        self.is_braked = kind == MockFaultKind::Ebrake;
-        self.is_unplugged = kind == MockFaultKind::Unplug;
-        self.is_calibrated = kind != MockFaultKind::Uncalibrated;
-        self.is_ready = kind != MockFaultKind::Unready;
-        if !(self.is_calibrated && self.is_ready) {
-            self.ends = Some((now + MockFaultKind::LASTS, None));
+        self.active = Some(kind);
+        let [event, end] = kind.events(&self.options.device_id);
+        if end.is_some() || is_status(kind) {
+            self.ends = Some((now + MockFaultKind::LASTS, end));
         }
-        if let Some((event, end)) = kind.events(&self.options.device_id) {
+        if let Some(event) = event {
             self.tell(&event);
-            self.ends = end.map(|end| (now + MockFaultKind::LASTS, Some(end)));
         }
     }
 
@@ -210,7 +197,7 @@ impl World {
     /// A state frame; with the configuration if it is the inventory.
     pub(super) fn state(&self, with_config: bool, session: u64) -> String {
         let mut devices = Vec::new();
-        if !self.is_unplugged {
+        if self.active != Some(MockFaultKind::Unplug) {
             let mut device = self.device();
             if with_config {
                 device["config"] = config(&self.options.device_id);
@@ -246,14 +233,19 @@ impl World {
                 "transform_velocity": {},
             },
             "status": {
-                "calibrated": self.is_calibrated,
+                "calibrated": self.active != Some(MockFaultKind::Uncalibrated),
                 "in_use": !is_idle,
                 "power_supply": true,
-                "ready": self.is_ready,
+                "ready": self.active != Some(MockFaultKind::Unready),
                 "started": true,
             },
         })
     }
+}
+
+/// True for a fault that the status alone tells of.
+fn is_status(kind: MockFaultKind) -> bool {
+    matches!(kind, MockFaultKind::Uncalibrated | MockFaultKind::Unready)
 }
 
 fn config(id: &str) -> Value {
