@@ -1,5 +1,7 @@
 //! The known word that a misspelt one probably means.
 
+use strsim::osa_distance;
+
 /// Shortest word that counts as meant when it is part of another.
 const SHORTEST_PART: usize = 3;
 
@@ -8,7 +10,8 @@ const SHORTEST_PART: usize = 3;
 pub(super) fn suggest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     let word = word.to_lowercase().replace('-', "_");
     let tolerated = (word.chars().count() / 3).max(1);
-    let near = known.iter().map(|&name| (distance(&word, name), name)).min().filter(|&(slips, _)| slips <= tolerated);
+    let near =
+        known.iter().map(|&name| (osa_distance(&word, name), name)).min().filter(|&(slips, _)| slips <= tolerated);
     let part = || {
         let holds = |long: &str, short: &str| short.len() >= SHORTEST_PART && long.contains(short);
         known
@@ -24,27 +27,6 @@ fn stem(key: &str) -> &str {
     const UNITS: [&str; 13] =
         ["_n_per_mm", "_n_per_ms", "_n_per_m", "_per_ms", "_mm", "_cm", "_ms", "_hz", "_kg", "_g", "_m", "_n", "_s"];
     UNITS.iter().find_map(|unit| key.strip_suffix(unit)).unwrap_or(key)
-}
-
-/// Insertions, deletions, replacements and swaps of neighbours that turn `a` into `b` (optimal string alignment).
-fn distance(a: &str, b: &str) -> usize {
-    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
-    let mut rows = vec![vec![0; b.len() + 1]; a.len() + 1];
-    for (i, row) in rows.iter_mut().enumerate() {
-        row[0] = i;
-    }
-    rows[0] = (0..=b.len()).collect();
-    for i in 1..=a.len() {
-        for j in 1..=b.len() {
-            let replaced = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
-            let mut best = replaced.min(rows[i - 1][j] + 1).min(rows[i][j - 1] + 1);
-            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
-                best = best.min(rows[i - 2][j - 2] + 1);
-            }
-            rows[i][j] = best;
-        }
-    }
-    rows[a.len()][b.len()]
 }
 
 #[cfg(test)]
@@ -79,8 +61,8 @@ mod tests {
 
     #[test]
     fn a_swap_of_neighbours_is_one_slip() {
-        assert_eq!(distance("ab", "ba"), 1);
-        assert_eq!(distance("kitten", "sitting"), 3);
-        assert_eq!(distance("", "abc"), 3);
+        assert_eq!(osa_distance("ab", "ba"), 1);
+        assert_eq!(osa_distance("kitten", "sitting"), 3);
+        assert_eq!(osa_distance("", "abc"), 3);
     }
 }

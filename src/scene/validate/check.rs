@@ -20,6 +20,14 @@ pub(super) fn not_negative(field: &str, value: f64) -> Result<(), Error> {
     Err(Error::scene(field, format!("is {value}, must be a finite number of at least 0")))
 }
 
+/// A time of at most `longest_ms` (ms).
+pub(super) fn at_most_ms(field: &str, ms: f64, longest_ms: f64) -> Result<(), Error> {
+    if ms <= longest_ms {
+        return Ok(());
+    }
+    Err(Error::scene(field, format!("is {ms}, must be at most {longest_ms} ms")))
+}
+
 /// Three finite lengths within `limit_m` (m).
 pub(super) fn lengths_within(field: &str, values_m: [f64; 3], limit_m: f64) -> Result<(), Error> {
     if values_m.iter().all(|value| value.is_finite() && value.abs() <= limit_m) {

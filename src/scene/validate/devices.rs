@@ -1,7 +1,7 @@
 //! What can be wrong with the devices of a scene: each by itself, and several together.
 
 use super::super::device::{DeviceKind, DeviceProfile, DeviceSpec, field, numbered};
-use super::check::{lengths_within, positive};
+use super::check::{at_most_ms, lengths_within, positive};
 use crate::devices::{HandSpec, PlantSpec};
 use crate::error::Error;
 use crate::model::contact::Equations;
@@ -64,33 +64,27 @@ fn device(device: &DeviceSpec) -> Result<(), Error> {
         return Err(Error::scene("device.path_csv", message));
     }
     // A key that does nothing is a mistake in the scene.
-    if device.kind != DeviceKind::Hand {
-        let unused = [
-            ("device.plant", device.plant != PlantSpec::default()),
-            ("device.hand", device.hand != HandSpec::default()),
-        ];
-        if let Some((field, _)) = unused.iter().find(|(_, is_set)| *is_set) {
-            return Err(Error::scene(field, "belongs to kind = \"hand\", set that or leave it out"));
-        }
-    }
-    if device.kind != DeviceKind::Replay && device.log.is_some() {
-        return Err(Error::scene("device.log", "belongs to kind = \"replay\", set that or leave it out"));
+    let of_kind = [
+        ("device.plant", device.plant != PlantSpec::default(), DeviceKind::Hand, "hand"),
+        ("device.hand", device.hand != HandSpec::default(), DeviceKind::Hand, "hand"),
+        ("device.log", device.log.is_some(), DeviceKind::Replay, "replay"),
+    ];
+    if let Some((field, .., name)) = of_kind.iter().find(|(_, is_set, kind, _)| *is_set && device.kind != *kind) {
+        return Err(Error::scene(field, format!("belongs to kind = {name:?}, set that or leave it out")));
     }
     if device.kind == DeviceKind::Replay && device.path_csv.is_some() {
         let message = "does nothing with kind = \"replay\", the tool moves as in the log: leave it out";
         return Err(Error::scene("device.path_csv", message));
     }
-    if let Some((field, message)) = device.plant.fault() {
-        return Err(Error::scene(&format!("device.plant.{field}"), message));
-    }
-    if let Some((field, message)) = device.hand.fault() {
-        return Err(Error::scene(&format!("device.hand.{field}"), message));
-    }
+    let none_of = |table: &str, fault: Option<(&str, String)>| match fault {
+        None => Ok(()),
+        Some((field, message)) => Err(Error::scene(&format!("device.{table}.{field}"), message)),
+    };
+    none_of("plant", device.plant.fault())?;
+    none_of("hand", device.hand.fault())?;
     haply(device)?;
-    let fault = device.faults.iter().enumerate().find_map(|(index, spec)| Some((index, spec.fault()?)));
-    fault.map_or(Ok(()), |(index, (field, message))| {
-        Err(Error::scene(&format!("device.fault[{index}].{field}"), message))
-    })
+    let mut faults = device.faults.iter().enumerate();
+    faults.try_for_each(|(index, spec)| none_of(&format!("fault[{index}]"), spec.fault()))
 }
 
 /// A scene file must move its tool itself; a program may bring a device of its own.
@@ -122,24 +116,19 @@ fn haply(device: &DeviceSpec) -> Result<(), Error> {
     if device.kind != DeviceKind::Haply {
         return Err(Error::scene("device.haply", "belongs to kind = \"haply\", set that or leave it out"));
     }
-    if device.path_csv.is_some() || device.path.is_some() {
-        let message = "moves a simulated tool, and a haply device is moved by a hand: leave it out";
-        return Err(Error::scene("device.path_csv", message));
-    }
-    if device.attach_node.is_some() {
-        let message = "glues a tool that starts at its node, and a hand starts anywhere: leave it out";
-        return Err(Error::scene("device.attach_node", message));
-    }
-    if device.profile != DeviceProfile::default() {
-        let message = "names the limits of a simulated device, those of this one are in device.haply: leave it out";
-        return Err(Error::scene("device.profile", message));
+    let (has_path, is_attached) = (device.path_csv.is_some() || device.path.is_some(), device.attach_node.is_some());
+    let has_profile = device.profile != DeviceProfile::default();
+    for (field, is_set, why) in [
+        ("path_csv", has_path, "moves a simulated tool, and a haply device is moved by a hand"),
+        ("attach_node", is_attached, "glues a tool that starts at its node, and a hand starts anywhere"),
+        ("profile", has_profile, "names the limits of a simulated device, those of this one are in device.haply"),
+    ] {
+        if is_set {
+            return Err(Error::scene(&format!("device.{field}"), format!("{why}: leave it out")));
+        }
     }
     positive("device.haply.max_force_n", spec.max_force_n)?;
     lengths_within("device.haply.origin_m", spec.origin_m, FARTHEST_M)?;
     positive("device.haply.watchdog_ms", spec.watchdog_ms)?;
-    if spec.watchdog_ms > LONGEST_WATCHDOG_MS {
-        let message = format!("is {}, must be at most {LONGEST_WATCHDOG_MS} ms", spec.watchdog_ms);
-        return Err(Error::scene("device.haply.watchdog_ms", message));
-    }
-    Ok(())
+    at_most_ms("device.haply.watchdog_ms", spec.watchdog_ms, LONGEST_WATCHDOG_MS)
 }

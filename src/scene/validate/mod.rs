@@ -17,7 +17,7 @@ use crate::model::local::{Feedback, Kind};
 use crate::model::mesh::Face;
 use crate::model::surroundings::LEAST_PCT;
 use crate::runtime::Rate;
-use check::{inside, lengths_within, movable, not_negative, on_surface, positive};
+use check::{at_most_ms, inside, lengths_within, movable, not_negative, on_surface, positive};
 
 /// Largest body; a million nodes have 13 million springs, minutes of work for a second of simulation.
 const MAX_NODES: usize = 1_000_000;
@@ -190,9 +190,7 @@ fn global(global: &GlobalSpec) -> Result<(), Error> {
     ];
     for (field, latency_ms) in latencies {
         not_negative(field, latency_ms)?;
-        if latency_ms > MAX_LATENCY_MS {
-            return Err(Error::scene(field, format!("is {latency_ms}, must be at most {MAX_LATENCY_MS} ms")));
-        }
+        at_most_ms(field, latency_ms, MAX_LATENCY_MS)?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! What can be wrong with the limits of a scene.
 
 use super::super::SafetySpec;
-use super::check::{not_negative, positive};
+use super::check::{at_most_ms, not_negative, positive};
 use crate::error::Error;
 
 /// A force that fades longer than this is no stop any more (ms).
@@ -49,9 +49,7 @@ pub(super) fn validate(safety: &SafetySpec) -> Result<(), Error> {
         ("safety.start_up_ms", safety.start_up_ms),
     ] {
         positive(field, ms)?;
-        if ms > LONGEST_MS {
-            return Err(Error::scene(field, format!("is {ms}, must be at most {LONGEST_MS} ms")));
-        }
+        at_most_ms(field, ms, LONGEST_MS)?;
     }
     match safety.off.iter().find(|stage| !stage.can_be_off()) {
         None => Ok(()),

@@ -111,11 +111,13 @@ impl Topic {
 #[derive(Clone, Debug)]
 pub(super) struct Comparison(Arc<Mutex<[Topic; TOPICS.len()]>>);
 
-impl Comparison {
-    pub(super) fn new() -> Self {
+impl Default for Comparison {
+    fn default() -> Self {
         Self(Arc::new(Mutex::new(TOPICS.map(|(name, _)| Topic::new(name)))))
     }
+}
 
+impl Comparison {
     /// Adds a sample of the log, if it is one that a replay computes.
     pub(super) fn log(&self, record: &LogRecord) {
         if let Some(place) = place(record) {

@@ -35,6 +35,7 @@ pub(super) struct Logged {
 }
 
 /// What one pass over the file gathers.
+#[derive(Default)]
 struct Gathered {
     environment: Option<Environment>,
     session: Option<String>,
@@ -58,18 +59,7 @@ impl Logged {
     /// another instruction set.
     pub(super) fn read(path: &Path) -> Result<Self, Error> {
         let mut reader = LogReader::open(path)?;
-        let mut gathered = Gathered {
-            environment: None,
-            session: None,
-            recording: Recording::default(),
-            samples: Vec::new(),
-            comparison: Comparison::new(),
-            stats: BTreeMap::new(),
-            timings: BTreeMap::new(),
-            events: EventSum::default(),
-            fault: None,
-            restarted: None,
-        };
+        let mut gathered = Gathered::default();
         for entry in reader.by_ref() {
             gathered.push(entry);
         }
