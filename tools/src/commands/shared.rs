@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use palpate::log::Window;
 use palpate::runtime::Nanos;
+use palpate::scene::Scene;
 use palpate::session::Running;
 use palpate::{Error, ErrorKind};
 
@@ -28,6 +29,19 @@ pub fn refuse_to_overwrite(input: &Path, out: &Path) -> Result<(), Error> {
         return Err(Error::new(ErrorKind::Usage, message).at(out.display().to_string()));
     }
     Ok(())
+}
+
+/// Refuses to write `out` over the scene at `path` or over what the scene reads.
+pub fn keep_inputs(path: &Path, scene: &Scene, out: &Path) -> Result<(), Error> {
+    refuse_to_overwrite(path, out)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut paths = scene.devices.iter().filter_map(|device| device.path_csv.as_ref());
+    paths.try_for_each(|path_csv| refuse_to_overwrite(&folder.join(path_csv), out))
+}
+
+/// Writes a page to where it was asked for, if it was.
+pub fn write_page(path: Option<&Path>, page: impl FnOnce() -> String) -> Result<(), Error> {
+    path.map_or(Ok(()), |path| std::fs::write(path, page()).map_err(|error| Error::io(path, error)))
 }
 
 /// True if the two are names of one file: hard links.
