@@ -19,7 +19,7 @@ pub use blocks::{Block, Buckets};
 pub use cyclictest::read_cyclictest;
 pub use device::{DeviceTiming, ForceBin, ResyncBin};
 pub use distribution::Shape;
-pub use group::{GroupTiming, TickBin};
+pub use group::{ActorTiming, GroupTiming, TickBin};
 pub use recent::ForcePoint;
 #[cfg(test)]
 pub use recent::Moment;

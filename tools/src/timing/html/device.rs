@@ -8,13 +8,12 @@ use super::chart_figure_in_two;
 use super::distributions::short;
 use super::named_figures::Numbers;
 use super::over_time::{Troubles, signs, troubles};
+use super::tables::percentiles;
 use crate::drawing::html::escaped;
 use crate::drawing::svg::{Axis, Chart, Line, Mark};
 use crate::timing::{DeviceTiming, ForceBin, ResyncBin, TimingReport};
 use crate::units::{duration, force, trimmed};
 
-const PERCENTILES: [(&str, &str); 6] =
-    [("p50", "p50"), ("p90", "p90"), ("p99", "p99"), ("p99.9", "p999"), ("max", "max"), ("samples", "count")];
 /// Newtons that a logarithmic axis does not tell from zero.
 const SMALLEST_STEP_N: f64 = 1e-6;
 
@@ -44,26 +43,14 @@ pub(crate) fn devices(report: &TimingReport, numbers: &Numbers, range: [f64; 2])
 
 fn table(device: &DeviceReport, numbers: &Numbers) -> String {
     let prefix = if device.name.is_empty() { String::new() } else { format!("{}.", device.name) };
-    let mut out = String::from(
-        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Model age and resyncs\"><table>\n<thead><tr><th scope=\"col\"></th>",
-    );
-    for (words, _) in PERCENTILES {
-        let _ = write!(out, "<th scope=\"col\">{words}</th>");
-    }
-    out.push_str("</tr></thead>\n<tbody>\n");
-    for (words, figure) in [
+    let rows = [
         ("model age at each tick", "force.model_age"),
         ("force jump of a resync, before blending", "resync.jump_before"),
         ("largest step that blending leaves", "resync.jump_after"),
         ("age of a new model on arrival", "resync.age"),
-    ] {
-        let _ = write!(out, "<tr><th scope=\"row\">{words}</th>");
-        for (_, percentile) in PERCENTILES {
-            let _ = write!(out, "<td>{}</td>", numbers.show(&format!("{prefix}{figure}.{percentile}")));
-        }
-        out.push_str("</tr>\n");
-    }
-    out.push_str("</tbody>\n</table></div>\n<p class=\"faint\">");
+    ];
+    let rows = rows.map(|(words, figure)| (words.to_owned(), "", format!("{prefix}{figure}")));
+    let mut out = percentiles("Model age and resyncs", rows, numbers) + "<p class=\"faint\">";
     let of = |figure: &str| numbers.show(&format!("{prefix}{figure}"));
     let _ = writeln!(
         out,
