@@ -47,10 +47,7 @@ pub fn run(args: &CompareArgs) -> Result<(), Error> {
     let mut comparison = compared.map_err(|error| error.at(&name))?;
     comparison.scene = name;
     shared::write_page(args.html.as_deref(), || to_html(&comparison))?;
-    match args.json {
-        true => shared::print(&format!("{}\n", to_json(&comparison)))?,
-        false => shared::print(&to_text(&comparison))?,
-    }
+    shared::print_report(args.json, || to_json(&comparison), || to_text(&comparison))?;
     match comparison.faults().next() {
         Some((model, fault)) => Err(Error::new(ErrorKind::Fault, format!("the run of `{model}`: {fault}"))),
         None => Ok(()),

@@ -85,10 +85,7 @@ pub fn run(args: &ReduceArgs) -> Result<(), Error> {
     shown.clear();
     let study = made?;
     shared::write_page(args.html.as_deref(), || to_html(&study))?;
-    match args.json {
-        true => shared::print(&format!("{}\n", to_json(&study)))?,
-        false => shared::print(&to_text(&study))?,
-    }
+    shared::print_report(args.json, || to_json(&study), || to_text(&study))?;
     match &study.locality {
         Some(locality) if args.fail_if_not_local && !locality.is_local => {
             Err(Error::new(ErrorKind::Condition, locality_verdict(locality)).at(&study.subject))

@@ -1,6 +1,7 @@
 //! What the subcommands share: standard output that may be closed early, the warning on a damaged log, `--from` and `--to`, and
 //! Ctrl-C.
 
+use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -16,6 +17,15 @@ pub fn print(text: &str) -> Result<(), Error> {
     let mut out = io::stdout().lock();
     let result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     forgive_closed_pipe(result.map_err(|e| Error::io(Path::new("standard output"), e)))
+}
+
+/// Prints one JSON document, or else the report for people.
+pub fn print_report<J: Display>(
+    is_json: bool,
+    json: impl FnOnce() -> J,
+    text: impl FnOnce() -> String,
+) -> Result<(), Error> {
+    print(&if is_json { format!("{}\n", json()) } else { text() })
 }
 
 /// Refuses to write `out` over `input`: opening it for writing would destroy what is being read.

@@ -52,7 +52,8 @@ macro_rules! table {
 pub(super) fn columns(kind: TopicKind) -> &'static [Column] {
     match kind {
         TopicKind::Timing => table! {
-            U64: tick scheduled_ns woke_ns start_ns end_ns deadline_ns, U32: slips, Text: cause, U32: given_up, Text: mode
+            U64: tick scheduled_ns woke_ns start_ns end_ns deadline_ns, U32: slips, Text: cause, U32: given_up,
+            Text: mode
         },
         TopicKind::Actors => table! { U64: scheduled_ns, U32: actor, U64: spent_ns },
         TopicKind::Stats => table! {

@@ -30,8 +30,10 @@
 //! Distributions are `{count, p50, p90, p99, p999, max}`, nearest-rank, all zero if `count` is zero. Causes are
 //! `late_wake`, `long_tick`, `stalled_peer`, `policy`, `fault` and `unattributed`.
 
+use std::collections::BTreeMap;
+
 use palpate::log::{
-    DeviceReport, Environment, ForceReport, GroupSummary, Level, LoggedExecution, Percentiles, RunReport, TextEvent,
+    DeviceReport, Environment, GroupSummary, Level, LoggedExecution, Percentiles, RunReport, TextEvent,
 };
 use palpate::report::verdict;
 use palpate::runtime::SlipCounts;
@@ -183,7 +185,7 @@ fn device(DeviceReport { resyncs, force, contact, limits, .. }: &DeviceReport) -
             "peak_commanded_n": force.peak_commanded_n,
             "not_finite": force.not_finite,
             "model_age_s": percentiles(force.model_age_s),
-            "served": shares(force),
+            "served": force.shares().map(|(model, share)| (model.name(), share)).collect::<BTreeMap<_, _>>(),
         },
         "contact": { "free": contact.free, "stick": contact.stick, "slip": contact.slip, "lost": contact.lost },
         "limits": {
@@ -195,10 +197,6 @@ fn device(DeviceReport { resyncs, force, contact, limits, .. }: &DeviceReport) -
             "stages": limits.stages.iter().map(|(name, count)| (name.clone(), json!(count))).collect::<Map<_, _>>(),
         },
     })
-}
-
-fn shares(force: &ForceReport) -> Map<String, Value> {
-    force.shares().map(|(model, share)| (model.name().to_owned(), json!(share))).collect()
 }
 
 fn environment(environment: &Environment) -> Value {

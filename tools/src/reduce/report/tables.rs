@@ -138,11 +138,7 @@ pub(super) fn truncations(decay: &HankelDecay) -> Table {
     };
     Table {
         title: format!("Truncations, {}", decay.title),
-        columns: columns(&[
-            ("states", "states kept"),
-            ERROR,
-            HINF,
-        ]),
+        columns: columns(&[("states", "states kept"), ERROR, HINF]),
         rows: rows.map(row).collect(),
     }
 }

@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use palpate::log::DeviceReport;
+use palpate::runtime::SlipCause;
 
+use super::causes::{CAUSES, key, legend};
 use super::chart_figure_in_two;
 use super::distributions::short;
 use super::named_figures::Numbers;
@@ -79,15 +81,6 @@ fn highest(lines: &[Line<'_>]) -> f64 {
     lines.iter().flat_map(|line| &line.points).map(|point| point.1).filter(|y| y.is_finite()).fold(0.0, f64::max)
 }
 
-fn key(entries: &[(&str, &str)], more: &str) -> String {
-    let mut out = String::from("<p class=\"legend\">");
-    for (class, words) in entries {
-        let _ = write!(out, "<span class=\"badge\"><i class=\"dash {class}\"></i>{words}</span>");
-    }
-    let _ = writeln!(out, "<span class=\"faint\">{more}</span></p>");
-    out
-}
-
 fn force_chart(device: &DeviceTiming, troubles: &[Troubles], range: [f64; 2]) -> String {
     let lines = [
         force_line(device, "c6", "least before safety", |bin| bin.force_n[0]),
@@ -106,17 +99,11 @@ fn force_chart(device: &DeviceTiming, troubles: &[Troubles], range: [f64; 2]) ->
         chart.signs = signs(troubles, range, size[0] - 66.0);
         chart.to_svg()
     };
-    let causes: Vec<_> = super::causes::CAUSES
-        .into_iter()
-        .filter(|cause| troubles.iter().any(|troubles| troubles.cause == *cause))
-        .collect();
+    let is_seen = |cause: &SlipCause| troubles.iter().any(|troubles| troubles.cause == *cause);
+    let causes: Vec<_> = CAUSES.into_iter().filter(is_seen).collect();
     let more = format!("magnitudes in each {} of the run", duration(device.force.width().0));
-    let mut caption =
-        key(&[("c1", "largest before safety"), ("c6", "least before safety"), ("c2", "largest commanded")], &more);
-    if !causes.is_empty() {
-        caption.push_str(&super::causes::legend(&causes));
-    }
-    chart_figure_in_two(draw, &caption)
+    let lines = [("c1", "largest before safety"), ("c6", "least before safety"), ("c2", "largest commanded")];
+    chart_figure_in_two(draw, &(key(&lines, &more) + &legend(&causes)))
 }
 
 fn age_chart(device: &DeviceTiming, report: &TimingReport, range: [f64; 2]) -> String {

@@ -103,7 +103,8 @@ pub(crate) fn percentiles<'a>(
     numbers: &Numbers,
 ) -> String {
     let mut out = format!(
-        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{}\"><table>\n<thead><tr><th scope=\"col\"></th>",
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{}\"><table>\n<thead><tr>\
+         <th scope=\"col\"></th>",
         escaped(label)
     );
     for (words, _) in PERCENTILES {
