@@ -1,6 +1,6 @@
 //! `palpate compare SCENE`: what each local model computes and costs, against `full`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::scene::Scene;
@@ -36,11 +36,7 @@ pub struct CompareArgs {
 pub fn run(args: &CompareArgs) -> Result<(), Error> {
     let scene = Scene::load(&args.scene)?;
     if let Some(html) = &args.html {
-        shared::refuse_to_overwrite(&args.scene, html)?;
-        for path_csv in scene.devices.iter().filter_map(|device| device.path_csv.as_ref()) {
-            let folder = args.scene.parent().unwrap_or(Path::new(""));
-            shared::refuse_to_overwrite(&folder.join(path_csv), html)?;
-        }
+        shared::keep_inputs(&args.scene, &scene, html)?;
     }
     let name = args.scene.display().to_string();
     let options =
@@ -50,13 +46,8 @@ pub fn run(args: &CompareArgs) -> Result<(), Error> {
     shown.clear();
     let mut comparison = compared.map_err(|error| error.at(&name))?;
     comparison.scene = name;
-    if let Some(html) = &args.html {
-        std::fs::write(html, to_html(&comparison)).map_err(|error| Error::io(html, error))?;
-    }
-    match args.json {
-        true => shared::print(&format!("{}\n", to_json(&comparison)))?,
-        false => shared::print(&to_text(&comparison))?,
-    }
+    shared::write_page(args.html.as_deref(), || to_html(&comparison))?;
+    shared::print_report(args.json, || to_json(&comparison), || to_text(&comparison))?;
     match comparison.faults().next() {
         Some((model, fault)) => Err(Error::new(ErrorKind::Fault, format!("the run of `{model}`: {fault}"))),
         None => Ok(()),

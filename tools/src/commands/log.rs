@@ -8,7 +8,7 @@ use palpate::{Error, ErrorKind};
 
 use super::log_info::{bytes, count, seconds, span, to_json, to_text};
 use super::progress::ReadBar;
-use super::shared::{print, refuse_to_overwrite, warn_of_damage};
+use super::shared::{print, print_report, refuse_to_overwrite, warn_of_damage};
 use crate::log_file::{CheckReport, LogInfo, Lost, Recovered, check, recover};
 
 /// The arguments of `palpate log`.
@@ -85,7 +85,7 @@ fn info(args: &InfoArgs) -> Result<(), Error> {
     bar.clear();
     let info = info?;
     warn_of_damage(&place, info.damage.first().map(String::as_str));
-    if args.json { print(&format!("{}\n", to_json(&info))) } else { print(&to_text(&info, &place)) }
+    print_report(args.json, || to_json(&info), || to_text(&info, &place))
 }
 
 fn run_check(args: &CheckArgs) -> Result<(), Error> {

@@ -98,24 +98,16 @@ fn execution(environment: &Environment) -> &'static str {
 /// The contents as one JSON document. Later versions only add fields.
 pub fn to_json(info: &LogInfo) -> Value {
     let chunks = info.chunks.iter().map(|(compression, chunks)| {
-        json!({
-            "compression": compression,
-            "count": chunks.count,
-            "packed_bytes": chunks.packed,
-            "unpacked_bytes": chunks.unpacked,
-        })
+        let mut chunks = json!(chunks);
+        chunks["compression"] = json!(compression);
+        chunks
     });
     let topics = info.topics.iter().map(|(name, topic)| {
-        json!({
-            "topic": name,
-            "messages": topic.messages,
-            "rate_hz": info.rate_hz(topic),
-            "schema": topic.schema,
-            "encoding": topic.encoding,
-        })
+        let rate_hz = info.rate_hz(topic);
+        let mut topic = json!(topic);
+        (topic["topic"], topic["rate_hz"]) = (json!(name), json!(rate_hz));
+        topic
     });
-    let attachments =
-        info.attachments.iter().map(|one| json!({"name": one.name, "media_type": one.media_type, "bytes": one.bytes}));
     json!({
         "schema_version": 1,
         "bytes": info.bytes,
@@ -130,7 +122,7 @@ pub fn to_json(info: &LogInfo) -> Value {
         "duration_s": info.duration_s(),
         "chunks": chunks.collect::<Vec<_>>(),
         "topics": topics.collect::<Vec<_>>(),
-        "attachments": attachments.collect::<Vec<_>>(),
+        "attachments": info.attachments,
         "metadata": info.metadata,
         "environment": info.environment.as_ref().map(environment_json),
     })

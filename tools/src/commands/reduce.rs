@@ -1,6 +1,6 @@
 //! `palpate reduce`: model reduction of the paper's meshes, of any like them, and the locality check of a scene.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use palpate::scene::Scene;
 use palpate::{Error, ErrorKind};
@@ -84,13 +84,8 @@ pub fn run(args: &ReduceArgs) -> Result<(), Error> {
     let made = study(args, &mut shown);
     shown.clear();
     let study = made?;
-    if let Some(html) = &args.html {
-        std::fs::write(html, to_html(&study)).map_err(|error| Error::io(html, error))?;
-    }
-    match args.json {
-        true => shared::print(&format!("{}\n", to_json(&study)))?,
-        false => shared::print(&to_text(&study))?,
-    }
+    shared::write_page(args.html.as_deref(), || to_html(&study))?;
+    shared::print_report(args.json, || to_json(&study), || to_text(&study))?;
     match &study.locality {
         Some(locality) if args.fail_if_not_local && !locality.is_local => {
             Err(Error::new(ErrorKind::Condition, locality_verdict(locality)).at(&study.subject))
@@ -103,7 +98,7 @@ fn study(args: &ReduceArgs, shown: &mut StepBar) -> Result<ReductionStudy, Error
     if let Some(path) = &args.scene {
         let scene = Scene::load(path)?;
         if let Some(html) = &args.html {
-            keep_inputs(path, &scene, html)?;
+            shared::keep_inputs(path, &scene, html)?;
         }
         let name = path.display().to_string();
         let study = reduce_scene(&scene, &options(args), |at| shown.show(&at.what, at.done, at.of));
@@ -121,14 +116,6 @@ fn study(args: &ReduceArgs, shown: &mut StepBar) -> Result<ReductionStudy, Error
         }
     }
     reduce_paper(&studies, |at| shown.show(&at.what, at.done, at.of))
-}
-
-/// Refuses a page that would overwrite what is read.
-fn keep_inputs(path: &Path, scene: &Scene, html: &Path) -> Result<(), Error> {
-    shared::refuse_to_overwrite(path, html)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut paths = scene.devices.iter().filter_map(|device| device.path_csv.as_ref());
-    paths.try_for_each(|path_csv| shared::refuse_to_overwrite(&folder.join(path_csv), html))
 }
 
 fn options(args: &ReduceArgs) -> ReduceOptions {

@@ -34,8 +34,7 @@ pub fn run(args: &ReplayArgs) -> Result<(), Error> {
     let report = replay.run_with(|elapsed| bar.show(elapsed));
     bar.clear();
     let report = report?;
-    let text = if args.json { format!("{}\n", to_json(&report)) } else { report.to_string() };
-    shared::print(&text)?;
+    shared::print_report(args.json, || to_json(&report), || report.to_string())?;
     if report.is_identical() {
         return Ok(());
     }

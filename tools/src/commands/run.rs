@@ -51,11 +51,7 @@ pub fn demo() -> Result<(), Error> {
 /// Input errors of the scene, or a failed run.
 pub fn run(args: &RunArgs) -> Result<(), Error> {
     let mut scene = Scene::load(&args.scene)?;
-    shared::refuse_to_overwrite(&args.scene, &args.out)?;
-    for path_csv in scene.devices.iter().filter_map(|device| device.path_csv.as_ref()) {
-        let folder = args.scene.parent().unwrap_or(Path::new(""));
-        shared::refuse_to_overwrite(&folder.join(path_csv), &args.out)?;
-    }
+    shared::keep_inputs(&args.scene, &scene, &args.out)?;
     for log in scene.devices.iter().filter_map(|device| device.log.as_ref()) {
         shared::refuse_to_overwrite(log, &args.out)?;
     }

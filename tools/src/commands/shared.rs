@@ -1,12 +1,14 @@
 //! What the subcommands share: standard output that may be closed early, the warning on a damaged log, `--from` and `--to`, and
 //! Ctrl-C.
 
+use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::OnceLock;
 
 use palpate::log::Window;
 use palpate::runtime::Nanos;
+use palpate::scene::Scene;
 use palpate::session::Running;
 use palpate::{Error, ErrorKind};
 
@@ -15,6 +17,15 @@ pub fn print(text: &str) -> Result<(), Error> {
     let mut out = io::stdout().lock();
     let result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     forgive_closed_pipe(result.map_err(|e| Error::io(Path::new("standard output"), e)))
+}
+
+/// Prints one JSON document, or else the report for people.
+pub fn print_report<J: Display>(
+    is_json: bool,
+    json: impl FnOnce() -> J,
+    text: impl FnOnce() -> String,
+) -> Result<(), Error> {
+    print(&if is_json { format!("{}\n", json()) } else { text() })
 }
 
 /// Refuses to write `out` over `input`: opening it for writing would destroy what is being read.
@@ -28,6 +39,19 @@ pub fn refuse_to_overwrite(input: &Path, out: &Path) -> Result<(), Error> {
         return Err(Error::new(ErrorKind::Usage, message).at(out.display().to_string()));
     }
     Ok(())
+}
+
+/// Refuses to write `out` over the scene at `path` or over what the scene reads.
+pub fn keep_inputs(path: &Path, scene: &Scene, out: &Path) -> Result<(), Error> {
+    refuse_to_overwrite(path, out)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut paths = scene.devices.iter().filter_map(|device| device.path_csv.as_ref());
+    paths.try_for_each(|path_csv| refuse_to_overwrite(&folder.join(path_csv), out))
+}
+
+/// Writes a page to where it was asked for, if it was.
+pub fn write_page(path: Option<&Path>, page: impl FnOnce() -> String) -> Result<(), Error> {
+    path.map_or(Ok(()), |path| std::fs::write(path, page()).map_err(|error| Error::io(path, error)))
 }
 
 /// True if the two are names of one file: hard links.

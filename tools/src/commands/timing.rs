@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use palpate::{Error, ErrorKind};
 
 use super::progress::ReadBar;
-use super::shared::{WindowArgs, print, refuse_to_overwrite, warn_of_damage};
+use super::shared::{WindowArgs, print_report, refuse_to_overwrite, warn_of_damage, write_page};
 use crate::timing::{
     Against, Condition, Selection, TimingAnalysis, TimingReport, against_to_json, against_to_text, figure_to_text,
     read_cyclictest, timing_html, timing_to_json, timing_to_text,
@@ -53,22 +53,17 @@ pub fn run(args: &TimingArgs) -> Result<(), Error> {
             .try_for_each(|log| refuse_to_overwrite(log, html))?;
     }
     let report = read(&args.log, args, &args.group)?;
-    if let Some(html) = &args.html {
-        let name = args.log.file_name().unwrap_or_default().to_string_lossy();
-        std::fs::write(html, timing_html(&report, &name)).map_err(|error| Error::io(html, error))?;
-    }
+    let name = args.log.file_name().unwrap_or_default().to_string_lossy();
+    write_page(args.html.as_deref(), || timing_html(&report, &name))?;
     match &args.against {
         Some(other_log) => {
             let other = matched(other_log, args)?;
             let against = Against::of(&report, &other);
             let [this_name, other_name] = [&args.log, other_log].map(|log| log.display().to_string());
-            match args.json {
-                true => print(&format!("{}\n", against_to_json(&against, &report, (&other_name, &other)))),
-                false => print(&against_to_text(&against, [(&this_name, &report), (&other_name, &other)])),
-            }
+            let json = || against_to_json(&against, &report, (&other_name, &other));
+            print_report(args.json, json, || against_to_text(&against, [(&this_name, &report), (&other_name, &other)]))
         }
-        None if args.json => print(&format!("{}\n", timing_to_json(&report))),
-        None => print(&timing_to_text(&report)),
+        None => print_report(args.json, || timing_to_json(&report), || timing_to_text(&report)),
     }?;
     check(args, &report)
 }

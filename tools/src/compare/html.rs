@@ -90,18 +90,16 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
     );
     for (number, latency) in comparison.latencies().into_iter().enumerate() {
         let [whole, near] = plots.forces(latency);
-        figure(
-            &format!("force-{number}"),
-            &whole,
-            "Magnitude of the force on the tool. The shaded part is shown below.",
-        );
-        figure(
-            &format!("resync-{number}"),
-            &near,
-            "The same around two resyncs in the middle of the contact. Dashed: a result of the global model becomes visible.",
-        );
-        let caption = "Distance from the force of `full`; what is below the lowest line is drawn on it.";
-        figure(&format!("error-{number}"), &plots.errors(latency), caption);
+        let errors = plots.errors(latency);
+        let around = "The same around two resyncs in the middle of the contact. Dashed: a result of the global model becomes \
+                      visible.";
+        for (what, svg, caption) in [
+            ("force", whole, "Magnitude of the force on the tool. The shaded part is shown below."),
+            ("resync", near, around),
+            ("error", errors, "Distance from the force of `full`; what is below the lowest line is drawn on it."),
+        ] {
+            figure(&format!("{what}-{number}"), &svg, caption);
+        }
     }
     style
 }

@@ -1,11 +1,9 @@
 //! A chart as an SVG file of its own, for documents.
 
-use super::svg::{Axis, Chart, Line, Mark, Point};
+use super::svg::{Axis, Chart, Line, Mark, Point, around};
 
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 420.0;
-/// Around the points, on axes that are logarithmic.
-const ROOM: f64 = 1.6;
 /// Of the width, to the right of lines that have their labels at their ends.
 const LABELS: f64 = 0.18;
 /// The colours of a page in the light; the first is the reference's.
@@ -98,13 +96,6 @@ impl Picture {
     }
 }
 
-/// From below the least to above the largest of those above zero.
-pub(super) fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    let shown = values.filter(|value| value.is_finite() && *value > 0.0);
-    let [low, high] = shown.fold([f64::INFINITY, 0.0], |[low, high], value| [value.min(low), value.max(high)]);
-    if low <= high { [low / ROOM, high * ROOM] } else { [0.1, 10.0] }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,6 +123,5 @@ mod tests {
     #[test]
     fn without_points_there_are_axes() {
         assert!(Picture::default().to_svg().contains("class=\"frame\""));
-        assert_eq!(around([0.0, 2.0, f64::NAN].into_iter()), [2.0 / ROOM, 2.0 * ROOM]);
     }
 }

@@ -4,8 +4,8 @@ use std::fmt::Write;
 use std::ops::Range;
 
 use super::html::escaped;
-use super::picture::{STYLE, around};
-use super::svg::{Axis, Chart, Line, Mark};
+use super::picture::STYLE;
+use super::svg::{Axis, Chart, Line, Mark, around};
 
 /// Near black, for a reference.
 pub const INK: usize = 0;

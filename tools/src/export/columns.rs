@@ -43,93 +43,38 @@ pub enum Cell {
 /// A column of a table: its name with the unit at its end, and its type.
 pub type Column = (&'static str, ColumnType);
 
+/// Columns by their types, each name once: `U64: tick start_ns, Text: mode`.
+macro_rules! table {
+    ($($of:ident: $($name:ident)+),*) => { &[$($((stringify!($name), ColumnType::$of)),+),*] };
+}
+
 /// The columns of a topic of this kind.
 pub(super) fn columns(kind: TopicKind) -> &'static [Column] {
-    use ColumnType::{F32, F64, OptionalU32, Text, U32, U64};
     match kind {
-        TopicKind::Timing => &[
-            ("tick", U64),
-            ("scheduled_ns", U64),
-            ("woke_ns", U64),
-            ("start_ns", U64),
-            ("end_ns", U64),
-            ("deadline_ns", U64),
-            ("slips", U32),
-            ("cause", Text),
-            ("given_up", U32),
-            ("mode", Text),
-        ],
-        TopicKind::Actors => &[("scheduled_ns", U64), ("actor", U32), ("spent_ns", U64)],
-        TopicKind::Stats => &[
-            ("t_s", F64),
-            ("released", U64),
-            ("skipped", U64),
-            ("missed", U64),
-            ("lost_records", U64),
-            ("lateness_p50_ns", U64),
-            ("lateness_p99_ns", U64),
-            ("lateness_max_ns", U64),
-            ("execution_p50_ns", U64),
-            ("execution_p99_ns", U64),
-            ("execution_max_ns", U64),
-            ("port_uses", U64),
-        ],
-        TopicKind::Force | TopicKind::ForceCommanded => &[("t_s", F64), ("fx_n", F64), ("fy_n", F64), ("fz_n", F64)],
-        TopicKind::Tool => &[
-            ("t_s", F64),
-            ("x_m", F64),
-            ("y_m", F64),
-            ("z_m", F64),
-            ("vx_m_s", F64),
-            ("vy_m_s", F64),
-            ("vz_m_s", F64),
-            ("sample_id", U32),
-            ("buttons", U32),
-        ],
-        TopicKind::Contact => &[
-            ("t_s", F64),
-            ("mode", Text),
-            ("triangle", OptionalU32),
-            ("weight_a", F64),
-            ("weight_b", F64),
-            ("weight_c", F64),
-            ("nx", F64),
-            ("ny", F64),
-            ("nz", F64),
-            ("normal_force_n", F32),
-            ("tangential_force_n", F32),
-        ],
-        TopicKind::Resync => &[
-            ("t_s", F64),
-            ("version", U32),
-            ("age_s", F64),
-            ("jump_before_n", F64),
-            ("jump_after_n", F64),
-            ("energy_j", F64),
-        ],
-        TopicKind::Global => &[("t_s", F64), ("version", U32), ("first_tick", U64), ("last_tick", U64)],
-        TopicKind::Ports => &[
-            ("t_s", F64),
-            ("group", U32),
-            ("port", U32),
-            ("kind", Text),
-            ("tick", U64),
-            ("count", U64),
-            ("sequence", U64),
-        ],
-        TopicKind::Probe => &[
-            ("t_s", F64),
-            ("node", U32),
-            ("local_x_m", F64),
-            ("local_y_m", F64),
-            ("local_z_m", F64),
-            ("global_x_m", F64),
-            ("global_y_m", F64),
-            ("global_z_m", F64),
-        ],
+        TopicKind::Timing => table! {
+            U64: tick scheduled_ns woke_ns start_ns end_ns deadline_ns, U32: slips, Text: cause, U32: given_up,
+            Text: mode
+        },
+        TopicKind::Actors => table! { U64: scheduled_ns, U32: actor, U64: spent_ns },
+        TopicKind::Stats => table! {
+            F64: t_s, U64: released skipped missed lost_records lateness_p50_ns lateness_p99_ns lateness_max_ns
+            execution_p50_ns execution_p99_ns execution_max_ns port_uses
+        },
+        TopicKind::Force | TopicKind::ForceCommanded => table! { F64: t_s fx_n fy_n fz_n },
+        TopicKind::Tool => table! { F64: t_s x_m y_m z_m vx_m_s vy_m_s vz_m_s, U32: sample_id buttons },
+        TopicKind::Contact => table! {
+            F64: t_s, Text: mode, OptionalU32: triangle, F64: weight_a weight_b weight_c nx ny nz,
+            F32: normal_force_n tangential_force_n
+        },
+        TopicKind::Resync => table! { F64: t_s, U32: version, F64: age_s jump_before_n jump_after_n energy_j },
+        TopicKind::Global => table! { F64: t_s, U32: version, U64: first_tick last_tick },
+        TopicKind::Ports => table! { F64: t_s, U32: group port, Text: kind, U64: tick count sequence },
+        TopicKind::Probe => table! {
+            F64: t_s, U32: node, F64: local_x_m local_y_m local_z_m global_x_m global_y_m global_z_m
+        },
         // For viewers; refused before anything is asked of it.
         TopicKind::Scene => &[],
-        TopicKind::Log => &[("t_s", F64), ("level", Text), ("message", Text)],
+        TopicKind::Log => table! { F64: t_s, Text: level message },
     }
 }
 

@@ -71,6 +71,9 @@ struct Channel {
     findings: u64,
 }
 
+/// Start and length of a chunk, its first and last log time, its size once unpacked and its compression.
+type Chunk = (u64, u64, (u64, u64), u64, String);
+
 #[derive(Default)]
 struct Checker {
     report: CheckReport,
@@ -83,8 +86,7 @@ struct Checker {
     ticks: BTreeMap<u16, u64>,
     lost_records: u64,
     span: Span,
-    /// Start, length, first and last log time of the chunks as they are.
-    chunks: Vec<ChunkIndex>,
+    chunks: HashSet<Chunk>,
     indexed: Vec<ChunkIndex>,
     counts: [(u64, u64); 2],
     statistics: Option<Statistics>,
@@ -108,17 +110,8 @@ impl Checker {
                 chunk = Some(start);
                 self.report.chunks += 1;
                 self.report.checksummed_chunks += u64::from(head.checksum != 0 && !head.is_cut);
-                self.chunks.push(ChunkIndex {
-                    message_start_time: head.first_time,
-                    message_end_time: head.last_time,
-                    chunk_start_offset: start,
-                    chunk_length: head.length,
-                    message_index_offsets: BTreeMap::new(),
-                    message_index_length: 0,
-                    compression: head.compression.clone(),
-                    compressed_size: 0,
-                    uncompressed_size: head.unpacked,
-                });
+                let times = (head.first_time, head.last_time);
+                self.chunks.insert((start, head.length, times, head.unpacked, head.compression.clone()));
                 progress(stream.offset(), length);
             }
             let in_chunk = stream.chunk().map(|(_, head)| (head.first_time, head.last_time));
@@ -287,10 +280,9 @@ impl Checker {
             (index.chunk_start_offset, index.chunk_length, times, index.uncompressed_size, index.compression.clone())
         };
         if !self.indexed.is_empty() {
-            let there: HashSet<_> = self.chunks.iter().map(key).collect();
-            let wrong = self.indexed.iter().filter(|index| !there.contains(&key(index))).count();
-            if wrong > 0 || self.indexed.len() != there.len() {
-                let (listed, there) = (self.indexed.len(), there.len());
+            let wrong = self.indexed.iter().filter(|index| !self.chunks.contains(&key(index))).count();
+            let (listed, there) = (self.indexed.len(), self.chunks.len());
+            if wrong > 0 || listed != there {
                 self.report.find(format!("the index lists {listed} chunks of {there}, {wrong} of them wrongly"));
             }
         }

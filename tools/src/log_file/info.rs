@@ -7,6 +7,7 @@ use std::path::Path;
 
 use mcap::Summary;
 use mcap::records::{Record, op};
+use serde::Serialize;
 
 use super::Span;
 use super::salvage::{Found, Salvage};
@@ -44,18 +45,20 @@ pub struct LogInfo {
 }
 
 /// The chunks of one compression.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ChunkInfo {
     /// The number of them.
     pub count: u64,
     /// Their size in the file (bytes).
+    #[serde(rename = "packed_bytes")]
     pub packed: u64,
     /// Their size once unpacked (bytes).
+    #[serde(rename = "unpacked_bytes")]
     pub unpacked: u64,
 }
 
 /// A topic of a log.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct TopicInfo {
     /// The name of the message type; empty without one.
     pub schema: String,
@@ -66,7 +69,7 @@ pub struct TopicInfo {
 }
 
 /// An attachment of a log.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct AttachmentInfo {
     /// The name of the attachment.
     pub name: String,

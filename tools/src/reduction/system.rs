@@ -44,13 +44,13 @@ impl Ports {
 
     /// The ports of coordinates z with x = T z, for the columns of `basis` T.
     pub(super) fn project(&self, basis: &Matrix) -> Self {
-        let project = |matrix: &Matrix| product_t(basis, matrix);
-        Self {
-            input: project(&self.input),
-            position: project(&self.position),
-            velocity: project(&self.velocity),
-            direct: self.direct.clone(),
-        }
+        self.each(|matrix| product_t(basis, matrix))
+    }
+
+    /// The ports with `of` done to B, P and V.
+    fn each(&self, of: impl Fn(&Matrix) -> Matrix) -> Self {
+        let [input, position, velocity] = [&self.input, &self.position, &self.velocity].map(of);
+        Self { input, position, velocity, direct: self.direct.clone() }
     }
 
     /// Number of inputs.
@@ -343,14 +343,12 @@ impl SecondOrder {
     pub fn part(&self, kept: &[usize]) -> Self {
         let mut place = vec![None; self.n];
         kept.iter().enumerate().for_each(|(new, &old)| place[old] = Some(new));
-        let Ports { input, position, velocity, direct } = &self.ports;
-        let [input, position, velocity] = [input, position, velocity].map(|matrix| matrix.select_rows(kept));
         let entry = |&((row, column), values): &Entry| Some(((place[row]?, place[column]?), values));
         Self {
             n: kept.len(),
             entries: self.entries.iter().filter_map(entry).collect(),
             order: self.order.as_ref().map(|order| order.iter().filter_map(|&at| place[at]).collect()),
-            ports: Ports { input, position, velocity, direct: direct.clone() },
+            ports: self.ports.each(|matrix| matrix.select_rows(kept)),
         }
     }
 }

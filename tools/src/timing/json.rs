@@ -30,8 +30,10 @@
 //! Distributions are `{count, p50, p90, p99, p999, max}`, nearest-rank, all zero if `count` is zero. Causes are
 //! `late_wake`, `long_tick`, `stalled_peer`, `policy`, `fault` and `unattributed`.
 
+use std::collections::BTreeMap;
+
 use palpate::log::{
-    DeviceReport, Environment, ForceReport, GroupSummary, Level, LoggedExecution, Percentiles, RunReport, TextEvent,
+    DeviceReport, Environment, GroupSummary, Level, LoggedExecution, Percentiles, RunReport, TextEvent,
 };
 use palpate::report::verdict;
 use palpate::runtime::SlipCounts;
@@ -154,68 +156,47 @@ fn document(report: &RunReport) -> Value {
         },
     });
     // The first device where the only one has always been, and all of them where there are several.
-    if let (Some(document), Some(first)) = (document.as_object_mut(), report.devices.first()) {
-        document.extend(device(first));
-        if report.devices.len() > 1 {
-            let named = |of: &DeviceReport| {
-                let mut all = device(of);
-                all.insert("name".to_owned(), json!(of.name));
-                Value::Object(all)
-            };
-            document.insert("devices".to_owned(), report.devices.iter().map(named).collect());
-        }
+    let first = report.devices.first().map(device);
+    if let (Some(document), Some(Value::Object(first))) = (document.as_object_mut(), first) {
+        document.extend(first);
+    }
+    if report.devices.len() > 1 {
+        let named = |of: &DeviceReport| {
+            let mut all = device(of);
+            all["name"] = json!(of.name);
+            all
+        };
+        document["devices"] = report.devices.iter().map(named).collect();
     }
     document
 }
 
-fn device(DeviceReport { resyncs, force, contact, limits, .. }: &DeviceReport) -> Map<String, Value> {
-    let fields = [
-        (
-            "resyncs",
-            json!({
-                "count": resyncs.jump_before_n.count,
-                "jump_before_n": percentiles(resyncs.jump_before_n),
-                "jump_after_n": percentiles(resyncs.jump_after_n),
-                "age_ns": percentiles(resyncs.age_ns),
-            }),
-        ),
-        (
-            "force",
-            json!({
-                "ticks": force.ticks,
-                "peak_n": force.peak_n,
-                "peak_commanded_n": force.peak_commanded_n,
-                "not_finite": force.not_finite,
-                "model_age_s": percentiles(force.model_age_s),
-                "served": shares(force),
-            }),
-        ),
-        (
-            "contact",
-            json!({
-                "free": contact.free,
-                "stick": contact.stick,
-                "slip": contact.slip,
-                "lost": contact.lost,
-            }),
-        ),
-        (
-            "limits",
-            json!({
-                "ticks": limits.ticks,
-                "limited": limits.limited,
-                "share": limits.share(),
-                "energy_j": { "least": limits.energy.least_j, "last": limits.energy.last_j },
-                "tank_j": { "least": limits.energy.least_tank_j },
-                "stages": limits.stages.iter().map(|(name, count)| (name.clone(), json!(count))).collect::<Map<_, _>>(),
-            }),
-        ),
-    ];
-    fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
-}
-
-fn shares(force: &ForceReport) -> Map<String, Value> {
-    force.shares().map(|(model, share)| (model.name().to_owned(), json!(share))).collect()
+fn device(DeviceReport { resyncs, force, contact, limits, .. }: &DeviceReport) -> Value {
+    json!({
+        "resyncs": {
+            "count": resyncs.jump_before_n.count,
+            "jump_before_n": percentiles(resyncs.jump_before_n),
+            "jump_after_n": percentiles(resyncs.jump_after_n),
+            "age_ns": percentiles(resyncs.age_ns),
+        },
+        "force": {
+            "ticks": force.ticks,
+            "peak_n": force.peak_n,
+            "peak_commanded_n": force.peak_commanded_n,
+            "not_finite": force.not_finite,
+            "model_age_s": percentiles(force.model_age_s),
+            "served": force.shares().map(|(model, share)| (model.name(), share)).collect::<BTreeMap<_, _>>(),
+        },
+        "contact": { "free": contact.free, "stick": contact.stick, "slip": contact.slip, "lost": contact.lost },
+        "limits": {
+            "ticks": limits.ticks,
+            "limited": limits.limited,
+            "share": limits.share(),
+            "energy_j": { "least": limits.energy.least_j, "last": limits.energy.last_j },
+            "tank_j": { "least": limits.energy.least_tank_j },
+            "stages": limits.stages.iter().map(|(name, count)| (name.clone(), json!(count))).collect::<Map<_, _>>(),
+        },
+    })
 }
 
 fn environment(environment: &Environment) -> Value {

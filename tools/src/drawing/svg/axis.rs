@@ -8,7 +8,7 @@ const LABELS: i32 = 7;
 const ROOM: f64 = 1.6;
 
 /// An axis of a chart.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Axis {
     pub(crate) label: String,
     pub(crate) range: [f64; 2],
@@ -126,13 +126,18 @@ fn decades([from, to]: [f64; 2]) -> Option<Vec<Tick>> {
 impl Axis {
     /// A logarithmic axis that shows all of `values` which are above zero and finite, with powers of ten for labels.
     pub(crate) fn decades(label: &str, values: impl Iterator<Item = f64>) -> Self {
-        let shown = values.filter(|value| value.is_finite() && *value > 0.0);
-        let [low, high] = shown.fold([f64::INFINITY, 0.0], |[low, high], value| [value.min(low), value.max(high)]);
-        let [low, high] = if low <= high { [low / ROOM, high * ROOM] } else { [0.1, 10.0] };
+        let [low, high] = around(values);
         // Less than a decade has too few ticks to be read.
         let short = (10.0 * low / high).max(1.0).sqrt();
         Self::log_down_to(label, [low / short, high * short]).in_words(power)
     }
+}
+
+/// From below the least to above the largest of those above zero.
+pub(crate) fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let shown = values.filter(|value| value.is_finite() && *value > 0.0);
+    let [low, high] = shown.fold([f64::INFINITY, 0.0], |[low, high], value| [value.min(low), value.max(high)]);
+    if low <= high { [low / ROOM, high * ROOM] } else { [0.1, 10.0] }
 }
 
 /// A value as a label: written out, or as a power of ten where that is shorter.
@@ -185,6 +190,7 @@ mod tests {
         assert!(labels(&Axis::decades("", [3.0].into_iter())).len() >= 2);
         assert!(labels(&Axis::decades("", [0.001, 0.0012].into_iter())).len() >= 2);
         assert_eq!(labels(&Axis::decades("", std::iter::empty())), ["0.1", "1", "10"]);
+        assert_eq!(around([0.0, 2.0, f64::NAN].into_iter()), [2.0 / ROOM, 2.0 * ROOM]);
     }
 
     #[test]

@@ -64,7 +64,7 @@ pub(crate) struct Mark {
 }
 
 /// A chart.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Chart<'a> {
     pub(crate) title: String,
     pub(crate) width: f64,
@@ -86,20 +86,7 @@ pub(crate) struct Chart<'a> {
 impl Chart<'_> {
     /// An empty chart of this size.
     pub(crate) fn new(title: impl Into<String>, [width, height]: [f64; 2], x: Axis, y: Axis) -> Self {
-        Self {
-            title: title.into(),
-            width,
-            height,
-            x,
-            y,
-            band: None,
-            marks: Vec::new(),
-            levels: Vec::new(),
-            lines: Vec::new(),
-            points: Vec::new(),
-            bars: Vec::new(),
-            signs: Vec::new(),
-        }
+        Self { title: title.into(), width, height, x, y, ..Self::default() }
     }
 
     /// The chart as an SVG element of a page.
@@ -321,7 +308,7 @@ mod tests {
             marks: vec![Mark { at: 0.5, label: "the period".to_owned() }],
             levels: vec![Mark { at: 1.0, label: "the level".to_owned() }],
             lines: vec![Line { class: "c1".to_owned(), name: "patch", points: vec![(0.0, 0.0), (1.0, 1e300)] }],
-            ..Chart::new("", [0.0; 2], Axis::linear("", [0.0; 2]), Axis::linear("", [0.0; 2]))
+            ..Chart::default()
         }
     }
 

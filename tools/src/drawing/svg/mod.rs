@@ -10,7 +10,7 @@ mod heat_map;
 mod sign;
 mod thin;
 
-pub(crate) use axis::{Axis, power, round_step};
+pub(crate) use axis::{Axis, around, power, round_step};
 pub(crate) use chart::{Bars, Chart, Line, Mark, Point, Signs};
 pub(crate) use heat::{HeatScale, heat_style};
 pub(crate) use heat_map::{HeatCell, HeatMap};

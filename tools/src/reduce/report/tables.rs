@@ -10,6 +10,11 @@ use crate::reduce::findings::{
 const FREQUENCIES: usize = 10;
 /// States that are written out.
 const STATES: usize = 12;
+/// What both errors of a reduced model are.
+const ERROR: (&str, &str) = ("error\n%", "2 (sum of the Hankel singular values left out) / (sum of all)");
+const HINF: (&str, &str) = ("H-inf\n%", "largest error of the frequency response over its largest gain");
+/// The contact that stands for the worst ones.
+const WORST: &str = "the same at the contact of the surface that is worst in the band for the scene's patch";
 
 fn columns(of: &[(&str, &str)]) -> Vec<Column> {
     of.iter().map(|(head, meaning)| Column::new(*head, *meaning)).collect()
@@ -47,10 +52,10 @@ pub(super) fn published(table: &ReductionTable) -> Table {
                 "states\nkept",
                 "states of the reduced model, of those asked for where fewer are above the numerical rank",
             ),
-            ("error\n%", "2 (sum of the Hankel singular values left out) / (sum of all)"),
+            ERROR,
             ("published\n%", "the paper's % error, which it does not define"),
             ("ratio", "computed over published"),
-            ("H-inf\n%", "largest error of the frequency response over its largest gain"),
+            HINF,
             ("time", "wall time, assembly included"),
             ("published\ntime", "the paper's"),
             ("stable", "every pole of the reduced model lies in the left half plane"),
@@ -133,11 +138,7 @@ pub(super) fn truncations(decay: &HankelDecay) -> Table {
     };
     Table {
         title: format!("Truncations, {}", decay.title),
-        columns: columns(&[
-            ("states", "states kept"),
-            ("error\n%", "2 (sum of the Hankel singular values left out) / (sum of all)"),
-            ("H-inf\n%", "largest error of the frequency response over its largest gain"),
-        ]),
+        columns: columns(&[("states", "states kept"), ERROR, HINF]),
         rows: rows.map(row).collect(),
     }
 }
@@ -233,18 +234,9 @@ pub(super) fn sizes(locality: &Locality) -> Table {
             ("contact\nband", "error at the contact, rms between resyncs"),
             ("contact\nat rest", "error at the contact at rest"),
             ("contact\nworst", "error at the contact at the worst frequency between resyncs"),
-            (
-                "worst contact\nband",
-                "the same at the contact of the surface that is worst in the band for the scene's patch",
-            ),
-            (
-                "worst contact\nat rest",
-                "the same at the contact of the surface that is worst in the band for the scene's patch",
-            ),
-            (
-                "worst contact\nworst",
-                "the same at the contact of the surface that is worst in the band for the scene's patch",
-            ),
+            ("worst contact\nband", WORST),
+            ("worst contact\nat rest", WORST),
+            ("worst contact\nworst", WORST),
         ]),
         rows: locality.sizes.iter().map(row).collect(),
     }

@@ -11,7 +11,7 @@ mod worst;
 
 use std::collections::BTreeMap;
 
-use palpate::log::{Analysis, Environment, LogEntry, LogRecord, RunReport, Window};
+use palpate::log::{Analysis, Environment, GroupInfo, LogEntry, LogRecord, RunReport, Window};
 use palpate::runtime::Nanos;
 use palpate::runtime::TickTiming;
 
@@ -19,7 +19,7 @@ pub use blocks::{Block, Buckets};
 pub use cyclictest::read_cyclictest;
 pub use device::{DeviceTiming, ForceBin, ResyncBin};
 pub use distribution::Shape;
-pub use group::{GroupTiming, TickBin};
+pub use group::{ActorTiming, GroupTiming, TickBin};
 pub use recent::ForcePoint;
 #[cfg(test)]
 pub use recent::Moment;
@@ -209,12 +209,9 @@ impl TimingAnalysis {
             let over_time = self.devices.get(&number).cloned().unwrap_or_default();
             devices.push(DeviceTiming { name: device.name.clone(), ..over_time });
         }
-        let actor = |group: u16, actor: usize| {
-            environment
-                .groups
-                .get(usize::from(group))
-                .map_or_else(|| format!("actor {actor}"), |info| info.actor_name(actor))
-        };
+        let unknown = GroupInfo::default();
+        let info = |group: u16| environment.groups.get(usize::from(group)).unwrap_or(&unknown);
+        let actor = |group: u16, actor: usize| info(group).actor_name(actor);
         TimingReport { cores, worst: self.worst.report(&self.recent, name, actor), run, groups, devices, span }
     }
 }

@@ -63,8 +63,21 @@ pub(crate) fn badge(cause: SlipCause) -> String {
     format!("<span class=\"badge\">{}{}</span>", icon(cause), name(cause))
 }
 
-/// The signs of these causes, with what filled and hollow ones mean.
+/// The colours of lines with their words, and `more` about them, which are HTML.
+pub(crate) fn key(entries: &[(&str, &str)], more: &str) -> String {
+    let mut out = String::from("<p class=\"legend\">");
+    for (class, words) in entries {
+        let _ = write!(out, "<span class=\"badge\"><i class=\"dash {class}\"></i>{words}</span>");
+    }
+    let _ = writeln!(out, "<span class=\"faint\">{more}</span></p>");
+    out
+}
+
+/// The signs of these causes, with what filled and hollow ones mean; nothing without a cause.
 pub(crate) fn legend(causes: &[SlipCause]) -> String {
+    if causes.is_empty() {
+        return String::new();
+    }
     let mut out = String::from("<p class=\"legend\">");
     for &cause in causes {
         out.push_str(&badge(cause));

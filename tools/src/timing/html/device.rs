@@ -3,18 +3,19 @@
 use std::fmt::Write;
 
 use palpate::log::DeviceReport;
+use palpate::runtime::SlipCause;
 
+use super::causes::{CAUSES, key, legend};
 use super::chart_figure_in_two;
 use super::distributions::short;
 use super::named_figures::Numbers;
 use super::over_time::{Troubles, signs, troubles};
+use super::tables::percentiles;
 use crate::drawing::html::escaped;
 use crate::drawing::svg::{Axis, Chart, Line, Mark};
 use crate::timing::{DeviceTiming, ForceBin, ResyncBin, TimingReport};
 use crate::units::{duration, force, trimmed};
 
-const PERCENTILES: [(&str, &str); 6] =
-    [("p50", "p50"), ("p90", "p90"), ("p99", "p99"), ("p99.9", "p999"), ("max", "max"), ("samples", "count")];
 /// Newtons that a logarithmic axis does not tell from zero.
 const SMALLEST_STEP_N: f64 = 1e-6;
 
@@ -44,26 +45,14 @@ pub(crate) fn devices(report: &TimingReport, numbers: &Numbers, range: [f64; 2])
 
 fn table(device: &DeviceReport, numbers: &Numbers) -> String {
     let prefix = if device.name.is_empty() { String::new() } else { format!("{}.", device.name) };
-    let mut out = String::from(
-        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Model age and resyncs\"><table>\n<thead><tr><th scope=\"col\"></th>",
-    );
-    for (words, _) in PERCENTILES {
-        let _ = write!(out, "<th scope=\"col\">{words}</th>");
-    }
-    out.push_str("</tr></thead>\n<tbody>\n");
-    for (words, figure) in [
+    let rows = [
         ("model age at each tick", "force.model_age"),
         ("force jump of a resync, before blending", "resync.jump_before"),
         ("largest step that blending leaves", "resync.jump_after"),
         ("age of a new model on arrival", "resync.age"),
-    ] {
-        let _ = write!(out, "<tr><th scope=\"row\">{words}</th>");
-        for (_, percentile) in PERCENTILES {
-            let _ = write!(out, "<td>{}</td>", numbers.show(&format!("{prefix}{figure}.{percentile}")));
-        }
-        out.push_str("</tr>\n");
-    }
-    out.push_str("</tbody>\n</table></div>\n<p class=\"faint\">");
+    ];
+    let rows = rows.map(|(words, figure)| (words.to_owned(), "", format!("{prefix}{figure}")));
+    let mut out = percentiles("Model age and resyncs", rows, numbers) + "<p class=\"faint\">";
     let of = |figure: &str| numbers.show(&format!("{prefix}{figure}"));
     let _ = writeln!(
         out,
@@ -92,15 +81,6 @@ fn highest(lines: &[Line<'_>]) -> f64 {
     lines.iter().flat_map(|line| &line.points).map(|point| point.1).filter(|y| y.is_finite()).fold(0.0, f64::max)
 }
 
-fn key(entries: &[(&str, &str)], more: &str) -> String {
-    let mut out = String::from("<p class=\"legend\">");
-    for (class, words) in entries {
-        let _ = write!(out, "<span class=\"badge\"><i class=\"dash {class}\"></i>{words}</span>");
-    }
-    let _ = writeln!(out, "<span class=\"faint\">{more}</span></p>");
-    out
-}
-
 fn force_chart(device: &DeviceTiming, troubles: &[Troubles], range: [f64; 2]) -> String {
     let lines = [
         force_line(device, "c6", "least before safety", |bin| bin.force_n[0]),
@@ -119,17 +99,11 @@ fn force_chart(device: &DeviceTiming, troubles: &[Troubles], range: [f64; 2]) ->
         chart.signs = signs(troubles, range, size[0] - 66.0);
         chart.to_svg()
     };
-    let causes: Vec<_> = super::causes::CAUSES
-        .into_iter()
-        .filter(|cause| troubles.iter().any(|troubles| troubles.cause == *cause))
-        .collect();
+    let is_seen = |cause: &SlipCause| troubles.iter().any(|troubles| troubles.cause == *cause);
+    let causes: Vec<_> = CAUSES.into_iter().filter(is_seen).collect();
     let more = format!("magnitudes in each {} of the run", duration(device.force.width().0));
-    let mut caption =
-        key(&[("c1", "largest before safety"), ("c6", "least before safety"), ("c2", "largest commanded")], &more);
-    if !causes.is_empty() {
-        caption.push_str(&super::causes::legend(&causes));
-    }
-    chart_figure_in_two(draw, &caption)
+    let lines = [("c1", "largest before safety"), ("c6", "least before safety"), ("c2", "largest commanded")];
+    chart_figure_in_two(draw, &(key(&lines, &more) + &legend(&causes)))
 }
 
 fn age_chart(device: &DeviceTiming, report: &TimingReport, range: [f64; 2]) -> String {

@@ -2,7 +2,7 @@
 
 use palpate::runtime::SlipCause;
 
-use super::causes::{CAUSES, class, legend, name, sign};
+use super::causes::{CAUSES, class, key, legend, name, sign};
 use super::chart_figure_in_two;
 use super::distributions::short;
 use crate::drawing::svg::{Axis, Chart, Line, Mark, Signs};
@@ -99,14 +99,11 @@ pub(crate) fn lateness(group: &GroupTiming, range: [f64; 2]) -> String {
         chart.to_svg()
     };
     let causes: Vec<SlipCause> = troubles.iter().map(|troubles| troubles.cause).collect();
-    let mut caption = format!(
-        "<p class=\"legend\"><span class=\"badge\"><i class=\"dash c1\"></i>largest lateness</span><span class=\"badge\">\
-         <i class=\"dash c3 dashed\"></i>mean lateness</span><span class=\"badge\"><i class=\"dash c4\"></i>latest end of the work, \
-         counted from when it was due</span><span class=\"faint\">in each {} of the run</span></p>\n",
-        duration(group.over_time.width().0)
-    );
-    if !causes.is_empty() {
-        caption.push_str(&legend(&causes));
-    }
-    chart_figure_in_two(draw, &caption)
+    let lines = [
+        ("c1", "largest lateness"),
+        ("c3 dashed", "mean lateness"),
+        ("c4", "latest end of the work, counted from when it was due"),
+    ];
+    let more = format!("in each {} of the run", duration(group.over_time.width().0));
+    chart_figure_in_two(draw, &(key(&lines, &more) + &legend(&causes)))
 }

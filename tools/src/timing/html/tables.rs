@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::causes::{CAUSES, badge};
 use super::named_figures::Numbers;
 use crate::drawing::html::escaped;
+use crate::timing::analysis::ActorTiming;
 use crate::timing::{GroupTiming, TimingReport, cause_name};
 use crate::units::duration;
 
@@ -85,27 +86,38 @@ fn by_cause(group: &str, numbers: &Numbers) -> String {
 
 /// Percentiles of one group.
 pub(crate) fn distributions(group: &GroupTiming, numbers: &Numbers) -> String {
-    let label = escaped(&format!("{}: distributions", group.name));
+    let name = &group.name;
+    let measures = MEASURES.map(|(words, figure, meaning)| (words.to_owned(), meaning, format!("{name}.{figure}")));
+    let actor = |actor: &ActorTiming| {
+        let words = format!("execution of {}", actor.name);
+        (words, "what this actor took of a release", format!("{name}.{}.execution", actor.name))
+    };
+    let rows = measures.into_iter().chain(group.actors.iter().map(actor));
+    percentiles(&format!("{name}: distributions"), rows, numbers)
+}
+
+/// A table of percentiles; the rows have their words, what they mean, which may be empty, and the name of the figure.
+pub(crate) fn percentiles<'a>(
+    label: &str,
+    rows: impl IntoIterator<Item = (String, &'a str, String)>,
+    numbers: &Numbers,
+) -> String {
     let mut out = format!(
-        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{label}\"><table>\n<thead><tr><th scope=\"col\"></th>"
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{}\"><table>\n<thead><tr>\
+         <th scope=\"col\"></th>",
+        escaped(label)
     );
     for (words, _) in PERCENTILES {
         let _ = write!(out, "<th scope=\"col\">{words}</th>");
     }
     out.push_str("</tr></thead>\n<tbody>\n");
-    let mut row = |words: &str, meaning: &str, figure: &str| {
-        let _ = write!(out, "<tr><th scope=\"row\" title=\"{meaning}\">{}</th>", escaped(words));
+    for (words, meaning, figure) in rows {
+        let title = if meaning.is_empty() { String::new() } else { format!(" title=\"{meaning}\"") };
+        let _ = write!(out, "<tr><th scope=\"row\"{title}>{}</th>", escaped(&words));
         for (_, percentile) in PERCENTILES {
-            let _ = write!(out, "<td>{}</td>", numbers.show(&format!("{}.{figure}.{percentile}", group.name)));
+            let _ = write!(out, "<td>{}</td>", numbers.show(&format!("{figure}.{percentile}")));
         }
         out.push_str("</tr>\n");
-    };
-    for (words, figure, meaning) in MEASURES {
-        row(words, meaning, figure);
-    }
-    for actor in &group.actors {
-        let words = format!("execution of {}", actor.name);
-        row(&words, "what this actor took of a release", &format!("{}.execution", actor.name));
     }
     out.push_str("</tbody>\n</table></div>\n");
     out

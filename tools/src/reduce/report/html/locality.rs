@@ -148,11 +148,13 @@ pub(super) fn sizes(locality: &Locality) -> String {
         return out;
     }
     out.push_str("<h2 id=\"sizes\">What a smaller error needs</h2>\n<div class=\"charts\">\n");
-    let level = |chart: &mut Chart<'_>| {
-        let mark = |budget: crate::reduce::findings::Budget| Mark { at: budget.error_pct, label: "budget".to_owned() };
-        chart.levels = locality.budget.map(mark).into_iter().collect();
+    let mut draw = |title: &str, x: Axis, curves: &[Curve<'_>], caption: &str| {
+        let budget = locality.budget.map(|budget| budget.error_pct);
+        let y = Axis::decades("error (%)", heights(curves).chain(budget));
+        let mut chart = Chart::new(title, SIZE, x, y);
+        chart.levels = budget.map(|at| Mark { at, label: "budget".to_owned() }).into_iter().collect();
+        out.push_str(&with_points(chart, curves, caption));
     };
-    let budget = || locality.budget.map(|budget| budget.error_pct);
     if !locality.sizes.is_empty() {
         type Of = fn(&crate::reduce::findings::PatchError) -> f64;
         let by_nodes = |of: Of| {
@@ -167,19 +169,13 @@ pub(super) fn sizes(locality: &Locality) -> String {
             Curve::new("worst contact, at rest", "c2", by_nodes(|size| size.worst.at_rest_pct)).hollow(),
         ];
         let x = Axis::decades("nodes of the patch", locality.sizes.iter().map(|size| size.nodes as f64));
-        let y = Axis::decades("error (%)", heights(&curves).chain(budget()));
-        let mut chart = Chart::new("Size of the patch", SIZE, x, y);
-        level(&mut chart);
-        out.push_str(&with_points(chart, &curves, "A patch between surroundings that are held."));
+        draw("Size of the patch", x, &curves, "A patch between surroundings that are held.");
     }
     if !locality.bases.is_empty() {
         let points = locality.bases.iter().map(|basis| (basis.states as f64, basis.error_pct));
         let curves = [Curve::new("estimated", "c3", points)];
         let x = Axis::decades("states r", locality.bases.iter().map(|basis| basis.states as f64));
-        let y = Axis::decades("error (%)", heights(&curves).chain(budget()));
-        let mut chart = Chart::new("Reduced surroundings", SIZE, x, y);
-        level(&mut chart);
-        out.push_str(&with_points(chart, &curves, "The same patch between reduced surroundings: `predictive`."));
+        draw("Reduced surroundings", x, &curves, "The same patch between reduced surroundings: `predictive`.");
     }
     out.push_str("</div>\n");
     if !locality.sizes.is_empty() {
