@@ -16,7 +16,7 @@ use crate::log::{
 };
 use crate::runtime::Nanos;
 
-/// What may wait for a slow disk before records are dropped (bytes): some six seconds of a usual log, two of one with pictures.
+/// The amount that may wait for a slow disk before records are dropped (bytes): some six seconds of a usual log, two of one with pictures.
 pub const MOST_WAITING: u64 = 2 << 20;
 /// How long the end of a run in real time waits for the disk. Less than the runtime waits for the logger.
 pub const LAST_WAIT: Duration = Duration::from_secs(3);

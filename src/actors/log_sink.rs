@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::log::{Environment, GroupStats, Level, LogRecord, SceneFrame, TextEvent};
 use crate::runtime::Nanos;
 
-/// Where log entries go, besides the statistics.
+/// The receiver of log entries, besides the statistics.
 ///
 /// # Real-time
 /// Called by the logger alone: may allocate, block and write files. Records wait in their rings meanwhile.

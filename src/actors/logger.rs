@@ -23,7 +23,7 @@ pub const LOG_FAILURE: &str = "palpate::log_failure";
 /// hands them over at its end, and the log is to be in the order of time.
 const HELD_BACK: Nanos = Nanos(100_000_000);
 
-/// What a run left behind, filled in when the logger stops.
+/// The outcome of a run, filled in when the logger stops.
 #[derive(Clone, Debug, Default)]
 pub struct LoggerOutcome(Arc<Mutex<(RunReport, Option<Error>)>>);
 

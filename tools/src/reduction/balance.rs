@@ -15,7 +15,7 @@ pub const NUMERICAL_RANK: f64 = 1e-14;
 /// A system with its states in balance: as hard to reach as to see.
 ///
 /// The square-root method (Laub, Heath, Paige and Ward 1987, IEEE Trans. Autom. Control 32; Tombs and Postlethwaite 1987,
-/// Int. J. Control 46) on factors of the Gramians, with a cut at [`NUMERICAL_RANK`]: what is below is never divided by.
+/// Int. J. Control 46) on factors of the Gramians, with a cut at `NUMERICAL_RANK`: what is below is never divided by.
 #[derive(Clone, Debug)]
 pub struct Balanced {
     /// Hankel singular values, in decreasing order: all of those that the factors of the Gramians hold.
