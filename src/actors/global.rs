@@ -64,9 +64,9 @@ pub struct SurroundingsPorts {
 /// Where the tool may be by the time that a basis is ready (s).
 const PREFETCH_S: [f64; 3] = [0.15, 0.3, 0.6];
 
-/// The number of its own periods whose tool samples a release follows at most: one that finds more starts again from its newest
-/// surface and the newest tool, so that under load it does not fall behind without end.
-const MOST_PERIODS: u64 = 4;
+/// The time whose tool samples a release follows at most, if two periods of its own are less (s): one that finds more
+/// starts again from its newest surface and the newest tool, so that under load it does not fall behind without end.
+const LONGEST_BACKLOG_S: f64 = 0.06;
 
 /// What a [`GlobalActor`] has to know of the session.
 #[derive(Clone, Debug)]
@@ -86,9 +86,15 @@ pub struct GlobalPlan {
 }
 
 impl GlobalPlan {
-    /// Haptic ticks in a period of its own.
-    fn period_ticks(&self) -> u64 {
-        (self.haptic.as_hz() / self.global.as_hz()).ceil().max(1.0) as u64
+    /// Haptic ticks that a release follows at most.
+    fn most_ticks(&self) -> u64 {
+        let seconds = (2.0 * self.global.period_s()).max(LONGEST_BACKLOG_S);
+        (seconds * self.haptic.as_hz()).ceil().max(4.0) as u64
+    }
+
+    /// Ticks in which a way is gone whose samples are not followed: half a period's.
+    fn way_ticks(&self) -> u64 {
+        self.most_ticks() / 4
     }
 
     /// How long a local model serves from its state on (s).
@@ -144,7 +150,7 @@ impl ToolSide {
 /// Runs the slow, detailed simulation.
 ///
 /// # Real-time
-/// Allocates in its first releases and where the patch changes its size. A release follows the tool samples of four of
+/// Allocates in its first releases and where the patch changes its size. A release follows the tool samples of two of
 /// its periods at most; what is older is not made up, and the release is degraded.
 #[derive(Debug)]
 pub struct GlobalActor {
@@ -199,14 +205,14 @@ impl GlobalActor {
 
     /// Advances along the tool samples up to `until`; what could not be followed as it was, if there is something.
     ///
-    /// The work is bounded: of more than [`MOST_PERIODS`] the state is not followed. It goes on as it is, the tools go
-    /// straight to where they were a period ago, and from there along their samples.
+    /// The work is bounded: of more than two periods the state is not followed. It goes on as it is, the tools go
+    /// straight to where they were half a period ago, and from there along their samples: a period's work.
     fn follow_tools(&mut self, ctx: &TickContext, until: Nanos) -> Option<Cause> {
-        let (newest, period) = (self.plan.haptic.last_release(until), self.plan.period_ticks());
+        let newest = self.plan.haptic.last_release(until);
         let mut cause = None;
-        if newest.saturating_sub(self.now()) > MOST_PERIODS * period {
+        if newest.saturating_sub(self.now()) > self.plan.most_ticks() {
             let before = self.begin_way();
-            while self.take_samples(ctx, newest - period) {}
+            while self.take_samples(ctx, newest - self.plan.way_ticks()) {}
             cause = self.go(before);
         }
         loop {
@@ -244,10 +250,10 @@ impl GlobalActor {
         true
     }
 
-    /// Advances while each tool goes its way, which began at the tick `before`, in a period's ticks at most.
+    /// Advances while each tool goes its way, which began at the tick `before`, in half a period's ticks at most.
     fn go(&mut self, before: u64) -> Option<Cause> {
         let passed = self.now().saturating_sub(before);
-        let ticks = passed.min(self.plan.period_ticks());
+        let ticks = passed.min(self.plan.way_ticks());
         for i in 0..ticks {
             let part = |side: &mut ToolSide| {
                 let way = ToolMotion { from: side.from, to: side.tool.position };
