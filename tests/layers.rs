@@ -4,8 +4,9 @@
 use std::path::{Path, PathBuf};
 
 /// The engine's modules, each built on those before it alone.
-const ORDER: [(&str, &[&str]); 9] = [
-    ("error", &[]),
+const ORDER: [(&str, &[&str]); 10] = [
+    ("printable", &[]),
+    ("error", &["printable"]),
     ("random", &[]),
     ("safety", &[]),
     ("devices", &["error", "random"]),
