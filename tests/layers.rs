@@ -11,7 +11,7 @@ const ORDER: [(&str, &[&str]); 10] = [
     ("safety", &[]),
     ("devices", &["error", "random"]),
     ("scene", &["devices", "error"]),
-    ("log", &["error"]),
+    ("log", &["error", "printable"]),
     ("report", &["error", "log"]),
     ("actors", &["devices", "error", "log", "report", "safety"]),
     ("session", &["actors", "devices", "error", "log", "report", "safety", "scene"]),
