@@ -98,12 +98,11 @@ fn a_log_chooses_no_path_where_it_is_replayed() {
     std::fs::remove_dir_all(folder.path("bases")).unwrap();
     folder.succeed(&["replay", "drive.mcap"]);
     assert!(!folder.files().contains(&"bases".to_owned()));
-    // Check that a log that names folders and files nevertheless is replayed without them
+    // Check that a log that names a folder nevertheless is replayed without it
     let elsewhere = folder.path("elsewhere").display().to_string();
     with_session(&folder, |session| {
-        assert!(session.contains("[local]\n") && session.contains("[device]\n"), "{session}");
-        let session = session.replace("[local]\n", &format!("[local]\nbasis_folder = {elsewhere:?}\n"));
-        session.replace("[device]\n", &format!("[device]\npath_csv = {elsewhere:?}\nlog = {elsewhere:?}\n"))
+        assert!(session.contains("[local]\n"), "{session}");
+        session.replace("[local]\n", &format!("[local]\nbasis_folder = {elsewhere:?}\n"))
     });
     folder.succeed(&["replay", "drive.mcap"]);
     assert!(!folder.path("elsewhere").exists());
@@ -233,8 +232,8 @@ fn a_full_standard_error_changes_no_exit_code() {
     }
     // Check that the warning is there, and on one line for each basis
     let called = folder.call(warned);
-    assert!(called.code == Some(0) && !called.err.is_empty(), "{called:?}");
-    assert!(called.err.lines().all(|line| line.contains(r"path.csv/a\n\u{1b}b")), "{called:?}");
+    assert!(called.code == Some(0) && !called.err.is_empty() && !called.err.contains('\u{1b}'), "{called:?}");
+    assert!(called.err.lines().all(|line| line.contains(r"path.csv/a\n")), "{called:?}");
 }
 
 // A thread that is to have a stack of 2^62 bytes is refused to anybody; the engine's own threads say what they need.

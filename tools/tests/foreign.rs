@@ -236,8 +236,8 @@ fn heads_of_chunks_within_chunks_take_as_long_as_the_file() {
 #[test]
 fn a_log_that_unpacks_to_more_than_a_log_can_is_refused_early() {
     let folder = Folder::new();
-    // Blocks that repeat one byte 2^17 times: as many as a chunk of 64 MiB has.
-    let (block, blocks) = (1_u32 << 17, 512_u32);
+    // Blocks that repeat one byte 2^17 times: as many as a chunk of 64 MiB has, of empty records of 9 bytes.
+    let (block, blocks) = (1_u32 << 17, 504_u32);
     let mut packed = vec![0x28, 0xb5, 0x2f, 0xfd, 0, 7 << 3];
     for number in 1..=blocks {
         let head = u32::from(number == blocks) | 1 << 1 | block << 3;
