@@ -8,6 +8,8 @@ use std::fmt;
 use palpate_model::ModelError;
 use palpate_runtime::{GraphError, GraphErrorKind};
 
+use crate::printable::{printable, within};
+
 /// The kind of an error: the cause, and whether a retry can help.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -40,6 +42,9 @@ impl ErrorKind {
 }
 
 /// The error of every fallible operation in palpate: a kind, a place and one line that says what would be right.
+///
+/// The line is fit for a terminal whatever the files are called and hold: place and message are made
+/// [printable](crate::printable), a piece of a place in 200 characters at most, a message in 2000.
 ///
 /// ```
 /// use palpate::ErrorKind;
@@ -81,8 +86,8 @@ impl Error {
     /// Puts `place` in front of the error's own: `place: earlier place: message`.
     #[must_use]
     pub fn at(mut self, place: impl AsRef<str>) -> Self {
-        let place = place.as_ref();
-        self.place = if self.place.is_empty() { place.to_owned() } else { format!("{place}: {}", self.place) };
+        let place = printable(place.as_ref());
+        self.place = if self.place.is_empty() { place.into_owned() } else { format!("{place}: {}", self.place) };
         self
     }
 
@@ -147,8 +152,12 @@ impl std::error::Error for Error {
     }
 }
 
+/// Longest message, in characters: each is made to be read.
+const LONGEST_MESSAGE: usize = 2000;
+
 fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    within(&line, LONGEST_MESSAGE).into_owned()
 }
 
 /// Longest piece of a user's text that a message repeats, in characters.
@@ -172,5 +181,14 @@ mod tests {
         let error = Error::scene("body.block.nodes", "must be\n at least 2").at("scene.toml:4");
         assert_eq!(error.to_string(), "scene.toml:4: body.block.nodes: must be at least 2");
         assert!(error.kind().is_input());
+    }
+
+    #[test]
+    fn a_name_that_breaks_lines_and_a_message_without_an_end_stay_one_line() {
+        let path = std::path::Path::new("a\n\u{1b}[31mb.toml");
+        let error = Error::io(path, std::io::ErrorKind::NotFound.into()).to_string();
+        assert!(error.starts_with(r"a\n\u{1b}[31mb.toml: "), "{error}");
+        let error = Error::new(ErrorKind::Usage, "\u{202e}x".repeat(5_000_000)).at("y".repeat(5_000_000)).to_string();
+        assert!(error.chars().count() < 2300 && !error.contains('\u{202e}'), "{} bytes", error.len());
     }
 }

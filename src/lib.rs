@@ -57,6 +57,7 @@ pub mod actors;
 pub mod devices;
 mod error;
 pub mod log;
+mod printable;
 pub mod random;
 pub mod report;
 pub mod safety;
@@ -68,6 +69,7 @@ pub use palpate_runtime as runtime;
 
 pub use devices::Device;
 pub use error::{Error, ErrorKind};
+pub use printable::printable;
 pub use session::Session;
 
 /// The names that most programs need.

@@ -4,13 +4,14 @@
 use std::path::{Path, PathBuf};
 
 /// The engine's modules, each built on those before it alone.
-const ORDER: [(&str, &[&str]); 9] = [
-    ("error", &[]),
+const ORDER: [(&str, &[&str]); 10] = [
+    ("printable", &[]),
+    ("error", &["printable"]),
     ("random", &[]),
     ("safety", &[]),
     ("devices", &["error", "random"]),
     ("scene", &["devices", "error"]),
-    ("log", &["error"]),
+    ("log", &["error", "printable"]),
     ("report", &["error", "log"]),
     ("actors", &["devices", "error", "log", "report", "safety"]),
     ("session", &["actors", "devices", "error", "log", "report", "safety", "scene"]),

@@ -4,9 +4,9 @@
 //! counted. In simulated time the run waits. In both a disk that takes nothing any more is given up.
 
 use std::collections::VecDeque;
-use std::fs::File;
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::log_sink::{LogSink, Loss};
@@ -33,6 +33,8 @@ pub struct LogFile {
     writer: Option<McapWriter<Backlog>>,
     disk: BacklogProgress,
     place: String,
+    /// The file itself, which nobody else may write meanwhile; `None` for an output without a name.
+    held: Option<Held>,
     waits: bool,
     /// What each block that waits for the disk ends with.
     marks: VecDeque<Mark>,
@@ -45,6 +47,45 @@ pub struct LogFile {
     closed_gap: Option<Loss>,
 }
 
+/// A file that this run alone writes.
+#[derive(Debug)]
+struct Held {
+    path: PathBuf,
+    /// Its lock is gone with it.
+    file: File,
+}
+
+impl Held {
+    /// Creates or empties the file at `path`, unless another run holds it; a second handle is for whoever writes it.
+    fn open(path: &Path) -> io::Result<(File, Self)> {
+        // Emptied once it is known that nobody else is writing it.
+        let file = OpenOptions::new().write(true).create(true).truncate(false).open(path)?;
+        // Devices and pipes take what anybody gives.
+        if file.metadata()?.is_file() {
+            // A file system without locks protects no file.
+            if let Err(TryLockError::WouldBlock) = file.try_lock() {
+                return Err(io::Error::other("another run is writing it, name another file for this log"));
+            }
+            file.set_len(0)?;
+        }
+        Ok((file.try_clone()?, Self { path: path.to_owned(), file }))
+    }
+
+    /// True if the path still leads to the file.
+    #[cfg(unix)]
+    fn is_there(&self) -> bool {
+        use std::os::unix::fs::MetadataExt;
+        let number = |file: std::fs::Metadata| (file.dev(), file.ino());
+        let there = std::fs::metadata(&self.path).map(number).ok();
+        there.is_some() && there == self.file.metadata().map(number).ok()
+    }
+
+    #[cfg(not(unix))]
+    fn is_there(&self) -> bool {
+        self.path.exists()
+    }
+}
+
 /// The end of a block: bytes and records up to there, and the time of the last one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mark {
@@ -54,16 +95,17 @@ struct Mark {
 }
 
 impl LogFile {
-    /// Creates or overwrites the log at `path`.
+    /// Creates or overwrites the log at `path`, which no other run can write until this one is over.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if the file cannot be created.
+    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if the file cannot be created, or if another run is writing it.
     ///
     /// # Real-time
     /// Not real-time safe: opens a file, starts a thread, allocates. Before a run.
     pub fn create(path: &Path, environment: &Environment) -> Result<Self, Error> {
-        let file = File::create(path).map_err(|e| Error::io(path, e))?;
-        Self::new(file, &path.display().to_string(), environment)
+        let failed = |error| Error::io(path, error);
+        let (file, held) = Held::open(path).map_err(failed)?;
+        Ok(Self { held: Some(held), ..Self::new(file, &path.display().to_string(), environment)? })
     }
 
     /// Begins a log in `output`, which a thread of its own writes; `place` names it in errors.
@@ -80,6 +122,7 @@ impl LogFile {
             writer: Some(McapWriter::new(backlog, place, environment)?),
             disk,
             place: place.to_owned(),
+            held: None,
             waits: environment.execution == LoggedExecution::Virtual,
             marks: VecDeque::new(),
             safe: Mark::default(),
@@ -177,7 +220,14 @@ impl LogFile {
         if !self.disk.wait_for_end(stalled, total) {
             return Err(self.stalled(stalled));
         }
-        self.disk.take_error().map_or(Ok(()), |error| Err(Error::io(Path::new(&self.place), error)))
+        let failed = |error| Error::io(Path::new(&self.place), error);
+        self.disk.take_error().map_or(Ok(()), |error| Err(failed(error)))?;
+        match &self.held {
+            Some(held) if !held.is_there() => {
+                Err(failed(io::Error::other("it is gone: the file was deleted, moved or replaced during the run")))
+            }
+            _ => Ok(()),
+        }
     }
 }
 

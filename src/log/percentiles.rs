@@ -42,6 +42,8 @@ pub struct Distribution {
     max: u64,
     /// Not yet counted: sorting many at once is several times cheaper than finding the place of each.
     pending: Vec<u64>,
+    /// Likewise, of values that came with a number of times.
+    pending_many: Vec<(u64, u64)>,
 }
 
 /// Values that are kept before they are counted, at least; with many distinct values a quarter of those.
@@ -61,9 +63,24 @@ impl Distribution {
     pub fn push(&mut self, value: u64) {
         self.max = self.max.max(value);
         self.pending.push(self.kept_bits.map_or(value, |bits| leading(value, bits)));
-        if self.pending.len() >= PENDING.max(self.counts.len() / 4) {
+        self.count_if_many();
+    }
+
+    /// Counts a value as often as it occurred. Numbers that come from elsewhere may be anything: sums end at the largest
+    /// number that there is.
+    pub fn push_many(&mut self, value: u64, count: u64) {
+        if count > 0 {
+            self.max = self.max.max(value);
+            self.pending_many.push((value, count));
+            self.count_if_many();
+        }
+    }
+
+    fn count_if_many(&mut self) {
+        if self.pending.len() + self.pending_many.len() >= PENDING.max(self.counts.len() / 4) {
             self.counts = self.merged();
             self.pending.clear();
+            self.pending_many.clear();
             self.coarsen();
         }
     }
@@ -76,23 +93,16 @@ impl Distribution {
             *bits -= 1;
             self.counts.iter_mut().for_each(|(value, _)| *value = leading(*value, *bits));
             self.counts.dedup_by(|(value, count), (other, sum)| {
-                *sum += if value == other { *count } else { 0 };
+                *sum = sum.saturating_add(if value == other { *count } else { 0 });
                 value == other
             });
         }
     }
 
-    /// Counts a value as often as it occurred.
-    pub fn push_many(&mut self, value: u64, count: u64) {
-        if count > 0 {
-            self.max = self.max.max(value);
-            self.counts = merge(&self.counts, &[(value, count)]);
-        }
-    }
-
     /// The number of values.
     pub fn count(&self) -> u64 {
-        self.counts.iter().map(|&(_, count)| count).sum::<u64>() + self.pending.len() as u64
+        let counted = self.counts.iter().chain(&self.pending_many).map(|&(_, count)| count);
+        counted.fold(self.pending.len() as u64, u64::saturating_add)
     }
 
     /// Forgets all values.
@@ -108,7 +118,7 @@ impl Distribution {
     /// The percentiles.
     pub fn percentiles(&self) -> Percentiles<u64> {
         let counts = self.merged();
-        let total = counts.iter().map(|&(_, count)| count).sum();
+        let total = counts.iter().map(|&(_, count)| count).fold(0, u64::saturating_add);
         // Ranks in thousandths, so that no rounding of 0.999 * n can pick a neighbour.
         let ranks = [500, 900, 990, 999, 1000].map(|permille| (u128::from(total) * permille).div_ceil(1000));
         let mut found = [0; 5];
@@ -129,7 +139,18 @@ impl Distribution {
         pending.sort_unstable();
         let counted: Vec<(u64, u64)> =
             pending.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u64)).collect();
-        merge(&self.counts, &counted)
+        let counts = merge(&self.counts, &counted);
+        if self.pending_many.is_empty() {
+            return counts;
+        }
+        let mut many = self.pending_many.clone();
+        many.sort_unstable();
+        many.dedup_by(|later, first| {
+            let is_same = later.0 == first.0;
+            first.1 = if is_same { first.1.saturating_add(later.1) } else { first.1 };
+            is_same
+        });
+        merge(&counts, &many)
     }
 }
 
@@ -148,7 +169,7 @@ fn merge(a: &[(u64, u64)], b: &[(u64, u64)]) -> Vec<(u64, u64)> {
             (Some((value, count)), Some((other, more))) if value == other => {
                 a.next();
                 b.next();
-                (value, count + more)
+                (value, count.saturating_add(more))
             }
             (Some(first), Some(second)) if first.0 < second.0 => {
                 a.next();

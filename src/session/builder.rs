@@ -227,7 +227,8 @@ impl SessionBuilder {
         self
     }
 
-    /// Writes a log to `path`, overwriting what is there.
+    /// Writes a log to `path`, overwriting what is there. A log that another run is still writing is refused at the start, and
+    /// one that is gone at the end is the [`log_error`](super::Summary::log_error).
     #[must_use]
     pub fn log(mut self, path: impl Into<std::path::PathBuf>) -> Self {
         self.parts.options.log = Some(path.into());

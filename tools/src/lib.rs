@@ -20,4 +20,4 @@ pub mod reduction;
 pub mod timing;
 mod units;
 
-pub use commands::{WindowArgs, main, refuse_to_overwrite};
+pub use commands::{Output, WindowArgs, main};

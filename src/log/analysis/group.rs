@@ -136,7 +136,7 @@ impl GroupCounter {
 
     /// Counts releases of which the lateness alone is known (ns).
     pub fn push_lateness(&mut self, lateness: u64, count: u64) {
-        self.released += count;
+        self.released = self.released.saturating_add(count);
         self.lateness.push_many(lateness, count);
     }
 

@@ -54,7 +54,7 @@ impl RunReport {
 
     /// The number of records lost because a ring was full, all groups together.
     pub fn lost_records(&self) -> u64 {
-        self.groups.iter().map(|group| group.lost_records).sum()
+        self.groups.iter().map(|group| group.lost_records).fold(0, u64::saturating_add)
     }
 
     /// The number of periods skipped, all groups together but those in the background.

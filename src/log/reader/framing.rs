@@ -14,6 +14,12 @@ use mcap::records::op;
 
 use super::chunk::{ChunkHead, ChunkRecords, MAX_RECORD_BYTES};
 use crate::error::{Error, ErrorKind};
+use crate::printable;
+
+/// Bytes that a file may unpack to for each of its own, all chunks so far together; beyond [`UNPACKED_ANYHOW`].
+const MOST_UNPACKED_PER_BYTE: u64 = 1000;
+/// Bytes that any file may unpack to: two of the largest chunks.
+const UNPACKED_ANYHOW: u64 = 2 * MAX_RECORD_BYTES;
 
 /// The records of a file one after the other, those inside chunks included.
 #[derive(Debug)]
@@ -31,6 +37,8 @@ pub struct RecordStream<R> {
     /// Where the record of the file begins that was read last, and what it is.
     record_start: u64,
     record_opcode: u8,
+    /// Bytes of the chunks so far, unpacked.
+    unpacked: u64,
     /// Begins behind a damage: what it reads of the data is not all that their checksum is of.
     resumed: bool,
     damage: Option<String>,
@@ -64,14 +72,15 @@ impl<R: Read> RecordStream<R> {
                 return Err(Error::new(ErrorKind::Log, what).at(place));
             }
         }
-        let mut stream = Self::resume(source, magic.len() as u64, Section::Data);
+        let mut stream = Self::resume(source, magic.len() as u64, Section::Data, 0);
         stream.checksum.update(&magic);
         (stream.has_chunks, stream.resumed) = (false, false);
         Ok(stream)
     }
 
-    /// A stream that goes on behind a damage: `source` is at `offset`, where a record of `section` begins.
-    pub fn resume(source: R, offset: u64, section: Section) -> Self {
+    /// A stream that goes on behind a damage: `source` is at `offset`, where a record of `section` begins; `unpacked` bytes
+    /// of chunks were [unpacked](Self::unpacked) before.
+    pub fn resume(source: R, offset: u64, section: Section, unpacked: u64) -> Self {
         Self {
             source,
             offset,
@@ -82,6 +91,7 @@ impl<R: Read> RecordStream<R> {
             section,
             record_start: offset,
             record_opcode: 0,
+            unpacked,
             resumed: true,
             damage: None,
             ended: false,
@@ -96,6 +106,11 @@ impl<R: Read> RecordStream<R> {
     /// The number of bytes read so far.
     pub fn offset(&self) -> u64 {
         self.offset
+    }
+
+    /// The number of bytes that the chunks read so far came to once unpacked, by their own account.
+    pub fn unpacked(&self) -> u64 {
+        self.unpacked
     }
 
     /// The part of the file that is being read.
@@ -127,7 +142,8 @@ impl<R: Read> RecordStream<R> {
     pub fn stop(&mut self, what: String) {
         self.ended = true;
         self.chunk = None;
-        self.damage.get_or_insert(what);
+        // Names in it are another program's.
+        self.damage.get_or_insert_with(|| printable(&what).into_owned());
     }
 
     /// The body of the record that [`read_next`](Self::read_next) found.
@@ -204,9 +220,9 @@ impl<R: Read> RecordStream<R> {
                 }
                 if opcode == op::CHUNK {
                     self.has_chunks = true;
-                    let chunk = ChunkRecords::new(std::mem::take(&mut self.record), length);
-                    self.chunk =
-                        Some((chunk.map_err(|e| format!("the chunk at byte {start} is damaged: {e}"))?, start));
+                    let chunk = self.open_chunk(length);
+                    let chunk = chunk.map_err(|e| format!("the chunk at byte {start} is damaged: {e}"))?;
+                    self.chunk = Some((chunk, start));
                     return Ok(None);
                 }
                 if complete { Ok(Some(opcode)) } else { Err(cut(self.offset)) }
@@ -221,6 +237,18 @@ impl<R: Read> RecordStream<R> {
                 if skipped == length { Ok(None) } else { Err(cut(self.offset)) }
             }
         }
+    }
+
+    /// The chunk in the record just read, unless the file has unpacked to more than any log would.
+    fn open_chunk(&mut self, length: u64) -> Result<ChunkRecords, String> {
+        let body = std::mem::take(&mut self.record);
+        let claimed = ChunkHead::of(&body, length, (body.len() as u64) < length)?.unpacked;
+        let unpacked = self.unpacked.saturating_add(claimed);
+        if unpacked > UNPACKED_ANYHOW + MOST_UNPACKED_PER_BYTE * self.offset {
+            return Err(format!("with it {} bytes of log would unpack to {unpacked}", self.offset));
+        }
+        self.unpacked = unpacked;
+        ChunkRecords::new(body, length)
     }
 
     /// Reads the rest of the record that ends the data, with the checksum of all bytes before it.

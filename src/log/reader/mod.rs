@@ -17,7 +17,7 @@ pub use self::framing::{RecordStream, Section};
 use super::entry::LogEntry;
 pub use super::messages::topic::TopicKind;
 use super::messages::{self, LogMessage, foxglove};
-use super::records::{Environment, GroupInfo, LogRecord, LoggedExecution, SCHEMA_VERSION_KEY};
+use super::records::{Environment, GroupInfo, LogRecord, LoggedExecution, MAX_GROUPS, SCHEMA_VERSION_KEY};
 use crate::error::Error;
 
 /// Logs before it have other messages on `/tool` and `/log`.
@@ -186,6 +186,11 @@ impl<R: Read> LogReader<R> {
                 // A log that was merged or split may have several channels of one group.
                 let place = environment.groups.iter().position(|group| group.name == foreign.name());
                 foreign.set_group(u16::try_from(place.unwrap_or(environment.groups.len())).unwrap_or(u16::MAX));
+                if place.is_none() && environment.groups.len() >= MAX_GROUPS {
+                    self.records
+                        .stop(format!("the log has more than {MAX_GROUPS} rate groups, which is all that is read"));
+                    return None;
+                }
                 if place.is_none() {
                     environment.groups.push(GroupInfo::new(foreign.name(), foreign.rate_hz().unwrap_or(0.0)));
                     known = Some(LogEntry::Environment(environment.clone()));

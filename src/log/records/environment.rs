@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::ToolSample;
+use super::{MAX_DEVICES, ToolSample};
 use crate::runtime::GroupGrant;
 use crate::runtime::Nanos;
 
@@ -211,6 +211,7 @@ impl Environment {
         };
         let groups = (0..)
             .map_while(|i| map.get(&format!("group.{i}.name")).map(|name| (i, name)))
+            .take(MAX_GROUPS)
             .map(|(i, name)| GroupInfo {
                 name: name.clone(),
                 rate_hz: number(&format!("group.{i}.rate_hz")),
@@ -235,7 +236,7 @@ impl Environment {
             haptic_hz: number("haptic_hz"),
             global_hz: number("global_hz"),
             groups,
-            devices: listed("device"),
+            devices: listed("device").into_iter().take(MAX_DEVICES.into()).collect(),
             limit_stages: listed("limit_stage"),
             safety_off: listed("safety_off"),
             stored_j: number("stored_j"),
@@ -247,6 +248,10 @@ impl Environment {
         }
     }
 }
+
+/// Rate groups that are read of a log; no run has as many. A log of another program could name any number, and each has a
+/// report.
+pub(in crate::log) const MAX_GROUPS: usize = 1024;
 
 /// The key of the schema's version.
 pub(in crate::log) const SCHEMA_VERSION_KEY: &str = "schema_version";

@@ -6,8 +6,8 @@ mod packing;
 mod samples;
 mod scene;
 
-pub(super) use self::environment::SCHEMA_VERSION_KEY;
 pub use self::environment::{Environment, GroupInfo, LoggedExecution, ModelReason};
+pub(super) use self::environment::{MAX_GROUPS, SCHEMA_VERSION_KEY};
 pub use self::event::{Level, TextEvent};
 pub(crate) use self::packing::MAX_DEVICES;
 pub use self::samples::{

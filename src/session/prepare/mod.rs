@@ -19,6 +19,8 @@ pub(super) use groups::BASIS;
 pub(super) use timing::Timing;
 pub(super) use tools::Tool;
 
+use std::path::PathBuf;
+
 use super::parts::{Options, Parts};
 use crate::error::Error;
 use crate::model::contact::{Equations, Law};
@@ -35,8 +37,8 @@ use patch::PatchChoice;
 /// Everything that a session's actors are made of.
 #[derive(Debug)]
 pub(super) struct Prepared {
-    /// The scene as it is run, with everything that a program, the command line or a choice changed; without the paths and
-    /// files of its devices, which a log holds in other places.
+    /// The scene as it is run, with everything that a program, the command line or a choice changed; without the paths,
+    /// files and folders, see [`as_run`].
     pub(super) scene: Scene,
     pub(super) simulation: Simulation,
     /// In the order of their devices.
@@ -62,6 +64,8 @@ pub(super) struct ModelPlan {
     pub(super) prefetches: bool,
     /// Logged nodes.
     pub(super) probes: Vec<u32>,
+    /// Where reduced surroundings are kept from run to run.
+    pub(super) basis_folder: Option<PathBuf>,
 }
 
 impl Prepared {
@@ -129,7 +133,8 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     };
     let blend = Blend::new(scene.local.blend.kind, blend_ticks);
     let (probes, prefetches) = (std::mem::take(&mut start.probes), options.in_real_time);
-    let plan = ModelPlan { template, timing, blend, prefetches, probes };
+    let basis_folder = scene.local.basis_folder.take();
+    let plan = ModelPlan { template, timing, blend, prefetches, probes, basis_folder };
     let until = (!endless).then(|| Nanos::from_secs_f64(scene.run.duration_s));
     let simulation = simulation(start, &scene, &tools)?;
     let prepared =
@@ -149,12 +154,14 @@ fn described(parts: &Parts) -> Result<Scene, Error> {
     Ok(scene)
 }
 
-/// The scene without what a log holds in other places, and with the nodes that a program named, if it has a lattice.
+/// The scene without what a log holds in other places, without what is of this machine alone (a log must not choose a path
+/// where it is read), and with the nodes that a program named, if it has a lattice.
 pub(super) fn as_run(scene: &Scene, named: Option<(&[Option<u32>], &[u32])>) -> Scene {
     let mut scene = scene.clone();
     for device in &mut scene.devices {
         (device.path_csv, device.path, device.log) = (None, None, None);
     }
+    scene.local.basis_folder = None;
     if let (Some(body), Some((attached, probes))) = (&scene.body, named) {
         let lattice = Lattice { nodes: body.block.nodes };
         for (device, node) in scene.devices.iter_mut().zip(attached) {

@@ -14,6 +14,7 @@ use crate::log::{
 use crate::model::body::Block;
 use crate::runtime::{Nanos, Recording, TickTiming};
 use crate::scene::{MAX_DEVICES, Scene};
+use crate::session::prepare::as_run;
 
 /// The rate group that is no part of what is repeated.
 const LOGGER: &str = "logger";
@@ -133,6 +134,8 @@ impl Gathered {
         })?;
         let scene = Scene::from_session_toml(&session, Environment::SESSION)
             .map_err(|error| refusal(format!("what was run cannot be read: {error}")))?;
+        // Whatever a log says, it chooses no path and no device here.
+        let scene = as_run(&scene, None);
         let devices = scene.devices.len();
         if environment.first_tools.len() != devices {
             return Err(refusal("it lacks the device's first state"));

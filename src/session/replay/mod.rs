@@ -12,7 +12,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::parts::Parts;
-use super::prepare::{Prepared, as_run, prepare};
+use super::prepare::{Prepared, prepare};
 use super::wire::{Rerun, start};
 use crate::devices::{Capabilities, Device, DeviceState, Replayed, ReplayedSample};
 use crate::error::{Error, ErrorKind};
@@ -88,7 +88,7 @@ impl Replay {
         parts.options.log = None;
         parts.options.keep_records = false;
         let prepared = prepare(parts).map_err(|error| error.at(&place))?;
-        let difference = first_difference(&prepared.scene.to_toml()?, &as_run(&logged.scene, None).to_toml()?);
+        let difference = first_difference(&prepared.scene.to_toml()?, &logged.scene.to_toml()?);
         if let Some((here, there)) = difference {
             let message = format!("it is the log of another session: `{there}` was run, this one has `{here}`");
             return Err(Error::new(ErrorKind::Log, message).at(place));

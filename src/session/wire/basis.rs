@@ -32,8 +32,8 @@ impl BasisSide {
         let Some(springs) = prepared.plan.template.springs.clone().filter(|_| prepared.reduces()) else {
             return Ok(None);
         };
-        let store =
-            BasisStore { size: prepared.scene.local.basis_size(), folder: prepared.scene.local.basis_folder.clone() };
+        let folder = prepared.plan.basis_folder.clone();
+        let store = BasisStore { size: prepared.scene.local.basis_size(), folder };
         let pace = if prepared.plan.prefetches { BasisPace::OneByOne } else { BasisPace::All };
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),

@@ -5,16 +5,15 @@
 
 mod table;
 
-use std::fs::File;
-use std::io::BufWriter;
+use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use palpate::Error;
 use palpate::log::LogReader;
-use palpate_cli::WindowArgs;
+use palpate::{Error, printable};
 use palpate_cli::export::export_rows;
+use palpate_cli::{Output, WindowArgs};
 
 use table::ParquetTable;
 
@@ -38,7 +37,8 @@ fn main() -> ExitCode {
     match run(&Args::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            // A full standard error takes nothing, and nobody is left to tell.
+            let _ = writeln!(io::stderr(), "error: {error}");
             ExitCode::from(if error.kind().is_input() { 2 } else { 1 })
         }
     }
@@ -47,14 +47,11 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> Result<(), Error> {
     let window = args.window.window()?;
     let mut reader = LogReader::open(&args.log)?;
-    // The file is created when the topic is known to exist.
-    export_rows(&mut reader, &args.topic, &window, |columns| {
-        palpate_cli::refuse_to_overwrite(&args.log, &args.out)?;
-        let file = File::create(&args.out).map_err(|error| Error::io(&args.out, error))?;
-        ParquetTable::new(columns, BufWriter::new(file))
-    })?;
+    let output = Output::create(&args.out, &[&args.log])?;
+    export_rows(&mut reader, &args.topic, &window, |columns| ParquetTable::new(columns, BufWriter::new(&output)))?;
+    output.finish()?;
     if let Some(damage) = reader.damage() {
-        eprintln!("warning: {}: {damage}", reader.place());
+        let _ = writeln!(io::stderr(), "warning: {}: {damage}", printable(reader.place()));
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use palpate::model::local::Kind as LocalModelKind;
 use palpate::scene::Scene;
 use palpate::{Error, ErrorKind};
 
-use super::{progress, run, shared};
+use super::{files, progress, run, shared};
 use crate::compare::{CompareOptions, CompareProgress, compare, to_html, to_json, to_text};
 
 /// The arguments of `palpate compare`.
@@ -35,10 +35,9 @@ pub struct CompareArgs {
 /// fault, after the others were printed.
 pub fn run(args: &CompareArgs) -> Result<(), Error> {
     let scene = Scene::load(&args.scene)?;
-    if let Some(html) = &args.html {
-        shared::keep_inputs(&args.scene, &scene, html)?;
-    }
-    let name = args.scene.display().to_string();
+    let inputs = files::inputs_of(&args.scene, &scene);
+    args.html.as_ref().map_or(Ok(()), |html| files::keep_inputs(&inputs, html))?;
+    let name = shared::name_of(&args.scene);
     let options =
         CompareOptions { models: args.models.clone(), duration_s: args.duration, ..CompareOptions::default() };
     let mut shown = Shown::default();
@@ -46,7 +45,7 @@ pub fn run(args: &CompareArgs) -> Result<(), Error> {
     shown.clear();
     let mut comparison = compared.map_err(|error| error.at(&name))?;
     comparison.scene = name;
-    shared::write_page(args.html.as_deref(), || to_html(&comparison))?;
+    files::write_page(args.html.as_deref(), &inputs, || to_html(&comparison))?;
     shared::print_report(args.json, || to_json(&comparison), || to_text(&comparison))?;
     match comparison.faults().next() {
         Some((model, fault)) => Err(Error::new(ErrorKind::Fault, format!("the run of `{model}`: {fault}"))),

@@ -1,14 +1,14 @@
 //! `palpate export LOG`: a log in the formats of other programs.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use palpate::log::{LogReader, Window};
 use palpate::{Error, ErrorKind};
 
+use super::files::Output;
 use super::progress::ReadBar;
-use super::shared::{WindowArgs, forgive_closed_pipe, refuse_to_overwrite, warn_of_damage};
+use super::shared::{WindowArgs, forgive_closed_pipe, warn_of_damage};
 use crate::export::{TickDuration, export_percentiles, export_table, export_trace};
 
 /// The formats of an export.
@@ -81,12 +81,12 @@ fn write_file<R: Read>(
     log: &Path,
     path: &Path,
 ) -> Result<(), Error> {
-    refuse_to_overwrite(log, path)?;
-    let mut out = BufWriter::new(LazyFile { path: path.to_owned(), file: None });
-    write(what, reader, window, &mut out).map_err(|e| match e.kind() {
+    let output = Output::create(path, &[log])?;
+    write(what, reader, window, &mut BufWriter::new(&output)).map_err(|e| match e.kind() {
         ErrorKind::Io => e.at(path.display().to_string()),
         _ => e,
-    })
+    })?;
+    output.finish()
 }
 
 fn write_standard_output<R: Read>(what: &What<'_>, reader: &mut LogReader<R>, window: &Window) -> Result<(), Error> {
@@ -146,24 +146,4 @@ fn what(args: &ExportArgs) -> Result<What<'_>, Error> {
 
 fn usage(message: &str) -> Error {
     Error::new(ErrorKind::Usage, format!("{message}; see `palpate export --help`"))
-}
-
-/// A file that is created by its first byte, so that a bad topic leaves none behind.
-struct LazyFile {
-    path: PathBuf,
-    file: Option<File>,
-}
-
-impl Write for LazyFile {
-    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
-        let file = match &mut self.file {
-            Some(file) => file,
-            none => none.insert(File::create(&self.path)?),
-        };
-        file.write(buffer)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.as_mut().map_or(Ok(()), File::flush)
-    }
 }

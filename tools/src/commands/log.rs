@@ -6,9 +6,10 @@ use std::path::PathBuf;
 
 use palpate::{Error, ErrorKind};
 
+use super::files::{Output, keep_inputs};
 use super::log_info::{bytes, count, seconds, span, to_json, to_text};
 use super::progress::ReadBar;
-use super::shared::{print, print_report, refuse_to_overwrite, warn_of_damage};
+use super::shared::{name_of, print, print_report, warn_of_damage};
 use crate::log_file::{CheckReport, LogInfo, Lost, Recovered, check, recover};
 
 /// The arguments of `palpate log`.
@@ -79,7 +80,7 @@ pub fn run(args: &LogArgs) -> Result<(), Error> {
 }
 
 fn info(args: &InfoArgs) -> Result<(), Error> {
-    let place = args.log.display().to_string();
+    let place = name_of(&args.log);
     let bar = ReadBar::new(&place);
     let info = LogInfo::open(&args.log, |read, length| bar.show(read, length));
     bar.clear();
@@ -89,7 +90,7 @@ fn info(args: &InfoArgs) -> Result<(), Error> {
 }
 
 fn run_check(args: &CheckArgs) -> Result<(), Error> {
-    let place = args.log.display().to_string();
+    let place = name_of(&args.log);
     let source = BufReader::with_capacity(1 << 18, File::open(&args.log).map_err(|e| Error::io(&args.log, e))?);
     let bar = ReadBar::new(&place);
     let report = check(source, &place, |read, length| bar.show(read, length));
@@ -122,17 +123,18 @@ fn findings(report: &CheckReport, place: &str) -> String {
 }
 
 fn run_recover(args: &RecoverArgs) -> Result<(), Error> {
-    let (place, new_place) = (args.log.display().to_string(), args.out.display().to_string());
+    let (place, new_place) = (name_of(&args.log), name_of(&args.out));
     let source = File::open(&args.log).map_err(|e| Error::io(&args.log, e))?;
-    refuse_to_overwrite(&args.log, &args.out)?;
-    // Before a file is created or overwritten.
+    keep_inputs(&[&args.log], &args.out)?;
+    // Before a pipe is opened.
     palpate::log::LogReader::open(&args.log)?;
-    let output = File::create(&args.out).map_err(|e| Error::io(&args.out, e))?;
+    let output = Output::create(&args.out, &[&args.log])?;
     let bar = ReadBar::new(&place);
-    let (source, output) = (BufReader::with_capacity(1 << 18, source), BufWriter::with_capacity(1 << 18, output));
-    let recovered = recover(source, &place, output, &new_place, |read, length| bar.show(read, length));
+    let (source, written) = (BufReader::with_capacity(1 << 18, source), BufWriter::with_capacity(1 << 18, &output));
+    let recovered = recover(source, &place, written, &new_place, |read, length| bar.show(read, length));
     bar.clear();
     let (recovered, _) = recovered?;
+    output.finish()?;
     print(&saved(&recovered, &place, &new_place))
 }
 

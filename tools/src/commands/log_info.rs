@@ -1,6 +1,7 @@
 //! What `palpate log` prints: a log's contents as text and as JSON.
 
 use palpate::log::{Environment, LoggedExecution};
+use palpate::printable;
 use serde_json::{Value, json};
 
 use crate::log_file::LogInfo;
@@ -44,25 +45,27 @@ pub fn to_text(info: &LogInfo, place: &str) -> String {
     let named = [info.library.as_str(), info.profile.as_str()].into_iter().filter(|name| !name.is_empty());
     let named: Vec<&str> = named.collect();
     if !named.is_empty() {
-        lines.push(format!("written by {}", named.join(", profile ")));
+        lines.push(format!("written by {}", printable(&named.join(", profile "))));
     }
     for (compression, chunks) in &info.chunks {
         let ratio = chunks.unpacked as f64 / (chunks.packed as f64).max(1.0);
         let (packed, unpacked) = (bytes(chunks.packed), bytes(chunks.unpacked));
         let number = count(chunks.count, "chunk", "chunks");
+        let compression = printable(compression);
         lines.push(format!("chunks     {number}, {compression}: {packed} of {unpacked} unpacked, {ratio:.1} to 1"));
     }
     if let Some(environment) = &info.environment {
         lines.extend(run(environment));
     }
-    let width = info.topics.keys().map(|name| name.chars().count()).max().unwrap_or(0).max(5);
+    let names: Vec<_> = info.topics.keys().map(|name| printable(name)).collect();
+    let width = names.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(5);
     lines.push(format!("\n{:width$} {:>10} {:>10}  message", "topic", "messages", "rate (Hz)"));
-    for (name, topic) in &info.topics {
+    for (name, topic) in names.iter().zip(info.topics.values()) {
         let rate = info.rate_hz(topic).map_or("-".to_owned(), |rate| format!("{rate:.1}"));
         let message = if topic.schema.is_empty() { &topic.encoding } else { &topic.schema };
-        lines.push(format!("{name:width$} {:>10} {rate:>10}  {message}", topic.messages));
+        lines.push(format!("{name:width$} {:>10} {rate:>10}  {}", topic.messages, printable(message)));
     }
-    let attachments = info.attachments.iter().map(|one| format!("{} ({})", one.name, bytes(one.bytes)));
+    let attachments = info.attachments.iter().map(|one| format!("{} ({})", printable(&one.name), bytes(one.bytes)));
     let attachments: Vec<String> = attachments.collect();
     if !attachments.is_empty() {
         lines.push(format!("\nattached   {}", attachments.join(", ")));
@@ -74,16 +77,19 @@ pub fn to_text(info: &LogInfo, place: &str) -> String {
 fn run(environment: &Environment) -> Vec<String> {
     let Environment { palpate_version, instruction_set, model, .. } = environment;
     let execution = execution(environment);
-    let groups = environment.groups.iter().map(|group| format!("{} {} Hz", group.name, group.rate_hz));
+    let groups = environment.groups.iter().map(|group| format!("{} {} Hz", printable(&group.name), group.rate_hz));
+    let [palpate_version, instruction_set, model] =
+        [palpate_version, instruction_set, model].map(|name| printable(name));
     let mut lines = vec![
         format!("run        {execution}, model {model}, palpate {palpate_version}, {instruction_set}"),
         format!("groups     {}", groups.collect::<Vec<_>>().join(", ")),
     ];
     if !environment.devices.is_empty() {
-        lines.push(format!("devices    {}", environment.devices.join(", ")));
+        lines.push(format!("devices    {}", printable(&environment.devices.join(", "))));
     }
     for (i, (what, granted)) in environment.granted.iter().enumerate() {
-        lines.push(format!("{:10} {what}: {granted}", if i == 0 { "granted" } else { "" }));
+        let granted = printable(&format!("{what}: {granted}")).into_owned();
+        lines.push(format!("{:10} {granted}", if i == 0 { "granted" } else { "" }));
     }
     lines
 }

@@ -12,13 +12,15 @@ pub mod replay;
 pub mod run;
 pub mod timing;
 
+mod files;
 mod log_info;
 mod progress;
 mod shared;
 
 use std::process::ExitCode;
 
-pub use shared::{WindowArgs, refuse_to_overwrite};
+pub use files::Output;
+pub use shared::WindowArgs;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use palpate::session::LOG_FAILURE;
@@ -66,7 +68,7 @@ pub fn main() -> ExitCode {
         .with_target(false)
         .without_time()
         .with_ansi(false)
-        .with_writer(std::io::stderr)
+        .with_writer(|| shared::Complaints)
         .finish()
         .with(shown)
         .init();
@@ -88,11 +90,11 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.kind() == ErrorKind::Interrupted => {
-            eprintln!("{error}");
+            shared::complain(&error);
             ExitCode::from(shared::EXIT_CODE)
         }
         Err(error) => {
-            eprintln!("error: {error}");
+            shared::complain(format_args!("error: {error}"));
             if error.kind().is_input() { ExitCode::from(2) } else { ExitCode::from(1) }
         }
     }

@@ -11,6 +11,8 @@ use palpate::log::LogReader;
 use palpate::runtime::{GroupLive, Nanos};
 use palpate::session::Running;
 
+use super::shared::name_of;
+
 /// How much of the run passes between two drawings.
 const STEP: Duration = Duration::from_millis(50);
 
@@ -21,8 +23,24 @@ pub fn preparing(what: &str) -> ProgressBar {
         ProgressStyle::with_template("{msg} {elapsed}").unwrap_or_else(|_| ProgressStyle::default_spinner()),
     );
     spinner.set_message(format!("preparing {what}"));
-    spinner.enable_steady_tick(STEP);
+    tick(&spinner);
     spinner
+}
+
+/// Lets time pass on a bar that nobody moves. Where the system gives no thread for it, it stands still.
+fn tick(bar: &ProgressBar) {
+    if bar.is_hidden() {
+        return;
+    }
+    let weak = bar.downgrade();
+    let ticks = move || {
+        while let Some(bar) = weak.upgrade().filter(|bar| !bar.is_finished()) {
+            bar.tick();
+            drop(bar);
+            std::thread::sleep(STEP);
+        }
+    };
+    let _ = std::thread::Builder::new().name("progress".to_owned()).spawn(ticks);
 }
 
 /// Waits for the end of `running`; shows how far it is and how its groups keep their time.
@@ -92,7 +110,7 @@ impl StepBar {
             let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
             let style = ProgressStyle::with_template("{msg} [{bar:40}] {pos} of {len}, {elapsed}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
-            bar.enable_steady_tick(STEP);
+            tick(&bar);
             bar
         });
         bar.set_length(of as u64);
@@ -136,7 +154,7 @@ impl ReadBar {
     pub fn open(what: &str, path: &Path, is_hidden: bool) -> Result<(Self, ShownLog), Error> {
         let file = File::open(path).map_err(|error| Error::io(path, error))?;
         let bytes = file.metadata().map_or(0, |metadata| metadata.len());
-        let bar = bar(&format!("{what} {}", path.display()), bytes, is_hidden);
+        let bar = bar(&format!("{what} {}", name_of(path)), bytes, is_hidden);
         let source = BufReader::with_capacity(READ_BUFFER_BYTES, bar.wrap_read(file));
         let reader = LogReader::new(source, &path.display().to_string());
         if reader.is_err() {

@@ -6,7 +6,7 @@ use palpate::scene::Scene;
 use palpate::{Error, ErrorKind};
 
 use super::progress::StepBar;
-use super::shared;
+use super::{files, shared};
 use crate::reduce::ReductionStudy;
 use crate::reduce::{
     MeshStudy, PaperStudy, ReduceOptions, locality_verdict, reduce_mesh, reduce_paper, reduce_scene, to_html, to_json,
@@ -80,11 +80,14 @@ pub struct Cells(Vec<usize>);
 /// Input errors of the scene and of the arguments; [`ErrorKind::Io`] if the page cannot be written; [`ErrorKind::Condition`]
 /// with `--fail-if-not-local` if the patch does not capture the force, after the report was printed.
 pub fn run(args: &ReduceArgs) -> Result<(), Error> {
+    let scene = args.scene.as_ref().map(|path| Scene::load(path).map(|scene| (path, scene))).transpose()?;
+    let inputs = scene.as_ref().map_or(Vec::new(), |(path, scene)| files::inputs_of(path, scene));
+    args.html.as_ref().map_or(Ok(()), |html| files::keep_inputs(&inputs, html))?;
     let mut shown = StepBar::default();
-    let made = study(args, &mut shown);
+    let made = study(args, scene, &mut shown);
     shown.clear();
     let study = made?;
-    shared::write_page(args.html.as_deref(), || to_html(&study))?;
+    files::write_page(args.html.as_deref(), &inputs, || to_html(&study))?;
     shared::print_report(args.json, || to_json(&study), || to_text(&study))?;
     match &study.locality {
         Some(locality) if args.fail_if_not_local && !locality.is_local => {
@@ -94,13 +97,9 @@ pub fn run(args: &ReduceArgs) -> Result<(), Error> {
     }
 }
 
-fn study(args: &ReduceArgs, shown: &mut StepBar) -> Result<ReductionStudy, Error> {
-    if let Some(path) = &args.scene {
-        let scene = Scene::load(path)?;
-        if let Some(html) = &args.html {
-            shared::keep_inputs(path, &scene, html)?;
-        }
-        let name = path.display().to_string();
+fn study(args: &ReduceArgs, scene: Option<(&PathBuf, Scene)>, shown: &mut StepBar) -> Result<ReductionStudy, Error> {
+    if let Some((path, scene)) = scene {
+        let name = shared::name_of(path);
         let study = reduce_scene(&scene, &options(args), |at| shown.show(&at.what, at.done, at.of));
         let mut study = study.map_err(|error| error.at(&name))?;
         study.subject = name;

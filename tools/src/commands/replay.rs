@@ -25,7 +25,7 @@ pub struct ReplayArgs {
 /// [`ErrorKind::Io`] if the log cannot be read, [`ErrorKind::Log`] if it does not hold all that a replay needs or nothing
 /// could be compared, [`ErrorKind::Fault`] if a sample is not identical.
 pub fn run(args: &ReplayArgs) -> Result<(), Error> {
-    let name = args.log.display().to_string();
+    let name = shared::name_of(&args.log);
     let preparing = progress::preparing(&name);
     let replay = Session::replay(&args.log);
     preparing.finish_and_clear();

@@ -7,7 +7,7 @@ use palpate::scene::{ModelChoice, Scene};
 use palpate::session::{Session, SessionBuilder};
 use palpate::{Error, ErrorKind};
 
-use super::{progress, shared};
+use super::{files, progress, shared};
 
 /// Where the log goes if nothing is said.
 const DEFAULT_LOG: &str = "palpate-run.mcap";
@@ -51,11 +51,8 @@ pub fn demo() -> Result<(), Error> {
 /// Input errors of the scene, or a failed run.
 pub fn run(args: &RunArgs) -> Result<(), Error> {
     let mut scene = Scene::load(&args.scene)?;
-    shared::keep_inputs(&args.scene, &scene, &args.out)?;
-    for log in scene.devices.iter().filter_map(|device| device.log.as_ref()) {
-        shared::refuse_to_overwrite(log, &args.out)?;
-    }
-    let name = args.scene.display().to_string();
+    files::keep_inputs(&files::inputs_of(&args.scene, &scene), &args.out)?;
+    let name = shared::name_of(&args.scene);
     if let Some(model) = args.model {
         scene = scene.with_model(model);
     }
@@ -102,7 +99,10 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
     }
     let first = summary.report.devices.first().map(|device| device.name.as_str()).filter(|name| !name.is_empty());
     let topic = first.map_or("/force".to_owned(), |name| format!("/{name}/force"));
-    shared::print(&format!("log: {0} (`palpate timing {0}`, `palpate export {0} --topic {topic}`)\n", log.display()))?;
+    shared::print(&format!(
+        "log: {0} (`palpate timing {0}`, `palpate export {0} --topic {topic}`)\n",
+        shared::name_of(log)
+    ))?;
     match until.filter(|_| interrupt.came()) {
         Some(until) if ended < until => {
             let (ended, until) = (ended.as_secs_f64(), until.as_secs_f64());

@@ -1,6 +1,6 @@
-//! What the subcommands share: standard output that may be closed early, the warning on a damaged log, `--from` and `--to`, and
-//! Ctrl-C.
+//! What the subcommands share: standard output and standard error that may be closed or full, `--from` and `--to`, and Ctrl-C.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::Path;
@@ -8,15 +8,53 @@ use std::sync::OnceLock;
 
 use palpate::log::Window;
 use palpate::runtime::Nanos;
-use palpate::scene::Scene;
 use palpate::session::Running;
-use palpate::{Error, ErrorKind};
+use palpate::{Error, ErrorKind, printable};
 
 /// Writes `text` to standard output. A reader that has gone away, such as `head`, is not an error.
 pub fn print(text: &str) -> Result<(), Error> {
     let mut out = io::stdout().lock();
-    let result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    let result = out.write_all(for_terminal(text).as_bytes()).and_then(|()| out.flush());
     forgive_closed_pipe(result.map_err(|e| Error::io(Path::new("standard output"), e)))
+}
+
+/// `text` without what a terminal would obey, but for the ends of lines. Reports have escaped the names in them before; this
+/// is for JSON, in which serde leaves some of it, and for what was forgotten. What it writes in place means the same in JSON.
+fn for_terminal(text: &str) -> Cow<'_, str> {
+    let is_obeyed = |c: char| c.is_control() && c != '\n';
+    if !text.contains(is_obeyed) {
+        return text.into();
+    }
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_obeyed(c) { shown += &format!("\\u{:04x}", u32::from(c)) } else { shown.push(c) }
+    }
+    shown.into()
+}
+
+/// Says one line on standard error. One that is full or gone takes nothing, and nobody is left to tell.
+pub fn complain(line: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "{line}");
+}
+
+/// Standard error for warnings of the engine: a line each, whatever is in them.
+#[derive(Debug)]
+pub struct Complaints;
+
+impl Write for Complaints {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        complain(printable(String::from_utf8_lossy(bytes).trim_end()));
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// The name of a file in a report: on one line, whatever it is called.
+pub fn name_of(path: &Path) -> String {
+    printable(&path.display().to_string()).into_owned()
 }
 
 /// Prints one JSON document, or else the report for people.
@@ -26,45 +64,6 @@ pub fn print_report<J: Display>(
     text: impl FnOnce() -> String,
 ) -> Result<(), Error> {
     print(&if is_json { format!("{}\n", json()) } else { text() })
-}
-
-/// Refuses to write `out` over `input`: opening it for writing would destroy what is being read.
-///
-/// # Errors
-/// [`ErrorKind::Usage`] if both are names of one file.
-pub fn refuse_to_overwrite(input: &Path, out: &Path) -> Result<(), Error> {
-    let real = |path: &Path| path.canonicalize().ok();
-    if real(input).is_some_and(|input| real(out) == Some(input)) || is_one_file(input, out) {
-        let message = "is the input itself, name another file for the output";
-        return Err(Error::new(ErrorKind::Usage, message).at(out.display().to_string()));
-    }
-    Ok(())
-}
-
-/// Refuses to write `out` over the scene at `path` or over what the scene reads.
-pub fn keep_inputs(path: &Path, scene: &Scene, out: &Path) -> Result<(), Error> {
-    refuse_to_overwrite(path, out)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut paths = scene.devices.iter().filter_map(|device| device.path_csv.as_ref());
-    paths.try_for_each(|path_csv| refuse_to_overwrite(&folder.join(path_csv), out))
-}
-
-/// Writes a page to where it was asked for, if it was.
-pub fn write_page(path: Option<&Path>, page: impl FnOnce() -> String) -> Result<(), Error> {
-    path.map_or(Ok(()), |path| std::fs::write(path, page()).map_err(|error| Error::io(path, error)))
-}
-
-/// True if the two are names of one file: hard links.
-#[cfg(unix)]
-fn is_one_file(a: &Path, b: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let of = |path: &Path| std::fs::metadata(path).map(|file| (file.dev(), file.ino())).ok();
-    of(a).is_some_and(|a| of(b) == Some(a))
-}
-
-#[cfg(not(unix))]
-fn is_one_file(_: &Path, _: &Path) -> bool {
-    false
 }
 
 /// Takes the error of a closed pipe for the end of the output.
@@ -80,7 +79,7 @@ pub fn forgive_closed_pipe(result: Result<(), Error>) -> Result<(), Error> {
 /// Says on standard error, in one line, what is wrong with the log.
 pub fn warn_of_damage(place: &str, damage: Option<&str>) {
     if let Some(damage) = damage {
-        eprintln!("warning: {place}: {damage}");
+        complain(format_args!("warning: {}: {damage}", printable(place)));
     }
 }
 

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use palpate::{Error, ErrorKind};
 
+use super::files::{keep_inputs, write_page};
 use super::progress::ReadBar;
-use super::shared::{WindowArgs, print_report, refuse_to_overwrite, warn_of_damage, write_page};
+use super::shared::{WindowArgs, name_of, print_report, warn_of_damage};
 use crate::timing::{
     Against, Condition, Selection, TimingAnalysis, TimingReport, against_to_json, against_to_text, figure_to_text,
     read_cyclictest, timing_html, timing_to_json, timing_to_text,
@@ -46,20 +47,17 @@ pub struct TimingArgs {
 /// [`ErrorKind::Io`] if a log cannot be read, [`ErrorKind::Log`] if it is none, [`ErrorKind::Usage`] if it has no such group
 /// or figure, [`ErrorKind::Condition`] if a condition holds.
 pub fn run(args: &TimingArgs) -> Result<(), Error> {
-    if let Some(html) = &args.html {
-        [Some(&args.log), args.against.as_ref()]
-            .into_iter()
-            .flatten()
-            .try_for_each(|log| refuse_to_overwrite(log, html))?;
-    }
+    let inputs: Vec<&Path> =
+        [Some(&args.log), args.against.as_ref()].into_iter().flatten().map(AsRef::as_ref).collect();
+    args.html.as_ref().map_or(Ok(()), |html| keep_inputs(&inputs, html))?;
     let report = read(&args.log, args, &args.group)?;
     let name = args.log.file_name().unwrap_or_default().to_string_lossy();
-    write_page(args.html.as_deref(), || timing_html(&report, &name))?;
+    write_page(args.html.as_deref(), &inputs, || timing_html(&report, &name))?;
     match &args.against {
         Some(other_log) => {
             let other = matched(other_log, args)?;
             let against = Against::of(&report, &other);
-            let [this_name, other_name] = [&args.log, other_log].map(|log| log.display().to_string());
+            let [this_name, other_name] = [&args.log, other_log].map(|log| name_of(log));
             let json = || against_to_json(&against, &report, (&other_name, &other));
             print_report(args.json, json, || against_to_text(&against, [(&this_name, &report), (&other_name, &other)]))
         }

@@ -5,9 +5,9 @@
 
 use std::io::{self, Read, Write};
 
-use palpate::Error;
 use palpate::log::{Distribution, LogEntry, LogReader, LogRecord, TickGauge, Window};
 use palpate::runtime::TickTiming;
+use palpate::{Error, printable};
 
 use super::table::lost_topic;
 use super::{Micros, output_error, unknown};
@@ -99,6 +99,7 @@ pub fn export_percentiles<R: Read, W: Write>(
         let groups: Vec<&str> = topics.keys().filter_map(|topic| topic.strip_prefix("/timing/")).collect();
         return Err(unknown(reader, "rate group", group, &groups));
     }
+    let group = printable(group);
     let title = format!("{} of rate group {group} in microseconds, exact percentiles (nearest rank)", figure.name());
     write(&values, &title, out).and_then(|()| out.flush()).map_err(output_error)
 }

@@ -1,5 +1,6 @@
 //! One topic of a log as a table: its rows for any writer, and CSV.
 
+use std::borrow::Cow;
 use std::io::{self, Read, Write};
 
 use palpate::log::TopicKind;
@@ -121,6 +122,15 @@ fn header(columns: &[Column], out: &mut impl Write) -> io::Result<()> {
     writeln!(out)
 }
 
+/// `text` with its control characters escaped: a row is a line, and a terminal obeys none of them.
+fn one_line(text: &str) -> Cow<'_, str> {
+    if !text.contains(char::is_control) {
+        return text.into();
+    }
+    let escaped = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
+    text.chars().map(escaped).collect::<String>().into()
+}
+
 /// Writes one row.
 fn write_row(cells: &[Cell], out: &mut impl Write) -> io::Result<()> {
     for (place, cell) in cells.iter().enumerate() {
@@ -133,7 +143,7 @@ fn write_row(cells: &[Cell], out: &mut impl Write) -> io::Result<()> {
             Cell::F64(value) => write!(out, "{value}")?,
             Cell::F32(value) => write!(out, "{value}")?,
             Cell::Word(word) => out.write_all(word.as_bytes())?,
-            Cell::Text(text) => write!(out, "\"{}\"", text.replace('"', "\"\""))?,
+            Cell::Text(text) => write!(out, "\"{}\"", one_line(text).replace('"', "\"\""))?,
             Cell::Missing => {}
         }
     }

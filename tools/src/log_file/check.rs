@@ -7,8 +7,8 @@ use mcap::records::{ChunkIndex, MessageHeader, Record, Statistics, op};
 
 use super::Span;
 use super::salvage::{Found, Salvage};
-use palpate::Error;
 use palpate::log::{Analysis, Environment, LogEntry, LogRecord, TopicKind};
+use palpate::{Error, printable};
 
 /// Findings that are kept in words; the others are only counted.
 const FINDINGS_KEPT: usize = 1000;
@@ -45,7 +45,8 @@ impl CheckReport {
     fn find(&mut self, what: String) {
         self.count += 1;
         if self.findings.len() < FINDINGS_KEPT {
-            self.findings.push(what);
+            // Topics and groups are called as another program likes.
+            self.findings.push(printable(&what).into_owned());
         }
     }
 }
@@ -209,6 +210,7 @@ impl Checker {
                 let (topic, number) = (&channel.topic, channel.messages);
                 let more =
                     if channel.findings == PER_TOPIC { " (further ones of this topic are only counted)" } else { "" };
+                let (topic, what) = (printable(topic), printable(&what));
                 self.report.findings.push(format!("{topic}: message {number} {what}{more}"));
             }
         }

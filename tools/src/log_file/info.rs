@@ -133,7 +133,8 @@ impl LogInfo {
             let topic = info.topics.entry(channel.topic.clone()).or_default();
             topic.schema = channel.schema.as_ref().map_or(String::new(), |schema| schema.name.clone());
             topic.encoding.clone_from(&channel.message_encoding);
-            topic.messages += stats.channel_message_counts.get(&channel.id).copied().unwrap_or(0);
+            let counted = stats.channel_message_counts.get(&channel.id).copied().unwrap_or(0);
+            topic.messages = topic.messages.saturating_add(counted);
         }
         for chunk in &index.chunk_indexes {
             info.chunk(&chunk.compression, chunk.compressed_size, chunk.uncompressed_size);
@@ -214,7 +215,9 @@ impl LogInfo {
     fn chunk(&mut self, compression: &str, packed: u64, unpacked: u64) {
         let name = if compression.is_empty() { "none" } else { compression };
         let of = self.chunks.entry(name.to_owned()).or_default();
-        *of = ChunkInfo { count: of.count + 1, packed: of.packed + packed, unpacked: of.unpacked + unpacked };
+        // What an index says may be anything.
+        let (packed, unpacked) = (of.packed.saturating_add(packed), of.unpacked.saturating_add(unpacked));
+        *of = ChunkInfo { count: of.count + 1, packed, unpacked };
     }
 
     /// A metadata record or an attachment.

@@ -41,6 +41,8 @@ pub(super) struct Salvage<R> {
     stream: Option<RecordStream<R>>,
     length: u64,
     damaged: bool,
+    /// Bytes that were read and unpacked in the search for a chunk that fits.
+    searched: u64,
 }
 
 impl<R: Read + Seek> Salvage<R> {
@@ -51,7 +53,7 @@ impl<R: Read + Seek> Salvage<R> {
     pub(super) fn new(mut source: R, place: &str) -> Result<Self, Error> {
         let length = source.seek(SeekFrom::End(0)).and_then(|length| source.rewind().map(|()| length));
         let length = length.map_err(|e| Error::io(Path::new(place), e))?;
-        Ok(Self { stream: Some(RecordStream::new(source, place)?), length, damaged: false })
+        Ok(Self { stream: Some(RecordStream::new(source, place)?), length, damaged: false, searched: 0 })
     }
 
     /// The size of the file (bytes).
@@ -70,20 +72,30 @@ impl<R: Read + Seek> Salvage<R> {
             return Some(Found::Record(opcode, self.stream.as_ref()?));
         }
         let stream = self.stream.as_ref()?;
-        let what = stream.damage()?.to_owned();
+        let mut what = stream.damage()?.to_owned();
         self.damaged = true;
         let (start, opcode) = stream.record_start();
-        let (section, end) = (stream.section(), stream.offset());
+        let (section, end, unpacked) = (stream.section(), stream.offset(), stream.unpacked());
         let mut source = self.stream.take().map(RecordStream::into_source)?;
         // A source that cannot be read further has nothing more to give.
         let next = self.resume_at(&mut source, start, opcode, section, end).ok().flatten();
         let next = next.filter(|at| source.seek(SeekFrom::Start(*at)).is_ok());
-        self.stream = next.map(|at| RecordStream::resume(source, at, section));
+        if next.is_none() && self.searched > most_searched(self.length) {
+            what += "; it holds more false beginnings of chunks than are looked at";
+        }
+        self.stream = next.map(|at| RecordStream::resume(source, at, section, unpacked));
         Some(Found::Damage(Damage { from: start, to: next.unwrap_or(self.length), what }))
     }
 
     /// Where to go on after a damage in the record at `start`, of which `end` is where reading stopped.
-    fn resume_at(&self, source: &mut R, start: u64, opcode: u8, section: Section, end: u64) -> io::Result<Option<u64>> {
+    fn resume_at(
+        &mut self,
+        source: &mut R,
+        start: u64,
+        opcode: u8,
+        section: Section,
+        end: u64,
+    ) -> io::Result<Option<u64>> {
         if section != Section::Data {
             // The data does not fit its checksum, but its end was read: the index follows. Within it, nothing does.
             return Ok((opcode == op::DATA_END).then_some(end));
@@ -95,7 +107,7 @@ impl<R: Read + Seek> Salvage<R> {
     }
 
     /// The next chunk at `from` or later whose checksum fits.
-    fn search(&self, source: &mut R, mut from: u64) -> io::Result<Option<u64>> {
+    fn search(&mut self, source: &mut R, mut from: u64) -> io::Result<Option<u64>> {
         let mut window = Vec::new();
         while from + (HEAD_BYTES as u64) < self.length {
             source.seek(SeekFrom::Start(from))?;
@@ -103,7 +115,13 @@ impl<R: Read + Seek> Salvage<R> {
             source.by_ref().take((WINDOW_BYTES + HEAD_BYTES) as u64).read_to_end(&mut window)?;
             for at in 0..window.len().min(WINDOW_BYTES) {
                 let place = from + at as u64;
-                if window[at] == op::CHUNK && self.may_begin(&window[at..], place) && self.fits(source, place)? {
+                let Some(cost) = self.cost_of(&window[at..], place) else { continue };
+                // Heads within heads would have the rest of the file read for each of them.
+                self.searched += cost;
+                if self.searched > most_searched(self.length) {
+                    return Ok(None);
+                }
+                if fits(source, place)? {
                     return Ok(Some(place));
                 }
             }
@@ -112,27 +130,35 @@ impl<R: Read + Seek> Salvage<R> {
         Ok(None)
     }
 
-    /// True if `bytes`, from `place` on, may be the head of a whole chunk.
-    fn may_begin(&self, bytes: &[u8], place: u64) -> bool {
-        let Some(length) = length_in(bytes) else { return false };
+    /// The bytes to be read and unpacked if `bytes`, from `place` on, may be the head of a whole chunk with a checksum.
+    fn cost_of(&self, bytes: &[u8], place: u64) -> Option<u64> {
+        let length = length_in(bytes).filter(|_| bytes[0] == op::CHUNK)?;
         let head = &bytes[9..bytes.len().min(HEAD_BYTES)];
-        length <= MAX_RECORD_BYTES
-            && place + 9 + length <= self.length
-            && ChunkHead::of(head, length, false).is_ok_and(|head| head.is_readable())
+        if length > MAX_RECORD_BYTES || place + 9 + length > self.length {
+            return None;
+        }
+        let head = ChunkHead::of(head, length, false).ok()?;
+        (head.is_readable() && head.checksum != 0).then_some(length + head.unpacked)
     }
+}
 
-    /// True if there is a chunk at `place` that has a checksum and fits it.
-    fn fits(&self, source: &mut R, place: u64) -> io::Result<bool> {
-        source.seek(SeekFrom::Start(place))?;
-        let mut head = [0; 9];
-        source.read_exact(&mut head)?;
-        let Some(length) = length_in(&head) else { return Ok(false) };
-        let mut body = Vec::new();
-        source.by_ref().take(length).read_to_end(&mut body)?;
-        let Ok(mut chunk) = ChunkRecords::new(body, length) else { return Ok(false) };
-        let mut record = Vec::new();
-        Ok(chunk.head().checksum != 0 && matches!(chunk.read_next(&mut record), Ok(Some(_))))
-    }
+/// The most that is read and unpacked in searches through a file of `length` bytes: twice the largest chunk, and for each
+/// byte as much as no log that is merely damaged takes.
+fn most_searched(length: u64) -> u64 {
+    4 * MAX_RECORD_BYTES + 64 * length
+}
+
+/// True if there is a chunk at `place` that fits its checksum.
+fn fits<R: Read + Seek>(source: &mut R, place: u64) -> io::Result<bool> {
+    source.seek(SeekFrom::Start(place))?;
+    let mut head = [0; 9];
+    source.read_exact(&mut head)?;
+    let Some(length) = length_in(&head) else { return Ok(false) };
+    let mut body = Vec::new();
+    source.by_ref().take(length).read_to_end(&mut body)?;
+    let Ok(mut chunk) = ChunkRecords::new(body, length) else { return Ok(false) };
+    let mut record = Vec::new();
+    Ok(matches!(chunk.read_next(&mut record), Ok(Some(_))))
 }
 
 fn length_in(head: &[u8]) -> Option<u64> {

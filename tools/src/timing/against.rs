@@ -1,5 +1,7 @@
 //! Two logs side by side.
 
+use std::collections::HashMap;
+
 use super::analysis::{Block, Buckets, GroupTiming, TimingReport};
 use super::bootstrap::{percentile_ratios, share_ratio};
 use super::figures::Figure;
@@ -38,25 +40,31 @@ impl Against {
     /// Holds `this` against `other`.
     pub fn of(this: &TimingReport, other: &TimingReport) -> Self {
         let (mine, theirs) = (this.figures(), other.figures());
-        let mut intervals = Vec::new();
-        for group in &this.groups {
-            if let Some(of_other) = other.groups.iter().find(|other| other.name == group.name) {
+        let (in_mine, in_theirs) = (by(&mine, |figure| &figure.name), by(&theirs, |figure| &figure.name));
+        let groups = by(&other.groups, |group| &group.name);
+        let mut intervals = HashMap::new();
+        for group in this.groups.iter().rev() {
+            if let Some(of_other) = groups.get(group.name.as_str()) {
                 intervals.extend(group_intervals(group, of_other));
             }
         }
-        let interval = |name: &str| intervals.iter().find(|(of, _)| of == name).and_then(|(_, interval)| *interval);
-        let lacks = |figures: &[Figure], name: &str| !figures.iter().any(|figure| figure.name == name);
-        let unmatched = mine.iter().filter(|figure| lacks(&theirs, &figure.name));
-        let unmatched = unmatched.chain(theirs.iter().filter(|figure| lacks(&mine, &figure.name)));
+        let interval = |name: &str| intervals.get(name).copied().flatten();
+        let unmatched = mine.iter().filter(|figure| !in_theirs.contains_key(figure.name.as_str()));
+        let unmatched = unmatched.chain(theirs.iter().filter(|figure| !in_mine.contains_key(figure.name.as_str())));
         let unmatched = unmatched.map(|figure| figure.name.clone()).collect();
-        let compare = |figure: Figure| {
-            let other = theirs.iter().find(|other| other.name == figure.name)?.clone();
+        let compare = |figure: &Figure| {
+            let (figure, other) = (figure.clone(), (*in_theirs.get(figure.name.as_str())?).clone());
             let ratio = figure.value.as_f64() / other.value.as_f64();
             let ratio = (ratio.is_finite() && ratio > 0.0).then_some(ratio);
             Some(ComparedFigure { interval: ratio.and(interval(&figure.name)), this: figure, other, ratio })
         };
-        Self { figures: mine.into_iter().filter_map(compare).collect(), unmatched }
+        Self { figures: mine.iter().filter_map(compare).collect(), unmatched }
     }
+}
+
+/// What has a name, by it; the first of several.
+fn by<'a, T>(all: &'a [T], name: impl Fn(&'a T) -> &'a str) -> HashMap<&'a str, &'a T> {
+    all.iter().rev().map(|one| (name(one), one)).collect()
 }
 
 /// A figure of a block.

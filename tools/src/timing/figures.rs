@@ -17,6 +17,8 @@
 //! `P` is `count`, `p50`, `p90`, `p99`, `p999` or `max`; without a sample there is only the count. With several devices
 //! the name of the device comes first: `left.resync.age.p99`.
 
+use std::collections::HashSet;
+
 use palpate::log::{DeviceReport, GroupSummary, Percentiles};
 use palpate::runtime::SlipCause;
 use palpate::runtime::SlipCounts;
@@ -90,10 +92,10 @@ impl TimingReport {
                 figures.durations(&format!("{}.{}.execution", group.name, actor.name), actor.execution.percentiles);
             }
         }
+        let looked_at: HashSet<&str> = run.groups.iter().map(|group| group.name.as_str()).collect();
         for core in &self.cores {
             // A core counts all of its groups, also those that are not looked at.
-            let is_looked_at = |name: &str| run.groups.iter().any(|group| group.name == name);
-            for (group, share) in core.groups.iter().filter(|(group, _)| is_looked_at(group)) {
+            for (group, share) in core.groups.iter().filter(|(group, _)| looked_at.contains(group.as_str())) {
                 figures.real(&format!("{group}.utilisation"), Unit::Share, *share);
             }
             let core_name = core.cpu.map_or("anywhere".to_owned(), |cpu| format!("core{cpu}"));

@@ -9,6 +9,9 @@ use serde_json::Value;
 
 use super::{Selection, TimingAnalysis, TimingReport};
 
+/// Threads of a file, at most: no machine has as many cores.
+const MOST_THREADS: usize = 1024;
+
 /// The threads of `text`, which was read from `place`, as rate groups `thread0`, `thread1`, ... with their lateness.
 ///
 /// Values that lie beyond the histogram count as the largest, which cyclictest knows apart from it; a warning says how many.
@@ -20,6 +23,9 @@ pub fn read_cyclictest(text: &str, place: &Path, selection: Selection) -> Result
     let neither = "no log: neither MCAP nor what `cyclictest --json` writes";
     let file: Value = serde_json::from_str(text).map_err(|_| refuse(neither))?;
     let threads = file["thread"].as_object().ok_or_else(|| refuse(neither))?;
+    if threads.len() > MOST_THREADS {
+        return Err(refuse(&format!("has {} threads, must be at most {MOST_THREADS}", threads.len())));
+    }
     let unit = if file["resolution_in_ns"].as_u64().unwrap_or(0) > 0 { 1 } else { 1000 };
     if selection.window != Window::default() {
         let message = "holds a histogram without times: leave --from and --to out";

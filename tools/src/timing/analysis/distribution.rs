@@ -49,7 +49,7 @@ fn bins(counts: &[(u64, u64)]) -> Vec<Bin> {
         (first..=place(largest)).map(|bin| Bin { from: edge(bin), to: edge(bin + 1), count: 0 }).collect();
     for &(value, count) in counts {
         if let Some(bin) = usize::try_from(place(value) - first).ok().and_then(|bin| bins.get_mut(bin)) {
-            bin.count += count;
+            bin.count = bin.count.saturating_add(count);
         }
     }
     bins
@@ -70,7 +70,8 @@ fn shares(total: u64) -> Vec<f64> {
 }
 
 fn curve(counts: &[(u64, u64)]) -> Vec<(f64, u64)> {
-    let total: u64 = counts.iter().map(|&(_, count)| count).sum();
+    // Counts of other programs may be anything.
+    let total = counts.iter().map(|&(_, count)| count).fold(0, u64::saturating_add);
     if total == 0 {
         return Vec::new();
     }
@@ -80,7 +81,7 @@ fn curve(counts: &[(u64, u64)]) -> Vec<(f64, u64)> {
         let rank = ((share * total as f64).ceil() as u64).clamp(1, total);
         while seen < rank && at + 1 < counts.len() {
             at += 1;
-            seen += counts[at].1;
+            seen = seen.saturating_add(counts[at].1);
         }
         curve.push((share, counts[at].0));
     }

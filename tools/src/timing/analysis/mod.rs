@@ -9,7 +9,7 @@ mod over_time;
 mod recent;
 mod worst;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use palpate::log::{Analysis, Environment, GroupInfo, LogEntry, LogRecord, RunReport, Window};
 use palpate::runtime::Nanos;
@@ -221,8 +221,10 @@ fn cores(run: &RunReport, environment: &Environment, [from, to]: [Nanos; 2]) -> 
     let elapsed = to.saturating_sub(from).as_secs_f64();
     let mut cores: BTreeMap<usize, CoreUse> = BTreeMap::new();
     let mut anywhere = CoreUse::default();
+    // The first of a name, as it is looked for everywhere.
+    let cpus: HashMap<&str, _> = environment.groups.iter().rev().map(|info| (info.name.as_str(), info.cpu)).collect();
     for group in run.groups.iter().filter(|group| group.released > 0 && elapsed > 0.0) {
-        let cpu = environment.groups.iter().find(|info| info.name == group.name).and_then(|info| info.cpu);
+        let cpu = cpus.get(group.name.as_str()).copied().flatten();
         let on = match cpu {
             Some(cpu) => cores.entry(cpu).or_insert_with(|| CoreUse { cpu: Some(cpu), groups: Vec::new() }),
             None => &mut anywhere,
