@@ -2,10 +2,9 @@
 
 use crate::actor::{Actor, Outcome, TickContext};
 use crate::error::{GraphError, GraphErrorKind};
-use crate::group::panic_hook::{guarded, text_of};
+use crate::group::panic_hook::{caught, guarded};
 use crate::records::timing::ActorTimes;
 use crate::time::Nanos;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// An actor in its group.
 struct Member {
@@ -34,7 +33,7 @@ pub(crate) struct Members(Vec<Member>);
 impl Members {
     pub(crate) fn new(actors: Vec<Box<dyn Actor>>) -> Self {
         let member = |actor: Box<dyn Actor>| {
-            let name = actor.name().to_owned();
+            let name = guarded(|| actor.name().to_owned()).unwrap_or_else(|text| format!("nameless: {text}"));
             Member { actor, name, started: false, failed: false, recovered: false }
         };
         Self(actors.into_iter().map(member).collect())
@@ -58,13 +57,10 @@ impl Members {
             let place = || format!("rate group `{group}`, actor `{name}`");
             // Noted first: an actor that fails half-way may hold something to give back.
             *started = true;
-            match catch_unwind(AssertUnwindSafe(|| actor.start(ctx))) {
-                Ok(result) => result.map_err(|error| GraphError::from_actor(error).at(place()))?,
-                Err(panic) => {
-                    let message = format!("panicked in start: {}", text_of(&*panic));
-                    return Err(GraphError::new(GraphErrorKind::Actor, message).at(place()));
-                }
-            }
+            let panicked =
+                |text| GraphError::new(GraphErrorKind::Actor, format!("panicked in start: {text}")).at(place());
+            let result = caught(|| actor.start(ctx)).map_err(panicked)?;
+            result.map_err(|error| GraphError::from_actor(error).at(place()))?;
         }
         Ok(())
     }
@@ -73,7 +69,7 @@ impl Members {
     pub(crate) fn undo_start(&mut self, ctx: &TickContext) {
         for member in self.0.iter_mut().filter(|member| member.started) {
             // The start's error is the one to report.
-            let _ = catch_unwind(AssertUnwindSafe(|| member.actor.stop(ctx)));
+            let _ = caught(|| member.actor.stop(ctx));
         }
     }
 
@@ -154,6 +150,16 @@ impl Members {
         let stopped = guarded(stop);
         let dropped = guarded(move || drop(actor));
         Some(stopped.and(dropped).map_err(|text| (name, Fatal::Panic(format!("{text} (in stop)")))))
+    }
+}
+
+/// Actors that nobody stops any more, on a thread that was left behind or after a start that failed, are contained to
+/// the end.
+impl Drop for Members {
+    fn drop(&mut self) {
+        for member in self.0.drain(..) {
+            let _ = guarded(move || drop(member.actor));
+        }
     }
 }
 
