@@ -99,7 +99,7 @@ impl RuntimeBuilder {
         let port = self.ports;
         self.ports += 1;
         let script = self.recording.as_ref().map(|(_, script)| script.port(port));
-        (PortPlan::new(port, &self.registry), script)
+        (PortPlan::new(self.execution, port, &self.registry), script)
     }
 
     /// A port for the newest value of a large state; every buffer is filled by `init`.
@@ -257,13 +257,14 @@ impl RuntimeBuilder {
                 Cast::Once(actors) => {
                     let ledger = Ledger::new(index, &spec, built.until);
                     let recorder = records.as_ref().map(RecorderPort::recorder);
-                    (GroupRun::new(index, spec, actors, recorder, ledger), None)
+                    (GroupRun::new(built.execution, index, spec, actors, recorder, ledger), None)
                 }
                 Cast::Restartable(policy, factory) => {
                     let events = registry.wanted().then(|| registry.recorder(SUPERVISOR_EVENTS));
                     let mut restarter = Restarter {
                         policy,
                         factory,
+                        execution: built.execution,
                         index,
                         spec,
                         until: built.until,
