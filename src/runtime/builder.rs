@@ -226,7 +226,7 @@ impl RuntimeBuilder {
     /// # Errors
     /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused), naming the group and the values, for a graph that
     /// cannot work: a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all
-    /// cores together, on threads a latency beyond the period, equal real-time priorities pinned to one core, a
+    /// cores together, on threads a core that is not there, a latency beyond the period, equal real-time priorities pinned to one core, a
     /// priority outside 1 to 99, a name used twice, no group that is not an observer; an overrun policy that says
     /// nothing or contradicts the release mode, a watchdog below a period, a device-paced group without an actor; a
     /// disturbance of threads, of no group, or a second one of the same; a [measurement](Self::measure_cost) of

@@ -19,8 +19,8 @@ in_both_executions! {
 const STATE: usize = 1 << 20;
 
 fn a_large_state_needs_no_large_stack(execution: Execution) {
-    // A value may be on the stack while it is made, once; three of them and the way to their places are ten.
-    let thread = std::thread::Builder::new().stack_size(4 * STATE).spawn(move || {
+    // One value may be on the stack while it is made; three of them do not fit.
+    let thread = std::thread::Builder::new().stack_size(5 * STATE / 2).spawn(move || {
         let mut graph = Runtime::builder(execution);
         let (_writer, reader) = graph.exchange(|| [7_u8; STATE]);
         let (_shown, display) = graph.outlet(|| [8_u8; STATE]);
