@@ -231,8 +231,7 @@ mod tests {
             (0..actors).chain((0..actors).rev()).for_each(|actor| timer.pass_to(actor));
             let spent = timer.end(Nanos(1000));
             assert_eq!(spent.iter().map(|spent| spent.0).sum::<u64>(), 1000);
-            let looks = *looks.lock().unwrap();
-            looks
+            *looks.lock().unwrap()
         };
         assert_eq!((looks(2), looks(12), looks(100)), (2, 22, 22));
     }
