@@ -101,6 +101,14 @@ fn budgets_above_a_core_are_refused_with_their_sum_before_a_log_is_made() {
 }
 
 #[test]
+fn a_local_group_that_only_names_its_rate_keeps_the_real_time_priority() {
+    let asked = |group: RateGroup| session(block()).local(group).build().unwrap().plan().unwrap().groups[0].priority;
+    assert_eq!(asked(RateGroup::hz(1000)), Some(80));
+    assert_eq!(asked(RateGroup::hz(1000).realtime(60)), Some(60));
+    assert_eq!(asked(RateGroup::hz(1000).best_effort()), None);
+}
+
+#[test]
 fn a_plan_asks_no_device_and_can_be_followed_by_a_run() {
     let built = session(block()).duration_s(0.05).virtual_time().build().unwrap();
     let plan = built.plan().unwrap();

@@ -1,6 +1,7 @@
 //! What a program writes: actors, and what they are told and answer at each release.
 
 use crate::error::ActorError;
+use crate::executor::Execution;
 use crate::time::{Nanos, Rate};
 
 /// A part of a program that is called once per release of its rate group.
@@ -199,6 +200,8 @@ pub struct TickContext {
     pub(crate) group: u16,
     /// In which part of its life.
     pub(crate) phase: Phase,
+    /// How the graph runs; `None` by hand, which ports of both executions take.
+    pub(crate) execution: Option<Execution>,
 }
 
 impl TickContext {
@@ -217,6 +220,7 @@ impl TickContext {
             visible_at: scheduled,
             group: 0,
             phase: Phase::Release,
+            execution: None,
         }
     }
 }

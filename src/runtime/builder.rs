@@ -99,7 +99,7 @@ impl RuntimeBuilder {
         let port = self.ports;
         self.ports += 1;
         let script = self.recording.as_ref().map(|(_, script)| script.port(port));
-        (PortPlan::new(port, &self.registry), script)
+        (PortPlan::new(self.execution, port, &self.registry), script)
     }
 
     /// A port for the newest value of a large state; every buffer is filled by `init`.
@@ -226,7 +226,7 @@ impl RuntimeBuilder {
     /// # Errors
     /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused), naming the group and the values, for a graph that
     /// cannot work: a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all
-    /// cores together, on threads a latency beyond the period, equal real-time priorities pinned to one core, a
+    /// cores together, on threads a core that is not there, a latency beyond the period, equal real-time priorities pinned to one core, a
     /// priority outside 1 to 99, a name used twice, no group that is not an observer; an overrun policy that says
     /// nothing or contradicts the release mode, a watchdog below a period, a device-paced group without an actor; a
     /// disturbance of threads, of no group, or a second one of the same; a [measurement](Self::measure_cost) of
@@ -257,13 +257,14 @@ impl RuntimeBuilder {
                 Cast::Once(actors) => {
                     let ledger = Ledger::new(index, &spec, built.until);
                     let recorder = records.as_ref().map(RecorderPort::recorder);
-                    (GroupRun::new(index, spec, actors, recorder, ledger), None)
+                    (GroupRun::new(built.execution, index, spec, actors, recorder, ledger), None)
                 }
                 Cast::Restartable(policy, factory) => {
                     let events = registry.wanted().then(|| registry.recorder(SUPERVISOR_EVENTS));
                     let mut restarter = Restarter {
                         policy,
                         factory,
+                        execution: built.execution,
                         index,
                         spec,
                         until: built.until,

@@ -95,7 +95,8 @@ impl SessionBuilder {
         self
     }
 
-    /// Sets the haptic rate group, in which devices and local models tick.
+    /// Sets the haptic rate group, in which devices and local models tick. It asks for SCHED_FIFO 80 unless it says
+    /// otherwise, by [`realtime`](RateGroup::realtime) or [`best_effort`](RateGroup::best_effort).
     #[must_use]
     pub fn local(mut self, group: RateGroup) -> Self {
         self.parts.scene.local.rate_hz = group.rate().as_hz();

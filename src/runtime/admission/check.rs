@@ -8,10 +8,19 @@ use std::collections::BTreeMap;
 /// Records carry the group's number in 16 bits; far fewer make sense.
 const MAX_GROUPS: usize = 256;
 
-/// Checks the groups of a graph against themselves, each other and `cores` processor cores.
+/// The processor cores that a graph is checked against.
+#[derive(Clone, Copy)]
+pub(crate) struct Cores<'a> {
+    /// The number of them that the process may use.
+    pub(crate) usable: usize,
+    /// The numbers of those that the machine has; empty if the system does not say.
+    pub(crate) there: &'a [usize],
+}
+
+/// Checks the groups of a graph against themselves, each other and the `cores` of the machine.
 ///
 /// Virtual time may stand for any machine: how many cores this one has and how long a result takes are no matter there.
-pub(crate) fn admit(groups: &[RateGroup], execution: Execution, cores: usize) -> Result<(), GraphError> {
+pub(crate) fn admit(groups: &[RateGroup], execution: Execution, cores: Cores<'_>) -> Result<(), GraphError> {
     if groups.iter().all(|group| group.observer) {
         return Err(GraphError::refused(
             "the graph has no group that is not an observer: it would end at once; add one",
@@ -29,7 +38,23 @@ pub(crate) fn admit(groups: &[RateGroup], execution: Execution, cores: usize) ->
     check_cores(groups)?;
     match execution {
         Execution::Virtual => Ok(()),
-        Execution::Threaded => groups.iter().try_for_each(check_latency).and_then(|()| check_all(groups, cores)),
+        Execution::Threaded => {
+            groups.iter().try_for_each(|group| check_latency(group).and_then(|()| check_core(group, cores.there)))?;
+            check_all(groups, cores.usable)
+        }
+    }
+}
+
+/// A core that the machine has not is a mistake, other than one that the process may not use: that is a refusal like any
+/// other.
+fn check_core(group: &RateGroup, there: &[usize]) -> Result<(), GraphError> {
+    match group.cpu {
+        Some(cpu) if !there.is_empty() && !there.contains(&cpu) => {
+            let there: Vec<String> = there.iter().map(usize::to_string).collect();
+            let message = format!("there is no core {cpu} to pin it to; the machine has {}", there.join(", "));
+            Err(GraphError::refused(message).in_group(&group.name))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -182,9 +207,13 @@ mod tests {
         RateGroup::hz(1000).name(name)
     }
 
+    fn cores(usable: usize) -> Cores<'static> {
+        Cores { usable, there: &[0, 1] }
+    }
+
     /// On threads, on a machine of two cores.
     fn admit(groups: &[RateGroup]) -> Result<(), GraphError> {
-        super::admit(groups, Execution::Threaded, 2)
+        super::admit(groups, Execution::Threaded, cores(2))
     }
 
     #[track_caller]
@@ -213,8 +242,18 @@ mod tests {
     fn a_latency_beyond_the_period_is_refused_on_threads_and_allowed_in_virtual_time() {
         let late = [named("a").latency(Nanos(1_000_001))];
         refused(&late, &["rate group `a`", "1.000001ms", "1ms", "virtual time"]);
-        assert!(super::admit(&late, Execution::Virtual, 2).is_ok());
+        assert!(super::admit(&late, Execution::Virtual, cores(2)).is_ok());
         assert!(admit(&[named("a").latency(Nanos(1_000_000))]).is_ok());
+    }
+
+    #[test]
+    fn a_core_that_does_not_exist_is_refused_on_threads_with_those_that_do() {
+        let far = [named("a").pin(2)];
+        refused(&far, &["rate group `a`", "no core 2", "has 0, 1"]);
+        assert!(admit(&[named("a").pin(1)]).is_ok());
+        assert!(super::admit(&far, Execution::Virtual, cores(2)).is_ok());
+        // Check that a system which does not say leaves it to the thread
+        assert!(super::admit(&far, Execution::Threaded, Cores { usable: 2, there: &[] }).is_ok());
     }
 
     #[test]
@@ -241,8 +280,8 @@ mod tests {
     fn budgets_that_overfill_all_cores_together_are_refused_on_threads_with_the_sum() {
         let groups = ["a", "b", "c"].map(|name| named(name).budget(Nanos(700_000)));
         refused(&groups, &["210.0 %", "`a` 700µs of 1ms + `b`", "2 cores"]);
-        assert!(super::admit(&groups, Execution::Threaded, 3).is_ok());
-        assert!(super::admit(&groups, Execution::Virtual, 1).is_ok());
+        assert!(super::admit(&groups, Execution::Threaded, cores(3)).is_ok());
+        assert!(super::admit(&groups, Execution::Virtual, cores(1)).is_ok());
         // Check that budgets which fill every core exactly fit
         assert!(admit(&[named("a").budget(Nanos(1_000_000)), named("b").budget(Nanos(1_000_000))]).is_ok());
     }

@@ -120,8 +120,8 @@ impl VirtualPace {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
-    use crate::RateGroup;
     use crate::accounting::ledger::Ledger;
+    use crate::{Execution, RateGroup};
 
     const MS: u64 = 1_000_000;
 
@@ -129,7 +129,7 @@ mod tests {
     fn the_watchdog_takes_over_while_the_device_is_silent() {
         let spec = RateGroup::hz(1000).device_paced(Nanos(3 * MS));
         let ledger = Ledger::new(0, &spec, None);
-        let group = GroupRun::new(0, spec, Vec::new(), None, ledger);
+        let group = GroupRun::new(Execution::Virtual, 0, spec, Vec::new(), None, ledger);
         let mut pace = VirtualPace::new(&group, None);
         let mut ready = |due: u64, stall: u64| {
             let (by, ready, took_over) = pace.ready(Nanos(due * MS), Nanos(stall * MS));

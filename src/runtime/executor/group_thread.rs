@@ -6,6 +6,7 @@ use crate::accounting::timeline::Wake;
 use crate::executor::device_wait::DeviceWait;
 use crate::group::group_run::{AfterFault, GroupRun};
 use crate::group::lease::Lease;
+use crate::group::panic_hook::guarded;
 use crate::reports::report::RuntimeFault;
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::Control;
@@ -30,6 +31,8 @@ pub(crate) struct Link {
     pub(crate) incarnation: usize,
     pub(crate) lease: Arc<Lease>,
     pub(crate) control: Arc<Control>,
+    /// Without a bound, so that nothing is lost: an end that does not arrive is one that a stop waits for. A fault
+    /// allocates its text anyway, and what a group can say is bounded by its actors and its periods of wind-down.
     pub(crate) post: Sender<Message>,
 }
 
@@ -100,7 +103,7 @@ impl GroupThread {
                 AfterFault::GoOn => post_fault(post, control, fault),
                 AfterFault::End if observer => {
                     // It costs what it would have observed and nothing else.
-                    let _ = post.try_send(Message::Fault(fault));
+                    let _ = post.send(Message::Fault(fault));
                     return None;
                 }
                 AfterFault::End => {
@@ -128,8 +131,7 @@ impl GroupThread {
         let books = group.ledger;
         let (report, fault) = group.finish(since(base_ns));
         if let Some(fault) = failed {
-            let _ =
-                post.try_send(Message::Failed(Box::new(Failure { group: index, incarnation, fault, report, books })));
+            let _ = post.send(Message::Failed(Box::new(Failure { group: index, incarnation, fault, report, books })));
             return;
         }
         if let Some(fault) = fault {
@@ -138,7 +140,7 @@ impl GroupThread {
         if !observer {
             control.group_ended();
         }
-        let _ = post.try_send(Message::Ended(index, Box::new(report)));
+        let _ = post.send(Message::Ended(index, Box::new(report)));
     }
 }
 
@@ -163,18 +165,20 @@ impl Link {
                 let restartable = restarter.may_restart();
                 let (group_number, grant, probe) = (failure.group, granted.group, granted.probe);
                 let begun = Restarted { group: group_number, restarter, books, failure, grant, probe };
-                let _ = self.post.try_send(Message::Restarted(Box::new(begun)));
+                let _ = self.post.send(Message::Restarted(Box::new(begun)));
                 GroupThread { group, restartable, watched: true, link: self }.run(granted.waiter);
             }
             Err(error) => {
-                let _ = self.post.try_send(Message::NotRestarted(Box::new(failure.not_answered(&error))));
+                // What an actor's own error says of itself is its code too.
+                let why = guarded(|| error.to_string()).unwrap_or_else(|text| format!("its error panicked: {text}"));
+                let _ = self.post.send(Message::NotRestarted(Box::new(failure.not_answered(&why))));
             }
         }
     }
 }
 
 fn post_fault(post: &Sender<Message>, control: &Control, fault: RuntimeFault) {
-    let _ = post.try_send(Message::Fault(fault));
+    let _ = post.send(Message::Fault(fault));
     control.request_stop();
 }
 

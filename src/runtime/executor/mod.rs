@@ -3,6 +3,7 @@
 pub(crate) mod device_wait;
 pub(crate) mod disturbance;
 pub(crate) mod group_thread;
+pub(crate) mod schedule;
 pub(crate) mod threaded;
 pub(crate) mod virtual_time;
 

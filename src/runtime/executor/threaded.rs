@@ -17,7 +17,7 @@ use crate::supervision::supervisor::{Failure, Message, Restarted, Supervisor};
 use crate::system::grant::{GrantHandle, SystemGrant, ThreadGrant, set_up_thread};
 use crate::system::os::{self, ThreadProbe};
 use crate::time::Nanos;
-use crossbeam_channel::{Receiver, Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 use std::fs::File;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -25,8 +25,6 @@ use std::time::{Duration, Instant};
 
 /// Time for all threads to wake up and wait for release 0.
 const LEAD_NS: u64 = 2_000_000;
-/// A fault in a tick, one in a stop and the end, or as many failures and restarts as a poll can find.
-const MAIL_PER_GROUP: usize = 16;
 /// How often a thread that waits for others looks again.
 const POLL: Duration = Duration::from_millis(2);
 /// Between two polls no more than this counts as waiting: if the whole process or machine stood still, nobody hung.
@@ -77,8 +75,7 @@ impl Threads {
         if groups.iter().any(|group| group.spec.priority.is_some()) {
             grant.mlock = os::lock_memory().map_or_else(|reason| reason, |()| "locked".to_owned());
         }
-        // Each group reports at most a fault in a tick, one in its stop, and its end; a restarted one again and again.
-        let (post, mail) = bounded(MAIL_PER_GROUP * groups.len());
+        let (post, mail) = unbounded();
         let mut handles = Vec::new();
         let mut gates = Vec::new();
         for group in &groups {

@@ -5,6 +5,7 @@
 //! [re-execution](crate::Recording) runs the recorded releases instead, and observers along with them.
 
 use crate::executor::disturbance::{Disturb, VirtualPace};
+use crate::executor::schedule::Schedule;
 use crate::group::group_run::{AfterFault, GroupRun};
 use crate::group::panic_hook;
 use crate::primitives::histogram::Histogram;
@@ -31,8 +32,10 @@ pub(crate) struct VirtualRun {
     /// `None` for groups that have ended.
     groups: Vec<Option<GroupRun>>,
     restarters: Vec<Option<Restarter>>,
-    /// When each group wakes next.
+    /// How each group wakes.
     paces: Vec<VirtualPace>,
+    /// When, in order.
+    schedule: Schedule,
     /// What the releases of each group cost; empty if nobody asked.
     stopwatches: Vec<Stopwatch>,
     /// Virtual time executed so far.
@@ -57,10 +60,21 @@ impl VirtualRun {
         let supervisor = Supervisor::new(groups.len());
         let paces = groups.iter().zip(disturbances).map(|(group, disturb)| VirtualPace::new(group, disturb)).collect();
         let stopwatches = groups.iter().filter(|_| measures_cost).map(|_| Stopwatch::new()).collect();
-        let groups = groups.into_iter().map(Some).collect();
-        let (now, stopping) = (Nanos::ZERO, false);
-        let mut run = Self { groups, restarters, paces, stopwatches, now, stopping, reexecution, control, supervisor };
-        run.end_what_is_over();
+        let schedule = Schedule::new(groups.len());
+        let groups: Vec<_> = groups.into_iter().map(Some).collect();
+        let mut run = Self {
+            groups,
+            restarters,
+            paces,
+            schedule,
+            stopwatches,
+            now: Nanos::ZERO,
+            stopping: false,
+            reexecution,
+            control,
+            supervisor,
+        };
+        run.end_all_that_is_over();
         run
     }
 
@@ -91,7 +105,8 @@ impl VirtualRun {
             if let Err(fault) = result {
                 self.answer(index, fault);
             }
-            self.end_what_is_over();
+            self.end_if_over(index);
+            self.end_observers_in_time();
         }
     }
 
@@ -135,7 +150,7 @@ impl VirtualRun {
                 self.end(index);
             }
         }
-        self.end_what_is_over();
+        self.end_all_that_is_over();
     }
 
     fn begin_wind_down(&mut self, index: usize) -> bool {
@@ -199,11 +214,11 @@ impl VirtualRun {
     /// The next release; at equal times the group that was added first. `None` if there is none any more.
     fn next(&mut self) -> Option<Next> {
         let Some(script) = &self.reexecution else {
-            return self.next_planned(|_| true);
+            return self.schedule.first().map(|(due, index)| Next { due, index, recorded: None });
         };
         match script.next(&self.groups) {
             Step::Run(index, release) => {
-                let observer = self.next_planned(|group| group.spec.observer);
+                let observer = self.next_observer();
                 let recorded = Next { due: release.scheduled, index, recorded: Some(release) };
                 Some(observer.filter(|observer| observer.due < recorded.due).unwrap_or(recorded))
             }
@@ -215,11 +230,11 @@ impl VirtualRun {
         }
     }
 
-    /// The next wake-up by schedule among the groups that are asked for.
-    fn next_planned(&self, is_asked: impl Fn(&GroupRun) -> bool) -> Option<Next> {
+    /// The next wake-up by schedule of an observer.
+    fn next_observer(&self) -> Option<Next> {
         let groups = self.groups.iter().enumerate();
         let due = |(index, group): (usize, &Option<GroupRun>)| {
-            group.as_ref().filter(|group| is_asked(group))?;
+            group.as_ref().filter(|group| group.spec.observer)?;
             Some((self.paces[index].next()?, index))
         };
         groups.filter_map(due).min().map(|(due, index)| Next { due, index, recorded: None })
@@ -230,21 +245,29 @@ impl VirtualRun {
         (0..self.groups.len()).filter(is).collect()
     }
 
-    fn end_what_is_over(&mut self) {
-        // Asked after every release: no list is made here.
-        for index in 0..self.groups.len() {
-            let over = |group: &GroupRun| {
-                let scripted = self.reexecution.as_ref();
-                !group.spec.observer
-                    && scripted.map_or_else(|| group.ledger.next_due().is_none(), |script| script.is_over(index))
-            };
-            if self.groups[index].as_ref().is_some_and(over) {
-                let asks = self.groups[index].as_ref().is_some_and(|group| group.spec.wind_down_at_end);
-                if !asks || !self.begin_wind_down(index) {
-                    self.end(index);
-                }
+    fn end_all_that_is_over(&mut self) {
+        (0..self.groups.len()).for_each(|index| self.end_if_over(index));
+        self.end_observers_in_time();
+    }
+
+    /// Asked after every release, of the group that was released: what it did may have ended that one alone.
+    fn end_if_over(&mut self, index: usize) {
+        let over = |group: &GroupRun| {
+            let scripted = self.reexecution.as_ref();
+            !group.spec.observer
+                && scripted.map_or_else(|| group.ledger.next_due().is_none(), |script| script.is_over(index))
+        };
+        if self.groups[index].as_ref().is_some_and(over) {
+            let asks = self.groups[index].as_ref().is_some_and(|group| group.spec.wind_down_at_end);
+            if !asks || !self.begin_wind_down(index) {
+                self.end(index);
             }
         }
+        let wakes = self.groups[index].as_ref().and_then(|_| self.paces[index].next());
+        self.schedule.put(index, wakes);
+    }
+
+    fn end_observers_in_time(&mut self) {
         if self.control.observers_may_end() {
             self.end_observers();
         }

@@ -5,6 +5,7 @@ use crate::accounting::overrun::Decision;
 use crate::accounting::timeline::Wake;
 use crate::actor::{Actor, GroupMode, Phase, TickContext};
 use crate::error::GraphError;
+use crate::executor::Execution;
 use crate::group::lease::Lease;
 use crate::group::members::{ActorTimer, Fatal, Members};
 use crate::group::panic_hook::place;
@@ -65,13 +66,15 @@ pub(crate) enum AfterFault {
 
 impl GroupRun {
     pub(crate) fn new(
+        execution: Execution,
         index: u16,
         spec: RateGroup,
         actors: Vec<Box<dyn Actor>>,
         recorder: Option<Recorder>,
         ledger: Ledger,
     ) -> Self {
-        let last = start_context(index, &spec, &ledger, Nanos::ZERO);
+        let start = start_context(index, &spec, &ledger, Nanos::ZERO);
+        let last = TickContext { execution: Some(execution), ..start };
         let (live, shown) = live(&spec);
         Self {
             index,
@@ -103,7 +106,8 @@ impl GroupRun {
 
     /// Starts the actors between two releases, in the place of ones that failed.
     pub(crate) fn start_at(&mut self, now: Nanos) -> Result<(), GraphError> {
-        self.last = start_context(self.index, &self.spec, &self.ledger, now);
+        let execution = self.last.execution;
+        self.last = TickContext { execution, ..start_context(self.index, &self.spec, &self.ledger, now) };
         self.start()
     }
 
@@ -228,6 +232,7 @@ impl GroupRun {
             visible_at: (scheduled + self.spec.latency).max(wake.free.unwrap_or(Nanos::ZERO)),
             group: self.index,
             phase: if self.spec.observer { Phase::Observer } else { Phase::Release },
+            execution: self.last.execution,
         };
         self.last = ctx;
         self.timer.iter_mut().for_each(|timer| timer.begin(now));

@@ -44,10 +44,15 @@ pub(crate) fn install() {
 #[inline]
 pub(crate) fn guarded<R>(call: impl FnOnce() -> R) -> Result<R, String> {
     let before = IN_ACTOR.replace(true);
-    // Unwind safe: after a panic an actor is asked whether it can go on, or stopped and dropped, nothing else.
-    let result = catch_unwind(AssertUnwindSafe(call));
+    let result = caught(call);
     IN_ACTOR.set(before);
-    result.map_err(|panic| text_of(&*panic))
+    result
+}
+
+/// Calls an actor where the program's own hook may print: before and after the run.
+pub(crate) fn caught<R>(call: impl FnOnce() -> R) -> Result<R, String> {
+    // Unwind safe: after a panic an actor is asked whether it can go on, or stopped and dropped, nothing else.
+    catch_unwind(AssertUnwindSafe(call)).map_err(text_of)
 }
 
 fn keep(location: &Location<'_>) {
@@ -66,9 +71,15 @@ pub(crate) fn place() -> String {
 }
 
 /// What a panic said.
-pub(crate) fn text_of(panic: &(dyn Any + Send)) -> String {
+fn text_of(panic: Box<dyn Any + Send>) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no text was given".to_owned())
+    let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
+    let place = PLACE.get();
+    // What was thrown is the actor's own value, and its drop may panic like anything else of it. What that throws is
+    // leaked: this has to end.
+    let _ = catch_unwind(AssertUnwindSafe(|| drop(panic))).map_err(std::mem::forget);
+    PLACE.set(place);
+    text.unwrap_or_else(|| "no text was given".to_owned())
 }
 
 #[cfg(all(test, not(loom)))]
@@ -82,7 +93,7 @@ mod tests {
         let line = line!() - 1;
         assert!(place().ends_with(&format!("panic_hook.rs:{line}")));
         assert_eq!(place(), "", "it is taken once");
-        assert!(catch_unwind(|| panic!("outside, printed by the test harness")).is_err());
+        assert!(caught(|| panic!("outside, printed by the test harness")).is_err());
         assert_eq!(place(), "");
     }
 }

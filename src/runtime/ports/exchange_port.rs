@@ -85,9 +85,14 @@ impl<T> Writer<T> {
     /// Makes the buffer the newest value and returns its version, counting from 1; 0 if this writer's place was
     /// [taken](crate::ExchangePort::writer): nothing is published then.
     ///
+    /// # Panics
+    /// In a graph of another [execution](crate::Execution) than that of the builder which made the port.
+    ///
     /// # Real-time
     /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock and may allocate.
+    #[track_caller]
     pub fn publish(&mut self, ctx: &TickContext) -> u64 {
+        self.group.check_execution(ctx);
         let Some(version) = self.versions.next() else { return 0 };
         self.group.set(ctx);
         match &mut self.kind {
@@ -108,9 +113,14 @@ impl<T> Reader<T> {
     ///
     /// A release looks once: further calls in the same release return false.
     ///
+    /// # Panics
+    /// In a graph of another [execution](crate::Execution) than that of the builder which made the port.
+    ///
     /// # Real-time
     /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock and may allocate.
+    #[track_caller]
     pub fn refresh(&mut self, ctx: &TickContext) -> bool {
+        self.group.check_execution(ctx);
         if !self.looks.is_first(ctx) {
             return false;
         }

@@ -2,6 +2,7 @@
 //! what has been recorded.
 
 use crate::actor::{Phase, TickContext};
+use crate::executor::Execution;
 use crate::primitives::sync::{AtomicUsize, Ordering, lock};
 use crate::records::port_use::{PortUse, PortUseKind};
 use crate::records::recorder::{Recorder, Registry};
@@ -29,9 +30,9 @@ struct UseRing {
 }
 
 impl PortPlan {
-    pub(crate) fn new(port: u32, registry: &Arc<Registry>) -> Self {
+    pub(crate) fn new(execution: Execution, port: u32, registry: &Arc<Registry>) -> Self {
         let (registry, recorded) = (Arc::clone(registry), registry.wanted());
-        Self { port, registry, recorded, uses: Mutex::default(), group: WriterGroup::new() }
+        Self { port, registry, recorded, uses: Mutex::default(), group: WriterGroup::new(execution, port) }
     }
 
     /// Records the uses of this kind, for one half; fences the recorder of the one taken before and goes on with its
@@ -73,27 +74,55 @@ impl Looks {
 
 /// The group that writes a port, told by the writer to the reader.
 #[derive(Clone, Debug)]
-pub(crate) struct WriterGroup(Arc<AtomicUsize>);
+pub(crate) struct WriterGroup {
+    writer: Arc<AtomicUsize>,
+    /// What the port was made for, and its number.
+    execution: Execution,
+    port: u32,
+}
 
 impl WriterGroup {
     const UNKNOWN: usize = usize::MAX;
 
-    pub(crate) fn new() -> Self {
-        Self(Arc::new(AtomicUsize::new(Self::UNKNOWN)))
+    pub(crate) fn new(execution: Execution, port: u32) -> Self {
+        Self { writer: Arc::new(AtomicUsize::new(Self::UNKNOWN)), execution, port }
+    }
+
+    /// Refuses a graph of the other execution than the port's. An actor does not say which ports it holds, so this is
+    /// seen at the first use; the panic is the actor's, which names the place.
+    #[inline]
+    #[track_caller]
+    pub(crate) fn check_execution(&self, ctx: &TickContext) {
+        if ctx.execution.is_some_and(|execution| execution != self.execution) {
+            self.refuse();
+        }
+    }
+
+    #[cold]
+    #[track_caller]
+    fn refuse(&self) -> ! {
+        let (port, own) = (self.port, self.execution);
+        let why = match own {
+            Execution::Threaded => "so no latency delays what it shows",
+            Execution::Virtual => "where it takes locks",
+        };
+        panic!(
+            "port {port} is one of a graph with Execution::{own:?} and is used in another, {why}; make it with the builder of this graph"
+        );
     }
 
     /// Called by the writer before each publication.
     pub(crate) fn set(&self, ctx: &TickContext) {
         // Relaxed: the reader asks only after it has taken a publication, and taking it synchronises with the writer's
         // release of it, which comes after this store.
-        self.0.store(ctx.group.into(), Ordering::Relaxed);
+        self.writer.store(ctx.group.into(), Ordering::Relaxed);
     }
 
     /// True if what the reader has taken was written by the group that is called. Before the first publication there is
     /// nothing that another group could have shown.
     pub(crate) fn is(&self, ctx: &TickContext) -> bool {
         // Relaxed: as in `set`.
-        let writer = self.0.load(Ordering::Relaxed);
+        let writer = self.writer.load(Ordering::Relaxed);
         writer == usize::from(ctx.group) || writer == Self::UNKNOWN
     }
 }
@@ -136,7 +165,7 @@ mod tests {
     fn uses_are_numbered_on_through_every_half_and_a_fenced_one_leaves_none() {
         let registry = Registry::new();
         let mut drain = registry.drain();
-        let plan = PortPlan::new(3, &registry);
+        let plan = PortPlan::new(Execution::Threaded, 3, &registry);
         let mut halves = vec![plan.recorder(PortUseKind::Took)];
         let mut other = plan.recorder(PortUseKind::Dropped);
         let mut records = Vec::new();
@@ -162,7 +191,7 @@ mod tests {
     #[test]
     fn a_port_made_before_the_drain_records_nothing_however_often_its_halves_are_taken() {
         let registry = Registry::new();
-        let plan = PortPlan::new(0, &registry);
+        let plan = PortPlan::new(Execution::Threaded, 0, &registry);
         let mut drain = registry.drain();
         plan.recorder(PortUseKind::Saw).push(&at(1), 1);
         let mut records = Vec::new();

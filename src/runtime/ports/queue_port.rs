@@ -73,9 +73,14 @@ impl<T: Copy> QueueWriter<T> {
     /// Sends a sample; false if the queue is full: the sample is then dropped and counted. Also false if this writer's
     /// place was [taken](crate::QueuePort::writer): nothing is sent or counted then.
     ///
+    /// # Panics
+    /// In a graph of another [execution](crate::Execution) than that of the builder which made the port.
+    ///
     /// # Real-time
     /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock and may allocate.
+    #[track_caller]
     pub fn push(&mut self, ctx: &TickContext, sample: T) -> bool {
+        self.group.check_execution(ctx);
         let Some(number) = self.attempts.next() else { return false };
         self.group.set(ctx);
         let sample = Numbered { number, value: sample };
@@ -109,8 +114,12 @@ impl<T: Copy> QueueReader<T> {
 
     /// The oldest sample that this release can see, left in the queue.
     ///
+    /// # Panics
+    /// In a graph of another [execution](crate::Execution) than that of the builder which made the port.
+    ///
     /// # Real-time
     /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock.
+    #[track_caller]
     pub fn peek(&mut self, ctx: &TickContext) -> Option<T> {
         self.look(ctx);
         match &mut self.kind {
@@ -121,8 +130,12 @@ impl<T: Copy> QueueReader<T> {
 
     /// Takes the oldest sample that this release can see: one that was there when the release looked first.
     ///
+    /// # Panics
+    /// In a graph of another [execution](crate::Execution) than that of the builder which made the port.
+    ///
     /// # Real-time
     /// On threads wait-free, real-time safe; in virtual time it takes an uncontended lock.
+    #[track_caller]
     pub fn pop(&mut self, ctx: &TickContext) -> Option<T> {
         self.look(ctx);
         match &mut self.kind {
@@ -132,7 +145,9 @@ impl<T: Copy> QueueReader<T> {
     }
 
     /// Decides, at the first call of a release, which samples it gets.
+    #[track_caller]
     fn look(&mut self, ctx: &TickContext) {
+        self.group.check_execution(ctx);
         if !self.looks.is_first(ctx) {
             return;
         }

@@ -5,8 +5,8 @@
 //! neither side ever waits, clones, allocates or drops.
 //!
 //! It keeps only the newest value: what the reader did not fetch in time is overwritten. Use a [`ring`](crate::ring)
-//! where every value counts. It costs three copies of the value in memory, and the buffer that the writer gets back
-//! holds an old value, not the one before.
+//! where every value counts. It costs three copies of the value in memory, made in their places one after the other,
+//! and the buffer that the writer gets back holds an old value, not the one before.
 //!
 //! Actors get their ports from the [builder](crate::RuntimeBuilder), which uses this type for threads and delays
 //! publications in virtual time. On its own:
@@ -46,8 +46,10 @@ impl<T> Stamped<T> {
     }
 }
 
+type Slot<T> = CachePadded<UnsafeCell<Stamped<T>>>;
+
 struct Shared<T> {
-    slots: [CachePadded<UnsafeCell<Stamped<T>>>; 3],
+    slots: [Slot<T>; 3],
     /// The index of the slot that neither side owns, and [`NEW`].
     in_flight: CachePadded<AtomicUsize>,
     #[cfg(all(test, loom))]
@@ -59,6 +61,25 @@ struct Shared<T> {
 unsafe impl<T: Send> Sync for Shared<T> {}
 
 impl<T> Shared<T> {
+    /// Fills the slots where they are to stay: three of them on the way there are more than the stack of a thread may
+    /// hold. An `init` that panics leaves the values before it undropped.
+    fn in_place(mut init: impl FnMut() -> T) -> Arc<Self> {
+        let shared = Arc::<Self>::new_uninit();
+        // Nobody else has it yet.
+        let place = Arc::as_ptr(&shared).cast::<Self>().cast_mut();
+        for index in 0..3 {
+            // SAFETY: the place is that of a slot, ours alone, and is written once.
+            unsafe { fill(&raw mut (*place).slots[index], &mut init) };
+        }
+        // SAFETY: as above; with these fields all of them are written.
+        unsafe {
+            (&raw mut (*place).in_flight).write(CachePadded(AtomicUsize::new(1)));
+            #[cfg(all(test, loom))]
+            (&raw mut (*place).ordering).write(Ordering::AcqRel);
+            shared.assume_init()
+        }
+    }
+
     /// Puts `slot` in flight and returns the slot that was.
     ///
     /// Release: the other side's swap, which takes the slot, sees all that was written to it (the writer's value; the
@@ -76,18 +97,18 @@ impl<T> Shared<T> {
 ///
 /// # Real-time
 /// Not real-time safe: allocates.
-pub fn exchange<T: Send>(mut init: impl FnMut() -> T) -> (ExchangeWriter<T>, ExchangeReader<T>) {
-    let mut slot = || CachePadded(UnsafeCell::new(Stamped::initial(init())));
-    pair(Shared {
-        slots: [slot(), slot(), slot()],
-        in_flight: CachePadded(AtomicUsize::new(1)),
-        #[cfg(all(test, loom))]
-        ordering: Ordering::AcqRel,
-    })
+pub fn exchange<T: Send>(init: impl FnMut() -> T) -> (ExchangeWriter<T>, ExchangeReader<T>) {
+    pair(Shared::in_place(init))
 }
 
-fn pair<T>(shared: Shared<T>) -> (ExchangeWriter<T>, ExchangeReader<T>) {
-    let shared = Arc::new(shared);
+/// Writes a slot into its place, with a frame of its own: what the compiler keeps on the stack for it is one value.
+#[inline(never)]
+unsafe fn fill<T>(place: *mut Slot<T>, init: &mut impl FnMut() -> T) {
+    // SAFETY: the caller owns the place.
+    unsafe { place.write(CachePadded(UnsafeCell::new(Stamped::initial(init())))) };
+}
+
+fn pair<T>(shared: Arc<Shared<T>>) -> (ExchangeWriter<T>, ExchangeReader<T>) {
     let writer = ExchangeWriter { shared: Arc::clone(&shared), slot: 0, version: 0 };
     (writer, ExchangeReader { shared, slot: 2, lends: PhantomData })
 }
@@ -266,6 +287,16 @@ mod tests {
         sync(&reader);
     }
 
+    // Check that no slot is dropped before its time, and each once.
+    #[test]
+    fn every_slot_is_dropped_once() {
+        let one = Arc::new(());
+        let halves = exchange(|| Arc::clone(&one));
+        assert_eq!(Arc::strong_count(&one), 4);
+        drop(halves);
+        assert_eq!(Arc::strong_count(&one), 1);
+    }
+
     #[test]
     fn boxes_can_be_swapped_out_through_the_reader() {
         let (mut writer, mut reader) = exchange(|| Box::new(0));
@@ -310,10 +341,9 @@ mod loom_tests {
 
     fn model(ordering: Ordering) {
         check(move || {
-            let slot = |_| CachePadded(UnsafeCell::new(Stamped::initial(0)));
-            let slots = std::array::from_fn(slot);
-            let (mut writer, mut reader) =
-                pair(Shared { slots, in_flight: CachePadded(AtomicUsize::new(1)), ordering });
+            let mut shared = Shared::in_place(|| 0);
+            Arc::get_mut(&mut shared).unwrap().ordering = ordering;
+            let (mut writer, mut reader) = pair(shared);
             let thread = loom::thread::spawn(move || {
                 for n in 1..=3 {
                     *writer.buffer() = n;

@@ -12,7 +12,9 @@
 //! ```
 
 use crate::primitives::sync::{AtomicU64, AtomicUsize, CachePadded, Ordering, UnsafeCell};
+use std::alloc::{Layout, alloc, dealloc, handle_alloc_error};
 use std::mem::MaybeUninit;
+use std::ptr::NonNull;
 use std::sync::Arc;
 
 /// How many slots ahead of the one that is written the next is fetched: about what a tick writes into one ring, so that
@@ -29,9 +31,71 @@ unsafe impl<T: Send> Sync for Slot<T> {}
 // SAFETY: as above; a value in a slot is a value.
 unsafe impl<T: Send> Send for Slot<T> {}
 
+/// The memory of a ring's slots, which begins with a cache line: a value as large as a line then lies in one.
+struct Buffer<T> {
+    start: NonNull<Slot<T>>,
+    len: usize,
+}
+
+// SAFETY: it owns slots, and nothing is reached through it but by the two sides; see `Slot`.
+unsafe impl<T: Send> Send for Buffer<T> {}
+// SAFETY: as above.
+unsafe impl<T: Send> Sync for Buffer<T> {}
+
+impl<T> Buffer<T> {
+    fn layout(len: usize) -> Layout {
+        let slots = Layout::array::<Slot<T>>(len).and_then(|slots| slots.align_to(align_of::<CachePadded<()>>()));
+        slots.unwrap_or_else(|_| panic!("a ring of {len} values is larger than any memory"))
+    }
+
+    fn new(len: usize) -> Self {
+        let layout = Self::layout(len);
+        if layout.size() == 0 {
+            return Self { start: NonNull::dangling(), len };
+        }
+        // SAFETY: the size is not zero.
+        let memory = unsafe { alloc(layout) }.cast::<Slot<T>>();
+        let Some(start) = NonNull::new(memory) else { handle_alloc_error(layout) };
+        for index in 0..len {
+            // SAFETY: inside of what was allocated, and nobody else has it yet. Volatile: where memory is not locked, a
+            // page that nothing was written to would be faulted in by the first push to it, and the compiler may leave
+            // out a write that nothing reads.
+            unsafe {
+                let slot = start.add(index);
+                slot.write(Slot(UnsafeCell::new(MaybeUninit::uninit())));
+                slot.as_ref().0.with_mut(|slot| slot.write_volatile(MaybeUninit::zeroed()));
+            }
+        }
+        Self { start, len }
+    }
+}
+
+impl<T> Drop for Buffer<T> {
+    fn drop(&mut self) {
+        let layout = Self::layout(self.len);
+        // SAFETY: both sides are gone, the slots were all written, and the memory came with this layout.
+        unsafe {
+            NonNull::slice_from_raw_parts(self.start, self.len).drop_in_place();
+            if layout.size() > 0 {
+                dealloc(self.start.as_ptr().cast(), layout);
+            }
+        }
+    }
+}
+
 /// The slots of a ring. Each side has their address of its own: to fetch it from what both share costs a cache miss in
 /// a tick that begins cold.
-struct Slots<T>(Arc<[Slot<T>]>);
+struct Slots<T> {
+    start: NonNull<Slot<T>>,
+    /// A power of two.
+    len: usize,
+    buffer: Arc<Buffer<T>>,
+}
+
+// SAFETY: as for the buffer that it keeps.
+unsafe impl<T: Send> Send for Slots<T> {}
+// SAFETY: as above.
+unsafe impl<T: Send> Sync for Slots<T> {}
 
 struct Shared {
     /// Values taken so far, wrapping; written by the consumer.
@@ -46,40 +110,59 @@ struct Shared {
 
 impl<T> Slots<T> {
     fn new(capacity: usize) -> Self {
-        let slots: Arc<[Slot<T>]> =
-            (0..rounded(capacity)).map(|_| Slot(UnsafeCell::new(MaybeUninit::uninit()))).collect();
-        for slot in &*slots {
-            // Where memory is not locked, a page that nothing was written to would be faulted in by the first push to
-            // it. SAFETY: nobody else has the slot yet. Volatile: the compiler may leave out a write that nothing
-            // reads.
-            slot.0.with_mut(|slot| unsafe { slot.write_volatile(MaybeUninit::zeroed()) });
-        }
-        Self(slots)
+        let buffer = Arc::new(Buffer::new(rounded(capacity)));
+        Self { start: buffer.start, len: buffer.len, buffer }
     }
 
-    fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    fn at(&self, index: usize) -> &UnsafeCell<MaybeUninit<T>> {
-        &self.0[index & (self.0.len() - 1)].0
-    }
-
-    /// Asks for the cache line of a slot that will soon be written. Nothing waits for it.
     #[inline]
-    fn prefetch(&self, index: usize) {
-        #[cfg(all(target_arch = "x86_64", not(loom)))]
-        self.at(index).with(|slot| {
-            use core::arch::x86_64::{_MM_HINT_ET0, _mm_prefetch};
-            // SAFETY: a hint, which reads and writes nothing; and the address is that of a slot.
-            unsafe { _mm_prefetch::<_MM_HINT_ET0>(slot.cast::<i8>()) };
-        });
-        #[cfg(not(all(target_arch = "x86_64", not(loom))))]
-        let _ = index;
+    fn len(&self) -> usize {
+        self.len
+    }
+
+    #[inline]
+    fn at(&self, index: usize) -> &UnsafeCell<MaybeUninit<T>> {
+        // SAFETY: the index is masked to what was allocated and written, which lives as long as `buffer`.
+        unsafe { &self.start.add(index & (self.len - 1)).as_ref().0 }
     }
 
     fn share(&self) -> Self {
-        Self(Arc::clone(&self.0))
+        Self { start: self.start, len: self.len, buffer: Arc::clone(&self.buffer) }
+    }
+}
+
+/// Asks for cache lines that will soon be written, as their owner: a plain prefetch fetches a line to be shared, and the
+/// write then has to wait for the other core after all.
+#[derive(Clone, Copy)]
+struct Prefetch {
+    /// Whether the processor knows the instruction.
+    known: bool,
+}
+
+impl Prefetch {
+    fn new() -> Self {
+        #[cfg(all(target_arch = "x86_64", not(loom), not(miri)))]
+        let known = {
+            use core::arch::x86_64::__cpuid;
+            // PREFETCHW, as AMD and Intel document it.
+            __cpuid(0x8000_0000).eax >= 0x8000_0001 && __cpuid(0x8000_0001).ecx & 1 << 8 != 0
+        };
+        #[cfg(not(all(target_arch = "x86_64", not(loom), not(miri))))]
+        let known = false;
+        Self { known }
+    }
+
+    /// Nothing waits for it.
+    #[inline]
+    fn to_write<T>(self, slot: &UnsafeCell<MaybeUninit<T>>) {
+        #[cfg(all(target_arch = "x86_64", not(loom), not(miri)))]
+        if self.known {
+            slot.with(|slot| {
+                // SAFETY: a hint that the processor knows; it reads and writes nothing, and the address is a slot's.
+                unsafe { core::arch::asm!("prefetchw [{}]", in(reg) slot, options(nostack, preserves_flags)) };
+            });
+        }
+        #[cfg(not(all(target_arch = "x86_64", not(loom), not(miri))))]
+        let _ = (self.known, slot);
     }
 }
 
@@ -119,7 +202,7 @@ pub fn ring<T: Copy + Send>(capacity: usize) -> (Producer<T>, Consumer<T>) {
 fn pair<T>(slots: Slots<T>, shared: Shared) -> (Producer<T>, Consumer<T>) {
     let shared = Arc::new(shared);
     (
-        Producer { slots: slots.share(), shared: Arc::clone(&shared), tail: 0, head: 0 },
+        Producer { slots: slots.share(), shared: Arc::clone(&shared), tail: 0, head: 0, prefetch: Prefetch::new() },
         Consumer { slots, shared, head: 0, tail: 0 },
     )
 }
@@ -131,6 +214,7 @@ pub struct Producer<T> {
     tail: usize,
     /// The consumer's index when it was last read: never ahead of the true one.
     head: usize,
+    prefetch: Prefetch,
 }
 
 impl<T: Copy> Producer<T> {
@@ -155,7 +239,7 @@ impl<T: Copy> Producer<T> {
             unsafe { (*slot).write(value) };
         });
         self.tail = self.tail.wrapping_add(1);
-        self.slots.prefetch(self.tail.wrapping_add(AHEAD));
+        self.prefetch.to_write(self.slots.at(self.tail.wrapping_add(AHEAD)));
         // Release: with the consumer's acquire of `tail`, so that it sees the value just written.
         self.shared.tail.store(self.tail, self.shared.release());
         true
@@ -302,6 +386,18 @@ mod tests {
                 prop_assert_eq!(consumer.sums(), expected);
             }
         }
+    }
+
+    #[test]
+    fn the_slots_begin_with_a_cache_line() {
+        fn begins<T: Copy + Send>() -> usize {
+            Slots::<T>::new(4).start.addr().get() % 64
+        }
+        assert_eq!((begins::<u8>(), begins::<[u64; 8]>(), begins::<[u8; 3]>(), begins::<u128>()), (0, 0, 0, 0));
+        // Check that values without a size need no memory
+        let (mut producer, mut consumer) = ring(2);
+        assert!(producer.push(()) && producer.push(()) && !producer.push(()));
+        assert_eq!((consumer.pop(), consumer.pop(), consumer.pop()), (Some(()), Some(()), None));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use crate::accounting::ledger::Ledger;
 use crate::actor::Actor;
 use crate::error::{ActorError, GraphError, GraphErrorKind};
+use crate::executor::Execution;
 use crate::group::group_run::GroupRun;
 use crate::group::panic_hook::{guarded, place as panicked_at};
 use crate::ports::restartable::RecorderPort;
@@ -40,6 +41,7 @@ impl Default for Restart {
 pub(crate) struct Restarter {
     pub(crate) policy: Restart,
     pub(crate) factory: Factory,
+    pub(crate) execution: Execution,
     pub(crate) index: u16,
     pub(crate) spec: RateGroup,
     pub(crate) until: Option<Nanos>,
@@ -102,7 +104,7 @@ impl Restarter {
         let actors = made.map_err(panicked)?.map_err(GraphError::from_actor)?;
         let recorder = self.records.as_ref().map(RecorderPort::recorder);
         let (writer, reader) = exchange(|| ledger);
-        let mut group = GroupRun::new(self.index, self.spec.clone(), actors, recorder, ledger);
+        let mut group = GroupRun::new(self.execution, self.index, self.spec.clone(), actors, recorder, ledger);
         group.books = Some(writer);
         match &self.shown {
             Some(shown) => group.show_on(shown.clone()),

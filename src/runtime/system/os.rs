@@ -13,7 +13,7 @@ use std::fs::read_to_string;
 pub(crate) fn pin(cpu: usize) -> Result<(), String> {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
     let Some(&core) = cores.iter().find(|core| core.id == cpu) else {
-        return Err(format!("core {cpu} is not available to this process"));
+        return Err(format!("core {cpu} is not open to this process (taskset -pc, or its cgroup's cpuset.cpus)"));
     };
     if core_affinity::set_for_current(core) { Ok(()) } else { Err(format!("pinning to core {cpu} was refused")) }
 }
@@ -29,6 +29,20 @@ pub(crate) fn touch_stack() {
 /// Processor cores that the process may use.
 pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// The numbers of the processor cores that are there, whoever may use them; empty if the system does not say.
+pub(crate) fn cores_there() -> Vec<usize> {
+    cores_in(&read_to_string("/sys/devices/system/cpu/online").unwrap_or_default())
+}
+
+/// The numbers in a list of the kernel's: `0-2,5`.
+fn cores_in(list: &str) -> Vec<usize> {
+    let range = |part: &str| {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        Some(first.parse().ok()?..=last.parse().ok()?)
+    };
+    list.trim().split(',').filter_map(range).flatten().collect()
 }
 
 /// The kernel's release and build.
@@ -98,7 +112,13 @@ mod imp {
         // The system call itself: musl's wrapper always fails, and 0 means the calling thread.
         // SAFETY: the pointer is to a sched_param of our own and outlives the call.
         let result = unsafe { libc::syscall(libc::SYS_sched_setscheduler, 0, policy, &raw const parameter) };
-        if result == 0 { Ok(()) } else { Err(format!("SCHED_FIFO {priority} refused: {}", Error::last_os_error())) }
+        if result == 0 {
+            return Ok(());
+        }
+        Err(format!(
+            "SCHED_FIFO {priority} refused: {} (setcap cap_sys_nice=ep on the program, or rtprio in limits.d)",
+            Error::last_os_error()
+        ))
     }
 
     /// A thread seen from another one: the time that it computed, and whether it waits for anything but a processor.
@@ -171,7 +191,7 @@ mod imp {
     /// every wake-up. It costs power.
     pub(crate) fn stay_awake() -> Result<File, String> {
         const DEVICE: &str = "/dev/cpu_dma_latency";
-        let refused = |error: Error| format!("refused: {DEVICE}: {error}");
+        let refused = |error: Error| format!("refused: {DEVICE}: {error} (a udev rule opens it to a group)");
         let mut file = File::options().write(true).open(DEVICE).map_err(refused)?;
         // The largest latency allowed, in microseconds, as the kernel's PM QoS interface reads it.
         file.write_all(&0_i32.to_ne_bytes()).map_err(refused)?;
@@ -292,6 +312,14 @@ mod tests {
             }
             assert!(monotonic() >= due);
         }
+    }
+
+    #[test]
+    fn the_kernels_list_of_cores_is_read_as_it_writes_it() {
+        assert_eq!(cores_in("0-2,5,8-9\n"), [0, 1, 2, 5, 8, 9]);
+        assert_eq!(cores_in("0\n"), [0]);
+        assert_eq!(cores_in(""), [] as [usize; 0]);
+        assert!(cores_there().len() >= cores() || cores_there().is_empty());
     }
 
     #[test]

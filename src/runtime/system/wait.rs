@@ -35,13 +35,25 @@ impl AdaptiveMargin {
     const FLOOR_NS: u64 = 5_000;
     /// More than this buys little: what still ends later is a stall that no margin covers.
     const CEILING_NS: u64 = 135_000;
-    /// At most this percentage of the period is spun away.
+    /// At most this percentage of the period is spun away,
     const PERIOD_PERCENT: u64 = 15;
+    /// unless that is less than a wake-up takes: a margin below it covers nothing, and every sleep ends late.
+    const WAKE_NS: u64 = 50_000;
+    /// A short sleep is left in each period even so. Where the kernel takes a real-time thread that never sleeps from
+    /// its core for 50 ms of each second, it costs less than that.
+    const MOST_PERCENT: u64 = 90;
 
     /// For releases `period` apart. It begins with the largest margin and learns how much less will do.
     pub(crate) fn new(period: Nanos) -> Self {
-        let ceiling_ns = Self::CEILING_NS.min(period.0 / 100 * Self::PERIOD_PERCENT);
+        let share = |percent| period.0 / 100 * percent;
+        let wake = Self::WAKE_NS.min(share(Self::MOST_PERCENT));
+        let ceiling_ns = Self::CEILING_NS.min(share(Self::PERIOD_PERCENT)).max(wake);
         Self { estimate_ns: ceiling_ns, ceiling_ns }
+    }
+
+    /// Whether a sleep can end before the release that follows a period later: above 20 kHz none does.
+    pub(crate) fn covers(period: Nanos) -> bool {
+        period.0 >= Self::WAKE_NS
     }
 
     /// Learns from a sleep that ended `lateness_ns` after its time.
@@ -81,6 +93,7 @@ impl Waiter {
     /// Spinning without a real-time policy only takes time from the threads that one waits for, so then it sleeps.
     pub(crate) fn new(wait: Wait, realtime: bool, period: Nanos) -> Self {
         Self(match wait {
+            Wait::Auto if realtime && !AdaptiveMargin::covers(period) => Strategy::Spin,
             Wait::Auto if realtime => Strategy::Adaptive(AdaptiveMargin::new(period)),
             Wait::SleepSpin { margin } if realtime => Strategy::Fixed(margin.0),
             Wait::Spin if realtime => Strategy::Spin,
@@ -169,7 +182,7 @@ mod tests {
             for late in lateness {
                 let before = margin.margin_ns();
                 margin.learn(late);
-                prop_assert!(margin.margin_ns() * 100 <= period_us * US * 15);
+                prop_assert!(margin.margin_ns() * 100 <= (period_us * US * 15).max((period_us * US * 90).min(5_000 * US)));
                 prop_assert!(margin.margin_ns() <= 135 * US);
                 // Check that it moves towards what it saw, and by one bounded step
                 if late > before {
@@ -236,7 +249,11 @@ mod tests {
     fn what_was_granted_is_told_with_its_bound() {
         let told = |wait, period| Waiter::new(wait, true, Nanos(period)).to_string();
         assert_eq!(told(Wait::Auto, MS), "sleep, then spin, margin adapts (at most 135µs)");
-        assert_eq!(told(Wait::Auto, MS / 5), "sleep, then spin, margin adapts (at most 30µs)");
+        // Check that a period of which 15 % are less than a wake-up takes gets that, and no sleep if it is shorter
+        assert_eq!(told(Wait::Auto, MS / 2), "sleep, then spin, margin adapts (at most 75µs)");
+        assert_eq!(told(Wait::Auto, MS / 5), "sleep, then spin, margin adapts (at most 50µs)");
+        assert_eq!(told(Wait::Auto, MS / 20), "sleep, then spin, margin adapts (at most 45µs)");
+        assert_eq!(told(Wait::Auto, MS / 50), "spin");
         assert_eq!(told(Wait::SleepSpin { margin: Nanos(50 * US) }, MS), "sleep, then spin 50µs");
         assert_eq!(told(Wait::Spin, MS), "spin");
         assert_eq!(told(Wait::Sleep, MS), "sleep");

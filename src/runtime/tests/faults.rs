@@ -21,6 +21,8 @@ in_both_executions! {
     a_group_that_fails_too_often_stops_the_run
     a_restart_that_fails_stops_the_run_and_says_why
     values_and_samples_reach_the_restarted_group_and_come_back
+    a_panic_whose_payload_panics_is_contained
+    every_actor_may_fail_in_the_wind_down_and_the_group_ends_with_its_sums
 }
 
 /// GroupMode and release of every call.
@@ -329,4 +331,109 @@ fn a_group_that_gets_no_processor_is_late_and_not_left_behind() {
     let events: Vec<Event> = records.iter().filter_map(Event::from_record).collect();
     assert!(events.iter().any(|event| (event.group, event.code) == (1, Event::STARVED)), "{events:?}");
     assert!(events.iter().all(|event| event.code != Event::ABANDONED), "{events:?}");
+}
+
+/// Thrown by an actor: to drop it panics, and to drop what that throws does so too.
+struct Explosive(u32);
+
+impl Drop for Explosive {
+    fn drop(&mut self) {
+        if self.0 > 0 {
+            std::panic::panic_any(Explosive(self.0 - 1));
+        }
+    }
+}
+
+fn a_panic_whose_payload_panics_is_contained(execution: Execution) {
+    let mut graph = Runtime::builder(execution);
+    let failing = actor_fn("failing", |ctx: &TickContext| match ctx.tick {
+        0..3 => Outcome::Continue,
+        _ => std::panic::panic_any(Explosive(3)),
+    });
+    graph.group(RateGroup::hz(1000).name("fails"), vec![failing]);
+    graph.group(RateGroup::hz(100).name("other"), vec![]);
+    let report = finish(&mut graph);
+    assert_identity(&report);
+    assert_eq!(report.groups.len(), 2);
+    let fault = report.fault.unwrap();
+    assert_eq!((fault.group.as_str(), fault.actor.as_str()), ("fails", "failing"));
+    // Check that the place is that of the first panic
+    assert!(fault.what.contains("/faults.rs:") && fault.what.ends_with("no text was given"), "{fault}");
+    let line: u32 = fault.what.split(':').nth(1).unwrap().parse().unwrap();
+    assert!(line > line!() - 20, "{fault}");
+}
+
+fn every_actor_may_fail_in_the_wind_down_and_the_group_ends_with_its_sums(execution: Execution) {
+    let mut graph = Runtime::builder(execution);
+    let actors = (0..40).map(|n| {
+        actor_fn(&format!("a{n}"), move |ctx: &TickContext| match ctx.mode {
+            GroupMode::Stopping => Outcome::Fault(n),
+            _ if n == 0 && ctx.tick >= 5 => Outcome::Fault(99),
+            _ => Outcome::Continue,
+        })
+    });
+    graph.group(RateGroup::hz(1000).name("all").wind_down(Nanos(100 * MS)), actors.collect());
+    let running = graph.build().unwrap().start().unwrap();
+    if execution == Execution::Threaded {
+        // Nobody takes the mail meanwhile: that of the whole wind-down waits.
+        std::thread::sleep(Duration::from_millis(400));
+    }
+    running.wait_for(Duration::from_secs(20));
+    let report = running.stop();
+    assert_identity(&report);
+    assert_eq!(report.groups.len(), 1, "its end was lost");
+    assert_eq!(report.fault.unwrap().what, "reported fault 99");
+}
+
+/// Whatever of it is called panics.
+struct Broken;
+
+impl Actor for Broken {
+    fn name(&self) -> &str {
+        panic!("no name")
+    }
+
+    fn tick(&mut self, _: &TickContext) -> Outcome {
+        panic!("no tick")
+    }
+}
+
+impl Drop for Broken {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            panic!("no drop");
+        }
+    }
+}
+
+/// An error that cannot even say what it is.
+#[derive(Debug)]
+struct Unspeakable;
+
+impl std::fmt::Display for Unspeakable {
+    fn fmt(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        panic!("no words")
+    }
+}
+
+impl std::error::Error for Unspeakable {}
+
+#[test]
+fn a_replacement_of_which_everything_panics_ends_the_run_in_order() {
+    let mut made = 0;
+    let factory = move || {
+        made += 1;
+        match made {
+            1 => Ok(vec![actor_fn("first", |ctx| if ctx.tick >= 3 { Outcome::Fault(9) } else { Outcome::Continue })]),
+            2 => Ok(vec![Box::new(Broken) as Box<dyn Actor>, Box::new(Broken)]),
+            _ => Err(Unspeakable.into()),
+        }
+    };
+    let mut graph = Runtime::builder(Execution::Threaded);
+    graph.restartable(RateGroup::hz(100).name("slow"), Restart::default(), factory);
+    let report = finish(&mut graph);
+    assert_identity(&report);
+    assert_eq!((report.groups.len(), report.restarts.len()), (1, 1));
+    let fault = report.fault.unwrap();
+    assert!(fault.actor.contains("no name") && fault.what.contains("no words"), "{fault}");
 }

@@ -43,8 +43,8 @@ pub(super) fn global_group(
     }
 }
 
-/// The haptic group: the program's, or one with a core of its own; with time to bring the force to rest. Released by the
-/// device if that is the only one and has replies to wait for.
+/// The haptic group: the program's, or one with a core of its own; real-time unless the program wants it otherwise, and
+/// with time to bring the force to rest. Released by the device if that is the only one and has replies to wait for.
 pub(super) fn local_group(
     given: Option<RateGroup>,
     rate: Rate,
@@ -54,12 +54,15 @@ pub(super) fn local_group(
 ) -> RateGroup {
     let last_core = std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1);
     let group = given.unwrap_or_else(|| {
-        let group = RateGroup::new(rate).realtime(HAPTIC_PRIORITY);
+        let group = RateGroup::new(rate);
         // On a single core the haptic thread preempts the others; pinning would gain nothing.
         if last_core > 0 { group.pin(last_core) } else { group }
     });
     let ramp_s = tools.iter().map(|tool| tool.limits.ramp_s).fold(0.0, f64::max);
-    let group = group.name("local").wind_down(Nanos::from_secs_f64(ramp_s + RAMP_MARGIN_S));
+    let group = group
+        .realtime_by_default(HAPTIC_PRIORITY)
+        .name("local")
+        .wind_down(Nanos::from_secs_f64(ramp_s + RAMP_MARGIN_S));
     // A device that exerts no force needs the time only to show in the log what would have been done.
     let exerts_force = tools.iter().any(|tool| tool.device.exerts_force());
     let group = if exerts_force { group.wind_down_at_end() } else { group };
