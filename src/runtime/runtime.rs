@@ -225,7 +225,12 @@ impl RunningGraph {
                 (&run.supervisor, run.now, self.names.iter().zip(run.costs()).map(cost).collect())
             }
         };
-        let ((groups, fault), restarts) = (supervisor.results(), supervisor.restarts.clone());
+        let ((mut groups, fault), restarts) = (supervisor.results(), supervisor.restarts.clone());
+        for group in &mut groups {
+            if let Some(shown) = self.live.iter().find(|shown| shown.name() == group.name) {
+                (group.lateness, group.execution) = shown.times();
+            }
+        }
         let what = "of a stop and was given up; its tick or stop must return";
         let stuck =
             || RuntimeFault::of_group(&given_up.join("`, `"), at, format!("did not end within {STOP_BOUND:?} {what}"));

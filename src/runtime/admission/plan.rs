@@ -5,6 +5,7 @@ use crate::admission::check::admit;
 use crate::error::GraphError;
 use crate::executor::Execution;
 use crate::rate_group::RateGroup;
+use crate::reports::text::{percent, places, short};
 use crate::system::grant::refusals;
 use crate::system::os;
 use crate::system::wait::Waiter;
@@ -229,27 +230,6 @@ impl fmt::Display for Plan {
         }
         self.missing.iter().try_for_each(|missing| writeln!(f, "missing    {missing}"))
     }
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.1} %", 100.0 * share)
-}
-
-/// A time in the unit that keeps it short, to three places.
-fn short(time: Nanos) -> String {
-    let (unit, name) = match time.0 {
-        0 => return "0".to_owned(),
-        1..1_000_000 => (1e3, "us"),
-        1_000_000..1_000_000_000 => (1e6, "ms"),
-        _ => (1e9, "s"),
-    };
-    format!("{} {name}", places(time.0 as f64 / unit))
-}
-
-/// At most three places behind the point.
-fn places(value: f64) -> String {
-    let text = format!("{value:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 #[cfg(all(test, not(loom)))]

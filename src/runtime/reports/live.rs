@@ -4,7 +4,7 @@ use crate::accounting::ledger::Ledger;
 use crate::primitives::histogram::{Histogram, HistogramReader, HistogramWriter, histogram};
 use crate::primitives::sync::{AtomicU64, CachePadded, Ordering};
 use crate::rate_group::RateGroup;
-use crate::records::timing::TickTiming;
+use crate::records::timing::{SlipCause, SlipCounts, TickTiming};
 use crate::time::{Nanos, Rate};
 use std::sync::{Arc, OnceLock};
 
@@ -25,6 +25,10 @@ pub struct GroupLive {
     pub skipped: u64,
     /// The number of releases that ended after their deadline.
     pub missed: u64,
+    /// The skipped periods by cause; their sum is `skipped`.
+    pub slips: SlipCounts,
+    /// The missed deadlines by cause; their sum is `missed`.
+    pub misses: SlipCounts,
     /// The lateness of every release: from its scheduled time to the end of the wait.
     pub lateness: Histogram,
     /// The execution time of every release, from the first actor's start to the last one's end; its sum is the time
@@ -35,8 +39,9 @@ pub struct GroupLive {
 #[derive(Debug, Default)]
 struct Counts {
     released: AtomicU64,
-    skipped: AtomicU64,
-    missed: AtomicU64,
+    /// By cause.
+    skipped: [AtomicU64; SlipCause::ALL.len()],
+    missed: [AtomicU64; SlipCause::ALL.len()],
 }
 
 /// What one writer shows. Each has its own: one that was fenced counts on where nobody looks.
@@ -104,8 +109,10 @@ impl LiveWriter {
     #[inline]
     pub(crate) fn count(&self, ledger: &Ledger) {
         let Counts { released, skipped, missed } = &**self.counts;
-        skipped.store(ledger.skipped.total(), Ordering::Relaxed);
-        missed.store(ledger.missed, Ordering::Relaxed);
+        for cause in SlipCause::ALL {
+            skipped[cause as usize].store(ledger.skipped.of(cause), Ordering::Relaxed);
+            missed[cause as usize].store(ledger.missed.of(cause), Ordering::Relaxed);
+        }
         // Release: with the acquire in `read`, so that whoever sees this release also sees its times and its skips.
         released.store(ledger.released, Ordering::Release);
     }
@@ -117,11 +124,25 @@ impl LiveReader {
         let last = self.last();
         let Counts { released, skipped, missed } = &**last.counts;
         let copy = |count: &AtomicU64| AtomicU64::new(count.load(Ordering::Acquire));
-        let counts = Counts { released: copy(released), skipped: copy(skipped), missed: copy(missed) };
+        let counts = Counts {
+            released: copy(released),
+            skipped: skipped.each_ref().map(copy),
+            missed: missed.each_ref().map(copy),
+        };
         let (writer, shown) = Shown::new(counts, Some(last.times()));
         // Set once: only the one who starts a group again comes here.
         let _ = last.next.set(shown);
         writer
+    }
+
+    /// The name of the group.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Lateness and execution so far.
+    pub(crate) fn times(&self) -> (Histogram, Histogram) {
+        self.last().times()
     }
 
     /// What the writer in force shows: as many steps away as the group was started again.
@@ -138,16 +159,26 @@ impl LiveReader {
         // Acquire: with the release in `count`; everything below is read afterwards.
         let released = shown.counts.released.load(Ordering::Acquire);
         let (lateness, execution) = shown.times();
+        let [slips, misses] = [&shown.counts.skipped, &shown.counts.missed].map(sums);
         GroupLive {
             name: self.name.clone(),
             rate: self.rate,
             released,
-            skipped: shown.counts.skipped.load(Ordering::Relaxed),
-            missed: shown.counts.missed.load(Ordering::Relaxed),
+            skipped: slips.total(),
+            missed: misses.total(),
+            slips,
+            misses,
             lateness,
             execution,
         }
     }
+}
+
+/// What was counted for each cause.
+fn sums(counts: &[AtomicU64; SlipCause::ALL.len()]) -> SlipCounts {
+    let mut sums = SlipCounts::default();
+    SlipCause::ALL.into_iter().for_each(|cause| sums.add(cause, counts[cause as usize].load(Ordering::Relaxed)));
+    sums
 }
 
 impl GroupLive {

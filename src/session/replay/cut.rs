@@ -125,9 +125,12 @@ mod tests {
             slips: Default::default(),
             elapsed_periods: released,
             missed_deadlines: 0,
+            misses: Default::default(),
             degraded: 0,
             in_degraded_mode: 0,
             watchdog_takeovers: 0,
+            lateness: Default::default(),
+            execution: Default::default(),
         };
         let groups = ["local", "global"].into_iter().zip(released).map(group).collect();
         RuntimeReport {
