@@ -14,7 +14,8 @@
 //! - Re-execution: a run on threads, [recorded](Recording), is repeated in virtual time bit for bit.
 //! - Admission: a graph that cannot work is refused when it is built, with the sum that failed; its
 //!   [plan](Runtime::plan) says what it asks for and what this system would refuse.
-//! - Introspection: [`RunningGraph::live`] shows counts, lateness and execution time of every group at any moment.
+//! - Introspection: [`RunningGraph::live`] shows counts, lateness and execution time of every group at any moment,
+//!   [`RunningGraph::graph`] the whole graph as text, JSON, DOT and SVG.
 //! - Faults: a panic or a reported fault stops the whole graph in order, after [winding down](RateGroup::wind_down), and
 //!   is in the [report](RuntimeReport); a [restartable](RuntimeBuilder::restartable) group is started again instead.
 //!
@@ -84,6 +85,7 @@ mod admission;
 mod builder;
 mod error;
 mod executor;
+mod graph;
 mod group;
 mod ports;
 mod primitives;
@@ -102,6 +104,7 @@ pub use builder::RuntimeBuilder;
 pub use error::{ActorError, GraphError, GraphErrorKind};
 pub use executor::Execution;
 pub use executor::disturbance::Disturbance;
+pub use graph::view::{GraphGroup, GraphPort, GraphView, PortEnd, PortKind};
 pub use ports::exchange_port::{Reader, Writer};
 pub use ports::outlet::{OutletReader, OutletWriter};
 pub use ports::queue_port::{QueueReader, QueueWriter};
@@ -114,7 +117,7 @@ pub use records::record::{Channel, Event, Record};
 pub use records::recorder::{RecordDrain, RecordGap, Recorder};
 pub use records::timing::{ActorTimes, SlipCause, SlipCounts, TickTiming};
 pub use reexecution::recording::Recording;
-pub use reports::live::GroupLive;
+pub use reports::group_live::GroupLive;
 pub use reports::report::{GroupCost, GroupReport, RuntimeFault, RuntimeReport};
 pub use runtime::{RunningGraph, Runtime};
 pub use supervision::restart::Restart;

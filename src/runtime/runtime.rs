@@ -7,13 +7,16 @@ use crate::executor::Execution;
 use crate::executor::disturbance::Disturb;
 use crate::executor::threaded::Threads;
 use crate::executor::virtual_time::VirtualRun;
+use crate::graph::view::GraphView;
+use crate::graph::wiring::Wiring;
 use crate::group::group_run::{GroupRun, start_actors};
 use crate::primitives::exchange::ExchangeReader;
 use crate::primitives::sync::lock;
 use crate::rate_group::RateGroup;
 use crate::records::recorder::Registry;
 use crate::reexecution::replay::Reexecution;
-use crate::reports::live::{GroupLive, LiveReader};
+use crate::reports::group_live::GroupLive;
+use crate::reports::live::LiveReader;
 use crate::reports::report::{GroupCost, RuntimeFault, RuntimeReport};
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND, StopHandle};
@@ -43,6 +46,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// Not real-time safe: allocates, and starting it makes threads.
 pub struct Runtime {
     pub(crate) execution: Execution,
+    pub(crate) wiring: Arc<Wiring>,
     pub(crate) groups: Vec<GroupRun>,
     pub(crate) restarters: Vec<Option<(Restarter, ExchangeReader<Ledger>)>>,
     /// Virtual time: what makes each group late.
@@ -62,7 +66,13 @@ impl Runtime {
     /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused) if the process has been moved to fewer cores since the graph was built and no longer
     /// fits.
     pub fn plan(&self) -> Result<Plan, GraphError> {
-        Plan::of(self.execution, &self.specs())
+        Ok(Plan { graph: self.graph(), ..Plan::of(self.execution, &self.specs())? })
+    }
+
+    /// The graph as it stands before the run: its groups with their actors, and its ports. Ends that were not declared
+    /// by a [link](crate::RuntimeBuilder::link) are known once they have been used.
+    pub fn graph(&self) -> GraphView {
+        self.wiring.view(self.execution, &self.specs())
     }
 
     fn specs(&self) -> Vec<RateGroup> {
@@ -77,11 +87,21 @@ impl Runtime {
     /// The error of the first actor whose start failed, after those already started were stopped; or
     /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused) if the system gives no thread.
     pub fn start(self) -> Result<RunningGraph, GraphError> {
-        let Self { execution, mut groups, restarters, disturbances, reexecution, registry, grants, measures_cost } =
-            self;
+        let Self {
+            execution,
+            wiring,
+            mut groups,
+            restarters,
+            disturbances,
+            reexecution,
+            registry,
+            grants,
+            measures_cost,
+        } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names: Vec<String> = groups.iter().map(|group| group.spec.name.clone()).collect();
         let live = groups.iter().map(|group| group.shown.clone()).collect();
+        let picture = Picture { execution, specs: groups.iter().map(|group| group.spec.clone()).collect(), wiring };
         let executor = match execution {
             Execution::Threaded => {
                 Executor::Threaded(Threads::start(groups, restarters, Arc::clone(&control), &grants)?)
@@ -104,7 +124,7 @@ impl Runtime {
             }
             return Err(error);
         }
-        Ok(RunningGraph { executor, control, names, live, registry, grants })
+        Ok(RunningGraph { executor, control, names, live, picture, registry, grants })
     }
 }
 
@@ -136,12 +156,20 @@ enum Executor {
     Virtual(VirtualRun),
 }
 
+/// What the graph's picture is drawn from.
+struct Picture {
+    execution: Execution,
+    specs: Vec<RateGroup>,
+    wiring: Arc<Wiring>,
+}
+
 /// A run in progress. Dropping it stops it, within [`STOP_BOUND`] for each group that does not end.
 pub struct RunningGraph {
     executor: Arc<Mutex<Executor>>,
     control: Arc<Control>,
     names: Vec<String>,
     live: Vec<LiveReader>,
+    picture: Picture,
     registry: Arc<Registry>,
     grants: GrantHandle,
 }
@@ -194,6 +222,19 @@ impl RunningGraph {
         self.live.iter().map(LiveReader::read).collect()
     }
 
+    /// The graph as it is now: groups with their times so far, ports with what went through them.
+    ///
+    /// # Real-time
+    /// Never disturbs a tick. It takes a lock and allocates: for threads that show it, never from an actor.
+    pub fn graph(&self) -> GraphView {
+        self.picture_at(self.elapsed())
+    }
+
+    fn picture_at(&self, elapsed: Nanos) -> GraphView {
+        let Picture { execution, specs, wiring } = &self.picture;
+        wiring.view(*execution, specs).after(elapsed, self.live())
+    }
+
     /// Asks every group to end after the release it is in; returns at once.
     ///
     /// # Real-time
@@ -236,7 +277,15 @@ impl RunningGraph {
             || RuntimeFault::of_group(&given_up.join("`, `"), at, format!("did not end within {STOP_BOUND:?} {what}"));
         let fault = fault.or_else(|| (!given_up.is_empty()).then(stuck));
         let grant = self.grants.get().unwrap_or_default();
-        RuntimeReport { groups, grant, fault, restarts, lost_records: self.registry.lost(), costs }
+        RuntimeReport {
+            groups,
+            graph: self.picture_at(at),
+            grant,
+            fault,
+            restarts,
+            lost_records: self.registry.lost(),
+            costs,
+        }
     }
 
     /// Ends the run if it has not ended; returns the groups that had to be given up.

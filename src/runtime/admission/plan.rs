@@ -4,6 +4,7 @@
 use crate::admission::check::admit;
 use crate::error::GraphError;
 use crate::executor::Execution;
+use crate::graph::view::GraphView;
 use crate::rate_group::RateGroup;
 use crate::reports::text::{percent, places, short};
 use crate::system::grant::refusals;
@@ -43,6 +44,8 @@ pub struct Plan {
     /// Pairs of groups that share a core, or may, and have releases at the same instant; in virtual time every pair
     /// does.
     pub coincidences: Vec<Coincidence>,
+    /// The picture of the graph; groups alone where nothing else is known.
+    pub graph: GraphView,
     /// Privileges that the system would refuse now, a sentence each; a refusal degrades a run and never fails it.
     pub missing: Vec<String>,
 }
@@ -141,6 +144,7 @@ impl Plan {
             total_load: plans.iter().filter_map(GroupPlan::utilisation).sum(),
             core_load,
             coincidences: coincidences(groups, execution),
+            graph: GraphView::of_groups(execution, groups),
             missing: match execution {
                 Execution::Virtual => Vec::new(),
                 Execution::Threaded => refusals(groups),
@@ -228,6 +232,7 @@ impl fmt::Display for Plan {
             let (per_second, every) = (places(1.0 / every.as_secs_f64()), short(*every));
             writeln!(f, "coincide   {first} and {second}: {per_second} times per second, every {every}")?;
         }
+        self.graph.warnings.iter().try_for_each(|warning| writeln!(f, "warning    {warning}"))?;
         self.missing.iter().try_for_each(|missing| writeln!(f, "missing    {missing}"))
     }
 }

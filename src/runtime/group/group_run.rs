@@ -92,6 +92,11 @@ impl GroupRun {
         }
     }
 
+    /// The names of the actors, in the order of their ticks.
+    pub(crate) fn actor_names(&self) -> Vec<String> {
+        self.members.names()
+    }
+
     /// Refuses a device-paced group that has nobody to wait for its device.
     pub(crate) fn check_listener(&self) -> Result<(), GraphError> {
         if self.spec.watchdog().is_some() && self.members.count() == 0 {
@@ -227,6 +232,7 @@ impl GroupRun {
             mode,
             visible_at: (scheduled + self.spec.latency).max(wake.free.unwrap_or(Nanos::ZERO)),
             group: self.index,
+            actor: 0,
             phase: if self.spec.observer { Phase::Observer } else { Phase::Release },
         };
         self.last = ctx;

@@ -2,6 +2,7 @@
 //! what has been recorded.
 
 use crate::actor::{Phase, TickContext};
+use crate::ports::port_traffic::Sides;
 use crate::primitives::sync::{AtomicUsize, Ordering, lock};
 use crate::records::port_use::{PortUse, PortUseKind};
 use crate::records::recorder::{Recorder, Registry};
@@ -16,6 +17,7 @@ pub(crate) struct PortPlan {
     recorded: bool,
     uses: Mutex<Vec<UseRing>>,
     pub(crate) group: WriterGroup,
+    pub(crate) sides: Sides,
 }
 
 /// Where the uses of one kind go.
@@ -31,7 +33,7 @@ struct UseRing {
 impl PortPlan {
     pub(crate) fn new(port: u32, registry: &Arc<Registry>) -> Self {
         let (registry, recorded) = (Arc::clone(registry), registry.wanted());
-        Self { port, registry, recorded, uses: Mutex::default(), group: WriterGroup::new() }
+        Self { port, registry, recorded, uses: Mutex::default(), group: WriterGroup::new(), sides: Sides::new() }
     }
 
     /// Records the uses of this kind, for one half; fences the recorder of the one taken before and goes on with its

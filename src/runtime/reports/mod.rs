@@ -1,5 +1,6 @@
 //! What a run tells of itself: at any moment, and when it is over.
 
+pub(crate) mod group_live;
 pub(crate) mod live;
 pub(crate) mod report;
 pub(crate) mod text;

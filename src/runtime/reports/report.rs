@@ -1,5 +1,6 @@
 //! What a run has to say when it is over.
 
+use crate::graph::view::GraphView;
 use crate::primitives::histogram::Histogram;
 use crate::records::timing::SlipCounts;
 use crate::reports::text::{by_cause, measured};
@@ -101,6 +102,8 @@ pub struct GroupCost {
 pub struct RuntimeReport {
     /// The sums of each rate group that ended, in graph order.
     pub groups: Vec<GroupReport>,
+    /// The graph with its times and what went through its ports.
+    pub graph: GraphView,
     /// The privileges that the system granted.
     pub grant: SystemGrant,
     /// The fault that ended the run, if one did.

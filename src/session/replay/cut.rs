@@ -135,6 +135,7 @@ mod tests {
         let groups = ["local", "global"].into_iter().zip(released).map(group).collect();
         RuntimeReport {
             groups,
+            graph: Default::default(),
             grant: Default::default(),
             fault: None,
             restarts: Vec::new(),
