@@ -16,6 +16,8 @@
 //!   [plan](Runtime::plan) says what it asks for and what this system would refuse.
 //! - Introspection: [`RunningGraph::live`] shows counts, lateness and execution time of every group at any moment,
 //!   [`RunningGraph::graph`] the whole graph as text, JSON, DOT and SVG.
+//! - Events: a thread outside the groups tells the program's `tracing` subscriber of slips, misses, restarts and faults,
+//!   under the targets `palpate_runtime::slip`, `::miss`, `::restart` and `::fault`.
 //! - Faults: a panic or a reported fault stops the whole graph in order, after [winding down](RateGroup::wind_down), and
 //!   is in the [report](RuntimeReport); a [restartable](RuntimeBuilder::restartable) group is started again instead.
 //!

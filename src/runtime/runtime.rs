@@ -18,6 +18,7 @@ use crate::reexecution::replay::Reexecution;
 use crate::reports::group_live::GroupLive;
 use crate::reports::live::LiveReader;
 use crate::reports::report::{GroupCost, RuntimeFault, RuntimeReport};
+use crate::reports::tell::Teller;
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND, StopHandle};
 use crate::system::grant::{GrantHandle, SystemGrant};
@@ -100,7 +101,8 @@ impl Runtime {
         } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names: Vec<String> = groups.iter().map(|group| group.spec.name.clone()).collect();
-        let live = groups.iter().map(|group| group.shown.clone()).collect();
+        let live: Vec<LiveReader> = groups.iter().map(|group| group.shown.clone()).collect();
+        let teller = Teller::new(&live, &wiring.view(execution, &[]).warnings);
         let picture = Picture { execution, specs: groups.iter().map(|group| group.spec.clone()).collect(), wiring };
         let executor = match execution {
             Execution::Threaded => {
@@ -116,9 +118,9 @@ impl Runtime {
                 Executor::Virtual(run)
             }
         };
-        let executor = Arc::new(Mutex::new(executor));
+        let executor = Arc::new(Mutex::new(Supervised { executor, teller }));
         if let Err(error) = watch(&executor) {
-            if let Executor::Threaded(threads) = &mut *lock(&executor) {
+            if let Executor::Threaded(threads) = &mut lock(&executor).executor {
                 // Nobody else would: the groups have been released.
                 threads.join(&names, STOP_BOUND);
             }
@@ -128,20 +130,20 @@ impl Runtime {
     }
 }
 
-/// Starts a thread that answers faults while the program does not look, if there is a group that can be started again.
+/// Starts a thread that answers faults while the program does not look, if there is a group that can be started again, and
+/// that tells the program's subscriber what happens, if it has one.
 /// It ends with the run.
-fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), GraphError> {
-    let needed = matches!(&*lock(executor), Executor::Threaded(threads) if threads.need_watching());
+fn watch(executor: &Arc<Mutex<Supervised>>) -> Result<(), GraphError> {
+    let needed = match &*lock(executor) {
+        Supervised { executor: Executor::Threaded(threads), teller } => threads.need_watching() || teller.is_heard(),
+        _ => false,
+    };
     if !needed {
         return Ok(());
     }
     let watched = Arc::downgrade(executor);
-    let over = |executor: &mut Executor| match executor {
-        Executor::Threaded(threads) => threads.poll(),
-        Executor::Virtual(_) => true,
-    };
     let watch = move || {
-        while watched.upgrade().is_some_and(|executor| !over(&mut lock(&executor))) {
+        while watched.upgrade().is_some_and(|executor| lock(&executor).poll() == Some(false)) {
             std::thread::sleep(POLL);
         }
     };
@@ -150,6 +152,30 @@ fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), GraphError> {
 }
 
 impl_debug!(Runtime, "execution": |own| own.execution, "groups": |own| own.specs());
+
+/// An executor and what it has told so far.
+struct Supervised {
+    executor: Executor,
+    teller: Teller,
+}
+
+impl Supervised {
+    /// Looks after the threads; true when the run is over, `None` in virtual time, which nobody has to look after.
+    fn poll(&mut self) -> Option<bool> {
+        let Executor::Threaded(threads) = &mut self.executor else { return None };
+        let over = threads.poll();
+        self.teller.tell(&threads.supervisor, over);
+        Some(over)
+    }
+
+    /// Tells all that is left.
+    fn tell_rest(&mut self) {
+        match &self.executor {
+            Executor::Threaded(threads) => self.teller.tell(&threads.supervisor, true),
+            Executor::Virtual(run) => self.teller.tell(&run.supervisor, true),
+        }
+    }
+}
 
 enum Executor {
     Threaded(Threads),
@@ -165,7 +191,7 @@ struct Picture {
 
 /// A run in progress. Dropping it stops it, within [`STOP_BOUND`] for each group that does not end.
 pub struct RunningGraph {
-    executor: Arc<Mutex<Executor>>,
+    executor: Arc<Mutex<Supervised>>,
     control: Arc<Control>,
     names: Vec<String>,
     live: Vec<LiveReader>,
@@ -182,9 +208,12 @@ impl RunningGraph {
     /// # Real-time
     /// Not real-time safe: sleeps, or executes the run. Never from an actor: in virtual time it would wait for itself.
     pub fn wait_for(&self, span: Duration) {
-        if let Executor::Virtual(run) = &mut *lock(&self.executor) {
-            return run.advance(Nanos::from_duration(span));
+        let mut supervised = lock(&self.executor);
+        if let Executor::Virtual(run) = &mut supervised.executor {
+            run.advance(Nanos::from_duration(span));
+            return supervised.tell_rest();
         }
+        drop(supervised);
         let start = Instant::now();
         while !self.finished() {
             let Some(left) = span.checked_sub(start.elapsed()).filter(|left| !left.is_zero()) else { return };
@@ -197,7 +226,7 @@ impl RunningGraph {
     /// # Real-time
     /// Not real-time safe: takes a lock. Never from an actor: in virtual time [`wait_for`](Self::wait_for) holds it.
     pub fn elapsed(&self) -> Nanos {
-        match &*lock(&self.executor) {
+        match &lock(&self.executor).executor {
             Executor::Threaded(threads) => threads.elapsed(),
             Executor::Virtual(run) => run.now,
         }
@@ -208,9 +237,10 @@ impl RunningGraph {
     /// # Real-time
     /// Not real-time safe: takes a lock, may start a group again. Never from an actor, as [`elapsed`](Self::elapsed).
     pub fn finished(&self) -> bool {
-        match &mut *lock(&self.executor) {
-            Executor::Threaded(threads) => threads.poll(),
-            Executor::Virtual(run) => run.supervisor.all_ended(),
+        let mut supervised = lock(&self.executor);
+        match (supervised.poll(), &supervised.executor) {
+            (None, Executor::Virtual(run)) => run.supervisor.all_ended(),
+            (over, _) => over.unwrap_or(true),
         }
     }
 
@@ -258,8 +288,8 @@ impl RunningGraph {
     /// Not real-time safe: waits for every group. Never from an actor: its own group is one of them.
     pub fn stop(self) -> RuntimeReport {
         let given_up = self.end();
-        let executor = lock(&self.executor);
-        let (supervisor, at, costs) = match &*executor {
+        let supervised = lock(&self.executor);
+        let (supervisor, at, costs) = match &supervised.executor {
             Executor::Threaded(threads) => (&threads.supervisor, threads.elapsed(), Vec::new()),
             Executor::Virtual(run) => {
                 let cost = |(name, cpu): (&String, _)| GroupCost { name: name.clone(), cpu };
@@ -290,13 +320,16 @@ impl RunningGraph {
 
     /// Ends the run if it has not ended; returns the groups that had to be given up.
     fn end(&self) -> Vec<String> {
-        match &mut *lock(&self.executor) {
+        let mut supervised = lock(&self.executor);
+        let given_up = match &mut supervised.executor {
             Executor::Threaded(threads) => threads.join(&self.names, STOP_BOUND),
             Executor::Virtual(run) => {
                 run.end_all();
                 Vec::new()
             }
-        }
+        };
+        supervised.tell_rest();
+        given_up
     }
 }
 
@@ -333,7 +366,7 @@ mod tests {
         graph.group(RateGroup::hz(100).name("log").observer(), vec![]);
         let running = graph.build().unwrap().start().unwrap();
         running.wait_for(Duration::from_millis(30));
-        let given_up = |bound| match &mut *lock(&running.executor) {
+        let given_up = |bound| match &mut lock(&running.executor).executor {
             Executor::Threaded(threads) => threads.join(&running.names, bound),
             Executor::Virtual(_) => unreachable!("the graph is threaded"),
         };

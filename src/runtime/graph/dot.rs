@@ -3,8 +3,15 @@
 use crate::graph::view::{GraphView, PortEnd};
 use std::fmt::Write;
 
+impl GraphView {
+    /// The picture in Graphviz's language: a cluster per rate group, a node per actor, an edge per port.
+    pub fn to_dot(&self) -> String {
+        of(self)
+    }
+}
+
 /// A cluster per group, a node per actor, an edge per port; what nobody holds is drawn in red.
-pub(crate) fn of(view: &GraphView) -> String {
+fn of(view: &GraphView) -> String {
     let mut dot = String::from(
         "digraph palpate {\n  rankdir=LR;\n  compound=true;\n  node [shape=box, style=rounded, fontname=\"sans-serif\"];\n  \
          edge [fontname=\"sans-serif\", fontsize=10];\n",

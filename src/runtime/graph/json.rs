@@ -6,8 +6,16 @@ use crate::primitives::histogram::Histogram;
 use crate::records::timing::SlipCounts;
 use crate::reports::group_live::GroupLive;
 
+impl GraphView {
+    /// The picture as JSON: one object with `execution`, `elapsed_ns`, `groups`, `ports` and `warnings`. Times are in
+    /// nanoseconds.
+    pub fn to_json(&self) -> String {
+        of(self)
+    }
+}
+
 /// The whole picture: a line per group and port.
-pub(crate) fn of(view: &GraphView) -> String {
+fn of(view: &GraphView) -> String {
     let execution = match view.execution {
         Execution::Virtual => "virtual",
         Execution::Threaded => "threaded",

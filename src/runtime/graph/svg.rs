@@ -142,7 +142,15 @@ fn ordered(columns: &[usize], edges: &[Edge]) -> Vec<Vec<usize>> {
     ordered
 }
 
-pub(crate) fn of(view: &GraphView) -> String {
+impl GraphView {
+    /// The picture as a drawing: a box per rate group with its actors, arrows from left to right for what goes forward
+    /// and from right to left for what comes back.
+    pub fn to_svg(&self) -> String {
+        of(self)
+    }
+}
+
+fn of(view: &GraphView) -> String {
     let (mut nodes, edges) = nodes(view);
     let pairs: Vec<_> = edges.iter().map(|edge| (edge.from.0, edge.to.0)).collect();
     let column = columns(nodes.len(), &pairs);

@@ -1,7 +1,6 @@
 //! The picture of a graph as data: what is known before a run, and what was measured in it.
 
 use crate::executor::Execution;
-use crate::graph::{dot, json, svg};
 use crate::rate_group::RateGroup;
 use crate::reports::group_live::GroupLive;
 use crate::time::{Nanos, Rate};
@@ -140,23 +139,6 @@ impl GraphView {
             }
         }
         self
-    }
-
-    /// The picture as JSON: one object with `execution`, `elapsed_ns`, `groups`, `ports` and `warnings`. Times are in
-    /// nanoseconds.
-    pub fn to_json(&self) -> String {
-        json::of(self)
-    }
-
-    /// The picture in Graphviz's language: a cluster per rate group, a node per actor, an edge per port.
-    pub fn to_dot(&self) -> String {
-        dot::of(self)
-    }
-
-    /// The picture as a drawing: a box per rate group with its actors, arrows from left to right for what goes forward
-    /// and from right to left for what comes back.
-    pub fn to_svg(&self) -> String {
-        svg::of(self)
     }
 
     /// An end in words: `group/actor`.

@@ -113,6 +113,12 @@ impl LiveReader {
         &self.name
     }
 
+    /// Skipped periods and missed deadlines so far.
+    pub(crate) fn counts(&self) -> (SlipCounts, SlipCounts) {
+        let counts = &self.last().counts;
+        (sums(&counts.skipped), sums(&counts.missed))
+    }
+
     /// Lateness and execution so far.
     pub(crate) fn times(&self) -> (Histogram, Histogram) {
         self.last().times()

@@ -3,4 +3,5 @@
 pub(crate) mod group_live;
 pub(crate) mod live;
 pub(crate) mod report;
+pub(crate) mod tell;
 pub(crate) mod text;

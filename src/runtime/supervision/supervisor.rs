@@ -83,6 +83,11 @@ impl Supervisor {
         }
     }
 
+    /// The first fault.
+    pub(crate) fn fault(&self) -> Option<&RuntimeFault> {
+        self.fault.as_ref()
+    }
+
     pub(crate) fn ended(&self) -> usize {
         self.reports.iter().flatten().count()
     }
