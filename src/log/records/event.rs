@@ -62,6 +62,10 @@ impl TextEvent {
                 let waited = Nanos(event.detail);
                 (Level::Error, format!("{group}: a release did not return within {waited}, its thread was left behind"))
             }
+            Event::STARVED => {
+                let waited = Nanos(event.detail);
+                (Level::Warning, format!("{group}: a release overdue by {waited} gets too little of a processor"))
+            }
             Event::WINDING_DOWN => {
                 (Level::Info, format!("{group}: winding down, {} more periods to come to rest", event.detail))
             }

@@ -161,7 +161,8 @@ impl Link {
                 // The actors were started without it, like those before them.
                 let granted = set_up_thread(&group.spec);
                 let restartable = restarter.may_restart();
-                let begun = Restarted { group: failure.group, restarter, books, failure, grant: granted.group };
+                let (group_number, grant, probe) = (failure.group, granted.group, granted.probe);
+                let begun = Restarted { group: group_number, restarter, books, failure, grant, probe };
                 let _ = self.post.try_send(Message::Restarted(Box::new(begun)));
                 GroupThread { group, restartable, watched: true, link: self }.run(granted.waiter);
             }

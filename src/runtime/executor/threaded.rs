@@ -10,11 +10,12 @@ use crate::group::panic_hook;
 use crate::primitives::exchange::ExchangeReader;
 use crate::rate_group::RateGroup;
 use crate::reports::report::RuntimeFault;
+use crate::supervision::overdue::{Overdue, OverdueWatch};
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND};
 use crate::supervision::supervisor::{Failure, Message, Restarted, Supervisor};
 use crate::system::grant::{GrantHandle, SystemGrant, ThreadGrant, set_up_thread};
-use crate::system::os;
+use crate::system::os::{self, ThreadProbe};
 use crate::time::Nanos;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::fs::File;
@@ -38,8 +39,8 @@ struct Seat {
     restart: Option<(Restarter, ExchangeReader<Ledger>)>,
     incarnation: usize,
     lease: Arc<Lease>,
-    /// The release that is waited for, and for how long the supervisor has seen it overdue.
-    overdue: (u64, Nanos),
+    probe: ThreadProbe,
+    watch: OverdueWatch,
 }
 
 /// The threads of a run.
@@ -82,7 +83,7 @@ impl Threads {
         let mut gates = Vec::new();
         for group in &groups {
             let (thread, gate, granted) = spawn(&group.spec)?;
-            handles.push(thread);
+            handles.push((thread, granted.probe));
             gates.push(gate);
             grant.timer_slack = worse(grant.timer_slack, granted.timer_slack);
             grant.groups.push(granted.group);
@@ -98,14 +99,15 @@ impl Threads {
         let base_ns = os::monotonic() + LEAD_NS;
         let supervisor = Supervisor::new(groups.len());
         let mut seats = Vec::new();
-        for (((group, gate), restart), handle) in groups.into_iter().zip(gates).zip(restarters).zip(handles) {
+        for (((group, gate), restart), (handle, probe)) in groups.into_iter().zip(gates).zip(restarters).zip(handles) {
             let lease = Arc::new(Lease::default());
             // A thread waits at its gate until it gets its group, so this cannot fail.
             let (control, post) = (Arc::clone(&control), post.clone());
             let link = Link { base_ns, incarnation: 0, lease: Arc::clone(&lease), control, post };
             let restartable = restart.as_ref().is_some_and(|(restarter, _)| restarter.may_restart());
             let _ = gate.send(GroupThread { group, restartable, watched: restart.is_some(), link });
-            seats.push(Seat { handle: Some(handle), restart, incarnation: 0, lease, overdue: (0, Nanos::ZERO) });
+            let watch = OverdueWatch::default();
+            seats.push(Seat { handle: Some(handle), restart, incarnation: 0, lease, probe, watch });
         }
         Ok(Self {
             seats,
@@ -174,7 +176,7 @@ impl Threads {
         };
         seat.incarnation += 1;
         seat.lease = Arc::new(Lease::default());
-        seat.overdue = (0, Nanos::ZERO);
+        seat.watch = OverdueWatch::default();
         let link = Link {
             incarnation: seat.incarnation,
             base_ns: self.base_ns,
@@ -190,7 +192,8 @@ impl Threads {
 
     /// A replacement has made the actors and goes on.
     fn install(&mut self, begun: Restarted) {
-        self.seats[begun.group].restart = Some((begun.restarter, begun.books));
+        let seat = &mut self.seats[begun.group];
+        (seat.restart, seat.probe) = (Some((begun.restarter, begun.books)), begun.probe);
         self.supervisor.restarts.push(begun.failure.fault);
         self.grants.replace(begun.group, begun.grant);
     }
@@ -214,7 +217,7 @@ impl Threads {
         }
     }
 
-    /// True if a restartable group's release has not returned for too long.
+    /// True if a restartable group's release hangs.
     fn hangs(&mut self, index: usize, now: Nanos, step: Nanos) -> bool {
         let seat = &mut self.seats[index];
         let Some((restarter, books)) = &mut seat.restart else { return false };
@@ -224,15 +227,17 @@ impl Threads {
         books.refresh();
         let books = books.get();
         let Some(due) = books.next_due() else { return false };
-        let release = books.elapsed_periods();
-        if seat.overdue.0 != release {
-            seat.overdue = (release, Nanos::ZERO);
-        } else {
-            // Of the time since the last look, what it was overdue for; a device-paced group may wait for its device.
-            let late = now.saturating_sub(due + restarter.spec.watchdog().unwrap_or_default());
-            seat.overdue.1 = seat.overdue.1 + step.min(late);
+        // Of the time since the last look, what it was overdue for; a device-paced group may wait for its device.
+        let late = step.min(now.saturating_sub(due + restarter.spec.watchdog().unwrap_or_default()));
+        let (release, limit, probe) = (books.elapsed_periods(), restarter.policy.hung_after, seat.probe);
+        match seat.watch.look(release, late, limit, probe.cpu(), || probe.is_ready()) {
+            Overdue::Waited => false,
+            Overdue::Starved => {
+                restarter.starved(due);
+                false
+            }
+            Overdue::Hung => true,
         }
-        seat.overdue.1 > restarter.policy.hung_after
     }
 
     fn leave_behind(&mut self, index: usize, now: Nanos) {
@@ -246,9 +251,8 @@ impl Threads {
         books.refresh();
         let books = *books.get();
         // Its thread may never end: nobody joins it, and it takes the core from nobody.
-        if let Some(handle) = seat.handle.take() {
-            os::give_up_realtime(&handle);
-        }
+        seat.handle = None;
+        seat.probe.put_behind();
         let at = books.next_due().unwrap_or(now);
         restarter.abandoned(at);
         let what = format!("did not return within {} and was left behind", restarter.policy.hung_after);

@@ -90,6 +90,9 @@ impl Event {
     pub const ABANDONED: u32 = 8;
     /// The group began to bring what it drives to rest; `detail` is the number of periods that it has.
     pub const WINDING_DOWN: u32 = 9;
+    /// The release due at `stamp` was overdue for `detail` nanoseconds and went on waiting, because its thread got too
+    /// little of a processor.
+    pub const STARVED: u32 = 10;
     /// The detail of events about a state when it is normal again.
     pub const RECOVERED: u64 = u64::MAX;
 }

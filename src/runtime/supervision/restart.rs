@@ -22,9 +22,10 @@ pub(crate) type Factory = Box<dyn FnMut() -> Result<Vec<Box<dyn Actor>>, ActorEr
 pub struct Restart {
     /// The number of restarts in one run; the fault after the last of them stops the run.
     pub at_most: u32,
-    /// The time after which a release counts as hung, on threads: one that is due for this long and has not returned
-    /// counts as one that never will. Its thread is left behind with its ports, and a new one is started. Virtual time
-    /// cannot see it.
+    /// The time after which a release counts as hung, on threads: one that is overdue and has computed for this long, or
+    /// has waited this long for something else than a processor, counts as one that never returns. Its thread is left
+    /// behind with its ports, and a new one is started. One that gets no processor is late and not hung. Virtual time
+    /// cannot see either.
     pub hung_after: Nanos,
 }
 
@@ -83,6 +84,11 @@ impl Restarter {
     /// Notes that a thread was left behind in the release due at `at`.
     pub(crate) fn abandoned(&mut self, at: Nanos) {
         self.event(at, Event::ABANDONED, self.policy.hung_after.0);
+    }
+
+    /// Notes that the release due at `at` gets too little of a processor.
+    pub(crate) fn starved(&mut self, at: Nanos) {
+        self.event(at, Event::STARVED, self.policy.hung_after.0);
     }
 
     fn make(&mut self, ledger: Ledger) -> Result<(GroupRun, ExchangeReader<Ledger>), GraphError> {

@@ -5,6 +5,7 @@ use crate::primitives::exchange::ExchangeReader;
 use crate::reports::report::{GroupReport, RuntimeFault};
 use crate::supervision::restart::Restarter;
 use crate::system::grant::GroupGrant;
+use crate::system::os::ThreadProbe;
 use std::fmt;
 
 /// What group threads tell the supervisor.
@@ -51,6 +52,7 @@ pub(crate) struct Restarted {
     pub(crate) books: ExchangeReader<Ledger>,
     pub(crate) failure: Box<Failure>,
     pub(crate) grant: GroupGrant,
+    pub(crate) probe: ThreadProbe,
 }
 
 /// Collects what the groups report.

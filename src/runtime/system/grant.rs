@@ -82,6 +82,8 @@ pub(crate) struct ThreadGrant {
     pub(crate) group: GroupGrant,
     pub(crate) timer_slack: String,
     pub(crate) waiter: Waiter,
+    /// Shows the thread to the supervisor.
+    pub(crate) probe: os::ThreadProbe,
 }
 
 const FIFO: &str = "SCHED_FIFO";
@@ -108,7 +110,7 @@ pub(crate) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
         wait: waiter.to_string(),
         refused: refused.join("; "),
     };
-    ThreadGrant { group, timer_slack, waiter }
+    ThreadGrant { group, timer_slack, waiter, probe: os::ThreadProbe::of_this_thread() }
 }
 
 /// What a threaded run of `groups` would be refused now, a sentence each: the same set-up on threads that end at once.

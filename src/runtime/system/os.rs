@@ -3,7 +3,7 @@
 //! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
 
 pub(crate) use imp::{
-    block_signals, give_up_realtime, lock_memory, may_lock_everything, monotonic, set_realtime, set_timer_slack,
+    ThreadProbe, block_signals, lock_memory, may_lock_everything, monotonic, set_realtime, set_timer_slack,
     sleep_until, stay_awake, thread_cpu,
 };
 
@@ -49,9 +49,7 @@ pub(crate) fn clock_source() -> String {
 mod imp {
     use std::fs::File;
     use std::io::{Error, Write};
-    use std::os::unix::thread::JoinHandleExt;
     use std::sync::OnceLock;
-    use std::thread::JoinHandle;
 
     const NANOS_PER_S: u64 = 1_000_000_000;
 
@@ -103,13 +101,46 @@ mod imp {
         if result == 0 { Ok(()) } else { Err(format!("SCHED_FIFO {priority} refused: {}", Error::last_os_error())) }
     }
 
-    /// Takes the real-time policy from another thread, which may be spinning and would keep its core from its
-    /// replacement.
-    pub(crate) fn give_up_realtime(thread: &JoinHandle<()>) {
-        let parameter = libc::sched_param { sched_priority: 0 };
-        // SAFETY: the thread has not been joined or detached, so the handle is valid; the pointer is to a sched_param
-        // of our own. A refusal leaves the thread as it is.
-        unsafe { libc::pthread_setschedparam(thread.as_pthread_t(), libc::SCHED_OTHER, &raw const parameter) };
+    /// A thread seen from another one: the time that it computed, and whether it waits for anything but a processor.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct ThreadProbe {
+        id: libc::pid_t,
+        clock: Option<libc::clockid_t>,
+    }
+
+    impl ThreadProbe {
+        /// The calling thread.
+        pub(crate) fn of_this_thread() -> Self {
+            let mut clock = 0;
+            // SAFETY: the first asks for a number; the second takes the calling thread's own handle and a pointer to a
+            // number of our own.
+            let (id, result) =
+                unsafe { (libc::gettid(), libc::pthread_getcpuclockid(libc::pthread_self(), &raw mut clock)) };
+            Self { id, clock: (result == 0).then_some(clock) }
+        }
+
+        /// CPU time that the thread has used, in nanoseconds; `None` if it has ended.
+        pub(crate) fn cpu(&self) -> Option<u64> {
+            let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+            // SAFETY: the pointer is to a timespec of our own; the clock of a thread that is gone is refused.
+            let result = unsafe { libc::clock_gettime(self.clock?, &raw mut time) };
+            (result == 0).then_some(time.tv_sec as u64 * NANOS_PER_S + time.tv_nsec as u64)
+        }
+
+        /// True if the thread could go on if it were given a processor, or was stopped from outside; not so if it waits for
+        /// a lock, a device, a page, or if nobody knows.
+        pub(crate) fn is_ready(&self) -> bool {
+            let stat = std::fs::read_to_string(format!("/proc/self/task/{}/stat", self.id)).unwrap_or_default();
+            // The name before the state may hold anything, brackets too.
+            stat.rsplit_once(") ").is_some_and(|(_, state)| state.starts_with(['R', 'T', 't']))
+        }
+
+        /// Puts the thread behind all others: it may be spinning and would keep its core from its replacement.
+        pub(crate) fn put_behind(&self) {
+            let parameter = libc::sched_param { sched_priority: 0 };
+            // SAFETY: the pointer is to a sched_param of our own and outlives the call. A refusal leaves the thread as it is.
+            unsafe { libc::syscall(libc::SYS_sched_setscheduler, self.id, libc::SCHED_IDLE, &raw const parameter) };
+        }
     }
 
     /// Leaves signals to the program's other threads: a handler on this one would make system calls in a tick. Those
@@ -209,7 +240,25 @@ mod imp {
         Err(NOT_AVAILABLE.to_owned())
     }
 
-    pub(crate) fn give_up_realtime(_thread: &std::thread::JoinHandle<()>) {}
+    /// Knows nothing here.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct ThreadProbe;
+
+    impl ThreadProbe {
+        pub(crate) fn of_this_thread() -> Self {
+            Self
+        }
+
+        pub(crate) fn cpu(&self) -> Option<u64> {
+            None
+        }
+
+        pub(crate) fn is_ready(&self) -> bool {
+            false
+        }
+
+        pub(crate) fn put_behind(&self) {}
+    }
 
     pub(crate) fn block_signals() {}
 

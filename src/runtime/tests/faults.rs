@@ -292,3 +292,41 @@ fn a_thread_that_never_returns_is_left_behind_with_its_ports() {
         "{ticks:?}"
     );
 }
+
+#[test]
+fn a_group_that_gets_no_processor_is_late_and_not_left_behind() {
+    let mut graph = Runtime::builder(Execution::Threaded);
+    let mut drain = graph.drain();
+    // One tick that keeps core 0 for itself for longer than a release may hang.
+    let hog = actor_fn("hog", |ctx| {
+        if ctx.tick == 1 {
+            support::busy(Duration::from_millis(500));
+        }
+        Outcome::Continue
+    });
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let sink = Arc::clone(&seen);
+    let factory = move || {
+        let sink = Arc::clone(&sink);
+        Ok(vec![actor_fn("slow", move |ctx| {
+            support::busy(Duration::from_millis(2));
+            sink.lock().unwrap().push(ctx.tick);
+            Outcome::Continue
+        })])
+    };
+    let restart = Restart { at_most: 3, hung_after: Nanos(100 * MS) };
+    graph.group(RateGroup::hz(10).name("hog").realtime(50).pin(0), vec![hog]);
+    graph.restartable(RateGroup::hz(100).name("slow").pin(0), restart, factory).until(Nanos(1_500 * MS));
+    let report = finish(&mut graph);
+    assert_identity(&report);
+    assert_eq!((report.fault, report.restarts), (None, vec![]));
+    let slow = &report.groups[1];
+    assert!(slow.skipped >= 20, "core 0 was not taken: {slow:?}");
+    // Check that it goes on to the end, and that the log says why it was late.
+    assert!(seen.lock().unwrap().iter().any(|&tick| tick >= 120), "{slow:?}");
+    let mut records = Vec::new();
+    drain.drain(&mut records);
+    let events: Vec<Event> = records.iter().filter_map(Event::from_record).collect();
+    assert!(events.iter().any(|event| (event.group, event.code) == (1, Event::STARVED)), "{events:?}");
+    assert!(events.iter().all(|event| event.code != Event::ABANDONED), "{events:?}");
+}
