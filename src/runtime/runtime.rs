@@ -17,7 +17,7 @@ use crate::records::recorder::Registry;
 use crate::reexecution::replay::Reexecution;
 use crate::reports::group_live::GroupLive;
 use crate::reports::live::LiveReader;
-use crate::reports::report::{GroupCost, RuntimeFault, RuntimeReport};
+use crate::reports::report::{FaultKind, GroupCost, RuntimeFault, RuntimeReport};
 use crate::reports::tell::Teller;
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND, StopHandle};
@@ -303,8 +303,14 @@ impl RunningGraph {
             }
         }
         let what = "of a stop and was given up; its tick or stop must return";
-        let stuck =
-            || RuntimeFault::of_group(&given_up.join("`, `"), at, format!("did not end within {STOP_BOUND:?} {what}"));
+        let stuck = || {
+            RuntimeFault::of_group(
+                &given_up.join("`, `"),
+                at,
+                FaultKind::GivenUp,
+                format!("did not end within {STOP_BOUND:?} {what}"),
+            )
+        };
         let fault = fault.or_else(|| (!given_up.is_empty()).then(stuck));
         let grant = self.grants.get().unwrap_or_default();
         RuntimeReport {

@@ -39,6 +39,27 @@ pub struct GroupReport {
     pub execution: Histogram,
 }
 
+/// The kind of a fault, as far as a program can act on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum FaultKind {
+    /// An actor panicked. The sentence has its words and, where known, the place in the source.
+    Panic,
+    /// An actor reported a [fault](crate::Outcome::Fault) with this code of the program's own.
+    Reported(u32),
+    /// The group's policy is to stop at an overrun, and one came.
+    Overrun {
+        /// The number of periods that were due at once.
+        skipped: u64,
+    },
+    /// A release did not return for as long as its [restart policy](crate::Restart::hung_after) allows.
+    Hung,
+    /// A group did not end within [`STOP_BOUND`](crate::STOP_BOUND) of a stop and was given up with its thread.
+    GivenUp,
+    /// A re-execution left its recording, or the recording lacks what a release needs.
+    Recording,
+}
+
 /// The first fatal event of a run: why it ended before it should.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RuntimeFault {
@@ -48,14 +69,16 @@ pub struct RuntimeFault {
     pub actor: String,
     /// The scheduled time of the release that the fault happened in.
     pub at: Nanos,
+    /// The kind of the fault, for programs.
+    pub kind: FaultKind,
     /// A sentence that says what happened.
     pub what: String,
 }
 
 impl RuntimeFault {
     /// A fault of a group itself, not of an actor in it.
-    pub(crate) fn of_group(group: &str, at: Nanos, what: String) -> Self {
-        Self { group: group.to_owned(), actor: String::new(), at, what }
+    pub(crate) fn of_group(group: &str, at: Nanos, kind: FaultKind, what: String) -> Self {
+        Self { group: group.to_owned(), actor: String::new(), at, kind, what }
     }
 }
 
