@@ -10,6 +10,7 @@ use crate::graph::view::PortKind;
 use crate::graph::wiring::Wiring;
 use crate::group::group_run::GroupRun;
 use crate::ports::exchange_port::{Reader, Writer};
+use crate::ports::inlet::{Commands, Input, Parameter};
 use crate::ports::outlet::{OutletReader, OutletWriter, outlet};
 use crate::ports::port_state::PortPlan;
 use crate::ports::port_traffic::Sides;
@@ -117,7 +118,7 @@ impl RuntimeBuilder {
 
     /// Names the port that is made next, and declares its ends for the [picture of the graph](crate::GraphView) before the run:
     /// each is an actor, `group/actor` where several actors have that name, or a rate group. The reading end of an
-    /// outlet is outside the graph and may be any word.
+    /// outlet and the sending end of a parameter or of commands are outside the graph and may be any word.
     ///
     /// Without it a port has a number for a name, and its ends are known once they have been used.
     ///
@@ -184,6 +185,23 @@ impl RuntimeBuilder {
     /// group can take again.
     pub fn outlet_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> OutletPort<T> {
         OutletPort::new(self.plan_outlet::<T>(), init)
+    }
+
+    /// A value that the program sets from outside while the graph runs.
+    ///
+    /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
+    pub fn parameter<T: Input>(&mut self, initial: T) -> Parameter<T> {
+        let (plan, script) = self.plan_port::<T>(PortKind::Parameter);
+        Parameter::new(plan, script, initial)
+    }
+
+    /// Commands that the program sends from outside while the graph runs; at least `capacity` of them may wait, rounded
+    /// up to a power of two.
+    ///
+    /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
+    pub fn commands<T: Input>(&mut self, capacity: usize) -> Commands<T> {
+        let (plan, script) = self.plan_port::<T>(PortKind::Commands);
+        Commands::new(plan, script, capacity)
     }
 
     /// A record sink for one actor, holding at least `capacity` records between two drains.

@@ -5,7 +5,8 @@
 //! time*, one thread for everything, in the order (time, group), bit-identical every time. The actors are the same.
 //!
 //! - Ports: [`exchange`](RuntimeBuilder::exchange) for the newest value of a large state,
-//!   [`queue`](RuntimeBuilder::queue) for ordered samples, [`outlet`](RuntimeBuilder::outlet) for threads outside.
+//!   [`queue`](RuntimeBuilder::queue) for ordered samples, [`outlet`](RuntimeBuilder::outlet) for threads outside,
+//!   [`parameter`](RuntimeBuilder::parameter) and [`commands`](RuntimeBuilder::commands) from threads outside.
 //! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
 //!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
 //! - Release modes: the clock, or a [device](Release::DevicePaced) whose blocking read drives its group.
@@ -108,6 +109,7 @@ pub use executor::Execution;
 pub use executor::disturbance::Disturbance;
 pub use graph::view::{GraphGroup, GraphPort, GraphView, PortEnd, PortKind};
 pub use ports::exchange_port::{Reader, Writer};
+pub use ports::inlet::{CommandReceiver, Commands, Input, Parameter, ParameterReader};
 pub use ports::outlet::{OutletReader, OutletWriter};
 pub use ports::queue_port::{QueueReader, QueueWriter};
 pub use ports::restartable::{ExchangePort, OutletPort, QueuePort, RecorderPort};

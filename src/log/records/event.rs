@@ -80,7 +80,7 @@ impl TextEvent {
                 Level::Warning,
                 format!("{group}: the device is silent, the watchdog took over at release {}", event.detail),
             ),
-            code => (Level::Warning, format!("{group}: event {code}, detail {}", event.detail)),
+            code => (Level::Warning, format!("{group}: event {}, detail {}", code.code(), event.detail)),
         };
         Self { time: event.stamp, level, message }
     }

@@ -61,6 +61,10 @@ pub enum PortKind {
     Queue,
     /// The newest value for a thread outside the graph.
     Outlet,
+    /// The newest value from outside the graph.
+    Parameter,
+    /// Commands in order from outside the graph.
+    Commands,
 }
 
 impl PortKind {
@@ -70,6 +74,8 @@ impl PortKind {
             Self::Exchange => "exchange",
             Self::Queue => "queue",
             Self::Outlet => "outlet",
+            Self::Parameter => "parameter",
+            Self::Commands => "commands",
         }
     }
 }

@@ -68,17 +68,22 @@ impl Wiring {
             }
             let port = &self.ports[index];
             let [from, to] = match &port.link {
-                None => [PortEnd::Unknown, PortEnd::Unknown],
+                None => match port.kind {
+                    PortKind::Outlet => [PortEnd::Unknown, outside()],
+                    PortKind::Parameter | PortKind::Commands => [outside(), PortEnd::Unknown],
+                    PortKind::Exchange | PortKind::Queue => [PortEnd::Unknown, PortEnd::Unknown],
+                },
                 Some(link) => {
                     let place = |end: &str| self.find(&names, end).map_err(|error| error.at(format!("link `{name}`")));
-                    let to = match port.kind {
-                        PortKind::Outlet => PortEnd::Outside(link.to.clone()),
-                        PortKind::Exchange | PortKind::Queue => place(&link.to)?,
-                    };
-                    [place(&link.from)?, to]
+                    match port.kind {
+                        PortKind::Outlet => [place(&link.from)?, PortEnd::Outside(link.to.clone())],
+                        PortKind::Parameter | PortKind::Commands => {
+                            [PortEnd::Outside(link.from.clone()), place(&link.to)?]
+                        }
+                        PortKind::Exchange | PortKind::Queue => [place(&link.from)?, place(&link.to)?],
+                    }
                 }
             };
-            let to = if port.kind == PortKind::Outlet && to == PortEnd::Unknown { outside() } else { to };
             let held = |held: bool, end| if held { end } else { PortEnd::Nobody };
             let ends = [held(port.sides.writer.is_held(), from), held(port.sides.reader.is_held(), to)];
             self.ports[index].ends = ends;

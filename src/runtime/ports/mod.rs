@@ -3,6 +3,7 @@
 pub(crate) mod exchange_port;
 pub(crate) mod hot_swap;
 pub(crate) mod hot_swap_queue;
+pub(crate) mod inlet;
 pub(crate) mod outlet;
 pub(crate) mod port_state;
 pub(crate) mod port_traffic;

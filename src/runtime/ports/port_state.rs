@@ -4,6 +4,7 @@
 use crate::actor::{Phase, TickContext};
 use crate::ports::port_traffic::Sides;
 use crate::primitives::sync::{AtomicUsize, Ordering, lock};
+use crate::records::input::InputUse;
 use crate::records::port_use::{PortUse, PortUseKind};
 use crate::records::recorder::{Recorder, Registry};
 use std::sync::{Arc, Mutex};
@@ -110,6 +111,14 @@ pub(crate) struct UseRecorder {
 }
 
 impl UseRecorder {
+    /// Records a value from outside.
+    pub(crate) fn push_input(&mut self, ctx: &TickContext, value: [u64; 5]) {
+        let Some(recorder) = &mut self.recorder else { return };
+        let (port, sequence) = (self.port, self.sequence);
+        self.sequence += 1;
+        recorder.push(InputUse { time: ctx.scheduled, group: ctx.group, port, sequence, value });
+    }
+
     pub(crate) fn push(&mut self, ctx: &TickContext, count: u64) {
         let Some(recorder) = &mut self.recorder else { return };
         let (port, kind, sequence) = (self.port, self.kind, self.sequence);

@@ -69,10 +69,10 @@ impl<W: Send, R: Send> Pair<W, R> {
     }
 }
 
-type ExchangePair<T> = Pair<ExchangeWriter<T>, ExchangeReader<T>>;
-type RingPair<T> = Pair<Producer<Numbered<T>>, Consumer<Numbered<T>>>;
+pub(crate) type ExchangePair<T> = Pair<ExchangeWriter<T>, ExchangeReader<T>>;
+pub(crate) type RingPair<T> = Pair<Producer<Numbered<T>>, Consumer<Numbered<T>>>;
 
-fn exchange_pair<T: Send + 'static>(mut init: impl FnMut() -> T + Send + 'static) -> ExchangePair<T> {
+pub(crate) fn exchange_pair<T: Send + 'static>(mut init: impl FnMut() -> T + Send + 'static) -> ExchangePair<T> {
     Pair::new(
         move || exchange(&mut init),
         |mut untaken, writer| {
@@ -84,7 +84,7 @@ fn exchange_pair<T: Send + 'static>(mut init: impl FnMut() -> T + Send + 'static
     )
 }
 
-fn ring_pair<T: Copy + Send + 'static>(capacity: usize) -> RingPair<T> {
+pub(crate) fn ring_pair<T: Copy + Send + 'static>(capacity: usize) -> RingPair<T> {
     Pair::new(
         move || ring(capacity),
         // They fit: both rings have the same capacity.

@@ -15,6 +15,9 @@ impl Channel {
     pub const PORT: Self = Self(2);
     /// The time that each actor of a group took of one release: see [`ActorTimes`](crate::ActorTimes).
     pub const ACTORS: Self = Self(3);
+    /// A value that a release took from outside the graph, through a [parameter](crate::Parameter) or
+    /// [commands](crate::Commands).
+    pub const INPUT: Self = Self(4);
     /// The first number that programs may use.
     pub const FIRST_USER: Self = Self(16);
 }

@@ -93,10 +93,9 @@ impl Reexecution {
     /// Strikes out the release that group `index` has just run, and sees whether it did all that was recorded.
     pub(crate) fn done(&mut self, index: usize, group: &GroupRun) -> Result<(), RuntimeFault> {
         let Some(release) = self.releases[index].pop_front() else { return Ok(()) };
-        match self.script.left_out(group.index, release.tick) {
+        match self.script.left_out(group.index, release.tick, release.scheduled) {
             None => Ok(()),
-            Some(used) => {
-                let (tick, port) = (used.tick, used.port);
+            Some((tick, port)) => {
                 let what = format!("the re-execution left the recording: release {tick} has not read port {port}");
                 Err(fault(group, &release, what))
             }
