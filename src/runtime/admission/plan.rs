@@ -69,6 +69,10 @@ pub struct GroupPlan {
     pub budget: Option<Nanos>,
     /// The number of the core that the group is pinned to.
     pub cpu: Option<usize>,
+    /// The numbers of the cores that the group may run on, where it may run on several and not on all.
+    pub cpus: Vec<usize>,
+    /// True if SCHED_DEADLINE is asked for.
+    pub by_deadline: bool,
     /// The real-time priority asked for.
     pub priority: Option<u8>,
     /// The way in which the group waits for its releases, in words.
@@ -86,6 +90,8 @@ impl GroupPlan {
             deadline: group.relative_deadline(),
             budget: group.budget,
             cpu: group.cpu,
+            cpus: group.cpus.clone(),
+            by_deadline: group.by_deadline,
             priority: group.priority,
             wait: match execution {
                 Execution::Virtual => "virtual".to_owned(),
@@ -158,7 +164,8 @@ fn coincidences(groups: &[RateGroup], execution: Execution) -> Vec<Coincidence> 
     let mut found = Vec::new();
     for (index, first) in groups.iter().enumerate() {
         for second in &groups[index + 1..] {
-            let apart = matches!((first.cpu, second.cpu), (Some(a), Some(b)) if a != b);
+            let (a, b) = (first.cores(), second.cores());
+            let apart = !a.is_empty() && !b.is_empty() && a.iter().all(|core| !b.contains(core));
             if apart && execution == Execution::Threaded {
                 continue;
             }
@@ -209,11 +216,16 @@ impl fmt::Display for Plan {
             let policy = match (self.execution, group.priority) {
                 (Execution::Virtual, _) => "-".to_owned(),
                 (Execution::Threaded, Some(priority)) => format!("SCHED_FIFO {priority}"),
+                (Execution::Threaded, None) if group.by_deadline => "SCHED_DEADLINE".to_owned(),
                 (Execution::Threaded, None) => "SCHED_OTHER".to_owned(),
             };
             let core = match self.execution {
                 Execution::Virtual => "-".to_owned(),
-                Execution::Threaded => group.cpu.map_or("any".to_owned(), |cpu| cpu.to_string()),
+                Execution::Threaded => match (group.cpu, &group.cpus[..]) {
+                    (Some(cpu), _) => cpu.to_string(),
+                    (None, []) => "any".to_owned(),
+                    (None, cpus) => cpus.iter().map(usize::to_string).collect::<Vec<_>>().join(","),
+                },
             };
             write!(f, "{:width$} {:>10}", group.name, group.rate.to_string())?;
             for time in [Some(group.rate.period()), Some(group.offset), Some(group.deadline), group.budget] {

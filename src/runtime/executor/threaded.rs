@@ -74,7 +74,7 @@ impl Threads {
     ) -> Result<Self, GraphError> {
         panic_hook::install();
         let mut grant = SystemGrant::of_machine();
-        if groups.iter().any(|group| group.spec.priority.is_some()) {
+        if groups.iter().any(|group| group.spec.is_realtime()) {
             grant.mlock = os::lock_memory().map_or_else(|reason| reason, |()| "locked".to_owned());
         }
         // Each group reports at most a fault in a tick, one in its stop, and its end; a restarted one again and again.
@@ -89,7 +89,7 @@ impl Threads {
             grant.groups.push(granted.group);
         }
         // Who may not have a real-time policy gains little by it.
-        let real_time = grant.groups.iter().any(|group| group.priority > 0);
+        let real_time = grant.groups.iter().any(SystemGrant::is_realtime);
         let awake = real_time.then(os::stay_awake);
         if let Some(awake) = &awake {
             grant.idle_states = awake.as_ref().map_or_else(String::clone, |_| "held off".to_owned());
@@ -311,7 +311,7 @@ fn spawn(spec: &RateGroup) -> Result<(JoinHandle<()>, Sender<GroupThread>, Threa
         }
     };
     let failed = |reason: String| GraphError::refused(format!("no thread for rate group `{}`: {reason}", spec.name));
-    let thread = std::thread::Builder::new().name(spec.name.clone()).spawn(body);
+    let thread = spec.thread().spawn(body);
     let thread = thread.map_err(|error| failed(error.to_string()))?;
     let granted = granted.recv().map_err(|_| failed("it ended during its set-up".to_owned()))?;
     Ok((thread, gate, granted))

@@ -172,9 +172,10 @@ impl GraphGroup {
             rate: group.rate,
             deadline: group.relative_deadline(),
             budget: group.budget,
-            cores: group.cpu.into_iter().filter(|_| threaded).collect(),
+            cores: if threaded { group.cores() } else { Vec::new() },
             policy: match group.priority.filter(|_| threaded) {
                 Some(priority) => format!("SCHED_FIFO {priority}"),
+                None if threaded && group.by_deadline => "SCHED_DEADLINE".to_owned(),
                 None if threaded => "SCHED_OTHER".to_owned(),
                 None => "virtual time".to_owned(),
             },
