@@ -127,6 +127,7 @@ pub use runtime::{RunningGraph, Runtime};
 pub use supervision::restart::Restart;
 pub use supervision::stop::{STOP_BOUND, StopHandle};
 pub use system::grant::{GrantHandle, GroupGrant, SystemGrant};
+pub use system::machine::{MachineFinding, Readiness};
 pub use system::stopwatch::Stopwatch;
 pub use time::{Nanos, Rate};
 

@@ -8,11 +8,13 @@ use crate::graph::view::GraphView;
 use crate::rate_group::RateGroup;
 use crate::reports::text::{percent, places, short};
 use crate::system::grant::refusals;
+use crate::system::machine::{MachineFinding, Readiness, findings};
 use crate::system::os;
 use crate::system::wait::Waiter;
 use crate::time::{Nanos, Rate};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
 
 /// The schedule of a graph; its `Display` is a table.
 ///
@@ -46,6 +48,8 @@ pub struct Plan {
     pub coincidences: Vec<Coincidence>,
     /// The picture of the graph; groups alone where nothing else is known.
     pub graph: GraphView,
+    /// How far the machine is prepared for real time; empty in virtual time and if no group asks for a real-time policy.
+    pub machine: Vec<MachineFinding>,
     /// Privileges that the system would refuse now, a sentence each; a refusal degrades a run and never fails it.
     pub missing: Vec<String>,
 }
@@ -151,6 +155,10 @@ impl Plan {
             core_load,
             coincidences: coincidences(groups, execution),
             graph: GraphView::of_groups(execution, groups),
+            machine: match execution {
+                Execution::Virtual => Vec::new(),
+                Execution::Threaded => findings(Path::new("/"), groups),
+            },
             missing: match execution {
                 Execution::Virtual => Vec::new(),
                 Execution::Threaded => refusals(groups),
@@ -245,6 +253,11 @@ impl fmt::Display for Plan {
             writeln!(f, "coincide   {first} and {second}: {per_second} times per second, every {every}")?;
         }
         self.graph.warnings.iter().try_for_each(|warning| writeln!(f, "warning    {warning}"))?;
+        let lacks = self.machine.iter().filter(|finding| finding.state == Readiness::Missing);
+        lacks.clone().try_for_each(|finding| writeln!(f, "machine    {finding}"))?;
+        if lacks.count() > 0 {
+            writeln!(f, "           (docs/realtime.md explains each)")?;
+        }
         self.missing.iter().try_for_each(|missing| writeln!(f, "missing    {missing}"))
     }
 }

@@ -3,8 +3,8 @@
 //! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
 
 pub(crate) use imp::{
-    ThreadProbe, block_signals, lock_memory, may_lock_everything, monotonic, pin_to, set_deadline, set_realtime,
-    set_timer_slack, sleep_until, stay_awake, thread_cpu,
+    ThreadProbe, block_signals, is_root, lock_memory, may_lock_everything, monotonic, pin_to, set_deadline,
+    set_realtime, set_timer_slack, sleep_until, stay_awake, thread_cpu,
 };
 
 use std::fs::read_to_string;
@@ -88,6 +88,12 @@ mod imp {
         };
         // SAFETY: the pointer is to a timespec of our own; an absolute sleep writes no remainder.
         unsafe { libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &time, std::ptr::null_mut()) };
+    }
+
+    /// Whether the process has the rights of root, to whom limits say nothing.
+    pub(crate) fn is_root() -> bool {
+        // SAFETY: asks for a number and touches no memory.
+        unsafe { libc::geteuid() == 0 }
     }
 
     /// Lets the calling thread run on these cores only.
@@ -313,6 +319,10 @@ mod imp {
 
     pub(crate) fn set_deadline(_runtime: u64, _deadline: u64, _period: u64) -> Result<(), String> {
         Err(NOT_AVAILABLE.to_owned())
+    }
+
+    pub(crate) fn is_root() -> bool {
+        false
     }
 
     pub(crate) fn pin_to(_cpus: &[usize]) -> Result<(), String> {
