@@ -20,6 +20,8 @@ pub enum Cause {
     SamplesLost,
     /// The surroundings of a patch could not be reduced: its model serves without them.
     NoBasis,
+    /// The global model was too late to follow the tool: it goes on from its newest surface and the newest tool.
+    PathDropped,
 }
 
 impl Cause {
@@ -34,6 +36,7 @@ impl Cause {
             Self::GlobalNotFinite => 302,
             Self::SamplesLost => 303,
             Self::NoBasis => 304,
+            Self::PathDropped => 305,
         }
     }
 
@@ -47,6 +50,7 @@ impl Cause {
             301 => "the local model's force is not finite, zero is commanded",
             302 => "the global model's state is not finite, it publishes nothing any more",
             304 => "the surroundings of a patch could not be reduced",
+            305 => "the global model was too late to follow the tool, it goes on from the newest surface and tool",
             303 => "tool samples were lost between local and global model",
             _ => return None,
         })
@@ -59,8 +63,14 @@ mod tests {
 
     #[test]
     fn every_cause_has_words() {
-        let others =
-            [Cause::DeviceNotFinite, Cause::LocalNotFinite, Cause::GlobalNotFinite, Cause::SamplesLost, Cause::NoBasis];
+        let others = [
+            Cause::DeviceNotFinite,
+            Cause::LocalNotFinite,
+            Cause::GlobalNotFinite,
+            Cause::SamplesLost,
+            Cause::NoBasis,
+            Cause::PathDropped,
+        ];
         let causes: Vec<Cause> = DeviceFault::ALL.map(Cause::Device).into_iter().chain(others).collect();
         for (index, cause) in causes.iter().enumerate() {
             assert!(Cause::describe(cause.code()).is_some(), "{cause:?}");

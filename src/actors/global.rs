@@ -5,6 +5,7 @@ use super::cause::Cause;
 use super::messages::{Checkpoint, SurfaceView, ToolTick};
 use crate::error::Error;
 use crate::log::GlobalTick;
+use crate::model::Vec3;
 use crate::model::body::Body;
 use crate::model::contact::ToolMotion;
 use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, wider};
@@ -63,6 +64,10 @@ pub struct SurroundingsPorts {
 /// Where the tool may be by the time that a basis is ready (s).
 const PREFETCH_S: [f64; 3] = [0.15, 0.3, 0.6];
 
+/// The number of its own periods whose tool samples a release follows at most: one that finds more starts again from its newest
+/// surface and the newest tool, so that under load it does not fall behind without end.
+const MOST_PERIODS: u64 = 4;
+
 /// What a [`GlobalActor`] has to know of the session.
 #[derive(Clone, Debug)]
 pub struct GlobalPlan {
@@ -81,6 +86,11 @@ pub struct GlobalPlan {
 }
 
 impl GlobalPlan {
+    /// Haptic ticks in a period of its own.
+    fn period_ticks(&self) -> u64 {
+        (self.haptic.as_hz() / self.global.as_hz()).ceil().max(1.0) as u64
+    }
+
     /// How long a local model serves from its state on (s).
     fn lead_s(&self) -> f64 {
         f64::from(self.horizon) * self.haptic.period_s()
@@ -93,6 +103,10 @@ struct ToolSide {
     ports: ToolPorts,
     /// The tool at the last tick taken: the state's own time.
     tool: ToolTick,
+    /// Where it comes from (m).
+    from: Vec3,
+    /// Its sample of the last tick was missing.
+    is_between: bool,
     history: ToolHistory,
     /// Triangles that the window of its next model has to hold.
     triangles: Vec<u32>,
@@ -130,8 +144,8 @@ impl ToolSide {
 /// Runs the slow, detailed simulation.
 ///
 /// # Real-time
-/// Allocates in its first releases and where the patch changes its size. Its work grows with the tool samples that
-/// wait.
+/// Allocates in its first releases and where the patch changes its size. A release follows the tool samples of four of
+/// its periods at most; what is older is not made up, and the release is degraded.
 #[derive(Debug)]
 pub struct GlobalActor {
     simulation: Simulation,
@@ -167,6 +181,8 @@ impl GlobalActor {
         let side = |(&tool, ports): (&ToolTick, ToolPorts)| ToolSide {
             ports,
             tool,
+            from: tool.position,
+            is_between: false,
             history: ToolHistory::new(tool.position, plan.haptic.period_s()),
             triangles: Vec::new(),
             patch: Vec::new(),
@@ -181,37 +197,75 @@ impl GlobalActor {
         self.tools[0].tool.tick
     }
 
-    /// Advances along every tool sample up to `until`; returns whether all of them were there.
+    /// Advances along the tool samples up to `until`; what could not be followed as it was, if there is something.
+    ///
+    /// The work is bounded: of more than [`MOST_PERIODS`] the state is not followed. It goes on as it is, the tools go
+    /// straight to where they were a period ago, and from there along their samples.
+    fn follow_tools(&mut self, ctx: &TickContext, until: Nanos) -> Option<Cause> {
+        let (newest, period) = (self.plan.haptic.last_release(until), self.plan.period_ticks());
+        let mut cause = None;
+        if newest.saturating_sub(self.now()) > MOST_PERIODS * period {
+            let before = self.begin_way();
+            while self.take_samples(ctx, newest - period) {}
+            cause = self.go(before);
+        }
+        loop {
+            let before = self.begin_way();
+            if !self.take_samples(ctx, newest) {
+                return cause;
+            }
+            cause = cause.or(self.go(before));
+        }
+    }
+
+    /// The way of each tool begins where it is; the tick at which that is.
+    fn begin_way(&mut self) -> u64 {
+        self.tools.iter_mut().for_each(|side| side.from = side.tool.position);
+        self.now()
+    }
+
+    /// Puts every tool to the earliest tick that waits, if it is not after `newest`; returns whether there was one.
     ///
     /// The samples of all tools come in step. Where one lacks a sample that another has, it is interpolated.
-    fn follow_tools(&mut self, ctx: &TickContext, until: Nanos) -> bool {
-        let mut complete = true;
-        while let Some(next) = self.next_tick(ctx).filter(|&next| self.plan.haptic.release(next) <= until) {
-            let gap = next.saturating_sub(self.now());
-            let is_there = |side: &mut ToolSide| side.ports.ticks.peek(ctx).is_some_and(|sample| sample.tick <= next);
-            complete &= gap <= 1 && self.tools.iter_mut().all(is_there);
-            for i in 0..gap {
-                self.motions.clear();
-                for side in &mut self.tools {
-                    let sample = side.ports.ticks.peek(ctx).unwrap_or(side.tool);
-                    let owed = sample.tick.saturating_sub(side.tool.tick).max(1) as f64;
-                    let path = ToolMotion { from: side.tool.position, to: sample.position };
-                    let motion = path.part(i as f64 / owed, (i + 1) as f64 / owed);
-                    side.history.push(motion.to);
-                    self.motions.push(motion);
-                }
-                self.simulation.tick_all(&self.motions);
-            }
-            for (index, side) in self.tools.iter_mut().enumerate() {
-                if let Some(sample) = side.ports.ticks.peek(ctx).filter(|sample| sample.tick <= next) {
-                    side.ports.ticks.pop(ctx);
-                    side.tool = sample;
-                } else if let Some(motion) = self.motions.get(index) {
-                    side.tool = ToolTick { tick: next, position: motion.to };
-                }
-            }
+    fn take_samples(&mut self, ctx: &TickContext, newest: u64) -> bool {
+        let Some(next) = self.next_tick(ctx).filter(|&next| next <= newest) else { return false };
+        for side in &mut self.tools {
+            let sample = side.ports.ticks.peek(ctx).unwrap_or(side.tool);
+            side.is_between = sample.tick > next;
+            side.tool = if side.is_between {
+                let share = next.saturating_sub(side.tool.tick) as f64 / (sample.tick - side.tool.tick) as f64;
+                let position = side.tool.position + (sample.position - side.tool.position) * share;
+                ToolTick { tick: next, position }
+            } else {
+                side.ports.ticks.pop(ctx);
+                sample
+            };
         }
-        complete
+        true
+    }
+
+    /// Advances while each tool goes its way, which began at the tick `before`, in a period's ticks at most.
+    fn go(&mut self, before: u64) -> Option<Cause> {
+        let passed = self.now().saturating_sub(before);
+        let ticks = passed.min(self.plan.period_ticks());
+        for i in 0..ticks {
+            let part = |side: &mut ToolSide| {
+                let way = ToolMotion { from: side.from, to: side.tool.position };
+                let motion = way.part(i as f64 / ticks as f64, (i + 1) as f64 / ticks as f64);
+                side.history.push(motion.to);
+                motion
+            };
+            self.motions.clear();
+            self.motions.extend(self.tools.iter_mut().map(part));
+            self.simulation.tick_all(&self.motions);
+        }
+        if passed > ticks {
+            // Nobody moved as the tools did here: what they will do is not to be told from it.
+            self.tools.iter_mut().for_each(|side| side.history.restart(side.tool.position));
+            return Some(Cause::PathDropped);
+        }
+        let is_interpolated = passed > 1 || self.tools.iter().any(|side| side.is_between);
+        is_interpolated.then_some(Cause::SamplesLost)
     }
 
     /// The earliest tick that waits, once there is one of every tool.
@@ -367,7 +421,7 @@ impl Actor for GlobalActor {
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         let before = self.now();
         self.take_bases(ctx);
-        let complete = self.follow_tools(ctx, ctx.scheduled);
+        let incomplete = self.follow_tools(ctx, ctx.scheduled);
         if self.now() == before {
             // Release 0, or local models that stand still: there is nothing new to say.
             return Outcome::Continue;
@@ -387,6 +441,6 @@ impl Actor for GlobalActor {
             first_tick: before + 1,
             last_tick: self.now(),
         });
-        if complete { Outcome::Continue } else { Outcome::Degraded(Cause::SamplesLost.code()) }
+        incomplete.map_or(Outcome::Continue, |cause| Outcome::Degraded(cause.code()))
     }
 }

@@ -78,7 +78,7 @@ impl LoggerActor {
         outcome: LoggerOutcome,
     ) -> Self {
         let stats = (0..environment.groups.len() as u16).map(StatsCounter::new).collect();
-        let mut analysis = Analysis::default();
+        let mut analysis = Analysis::bounded();
         analysis.set_environment(&environment);
         Self {
             drain,

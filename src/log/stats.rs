@@ -79,7 +79,8 @@ pub struct StatsCounter {
 impl StatsCounter {
     /// A counter for `group`.
     pub fn new(group: u16) -> Self {
-        Self { now: GroupStats { group, ..GroupStats::default() }, ..Self::default() }
+        let now = GroupStats { group, ..GroupStats::default() };
+        Self { now, lateness: Distribution::bounded(), execution: Distribution::bounded(), ..Self::default() }
     }
 
     /// Counts one release. Returns the statistics of the second before if this release begins another one. Allocates.

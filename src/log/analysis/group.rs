@@ -105,6 +105,12 @@ pub struct TickFigures {
 }
 
 impl GroupCounter {
+    /// A counter for a run of any length, see [`Distribution::bounded`].
+    pub(super) fn bounded() -> Self {
+        let [lateness, execution, period_error, jitter] = [(); 4].map(|()| Distribution::bounded());
+        Self { lateness, execution, period_error, jitter, ..Self::default() }
+    }
+
     /// Counts one release. Allocates.
     pub fn push(&mut self, timing: &TickTiming) {
         for (cause, slips) in timing.slips_by_cause() {

@@ -120,6 +120,12 @@ pub(super) struct HapticsCounter {
 }
 
 impl HapticsCounter {
+    /// A counter for a run of any length, see [`Distribution::bounded`].
+    pub(super) fn bounded() -> Self {
+        let [jump_before, jump_after, model_age] = [(); 3].map(|()| Magnitudes::bounded());
+        Self { jump_before, jump_after, model_age, resync_age: Distribution::bounded(), ..Self::default() }
+    }
+
     pub(super) fn push_force(&mut self, sample: &ForceSample) {
         self.force.ticks += 1;
         self.force.served[usize::from(sample.served_by as u16)] += 1;

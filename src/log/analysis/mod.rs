@@ -80,7 +80,7 @@ impl RunReport {
 
 /// Gathers a [`RunReport`] from records in any order that is in time order within each group.
 ///
-/// Memory grows with the number of distinct durations, see [`Distribution`](super::Distribution).
+/// Memory grows with the number of distinct durations, unless it is [`bounded`](Self::bounded).
 ///
 /// ```
 /// use palpate::log::{Analysis, LogRecord};
@@ -92,6 +92,7 @@ impl RunReport {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Analysis {
+    is_bounded: bool,
     environment: Option<Environment>,
     duration: Nanos,
     groups: BTreeMap<u16, GroupCounter>,
@@ -104,11 +105,23 @@ pub struct Analysis {
 }
 
 impl Analysis {
+    /// An analysis for a run of any length while it goes on: see [`Distribution::bounded`](super::Distribution::bounded).
+    pub fn bounded() -> Self {
+        Self { is_bounded: true, ..Self::default() }
+    }
+
+    fn group(&mut self, group: u16) -> &mut GroupCounter {
+        let bounded = self.is_bounded;
+        self.groups
+            .entry(group)
+            .or_insert_with(|| if bounded { GroupCounter::bounded() } else { GroupCounter::default() })
+    }
+
     /// Counts one record. Allocates.
     pub fn push(&mut self, record: &LogRecord) {
         self.duration = self.duration.max(record.time());
         match record {
-            LogRecord::Tick(r) => self.groups.entry(r.group).or_default().push(r),
+            LogRecord::Tick(r) => self.group(r.group).push(r),
             LogRecord::Event(r) => self.push_event(r),
             LogRecord::Force(r) => self.device(record).push_force(r),
             LogRecord::Command(r) => self.device(record).push_command(r),
@@ -123,7 +136,9 @@ impl Analysis {
     }
 
     fn device(&mut self, record: &LogRecord) -> &mut HapticsCounter {
-        self.haptics.entry(record.device()).or_default()
+        let bounded = self.is_bounded;
+        let new = || if bounded { HapticsCounter::bounded() } else { HapticsCounter::default() };
+        self.haptics.entry(record.device()).or_insert_with(new)
     }
 
     /// Counts one entry of a log.
@@ -153,7 +168,7 @@ impl Analysis {
 
     /// Notes that `total` records of `group` have been lost since the start.
     pub fn set_lost(&mut self, group: u16, total: u64) {
-        self.groups.entry(group).or_default().set_lost(total);
+        self.group(group).set_lost(total);
     }
 
     /// The environment of the run, if it is known.
@@ -163,7 +178,7 @@ impl Analysis {
 
     /// Counts releases of which the lateness alone is known (ns).
     pub fn push_lateness(&mut self, group: u16, lateness: u64, count: u64) {
-        self.groups.entry(group).or_default().push_lateness(lateness, count);
+        self.group(group).push_lateness(lateness, count);
     }
 
     /// The figures of a release that is pushed next.

@@ -74,6 +74,15 @@ impl ToolHistory {
         Self { positions: vec![position; ticks(CHANGE_SPAN, tick) + 1], known: 0, tick }
     }
 
+    /// Forgets the way so far: the tool has rested at `position` (m).
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
+    pub fn restart(&mut self, position: Vec3) {
+        self.positions.fill(position);
+        self.known = 0;
+    }
+
     /// Adds the tool's position one tick after the last (m).
     ///
     /// # Real-time
