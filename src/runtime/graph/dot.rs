@@ -23,7 +23,7 @@ fn of(view: &GraphView) -> String {
         // An edge needs a node, also in a group whose actor is not known.
         let _ = writeln!(dot, "    g{index} [shape=point, style=invis];");
         for (actor, name) in group.actors.iter().enumerate() {
-            let _ = writeln!(dot, "    g{index}a{actor} [label={}];", quoted(&[name.clone()]));
+            let _ = writeln!(dot, "    g{index}a{actor} [label={}];", quoted(std::slice::from_ref(name)));
         }
         dot.push_str("  }\n");
     }
@@ -36,7 +36,7 @@ fn of(view: &GraphView) -> String {
                 PortEnd::Group { group, actor: None } => format!("g{group}"),
                 PortEnd::Outside(name) => {
                     let node = format!("o{}", outside(view, name));
-                    let _ = writeln!(dot, "  {node} [label={}, shape=ellipse];", quoted(&[name.clone()]));
+                    let _ = writeln!(dot, "  {node} [label={}, shape=ellipse];", quoted(std::slice::from_ref(name)));
                     node
                 }
                 PortEnd::Unknown | PortEnd::Nobody => {
