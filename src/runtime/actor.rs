@@ -198,6 +198,8 @@ pub struct TickContext {
     pub(crate) visible_at: Nanos,
     /// The rate group that is called: ports tell by it what comes from another group.
     pub(crate) group: u16,
+    /// The place of the actor that is called among those of the group.
+    pub(crate) actor: u16,
     /// In which part of its life.
     pub(crate) phase: Phase,
     /// How the graph runs; `None` by hand, which ports of both executions take.
@@ -219,6 +221,7 @@ impl TickContext {
             mode: GroupMode::Normal,
             visible_at: scheduled,
             group: 0,
+            actor: 0,
             phase: Phase::Release,
             execution: None,
         }

@@ -6,10 +6,14 @@ use crate::admission::plan::Plan;
 use crate::error::{ActorError, GraphError};
 use crate::executor::Execution;
 use crate::executor::disturbance::{Disturb, Disturbance};
+use crate::graph::view::PortKind;
+use crate::graph::wiring::Wiring;
 use crate::group::group_run::GroupRun;
 use crate::ports::exchange_port::{Reader, Writer};
+use crate::ports::inlet::{Commands, Input, Parameter};
 use crate::ports::outlet::{OutletReader, OutletWriter, outlet};
 use crate::ports::port_state::PortPlan;
+use crate::ports::port_traffic::Sides;
 use crate::ports::queue_port::{QueueReader, QueueWriter};
 use crate::ports::restartable::{ExchangePort, OutletPort, QueuePort, RecorderPort};
 use crate::rate_group::RateGroup;
@@ -55,6 +59,7 @@ pub struct RuntimeBuilder {
     grants: GrantHandle,
     /// Exchanges and queues made so far.
     ports: u32,
+    wiring: Wiring,
     measures_cost: bool,
     /// What to repeat, and what its ports must show.
     recording: Option<(Recording, Script)>,
@@ -86,6 +91,7 @@ impl RuntimeBuilder {
             registry: Registry::new(),
             grants: GrantHandle::default(),
             ports: 0,
+            wiring: Wiring::default(),
             measures_cost: false,
             recording: recording.map(|recording| {
                 let script = recording.script();
@@ -95,11 +101,50 @@ impl RuntimeBuilder {
     }
 
     /// The next port's number, and what it must show in a re-execution.
-    fn plan_port(&mut self) -> (PortPlan, Option<ScriptedPort>) {
+    fn plan_port<T>(&mut self, kind: PortKind) -> (PortPlan, Option<ScriptedPort>) {
         let port = self.ports;
         self.ports += 1;
         let script = self.recording.as_ref().map(|(_, script)| script.port(port));
-        (PortPlan::new(self.execution, port, &self.registry), script)
+        let plan = PortPlan::new(self.execution, port, &self.registry);
+        self.wiring.add::<T>(kind, &plan.sides);
+        (plan, script)
+    }
+
+    fn plan_outlet<T>(&mut self) -> Sides {
+        let sides = Sides::new();
+        self.wiring.add::<T>(PortKind::Outlet, &sides);
+        sides
+    }
+
+    /// Names the port that is made next, and declares its ends for the [picture of the graph](crate::GraphView) before the run:
+    /// each is an actor, `group/actor` where several actors have that name, or a rate group. The reading end of an
+    /// outlet and the sending end of a parameter or of commands are outside the graph and may be any word.
+    ///
+    /// Without it a port has a number for a name, and its ends are known once they have been used.
+    ///
+    /// ```
+    /// use palpate_runtime::{Execution, Outcome, RateGroup, Runtime, actor_fn};
+    ///
+    /// let mut graph = Runtime::builder(Execution::Virtual);
+    /// let (mut plan, mut target) = graph.link("target", "planner", "controller").exchange(|| 0.0);
+    /// let planner = actor_fn("planner", move |ctx| {
+    ///     plan.publish(ctx);
+    ///     Outcome::Continue
+    /// });
+    /// let controller = actor_fn("controller", move |ctx| {
+    ///     target.refresh(ctx);
+    ///     Outcome::Continue
+    /// });
+    /// graph.group(RateGroup::hz(1000).name("control"), vec![controller]);
+    /// graph.group(RateGroup::hz(10).name("plan"), vec![planner]);
+    /// let graph = graph.build()?.graph();
+    /// assert!(graph.to_string().contains("plan/planner -> control/controller"));
+    /// std::fs::write(std::env::temp_dir().join("graph.svg"), graph.to_svg())?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn link(&mut self, name: impl Into<String>, from: impl Into<String>, to: impl Into<String>) -> &mut Self {
+        self.wiring.link(name.into(), from.into(), to.into());
+        self
     }
 
     /// A port for the newest value of a large state; every buffer is filled by `init`.
@@ -113,7 +158,7 @@ impl RuntimeBuilder {
     /// A port for the newest value of a large state, with halves that a [restarted](Self::restartable) group can take
     /// again.
     pub fn exchange_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> ExchangePort<T> {
-        let (plan, script) = self.plan_port();
+        let (plan, script) = self.plan_port::<T>(PortKind::Exchange);
         ExchangePort::new(self.execution, plan, script, init)
     }
 
@@ -127,19 +172,36 @@ impl RuntimeBuilder {
 
     /// A port for ordered samples, with halves that a [restarted](Self::restartable) group can take again.
     pub fn queue_port<T: Copy + Send + 'static>(&mut self, capacity: usize) -> QueuePort<T> {
-        let (plan, script) = self.plan_port();
+        let (plan, script) = self.plan_port::<T>(PortKind::Queue);
         QueuePort::new(self.execution, plan, script, capacity)
     }
 
     /// The newest value for a thread outside the graph, such as a renderer; visible at once in both executions.
     pub fn outlet<T: Send>(&mut self, init: impl FnMut() -> T) -> (OutletWriter<T>, OutletReader<T>) {
-        outlet(init)
+        outlet(&self.plan_outlet::<T>(), init)
     }
 
     /// A port for the newest value for a thread outside the graph, with halves that a [restarted](Self::restartable)
     /// group can take again.
     pub fn outlet_port<T: Send + 'static>(&mut self, init: impl FnMut() -> T + Send + 'static) -> OutletPort<T> {
-        OutletPort::new(init)
+        OutletPort::new(self.plan_outlet::<T>(), init)
+    }
+
+    /// A value that the program sets from outside while the graph runs.
+    ///
+    /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
+    pub fn parameter<T: Input>(&mut self, initial: T) -> Parameter<T> {
+        let (plan, script) = self.plan_port::<T>(PortKind::Parameter);
+        Parameter::new(plan, script, initial)
+    }
+
+    /// Commands that the program sends from outside while the graph runs; at least `capacity` of them may wait, rounded
+    /// up to a power of two.
+    ///
+    /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
+    pub fn commands<T: Input>(&mut self, capacity: usize) -> Commands<T> {
+        let (plan, script) = self.plan_port::<T>(PortKind::Commands);
+        Commands::new(plan, script, capacity)
     }
 
     /// A record sink for one actor, holding at least `capacity` records between two drains.
@@ -228,7 +290,7 @@ impl RuntimeBuilder {
     /// cannot work: a deadline beyond the period, a budget beyond the deadline, budgets that overfill a core or all
     /// cores together, on threads a core that is not there, a latency beyond the period, equal real-time priorities pinned to one core, a
     /// priority outside 1 to 99, a name used twice, no group that is not an observer; an overrun policy that says
-    /// nothing or contradicts the release mode, a watchdog below a period, a device-paced group without an actor; a
+    /// nothing or contradicts the release mode, a [link](Self::link) to nobody, a watchdog below a period, a device-paced group without an actor; a
     /// disturbance of threads, of no group, or a second one of the same; a [measurement](Self::measure_cost) of
     /// threads. Or what a [factory](Self::restartable) says. For a re-execution also if the recording is one of another
     /// graph, and [`GraphErrorKind::Recording`](crate::GraphErrorKind::Recording) if it has gaps.
@@ -284,8 +346,20 @@ impl RuntimeBuilder {
         }
         let repeat = |(recording, script)| Reexecution::new(recording, script, &groups, built.ports);
         let reexecution = built.recording.map(repeat).transpose()?;
-        let Self { execution, grants, measures_cost, .. } = built;
-        Ok(Runtime { execution, groups, restarters, disturbances, reexecution, registry, grants, measures_cost })
+        built.wiring.close(&groups)?;
+        let Self { execution, grants, measures_cost, wiring, .. } = built;
+        let wiring = Arc::new(wiring);
+        Ok(Runtime {
+            execution,
+            wiring,
+            groups,
+            restarters,
+            disturbances,
+            reexecution,
+            registry,
+            grants,
+            measures_cost,
+        })
     }
 }
 

@@ -5,7 +5,8 @@
 //! time*, one thread for everything, in the order (time, group), bit-identical every time. The actors are the same.
 //!
 //! - Ports: [`exchange`](RuntimeBuilder::exchange) for the newest value of a large state,
-//!   [`queue`](RuntimeBuilder::queue) for ordered samples, [`outlet`](RuntimeBuilder::outlet) for threads outside.
+//!   [`queue`](RuntimeBuilder::queue) for ordered samples, [`outlet`](RuntimeBuilder::outlet) for threads outside,
+//!   [`parameter`](RuntimeBuilder::parameter) and [`commands`](RuntimeBuilder::commands) from threads outside.
 //! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
 //!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
 //! - Release modes: the clock, or a [device](Release::DevicePaced) whose blocking read drives its group.
@@ -14,7 +15,10 @@
 //! - Re-execution: a run on threads, [recorded](Recording), is repeated in virtual time bit for bit.
 //! - Admission: a graph that cannot work is refused when it is built, with the sum that failed; its
 //!   [plan](Runtime::plan) says what it asks for and what this system would refuse.
-//! - Introspection: [`RunningGraph::live`] shows counts, lateness and execution time of every group at any moment.
+//! - Introspection: [`RunningGraph::live`] shows counts, lateness and execution time of every group at any moment,
+//!   [`RunningGraph::graph`] the whole graph as text, JSON, DOT and SVG.
+//! - Events: a thread outside the groups tells the program's `tracing` subscriber of slips, misses, restarts and faults,
+//!   under the targets `palpate_runtime::slip`, `::miss`, `::restart` and `::fault`.
 //! - Faults: a panic or a reported fault stops the whole graph in order, after [winding down](RateGroup::wind_down), and
 //!   is in the [report](RuntimeReport); a [restartable](RuntimeBuilder::restartable) group is started again instead.
 //!
@@ -84,6 +88,7 @@ mod admission;
 mod builder;
 mod error;
 mod executor;
+mod graph;
 mod group;
 mod ports;
 mod primitives;
@@ -102,7 +107,9 @@ pub use builder::RuntimeBuilder;
 pub use error::{ActorError, GraphError, GraphErrorKind};
 pub use executor::Execution;
 pub use executor::disturbance::Disturbance;
+pub use graph::view::{GraphGroup, GraphPort, GraphView, PortEnd, PortKind};
 pub use ports::exchange_port::{Reader, Writer};
+pub use ports::inlet::{CommandReceiver, Commands, Input, Parameter, ParameterReader};
 pub use ports::outlet::{OutletReader, OutletWriter};
 pub use ports::queue_port::{QueueReader, QueueWriter};
 pub use ports::restartable::{ExchangePort, OutletPort, QueuePort, RecorderPort};
@@ -110,16 +117,17 @@ pub use primitives::histogram::{Histogram, HistogramReader};
 pub use primitives::{exchange, ring};
 pub use rate_group::{OverrunPolicy, RateGroup, Release, Wait};
 pub use records::port_use::{PortUse, PortUseKind};
-pub use records::record::{Channel, Event, Record};
+pub use records::record::{Channel, Event, EventCode, Record};
 pub use records::recorder::{RecordDrain, RecordGap, Recorder};
 pub use records::timing::{ActorTimes, SlipCause, SlipCounts, TickTiming};
 pub use reexecution::recording::Recording;
-pub use reports::live::GroupLive;
-pub use reports::report::{GroupCost, GroupReport, RuntimeFault, RuntimeReport};
+pub use reports::group_live::GroupLive;
+pub use reports::report::{FaultKind, GroupCost, GroupReport, RuntimeFault, RuntimeReport};
 pub use runtime::{RunningGraph, Runtime};
 pub use supervision::restart::Restart;
 pub use supervision::stop::{STOP_BOUND, StopHandle};
 pub use system::grant::{GrantHandle, GroupGrant, SystemGrant};
+pub use system::machine::{MachineFinding, Readiness};
 pub use system::stopwatch::Stopwatch;
 pub use time::{Nanos, Rate};
 

@@ -104,6 +104,10 @@ pub struct RateGroup {
     pub(crate) budget: Option<Nanos>,
     pub(crate) latency: Nanos,
     pub(crate) cpu: Option<usize>,
+    /// Several cores instead of one.
+    pub(crate) cpus: Vec<usize>,
+    pub(crate) by_deadline: bool,
+    pub(crate) stack: Option<usize>,
     pub(crate) priority: Option<u8>,
     /// No real-time policy is what the group asked for.
     best_effort: bool,
@@ -126,6 +130,9 @@ impl RateGroup {
             budget: None,
             latency: Nanos::ZERO,
             cpu: None,
+            cpus: Vec::new(),
+            by_deadline: false,
+            stack: None,
             priority: None,
             best_effort: false,
             overrun: OverrunPolicy::default(),
@@ -192,6 +199,36 @@ impl RateGroup {
     #[must_use]
     pub fn pin(mut self, cpu: usize) -> Self {
         self.cpu = Some(cpu);
+        self.cpus.clear();
+        self
+    }
+
+    /// Lets the thread of the group run on these processor cores only. One core is the same as [`pin`](Self::pin).
+    #[must_use]
+    pub fn pin_to(mut self, cpus: impl IntoIterator<Item = usize>) -> Self {
+        let mut cpus: Vec<usize> = cpus.into_iter().collect();
+        cpus.sort_unstable();
+        cpus.dedup();
+        self.cpu = if let [cpu] = cpus[..] { Some(cpu) } else { None };
+        self.cpus = if cpus.len() > 1 { cpus } else { Vec::new() };
+        self
+    }
+
+    /// Asks for SCHED_DEADLINE on threads: the kernel then gives the group its [budget](Self::budget) in every period by
+    /// its deadline, or refuses. It stops a release that takes longer until the next period. Needs a budget, and neither
+    /// a priority nor a [core](Self::pin): the kernel wants the thread free to go to any of its cores. A refusal is
+    /// reported, the run goes on without.
+    #[must_use]
+    pub fn realtime_by_deadline(mut self) -> Self {
+        self.by_deadline = true;
+        self
+    }
+
+    /// Sets the size of the thread's stack in bytes, at least 256 KiB; 2 MiB if not given. Where memory is locked, all of
+    /// it is.
+    #[must_use]
+    pub fn stack_size(mut self, bytes: usize) -> Self {
+        self.stack = Some(bytes);
         self
     }
 
@@ -287,6 +324,25 @@ impl RateGroup {
         match self.overrun {
             OverrunPolicy::CatchUp { max } => self.rate.release(max.into()),
             _ => Nanos::ZERO,
+        }
+    }
+
+    /// The cores that the group may run on; empty if it may run on any.
+    pub(crate) fn cores(&self) -> Vec<usize> {
+        self.cpu.map_or_else(|| self.cpus.clone(), |cpu| vec![cpu])
+    }
+
+    /// True if a real-time policy is asked for.
+    pub(crate) fn is_realtime(&self) -> bool {
+        self.priority.is_some() || self.by_deadline
+    }
+
+    /// A thread of the group's name and stack.
+    pub(crate) fn thread(&self) -> std::thread::Builder {
+        let thread = std::thread::Builder::new().name(self.name.clone());
+        match self.stack {
+            Some(bytes) => thread.stack_size(bytes),
+            None => thread,
         }
     }
 

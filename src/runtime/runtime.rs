@@ -7,14 +7,18 @@ use crate::executor::Execution;
 use crate::executor::disturbance::Disturb;
 use crate::executor::threaded::Threads;
 use crate::executor::virtual_time::VirtualRun;
+use crate::graph::view::GraphView;
+use crate::graph::wiring::Wiring;
 use crate::group::group_run::{GroupRun, start_actors};
 use crate::primitives::exchange::ExchangeReader;
 use crate::primitives::sync::lock;
 use crate::rate_group::RateGroup;
 use crate::records::recorder::Registry;
 use crate::reexecution::replay::Reexecution;
-use crate::reports::live::{GroupLive, LiveReader};
-use crate::reports::report::{GroupCost, RuntimeFault, RuntimeReport};
+use crate::reports::group_live::GroupLive;
+use crate::reports::live::LiveReader;
+use crate::reports::report::{FaultKind, GroupCost, RuntimeFault, RuntimeReport};
+use crate::reports::tell::Teller;
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND, StopHandle};
 use crate::system::grant::{GrantHandle, SystemGrant};
@@ -43,6 +47,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// Not real-time safe: allocates, and starting it makes threads.
 pub struct Runtime {
     pub(crate) execution: Execution,
+    pub(crate) wiring: Arc<Wiring>,
     pub(crate) groups: Vec<GroupRun>,
     pub(crate) restarters: Vec<Option<(Restarter, ExchangeReader<Ledger>)>>,
     /// Virtual time: what makes each group late.
@@ -62,7 +67,13 @@ impl Runtime {
     /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused) if the process has been moved to fewer cores since the graph was built and no longer
     /// fits.
     pub fn plan(&self) -> Result<Plan, GraphError> {
-        Plan::of(self.execution, &self.specs())
+        Ok(Plan { graph: self.graph(), ..Plan::of(self.execution, &self.specs())? })
+    }
+
+    /// The graph as it stands before the run: its groups with their actors, and its ports. Ends that were not declared
+    /// by a [link](crate::RuntimeBuilder::link) are known once they have been used.
+    pub fn graph(&self) -> GraphView {
+        self.wiring.view(self.execution, &self.specs())
     }
 
     fn specs(&self) -> Vec<RateGroup> {
@@ -77,11 +88,22 @@ impl Runtime {
     /// The error of the first actor whose start failed, after those already started were stopped; or
     /// [`GraphErrorKind::Refused`](crate::GraphErrorKind::Refused) if the system gives no thread.
     pub fn start(self) -> Result<RunningGraph, GraphError> {
-        let Self { execution, mut groups, restarters, disturbances, reexecution, registry, grants, measures_cost } =
-            self;
+        let Self {
+            execution,
+            wiring,
+            mut groups,
+            restarters,
+            disturbances,
+            reexecution,
+            registry,
+            grants,
+            measures_cost,
+        } = self;
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names: Vec<String> = groups.iter().map(|group| group.spec.name.clone()).collect();
-        let live = groups.iter().map(|group| group.shown.clone()).collect();
+        let live: Vec<LiveReader> = groups.iter().map(|group| group.shown.clone()).collect();
+        let teller = Teller::new(&live, &wiring.view(execution, &[]).warnings);
+        let picture = Picture { execution, specs: groups.iter().map(|group| group.spec.clone()).collect(), wiring };
         let executor = match execution {
             Execution::Threaded => {
                 Executor::Threaded(Threads::start(groups, restarters, Arc::clone(&control), &grants)?)
@@ -96,32 +118,32 @@ impl Runtime {
                 Executor::Virtual(run)
             }
         };
-        let executor = Arc::new(Mutex::new(executor));
+        let executor = Arc::new(Mutex::new(Supervised { executor, teller }));
         if let Err(error) = watch(&executor) {
-            if let Executor::Threaded(threads) = &mut *lock(&executor) {
+            if let Executor::Threaded(threads) = &mut lock(&executor).executor {
                 // Nobody else would: the groups have been released.
                 threads.join(&names, STOP_BOUND);
             }
             return Err(error);
         }
-        Ok(RunningGraph { executor, control, names, live, registry, grants })
+        Ok(RunningGraph { executor, control, names, live, picture, registry, grants })
     }
 }
 
-/// Starts a thread that answers faults while the program does not look, if there is a group that can be started again.
+/// Starts a thread that answers faults while the program does not look, if there is a group that can be started again, and
+/// that tells the program's subscriber what happens, if it has one.
 /// It ends with the run.
-fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), GraphError> {
-    let needed = matches!(&*lock(executor), Executor::Threaded(threads) if threads.need_watching());
+fn watch(executor: &Arc<Mutex<Supervised>>) -> Result<(), GraphError> {
+    let needed = match &*lock(executor) {
+        Supervised { executor: Executor::Threaded(threads), teller } => threads.need_watching() || teller.is_heard(),
+        _ => false,
+    };
     if !needed {
         return Ok(());
     }
     let watched = Arc::downgrade(executor);
-    let over = |executor: &mut Executor| match executor {
-        Executor::Threaded(threads) => threads.poll(),
-        Executor::Virtual(_) => true,
-    };
     let watch = move || {
-        while watched.upgrade().is_some_and(|executor| !over(&mut lock(&executor))) {
+        while watched.upgrade().is_some_and(|executor| lock(&executor).poll() == Some(false)) {
             std::thread::sleep(POLL);
         }
     };
@@ -131,17 +153,49 @@ fn watch(executor: &Arc<Mutex<Executor>>) -> Result<(), GraphError> {
 
 impl_debug!(Runtime, "execution": |own| own.execution, "groups": |own| own.specs());
 
+/// An executor and what it has told so far.
+struct Supervised {
+    executor: Executor,
+    teller: Teller,
+}
+
+impl Supervised {
+    /// Looks after the threads; true when the run is over, `None` in virtual time, which nobody has to look after.
+    fn poll(&mut self) -> Option<bool> {
+        let Executor::Threaded(threads) = &mut self.executor else { return None };
+        let over = threads.poll();
+        self.teller.tell(&threads.supervisor, over);
+        Some(over)
+    }
+
+    /// Tells all that is left.
+    fn tell_rest(&mut self) {
+        match &self.executor {
+            Executor::Threaded(threads) => self.teller.tell(&threads.supervisor, true),
+            Executor::Virtual(run) => self.teller.tell(&run.supervisor, true),
+        }
+    }
+}
+
 enum Executor {
     Threaded(Threads),
     Virtual(VirtualRun),
 }
 
+/// What the graph's picture is drawn from.
+struct Picture {
+    execution: Execution,
+    specs: Vec<RateGroup>,
+    wiring: Arc<Wiring>,
+}
+
 /// A run in progress. Dropping it stops it, within [`STOP_BOUND`] for each group that does not end.
 pub struct RunningGraph {
-    executor: Arc<Mutex<Executor>>,
+    executor: Arc<Mutex<Supervised>>,
     control: Arc<Control>,
     names: Vec<String>,
     live: Vec<LiveReader>,
+    picture: Picture,
     registry: Arc<Registry>,
     grants: GrantHandle,
 }
@@ -154,9 +208,12 @@ impl RunningGraph {
     /// # Real-time
     /// Not real-time safe: sleeps, or executes the run. Never from an actor: in virtual time it would wait for itself.
     pub fn wait_for(&self, span: Duration) {
-        if let Executor::Virtual(run) = &mut *lock(&self.executor) {
-            return run.advance(Nanos::from_duration(span));
+        let mut supervised = lock(&self.executor);
+        if let Executor::Virtual(run) = &mut supervised.executor {
+            run.advance(Nanos::from_duration(span));
+            return supervised.tell_rest();
         }
+        drop(supervised);
         let start = Instant::now();
         while !self.finished() {
             let Some(left) = span.checked_sub(start.elapsed()).filter(|left| !left.is_zero()) else { return };
@@ -169,7 +226,7 @@ impl RunningGraph {
     /// # Real-time
     /// Not real-time safe: takes a lock. Never from an actor: in virtual time [`wait_for`](Self::wait_for) holds it.
     pub fn elapsed(&self) -> Nanos {
-        match &*lock(&self.executor) {
+        match &lock(&self.executor).executor {
             Executor::Threaded(threads) => threads.elapsed(),
             Executor::Virtual(run) => run.now,
         }
@@ -180,9 +237,10 @@ impl RunningGraph {
     /// # Real-time
     /// Not real-time safe: takes a lock, may start a group again. Never from an actor, as [`elapsed`](Self::elapsed).
     pub fn finished(&self) -> bool {
-        match &mut *lock(&self.executor) {
-            Executor::Threaded(threads) => threads.poll(),
-            Executor::Virtual(run) => run.supervisor.all_ended(),
+        let mut supervised = lock(&self.executor);
+        match (supervised.poll(), &supervised.executor) {
+            (None, Executor::Virtual(run)) => run.supervisor.all_ended(),
+            (over, _) => over.unwrap_or(true),
         }
     }
 
@@ -192,6 +250,19 @@ impl RunningGraph {
     /// Never disturbs a tick: wait-free on both sides. It allocates: for threads that show it.
     pub fn live(&self) -> Vec<GroupLive> {
         self.live.iter().map(LiveReader::read).collect()
+    }
+
+    /// The graph as it is now: groups with their times so far, ports with what went through them.
+    ///
+    /// # Real-time
+    /// Never disturbs a tick. It takes a lock and allocates: for threads that show it, never from an actor.
+    pub fn graph(&self) -> GraphView {
+        self.picture_at(self.elapsed())
+    }
+
+    fn picture_at(&self, elapsed: Nanos) -> GraphView {
+        let Picture { execution, specs, wiring } = &self.picture;
+        wiring.view(*execution, specs).after(elapsed, self.live())
     }
 
     /// Asks every group to end after the release it is in; returns at once.
@@ -217,32 +288,54 @@ impl RunningGraph {
     /// Not real-time safe: waits for every group. Never from an actor: its own group is one of them.
     pub fn stop(self) -> RuntimeReport {
         let given_up = self.end();
-        let executor = lock(&self.executor);
-        let (supervisor, at, costs) = match &*executor {
+        let supervised = lock(&self.executor);
+        let (supervisor, at, costs) = match &supervised.executor {
             Executor::Threaded(threads) => (&threads.supervisor, threads.elapsed(), Vec::new()),
             Executor::Virtual(run) => {
                 let cost = |(name, cpu): (&String, _)| GroupCost { name: name.clone(), cpu };
                 (&run.supervisor, run.now, self.names.iter().zip(run.costs()).map(cost).collect())
             }
         };
-        let ((groups, fault), restarts) = (supervisor.results(), supervisor.restarts.clone());
+        let ((mut groups, fault), restarts) = (supervisor.results(), supervisor.restarts.clone());
+        for group in &mut groups {
+            if let Some(shown) = self.live.iter().find(|shown| shown.name() == group.name) {
+                (group.lateness, group.execution) = shown.times();
+            }
+        }
         let what = "of a stop and was given up; its tick or stop must return";
-        let stuck =
-            || RuntimeFault::of_group(&given_up.join("`, `"), at, format!("did not end within {STOP_BOUND:?} {what}"));
+        let stuck = || {
+            RuntimeFault::of_group(
+                &given_up.join("`, `"),
+                at,
+                FaultKind::GivenUp,
+                format!("did not end within {STOP_BOUND:?} {what}"),
+            )
+        };
         let fault = fault.or_else(|| (!given_up.is_empty()).then(stuck));
         let grant = self.grants.get().unwrap_or_default();
-        RuntimeReport { groups, grant, fault, restarts, lost_records: self.registry.lost(), costs }
+        RuntimeReport {
+            groups,
+            graph: self.picture_at(at),
+            grant,
+            fault,
+            restarts,
+            lost_records: self.registry.lost(),
+            costs,
+        }
     }
 
     /// Ends the run if it has not ended; returns the groups that had to be given up.
     fn end(&self) -> Vec<String> {
-        match &mut *lock(&self.executor) {
+        let mut supervised = lock(&self.executor);
+        let given_up = match &mut supervised.executor {
             Executor::Threaded(threads) => threads.join(&self.names, STOP_BOUND),
             Executor::Virtual(run) => {
                 run.end_all();
                 Vec::new()
             }
-        }
+        };
+        supervised.tell_rest();
+        given_up
     }
 }
 
@@ -279,7 +372,7 @@ mod tests {
         graph.group(RateGroup::hz(100).name("log").observer(), vec![]);
         let running = graph.build().unwrap().start().unwrap();
         running.wait_for(Duration::from_millis(30));
-        let given_up = |bound| match &mut *lock(&running.executor) {
+        let given_up = |bound| match &mut lock(&running.executor).executor {
             Executor::Threaded(threads) => threads.join(&running.names, bound),
             Executor::Virtual(_) => unreachable!("the graph is threaded"),
         };

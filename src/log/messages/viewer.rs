@@ -88,7 +88,7 @@ impl Log {
             name: group.into(),
             coded: true,
             group: event.group,
-            code: event.code,
+            code: event.code.code(),
             detail: event.detail,
             ..Self::text(&TextEvent::describe(event, group), epoch_ns)
         }
@@ -96,7 +96,12 @@ impl Log {
 
     /// The event record it came from; `None` if it never was one.
     pub(crate) fn event(&self) -> Option<Event> {
-        self.coded.then_some(Event { stamp: self.time_ns, group: self.group, code: self.code, detail: self.detail })
+        self.coded.then_some(Event {
+            stamp: self.time_ns,
+            group: self.group,
+            code: self.code.into(),
+            detail: self.detail,
+        })
     }
 }
 

@@ -80,7 +80,7 @@ impl TextEvent {
                 Level::Warning,
                 format!("{group}: the device is silent, the watchdog took over at release {}", event.detail),
             ),
-            code => (Level::Warning, format!("{group}: event {code}, detail {}", event.detail)),
+            code => (Level::Warning, format!("{group}: event {}, detail {}", code.code(), event.detail)),
         };
         Self { time: event.stamp, level, message }
     }
@@ -89,6 +89,7 @@ impl TextEvent {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::runtime::EventCode;
 
     #[test]
     fn a_degraded_group_and_its_recovery_are_told_apart() {
@@ -121,7 +122,8 @@ mod tests {
     fn a_restart_is_told_from_every_other_event() {
         let describe = |code| TextEvent::describe(&Event { stamp: Nanos(5), group: 1, code, detail: 2 }, "global");
         assert_eq!(describe(Event::RESTARTED).message, "global: restarted after a fault, restart 2");
-        let restarts: Vec<u32> = (0..20).filter(|code| describe(*code).tells_restart()).collect();
+        let codes = (0..20).map(EventCode::from);
+        let restarts: Vec<_> = codes.filter(|code| describe(*code).tells_restart()).collect();
         assert_eq!(restarts, [Event::RESTARTED]);
     }
 

@@ -5,6 +5,7 @@
 use crate::accounting::overrun::{Decision, decide};
 use crate::accounting::timeline::{Timeline, Wake, WokenBy};
 use crate::actor::GroupMode;
+use crate::primitives::histogram::Histogram;
 use crate::rate_group::{OverrunPolicy, RateGroup};
 use crate::records::timing::{RecordedRelease, SlipCause, SlipCounts, TickTiming};
 use crate::reports::report::GroupReport;
@@ -30,7 +31,7 @@ pub(crate) struct Ledger {
     recovering: u32,
     pub(crate) released: u64,
     pub(crate) skipped: SlipCounts,
-    pub(crate) missed: u64,
+    pub(crate) missed: SlipCounts,
     /// Releases with a degraded result.
     pub(crate) degraded: u64,
     /// Releases in [`GroupMode::Degraded`].
@@ -57,7 +58,7 @@ impl Ledger {
             recovering: 0,
             released: 0,
             skipped: SlipCounts::default(),
-            missed: 0,
+            missed: SlipCounts::default(),
             degraded: 0,
             in_degraded_mode: 0,
             takeovers: 0,
@@ -103,10 +104,13 @@ impl Ledger {
             skipped: self.skipped.total(),
             slips: self.skipped,
             elapsed_periods: self.elapsed_periods(),
-            missed_deadlines: self.missed,
+            missed_deadlines: self.missed.total(),
+            misses: self.missed,
             degraded: self.degraded,
             in_degraded_mode: self.in_degraded_mode,
             watchdog_takeovers: self.takeovers,
+            lateness: Histogram::default(),
+            execution: Histogram::default(),
         }
     }
 
@@ -222,7 +226,7 @@ impl Ledger {
         } else if timing.missed() {
             timing.cause = blame;
         }
-        self.missed += u64::from(timing.missed());
+        self.missed.add(timing.cause, u64::from(timing.missed()));
         self.released += 1;
         self.free = free;
         self.previous_work = free.saturating_sub(woke);
@@ -391,7 +395,7 @@ mod tests {
         assert_eq!((carried.slips, carried.cause), (0, SlipCause::LateWake));
         assert_eq!(ledger.skipped.of(SlipCause::LateWake), 2);
         assert_eq!(ledger.skipped.of(SlipCause::LongTick), 1);
-        assert_eq!(ledger.missed, 3);
+        assert_eq!(ledger.missed.total(), 3);
     }
 
     #[test]

@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 /// Records carry the group's number in 16 bits; far fewer make sense.
 const MAX_GROUPS: usize = 256;
 
+/// A thread touches half of it beforehand.
+const LEAST_STACK: usize = 256 * 1024;
+
 /// The processor cores that a graph is checked against.
 #[derive(Clone, Copy)]
 pub(crate) struct Cores<'a> {
@@ -78,6 +81,19 @@ fn check_group(group: &RateGroup) -> Result<(), GraphError> {
         && !(1..=99).contains(&priority)
     {
         return refuse(format!("real-time priority {priority} must be 1 to 99"));
+    }
+    if group.by_deadline && group.budget.is_none() {
+        return refuse(
+            "SCHED_DEADLINE needs a budget: the computing time that the kernel is to keep for it".to_owned(),
+        );
+    }
+    if group.by_deadline && group.priority.is_some() {
+        return refuse("SCHED_DEADLINE and a real-time priority exclude each other; leave one out".to_owned());
+    }
+    if let Some(stack) = group.stack
+        && stack < LEAST_STACK
+    {
+        return refuse(format!("a stack of {stack} bytes is below the {LEAST_STACK} that a group's thread needs"));
     }
     if matches!(group.overrun, OverrunPolicy::CatchUp { max: 0 }) {
         return refuse(
@@ -173,6 +189,20 @@ fn check_cores(groups: &[RateGroup]) -> Result<(), GraphError> {
     let mut cores = BTreeMap::<usize, Load>::new();
     for group in groups {
         group.cpu.into_iter().for_each(|cpu| cores.entry(cpu).or_default().add(group));
+    }
+    for set in groups.iter().map(|group| &group.cpus).filter(|set| !set.is_empty()) {
+        let mut load = Load::default();
+        let within = |group: &&RateGroup| {
+            let cores = group.cores();
+            !cores.is_empty() && cores.iter().all(|core| set.contains(core))
+        };
+        groups.iter().filter(within).for_each(|group| load.add(group));
+        if load.exceeds(set.len()) {
+            let (need, room) = (load.in_words(), 100 * set.len());
+            let wrong =
+                format!("the budgets on cores {set:?} need {need} of their {room} %; lower them or use more cores");
+            return Err(GraphError::refused(wrong));
+        }
     }
     match cores.iter().find(|(_, load)| load.exceeds(1)) {
         None => Ok(()),

@@ -4,13 +4,17 @@
 use crate::admission::check::{Cores, admit};
 use crate::error::GraphError;
 use crate::executor::Execution;
+use crate::graph::view::GraphView;
 use crate::rate_group::RateGroup;
+use crate::reports::text::{percent, places, short};
 use crate::system::grant::refusals;
+use crate::system::machine::{MachineFinding, Readiness, findings};
 use crate::system::os;
 use crate::system::wait::Waiter;
 use crate::time::{Nanos, Rate};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
 
 /// The schedule of a graph; its `Display` is a table.
 ///
@@ -42,6 +46,10 @@ pub struct Plan {
     /// Pairs of groups that share a core, or may, and have releases at the same instant; in virtual time every pair
     /// does.
     pub coincidences: Vec<Coincidence>,
+    /// The picture of the graph; groups alone where nothing else is known.
+    pub graph: GraphView,
+    /// How far the machine is prepared for real time; empty in virtual time and if no group asks for a real-time policy.
+    pub machine: Vec<MachineFinding>,
     /// Privileges that the system would refuse now, a sentence each; a refusal degrades a run and never fails it.
     pub missing: Vec<String>,
 }
@@ -65,6 +73,10 @@ pub struct GroupPlan {
     pub budget: Option<Nanos>,
     /// The number of the core that the group is pinned to.
     pub cpu: Option<usize>,
+    /// The numbers of the cores that the group may run on, where it may run on several and not on all.
+    pub cpus: Vec<usize>,
+    /// True if SCHED_DEADLINE is asked for.
+    pub by_deadline: bool,
     /// The real-time priority asked for.
     pub priority: Option<u8>,
     /// The way in which the group waits for its releases, in words.
@@ -82,6 +94,8 @@ impl GroupPlan {
             deadline: group.relative_deadline(),
             budget: group.budget,
             cpu: group.cpu,
+            cpus: group.cpus.clone(),
+            by_deadline: group.by_deadline,
             priority: group.priority,
             wait: match execution {
                 Execution::Virtual => "virtual".to_owned(),
@@ -140,6 +154,11 @@ impl Plan {
             total_load: plans.iter().filter_map(GroupPlan::utilisation).sum(),
             core_load,
             coincidences: coincidences(groups, execution),
+            graph: GraphView::of_groups(execution, groups),
+            machine: match execution {
+                Execution::Virtual => Vec::new(),
+                Execution::Threaded => findings(Path::new("/"), groups),
+            },
             missing: match execution {
                 Execution::Virtual => Vec::new(),
                 Execution::Threaded => refusals(groups),
@@ -153,7 +172,8 @@ fn coincidences(groups: &[RateGroup], execution: Execution) -> Vec<Coincidence> 
     let mut found = Vec::new();
     for (index, first) in groups.iter().enumerate() {
         for second in &groups[index + 1..] {
-            let apart = matches!((first.cpu, second.cpu), (Some(a), Some(b)) if a != b);
+            let (a, b) = (first.cores(), second.cores());
+            let apart = !a.is_empty() && !b.is_empty() && a.iter().all(|core| !b.contains(core));
             if apart && execution == Execution::Threaded {
                 continue;
             }
@@ -204,11 +224,16 @@ impl fmt::Display for Plan {
             let policy = match (self.execution, group.priority) {
                 (Execution::Virtual, _) => "-".to_owned(),
                 (Execution::Threaded, Some(priority)) => format!("SCHED_FIFO {priority}"),
+                (Execution::Threaded, None) if group.by_deadline => "SCHED_DEADLINE".to_owned(),
                 (Execution::Threaded, None) => "SCHED_OTHER".to_owned(),
             };
             let core = match self.execution {
                 Execution::Virtual => "-".to_owned(),
-                Execution::Threaded => group.cpu.map_or("any".to_owned(), |cpu| cpu.to_string()),
+                Execution::Threaded => match (group.cpu, &group.cpus[..]) {
+                    (Some(cpu), _) => cpu.to_string(),
+                    (None, []) => "any".to_owned(),
+                    (None, cpus) => cpus.iter().map(usize::to_string).collect::<Vec<_>>().join(","),
+                },
             };
             write!(f, "{:width$} {:>10}", group.name, group.rate.to_string())?;
             for time in [Some(group.rate.period()), Some(group.offset), Some(group.deadline), group.budget] {
@@ -227,29 +252,14 @@ impl fmt::Display for Plan {
             let (per_second, every) = (places(1.0 / every.as_secs_f64()), short(*every));
             writeln!(f, "coincide   {first} and {second}: {per_second} times per second, every {every}")?;
         }
+        self.graph.warnings.iter().try_for_each(|warning| writeln!(f, "warning    {warning}"))?;
+        let lacks = self.machine.iter().filter(|finding| finding.state == Readiness::Missing);
+        lacks.clone().try_for_each(|finding| writeln!(f, "machine    {finding}"))?;
+        if lacks.count() > 0 {
+            writeln!(f, "           (docs/realtime.md explains each)")?;
+        }
         self.missing.iter().try_for_each(|missing| writeln!(f, "missing    {missing}"))
     }
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.1} %", 100.0 * share)
-}
-
-/// A time in the unit that keeps it short, to three places.
-fn short(time: Nanos) -> String {
-    let (unit, name) = match time.0 {
-        0 => return "0".to_owned(),
-        1..1_000_000 => (1e3, "us"),
-        1_000_000..1_000_000_000 => (1e6, "ms"),
-        _ => (1e9, "s"),
-    };
-    format!("{} {name}", places(time.0 as f64 / unit))
-}
-
-/// At most three places behind the point.
-fn places(value: f64) -> String {
-    let text = format!("{value:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 #[cfg(all(test, not(loom)))]

@@ -152,7 +152,7 @@ impl Link {
     /// The failure, with what the system said, if it gives no thread.
     pub(crate) fn replace(self, restarter: Restarter, failure: Box<Failure>) -> Result<JoinHandle<()>, Box<Failure>> {
         let unanswered = failure.clone();
-        let thread = std::thread::Builder::new().name(restarter.spec.name.clone());
+        let thread = restarter.spec.thread();
         let run = move || self.run_again(restarter, failure);
         thread.spawn(run).map_err(|error| Box::new(unanswered.not_answered(&error)))
     }

@@ -8,11 +8,12 @@ pub(crate) mod threaded;
 pub(crate) mod virtual_time;
 
 /// The execution of a graph: in virtual time or in real time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Execution {
     /// One thread for everything, in the order of virtual time, as fast as the machine allows; bit-identical every
     /// time.
     Virtual,
     /// One thread per rate group, in real time.
+    #[default]
     Threaded,
 }

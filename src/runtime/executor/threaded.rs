@@ -9,7 +9,7 @@ use crate::group::lease::Lease;
 use crate::group::panic_hook;
 use crate::primitives::exchange::ExchangeReader;
 use crate::rate_group::RateGroup;
-use crate::reports::report::RuntimeFault;
+use crate::reports::report::{FaultKind, RuntimeFault};
 use crate::supervision::overdue::{Overdue, OverdueWatch};
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND};
@@ -72,7 +72,7 @@ impl Threads {
     ) -> Result<Self, GraphError> {
         panic_hook::install();
         let mut grant = SystemGrant::of_machine();
-        if groups.iter().any(|group| group.spec.priority.is_some()) {
+        if groups.iter().any(|group| group.spec.is_realtime()) {
             grant.mlock = os::lock_memory().map_or_else(|reason| reason, |()| "locked".to_owned());
         }
         let (post, mail) = unbounded();
@@ -86,7 +86,7 @@ impl Threads {
             grant.groups.push(granted.group);
         }
         // Who may not have a real-time policy gains little by it.
-        let real_time = grant.groups.iter().any(|group| group.priority > 0);
+        let real_time = grant.groups.iter().any(SystemGrant::is_realtime);
         let awake = real_time.then(os::stay_awake);
         if let Some(awake) = &awake {
             grant.idle_states = awake.as_ref().map_or_else(String::clone, |_| "held off".to_owned());
@@ -253,7 +253,7 @@ impl Threads {
         let at = books.next_due().unwrap_or(now);
         restarter.abandoned(at);
         let what = format!("did not return within {} and was left behind", restarter.policy.hung_after);
-        let fault = RuntimeFault::of_group(&restarter.spec.name, at, what);
+        let fault = RuntimeFault::of_group(&restarter.spec.name, at, FaultKind::Hung, what);
         let (report, incarnation) = (books.report(&restarter.spec), seat.incarnation);
         self.succeed(Box::new(Failure { group: index, incarnation, fault, report, books }));
     }
@@ -308,7 +308,7 @@ fn spawn(spec: &RateGroup) -> Result<(JoinHandle<()>, Sender<GroupThread>, Threa
         }
     };
     let failed = |reason: String| GraphError::refused(format!("no thread for rate group `{}`: {reason}", spec.name));
-    let thread = std::thread::Builder::new().name(spec.name.clone()).spawn(body);
+    let thread = spec.thread().spawn(body);
     let thread = thread.map_err(|error| failed(error.to_string()))?;
     let granted = granted.recv().map_err(|_| failed("it ended during its set-up".to_owned()))?;
     Ok((thread, gate, granted))

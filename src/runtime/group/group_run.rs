@@ -11,11 +11,11 @@ use crate::group::members::{ActorTimer, Fatal, Members};
 use crate::group::panic_hook::place;
 use crate::primitives::exchange::ExchangeWriter;
 use crate::rate_group::RateGroup;
-use crate::records::record::Event;
+use crate::records::record::{Event, EventCode};
 use crate::records::recorder::Recorder;
 use crate::records::timing::{ActorTimes, RecordedRelease, TickTiming};
 use crate::reports::live::{LiveReader, LiveWriter, live};
-use crate::reports::report::{GroupReport, RuntimeFault};
+use crate::reports::report::{FaultKind, GroupReport, RuntimeFault};
 use crate::time::Nanos;
 use std::sync::Arc;
 
@@ -93,6 +93,11 @@ impl GroupRun {
             overran: false,
             faulted: false,
         }
+    }
+
+    /// The names of the actors, in the order of their ticks.
+    pub(crate) fn actor_names(&self) -> Vec<String> {
+        self.members.names()
     }
 
     /// Refuses a device-paced group that has nobody to wait for its device.
@@ -231,6 +236,7 @@ impl GroupRun {
             mode,
             visible_at: (scheduled + self.spec.latency).max(wake.free.unwrap_or(Nanos::ZERO)),
             group: self.index,
+            actor: 0,
             phase: if self.spec.observer { Phase::Observer } else { Phase::Release },
             execution: self.last.execution,
         };
@@ -293,17 +299,17 @@ impl GroupRun {
 
     fn describe(&mut self, actor: String, index: usize, fatal: Fatal) -> RuntimeFault {
         let at = self.last.scheduled;
-        let what = match fatal {
+        let (kind, what) = match fatal {
             Fatal::Panic(text) => {
                 self.event(at, Event::PANIC, index as u64);
-                format!("panicked{}: {text}", place())
+                (FaultKind::Panic, format!("panicked{}: {text}", place()))
             }
             Fatal::Fault(code) => {
                 self.event(at, Event::FAULT, code.into());
-                format!("reported fault {code}")
+                (FaultKind::Reported(code), format!("reported fault {code}"))
             }
         };
-        RuntimeFault { group: self.spec.name.clone(), actor, at, what }
+        RuntimeFault { group: self.spec.name.clone(), actor, at, kind, what }
     }
 
     fn overrun(&mut self, skipped: u64) -> RuntimeFault {
@@ -313,10 +319,10 @@ impl GroupRun {
         let at = self.ledger.due(self.ledger.elapsed_periods() - 1);
         self.event(at, Event::STOPPED, skipped);
         let what = format!("stopped by its overrun policy with {skipped} releases due at once");
-        RuntimeFault::of_group(&self.spec.name, at, what)
+        RuntimeFault::of_group(&self.spec.name, at, FaultKind::Overrun { skipped }, what)
     }
 
-    fn event(&mut self, stamp: Nanos, code: u32, detail: u64) {
+    fn event(&mut self, stamp: Nanos, code: EventCode, detail: u64) {
         if let Some(recorder) = &mut self.recorder {
             recorder.push(Event { stamp, group: self.index, code, detail });
         }

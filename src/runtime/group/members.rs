@@ -47,13 +47,18 @@ impl Members {
         self.0.iter().all(|member| member.failed)
     }
 
+    pub(crate) fn names(&self) -> Vec<String> {
+        self.0.iter().map(|member| member.name.clone()).collect()
+    }
+
     pub(crate) fn name(&self, index: usize) -> &str {
         &self.0[index].name
     }
 
     /// Starts the actors in order. On an error the ones started stay started: see [`undo_start`](Self::undo_start).
     pub(crate) fn start(&mut self, ctx: &TickContext, group: &str) -> Result<(), GraphError> {
-        for Member { actor, name, started, .. } in &mut self.0 {
+        for (index, Member { actor, name, started, .. }) in self.0.iter_mut().enumerate() {
+            let ctx = &of_actor(ctx, index);
             let place = || format!("rate group `{group}`, actor `{name}`");
             // Noted first: an actor that fails half-way may hold something to give back.
             *started = true;
@@ -103,11 +108,11 @@ impl Members {
             };
             for (index, member) in members.iter_mut().enumerate().filter(|(_, member)| !member.failed) {
                 call(index);
-                note(member.actor.tick(ctx))?;
+                note(member.actor.tick(&of_actor(ctx, index)))?;
             }
             for (index, member) in members.iter_mut().enumerate().rev().filter(|(_, member)| !member.failed) {
                 call(index);
-                note(member.actor.commit(ctx))?;
+                note(member.actor.commit(&of_actor(ctx, index)))?;
             }
             Ok(())
         };
@@ -161,6 +166,11 @@ impl Drop for Members {
             let _ = guarded(move || drop(member.actor));
         }
     }
+}
+
+/// The context of a call of the actor with this number.
+fn of_actor(ctx: &TickContext, index: usize) -> TickContext {
+    TickContext { actor: index as u16, ..*ctx }
 }
 
 /// Measures the actors of one group.

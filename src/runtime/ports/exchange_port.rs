@@ -12,6 +12,7 @@
 use crate::actor::{Phase, TickContext};
 use crate::ports::hot_swap::Swappable;
 use crate::ports::port_state::{Looks, PortPlan, UseRecorder, WriterGroup};
+use crate::ports::port_traffic::Counter;
 use crate::ports::virtual_exchange::{VirtualReader, VirtualWriter};
 use crate::primitives::exchange::{ExchangeReader, ExchangeWriter, Stamped};
 use crate::primitives::fenced_counter::FencedCounter;
@@ -44,6 +45,7 @@ pub struct Writer<T> {
     kind: WriterKind<T>,
     versions: FencedCounter,
     group: WriterGroup,
+    sent: Counter,
 }
 
 /// Reads the newest value of a state that a [`Writer`] in another actor publishes. The reader owns its buffer until the
@@ -64,11 +66,12 @@ pub struct Reader<T> {
     group: WriterGroup,
     looks: Looks,
     took: UseRecorder,
+    taken: Counter,
 }
 
 impl<T> Writer<T> {
     pub(crate) fn new(plan: &PortPlan, kind: WriterKind<T>, versions: FencedCounter) -> Self {
-        Self { kind, versions, group: plan.group.clone() }
+        Self { kind, versions, group: plan.group.clone(), sent: plan.sides.writer.take() }
     }
 
     /// The buffer to write the next value into; it holds an old value, of no particular age.
@@ -99,6 +102,7 @@ impl<T> Writer<T> {
             WriterKind::Threaded(writer) => writer.publish_as(version, ctx.scheduled),
             WriterKind::Virtual(writer) => writer.publish_as(version, ctx),
         }
+        self.sent.pass(ctx);
         version
     }
 }
@@ -106,7 +110,8 @@ impl<T> Writer<T> {
 impl<T> Reader<T> {
     pub(crate) fn new(plan: &PortPlan, kind: ReaderKind<T>) -> Self {
         let took = plan.recorder(PortUseKind::Took);
-        Self { kind, group: plan.group.clone(), looks: Looks::default(), took }
+        let taken = plan.sides.reader.take();
+        Self { kind, group: plan.group.clone(), looks: Looks::default(), took, taken }
     }
 
     /// Takes the newest value if there is one that was not taken yet; returns whether there was.
@@ -128,6 +133,9 @@ impl<T> Reader<T> {
             ReaderKind::Threaded(reader) => reader.refresh(),
             ReaderKind::Virtual(reader) => reader.refresh(ctx, self.group.is(ctx)),
         };
+        if fresh {
+            self.taken.pass(ctx);
+        }
         if fresh && ctx.phase == Phase::Release && !self.group.is(ctx) {
             self.took.push(ctx, self.version());
         }

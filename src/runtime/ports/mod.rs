@@ -3,8 +3,10 @@
 pub(crate) mod exchange_port;
 pub(crate) mod hot_swap;
 pub(crate) mod hot_swap_queue;
+pub(crate) mod inlet;
 pub(crate) mod outlet;
 pub(crate) mod port_state;
+pub(crate) mod port_traffic;
 pub(crate) mod queue_port;
 pub(crate) mod restartable;
 pub(crate) mod virtual_exchange;

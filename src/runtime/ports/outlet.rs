@@ -2,13 +2,14 @@
 
 use crate::actor::TickContext;
 use crate::ports::hot_swap::{Swappable, swappable};
+use crate::ports::port_traffic::{Counter, Sides};
 use crate::primitives::exchange::{ExchangeReader, ExchangeWriter, exchange};
 use crate::primitives::fenced_counter::FencedCounter;
 use crate::time::Nanos;
 
 /// The actor's side of an outlet.
 #[derive(Debug)]
-pub struct OutletWriter<T>(Swappable<ExchangeWriter<T>>, FencedCounter);
+pub struct OutletWriter<T>(Swappable<ExchangeWriter<T>>, FencedCounter, Counter);
 
 /// The outside thread's side of an outlet. It owns its buffer until the next successful refresh.
 ///
@@ -32,16 +33,17 @@ pub struct OutletWriter<T>(Swappable<ExchangeWriter<T>>, FencedCounter);
 /// share_between_threads(&reader);
 /// ```
 #[derive(Debug)]
-pub struct OutletReader<T>(Swappable<ExchangeReader<T>>);
+pub struct OutletReader<T>(Swappable<ExchangeReader<T>>, Counter);
 
-pub(crate) fn outlet<T: Send>(init: impl FnMut() -> T) -> (OutletWriter<T>, OutletReader<T>) {
+pub(crate) fn outlet<T: Send>(sides: &Sides, init: impl FnMut() -> T) -> (OutletWriter<T>, OutletReader<T>) {
     let (writer, reader) = exchange(init);
-    (OutletWriter::new(swappable(writer).0, FencedCounter::default()), OutletReader::new(swappable(reader).0))
+    let writer = OutletWriter::new(swappable(writer).0, FencedCounter::default(), sides.writer.take());
+    (writer, OutletReader::new(swappable(reader).0, sides.reader.take()))
 }
 
 impl<T> OutletWriter<T> {
-    pub(crate) fn new(half: Swappable<ExchangeWriter<T>>, versions: FencedCounter) -> Self {
-        Self(half, versions)
+    pub(crate) fn new(half: Swappable<ExchangeWriter<T>>, versions: FencedCounter, sent: Counter) -> Self {
+        Self(half, versions, sent)
     }
 
     /// The buffer to write the next value into; it holds an old value, of no particular age.
@@ -60,13 +62,14 @@ impl<T> OutletWriter<T> {
     pub fn publish(&mut self, ctx: &TickContext) -> u64 {
         let Some(version) = self.1.next() else { return 0 };
         self.0.publish_as(version, ctx.scheduled);
+        self.2.pass(ctx);
         version
     }
 }
 
 impl<T> OutletReader<T> {
-    pub(crate) fn new(half: Swappable<ExchangeReader<T>>) -> Self {
-        Self(half)
+    pub(crate) fn new(half: Swappable<ExchangeReader<T>>, taken: Counter) -> Self {
+        Self(half, taken)
     }
 
     /// Takes the newest value if there is one that was not taken yet; returns whether there was.
@@ -74,7 +77,11 @@ impl<T> OutletReader<T> {
     /// # Real-time
     /// Wait-free, real-time safe; never disturbs the writer.
     pub fn refresh(&mut self) -> bool {
-        self.0.refresh()
+        let fresh = self.0.refresh();
+        if fresh {
+            self.1.pass_outside();
+        }
+        fresh
     }
 
     /// The value of the last refresh, or the initial value.

@@ -3,7 +3,9 @@
 
 use crate::actor::{Phase, TickContext};
 use crate::executor::Execution;
+use crate::ports::port_traffic::Sides;
 use crate::primitives::sync::{AtomicUsize, Ordering, lock};
+use crate::records::input::InputUse;
 use crate::records::port_use::{PortUse, PortUseKind};
 use crate::records::recorder::{Recorder, Registry};
 use std::sync::{Arc, Mutex};
@@ -17,6 +19,7 @@ pub(crate) struct PortPlan {
     recorded: bool,
     uses: Mutex<Vec<UseRing>>,
     pub(crate) group: WriterGroup,
+    pub(crate) sides: Sides,
 }
 
 /// Where the uses of one kind go.
@@ -32,7 +35,8 @@ struct UseRing {
 impl PortPlan {
     pub(crate) fn new(execution: Execution, port: u32, registry: &Arc<Registry>) -> Self {
         let (registry, recorded) = (Arc::clone(registry), registry.wanted());
-        Self { port, registry, recorded, uses: Mutex::default(), group: WriterGroup::new(execution, port) }
+        let group = WriterGroup::new(execution, port);
+        Self { port, registry, recorded, uses: Mutex::default(), group, sides: Sides::new() }
     }
 
     /// Records the uses of this kind, for one half; fences the recorder of the one taken before and goes on with its
@@ -137,6 +141,14 @@ pub(crate) struct UseRecorder {
 }
 
 impl UseRecorder {
+    /// Records a value from outside.
+    pub(crate) fn push_input(&mut self, ctx: &TickContext, value: [u64; 5]) {
+        let Some(recorder) = &mut self.recorder else { return };
+        let (port, sequence) = (self.port, self.sequence);
+        self.sequence += 1;
+        recorder.push(InputUse { time: ctx.scheduled, group: ctx.group, port, sequence, value });
+    }
+
     pub(crate) fn push(&mut self, ctx: &TickContext, count: u64) {
         let Some(recorder) = &mut self.recorder else { return };
         let (port, kind, sequence) = (self.port, self.kind, self.sequence);

@@ -8,6 +8,7 @@ use crate::actor::{Phase, TickContext};
 use crate::ports::hot_swap::Swappable;
 use crate::ports::hot_swap_queue::{Numbered, SwappableConsumer};
 use crate::ports::port_state::{Looks, PortPlan, UseRecorder, WriterGroup};
+use crate::ports::port_traffic::Counter;
 use crate::ports::virtual_queue::{VirtualQueue, VirtualReceiver};
 use crate::primitives::fenced_counter::FencedCounter;
 use crate::primitives::ring::Producer;
@@ -40,6 +41,7 @@ pub struct QueueWriter<T> {
     attempts: FencedCounter,
     drops: FencedCounter,
     dropped: UseRecorder,
+    sent: Counter,
 }
 
 /// Receives the samples of a [`QueueWriter`] in the order in which they were sent.
@@ -62,12 +64,14 @@ pub struct QueueReader<T> {
     /// The same at the last look that was recorded.
     recorded: u64,
     saw: UseRecorder,
+    taken: Counter,
 }
 
 impl<T: Copy> QueueWriter<T> {
     pub(crate) fn new(plan: &PortPlan, kind: WriterKind<T>, attempts: FencedCounter, drops: FencedCounter) -> Self {
         let dropped = plan.recorder(PortUseKind::Dropped);
-        Self { kind, group: plan.group.clone(), attempts, drops, dropped }
+        let sent = plan.sides.writer.take();
+        Self { kind, group: plan.group.clone(), attempts, drops, dropped, sent }
     }
 
     /// Sends a sample; false if the queue is full: the sample is then dropped and counted. Also false if this writer's
@@ -88,7 +92,10 @@ impl<T: Copy> QueueWriter<T> {
             WriterKind::Threaded(producer) => producer.push(sample),
             WriterKind::Virtual(queue) => queue.push(ctx, sample),
         };
-        if !sent {
+        if sent {
+            self.sent.pass(ctx);
+        } else {
+            self.sent.drop_one();
             self.drops.next();
             if matches!(ctx.phase, Phase::Start | Phase::Release) {
                 self.dropped.push(ctx, number);
@@ -109,7 +116,8 @@ impl<T: Copy> QueueWriter<T> {
 impl<T: Copy> QueueReader<T> {
     pub(crate) fn new(plan: &PortPlan, kind: ReaderKind<T>) -> Self {
         let saw = plan.recorder(PortUseKind::Saw);
-        Self { kind, group: plan.group.clone(), looks: Looks::default(), visible: 0, recorded: 0, saw }
+        let taken = plan.sides.reader.take();
+        Self { kind, group: plan.group.clone(), looks: Looks::default(), visible: 0, recorded: 0, saw, taken }
     }
 
     /// The oldest sample that this release can see, left in the queue.
@@ -138,10 +146,14 @@ impl<T: Copy> QueueReader<T> {
     #[track_caller]
     pub fn pop(&mut self, ctx: &TickContext) -> Option<T> {
         self.look(ctx);
-        match &mut self.kind {
+        let sample = match &mut self.kind {
             ReaderKind::Threaded(consumer) => consumer.pop(self.visible),
             ReaderKind::Virtual(queue) => queue.pop(self.visible),
+        };
+        if sample.is_some() {
+            self.taken.pass(ctx);
         }
+        sample
     }
 
     /// Decides, at the first call of a release, which samples it gets.

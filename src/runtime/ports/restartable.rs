@@ -10,6 +10,7 @@ use crate::ports::hot_swap::{Swappable, Swapper, swappable};
 use crate::ports::hot_swap_queue::{Numbered, SwappableConsumer};
 use crate::ports::outlet::{OutletReader, OutletWriter};
 use crate::ports::port_state::PortPlan;
+use crate::ports::port_traffic::Sides;
 use crate::ports::queue_port::{self, QueueReader, QueueWriter};
 use crate::ports::virtual_exchange::{SharedFlight, VirtualReader, VirtualWriter, flight};
 use crate::ports::virtual_queue::VirtualQueue;
@@ -68,10 +69,10 @@ impl<W: Send, R: Send> Pair<W, R> {
     }
 }
 
-type ExchangePair<T> = Pair<ExchangeWriter<T>, ExchangeReader<T>>;
-type RingPair<T> = Pair<Producer<Numbered<T>>, Consumer<Numbered<T>>>;
+pub(crate) type ExchangePair<T> = Pair<ExchangeWriter<T>, ExchangeReader<T>>;
+pub(crate) type RingPair<T> = Pair<Producer<Numbered<T>>, Consumer<Numbered<T>>>;
 
-fn exchange_pair<T: Send + 'static>(mut init: impl FnMut() -> T + Send + 'static) -> ExchangePair<T> {
+pub(crate) fn exchange_pair<T: Send + 'static>(mut init: impl FnMut() -> T + Send + 'static) -> ExchangePair<T> {
     Pair::new(
         move || exchange(&mut init),
         |mut untaken, writer| {
@@ -83,7 +84,7 @@ fn exchange_pair<T: Send + 'static>(mut init: impl FnMut() -> T + Send + 'static
     )
 }
 
-fn ring_pair<T: Copy + Send + 'static>(capacity: usize) -> RingPair<T> {
+pub(crate) fn ring_pair<T: Copy + Send + 'static>(capacity: usize) -> RingPair<T> {
     Pair::new(
         move || ring(capacity),
         // They fit: both rings have the same capacity.
@@ -229,6 +230,7 @@ impl<T: Copy + Send + 'static> QueuePort<T> {
 struct Outlet<T> {
     pair: ExchangePair<T>,
     versions: FencedCounter,
+    sides: Sides,
 }
 
 /// An [outlet](crate::RuntimeBuilder::outlet) whose halves can be taken again, as those of an [`ExchangePort`]; clones
@@ -240,8 +242,8 @@ struct Outlet<T> {
 pub struct OutletPort<T>(Arc<Mutex<Outlet<T>>>);
 
 impl<T: Send + 'static> OutletPort<T> {
-    pub(crate) fn new(init: impl FnMut() -> T + Send + 'static) -> Self {
-        Self(Arc::new(Mutex::new(Outlet { pair: exchange_pair(init), versions: FencedCounter::default() })))
+    pub(crate) fn new(sides: Sides, init: impl FnMut() -> T + Send + 'static) -> Self {
+        Self(Arc::new(Mutex::new(Outlet { pair: exchange_pair(init), versions: FencedCounter::default(), sides })))
     }
 
     /// The actor's half; fences the one taken before. Versions go on.
@@ -249,9 +251,9 @@ impl<T: Send + 'static> OutletPort<T> {
     /// # Real-time
     /// Takes a lock and allocates: for [factories](crate::RuntimeBuilder::restartable).
     pub fn writer(&self) -> OutletWriter<T> {
-        let Outlet { pair, versions } = &mut *lock(&self.0);
+        let Outlet { pair, versions, sides } = &mut *lock(&self.0);
         let (half, versions) = pair.writer(versions);
-        OutletWriter::new(half, versions)
+        OutletWriter::new(half, versions, sides.writer.take())
     }
 
     /// The outside half; fences the one taken before.
@@ -259,7 +261,8 @@ impl<T: Send + 'static> OutletPort<T> {
     /// # Real-time
     /// Takes a lock and allocates.
     pub fn reader(&self) -> OutletReader<T> {
-        OutletReader::new(lock(&self.0).pair.reader())
+        let Outlet { pair, sides, .. } = &mut *lock(&self.0);
+        OutletReader::new(pair.reader(), sides.reader.take())
     }
 }
 

@@ -116,6 +116,13 @@ pub struct Histogram {
     max: Nanos,
 }
 
+impl Default for Histogram {
+    /// A histogram of nothing.
+    fn default() -> Self {
+        Self { counts: vec![0; BUCKETS].into(), count: 0, sum: Nanos::ZERO, max: Nanos::ZERO }
+    }
+}
+
 impl Histogram {
     /// What two histograms held together.
     pub(crate) fn merged(&self, other: &Self) -> Self {

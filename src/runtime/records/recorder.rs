@@ -142,7 +142,7 @@ impl Registry {
 ///
 /// let mut graph = Runtime::builder(Execution::Threaded);
 /// let (mut recorder, mut drain) = (graph.recorder(16), graph.drain());
-/// recorder.push(Event { stamp: Nanos(5), group: 0, code: 300, detail: 42 }); // in a tick
+/// recorder.push(Event { stamp: Nanos(5), group: 0, code: 300.into(), detail: 42 }); // in a tick
 /// let mut records = Vec::new();
 /// drain.drain(&mut records); // in a logger
 /// assert_eq!(Event::from_record(&records[0]).map(|event| event.detail), Some(42));
@@ -205,7 +205,7 @@ mod tests {
     use crate::records::record::Event;
 
     fn event(stamp: u64, code: u32) -> Event {
-        Event { stamp: Nanos(stamp), group: 0, code, detail: 0 }
+        Event { stamp: Nanos(stamp), group: 0, code: code.into(), detail: 0 }
     }
 
     #[test]
@@ -222,7 +222,7 @@ mod tests {
         }
         let mut records = Vec::new();
         drain.drain(&mut records);
-        let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|e| e.code).collect();
+        let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|e| e.code.code()).collect();
         assert_eq!(codes, [10, 20, 11, 12, 21]);
         assert_eq!(drain.lost(), 1);
     }
@@ -261,7 +261,7 @@ mod tests {
         old.push(event(7, 7));
         fresh.push(event(8, 8));
         drain.drain(&mut records);
-        let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|e| e.code).collect();
+        let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|e| e.code.code()).collect();
         assert_eq!(codes, [1, 2, 3, 4, 5, 8]);
         assert_eq!(lock(&registry.rings).all.len(), 1);
     }

@@ -1,6 +1,7 @@
 //! What has to be known of a run to repeat it: which releases ran, and what they saw through ports from other groups.
 
 use crate::error::{GraphError, GraphErrorKind};
+use crate::records::input::InputUse;
 use crate::records::port_use::{PortUse, PortUseKind};
 use crate::records::record::Record;
 use crate::records::timing::{RecordedRelease, TickTiming};
@@ -65,6 +66,7 @@ use std::collections::{BTreeMap, VecDeque};
 pub struct Recording {
     releases: BTreeMap<u16, Vec<RecordedRelease>>,
     uses: BTreeMap<(u32, PortUseKind), Vec<PortUse>>,
+    inputs: BTreeMap<u32, Vec<InputUse>>,
 }
 
 impl Recording {
@@ -75,6 +77,9 @@ impl Recording {
         for record in records {
             TickTiming::from_record(record).iter().for_each(|timing| recording.push_timing(timing));
             PortUse::from_record(record).iter().for_each(|used| recording.push_use(used));
+            if let Some(input) = InputUse::from_record(record) {
+                recording.inputs.entry(input.port).or_default().push(input);
+            }
         }
         recording
     }
@@ -98,6 +103,9 @@ impl Recording {
         }
         for uses in self.uses.values_mut() {
             uses.retain(|used| used.time < time);
+        }
+        for inputs in self.inputs.values_mut() {
+            inputs.retain(|input| input.time < time);
         }
         self
     }
@@ -142,12 +150,22 @@ impl Recording {
                 next = release.tick + 1;
             }
         }
+        for (port, inputs) in &self.inputs {
+            if let Some(index) = inputs.iter().zip(0..).position(|(input, index)| input.sequence != index) {
+                let (group, at) = (name(inputs[index].group), inputs[index].time);
+                let place = format!(
+                    "value {} from outside through port {port} of rate group `{group}`",
+                    inputs[index].sequence
+                );
+                return Err(incomplete(format!("{place}, release due at {at}, follows value {index} that is missing")));
+            }
+        }
         self.uses.iter().try_for_each(|((port, kind), uses)| check_uses(*port, *kind, uses, &name))
     }
 
     /// The number of the last port with a use, plus one.
     pub(crate) fn ports(&self) -> u32 {
-        self.uses.keys().map(|(port, _)| port + 1).max().unwrap_or(0)
+        self.uses.keys().map(|(port, _)| port + 1).chain(self.inputs.keys().map(|port| port + 1)).max().unwrap_or(0)
     }
 
     /// The number of the last group with a release, plus one.
@@ -161,6 +179,7 @@ impl Recording {
         let of_port = |port| PortScript {
             // A port is an exchange or a queue: one of the two is empty.
             reads: uses(port, PortUseKind::Took).chain(uses(port, PortUseKind::Saw)).collect(),
+            inputs: self.inputs.get(&port).into_iter().flatten().copied().collect(),
             drops: uses(port, PortUseKind::Dropped).map(|used| used.count).collect(),
             ..PortScript::default()
         };

@@ -8,7 +8,7 @@ use crate::group::group_run::GroupRun;
 use crate::records::timing::RecordedRelease;
 use crate::reexecution::recording::Recording;
 use crate::reexecution::script::Script;
-use crate::reports::report::RuntimeFault;
+use crate::reports::report::{FaultKind, RuntimeFault};
 use std::collections::VecDeque;
 
 /// A recording that is being re-executed.
@@ -93,10 +93,9 @@ impl Reexecution {
     /// Strikes out the release that group `index` has just run, and sees whether it did all that was recorded.
     pub(crate) fn done(&mut self, index: usize, group: &GroupRun) -> Result<(), RuntimeFault> {
         let Some(release) = self.releases[index].pop_front() else { return Ok(()) };
-        match self.script.left_out(group.index, release.tick) {
+        match self.script.left_out(group.index, release.tick, release.scheduled) {
             None => Ok(()),
-            Some(used) => {
-                let (tick, port) = (used.tick, used.port);
+            Some((tick, port)) => {
                 let what = format!("the re-execution left the recording: release {tick} has not read port {port}");
                 Err(fault(group, &release, what))
             }
@@ -105,5 +104,5 @@ impl Reexecution {
 }
 
 fn fault(group: &GroupRun, release: &RecordedRelease, what: String) -> RuntimeFault {
-    RuntimeFault::of_group(&group.spec.name, release.scheduled, what)
+    RuntimeFault::of_group(&group.spec.name, release.scheduled, FaultKind::Recording, what)
 }

@@ -4,7 +4,9 @@
 
 use crate::actor::TickContext;
 use crate::primitives::sync::lock;
+use crate::records::input::InputUse;
 use crate::records::port_use::PortUse;
+use crate::time::Nanos;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
@@ -13,6 +15,8 @@ use std::sync::{Arc, Mutex};
 pub(crate) struct PortScript {
     /// What readers took or saw, in order.
     pub(crate) reads: VecDeque<PortUse>,
+    /// What actors took from outside, in order.
+    pub(crate) inputs: VecDeque<InputUse>,
     /// The attempts to send that failed, in order.
     pub(crate) drops: VecDeque<u64>,
     /// The newest version published, or the number of the newest sample sent.
@@ -57,16 +61,20 @@ impl Script {
         ports.iter().find_map(missing)
     }
 
-    /// A use that release `tick` of `group` should have made and has not.
-    pub(crate) fn left_out(&self, group: u16, tick: u64) -> Option<PortUse> {
+    /// The port of a use that release `tick` of `group`, due at `scheduled`, should have made and has not.
+    pub(crate) fn left_out(&self, group: u16, tick: u64, scheduled: Nanos) -> Option<(u64, u32)> {
         let ports = lock(&self.0);
+        let is_late = |next: &&InputUse| next.group == group && next.time <= scheduled;
+        if let Some(input) = ports.iter().find_map(|port| port.inputs.front().filter(is_late)) {
+            return Some((tick, input.port));
+        }
         let is_past = |next: &&PortUse| next.group == group && next.tick <= tick;
-        ports.iter().find_map(|port| port.reads.front().filter(is_past)).copied()
+        ports.iter().find_map(|port| port.reads.front().filter(is_past)).map(|used| (used.tick, used.port))
     }
 }
 
 /// One port's view of the script.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct ScriptedPort {
     script: Script,
     index: usize,
@@ -91,6 +99,12 @@ impl ScriptedPort {
     pub(crate) fn took(&self, ctx: &TickContext) -> Option<u64> {
         let is_now = |next: &mut PortUse| next.group == ctx.group && next.tick == ctx.tick;
         self.with(|port| port.reads.pop_front_if(is_now)).map(|now| now.count)
+    }
+
+    /// The next value that this release took from outside, if there is one.
+    pub(crate) fn input(&self, ctx: &TickContext) -> Option<[u64; 5]> {
+        let is_now = |next: &mut InputUse| next.group == ctx.group && next.time == ctx.scheduled;
+        self.with(|port| port.inputs.pop_front_if(is_now)).map(|now| now.value)
     }
 
     /// The number of the newest sample that this release saw.

@@ -4,39 +4,17 @@ use crate::accounting::ledger::Ledger;
 use crate::primitives::histogram::{Histogram, HistogramReader, HistogramWriter, histogram};
 use crate::primitives::sync::{AtomicU64, CachePadded, Ordering};
 use crate::rate_group::RateGroup;
-use crate::records::timing::TickTiming;
-use crate::time::{Nanos, Rate};
+use crate::records::timing::{SlipCause, SlipCounts, TickTiming};
+use crate::reports::group_live::GroupLive;
+use crate::time::Rate;
 use std::sync::{Arc, OnceLock};
-
-/// A rate group at one moment of its run: counts, lateness and execution times so far.
-///
-/// The parts are read one after the other while the group goes on: a release that is counted in the histograms may not
-/// be in [`released`](Self::released) yet, never the other way round. When the run is over they agree.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct GroupLive {
-    /// The group's name.
-    pub name: String,
-    /// The rate of the group.
-    pub rate: Rate,
-    /// The number of releases that ran.
-    pub released: u64,
-    /// The number of periods without a release.
-    pub skipped: u64,
-    /// The number of releases that ended after their deadline.
-    pub missed: u64,
-    /// The lateness of every release: from its scheduled time to the end of the wait.
-    pub lateness: Histogram,
-    /// The execution time of every release, from the first actor's start to the last one's end; its sum is the time
-    /// that the group was at work.
-    pub execution: Histogram,
-}
 
 #[derive(Debug, Default)]
 struct Counts {
     released: AtomicU64,
-    skipped: AtomicU64,
-    missed: AtomicU64,
+    /// By cause.
+    skipped: [AtomicU64; SlipCause::ALL.len()],
+    missed: [AtomicU64; SlipCause::ALL.len()],
 }
 
 /// What one writer shows. Each has its own: one that was fenced counts on where nobody looks.
@@ -104,8 +82,10 @@ impl LiveWriter {
     #[inline]
     pub(crate) fn count(&self, ledger: &Ledger) {
         let Counts { released, skipped, missed } = &**self.counts;
-        skipped.store(ledger.skipped.total(), Ordering::Relaxed);
-        missed.store(ledger.missed, Ordering::Relaxed);
+        for cause in SlipCause::ALL {
+            skipped[cause as usize].store(ledger.skipped.of(cause), Ordering::Relaxed);
+            missed[cause as usize].store(ledger.missed.of(cause), Ordering::Relaxed);
+        }
         // Release: with the acquire in `read`, so that whoever sees this release also sees its times and its skips.
         released.store(ledger.released, Ordering::Release);
     }
@@ -117,11 +97,31 @@ impl LiveReader {
         let last = self.last();
         let Counts { released, skipped, missed } = &**last.counts;
         let copy = |count: &AtomicU64| AtomicU64::new(count.load(Ordering::Acquire));
-        let counts = Counts { released: copy(released), skipped: copy(skipped), missed: copy(missed) };
+        let counts = Counts {
+            released: copy(released),
+            skipped: skipped.each_ref().map(copy),
+            missed: missed.each_ref().map(copy),
+        };
         let (writer, shown) = Shown::new(counts, Some(last.times()));
         // Set once: only the one who starts a group again comes here.
         let _ = last.next.set(shown);
         writer
+    }
+
+    /// The name of the group.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Skipped periods and missed deadlines so far.
+    pub(crate) fn counts(&self) -> (SlipCounts, SlipCounts) {
+        let counts = &self.last().counts;
+        (sums(&counts.skipped), sums(&counts.missed))
+    }
+
+    /// Lateness and execution so far.
+    pub(crate) fn times(&self) -> (Histogram, Histogram) {
+        self.last().times()
     }
 
     /// What the writer in force shows: as many steps away as the group was started again.
@@ -138,31 +138,32 @@ impl LiveReader {
         // Acquire: with the release in `count`; everything below is read afterwards.
         let released = shown.counts.released.load(Ordering::Acquire);
         let (lateness, execution) = shown.times();
+        let [slips, misses] = [&shown.counts.skipped, &shown.counts.missed].map(sums);
         GroupLive {
             name: self.name.clone(),
             rate: self.rate,
             released,
-            skipped: shown.counts.skipped.load(Ordering::Relaxed),
-            missed: shown.counts.missed.load(Ordering::Relaxed),
+            skipped: slips.total(),
+            missed: misses.total(),
+            slips,
+            misses,
             lateness,
             execution,
         }
     }
 }
 
-impl GroupLive {
-    /// The share of `elapsed` that the group was at work, from 0 to 1; waiting, also by spinning, is no work.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn busy(&self, elapsed: Nanos) -> f64 {
-        if elapsed == Nanos::ZERO { 0.0 } else { self.execution.sum().0 as f64 / elapsed.0 as f64 }
-    }
+/// What was counted for each cause.
+fn sums(counts: &[AtomicU64; SlipCause::ALL.len()]) -> SlipCounts {
+    let mut sums = SlipCounts::default();
+    SlipCause::ALL.into_iter().for_each(|cause| sums.add(cause, counts[cause as usize].load(Ordering::Relaxed)));
+    sums
 }
 
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
+    use crate::time::Nanos;
 
     #[test]
     fn counts_and_times_go_on_with_the_next_writer_and_a_fenced_one_has_no_part_in_them() {

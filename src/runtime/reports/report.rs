@@ -1,7 +1,9 @@
 //! What a run has to say when it is over.
 
+use crate::graph::view::GraphView;
 use crate::primitives::histogram::Histogram;
 use crate::records::timing::SlipCounts;
+use crate::reports::text::{by_cause, measured};
 use crate::system::grant::SystemGrant;
 use crate::time::{Nanos, Rate};
 use std::fmt;
@@ -23,12 +25,39 @@ pub struct GroupReport {
     pub elapsed_periods: u64,
     /// The number of releases that ended after their deadline.
     pub missed_deadlines: u64,
+    /// The missed deadlines by cause; their sum is `missed_deadlines`.
+    pub misses: SlipCounts,
     /// The number of releases in which an actor reported a degraded result.
     pub degraded: u64,
     /// The number of releases in [`GroupMode::Degraded`](crate::GroupMode::Degraded), which an overrun policy sets.
     pub in_degraded_mode: u64,
     /// The number of times that the watchdog of a device-paced group took over.
     pub watchdog_takeovers: u64,
+    /// The lateness of every release: from its scheduled time to the end of the wait.
+    pub lateness: Histogram,
+    /// The execution time of every release: from the first actor's start to the last one's end.
+    pub execution: Histogram,
+}
+
+/// The kind of a fault, as far as a program can act on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum FaultKind {
+    /// An actor panicked. The sentence has its words and, where known, the place in the source.
+    Panic,
+    /// An actor reported a [fault](crate::Outcome::Fault) with this code of the program's own.
+    Reported(u32),
+    /// The group's policy is to stop at an overrun, and one came.
+    Overrun {
+        /// The number of periods that were due at once.
+        skipped: u64,
+    },
+    /// A release did not return for as long as its [restart policy](crate::Restart::hung_after) allows.
+    Hung,
+    /// A group did not end within [`STOP_BOUND`](crate::STOP_BOUND) of a stop and was given up with its thread.
+    GivenUp,
+    /// A re-execution left its recording, or the recording lacks what a release needs.
+    Recording,
 }
 
 /// The first fatal event of a run: why it ended before it should.
@@ -40,14 +69,16 @@ pub struct RuntimeFault {
     pub actor: String,
     /// The scheduled time of the release that the fault happened in.
     pub at: Nanos,
+    /// The kind of the fault, for programs.
+    pub kind: FaultKind,
     /// A sentence that says what happened.
     pub what: String,
 }
 
 impl RuntimeFault {
     /// A fault of a group itself, not of an actor in it.
-    pub(crate) fn of_group(group: &str, at: Nanos, what: String) -> Self {
-        Self { group: group.to_owned(), actor: String::new(), at, what }
+    pub(crate) fn of_group(group: &str, at: Nanos, kind: FaultKind, what: String) -> Self {
+        Self { group: group.to_owned(), actor: String::new(), at, kind, what }
     }
 }
 
@@ -94,6 +125,8 @@ pub struct GroupCost {
 pub struct RuntimeReport {
     /// The sums of each rate group that ended, in graph order.
     pub groups: Vec<GroupReport>,
+    /// The graph with its times and what went through its ports.
+    pub graph: GraphView,
     /// The privileges that the system granted.
     pub grant: SystemGrant,
     /// The fault that ended the run, if one did.
@@ -108,21 +141,16 @@ pub struct RuntimeReport {
 
 impl fmt::Display for RuntimeReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write_table(f)?;
         for group in &self.groups {
-            writeln!(
-                f,
-                "{}: {}, {} released + {} skipped = {} periods, {} deadlines missed, {} degraded",
-                group.name,
-                group.rate,
-                group.released,
-                group.skipped,
-                group.elapsed_periods,
-                group.missed_deadlines,
-                group.degraded
-            )?;
+            for (what, counts) in [("skipped", by_cause(&group.slips)), ("missed", by_cause(&group.misses))] {
+                if !counts.is_empty() {
+                    writeln!(f, "{what:10} {}: {counts}", group.name)?;
+                }
+            }
         }
         for group in self.grant.groups.iter().filter(|group| !group.refused.is_empty()) {
-            writeln!(f, "{}: {}", group.name, group.refused)?;
+            writeln!(f, "refused    {}: {}", group.name, group.refused)?;
         }
         if self.lost_records > 0 {
             writeln!(f, "{} records lost", self.lost_records)?;
@@ -134,5 +162,27 @@ impl fmt::Display for RuntimeReport {
             Some(fault) => write!(f, "stopped by a fault: {fault}"),
             None => f.write_str("no fault"),
         }
+    }
+}
+
+impl RuntimeReport {
+    /// A line per group: counts, then how late releases began and how long they took (p50, p99 and the maximum).
+    fn write_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self.groups.iter().map(|group| group.name.chars().count()).max().unwrap_or(0).max(5);
+        write!(f, "{:width$} {:>10}", "group", "rate")?;
+        ["periods", "released", "skipped", "missed", "degraded"].iter().try_for_each(|name| write!(f, " {name:>9}"))?;
+        ["late p50", "p99", "max", "work p50", "p99", "max"].iter().try_for_each(|name| write!(f, " {name:>10}"))?;
+        writeln!(f)?;
+        for group in &self.groups {
+            write!(f, "{:width$} {:>10}", group.name, group.rate.to_string())?;
+            let counts = [group.elapsed_periods, group.released, group.skipped, group.missed_deadlines, group.degraded];
+            counts.iter().try_for_each(|count| write!(f, " {count:>9}"))?;
+            for times in [&group.lateness, &group.execution] {
+                let figures = [times.percentile(0.5), times.percentile(0.99), times.max()];
+                figures.iter().try_for_each(|time| write!(f, " {:>10}", measured(*time)))?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
     }
 }

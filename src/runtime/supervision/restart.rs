@@ -9,7 +9,7 @@ use crate::group::panic_hook::{guarded, place as panicked_at};
 use crate::ports::restartable::RecorderPort;
 use crate::primitives::exchange::{ExchangeReader, exchange};
 use crate::rate_group::RateGroup;
-use crate::records::record::Event;
+use crate::records::record::{Event, EventCode};
 use crate::records::recorder::Recorder;
 use crate::reports::live::LiveReader;
 use crate::reports::report::RuntimeFault;
@@ -113,7 +113,7 @@ impl Restarter {
         Ok((group, reader))
     }
 
-    fn event(&mut self, stamp: Nanos, code: u32, detail: u64) {
+    fn event(&mut self, stamp: Nanos, code: EventCode, detail: u64) {
         if let Some(events) = &mut self.events {
             events.push(Event { stamp, group: self.index, code, detail });
         }

@@ -90,6 +90,11 @@ impl Supervisor {
         self.ended += usize::from(self.reports[group].replace(report).is_none());
     }
 
+    /// The first fault.
+    pub(crate) fn fault(&self) -> Option<&RuntimeFault> {
+        self.fault.as_ref()
+    }
+
     /// How many groups have ended. Asked after every release of virtual time.
     pub(crate) fn ended(&self) -> usize {
         self.ended

@@ -46,6 +46,8 @@ pub struct GroupGrant {
     pub cpu_asked: Option<usize>,
     /// The number of the core that the thread is pinned to.
     pub cpu: Option<usize>,
+    /// The numbers of the cores that the thread may run on, where several were asked for and granted.
+    pub cpus: Vec<usize>,
     /// The way in which the thread waits for its releases, in words.
     pub wait: String,
     /// The privileges that were refused, with the reason; empty if nothing was.
@@ -87,7 +89,21 @@ pub(crate) struct ThreadGrant {
 }
 
 const FIFO: &str = "SCHED_FIFO";
+const DEADLINE: &str = "SCHED_DEADLINE";
 const OTHER: &str = "SCHED_OTHER";
+
+fn policy(fifo: bool, deadline: bool) -> &'static str {
+    match (fifo, deadline) {
+        (_, true) => DEADLINE,
+        (true, _) => FIFO,
+        _ => OTHER,
+    }
+}
+
+/// The group's three numbers; admission has seen to it that there is a budget.
+fn ask_deadline(spec: &RateGroup) -> Result<(), String> {
+    os::set_deadline(spec.budget.unwrap_or_default().0, spec.relative_deadline().0, spec.rate.period().0)
+}
 
 /// Sets the calling thread up for `spec` as far as the system allows.
 pub(crate) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
@@ -98,15 +114,20 @@ pub(crate) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
     let timer_slack = os::set_timer_slack().map_or_else(|reason| reason, |()| "1 ns".to_owned());
     let cpu = spec.cpu.filter(|&cpu| granted(os::pin(cpu)));
     let priority = spec.priority.filter(|&priority| granted(os::set_realtime(priority)));
+    let cpus = if !spec.cpus.is_empty() && granted(os::pin_to(&spec.cpus)) { spec.cpus.clone() } else { Vec::new() };
+    // After the cores: the kernel looks at them when it grants it.
+    let by_deadline = spec.by_deadline && granted(ask_deadline(spec));
+    // A thread that spins uses up its budget: under SCHED_DEADLINE it sleeps.
     let waiter = Waiter::new(spec.wait, priority.is_some(), spec.rate.period());
     let group = GroupGrant {
         name: spec.name.clone(),
-        policy_asked: if spec.priority.is_some() { FIFO } else { OTHER }.to_owned(),
-        policy: if priority.is_some() { FIFO } else { OTHER }.to_owned(),
+        policy_asked: policy(spec.priority.is_some(), spec.by_deadline).to_owned(),
+        policy: policy(priority.is_some(), by_deadline).to_owned(),
         priority_asked: spec.priority.unwrap_or(0),
         priority: priority.unwrap_or(0),
         cpu_asked: spec.cpu,
         cpu,
+        cpus,
         wait: waiter.to_string(),
         refused: refused.join("; "),
     };
@@ -118,7 +139,7 @@ pub(crate) fn refusals(groups: &[RateGroup]) -> Vec<String> {
     let mut refused = Vec::new();
     for spec in groups {
         let own = spec.clone();
-        let probe = std::thread::Builder::new().name(spec.name.clone()).spawn(move || set_up_thread(&own));
+        let probe = spec.thread().spawn(move || set_up_thread(&own));
         let grant = match probe.map(std::thread::JoinHandle::join) {
             Ok(Ok(grant)) => grant,
             _ => {
@@ -133,7 +154,7 @@ pub(crate) fn refusals(groups: &[RateGroup]) -> Vec<String> {
             refused.push(format!("{}: timer slack {}", spec.name, grant.timer_slack));
         }
     }
-    if groups.iter().any(|spec| spec.priority.is_some()) {
+    if groups.iter().any(RateGroup::is_realtime) {
         refused.extend(os::may_lock_everything().err().map(|reason| format!("memory: {reason}")));
         refused.extend(os::stay_awake().err().map(|reason| format!("idle states: {reason}")));
     }
@@ -141,6 +162,11 @@ pub(crate) fn refusals(groups: &[RateGroup]) -> Vec<String> {
 }
 
 impl SystemGrant {
+    /// True if the group got a real-time policy.
+    pub(crate) fn is_realtime(group: &GroupGrant) -> bool {
+        group.policy == FIFO || group.policy == DEADLINE
+    }
+
     /// The facts about the machine; groups and privileges are left to the caller.
     pub(crate) fn of_machine() -> Self {
         Self {

@@ -3,8 +3,8 @@
 //! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
 
 pub(crate) use imp::{
-    ThreadProbe, block_signals, lock_memory, may_lock_everything, monotonic, set_realtime, set_timer_slack,
-    sleep_until, stay_awake, thread_cpu,
+    ThreadProbe, block_signals, is_root, lock_memory, may_lock_everything, monotonic, pin_to, set_deadline,
+    set_realtime, set_timer_slack, sleep_until, stay_awake, thread_cpu,
 };
 
 use std::fs::read_to_string;
@@ -102,6 +102,83 @@ mod imp {
         };
         // SAFETY: the pointer is to a timespec of our own; an absolute sleep writes no remainder.
         unsafe { libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &time, std::ptr::null_mut()) };
+    }
+
+    /// Whether the process has the rights of root, to whom limits say nothing.
+    pub(crate) fn is_root() -> bool {
+        // SAFETY: asks for a number and touches no memory.
+        unsafe { libc::geteuid() == 0 }
+    }
+
+    /// Lets the calling thread run on these cores only.
+    pub(crate) fn pin_to(cpus: &[usize]) -> Result<(), String> {
+        let refused = |why: &dyn std::fmt::Display| Err(format!("cores {cpus:?} refused: {why}"));
+        if let Some(cpu) = cpus.iter().find(|&&cpu| cpu >= libc::CPU_SETSIZE as usize) {
+            return refused(&format!("core {cpu} is beyond the {} that are possible", libc::CPU_SETSIZE));
+        }
+        // SAFETY: all zeros is an empty set; `CPU_SET` stays within it, as was checked; the pointer is to our own set,
+        // and 0 means the calling thread.
+        let result = unsafe {
+            let mut set: libc::cpu_set_t = std::mem::zeroed();
+            cpus.iter().for_each(|&cpu| libc::CPU_SET(cpu, &mut set));
+            // Checked first: the kernel leaves out cores that do not exist and says nothing.
+            let mut allowed: libc::cpu_set_t = std::mem::zeroed();
+            libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &raw mut allowed);
+            if let Some(cpu) = cpus.iter().find(|&&cpu| !libc::CPU_ISSET(cpu, &allowed)) {
+                return refused(&format!("core {cpu} is not available to this process"));
+            }
+            libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set)
+        };
+        if result == 0 { Ok(()) } else { refused(&Error::last_os_error()) }
+    }
+
+    /// The kernel's `struct sched_attr`, in its first version.
+    #[repr(C)]
+    struct SchedAttr {
+        size: u32,
+        policy: u32,
+        flags: u64,
+        nice: i32,
+        priority: u32,
+        runtime: u64,
+        deadline: u64,
+        period: u64,
+    }
+
+    const SCHED_FLAG_RESET_ON_FORK: u64 = 1;
+
+    /// Gives the calling thread SCHED_DEADLINE: `runtime` of a processor within `deadline` of each `period`, in
+    /// nanoseconds.
+    pub(crate) fn set_deadline(runtime: u64, deadline: u64, period: u64) -> Result<(), String> {
+        let attr = SchedAttr {
+            size: size_of::<SchedAttr>() as u32,
+            policy: libc::SCHED_DEADLINE as u32,
+            // Threads that this one creates start without the policy.
+            flags: SCHED_FLAG_RESET_ON_FORK,
+            nice: 0,
+            priority: 0,
+            runtime,
+            deadline,
+            period,
+        };
+        // SAFETY: the pointer is to a structure of our own that says its size; 0 is the calling thread, and no flags.
+        let result = unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attr, 0) };
+        if result == 0 {
+            return Ok(());
+        }
+        let error = Error::last_os_error();
+        let remedy = match error.raw_os_error() {
+            Some(libc::EPERM) => {
+                "; it takes CAP_SYS_NICE and a thread that may run on every core of its root domain: leave `pin` out, or \
+                 give the process an exclusive cpuset"
+            }
+            Some(libc::EBUSY) => {
+                "; the budgets of all such threads are above what the kernel keeps for them: lower them"
+            }
+            Some(libc::EINVAL) => "; the budget must be at least 1024 ns",
+            _ => "",
+        };
+        Err(format!("SCHED_DEADLINE {runtime} of {period} ns refused: {error}{remedy}"))
     }
 
     /// Gives the calling thread SCHED_FIFO at `priority`.
@@ -257,6 +334,18 @@ mod imp {
     }
 
     pub(crate) fn set_realtime(_priority: u8) -> Result<(), String> {
+        Err(NOT_AVAILABLE.to_owned())
+    }
+
+    pub(crate) fn set_deadline(_runtime: u64, _deadline: u64, _period: u64) -> Result<(), String> {
+        Err(NOT_AVAILABLE.to_owned())
+    }
+
+    pub(crate) fn is_root() -> bool {
+        false
+    }
+
+    pub(crate) fn pin_to(_cpus: &[usize]) -> Result<(), String> {
         Err(NOT_AVAILABLE.to_owned())
     }
 

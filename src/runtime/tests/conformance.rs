@@ -357,7 +357,7 @@ fn an_observer_ends_last_and_sees_everything(execution: Execution) {
     let mut recorder = graph.recorder(1024);
     let mut drain = graph.drain();
     let work = actor_fn("work", move |ctx| {
-        recorder.push(Event { stamp: ctx.scheduled, group: 0, code: 1000, detail: ctx.tick });
+        recorder.push(Event { stamp: ctx.scheduled, group: 0, code: 1000.into(), detail: ctx.tick });
         Outcome::Continue
     });
     let records: Arc<Mutex<Vec<Record>>> = Arc::default();

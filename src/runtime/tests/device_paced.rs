@@ -4,8 +4,8 @@ mod device_clock;
 
 use device_clock::DeviceClock;
 use palpate_runtime::{
-    Actor, Event, Execution, Nanos, Outcome, OverrunPolicy, RateGroup, Record, Restart, Runtime, RuntimeReport,
-    SlipCause, TickContext, TickTiming, actor_fn,
+    Actor, Event, EventCode, Execution, Nanos, Outcome, OverrunPolicy, RateGroup, Record, Restart, Runtime,
+    RuntimeReport, SlipCause, TickContext, TickTiming, actor_fn,
 };
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -85,7 +85,7 @@ fn run(answer: Answer, watchdog_ms: u64, until_ms: u64) -> Left {
     Left { report, timings, events: records.iter().filter_map(Event::from_record).collect(), asked }
 }
 
-fn codes(events: &[Event]) -> Vec<(u32, bool)> {
+fn codes(events: &[Event]) -> Vec<(EventCode, bool)> {
     events.iter().map(|event| (event.code, event.detail == Event::RECOVERED)).collect()
 }
 

@@ -281,7 +281,7 @@ fn a_thread_that_never_returns_is_left_behind_with_its_ports() {
     assert!(seen.len() > released_before && seen.windows(2).all(|pair| pair[0] <= pair[1]), "{seen:?}");
     let mut records = Vec::new();
     drain.drain(&mut records);
-    let codes: Vec<u32> = records.iter().filter_map(Event::from_record).map(|event| event.code).collect();
+    let codes: Vec<_> = records.iter().filter_map(Event::from_record).map(|event| event.code).collect();
     assert_eq!(codes, [Event::ABANDONED, Event::RESTARTED]);
     let ticks: Vec<u64> = records
         .iter()

@@ -6,7 +6,7 @@ mod support;
 
 use device_clock::DeviceClock;
 use palpate_runtime::{
-    Actor, Disturbance, Execution, GroupMode, Nanos, Outcome, OverrunPolicy, RateGroup, Restart, Runtime,
+    Actor, Disturbance, Execution, FaultKind, GroupMode, Nanos, Outcome, OverrunPolicy, RateGroup, Restart, Runtime,
     RuntimeBuilder, RuntimeReport, SlipCause, TickContext, actor_fn,
 };
 use std::collections::HashSet;
@@ -186,7 +186,12 @@ fn time_lost_in_a_restart_is_no_overrun(execution: Execution) {
         finish(graph.restartable(group, Restart::default(), factory).until(Nanos(300 * MS)))
     };
     let passed = |report: &RuntimeReport| {
-        assert_eq!(report.restarts.len(), 1);
+        // A stall before the failure has ended the run without a restart.
+        assert!(
+            report.restarts.len() == 1
+                || report.fault.as_ref().is_some_and(|fault| matches!(fault.kind, FaultKind::Overrun { .. })),
+            "{report}"
+        );
         report.fault.is_none()
     };
     let report = (0..5).map(|_| attempt()).find(passed).expect("one attempt without a stall");

@@ -79,7 +79,7 @@ impl Cut {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::{GroupReport, Rate};
+    use crate::runtime::{FaultKind, GroupReport, Rate};
 
     /// Due every 10 ns; each with the times at which it woke and ended.
     fn group(ran: &[[u64; 2]]) -> Vec<TickTiming> {
@@ -125,13 +125,17 @@ mod tests {
             slips: Default::default(),
             elapsed_periods: released,
             missed_deadlines: 0,
+            misses: Default::default(),
             degraded: 0,
             in_degraded_mode: 0,
             watchdog_takeovers: 0,
+            lateness: Default::default(),
+            execution: Default::default(),
         };
         let groups = ["local", "global"].into_iter().zip(released).map(group).collect();
         RuntimeReport {
             groups,
+            graph: Default::default(),
             grant: Default::default(),
             fault: None,
             restarts: Vec::new(),
@@ -151,6 +155,7 @@ mod tests {
             group: "local".to_owned(),
             actor: String::new(),
             at: Nanos(at),
+            kind: FaultKind::Recording,
             what: "release 3 waits".to_owned(),
         };
         let unrepeated = cut.excuse(&report([3, 4]), ended(30)).unwrap();
