@@ -12,6 +12,8 @@ pub enum Cause {
     Device(DeviceFault),
     /// The device reported numbers that are not finite; the last state is used.
     DeviceNotFinite,
+    /// The device reported a place that it cannot be at, by its workspace or by its last place; the last state is used.
+    DeviceImpossible,
     /// The local model's force is not finite: zero is commanded until the next resync.
     LocalNotFinite,
     /// The global model's state is not finite: it publishes nothing any more.
@@ -34,6 +36,7 @@ impl Cause {
             Self::GlobalNotFinite => 302,
             Self::SamplesLost => 303,
             Self::NoBasis => 304,
+            Self::DeviceImpossible => 305,
         }
     }
 
@@ -47,6 +50,7 @@ impl Cause {
             301 => "the local model's force is not finite, zero is commanded",
             302 => "the global model's state is not finite, it publishes nothing any more",
             304 => "the surroundings of a patch could not be reduced",
+            305 => "the device reported a place where it cannot be, the last one is used",
             303 => "tool samples were lost between local and global model",
             _ => return None,
         })
@@ -59,8 +63,14 @@ mod tests {
 
     #[test]
     fn every_cause_has_words() {
-        let others =
-            [Cause::DeviceNotFinite, Cause::LocalNotFinite, Cause::GlobalNotFinite, Cause::SamplesLost, Cause::NoBasis];
+        let others = [
+            Cause::DeviceNotFinite,
+            Cause::DeviceImpossible,
+            Cause::LocalNotFinite,
+            Cause::GlobalNotFinite,
+            Cause::SamplesLost,
+            Cause::NoBasis,
+        ];
         let causes: Vec<Cause> = DeviceFault::ALL.map(Cause::Device).into_iter().chain(others).collect();
         for (index, cause) in causes.iter().enumerate() {
             assert!(Cause::describe(cause.code()).is_some(), "{cause:?}");
