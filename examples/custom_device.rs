@@ -109,7 +109,7 @@ fn main() -> Result<(), Error> {
             tool.position.z * 1e3,
             gap * 1e3,
             Hand::STIFFNESS * gap,
-            tool.force.z,
+            tool.commanded_force.z,
             tool.mode,
         );
     }

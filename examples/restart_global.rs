@@ -82,7 +82,7 @@ fn main() -> Result<(), Error> {
             running.wait_for(Duration::from_millis(250));
             let (tool, surface) = (viewer.tool(), viewer.surface().time);
             let age = tool.time.saturating_sub(surface).as_secs_f64() * 1e3;
-            println!("{:7.2}   {:9.3}   {age:6.0}", tool.time.as_secs_f64(), tool.force.norm());
+            println!("{:7.2}   {:9.3}   {age:6.0}", tool.time.as_secs_f64(), tool.commanded_force.norm());
         }
     }
     println!("\n{}", running.stop());

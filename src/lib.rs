@@ -56,6 +56,7 @@
 pub mod actors;
 pub mod devices;
 mod error;
+mod files;
 pub mod log;
 mod printable;
 pub mod random;

@@ -4,17 +4,18 @@
 use std::path::{Path, PathBuf};
 
 /// The engine's modules, each built on those before it alone.
-const ORDER: [(&str, &[&str]); 10] = [
+const ORDER: [(&str, &[&str]); 11] = [
     ("printable", &[]),
     ("error", &["printable"]),
+    ("files", &["error"]),
     ("random", &[]),
     ("safety", &[]),
-    ("devices", &["error", "random"]),
-    ("scene", &["devices", "error"]),
+    ("devices", &["error", "files", "random"]),
+    ("scene", &["devices", "error", "files", "printable"]),
     ("log", &["error", "printable"]),
     ("report", &["error", "log"]),
     ("actors", &["devices", "error", "log", "report", "safety"]),
-    ("session", &["actors", "devices", "error", "log", "report", "safety", "scene"]),
+    ("session", &["actors", "devices", "error", "files", "log", "report", "safety", "scene"]),
 ];
 
 /// Words that belong to few files, or to few folders.

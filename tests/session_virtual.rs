@@ -322,5 +322,5 @@ fn a_renderer_sees_the_newest_surface_tool_and_force() {
     running.wait();
     let summary = running.stop();
     let row = forces(&summary).into_iter().find(|row| row.time == tool.time).unwrap();
-    assert_eq!((tool.time, <[f64; 3]>::from(tool.force)), (Nanos(150_000_000), row.force_n));
+    assert_eq!((tool.time, <[f64; 3]>::from(tool.computed_force)), (Nanos(150_000_000), row.force_n));
 }

@@ -149,14 +149,14 @@ fn draw_tool(svg: &mut String, camera: &Camera, tool: &ToolView, tip: Seen) {
     );
 }
 
-/// The force on the tool, from the tip's surface.
+/// The force that the hand feels, from the tip's surface.
 fn arrow(svg: &mut String, camera: &Camera, tool: &ToolView) {
-    let newtons = tool.force.norm();
+    let newtons = tool.commanded_force.norm();
     if newtons < NO_FORCE {
         return;
     }
-    let start = tool.position + Vec3::z() * TIP_RADIUS + tool.force * (TIP_RADIUS / newtons);
-    let ([x, y], [ex, ey]) = (camera.see(&start).at, camera.see(&(start + tool.force * ARROW_PER_NEWTON)).at);
+    let start = tool.position + Vec3::z() * TIP_RADIUS + tool.commanded_force * (TIP_RADIUS / newtons);
+    let ([x, y], [ex, ey]) = (camera.see(&start).at, camera.see(&(start + tool.commanded_force * ARROW_PER_NEWTON)).at);
     let (dx, dy) = (ex - x, ey - y);
     let length = dx.hypot(dy).max(1e-9);
     let (ux, uy) = (dx / length, dy / length);
@@ -187,7 +187,7 @@ fn caption(svg: &mut String, camera: &Camera, tip: Seen, tool: &ToolView) {
         format_args!(
             "<text class=\"b\" x=\"36\" y=\"48\" fill=\"#f4f7fb\">palpate</text>\n\
              <text class=\"t\" x=\"36\" y=\"74\">a soft block, simulated at 30 Hz and felt at 1 kHz</text>\n\
-             <text class=\"t\" x=\"36\" y=\"{:.0}\">demo scene, t = {:.2} s, contact: {mode}; arrow: force on the tool</text>\n\
+             <text class=\"t\" x=\"36\" y=\"{:.0}\">demo scene, t = {:.2} s, contact: {mode}; arrow: force that the hand feels</text>\n\
              <path stroke=\"#c7d2e2\" stroke-width=\"2\" d=\"M{left:.1} {:.1}v8m0-4H{right:.1}m0-4v8\"/>\n\
              <text class=\"t\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">20 mm</text>\n",
             HEIGHT - 36.0,

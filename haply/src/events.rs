@@ -3,9 +3,11 @@
 use crate::guard::News;
 use crate::protocol;
 use crate::wire::Wire;
+use crate::words::Words;
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
+use palpate::printable;
 use std::io;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tracing::{debug, warn};
 
 /// A thread that is to end does so within this.
@@ -35,7 +37,7 @@ impl Events {
         let (alive, stopped) = bounded(0);
         std::thread::Builder::new()
             .name("haply-events".to_owned())
-            .spawn(move || Listener { address, device, news: sender, stopped }.run(wire))?;
+            .spawn(move || Listener { address, device, news: sender, stopped, words: Words::default() }.run(wire))?;
         Ok(Self { news, _alive: alive })
     }
 
@@ -56,10 +58,11 @@ struct Listener {
     device: String,
     news: Sender<News>,
     stopped: Receiver<()>,
+    words: Words,
 }
 
 impl Listener {
-    fn run(self, mut wire: Wire) {
+    fn run(mut self, mut wire: Wire) {
         loop {
             let why = loop {
                 if self.is_stopped() {
@@ -73,7 +76,7 @@ impl Listener {
             };
             // First the tick, then the words: whoever reads these may keep this thread waiting.
             self.tell(News::ChannelLost);
-            warn!("haply: the events channel at {} {why}: no force until it is back", self.address);
+            self.say(format!("the events channel at {} {why}: no force until it is back", self.address));
             wire = loop {
                 std::thread::sleep(RETRY);
                 if self.is_stopped() {
@@ -84,7 +87,7 @@ impl Listener {
                 }
             };
             self.tell(News::ChannelBack);
-            warn!("haply: the events channel at {} is back", self.address);
+            self.say(format!("the events channel at {} is back", self.address));
         }
     }
 
@@ -92,19 +95,26 @@ impl Listener {
         self.stopped.try_recv() == Err(TryRecvError::Disconnected)
     }
 
-    fn pass_on(&self, message: &[u8]) {
+    fn pass_on(&mut self, message: &[u8]) {
         let text = String::from_utf8_lossy(message);
         match protocol::news(message, &self.device) {
             Ok(Some(news)) => {
                 self.tell(news);
-                warn!("haply: device {}: {news:?}: {text}", self.device);
+                self.say(format!("device {}: {news:?}: {}", self.device, printable(&text)));
             }
-            Ok(None) => debug!("haply: {text}"),
+            Ok(None) => debug!("haply: {}", printable(&text)),
             Err(_) => {
                 // It may have been one that concerns safety.
                 self.tell(News::UnknownSafety);
-                warn!("haply: the events channel sent what is no event, no force for now: {text:.80}");
+                self.say(format!("the events channel sent what is no event, no force for now: {}", printable(&text)));
             }
+        }
+    }
+
+    /// Says what a user should know, but not all of it where there is no end of it.
+    fn say(&mut self, line: String) {
+        if let Some(left_out) = self.words.speaks(Instant::now()) {
+            warn!("haply: {line}{left_out}");
         }
     }
 

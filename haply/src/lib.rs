@@ -44,6 +44,7 @@ mod protocol;
 mod pulse;
 mod watch;
 mod wire;
+mod words;
 
 pub use client::{Haply, HaplyCounts};
 pub use options::HaplyOptions;

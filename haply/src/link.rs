@@ -2,8 +2,10 @@
 
 use crate::protocol::{self, Reply};
 use crate::wire::{Broken, Wire};
+use crate::words::Words;
 use crossbeam_channel::{Receiver, Sender, bounded};
-use std::time::Duration;
+use palpate::printable;
+use std::time::{Duration, Instant};
 use tracing::warn;
 
 /// Between two attempts to connect.
@@ -72,11 +74,17 @@ impl Links {
         let (lost, losses) = bounded::<(Lost, Wire)>(1);
         let (sender, made) = bounded(1);
         std::thread::Builder::new().name("haply-link".to_owned()).spawn(move || {
+            let mut words = Words::default();
+            let mut say = |line: String| {
+                if let Some(left_out) = words.speaks(Instant::now()) {
+                    warn!("haply: {}{left_out}", printable(&line));
+                }
+            };
             // Ends with the tick's side: then there is nobody to lose a connection.
             for (why, mut wire) in &losses {
                 // For every writer on it; then the words, which may have to wait for a reader.
                 wire.close();
-                warn!("haply: the service at {address} {why}: the force is zero, reconnecting");
+                say(format!("the service at {address} {why}: the force is zero, reconnecting"));
                 let mut last = String::new();
                 let (link, second) = loop {
                     // Nothing is lost while there is nothing: what comes here is the end.
@@ -86,13 +94,13 @@ impl Links {
                     match connect(&address, Some(&device)) {
                         Ok((link, second, _)) => break (link, second),
                         Err(why) if why != last => {
-                            warn!("haply: the service at {address} {why}");
+                            say(format!("the service at {address} {why}"));
                             last = why;
                         }
                         Err(_) => {}
                     }
                 };
-                warn!("haply: connected to the service at {address} again, device {device}");
+                say(format!("connected to the service at {address} again, device {device}"));
                 if watch.send(second).is_err() || sender.send(link).is_err() {
                     return;
                 }

@@ -7,6 +7,10 @@ use bytes::{BufMut, Bytes, BytesMut};
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
+#[cfg(any(test, feature = "mock"))]
+use tungstenite::handshake::server::{ErrorResponse, Request, Response};
+#[cfg(any(test, feature = "mock"))]
+use tungstenite::http::StatusCode;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, HandshakeError, Message, WebSocket};
 
@@ -120,7 +124,7 @@ impl Wire {
     /// Answers a client that has connected.
     #[cfg(any(test, feature = "mock"))]
     pub(crate) fn accept(stream: TcpStream) -> io::Result<Self> {
-        let made = tungstenite::accept_with_config(limited(stream)?, Some(config()));
+        let made = tungstenite::accept_hdr_with_config(limited(stream)?, native, Some(config()));
         Ok(Self::over(made.map_err(refused)?))
     }
 
@@ -186,6 +190,18 @@ impl Wire {
         let _ = self.socket.close(None);
         let _ = self.socket.get_ref().stream.shutdown(Shutdown::Both);
     }
+}
+
+/// Refuses the page of a browser, which says where it is from: any site could otherwise push a hand on this machine.
+#[cfg(any(test, feature = "mock"))]
+#[expect(clippy::result_large_err, reason = "the type is tungstenite's")]
+fn native(request: &Request, response: Response) -> Result<Response, ErrorResponse> {
+    if !request.headers().contains_key("origin") {
+        return Ok(response);
+    }
+    let mut refusal = ErrorResponse::new(Some("pages of a browser are not served".to_owned()));
+    *refusal.status_mut() = StatusCode::FORBIDDEN;
+    Err(refusal)
 }
 
 fn is_none_yet(kind: io::ErrorKind) -> bool {

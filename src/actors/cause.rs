@@ -12,6 +12,8 @@ pub enum Cause {
     Device(DeviceFault),
     /// The device reported numbers that are not finite; the last state is used.
     DeviceNotFinite,
+    /// The device reported a place that it cannot be at, by its workspace or by its last place; the last state is used.
+    DeviceImpossible,
     /// The local model's force is not finite: zero is commanded until the next resync.
     LocalNotFinite,
     /// The global model's state is not finite: it publishes nothing any more.
@@ -36,7 +38,8 @@ impl Cause {
             Self::GlobalNotFinite => 302,
             Self::SamplesLost => 303,
             Self::NoBasis => 304,
-            Self::PathDropped => 305,
+            Self::PathDropped => 306,
+            Self::DeviceImpossible => 305,
         }
     }
 
@@ -50,7 +53,8 @@ impl Cause {
             301 => "the local model's force is not finite, zero is commanded",
             302 => "the global model's state is not finite, it publishes nothing any more",
             304 => "the surroundings of a patch could not be reduced",
-            305 => "the global model was too late to follow the tool, it goes on from the newest surface and tool",
+            306 => "the global model was too late to follow the tool, it goes on from the newest surface and tool",
+            305 => "the device reported a place where it cannot be, the last one is used",
             303 => "tool samples were lost between local and global model",
             _ => return None,
         })
@@ -65,6 +69,7 @@ mod tests {
     fn every_cause_has_words() {
         let others = [
             Cause::DeviceNotFinite,
+            Cause::DeviceImpossible,
             Cause::LocalNotFinite,
             Cause::GlobalNotFinite,
             Cause::SamplesLost,

@@ -3,21 +3,40 @@
 //! When the run stops, when nothing computes a force any more or when the device itself panicked, the force goes to zero
 //! within the ramp time; after a gap in which nobody drove the device it starts from zero.
 
+use super::believed::{Believed, Bounds, Disbelieved};
 use super::cause::Cause;
-use super::messages::{ComputedForce, DeviceSample};
+use super::messages::{ComputedForce, DeviceSample, ToolView};
 use crate::devices::{Calibration, Device, DeviceFault, DeviceState, ForceCommand};
 use crate::error::{Error, ErrorKind};
 use crate::log::{CommandSample, ToolSample};
 use crate::model::Vec3;
 use crate::runtime::Nanos;
-use crate::runtime::{Actor, GroupMode, Outcome, Reader, Recorder, TickContext, Writer};
+use crate::runtime::{Actor, GroupMode, Outcome, OutletWriter, Reader, Recorder, TickContext, Writer};
 use crate::safety::{Input, Output, Pipeline, Request};
+
+/// A device that begins farther away tells another unit (m).
+const FARTHEST_M: f64 = 1e3;
 
 /// Releases without a new command after which the force goes to rest.
 const COMMAND_EXPIRES: u32 = 2;
 
 /// A time without a command (s) after which the device may have done anything: the force starts from zero.
 pub(crate) const GAP_S: f64 = 0.1;
+
+/// The ports of a [`DeviceActor`].
+#[derive(Debug)]
+pub struct DevicePorts {
+    /// The device's newest state.
+    pub samples: Writer<DeviceSample>,
+    /// The newest force for it.
+    pub commands: Reader<ComputedForce>,
+    /// The newest tool and its forces for a program that draws.
+    pub view: OutletWriter<ToolView>,
+    /// The newest state that was not believed, for the log.
+    pub disbelieved: OutletWriter<Disbelieved>,
+    /// Records.
+    pub recorder: Recorder,
+}
 
 /// Reads and writes one device; everything that is written passes the safety pipeline.
 ///
@@ -26,10 +45,10 @@ pub(crate) const GAP_S: f64 = 0.1;
 #[derive(Debug)]
 pub struct DeviceActor {
     device: Box<dyn Device>,
-    samples: Writer<DeviceSample>,
-    commands: Reader<ComputedForce>,
+    ports: DevicePorts,
+    believed: Believed,
+    disbelieved: u64,
     safety: Pipeline,
-    recorder: Recorder,
     /// Its number in the log.
     number: u16,
     last: DeviceSample,
@@ -41,18 +60,17 @@ pub struct DeviceActor {
 }
 
 impl DeviceActor {
-    /// An actor for `device`, which has given its `first` state.
+    /// An actor for `device`, which has given its `first` state and is believed within `bounds`.
     pub fn new(
         device: Box<dyn Device>,
         first: DeviceState,
-        samples: Writer<DeviceSample>,
-        commands: Reader<ComputedForce>,
+        bounds: Bounds,
         safety: Pipeline,
-        recorder: Recorder,
+        ports: DevicePorts,
     ) -> Self {
-        let last = DeviceSample { id: 0, state: first };
-        let (number, missed_commands, stale_ticks, reading) = (0, 0, 0, false);
-        Self { device, samples, commands, safety, recorder, number, last, missed_commands, stale_ticks, reading }
+        let (last, believed) = (DeviceSample { id: 0, state: first }, Believed::new(bounds, &first));
+        let (number, disbelieved, missed_commands, stale_ticks, reading) = (0, 0, 0, 0, false);
+        Self { device, ports, believed, disbelieved, safety, number, last, missed_commands, stale_ticks, reading }
     }
 
     /// The same as one of several: its records are those of device `number`.
@@ -73,6 +91,12 @@ impl DeviceActor {
         self.reading = false;
         match state {
             Ok(state) if state.is_finite() => {
+                if let Err(wrong) = self.believed.believe(&state, ctx.scheduled) {
+                    self.disbelieved += 1;
+                    *self.ports.disbelieved.buffer() = Disbelieved { count: self.disbelieved, ..wrong };
+                    self.ports.disbelieved.publish(ctx);
+                    return Outcome::Degraded(Cause::DeviceImpossible.code());
+                }
                 self.last = DeviceSample { id: self.last.id.wrapping_add(1), state };
                 self.stale_ticks = 0;
                 Outcome::Continue
@@ -114,10 +138,10 @@ impl Actor for DeviceActor {
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         let outcome = self.read(ctx);
-        *self.samples.buffer() = self.last;
-        self.samples.publish(ctx);
+        *self.ports.samples.buffer() = self.last;
+        self.ports.samples.publish(ctx);
         let DeviceSample { id, state } = self.last;
-        self.recorder.push(ToolSample {
+        self.ports.recorder.push(ToolSample {
             time: ctx.scheduled,
             id,
             position_m: state.position.into(),
@@ -129,15 +153,15 @@ impl Actor for DeviceActor {
     }
 
     fn commit(&mut self, ctx: &TickContext) -> Outcome {
-        if self.commands.refresh(ctx) {
+        if self.ports.commands.refresh(ctx) {
             self.missed_commands = 0;
-        } else if self.commands.version() == 0 {
+        } else if self.ports.commands.version() == 0 {
             // Release 0: nothing has been computed, so nothing is written.
             return Outcome::Continue;
         } else {
             self.missed_commands = self.missed_commands.saturating_add(1);
         }
-        let command = *self.commands.get();
+        let command = *self.ports.commands.get();
         let Output { force, actions, energy_j, tank_j } = self.safety_output(ctx, &command);
         // As long as the force would be taken up where it was, and no longer.
         let expires = ctx.scheduled + Nanos::from_secs_f64(GAP_S);
@@ -145,7 +169,11 @@ impl Actor for DeviceActor {
         let outcome = self.device.write(exerted).map_or_else(degraded, |()| Outcome::Continue);
         let time = if self.missed_commands == 0 { command.time } else { ctx.scheduled };
         let (limits, device) = (actions.0, self.number);
-        self.recorder.push(CommandSample { time, force_n: force, limits, energy_j, tank_j, device });
+        self.ports.recorder.push(CommandSample { time, force_n: force, limits, energy_j, tank_j, device });
+        let ComputedForce { position, mode, force: computed_force, .. } = command;
+        let commanded_force = Vec3::from(force);
+        *self.ports.view.buffer() = ToolView { time, position, computed_force, commanded_force, mode };
+        self.ports.view.publish(ctx);
         outcome
     }
 
@@ -164,7 +192,7 @@ impl Actor for DeviceActor {
 /// body, and the first local model is built around it.
 ///
 /// # Errors
-/// [`ErrorKind::Device`] if it is not calibrated, gives none or one that is not finite.
+/// [`ErrorKind::Device`] if it is not calibrated, gives none or one that is not finite or a kilometre away.
 ///
 /// # Real-time
 /// Not called in a tick: an error allocates.
@@ -172,7 +200,11 @@ pub fn first_state(device: &mut dyn Device) -> Result<DeviceState, Error> {
     let message = match (device.calibration(), device.read(Nanos::ZERO)) {
         (Calibration::Needed, _) => "it is not calibrated: calibrate it, then start again".to_owned(),
         (Calibration::Running, _) => "it is being calibrated: start again when that is done".to_owned(),
-        (_, Ok(state)) if state.is_finite() => return Ok(state),
+        (_, Ok(state)) if state.is_finite() && state.position.amax() <= FARTHEST_M => return Ok(state),
+        (_, Ok(state)) if state.is_finite() => {
+            let place: [f64; 3] = state.position.into();
+            format!("its first position is {place:?}, must lie within {FARTHEST_M} m of the origin")
+        }
         (_, Ok(_)) => "its first state is not finite".to_owned(),
         (_, Err(fault)) => format!("no first state: {fault}"),
     };

@@ -1,7 +1,7 @@
 //! The local actor: turns the newest tool sample into a force at the haptic rate.
 
 use super::cause::Cause;
-use super::messages::{ComputedForce, DeviceSample, SurfaceView, ToolTick, ToolView};
+use super::messages::{ComputedForce, DeviceSample, SurfaceView, ToolTick};
 use crate::log::{ContactSample, ForceSample, ProbeSample, Resync, ServedBy};
 use crate::model::Vec3;
 use crate::model::contact::{Contact, ContactMode};
@@ -43,8 +43,6 @@ pub struct LocalPorts {
     pub commands: Writer<ComputedForce>,
     /// Where local models come from.
     pub source: ModelSource,
-    /// The newest tool and force for a program that draws.
-    pub view: OutletWriter<ToolView>,
     /// Records.
     pub recorder: Recorder,
 }
@@ -245,11 +243,10 @@ impl Actor for LocalActor {
         let force = finite_or_zero(computed);
         let time = self.haptic.release(self.models.now());
         let age_ticks = u32::try_from(self.age_ticks()).unwrap_or(u32::MAX);
-        *self.ports.commands.buffer() = ComputedForce { time, force, age_ticks, swap_step, dissipated_j };
+        let (position, mode) = (self.models.tool(), self.models.serving().contact().mode);
+        *self.ports.commands.buffer() =
+            ComputedForce { time, force, age_ticks, swap_step, dissipated_j, position, mode };
         self.ports.commands.publish(ctx);
-        let mode = self.models.serving().contact().mode;
-        *self.ports.view.buffer() = ToolView { time, position: self.models.tool(), force, mode };
-        self.ports.view.publish(ctx);
         self.record(time, force, resync);
         match (force == computed, &self.ports.source) {
             (true, _) => Outcome::Continue,

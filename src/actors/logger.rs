@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::believed::Disbelieved;
 use super::cause::Cause;
 use super::log_sink::{LogSink, Loss};
 use super::scene_watch::SceneWatch;
+use super::throttle::Throttle;
 use crate::error::{Error, ErrorKind};
 use crate::log::{Analysis, Environment, Level, LogRecord, RunReport, StatsCounter, TextEvent};
 use crate::runtime::Event;
 use crate::runtime::Nanos;
 use crate::runtime::{
-    Actor, GrantHandle, GroupGrant, Outcome, Record, RecordDrain, RecordGap, SystemGrant, TickContext,
+    Actor, GrantHandle, GroupGrant, Outcome, OutletReader, Record, RecordDrain, RecordGap, SystemGrant, TickContext,
 };
 
 /// The target of the event that says that a log could not be written, for programs that report the summary's
@@ -60,6 +62,9 @@ pub struct LoggerActor {
     sink_failed: bool,
     log_time: Nanos,
     scene: Option<SceneWatch>,
+    /// What was not believed of each device.
+    disbelieved: Vec<OutletReader<Disbelieved>>,
+    throttle: Throttle,
 }
 
 impl std::fmt::Debug for LoggerActor {
@@ -96,6 +101,8 @@ impl LoggerActor {
             sink_failed: false,
             log_time: Nanos::ZERO,
             scene: None,
+            disbelieved: Vec::new(),
+            throttle: Throttle::default(),
         }
     }
 
@@ -104,6 +111,29 @@ impl LoggerActor {
     pub fn watching(mut self, scene: Option<SceneWatch>) -> Self {
         self.scene = scene;
         self
+    }
+
+    /// Also says in words what was not believed of each device.
+    #[must_use]
+    pub(crate) fn telling(mut self, disbelieved: Vec<OutletReader<Disbelieved>>) -> Self {
+        self.disbelieved = disbelieved;
+        self
+    }
+
+    /// An event in words, with the place and the limit if a device told what cannot be.
+    fn in_words(&mut self, event: &Event) -> TextEvent {
+        let mut text = in_words(event, &self.environment.group_name(event.group));
+        if event.code == Event::DEGRADED && event.detail == u64::from(Cause::DeviceImpossible.code()) {
+            for (number, reader) in self.disbelieved.iter_mut().enumerate() {
+                if reader.refresh() {
+                    let name = self.environment.devices.get(number).map_or("", String::as_str);
+                    let wrong = reader.get();
+                    let colon = if name.is_empty() { "" } else { ": " };
+                    text.message = format!("{}; {name}{colon}{wrong} ({} so far)", text.message, wrong.count);
+                }
+            }
+        }
+        text
     }
 
     /// Passes on the pictures from before `time`, once every record up to there has been.
@@ -165,11 +195,13 @@ impl LoggerActor {
         self.log_time = self.log_time.max(record.time());
         match record {
             LogRecord::Event(event) => {
-                let text = in_words(event, &self.environment.group_name(event.group));
-                match text.level {
-                    Level::Info => tracing::info!(time = %text.time, "{}", text.message),
-                    Level::Warning => tracing::warn!(time = %text.time, "{}", text.message),
-                    Level::Error => tracing::error!(time = %text.time, "{}", text.message),
+                let text = self.in_words(event);
+                if let Some(times) = self.throttle.speaks(kind(event)) {
+                    match text.level {
+                        Level::Info => tracing::info!(time = %text.time, "{}{times}", text.message),
+                        Level::Warning => tracing::warn!(time = %text.time, "{}{times}", text.message),
+                        Level::Error => tracing::error!(time = %text.time, "{}{times}", text.message),
+                    }
                 }
                 self.text(event.group, &text);
                 return;
@@ -289,6 +321,12 @@ fn in_words(event: &Event, group: &str) -> TextEvent {
         text.message = format!("{group}: {cause}");
     }
     text
+}
+
+/// What events have in common that are said less and less often: the group, the code, the cause or that it has ended.
+fn kind(event: &Event) -> (u16, u32, u64) {
+    let has_cause = event.code == Event::DEGRADED || event.detail == Event::RECOVERED;
+    (event.group, event.code.code(), if has_cause { event.detail } else { 0 })
 }
 
 /// The grant as text: the machine, what the process got, and a line per rate group.

@@ -41,17 +41,24 @@ pub struct ComputedForce {
     pub swap_step: Vec3,
     /// What friction took of the tool's motion (J).
     pub dissipated_j: f64,
+    /// Where the simulated tool is (m).
+    pub position: Vec3,
+    /// State of its contact.
+    pub mode: ContactMode,
 }
 
-/// The newest tool and force, for a program that draws.
+/// The newest tool and its two forces, for a program that draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToolView {
     /// End of the haptic tick.
     pub time: Nanos,
     /// Tool position (m).
     pub position: Vec3,
-    /// Force on the tool (N).
-    pub force: Vec3,
+    /// Force on the tool that the model computed (N), before the safety pipeline: nobody feels it.
+    pub computed_force: Vec3,
+    /// Force that the device was commanded (N): what the hand feels. It is zero while nothing may be felt, such as at the start
+    /// or after a fault, however large the computed one is.
+    pub commanded_force: Vec3,
     /// State of the contact.
     pub mode: ContactMode,
 }

@@ -11,6 +11,7 @@
 
 mod basis;
 mod basis_store;
+mod believed;
 mod cause;
 mod device;
 mod global;
@@ -20,10 +21,12 @@ mod log_sink;
 mod logger;
 mod messages;
 mod scene_watch;
+mod throttle;
 
 pub(crate) use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub(crate) use basis_store::BasisStore;
-pub(crate) use device::{DeviceActor, GAP_S, first_state};
+pub(crate) use believed::{Bounds, Disbelieved};
+pub(crate) use device::{DeviceActor, DevicePorts, GAP_S, first_state};
 pub(crate) use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
 pub(crate) use local::{LocalActor, LocalPorts, ModelSource};
 pub(crate) use messages::{Checkpoint, ComputedForce, DeviceSample, ToolTick};

@@ -3,12 +3,19 @@
 use std::path::Path;
 
 use crate::error::{Error, ErrorKind, quoted};
+use crate::files;
 
 /// The first line of every path file; the units in it are the reason that it must be exactly this.
 const HEADER: &str = "t_s,x_m,y_m,z_m";
 
 /// No coordinate of a tool lies farther out than this (m); it keeps every difference of positions finite.
 const FARTHEST_M: f64 = 1e6;
+
+/// Most samples of a path file, over an hour at 1 kHz: 128 MB.
+const MOST_SAMPLES: usize = 4_000_000;
+
+/// Room for so many samples of 64 characters (bytes).
+const LARGEST_FILE: u64 = 64 * MOST_SAMPLES as u64;
 
 /// Tool positions over time, linear in between, held after the last and before the first.
 ///
@@ -71,13 +78,16 @@ impl ToolPath {
     /// Reads a file with the columns `t_s,x_m,y_m,z_m`.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] if the file cannot be read, [`ErrorKind::Scene`] with its name and line if a row is unusable.
+    /// [`ErrorKind::Io`] if the file cannot be read or is larger than 244 MiB, [`ErrorKind::Scene`] with its name and line
+    /// if a row is unusable or there are more than four million.
     ///
     /// # Real-time
     /// Not real-time safe: reads a file, allocates.
     pub fn read_csv(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-        Self::from_csv(&text, &path.display().to_string())
+        let name = path.display().to_string();
+        let text = String::from_utf8(files::read(path, LARGEST_FILE)?)
+            .map_err(|_| Error::new(ErrorKind::Io, "is not UTF-8 text, save the file as UTF-8").at(&name))?;
+        Self::from_csv(&text, &name)
     }
 
     /// Reads the text of a file with the columns `t_s,x_m,y_m,z_m`; `name` stands for the file in errors.
@@ -176,6 +186,9 @@ fn parse(text: &str, name: &str) -> Result<(Vec<f64>, Vec<[f64; 3]>), Error> {
     }
     for (index, row) in lines.enumerate() {
         let line = index + 2;
+        if index == MOST_SAMPLES {
+            return Err(at(line, format!("is one row too many, a path has at most {MOST_SAMPLES}")));
+        }
         let [time_s, position_m @ ..] = numbers(row).map_err(|message| at(line, message))?;
         check_sample(times_s.last().copied(), time_s, &position_m).map_err(|message| at(line, message))?;
         times_s.push(time_s);

@@ -20,6 +20,7 @@ pub use coupling::sampled_wall;
 pub use force::Force;
 pub use limits::{DeviceLimits, Limits};
 pub use model_age::ModelAge;
+pub(crate) use passivity::FASTEST_HAND_M_S;
 pub use passivity::Passivity;
 pub use pipeline::{Input, Output, Pipeline, Request};
 pub use start_up::StartUp;

@@ -74,8 +74,9 @@ pub(crate) fn control(limits: &Passivity, balance_j: f64, force: Force, velocity
     Controlled { force: std::array::from_fn(|i| kept[i] - damping * velocity[i]), damping, withdrew: kept != force }
 }
 
-/// No hand on a device is faster (m/s).
-const FASTEST_HAND_M_S: f64 = 10.0;
+/// No hand on a device is faster (m/s): the force is gone at a fifth of it (`safety.stop_speed_m_s`), and a quick reach of the
+/// free arm has 2 to 4 m/s.
+pub(crate) const FASTEST_HAND_M_S: f64 = 10.0;
 
 /// The energy of one contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

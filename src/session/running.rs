@@ -136,7 +136,7 @@ impl Memory {
 ///     let corners = &viewer.surface().positions;
 ///     let _ = (corners[a], corners[b], corners[c]); // draw it
 /// }
-/// println!("{} N at {} m", viewer.tool().force, viewer.tool().position);
+/// println!("the hand feels {} N at {} m", viewer.tool().commanded_force, viewer.tool().position);
 /// # Ok(())
 /// # }
 /// ```

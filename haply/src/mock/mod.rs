@@ -235,6 +235,21 @@ mod tests {
         assert_eq!((counts.messages, counts.replies, counts.commands, counts.malformed), (3, 3, 1, 1));
     }
 
+    // Check that a page of any site, which a browser lets connect, cannot push the hand on this machine.
+    #[test]
+    fn a_page_of_a_browser_is_refused_and_a_program_is_not() {
+        use std::io::{Read, Write};
+        let (service, mut wire) = service();
+        assert!(received(&mut wire).contains("inverse3"));
+        let mut stream = TcpStream::connect(service.address()).unwrap();
+        let request = "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+            Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nOrigin: http://evil.example\r\n\r\n";
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 403"), "{answer}");
+    }
+
     #[test]
     fn two_commands_in_one_frame_conflict_and_a_device_without_commands_goes_idle() {
         let (service, mut wire) = service();

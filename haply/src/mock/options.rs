@@ -36,6 +36,8 @@ pub struct MockCounts {
     pub probes: u64,
     /// Messages with two `set_*` commands for one device.
     pub conflicts: u64,
+    /// Messages with a force above 24 N, of which nothing is exerted.
+    pub refused: u64,
     /// Messages that were not JSON of the documented shape.
     pub malformed: u64,
     /// Replies sent.

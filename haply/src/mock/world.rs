@@ -15,6 +15,9 @@ const AWAY: Duration = Duration::from_millis(300);
 /// How late a slow service is.
 const SLOW: Duration = Duration::from_millis(5);
 
+/// The largest force of a command (N), twice that of the strongest desktop device whose limits are known.
+const MOST_N: f64 = 24.0;
+
 /// Forces that are kept from the beginning of the fault on.
 const MOST_KEPT: usize = 10_000;
 
@@ -156,7 +159,14 @@ impl World {
             let data = json!({"field": "commands", "reason": "conflict", "context": "inverse3"});
             self.warn("invalid-value", data, "two commands in one frame");
         } else if let Some(force_n) = force_n {
-            self.command(force_n.into());
+            let force_n: [f64; 3] = force_n.into();
+            if force_n.iter().map(|c| c * c).sum::<f64>() <= MOST_N * MOST_N {
+                self.command(force_n);
+            } else {
+                self.counts.refused += 1;
+                let data = json!({"field": "set_cursor_force", "reason": "out of range", "context": "inverse3"});
+                self.warn("invalid-value", data, "a force that no device has");
+            }
         }
         Ok(session.contains_key("force_render_full_state"))
     }
@@ -288,6 +298,10 @@ mod tests {
         assert_eq!(follow(&unexecuted), (Some(false), [1, 1, 0, 0], [0.0; 3]));
         let probe = r#"{"session":{"force_render_full_state":{}},"inverse3":[{"device_id":"049D","commands":{"probe_position":{}}}]}"#;
         assert_eq!(follow(probe), (Some(true), [0, 0, 1, 0], [0.0; 3]));
+        for huge in ["1e308", "-25"] {
+            let huge = first.replace("\"x\":1", &format!("\"x\":{huge}"));
+            assert_eq!(follow(&huge), (Some(false), [1, 1, 0, 0], [0.0; 3]));
+        }
         let both = first.replace("{\"set_c", "{\"set_cursor_position\":{\"position\":{}},\"set_c");
         assert_eq!(follow(&both), (Some(false), [1, 1, 0, 1], [0.0; 3]));
         assert_eq!(follow("{\"inverse3\":[{]}").0, None);

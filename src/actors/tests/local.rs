@@ -32,7 +32,7 @@ fn bits(force: [f64; 3]) -> [u64; 3] {
 struct ByHand {
     actor: LocalActor,
     samples: crate::runtime::Writer<DeviceSample>,
-    view: crate::runtime::OutletReader<ToolView>,
+    commands: crate::runtime::Reader<ComputedForce>,
     drain: crate::runtime::RecordDrain,
     /// The same body, ticked directly.
     simulation: Simulation,
@@ -52,21 +52,19 @@ impl ByHand {
         let mut graph = Runtime::builder(Execution::Virtual);
         let drain = graph.drain();
         let (samples, sample_reader) = graph.exchange(DeviceSample::default);
-        let (commands, _) = graph.exchange(ComputedForce::default);
+        let (commands, command_reader) = graph.exchange(ComputedForce::default);
         let (surface, _) = graph.outlet(SurfaceView::default);
-        let (view_writer, view) = graph.outlet(ToolView::default);
         let ports = LocalPorts {
             samples: sample_reader,
             commands,
             source: ModelSource::Alone(vec![surface]),
-            view: view_writer,
             recorder: graph.recorder(256),
         };
         let spare = || Box::new(Hold::default()) as Box<dyn LocalModel>;
         let full = Box::new(Full::new(glued_simulation()));
         let models = Succession::new([full, spare(), spare()], Blend::default(), Vec3::zeros());
         let actor = LocalActor::new(models, HAPTIC, Rate::hz(30), Vec::new(), ports);
-        Self { actor, samples, view, drain, simulation: glued_simulation() }
+        Self { actor, samples, commands: command_reader, drain, simulation: glued_simulation() }
     }
 
     /// Release `n` with the tool at `position`; gives the force row that it wrote.
@@ -110,8 +108,9 @@ fn skipped_periods_are_made_up_with_the_tool_interpolated_and_eight_ticks_a_rele
         simulated += ticks;
         assert_eq!(row.time, HAPTIC.release(simulated), "release {n}");
         assert_eq!(bits(row.force_n), bits(force.into()), "release {n}");
-        assert!(hand.view.refresh());
-        assert_eq!((hand.view.get().time, hand.view.get().position), (row.time, at), "release {n}");
+        assert!(hand.commands.refresh(&TickContext::by_hand(HAPTIC, n)));
+        let command = hand.commands.get();
+        assert_eq!((command.time, command.position), (row.time, at), "release {n}");
     }
     assert_eq!(simulated, 64, "simulated time has caught up");
     assert!((at - tool(64)).norm() < 1e-12);

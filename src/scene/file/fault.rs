@@ -46,10 +46,13 @@ impl Fault {
     }
 }
 
-/// A key as TOML writes it, quoted and escaped where it must be, so that it never breaks a line.
+/// Twice the longest key that a scene knows.
+const LONGEST_BARE: usize = 64;
+
+/// A key as TOML writes it, quoted and escaped where it must be, so that it never breaks a line, and shortened.
 pub(super) fn plain_key(key: &str) -> String {
     let bare = !key.is_empty() && key.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"_-".contains(&byte));
-    if bare { key.to_owned() } else { quoted(key) }
+    if bare && key.len() <= LONGEST_BARE { key.to_owned() } else { quoted(key) }
 }
 
 /// `"a", "b" or "c"`.

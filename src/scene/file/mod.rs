@@ -14,22 +14,26 @@ use super::device::{field as device_field, numbered};
 use super::validate::tool;
 use crate::devices::ToolPath;
 use crate::error::{Error, ErrorKind};
+use crate::files;
 use fault::{Fault, plain_key};
 use locate::{exact_offset_of, line_of, offset_of, table_at};
 
 /// The scene that `palpate` alone runs, part of the program.
 const DEMO_TOML: &str = include_str!("../../../scenes/demo.toml");
+/// Largest scene file (bytes): a hundred times what a person writes.
+const LARGEST_FILE: usize = 1 << 20;
+
 const DEMO_PATH_CSV: &str = include_str!("../../../scenes/paths/demo.csv");
 
 impl Scene {
     /// Reads, completes and validates a scene file; the tool's path is found relative to it.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] if a file cannot be read, [`ErrorKind::Scene`] with file, line, field and what would be right if
+    /// [`ErrorKind::Io`] if a file cannot be read or is too large (a scene: 1 MiB), [`ErrorKind::Scene`] with file, line, field and what would be right if
     /// it cannot work.
     pub fn load(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
+        let bytes = files::read(path, LARGEST_FILE as u64)?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let line = line_of(error.as_bytes(), error.utf8_error().valid_up_to());
             Error::new(ErrorKind::Scene, "is not UTF-8 text, save the file as UTF-8").at(format!("{name}:{line}"))
@@ -66,14 +70,19 @@ impl Scene {
         name: &str,
         read_path: impl Fn(&Path) -> Result<ToolPath, Error>,
     ) -> Result<Self, Error> {
+        let mut scene = Self::parse(text, name)?;
         let (document, _) = DeTable::parse_recoverable(text);
         let root = document.get_ref();
         let on_line = |error: Error, offset: usize| error.at(format!("{name}:{}", line_of(text, offset)));
-        let mut scene = Self::parse(text, name)?;
         if scene.body.is_none() {
             let message = "is missing, a scene needs the tables [body.block] and [body.material]";
             return Err(on_line(Error::scene("body", message), 0));
         }
+        // Before any of their files is read.
+        scene.check_counts().map_err(|error| {
+            let offset = offset_of(root, error.place());
+            on_line(error, offset)
+        })?;
         scene.source = Some(text.to_owned());
         let count = scene.devices.len();
         for (index, device) in scene.devices.iter_mut().enumerate() {
@@ -99,6 +108,10 @@ impl Scene {
 
     /// The scene in `text` as it stands: nothing is fetched, completed or validated.
     fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        if text.len() > LARGEST_FILE {
+            let message = format!("is larger than {} MiB, the most that is read", LARGEST_FILE >> 20);
+            return Err(Error::new(ErrorKind::Scene, message).at(name));
+        }
         let (document, syntax) = DeTable::parse_recoverable(text);
         let root = document.get_ref();
         let refuse = |fault: Fault| {

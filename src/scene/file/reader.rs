@@ -11,6 +11,7 @@ use toml::de::{DeArray, DeInteger, DeTable, DeValue};
 
 use super::fault::{Fault, one_of};
 use crate::error::quoted;
+use crate::printable::printable;
 
 /// A value of the file, ready to be read as what serde asks for.
 pub(super) struct Reader<'a, 'i>(&'a DeValue<'i>);
@@ -35,8 +36,8 @@ impl Reader<'_, '_> {
     fn wrong(&self, needed: &str) -> Fault {
         let found = match self.0 {
             DeValue::String(text) => quoted(text),
-            DeValue::Integer(number) => number.to_string(),
-            DeValue::Float(number) => number.as_str().to_owned(),
+            DeValue::Integer(number) => printable(&number.to_string()).into_owned(),
+            DeValue::Float(number) => printable(number.as_str()).into_owned(),
             DeValue::Boolean(value) => value.to_string(),
             DeValue::Datetime(_) => "a date".to_owned(),
             DeValue::Array(_) => "an array".to_owned(),

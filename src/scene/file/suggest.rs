@@ -4,10 +4,16 @@ use strsim::osa_distance;
 
 /// Shortest word that counts as meant when it is part of another.
 const SHORTEST_PART: usize = 3;
+/// Longest word that a known one is looked for in (bytes).
+const LONGEST: usize = 64;
 
 /// The entry of `known` that `word` probably means: the same without or with another unit or prefix, or a few slips of
 /// the finger away.
 pub(super) fn suggest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+    // The distance costs the product of the lengths, and nobody means a short word by so long a one.
+    if word.len() > LONGEST {
+        return None;
+    }
     let word = word.to_lowercase().replace('-', "_");
     let tolerated = (word.chars().count() / 3).max(1);
     let near =

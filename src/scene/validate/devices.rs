@@ -20,10 +20,6 @@ const TAKEN: [&str; 5] = ["timing", "stats", "global", "ports", "log"];
 
 /// What can be wrong with them.
 pub(super) fn validate(devices: &[DeviceSpec], equations: Equations) -> Result<(), Error> {
-    if devices.is_empty() || devices.len() > MAX_DEVICES {
-        let message = format!("is given {} times, a scene has 1 to {MAX_DEVICES}", devices.len());
-        return Err(Error::scene("device", message));
-    }
     for (index, device) in devices.iter().enumerate() {
         self::device(device).map_err(|error| numbered(error, index, devices))?;
     }

@@ -1,6 +1,7 @@
 //! The one validation that builder and scene files pass through.
 
 mod check;
+mod counts;
 mod devices;
 mod safety;
 
@@ -47,6 +48,7 @@ impl Scene {
 }
 
 fn validate(scene: &Scene) -> Result<(), Error> {
+    scene.check_counts()?;
     if let Some(spec) = &scene.body {
         body(spec)?;
     }

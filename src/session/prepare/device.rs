@@ -5,6 +5,7 @@ use std::path::Path;
 use super::super::parts::OpenHaply;
 use crate::devices::{Device, DeviceState, Faulty, Hand, Replayed, ReplayedSample, Scripted, ToolPath};
 use crate::error::{Error, ErrorKind};
+use crate::files;
 use crate::log::{LogEntry, LogReader, LogRecord, ToolSample};
 use crate::model::Vec3;
 use crate::runtime::Execution;
@@ -75,6 +76,25 @@ fn path(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<ToolPath, Error> {
     }
 }
 
+/// Refuses a path that leaves what its device reaches (m) from the path's beginning: most often it is of another unit.
+pub(super) fn check_path(spec: &DeviceSpec, reach_m: f64) -> Result<(), Error> {
+    let Some(path) = &spec.path else { return Ok(()) };
+    let first = Vec3::from(path.positions_m()[0]);
+    let samples = path.times_s().iter().zip(path.positions_m());
+    let far_m = |position: &[f64; 3]| (Vec3::from(*position) - first).norm();
+    match samples.into_iter().find(|(_, position)| far_m(position) > reach_m) {
+        None => Ok(()),
+        Some((time_s, position)) => {
+            let message = format!(
+                "is at {position:?} m after {time_s} s, {} m from its beginning, and the device reaches {reach_m:.3} m: is \
+                 the path in metres?",
+                far_m(position)
+            );
+            Err(Error::scene("device.path_csv", message))
+        }
+    }
+}
+
 fn check_start(field: &str, start: Vec3, glued_at: Option<Vec3>) -> Result<(), Error> {
     let Some(node) = glued_at else { return Ok(()) };
     let gap = (start - node).norm();
@@ -98,6 +118,7 @@ fn replayed(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dyn Device>
 /// The first state and the samples of the tool in a log, as far as it is whole: of the device called `name` if the log has
 /// several, where no name means the first.
 fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<ReplayedSample>), Error> {
+    files::ordinary(log)?;
     let mut reader = LogReader::open(log)?;
     let reader_place = reader.place().to_owned();
     let (mut number, mut first, mut samples) = (0, None, Vec::new());

@@ -90,6 +90,18 @@ pub(super) fn limits(safety: &SafetySpec, device: &DeviceLimits, stored_j: f64, 
     }
 }
 
+/// A device's ball is one in its workspace: the whole is taken to be four times as wide.
+const WORKSPACE_PER_BALL: f64 = 4.0;
+
+/// How far a device is believed to go from where it began (m): across its whole workspace, or twice across `body`, if that is
+/// farther: scenes may be larger than any device.
+pub(super) fn reach_m(capabilities: &Capabilities, body: &dyn Body) -> f64 {
+    let rest = body.rest();
+    let corner = |by: fn(&Vec3, &Vec3) -> Vec3| rest.iter().copied().reduce(|a, b| by(&a, &b)).unwrap_or_default();
+    let across_m = (corner(Vec3::sup) - corner(Vec3::inf)).norm();
+    (2.0 * WORKSPACE_PER_BALL * capabilities.workspace_radius_m).max(2.0 * across_m)
+}
+
 /// Limits and gains follow from what the device says, so it must be possible; its largest force is [`check_ramp`]'s.
 pub(super) fn check_capabilities(capabilities: Capabilities, limits: &Limits) -> Result<(), Error> {
     let asked = Capabilities { max_force_n: limits.max_force_n, continuous_force_n: None, ..capabilities };

@@ -4,6 +4,7 @@ use super::super::parts::{OpenHaply, Parts};
 use super::body::Start;
 use super::device;
 use super::limits::{self, check_capabilities, check_ramp};
+use crate::actors::Bounds;
 use crate::devices::Device;
 use crate::error::Error;
 use crate::model::body::Body;
@@ -24,6 +25,8 @@ pub(crate) struct Tool {
     /// How it touches the body at the start.
     pub(crate) contact: Contact,
     pub(crate) limits: Limits,
+    /// What is believed of its device.
+    pub(crate) bounds: Bounds,
     /// Between device and simulated tool.
     pub(crate) coupling: Option<Design>,
 }
@@ -86,8 +89,17 @@ pub(super) fn tools(
             false => None,
         };
         let contact = node.map_or_else(Contact::default, |node| glued(body, node));
+        let reach_m = limits::reach_m(&device.capabilities(), body);
+        let bounds = match is_replay {
+            // It was looked at in the run that is executed again.
+            true => Bounds::NONE,
+            false => {
+                device::check_path(spec, reach_m).map_err(of_this)?;
+                Bounds::of(reach_m, device.exerts_force())
+            }
+        };
         let name = spec.name.clone().filter(|_| scene.devices.len() > 1).unwrap_or_default();
-        tools.push(Tool { name, device, contact, limits, coupling });
+        tools.push(Tool { name, device, contact, limits, bounds, coupling });
         all_resolved.push(resolved);
     }
     // What differs between devices stays theirs.

@@ -1,7 +1,9 @@
 //! The haptic group: a device and a local actor for each tool, with what they say to each other.
 
 use super::models::Source;
-use crate::actors::{ComputedForce, DeviceActor, DeviceSample, LocalActor, LocalPorts, ToolView};
+use crate::actors::{
+    ComputedForce, DeviceActor, DevicePorts, DeviceSample, Disbelieved, LocalActor, LocalPorts, ToolView,
+};
 use crate::devices::DeviceState;
 use crate::model::Vec3;
 use crate::model::local::Succession;
@@ -13,6 +15,9 @@ use crate::session::prepare::{ModelPlan, Tool};
 /// Records of a local actor per haptic tick at most, besides one per probe.
 const RECORDS_PER_TICK: usize = 4;
 
+/// Room for records of one actor, whatever the haptic rate: 64 MiB.
+const MOST_RECORDS: usize = 1 << 20;
+
 /// Both ends of what a tool's device and local actor say to each other and to a program that draws.
 pub(super) struct ToolEnds {
     sample_writer: Writer<DeviceSample>,
@@ -21,6 +26,8 @@ pub(super) struct ToolEnds {
     forces: Reader<ComputedForce>,
     view_writer: OutletWriter<ToolView>,
     view: Option<OutletReader<ToolView>>,
+    disbelieved_writer: OutletWriter<Disbelieved>,
+    disbelieved: Option<OutletReader<Disbelieved>>,
 }
 
 impl ToolEnds {
@@ -28,7 +35,14 @@ impl ToolEnds {
         let (sample_writer, samples) = graph.exchange(DeviceSample::default);
         let (force_writer, forces) = graph.exchange(ComputedForce::default);
         let (view_writer, view) = graph.outlet(ToolView::default);
-        Self { sample_writer, samples, force_writer, forces, view_writer, view: Some(view) }
+        let (disbelieved_writer, disbelieved) = graph.outlet(Disbelieved::default);
+        let (view, disbelieved) = (Some(view), Some(disbelieved));
+        Self { sample_writer, samples, force_writer, forces, view_writer, view, disbelieved_writer, disbelieved }
+    }
+
+    /// The end of the logger.
+    pub(super) fn take_disbelieved(&mut self) -> Option<OutletReader<Disbelieved>> {
+        self.disbelieved.take()
     }
 
     /// The end of a program that draws.
@@ -51,14 +65,19 @@ pub(super) fn actors(
     let each = tools.into_iter().zip(ends).zip(first).zip(sources);
     for (number, (((tool, ends), state), Source { models, source })) in (0..).zip(each) {
         let safety = Pipeline::new(tool.limits);
-        let recorder = graph.recorder(ticks * 2);
-        let device = DeviceActor::new(tool.device, *state, ends.sample_writer, ends.forces, safety, recorder);
+        let ports = DevicePorts {
+            samples: ends.sample_writer,
+            commands: ends.forces,
+            view: ends.view_writer,
+            disbelieved: ends.disbelieved_writer,
+            recorder: graph.recorder((ticks * 2).min(MOST_RECORDS)),
+        };
+        let device = DeviceActor::new(tool.device, *state, tool.bounds, safety, ports);
         let ports = LocalPorts {
             samples: ends.samples,
             commands: ends.force_writer,
             source,
-            view: ends.view_writer,
-            recorder: graph.recorder(ticks * (RECORDS_PER_TICK + plan.probes.len())),
+            recorder: graph.recorder((ticks * (RECORDS_PER_TICK + plan.probes.len())).min(MOST_RECORDS)),
         };
         let succession = Succession::new(models, plan.blend, Vec3::zeros());
         let local = LocalActor::new(succession, plan.timing.haptic, plan.timing.global, plan.probes.clone(), ports);

@@ -24,6 +24,8 @@ use sink::Sinks;
 const SECONDS_BUFFERED: f64 = 4.0;
 /// However slow the haptic rate is: release 0 makes several records before the first drain.
 const MIN_TICKS_BUFFERED: usize = 64;
+/// However fast it is: a second of 1 MHz, 64 MiB a ring.
+const MAX_TICKS_BUFFERED: usize = 1 << 20;
 
 /// A recording that is executed again in place of a run of its own.
 pub(super) struct Rerun {
@@ -55,10 +57,12 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
 
     // Before the ports, so that they record what a replay needs. The order of the ports below numbers them in the log.
     let drain = graph.drain();
-    let ticks = ((SECONDS_BUFFERED * prepared.plan.timing.haptic.as_hz()) as usize).max(MIN_TICKS_BUFFERED);
+    let ticks = (SECONDS_BUFFERED * prepared.plan.timing.haptic.as_hz()) as usize;
+    let ticks = ticks.clamp(MIN_TICKS_BUFFERED, MAX_TICKS_BUFFERED);
     let (surfaces, scene) = surfaces(&mut graph, &prepared);
     let mut ends: Vec<ToolEnds> = prepared.tools.iter().map(|_| ToolEnds::new(&mut graph)).collect();
     let views = ends.iter_mut().filter_map(ToolEnds::take_view).collect();
+    let disbelieved = ends.iter_mut().filter_map(ToolEnds::take_disbelieved).collect();
     let viewer = Viewer::new(prepared.simulation.body().surface(), surfaces[0].reader(), views);
     let bases = BasisSide::new(&mut graph, &prepared, &places)?;
     if let Some(bases) = &bases {
@@ -73,7 +77,10 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     let outcome = LoggerOutcome::default();
     let logger = match taker {
         Some(taker) => taker(drain),
-        None => Box::new(LoggerActor::new(drain, sinks, environment, graph.grants(), outcome.clone()).watching(scene)),
+        None => {
+            let logger = LoggerActor::new(drain, sinks, environment, graph.grants(), outcome.clone());
+            Box::new(logger.watching(scene).telling(disbelieved))
+        }
     };
     graph.group(local, haptic);
     if let Some((group, actor)) = reducing {
