@@ -5,16 +5,13 @@
 
 mod table;
 
-use std::fs::File;
 use std::io::BufWriter;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
 use palpate::Error;
-use palpate::log::LogReader;
-use palpate_cli::WindowArgs;
-use palpate_cli::export::export_rows;
+use palpate_cli::{WindowArgs, export_to_file};
 
 use table::ParquetTable;
 
@@ -45,16 +42,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), Error> {
-    let window = args.window.window()?;
-    let mut reader = LogReader::open(&args.log)?;
-    // The file is created when the topic is known to exist.
-    export_rows(&mut reader, &args.topic, &window, |columns| {
-        palpate_cli::refuse_to_overwrite(&args.log, &args.out)?;
-        let file = File::create(&args.out).map_err(|error| Error::io(&args.out, error))?;
+    export_to_file(&args.log, &args.topic, &args.window, &args.out, |columns, file| {
         ParquetTable::new(columns, BufWriter::new(file))
-    })?;
-    if let Some(damage) = reader.damage() {
-        eprintln!("warning: {}: {damage}", reader.place());
-    }
-    Ok(())
+    })
 }

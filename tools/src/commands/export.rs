@@ -9,7 +9,9 @@ use palpate::{Error, ErrorKind};
 
 use super::progress::ReadBar;
 use super::shared::{WindowArgs, forgive_closed_pipe, refuse_to_overwrite, warn_of_damage};
-use crate::export::{TickDuration, export_percentiles, export_table, export_trace};
+use crate::export::{
+    ColumnType, TableWriter, TickDuration, export_percentiles, export_rows, export_table, export_trace,
+};
 
 /// The formats of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -70,6 +72,32 @@ pub fn run(args: &ExportArgs) -> Result<(), Error> {
     };
     bar.clear();
     result?;
+    warn_of_damage(reader.place(), reader.damage());
+    Ok(())
+}
+
+/// Gives every message of `topic` of the log at `log` within `window` to the table that `begin` makes of its columns, each a name and
+/// a type, and of the file at `out`. Says on standard error if the log is damaged.
+///
+/// No file is created before the topic is known to exist.
+///
+/// # Errors
+/// [`ErrorKind::Usage`] if `window` is none, or if `out` is the log; [`ErrorKind::Io`] if the log cannot be read or the file not
+/// created; [`ErrorKind::Log`] if the log has no such topic, with the topics that it has, or if the topic is for viewers only;
+/// what `begin` and the table say.
+pub fn export_to_file<T: TableWriter>(
+    log: &Path,
+    topic: &str,
+    window: &WindowArgs,
+    out: &Path,
+    begin: impl FnOnce(&[(&'static str, ColumnType)], File) -> Result<T, Error>,
+) -> Result<(), Error> {
+    let window = window.window()?;
+    let mut reader = LogReader::open(log)?;
+    export_rows(&mut reader, topic, &window, |columns| {
+        refuse_to_overwrite(log, out)?;
+        begin(columns, File::create(out).map_err(|error| Error::io(out, error))?)
+    })?;
     warn_of_damage(reader.place(), reader.damage());
     Ok(())
 }

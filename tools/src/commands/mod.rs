@@ -18,7 +18,8 @@ mod shared;
 
 use std::process::ExitCode;
 
-pub use shared::{WindowArgs, refuse_to_overwrite};
+pub use export::export_to_file;
+pub use shared::WindowArgs;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use palpate::session::LOG_FAILURE;

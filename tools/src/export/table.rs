@@ -54,7 +54,7 @@ pub trait TableWriter {
 /// # Errors
 /// [`ErrorKind::Log`] if the log has no such topic, with the topics that it has, or if the topic is for viewers only; what
 /// `begin` and the table say.
-pub fn export_rows<R: Read, T: TableWriter>(
+pub(crate) fn export_rows<R: Read, T: TableWriter>(
     reader: &mut LogReader<R>,
     topic: &str,
     window: &Window,
