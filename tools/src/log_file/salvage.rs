@@ -9,7 +9,7 @@ use std::path::Path;
 use mcap::records::op;
 
 use palpate::Error;
-use palpate::log::file::{ChunkHead, ChunkRecords, MAX_RECORD_BYTES, RecordStream, Section};
+use palpate::log::file::{ChunkHead, ChunkRecords, RecordStream, Section};
 
 /// How much is looked at at once in the search for a chunk (bytes).
 const WINDOW_BYTES: usize = 1 << 20;
@@ -116,7 +116,7 @@ impl<R: Read + Seek> Salvage<R> {
     fn may_begin(&self, bytes: &[u8], place: u64) -> bool {
         let Some(length) = length_in(bytes) else { return false };
         let head = &bytes[9..bytes.len().min(HEAD_BYTES)];
-        length <= MAX_RECORD_BYTES
+        length <= ChunkHead::MAX_RECORD_BYTES
             && place + 9 + length <= self.length
             && ChunkHead::of(head, length, false).is_ok_and(|head| head.is_readable())
     }
@@ -151,7 +151,7 @@ fn follow<R: Read + Seek>(source: &mut R, mut at: u64, length: u64) -> io::Resul
         source.read_exact(&mut head)?;
         let body = length_in(&head).unwrap_or(u64::MAX);
         let is_known = (op::SCHEMA..=op::DATA_END).contains(&head[0]);
-        if !is_known || body > MAX_RECORD_BYTES || at + 9 + body > length {
+        if !is_known || body > ChunkHead::MAX_RECORD_BYTES || at + 9 + body > length {
             return Ok(false);
         }
         at += 9 + body;

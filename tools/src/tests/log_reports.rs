@@ -4,7 +4,6 @@ use crate::export::export_table;
 use crate::timing::{Selection, TimingAnalysis, timing_to_json};
 use palpate::ErrorKind;
 use palpate::log::{Analysis, LogEntry, LogReader, LogRecord, RunReport, Window};
-use palpate::report::to_text;
 
 use super::log_sample::{entries, log_of, time_of};
 
@@ -62,7 +61,7 @@ fn json_is_one_document_that_says_what_the_log_says() {
     assert_eq!(value["resyncs"]["count"], 15);
     assert_eq!(value["environment"]["granted"]["mlock"], "refused");
     assert_eq!(value["events"]["count"], 2);
-    let text = to_text(&analyse(&bytes));
+    let text = analyse(&bytes).to_string();
     assert!(text.starts_with("FAILED: global: an actor reported fault"), "{text}");
     assert!(text.lines().count() <= 40, "{text}");
 }
@@ -74,7 +73,7 @@ fn every_cut_of_a_log_can_be_analysed_and_exported() {
     for cut in (8..bytes.len()).step_by(11) {
         let report = analyse(&bytes[..cut]);
         let forces = table(&bytes[..cut], "/force");
-        assert!(to_text(&report).contains("damage"));
+        assert!(report.to_string().contains("damage"));
         assert_eq!(forces.lines().count() as u64, 1 + report.devices[0].force.ticks);
         assert!(forces.lines().count() >= rows);
         rows = forces.lines().count();

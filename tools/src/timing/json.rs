@@ -33,7 +33,6 @@ use std::collections::BTreeMap;
 use palpate::log::{
     DeviceReport, Environment, GroupSummary, Level, LoggedExecution, Percentiles, RunReport, TextEvent,
 };
-use palpate::report::verdict;
 use palpate::runtime::SlipCounts;
 use palpate::runtime::TickTiming;
 use serde_json::{Map, Value, json};
@@ -73,7 +72,7 @@ pub fn against_to_json(against: &Against, this: &TimingReport, other: (&str, &Ti
     let mut document = timing_document(this);
     document["against"] = json!({
         "log": other.0,
-        "verdict": verdict(&other.1.run).0.name(),
+        "verdict": other.1.run.verdict().0.name(),
         "figures": against.figures.iter().map(compared).collect::<Map<_, _>>(),
         "unmatched": against.unmatched,
     });
@@ -130,7 +129,7 @@ fn worst_tick(worst: &WorstTick, report: &TimingReport) -> Value {
 }
 
 fn document(report: &RunReport) -> Value {
-    let (verdict, reason) = verdict(report);
+    let (verdict, reason) = report.verdict();
     let mut document = json!({
         "schema_version": 1,
         "verdict": verdict.name(),
