@@ -1,7 +1,7 @@
 //! Every device of palpate keeps to what a device must keep to, a program's own can be held to the same, and one that does
 //! not is caught.
 
-use palpate::devices::conformance::{Conformance, Verdict, check, check_disconnecting};
+use palpate::devices::conformance::{Conformance, Verdict};
 use palpate::devices::{
     Axis, Calibration, Capabilities, Device, DeviceFault, DeviceState, FaultKind, FaultSpec, Faulty, ForceCommand,
     Hand, HandSpec, PlantSpec, Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
@@ -33,7 +33,7 @@ fn assert_passed(report: &Conformance) {
 
 #[test]
 fn a_scripted_tool_conforms() {
-    assert_passed(&check(|| Scripted::new(path())));
+    assert_passed(&Conformance::check(|| Scripted::new(path())));
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn a_simulated_hand_conforms_and_everything_about_it_can_be_seen() {
         PlantSpec { axes: vec![Axis::Z], encoder_step_m: 0.0, velocity_cutoff_hz: None, ..PlantSpec::default() },
     ];
     for plant in plants {
-        let report = check(|| hand(plant.clone()));
+        let report = Conformance::check(|| hand(plant.clone()));
         assert_passed(&report);
         // All but the last, for which the suite needs to disconnect it.
         let seen = report.checks.iter().filter(|check| check.verdict == Verdict::Passed).count();
@@ -54,8 +54,10 @@ fn a_simulated_hand_conforms_and_everything_about_it_can_be_seen() {
 
 #[test]
 fn a_replayed_tool_conforms_at_its_own_times_and_at_others() {
-    assert_passed(&check(|| Replayed::new(samples()[0].state, samples(), Capabilities::FALCON)));
-    assert_passed(&check(|| Replayed::new(samples()[0].state, samples(), Capabilities::FALCON).at_any_rate()));
+    assert_passed(&Conformance::check(|| Replayed::new(samples()[0].state, samples(), Capabilities::FALCON)));
+    assert_passed(&Conformance::check(|| {
+        Replayed::new(samples()[0].state, samples(), Capabilities::FALCON).at_any_rate()
+    }));
 }
 
 fn failing(kind: FaultKind) -> Faulty<Box<dyn Device>> {
@@ -69,10 +71,10 @@ fn a_device_that_fails_in_order_conforms() {
     use FaultKind::{Disconnected, Frozen, Late, Lost, SafetyStop};
     for kind in [Late, Lost, Frozen, Disconnected, SafetyStop] {
         println!("{kind:?}");
-        assert_passed(&check(|| failing(kind)));
+        assert_passed(&Conformance::check(|| failing(kind)));
     }
     // Its cable comes off after 10 ms, as the suite's own.
-    let report = check_disconnecting(|| failing(FaultKind::Disconnected), |_| {});
+    let report = Conformance::check_disconnecting(|| failing(FaultKind::Disconnected), |_| {});
     assert_passed(&report);
     assert_eq!(report.checks.last().map(|check| check.verdict), Some(Verdict::Passed));
 }
@@ -161,7 +163,7 @@ impl Device for Own {
 }
 
 fn own(wrong: Wrong) -> Conformance {
-    check_disconnecting(|| Own { wrong, ..Own::default() }, |device| device.is_gone = true)
+    Conformance::check_disconnecting(|| Own { wrong, ..Own::default() }, |device| device.is_gone = true)
 }
 
 #[test]
@@ -200,7 +202,7 @@ fn each_fault_of_a_device_fails_the_check_that_is_about_it() {
 
 #[test]
 fn a_device_that_gives_states_that_are_no_numbers_is_caught() {
-    let report = check(|| failing(FaultKind::NotFinite));
+    let report = Conformance::check(|| failing(FaultKind::NotFinite));
     let verdict = report.verdict("its states are finite, and what is none is a fault");
     assert_eq!(verdict, Some(Verdict::Failed), "{report}");
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use palpate::Error;
-use palpate::actors::{LAST_WAIT, LogFile, LogSink, LoggerActor, LoggerOutcome, MOST_WAITING};
+use palpate::actors::{LogFile, LogSink, LoggerActor, LoggerOutcome};
 use palpate::log::{
     Environment, ForceSample, GroupInfo, GroupStats, LogEntry, LogReader, LogRecord, LoggedExecution, RunReport,
     TextEvent,
@@ -240,7 +240,7 @@ fn a_disk_of_20_kb_per_second_costs_records_within_bounds_of_memory_and_time() {
     let ran = run(Execution::Threaded, 9000, 4000, Some(on(&disk, Execution::Threaded)));
     assert_haptic_is_whole(&ran, 9000);
     assert_eq!(ran.runtime.fault, None, "the logger did not hang");
-    assert!(ran.took < Duration::from_secs(9) + LAST_WAIT + Duration::from_secs(2), "{:?}", ran.took);
+    assert!(ran.took < Duration::from_secs(9) + LogFile::LAST_WAIT + Duration::from_secs(2), "{:?}", ran.took);
     assert!(ran.error.unwrap().to_string().contains("the disk did not take the last "));
     let (got, _) = disk.read();
     let (lost, given) = (ran.report.lost_records(), ran.ticks * PER_TICK);
@@ -279,7 +279,7 @@ fn a_gap_is_told_in_the_log_with_its_times() {
     };
     let mut n = 0;
     // Until three times as much was given as may wait.
-    let (mut first_lost, most) = (None, 3 * MOST_WAITING / 40);
+    let (mut first_lost, most) = (None, 3 * LogFile::MOST_WAITING / 40);
     while n < most {
         file.record(&record(n)).unwrap();
         file.flush(Nanos(n * MS), Nanos(n * MS)).unwrap();
@@ -329,7 +329,7 @@ fn a_disk_that_never_answers_again_ends_the_run_in_bounded_time() {
     let ran = run(Execution::Threaded, 2000, 4000, Some(on(&disk, Execution::Threaded)));
     assert_haptic_is_whole(&ran, 2000);
     assert_eq!(ran.runtime.fault, None);
-    assert!(ran.took < Duration::from_secs(2) + LAST_WAIT + Duration::from_secs(2), "{:?}", ran.took);
+    assert!(ran.took < Duration::from_secs(2) + LogFile::LAST_WAIT + Duration::from_secs(2), "{:?}", ran.took);
     let (got, damage) = disk.read();
     assert!(damage.is_some());
     assert!(ran.report.lost_records() + messages(&got) >= ran.ticks * PER_TICK);

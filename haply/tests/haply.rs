@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use palpate::ErrorKind;
-use palpate::devices::conformance::{self, Verdict};
+use palpate::devices::conformance::{Conformance, Verdict};
 use palpate::devices::{Calibration, Capabilities, ForceCommand, SafetyStop};
 use palpate::prelude::*;
 use palpate::runtime::{Actor, Execution, Outcome, RateGroup, Runtime, TickContext};
@@ -389,7 +389,7 @@ fn it_conforms_and_everything_about_it_can_be_seen() {
         engage(&mut device);
         InItsTime { device, service: Some(service), begun: None }
     };
-    let report = conformance::check_disconnecting(make, |device| device.service = None);
+    let report = Conformance::check_disconnecting(make, |device| device.service = None);
     println!("{report}");
     assert!(report.checks.iter().all(|check| check.verdict == Verdict::Passed), "{report}");
 }

@@ -8,7 +8,7 @@ use crate::log::GlobalTick;
 use crate::model::Vec3;
 use crate::model::body::Body;
 use crate::model::contact::ToolMotion;
-use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, wider};
+use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView};
 use crate::model::local::{ToolForecast, ToolHistory};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
@@ -336,7 +336,7 @@ impl GlobalActor {
                 list.wish(triangles, size);
             } else if self.plan.prefetches {
                 // In the time that one takes the tool can be in the next cells: a window that is a cell wider serves there too.
-                let wide = wider(size);
+                let wide = Aim::wider(size);
                 if !list.is_covered(triangles, size) {
                     list.wish(triangles, size);
                 }

@@ -1,6 +1,6 @@
 //! The log as a file: written by a thread of its own, within bounds of memory and of waiting.
 //!
-//! In real time nobody waits for the disk: while more than [`MOST_WAITING`] bytes wait for it, records are dropped and
+//! In real time nobody waits for the disk: while more than [`LogFile::MOST_WAITING`] bytes wait for it, records are dropped and
 //! counted. In simulated time the run waits. In both a disk that takes nothing any more is given up.
 
 use std::collections::VecDeque;
@@ -16,17 +16,13 @@ use crate::log::{
 };
 use crate::runtime::Nanos;
 
-/// The amount that may wait for a slow disk before records are dropped (bytes): some six seconds of a usual log, two of one with pictures.
-pub const MOST_WAITING: u64 = 2 << 20;
-/// How long the end of a run in real time waits for the disk. Less than the runtime waits for the logger.
-pub const LAST_WAIT: Duration = Duration::from_secs(3);
 /// In simulated time: how long a disk may take nothing.
 const STALLED: Duration = Duration::from_secs(10);
 
 /// A log file as a sink.
 ///
 /// # Real-time
-/// For the logger alone. In real time no call blocks but [`finish`](LogSink::finish), for at most [`LAST_WAIT`].
+/// For the logger alone. In real time no call blocks but [`finish`](LogSink::finish), for at most [`LogFile::LAST_WAIT`].
 #[derive(Debug)]
 pub struct LogFile {
     /// Gone after an error.
@@ -95,6 +91,12 @@ struct Mark {
 }
 
 impl LogFile {
+    /// The amount that may wait for a slow disk before records are dropped (bytes): some six seconds of a usual log, two of one with pictures.
+    pub const MOST_WAITING: u64 = 2 << 20;
+
+    /// How long the end of a run in real time waits for the disk. Less than the runtime waits for the logger.
+    pub const LAST_WAIT: Duration = Duration::from_secs(3);
+
     /// Creates or overwrites the log at `path`, which no other run can write until this one is over.
     ///
     /// # Errors
@@ -159,12 +161,13 @@ impl LogFile {
         let waiting = self.disk.waiting();
         if self.waits {
             // One block at a time: nothing is lost here, however slow the disk is.
-            if waiting > MOST_WAITING && !self.disk.wait_for(MOST_WAITING / 2, STALLED, Duration::MAX) {
+            if waiting > LogFile::MOST_WAITING && !self.disk.wait_for(LogFile::MOST_WAITING / 2, STALLED, Duration::MAX)
+            {
                 return Err(self.stalled(STALLED));
             }
             return Ok(true);
         }
-        self.is_full = waiting > if self.is_full { MOST_WAITING / 2 } else { MOST_WAITING };
+        self.is_full = waiting > if self.is_full { LogFile::MOST_WAITING / 2 } else { LogFile::MOST_WAITING };
         if !self.is_full {
             self.closed_gap = self.gap.take().or(self.closed_gap.take());
         }
@@ -216,7 +219,8 @@ impl LogFile {
     fn close(&mut self, writer: McapWriter<Backlog>) -> Result<(), Error> {
         // Dropped here: the thread ends when all is written.
         writer.finish().map(drop)?;
-        let (stalled, total) = if self.waits { (STALLED, Duration::MAX) } else { (LAST_WAIT, LAST_WAIT) };
+        let (stalled, total) =
+            if self.waits { (STALLED, Duration::MAX) } else { (LogFile::LAST_WAIT, LogFile::LAST_WAIT) };
         if !self.disk.wait_for_end(stalled, total) {
             return Err(self.stalled(stalled));
         }

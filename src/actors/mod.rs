@@ -38,6 +38,6 @@ pub use messages::{SurfaceView, ToolView};
 
 // A log file for programs that drive the logger themselves, and the causes in its records.
 pub use cause::Cause;
-pub use log_file::{LAST_WAIT, LogFile, MOST_WAITING};
+pub use log_file::LogFile;
 pub use log_sink::{LogSink, Loss};
 pub use logger::{LoggerActor, LoggerOutcome};

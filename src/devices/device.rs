@@ -12,7 +12,7 @@ use crate::runtime::Nanos;
 /// [`write`](Self::write) once with the force of the same release. Before the first release `read` is called once at time
 /// zero. Times never go backwards; releases may be skipped.
 ///
-/// [`conformance::check`](super::conformance::check) tells whether an implementation keeps to all of this.
+/// [`Conformance`](super::conformance::Conformance) tells whether an implementation keeps to all of this.
 ///
 /// ```
 /// use palpate::prelude::*;

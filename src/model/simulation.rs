@@ -26,6 +26,14 @@ impl Default for Stepping {
 }
 
 impl Stepping {
+    /// Substeps per tick of `tick` (s) from the body's stability limit.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates, and evaluates the body's forces hundreds of times.
+    pub fn stable_substeps(body: &mut dyn Body, tick: f64) -> u32 {
+        Spectrum::estimate(body).substeps(tick)
+    }
+
     /// The substep d (s).
     pub fn step(&self) -> f64 {
         self.tick / f64::from(self.substeps)
@@ -304,12 +312,4 @@ impl Simulation {
     pub fn force(&self, tool: usize) -> Vec3 {
         self.means[tool]
     }
-}
-
-/// Substeps per tick of `tick` (s) from the body's stability limit.
-///
-/// # Real-time
-/// Not real-time safe: allocates, and evaluates the body's forces hundreds of times.
-pub fn stable_substeps(body: &mut dyn Body, tick: f64) -> u32 {
-    Spectrum::estimate(body).substeps(tick)
 }

@@ -1,9 +1,10 @@
 //! The report on a run that is over, as text for a terminal.
 
 mod page;
-pub mod text;
-pub mod units;
+mod text;
+mod units;
 mod verdict;
 
-pub use text::to_text;
-pub use verdict::{RunVerdict, verdict};
+pub use page::Page;
+pub use units::Quantity;
+pub use verdict::RunVerdict;

@@ -5,7 +5,7 @@ pub const WIDTH: usize = 80;
 /// Columns of a name in front.
 const NAME_WIDTH: usize = 11;
 
-/// The text so far.
+/// A report in the making, on lines of at most 80 columns.
 #[derive(Clone, Debug, Default)]
 pub struct Page {
     /// What has been added, every line ended by a newline.

@@ -4,9 +4,8 @@
 
 use std::fmt;
 
-pub use super::page::Page;
-use super::units::{duration, force, seconds};
-use super::verdict::verdict;
+use super::page::Page;
+use super::units::Quantity;
 use crate::log::{DeviceReport, GroupSummary, LoggedExecution, Percentiles, RunReport};
 use crate::runtime::SlipCounts;
 
@@ -16,169 +15,179 @@ const GRANT_LINES: usize = 6;
 
 impl fmt::Display for RunReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&to_text(self))
+        let mut page = Page::default();
+        page.head(self);
+        page.about(self);
+        page.line(String::new());
+        page.groups(self);
+        page.line(String::new());
+        self.devices.iter().for_each(|device| page.haptics(self, device));
+        page.events(self);
+        f.write_str(&page.text)
     }
 }
 
-/// The report as text, every line ended by a newline.
-pub fn to_text(report: &RunReport) -> String {
-    let mut page = Page::default();
-    head(&mut page, report);
-    about(&mut page, report);
-    page.line(String::new());
-    groups(&mut page, report);
-    page.line(String::new());
-    report.devices.iter().for_each(|device| haptics(&mut page, report, device));
-    events(&mut page, report);
-    page.text
-}
+impl Page {
+    /// Adds what a report begins with: the verdict in a line.
+    pub fn head(&mut self, report: &RunReport) {
+        let (verdict, reason) = report.verdict();
+        self.line(format!("{}: {reason}", verdict.name()));
+    }
 
-/// Adds what a report begins with: the verdict in a line.
-pub fn head(page: &mut Page, report: &RunReport) {
-    let (verdict, reason) = verdict(report);
-    page.line(format!("{}: {reason}", verdict.name()));
-}
+    /// Adds what the run was: execution, model and why, what is switched off, what the system granted.
+    pub fn about(&mut self, report: &RunReport) {
+        let Some(environment) = &report.environment else { return };
+        self.line(String::new());
+        let execution = match environment.execution {
+            LoggedExecution::Virtual => "virtual",
+            LoggedExecution::Threaded { .. } => "threaded",
+        };
+        self.named(
+            "run",
+            format!(
+                "{execution}, model {}, palpate {}, {}",
+                environment.model, environment.palpate_version, environment.instruction_set
+            ),
+        );
+        if let Some(reason) = &environment.model_reason {
+            self.wrapped("model", &format!("{}: {}", environment.model, reason.why));
+            reason.warning.iter().for_each(|warning| self.wrapped("warning", warning));
+        }
+        if !environment.safety_off.is_empty() {
+            self.wrapped("SAFETY OFF", &environment.safety_off.join(", "));
+        }
+        environment.coupling.iter().for_each(|design| self.wrapped("coupling", design));
+        for (i, (what, granted)) in environment.granted.iter().take(GRANT_LINES).enumerate() {
+            self.wrapped(if i == 0 { "granted" } else { "" }, &format!("{what}: {granted}"));
+        }
+        if let Some(hidden) = environment.granted.len().checked_sub(GRANT_LINES).filter(|&hidden| hidden > 0) {
+            self.named("", format!("and {hidden} more"));
+        }
+    }
 
-/// Adds what the run was: execution, model and why, what is switched off, what the system granted.
-pub fn about(page: &mut Page, report: &RunReport) {
-    let Some(environment) = &report.environment else { return };
-    page.line(String::new());
-    let execution = match environment.execution {
-        LoggedExecution::Virtual => "virtual",
-        LoggedExecution::Threaded { .. } => "threaded",
-    };
-    page.named(
-        "run",
-        format!(
-            "{execution}, model {}, palpate {}, {}",
-            environment.model, environment.palpate_version, environment.instruction_set
-        ),
-    );
-    if let Some(reason) = &environment.model_reason {
-        page.wrapped("model", &format!("{}: {}", environment.model, reason.why));
-        reason.warning.iter().for_each(|warning| page.wrapped("warning", warning));
-    }
-    if !environment.safety_off.is_empty() {
-        page.wrapped("SAFETY OFF", &environment.safety_off.join(", "));
-    }
-    environment.coupling.iter().for_each(|design| page.wrapped("coupling", design));
-    for (i, (what, granted)) in environment.granted.iter().take(GRANT_LINES).enumerate() {
-        page.wrapped(if i == 0 { "granted" } else { "" }, &format!("{what}: {granted}"));
-    }
-    if let Some(hidden) = environment.granted.len().checked_sub(GRANT_LINES).filter(|&hidden| hidden > 0) {
-        page.named("", format!("and {hidden} more"));
-    }
-}
-
-/// Adds the rate groups: periods, causes of slips and misses, percentiles.
-pub fn groups(page: &mut Page, report: &RunReport) {
-    page.line(format!(
-        "{:<11}{:>10}{:>11}{:>11}{:>11}{:>13}",
-        "group", "rate", "released", "skipped", "missed", "lost records"
-    ));
-    for group in &report.groups {
-        let rate = group.rate_hz.map_or("-".to_owned(), |hz| format!("{hz} Hz"));
-        let (skipped, missed) = (group.skipped.total(), group.missed.total());
-        page.line(format!(
-            "{:<11}{rate:>10}{:>11}{skipped:>11}{missed:>11}{:>13}",
-            short(&group.name),
-            group.released,
-            group.lost_records
+    /// Adds the rate groups: periods, causes of slips and misses, percentiles.
+    pub fn groups(&mut self, report: &RunReport) {
+        self.line(format!(
+            "{:<11}{:>10}{:>11}{:>11}{:>11}{:>13}",
+            "group", "rate", "released", "skipped", "missed", "lost records"
         ));
-    }
-    for (what, of) in
-        [("skipped", (|group| group.skipped) as fn(&GroupSummary) -> SlipCounts), ("missed", |group| group.missed)]
-    {
-        for group in report.groups.iter().filter(|group| of(group).total() > 0) {
-            page.line(format!("  {} {what}: {}", group.name, causes(of(group))));
+        for group in &report.groups {
+            let rate = group.rate_hz.map_or("-".to_owned(), |hz| format!("{hz} Hz"));
+            let (skipped, missed) = (group.skipped.total(), group.missed.total());
+            self.line(format!(
+                "{:<11}{rate:>10}{:>11}{skipped:>11}{missed:>11}{:>13}",
+                short(&group.name),
+                group.released,
+                group.lost_records
+            ));
+        }
+        for (what, of) in
+            [("skipped", (|group| group.skipped) as fn(&GroupSummary) -> SlipCounts), ("missed", |group| group.missed)]
+        {
+            for group in report.groups.iter().filter(|group| of(group).total() > 0) {
+                self.line(format!("  {} {what}: {}", group.name, causes(of(group))));
+            }
+        }
+        self.line(String::new());
+        self.line(format!(
+            "{:<11}{:<13}{:>8}{:>9}{:>10}{:>10}{:>10}{:>9}",
+            "", "", "samples", "p50", "p90", "p99", "p99.9", "max"
+        ));
+        for group in &report.groups {
+            percentiles(self, short(&group.name), "lateness", group.lateness);
+            // Other programs' logs may know the lateness alone.
+            let others =
+                [("execution", group.execution), ("period error", group.period_error), ("jitter", group.jitter)];
+            for (what, found) in others.into_iter().filter(|(_, found)| found.count > 0 || group.released == 0) {
+                percentiles(self, "", what, found);
+            }
+        }
+        if report.is_virtual() {
+            self.line("virtual time: lateness, execution and period error are declared, not measured".to_owned());
         }
     }
-    page.line(String::new());
-    page.line(format!(
-        "{:<11}{:<13}{:>8}{:>9}{:>10}{:>10}{:>10}{:>9}",
-        "", "", "samples", "p50", "p90", "p99", "p99.9", "max"
-    ));
-    for group in &report.groups {
-        percentiles(page, short(&group.name), "lateness", group.lateness);
-        // Other programs' logs may know the lateness alone.
-        let others = [("execution", group.execution), ("period error", group.period_error), ("jitter", group.jitter)];
-        for (what, found) in others.into_iter().filter(|(_, found)| found.count > 0 || group.released == 0) {
-            percentiles(page, "", what, found);
+
+    /// Adds the haptics of one device: resyncs, model age, contact, force, energy and limits.
+    pub fn haptics(&mut self, run: &RunReport, report: &DeviceReport) {
+        if run.devices.len() > 1 {
+            self.named("DEVICE", report.name.clone());
+        }
+        let resyncs = &report.resyncs;
+        self.named("resyncs", resyncs.jump_before_n.count.to_string());
+        if resyncs.jump_before_n.count > 0 {
+            let of = |p: Percentiles<f64>, show: fn(f64) -> Quantity| {
+                format!(
+                    "p50 {:>9}   p99 {:>9}   max {:>9}",
+                    show(p.p50).to_string(),
+                    show(p.p99).to_string(),
+                    show(p.max).to_string()
+                )
+            };
+            self.named("  jump", format!("before blending  {}", of(resyncs.jump_before_n, Quantity::Newtons)));
+            self.named("", format!("after blending   {}", of(resyncs.jump_after_n, Quantity::Newtons)));
+            self.named(
+                "  age",
+                format!("on arrival       {}", of(resyncs.age_ns.map(|ns| ns as f64 / 1e9), Quantity::Seconds)),
+            );
+            self.named("", format!("at each tick     {}", of(report.force.model_age_s, Quantity::Seconds)));
+        }
+        let shares: Vec<String> =
+            report.force.shares().map(|(model, share)| format!("{} {:.2} %", model.name(), 100.0 * share)).collect();
+        if !shares.is_empty() {
+            self.named("served by", shares.join(", "));
+        }
+        let contact = report.contact;
+        self.named(
+            "contact",
+            format!(
+                "free {}, stick {}, slip {}, lost {} (haptic ticks)",
+                contact.free, contact.stick, contact.slip, contact.lost
+            ),
+        );
+        let not_finite = match report.force.not_finite {
+            0 => String::new(),
+            count => format!(", {count} not finite"),
+        };
+        self.named(
+            "force",
+            format!(
+                "peak {}, commanded {}{not_finite}",
+                Quantity::Newtons(report.force.peak_n),
+                Quantity::Newtons(report.force.peak_commanded_n)
+            ),
+        );
+        if report.limits.ticks > 0 {
+            let energy = report.limits.energy;
+            let [least, last, tank] = [energy.least_j, energy.last_j, energy.least_tank_j].map(|j| 1e3 * j);
+            self.named("energy", format!("ledger least {least:.3} mJ, end {last:.3} mJ; tank least {tank:.3} mJ"));
+        }
+        if report.limits.limited > 0 {
+            let stages = report.limits.stages.iter().map(|(name, count)| format!("{name} {count}"));
+            let share = 100.0 * report.limits.share();
+            self.wrapped("limits", &format!("{} ({share:.2} % of ticks)", stages.collect::<Vec<_>>().join(", ")));
         }
     }
-    if report.is_virtual() {
-        page.line("virtual time: lateness, execution and period error are declared, not measured".to_owned());
+
+    /// Adds the first events, and what is wrong with the log.
+    pub fn events(&mut self, report: &RunReport) {
+        for (i, event) in report.events.iter().take(EVENTS_SHOWN).enumerate() {
+            let name = if i == 0 { "events" } else { "" };
+            self.named(name, format!("{:.3} s {}: {}", event.time.as_secs_f64(), event.level.name(), event.message));
+        }
+        let hidden = report.event_count.saturating_sub(EVENTS_SHOWN as u64);
+        if hidden > 0 {
+            self.named("", format!("and {hidden} more"));
+        }
+        if let Some(damage) = &report.damage {
+            self.named("damage", damage.clone());
+        }
     }
 }
 
 fn percentiles(page: &mut Page, group: &str, what: &str, p: Percentiles<u64>) {
-    let cell = |ns: u64| if p.count == 0 { "-".to_owned() } else { duration(ns) };
+    let cell = |ns: u64| if p.count == 0 { "-".to_owned() } else { Quantity::Nanoseconds(ns).to_string() };
     let [p50, p90, p99, p999, max] = [p.p50, p.p90, p.p99, p.p999, p.max].map(cell);
     page.line(format!("{group:<11}{what:<13}{:>8}{p50:>9}{p90:>10}{p99:>10}{p999:>10}{max:>9}", p.count));
-}
-
-/// Adds the haptics of one device: resyncs, model age, contact, force, energy and limits.
-pub fn haptics(page: &mut Page, run: &RunReport, report: &DeviceReport) {
-    if run.devices.len() > 1 {
-        page.named("DEVICE", report.name.clone());
-    }
-    let resyncs = &report.resyncs;
-    page.named("resyncs", resyncs.jump_before_n.count.to_string());
-    if resyncs.jump_before_n.count > 0 {
-        let of = |p: Percentiles<f64>, show: fn(f64) -> String| {
-            format!("p50 {:>9}   p99 {:>9}   max {:>9}", show(p.p50), show(p.p99), show(p.max))
-        };
-        page.named("  jump", format!("before blending  {}", of(resyncs.jump_before_n, force)));
-        page.named("", format!("after blending   {}", of(resyncs.jump_after_n, force)));
-        page.named("  age", format!("on arrival       {}", of(resyncs.age_ns.map(|ns| ns as f64 / 1e9), seconds)));
-        page.named("", format!("at each tick     {}", of(report.force.model_age_s, seconds)));
-    }
-    let shares: Vec<String> =
-        report.force.shares().map(|(model, share)| format!("{} {:.2} %", model.name(), 100.0 * share)).collect();
-    if !shares.is_empty() {
-        page.named("served by", shares.join(", "));
-    }
-    let contact = report.contact;
-    page.named(
-        "contact",
-        format!(
-            "free {}, stick {}, slip {}, lost {} (haptic ticks)",
-            contact.free, contact.stick, contact.slip, contact.lost
-        ),
-    );
-    let not_finite = match report.force.not_finite {
-        0 => String::new(),
-        count => format!(", {count} not finite"),
-    };
-    page.named(
-        "force",
-        format!("peak {}, commanded {}{not_finite}", force(report.force.peak_n), force(report.force.peak_commanded_n)),
-    );
-    if report.limits.ticks > 0 {
-        let energy = report.limits.energy;
-        let [least, last, tank] = [energy.least_j, energy.last_j, energy.least_tank_j].map(|j| 1e3 * j);
-        page.named("energy", format!("ledger least {least:.3} mJ, end {last:.3} mJ; tank least {tank:.3} mJ"));
-    }
-    if report.limits.limited > 0 {
-        let stages = report.limits.stages.iter().map(|(name, count)| format!("{name} {count}"));
-        let share = 100.0 * report.limits.share();
-        page.wrapped("limits", &format!("{} ({share:.2} % of ticks)", stages.collect::<Vec<_>>().join(", ")));
-    }
-}
-
-/// Adds the first events, and what is wrong with the log.
-pub fn events(page: &mut Page, report: &RunReport) {
-    for (i, event) in report.events.iter().take(EVENTS_SHOWN).enumerate() {
-        let name = if i == 0 { "events" } else { "" };
-        page.named(name, format!("{:.3} s {}: {}", event.time.as_secs_f64(), event.level.name(), event.message));
-    }
-    let hidden = report.event_count.saturating_sub(EVENTS_SHOWN as u64);
-    if hidden > 0 {
-        page.named("", format!("and {hidden} more"));
-    }
-    if let Some(damage) = &report.damage {
-        page.named("damage", damage.clone());
-    }
 }
 
 fn causes(counts: SlipCounts) -> String {
@@ -233,7 +242,7 @@ mod tests {
 
     #[test]
     fn even_a_busy_report_fits_eighty_columns_and_its_head_says_what_matters() {
-        let text = to_text(&busy_report());
+        let text = busy_report().to_string();
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
         assert!(text.starts_with("LATE: 85899345900 periods skipped and 20 deadlines missed"), "{text}");
         assert!(text.contains("haptic skipped: late wake 4294967295, long tick 4294967295"), "{text}");
@@ -252,7 +261,7 @@ mod tests {
             analysis.push(&LogRecord::Tick(TickTiming { group, ..TickTiming::default() }));
         }
         analysis.push(&LogRecord::Resync(Resync::default()));
-        let text = to_text(&analysis.report());
+        let text = analysis.report().to_string();
         assert!(text.lines().count() <= 40, "{text}");
         assert!(text.contains("declared, not measured"), "{text}");
     }
@@ -266,7 +275,7 @@ mod tests {
             granted: [("local".to_owned(), refusal.to_owned())].into(),
             ..Environment::default()
         });
-        let text = to_text(&analysis.report());
+        let text = analysis.report().to_string();
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
         let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>().join(" ");
         assert!(words(&text).contains(refusal), "{text}");

@@ -31,47 +31,49 @@ impl RunVerdict {
     }
 }
 
-/// The verdict on a run and the reason in words.
-pub fn verdict(report: &RunReport) -> (RunVerdict, String) {
-    let time = match (report.is_virtual(), &report.environment) {
-        (true, _) => "virtual time",
-        (false, Some(_)) => "real time",
-        (false, None) => "run time",
-    };
-    let ran = format!("{:.3} s of {time}", report.duration.as_secs_f64());
-    let (skipped, missed, lost) = (report.skipped(), report.missed(), report.lost_records());
-    if report.worst_event == Some(Level::Error) {
-        let errors = || report.events.iter().filter(|event| event.level == Level::Error);
-        let first = errors().find(|event| restart_after(report, event).is_none());
-        if first.is_none()
-            && let Some(restart) = errors().next_back().and_then(|event| restart_after(report, event))
-        {
-            let (skipped, missed) = (plural(skipped, "period", "periods"), plural(missed, "deadline", "deadlines"));
-            let restart = &restart.message;
-            return (RunVerdict::Restarted, format!("{restart}; {skipped} skipped and {missed} missed in {ran}"));
+impl RunReport {
+    /// The verdict on a run and the reason in words.
+    pub fn verdict(&self) -> (RunVerdict, String) {
+        let time = match (self.is_virtual(), &self.environment) {
+            (true, _) => "virtual time",
+            (false, Some(_)) => "real time",
+            (false, None) => "run time",
+        };
+        let ran = format!("{:.3} s of {time}", self.duration.as_secs_f64());
+        let (skipped, missed, lost) = (self.skipped(), self.missed(), self.lost_records());
+        if self.worst_event == Some(Level::Error) {
+            let errors = || self.events.iter().filter(|event| event.level == Level::Error);
+            let first = errors().find(|event| restart_after(self, event).is_none());
+            if first.is_none()
+                && let Some(restart) = errors().next_back().and_then(|event| restart_after(self, event))
+            {
+                let (skipped, missed) = (plural(skipped, "period", "periods"), plural(missed, "deadline", "deadlines"));
+                let restart = &restart.message;
+                return (RunVerdict::Restarted, format!("{restart}; {skipped} skipped and {missed} missed in {ran}"));
+            }
+            let reason = first.map_or("an actor failed".to_owned(), |event| event.message.clone());
+            return (RunVerdict::Failed, format!("{reason}, in {ran}"));
         }
-        let reason = first.map_or("an actor failed".to_owned(), |event| event.message.clone());
-        return (RunVerdict::Failed, format!("{reason}, in {ran}"));
+        if skipped > 0 || missed > 0 {
+            let skipped = plural(skipped, "period", "periods");
+            let missed = plural(missed, "deadline", "deadlines");
+            return (RunVerdict::Late, format!("{skipped} skipped and {missed} missed in {ran}"));
+        }
+        if lost > 0 {
+            return (RunVerdict::Incomplete, format!("{} lost in {ran}", plural(lost, "record", "records")));
+        }
+        if self.damage.is_some() {
+            return (RunVerdict::Incomplete, format!("the log is damaged after {ran}"));
+        }
+        if self.groups.iter().all(|group| group.released == 0) {
+            return (RunVerdict::Incomplete, "the log holds no ticks".to_owned());
+        }
+        if self.groups.iter().all(|group| group.execution.count == 0) {
+            let released: u64 = self.groups.iter().map(|group| group.released).sum();
+            return (RunVerdict::Ok, format!("the lateness of {released} wake-ups, and nothing else, is known"));
+        }
+        (RunVerdict::Ok, format!("{ran}, every period kept, every deadline met"))
     }
-    if skipped > 0 || missed > 0 {
-        let skipped = plural(skipped, "period", "periods");
-        let missed = plural(missed, "deadline", "deadlines");
-        return (RunVerdict::Late, format!("{skipped} skipped and {missed} missed in {ran}"));
-    }
-    if lost > 0 {
-        return (RunVerdict::Incomplete, format!("{} lost in {ran}", plural(lost, "record", "records")));
-    }
-    if report.damage.is_some() {
-        return (RunVerdict::Incomplete, format!("the log is damaged after {ran}"));
-    }
-    if report.groups.iter().all(|group| group.released == 0) {
-        return (RunVerdict::Incomplete, "the log holds no ticks".to_owned());
-    }
-    if report.groups.iter().all(|group| group.execution.count == 0) {
-        let released: u64 = report.groups.iter().map(|group| group.released).sum();
-        return (RunVerdict::Ok, format!("the lateness of {released} wake-ups, and nothing else, is known"));
-    }
-    (RunVerdict::Ok, format!("{ran}, every period kept, every deadline met"))
 }
 
 /// The restart that answered a fault: the first of the same group at its time or later.
@@ -107,16 +109,16 @@ mod tests {
     #[test]
     fn the_gravest_finding_decides() {
         let good = (RunVerdict::Ok, "1.500 s of virtual time, every period kept, every deadline met".to_owned());
-        assert_eq!(verdict(&report(0)), good);
-        let late = verdict(&report(3));
+        assert_eq!(report(0).verdict(), good);
+        let late = report(3).verdict();
         assert_eq!(
             late,
             (RunVerdict::Late, "3 periods skipped and 0 deadlines missed in 1.500 s of virtual time".into())
         );
         let cut = RunReport { damage: Some("cut".into()), ..report(0) };
-        assert_eq!(verdict(&cut).0, RunVerdict::Incomplete);
+        assert_eq!(cut.verdict().0, RunVerdict::Incomplete);
         let both = RunReport { worst_event: Some(Level::Error), ..report(3) };
-        assert_eq!(verdict(&both).0, RunVerdict::Failed);
+        assert_eq!(both.verdict().0, RunVerdict::Failed);
     }
 
     #[test]
@@ -125,12 +127,12 @@ mod tests {
         let restarted = event(6, Level::Warning, "global: restarted after a fault, restart 1");
         let with = |events: Vec<TextEvent>| RunReport { worst_event: Some(Level::Error), events, ..report(3) };
         let panicked = |s, group: &str| event(s, Level::Error, &format!("{group}: actor 0 panicked"));
-        let (found, why) = verdict(&with(vec![panicked(5, "global"), restarted.clone()]));
+        let (found, why) = with(vec![panicked(5, "global"), restarted.clone()]).verdict();
         assert_eq!(found, RunVerdict::Restarted);
         assert!(why.starts_with("global: restarted after a fault, restart 1; 3 periods skipped"), "{why}");
         // Check that neither another group's restart nor an earlier one answers a fault
         for fault in [panicked(5, "local"), panicked(7, "global")] {
-            assert_eq!(verdict(&with(vec![fault, restarted.clone()])).0, RunVerdict::Failed);
+            assert_eq!(with(vec![fault, restarted.clone()]).verdict().0, RunVerdict::Failed);
         }
     }
 }

@@ -54,7 +54,7 @@ pub struct Design {
 ///
 /// # Real-time
 /// Wait-free, real-time safe.
-pub fn sampled_wall(damping: f64, virtual_damping: f64, period_s: f64, delay_s: f64) -> f64 {
+pub(crate) fn sampled_wall(damping: f64, virtual_damping: f64, period_s: f64, delay_s: f64) -> f64 {
     ((damping - virtual_damping.abs()) / (0.5 * period_s + delay_s)).max(0.0)
 }
 

@@ -58,17 +58,17 @@ pub struct Limits {
     /// Period of the local group (s).
     pub tick_s: f64,
     /// Limits of the stage that lets the force of a fast tool fade.
-    pub tool_speed: Option<ToolSpeed>,
+    pub(crate) tool_speed: Option<ToolSpeed>,
     /// Limits of the tank that pays for steps of model swaps.
-    pub tank: Option<Tank>,
+    pub(crate) tank: Option<Tank>,
     /// Limits of the passivity controller.
     pub passivity: Option<Passivity>,
     /// Limits of the stage that lets the force of an old model fade.
-    pub model_age: Option<ModelAge>,
+    pub(crate) model_age: Option<ModelAge>,
     /// Limits of the start-up.
-    pub start_up: Option<StartUp>,
+    pub(crate) start_up: Option<StartUp>,
     /// Limits of the watchdog over a silent device.
-    pub watchdog: Option<Watchdog>,
+    pub(crate) watchdog: Option<Watchdog>,
 }
 
 impl Limits {

@@ -12,18 +12,18 @@ mod passivity;
 mod pipeline;
 mod start_up;
 mod tank;
+#[cfg(test)]
+mod tests;
 mod tool_speed;
 mod watchdog;
 
 pub use actions::Actions;
-pub use coupling::sampled_wall;
-pub use force::Force;
 pub use limits::{DeviceLimits, Limits};
-pub use model_age::ModelAge;
+pub(crate) use model_age::ModelAge;
 pub(crate) use passivity::FASTEST_HAND_M_S;
 pub use passivity::Passivity;
 pub use pipeline::{Input, Output, Pipeline, Request};
-pub use start_up::StartUp;
-pub use tank::Tank;
-pub use tool_speed::ToolSpeed;
-pub use watchdog::Watchdog;
+pub(crate) use start_up::StartUp;
+pub(crate) use tank::Tank;
+pub(crate) use tool_speed::ToolSpeed;
+pub(crate) use watchdog::Watchdog;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::model::local::{BlendKind, Feedback, Kind, Prediction};
-use crate::model::surroundings::{LEAST_PCT, Size};
+use crate::model::surroundings::Size;
 
 /// The global model of a scene: the slow, detailed simulation.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
@@ -90,7 +90,7 @@ impl LocalSpec {
     pub(crate) fn name_chosen(&mut self, kind: Kind) {
         self.model = kind.into();
         if kind == Kind::Predictive {
-            self.error_pct = self.error_pct.map(|error_pct| error_pct.max(LEAST_PCT));
+            self.error_pct = self.error_pct.map(|error_pct| error_pct.max(Size::LEAST_PCT));
         }
     }
 
@@ -99,7 +99,7 @@ impl LocalSpec {
         match (self.basis, self.error_pct) {
             (Some(states), _) => Size::States(states),
             // `auto` may choose a model that does not meet less, and says so.
-            (None, Some(error_pct)) => Size::ErrorPct(error_pct.max(LEAST_PCT)),
+            (None, Some(error_pct)) => Size::ErrorPct(error_pct.max(Size::LEAST_PCT)),
             (None, None) => Size::States(50),
         }
     }

@@ -2,22 +2,28 @@
 //!
 //! | module | what it does |
 //! | --- | --- |
-//! | [`timing`] | says who was late in a log, why, and what it did to the force: text, JSON, a page |
+//! | `timing` | says who was late in a log, why, and what it did to the force: text, JSON, a page |
 //! | [`compare`] | runs every local model on a scene and measures error and cost against `full` |
-//! | [`reduce`] | reduces a body's model and says where a local model may be trusted |
-//! | [`reduction`] | the numerics of that: balanced truncation, Krylov spaces, condensation |
-//! | [`export`] | writes topics of a log as CSV, percentile files and Chrome traces; its rows for other formats |
-//! | [`log_file`] | looks into a log file, checks it, and saves what is readable of a damaged one |
+//! | `reduce` | reduces a body's model and says where a local model may be trusted |
+//! | `reduction` | the numerics of that: balanced truncation, Krylov spaces, condensation |
+//! | `export` | writes topics of a log as CSV, percentile files and Chrome traces; its rows for other formats |
+//! | `log_file` | looks into a log file, checks it, and saves what is readable of a damaged one |
 //! | [`drawing`] | charts as SVG, pages as HTML |
+//!
+//! It is no library for programs: public is what the repository's own benches and pictures and the program `palpate-parquet` need.
 
 mod commands;
 pub mod compare;
 pub mod drawing;
-pub mod export;
-pub mod log_file;
-pub mod reduce;
-pub mod reduction;
-pub mod timing;
+mod export;
+mod log_file;
+mod reduce;
+mod reduction;
+#[cfg(test)]
+mod tests;
+mod timing;
 mod units;
 
 pub use commands::{Output, WindowArgs, main};
+pub use export::{Cell, ColumnType, TableWriter, export_rows};
+pub use reduce::reduction_costs;

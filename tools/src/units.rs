@@ -1,8 +1,28 @@
 //! Numbers for people, as in a run's report, and those that only analyses show.
 
-pub(crate) use palpate::report::units::{duration, force, plural, seconds};
+use palpate::report::Quantity;
 
 use crate::timing::{FigureValue, Unit};
+
+/// A duration in nanoseconds.
+pub(crate) fn duration(ns: u64) -> String {
+    Quantity::Nanoseconds(ns).to_string()
+}
+
+/// A duration in seconds.
+pub(crate) fn seconds(s: f64) -> String {
+    Quantity::Seconds(s).to_string()
+}
+
+/// A force in newtons.
+pub(crate) fn force(n: f64) -> String {
+    Quantity::Newtons(n).to_string()
+}
+
+/// `count` things in words: `1 period`, `3 periods`.
+pub(crate) fn plural(count: u64, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
 
 /// A share, 0 to 1, in percent.
 pub(crate) fn share(share: f64) -> String {

@@ -5,13 +5,13 @@
 mod session_support;
 
 use std::path::Path;
+use std::process::Command;
 
 use palpate::devices::{Scripted, ToolPath};
 use palpate::log::{Environment, LogEntry, LogReader};
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::scene::{ModelChoice, Scene};
 use palpate::session::{Session, SessionBuilder, Summary};
-use palpate_cli::timing::to_json;
 
 use session_support::*;
 
@@ -44,14 +44,17 @@ fn as_run(log: &Path) -> Scene {
 
 #[test]
 fn a_budget_takes_the_patch_that_keeps_it_and_says_which() {
-    let summary = run(session("error_pct = 0.4\n"));
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("run.mcap");
+    let summary = run(session("error_pct = 0.4\n").log(&log));
     let reason = environment(&summary).model_reason.as_ref().unwrap();
     let words = [
         "error_pct = 0.4 takes patch 5 x 5 x 2 (0.40 % expected with 104 states at node [3, 3, 5])",
         "; error_pct = 0.4 takes 104 states at the start",
     ];
     assert!(words.iter().all(|words| reason.why.contains(words)) && reason.warning.is_none(), "{reason:?}");
-    let json = to_json(&summary.report);
+    let timing = Command::new(env!("CARGO_BIN_EXE_palpate")).arg("timing").arg(&log).arg("--json").output().unwrap();
+    let json = String::from_utf8(timing.stdout).unwrap();
     assert!(json.contains(words[0]), "{json}");
     let report = summary.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(report.contains("takes patch 5 x 5 x 2"), "{report}");

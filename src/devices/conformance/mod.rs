@@ -1,9 +1,10 @@
 //! What every device must keep to, as checks that a program runs against its own from one test.
 //!
 //! ```
-//! use palpate::devices::{Scripted, ToolPath, conformance};
+//! use palpate::devices::conformance::Conformance;
+//! use palpate::devices::{Scripted, ToolPath};
 //!
-//! let report = conformance::check(|| Scripted::new(ToolPath::constant([0.0, 0.0, 0.1]).expect("finite")));
+//! let report = Conformance::check(|| Scripted::new(ToolPath::constant([0.0, 0.0, 0.1]).expect("finite")));
 //! assert!(report.passed(), "{report}");
 //! ```
 //!
@@ -50,6 +51,22 @@ pub struct Conformance {
 }
 
 impl Conformance {
+    /// Runs every check against devices from `make`.
+    ///
+    /// # Real-time
+    /// Not called in a tick.
+    pub fn check<D: Device>(make: impl FnMut() -> D) -> Self {
+        run(make, None::<fn(&mut D)>)
+    }
+
+    /// Runs every check of [`check`](Self::check), and one more: what the device does when it is cut off.
+    ///
+    /// # Real-time
+    /// Not called in a tick.
+    pub fn check_disconnecting<D: Device>(make: impl FnMut() -> D, disconnect: impl FnMut(&mut D)) -> Self {
+        run(make, Some(disconnect))
+    }
+
     /// True if no check failed.
     ///
     /// # Real-time
@@ -89,22 +106,6 @@ impl fmt::Display for Conformance {
         }
         Ok(())
     }
-}
-
-/// Runs every check against devices from `make`.
-///
-/// # Real-time
-/// Not called in a tick.
-pub fn check<D: Device>(make: impl FnMut() -> D) -> Conformance {
-    run(make, None::<fn(&mut D)>)
-}
-
-/// Runs every check of [`check`], and one more: what the device does when it is cut off.
-///
-/// # Real-time
-/// Not called in a tick.
-pub fn check_disconnecting<D: Device>(make: impl FnMut() -> D, disconnect: impl FnMut(&mut D)) -> Conformance {
-    run(make, Some(disconnect))
 }
 
 fn run<D: Device>(mut make: impl FnMut() -> D, mut disconnect: Option<impl FnMut(&mut D)>) -> Conformance {

@@ -5,9 +5,6 @@ use std::io::Read;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use ruzstd::decoding::StreamingDecoder;
 
-/// The size of the largest record or unpacked chunk that is read (bytes).
-pub const MAX_RECORD_BYTES: u64 = 1 << 26;
-
 /// Bytes of the fixed part of a chunk's header before the name of its compression.
 const NAME_LENGTH_AT: usize = 28;
 
@@ -46,6 +43,9 @@ pub struct ChunkHead {
 }
 
 impl ChunkHead {
+    /// The size of the largest record or unpacked chunk that is read (bytes).
+    pub const MAX_RECORD_BYTES: u64 = 1 << 26;
+
     /// Reads the header in a record of `length` bytes that begins with `body`; an empty one if the file ends in it.
     ///
     /// # Errors
@@ -72,7 +72,7 @@ impl ChunkHead {
         match header() {
             None if cut => Ok(Self { is_cut: true, ..Self::default() }),
             None => Err("its header is too short".into()),
-            Some((head, _, _)) if head.unpacked > MAX_RECORD_BYTES => {
+            Some((head, _, _)) if head.unpacked > ChunkHead::MAX_RECORD_BYTES => {
                 Err(format!("it claims {} unpacked bytes", head.unpacked))
             }
             Some((_, packed, header)) if header.checked_add(packed) != Some(length) => {
@@ -106,7 +106,7 @@ impl ChunkRecords {
         let mut options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
-            .with_record_length_limit(MAX_RECORD_BYTES as usize);
+            .with_record_length_limit(ChunkHead::MAX_RECORD_BYTES as usize);
         // Nothing of a chunk is given out before its checksum fits; a cut one cannot be checked.
         options.prevalidate_chunk_crcs = !cut;
         let mut bytes = vec![mcap::records::op::CHUNK];

@@ -1,7 +1,7 @@
 //! The record structure of an MCAP file, read to the first damage.
 //!
 //! A file may end at any byte or hold wrong bytes: whatever is read before the damage is good, memory stays bounded by
-//! [`MAX_RECORD_BYTES`], and [`RecordStream::damage`] says where and what. Chunks are checked against their checksum
+//! [`ChunkHead::MAX_RECORD_BYTES`], and [`RecordStream::damage`] says where and what. Chunks are checked against their checksum
 //! before anything of them is given out, except the last one of a cut file, which ends before its records do. What is
 //! beside the chunks (metadata, attachments, the frame itself) has no checksum of its own that is checked before: the one
 //! of the whole data section follows it, the one of the index ends the file, and a wrong bit anywhere is damage.
@@ -12,14 +12,14 @@ use std::path::Path;
 use crc32fast::Hasher;
 use mcap::records::op;
 
-use super::chunk::{ChunkHead, ChunkRecords, MAX_RECORD_BYTES};
+use super::chunk::{ChunkHead, ChunkRecords};
 use crate::error::{Error, ErrorKind};
 use crate::printable;
 
 /// Bytes that a file may unpack to for each of its own, all chunks so far together; beyond [`UNPACKED_ANYHOW`].
 const MOST_UNPACKED_PER_BYTE: u64 = 1000;
 /// Bytes that any file may unpack to: two of the largest chunks.
-const UNPACKED_ANYHOW: u64 = 2 * MAX_RECORD_BYTES;
+const UNPACKED_ANYHOW: u64 = 2 * ChunkHead::MAX_RECORD_BYTES;
 
 /// The records of a file one after the other, those inside chunks included.
 #[derive(Debug)]
@@ -209,7 +209,7 @@ impl<R: Read> RecordStream<R> {
             | op::CHUNK_INDEX
             | op::METADATA_INDEX
             | op::ATTACHMENT_INDEX => {
-                if length > MAX_RECORD_BYTES {
+                if length > ChunkHead::MAX_RECORD_BYTES {
                     return Err(format!("the record at byte {start} is damaged: it claims {length} bytes"));
                 }
                 self.read_body(length)?;
@@ -254,7 +254,7 @@ impl<R: Read> RecordStream<R> {
     /// Reads the rest of the record that ends the data, with the checksum of all bytes before it.
     fn end_data(&mut self, start: u64, length: u64) -> Result<(), String> {
         let computed = std::mem::take(&mut self.checksum).finalize();
-        self.read_body(length.min(MAX_RECORD_BYTES))?;
+        self.read_body(length.min(ChunkHead::MAX_RECORD_BYTES))?;
         let Ok(stored) = <[u8; 4]>::try_from(self.record.as_slice()) else {
             return Err(format!("the end of the data is damaged at byte {start}"));
         };
@@ -270,7 +270,7 @@ impl<R: Read> RecordStream<R> {
     /// Reads the rest of the footer: the index with its checksum is whole and the file ends as it should.
     fn end_index(&mut self, start: u64, length: u64) -> Result<(), String> {
         self.ended = true;
-        self.read_body(length.saturating_add(mcap::MAGIC.len() as u64).min(MAX_RECORD_BYTES))?;
+        self.read_body(length.saturating_add(mcap::MAGIC.len() as u64).min(ChunkHead::MAX_RECORD_BYTES))?;
         let whole = length == 20 && self.record.len() == 28 && self.record.ends_with(mcap::MAGIC);
         let mut fits = || {
             let (offsets, rest) = self.record.split_at(16);

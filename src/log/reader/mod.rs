@@ -11,7 +11,7 @@ use std::path::Path;
 
 use mcap::records::{Record, op};
 
-pub use self::chunk::{ChunkHead, ChunkRecords, MAX_RECORD_BYTES};
+pub use self::chunk::{ChunkHead, ChunkRecords};
 use self::foreign::ForeignChannel;
 pub use self::framing::{RecordStream, Section};
 use super::entry::LogEntry;

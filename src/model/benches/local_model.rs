@@ -126,7 +126,7 @@ fn whole_body(c: &mut Criterion) {
     c.bench_function("12^3 body: largest eigenvalues and substeps", |b| {
         b.iter_batched(
             || builder.clone().build().expect("a valid block"),
-            |mut body| palpate_model::simulation::stable_substeps(&mut body, 1e-3),
+            |mut body| palpate_model::simulation::Stepping::stable_substeps(&mut body, 1e-3),
             BatchSize::LargeInput,
         );
     });

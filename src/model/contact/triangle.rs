@@ -2,7 +2,7 @@
 
 use super::Normals;
 use crate::Vec3;
-use crate::mesh::{NONE, Surface};
+use crate::mesh::Surface;
 
 /// Twice the area below which corners are no triangle (m^2).
 const SLIVER: f64 = 1e-14;
@@ -79,7 +79,7 @@ fn unit(vector: Vec3) -> Vec3 {
 /// Walks from triangle `from` across the edge of the most negative weight to the triangle under `point`, projecting
 /// along face normals. A walk that returns (a valley or a ridge) or meets the surface's rim is clamped to the edge.
 pub(super) fn walk(surface: &Surface, x: &[Vec3], from: u32, point: &Vec3) -> (u32, [f64; 3]) {
-    let (mut t, mut previous) = (from, NONE);
+    let (mut t, mut previous) = (from, Surface::NONE);
     let mut weights = [1.0 / 3.0; 3];
     for hop in 0..=MAX_HOPS {
         let corners = surface.triangles[t as usize].map(|node| x[node as usize]);
@@ -90,7 +90,7 @@ pub(super) fn walk(surface: &Surface, x: &[Vec3], from: u32, point: &Vec3) -> (u
             return (t, weights);
         }
         let next = surface.neighbours[t as usize][lowest];
-        if next == NONE || next == previous || hop == MAX_HOPS {
+        if next == Surface::NONE || next == previous || hop == MAX_HOPS {
             break;
         }
         (previous, t) = (t, next);

@@ -12,14 +12,6 @@ const AT_REST: f64 = 1e-3;
 /// Places on that way that are looked at, besides the present one.
 const LOOKS: u32 = 3;
 
-/// The size of a window that is a cell wider on every side than one of `size`.
-///
-/// # Real-time
-/// Wait-free, real-time safe.
-pub fn wider(size: [usize; 3]) -> [usize; 3] {
-    [size[0] + 2, size[1] + 2, size[2]]
-}
-
 /// Finds the surface triangles under the tool, now and where it is going.
 #[derive(Clone, Debug)]
 pub struct Aim {
@@ -27,6 +19,14 @@ pub struct Aim {
 }
 
 impl Aim {
+    /// The size of a window that is a cell wider on every side than one of `size`.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn wider(size: [usize; 3]) -> [usize; 3] {
+        [size[0] + 2, size[1] + 2, size[2]]
+    }
+
     /// A search over `surface` with nodes at `positions` (m).
     ///
     /// # Errors

@@ -25,6 +25,10 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// A linear patch whose stability asks for more takes one implicit step per tick: that costs as much as two explicit ones,
+    /// and damps what four still show.
+    pub const MOST_EXPLICIT_STEPS: u32 = 4;
+
     /// Every model, in order of cost.
     pub const ALL: [Self; 8] = [
         Self::Hold,

@@ -18,13 +18,12 @@ use crate::contact::{Contact, ToolMotion};
 use crate::simulation::Simulation;
 use crate::surroundings::Bases;
 
-pub use aim::{Aim, wider};
+pub use aim::Aim;
 pub use feedback::{Feedback, PatchGeometry};
 pub use forecast::{ToolForecast, ToolHistory};
 pub use full::Full;
 pub use hold::Hold;
 pub use kind::Kind;
-pub use linear::MOST_EXPLICIT_STEPS;
 pub use predictive::Prediction;
 pub use succession::{Blend, BlendKind, Jump, Resynced, Served, Succession};
 pub use template::Template;

@@ -5,7 +5,7 @@ use super::{PatchGeometry, ResyncView, Watched};
 use crate::Vec3;
 use crate::body::{Body, State};
 use crate::contact::{Contact, Deformable, Law, ToolMotion, step};
-use crate::mesh::{NONE, Surface};
+use crate::mesh::Surface;
 use crate::simulation::Stepping;
 use crate::surroundings::SpringGraph;
 
@@ -118,7 +118,7 @@ pub(super) struct Window {
     pub candidates: Vec<u32>,
     /// By local node: true for those that give way in the body, but not here.
     beyond: Vec<bool>,
-    /// Local place of each global node and triangle, or [`NONE`]; as long as the body, only touched entries change.
+    /// Local place of each global node and triangle, or [`Surface::NONE`]; as long as the body, only touched entries change.
     local_node: Vec<u32>,
     local_triangle: Vec<u32>,
     /// Of the patch: the ring, and held nodes.
@@ -137,8 +137,8 @@ impl Window {
     ) {
         let whole = body.surface();
         self.forget();
-        self.local_node.resize(body.rest().len(), NONE);
-        self.local_triangle.resize(whole.triangles.len(), NONE);
+        self.local_node.resize(body.rest().len(), Surface::NONE);
+        self.local_triangle.resize(whole.triangles.len(), Surface::NONE);
         patch(&mut self.nodes);
         self.movable = self.nodes.len();
         for (place, &node) in self.nodes.iter().enumerate() {
@@ -180,7 +180,7 @@ impl Window {
         self.surface.neighbours.clear();
         for &t in &self.triangles {
             self.surface.triangles.push(whole.triangles[t as usize].map(|node| self.local_node[node as usize]));
-            let local = |t: u32| if t == NONE { NONE } else { self.local_triangle[t as usize] };
+            let local = |t: u32| if t == Surface::NONE { Surface::NONE } else { self.local_triangle[t as usize] };
             self.surface.neighbours.push(whole.neighbours[t as usize].map(local));
         }
         self.surface.index_nodes(self.nodes.len());
@@ -192,7 +192,7 @@ impl Window {
     }
 
     fn add_node(&mut self, node: u32) {
-        if self.local_node[node as usize] == NONE {
+        if self.local_node[node as usize] == Surface::NONE {
             self.local_node[node as usize] = self.nodes.len() as u32;
             self.nodes.push(node);
         }
@@ -214,7 +214,7 @@ impl Window {
     }
 
     fn add_triangle(&mut self, triangle: u32) {
-        if self.local_triangle[triangle as usize] == NONE {
+        if self.local_triangle[triangle as usize] == Surface::NONE {
             self.local_triangle[triangle as usize] = self.triangles.len() as u32;
             self.triangles.push(triangle);
         }
@@ -229,18 +229,18 @@ impl Window {
     }
 
     fn forget(&mut self) {
-        self.nodes.drain(..).for_each(|node| self.local_node[node as usize] = NONE);
-        self.triangles.drain(..).for_each(|t| self.local_triangle[t as usize] = NONE);
+        self.nodes.drain(..).for_each(|node| self.local_node[node as usize] = Surface::NONE);
+        self.triangles.drain(..).for_each(|t| self.local_triangle[t as usize] = Surface::NONE);
     }
 
     /// Local place of a global node.
     pub(super) fn node(&self, global: u32) -> Option<u32> {
-        self.local_node.get(global as usize).copied().filter(|&place| place != NONE)
+        self.local_node.get(global as usize).copied().filter(|&place| place != Surface::NONE)
     }
 
     /// Local place of a global triangle.
     pub(super) fn triangle(&self, global: u32) -> Option<u32> {
-        self.local_triangle.get(global as usize).copied().filter(|&place| place != NONE)
+        self.local_triangle.get(global as usize).copied().filter(|&place| place != Surface::NONE)
     }
 
     /// Place of a global node among the movable ones.

@@ -8,4 +8,4 @@ mod surface;
 pub use lattice::{Face, Lattice};
 pub(crate) use lists::Lists;
 pub(crate) use nearest::NearestTriangle;
-pub use surface::{NONE, Surface};
+pub use surface::Surface;

@@ -5,21 +5,21 @@ use std::collections::HashMap;
 use super::Lists;
 use crate::error::ModelError;
 
-/// No triangle, or no neighbour across an edge.
-pub const NONE: u32 = u32::MAX;
-
 /// Triangles over numbered nodes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Surface {
     /// Node ids of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// For each triangle the neighbour across the edge opposite to its first, second and third node, or [`NONE`].
+    /// For each triangle the neighbour across the edge opposite to its first, second and third node, or [`Surface::NONE`].
     pub neighbours: Vec<[u32; 3]>,
     /// The triangles at each node.
     at_node: Lists,
 }
 
 impl Surface {
+    /// No triangle, or no neighbour across an edge.
+    pub const NONE: u32 = u32::MAX;
+
     /// A surface of `triangles` over `nodes` nodes, with its adjacency.
     ///
     /// # Errors
@@ -29,7 +29,7 @@ impl Surface {
     /// Not real-time safe: allocates.
     pub fn new(nodes: usize, triangles: Vec<[u32; 3]>) -> Result<Self, ModelError> {
         let mut edges: HashMap<(u32, u32), (u32, usize)> = HashMap::with_capacity(triangles.len() * 2);
-        let mut neighbours = vec![[NONE; 3]; triangles.len()];
+        let mut neighbours = vec![[Surface::NONE; 3]; triangles.len()];
         for (t, triangle) in triangles.iter().enumerate() {
             let [a, b, c] = *triangle;
             if triangle.iter().any(|&node| node as usize >= nodes) || a == b || b == c || c == a {
@@ -44,7 +44,7 @@ impl Surface {
                     None => {
                         edges.insert(edge, (t as u32, opposite));
                     }
-                    Some(&(other, across)) if neighbours[other as usize][across] == NONE => {
+                    Some(&(other, across)) if neighbours[other as usize][across] == Surface::NONE => {
                         neighbours[other as usize][across] = t as u32;
                         neighbours[t][opposite] = other;
                     }
@@ -96,7 +96,7 @@ mod tests {
         assert_eq!(surface.triangles.len(), 2 * 2 * (3 * 2 + 3 * 4 + 2 * 4));
         for (t, neighbours) in surface.neighbours.iter().enumerate() {
             for (opposite, &across) in neighbours.iter().enumerate() {
-                assert_ne!(across, NONE);
+                assert_ne!(across, Surface::NONE);
                 assert!(surface.neighbours[across as usize].contains(&(t as u32)));
                 let edge = [surface.triangles[t][(opposite + 1) % 3], surface.triangles[t][(opposite + 2) % 3]];
                 assert!(edge.iter().all(|node| surface.triangles[across as usize].contains(node)));

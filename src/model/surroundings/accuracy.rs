@@ -9,22 +9,23 @@ pub enum Size {
     ErrorPct(f64),
 }
 
+impl Size {
+    /// The least error budget that can be kept (%): closer to the floor the states grow without end.
+    pub const LEAST_PCT: f64 = 0.4;
+
+    /// The largest number of states that is tried for an error budget.
+    pub const MOST_STATES: usize = 150;
+}
+
 impl From<usize> for Size {
     fn from(states: usize) -> Self {
         Self::States(states)
     }
 }
 
-/// The force error that is left however many states there are (%): that of the forecast of the tool and the rest of the body's non-linearity. Measured
-/// one global period late with 100 states: `hand` 0.34, `wave` 0.24, `drag_friction` 0.20, `drag_slip` 0.12.
-pub const FLOOR_PCT: f64 = 0.35;
 /// Force error of a run for an error of the linear force: the share of the force that deviates from the forecast. Measured
 /// with 5 to 100 states, one period late: 0.2 to 0.72, the largest with 5 on `hand`.
 const GAIN: f64 = 0.8;
-/// The least error budget that can be kept (%): closer to the floor the states grow without end.
-pub const LEAST_PCT: f64 = 0.4;
-/// The largest number of states that is tried for an error budget.
-pub const MOST_STATES: usize = 150;
 
 /// The reduction error of the linear contact force of a basis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,13 +36,17 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// The force error that is left however many states there are (%): that of the forecast of the tool and the rest of the body's non-linearity. Measured
+    /// one global period late with 100 states: `hand` 0.34, `wave` 0.24, `drag_friction` 0.20, `drag_slip` 0.12.
+    pub const FLOOR_PCT: f64 = 0.35;
+
     /// The force error of `predictive` that goes with it, one period late (rms over a run, % of the peak): a calibration on the
     /// scenes `hand`, `wave`, `drag_friction` and `drag_slip`, above all that was measured there.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn expected_pct(&self) -> f64 {
-        FLOOR_PCT.hypot(GAIN * self.linear_pct)
+        Self::FLOOR_PCT.hypot(GAIN * self.linear_pct)
     }
 }
 

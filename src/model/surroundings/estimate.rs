@@ -116,7 +116,7 @@ mod tests {
     use nalgebra::{DMatrix, Matrix3};
 
     use super::super::reduced::Damping;
-    use super::super::{Basis, FLOOR_PCT, Size, SpringGraph, errors_by_states};
+    use super::super::{Basis, Estimate, Reduction, Size, SpringGraph};
     use super::FREQUENCIES;
     use crate::Vec3;
     use crate::body::{Block, Body, Spring, SpringNetwork};
@@ -223,7 +223,7 @@ mod tests {
         let mut seed = 7;
         for _ in 0..3 {
             let (graph, patch) = uneven(&mut seed);
-            let estimates = errors_by_states(&graph, &patch).unwrap();
+            let estimates = Reduction::errors_by_states(&graph, &patch).unwrap();
             for states in [3, 10, 25] {
                 let basis = Basis::compute(&graph, &patch, states).unwrap().unwrap();
                 let pressed = super::Near::new(&graph, &patch, &[]).pressed;
@@ -239,7 +239,7 @@ mod tests {
     fn a_smaller_budget_takes_more_states_and_is_kept() {
         let mut seed = 3;
         let (graph, patch) = uneven(&mut seed);
-        let estimates = errors_by_states(&graph, &patch).unwrap();
+        let estimates = Reduction::errors_by_states(&graph, &patch).unwrap();
         assert!(estimates.windows(2).all(|pair| pair[0].1.linear_pct >= pair[1].1.linear_pct * (1.0 - 1e-6)));
         let mut last = 0;
         for budget in [5.0, 2.0, 1.0, 0.5] {
@@ -252,6 +252,6 @@ mod tests {
         }
         // What cannot be kept takes all there are, and says what that comes to.
         let all = Basis::compute(&graph, &patch, Size::ErrorPct(0.1)).unwrap().unwrap();
-        assert!(all.states() >= last && all.estimate().unwrap().expected_pct() >= FLOOR_PCT);
+        assert!(all.states() >= last && all.estimate().unwrap().expected_pct() >= Estimate::FLOOR_PCT);
     }
 }

@@ -13,9 +13,9 @@ mod reduced;
 mod reduction;
 mod stored;
 
-pub use accuracy::{Estimate, FLOOR_PCT, LEAST_PCT, MOST_STATES, Size};
+pub use accuracy::{Estimate, Size};
 pub use basis::{Bases, Basis};
 pub use condense::Condensation;
 pub use graph::SpringGraph;
 pub(crate) use reduced::ReducedMotion;
-pub use reduction::{Reduction, errors_by_states};
+pub use reduction::Reduction;

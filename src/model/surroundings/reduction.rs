@@ -1,6 +1,6 @@
 //! The computation of a basis, in parts that end in time.
 
-use super::accuracy::{Estimate, MOST_STATES, Size, states_within};
+use super::accuracy::{Estimate, Size, states_within};
 use super::basis::{Basis, Forecast};
 use super::estimate::Contacts;
 use super::far::Far;
@@ -141,7 +141,7 @@ impl Reduction {
         let Self { far, ring, patch, size, .. } = self;
         let most = match size {
             Size::States(states) => *states,
-            Size::ErrorPct(_) => MOST_STATES,
+            Size::ErrorPct(_) => Size::MOST_STATES,
         };
         let wide = leading_left_singular_vectors(moments, FORECAST_STATES.max(most));
         match size {
@@ -219,24 +219,26 @@ impl Basis {
     }
 }
 
-/// The estimate for every number of states of the surroundings of `patch` (ids in increasing order), from 1 on, in one pass.
-/// Empty if nothing around the patch can move.
-///
-/// # Errors
-/// If nothing holds the surroundings together.
-///
-/// # Real-time
-/// Not real-time safe: factorises the body several times.
-pub fn errors_by_states(graph: &SpringGraph, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, ModelError> {
-    // No number of states keeps this budget, so that all are looked at.
-    let Some(mut reduction) = Reduction::new(graph, patch, Size::ErrorPct(0.0)) else { return Ok(Vec::new()) };
-    loop {
-        if let Some(errors) = reduction.errors() {
-            let estimate = |(index, &error): (usize, &f64)| (index + 1, Estimate { linear_pct: 100.0 * error });
-            return Ok(errors.iter().enumerate().map(estimate).collect());
-        }
-        if reduction.advance(graph)?.is_some() {
-            return Ok(Vec::new());
+impl Reduction {
+    /// The estimate for every number of states of the surroundings of `patch` (ids in increasing order), from 1 on, in one pass.
+    /// Empty if nothing around the patch can move.
+    ///
+    /// # Errors
+    /// If nothing holds the surroundings together.
+    ///
+    /// # Real-time
+    /// Not real-time safe: factorises the body several times.
+    pub fn errors_by_states(graph: &SpringGraph, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, ModelError> {
+        // No number of states keeps this budget, so that all are looked at.
+        let Some(mut reduction) = Self::new(graph, patch, Size::ErrorPct(0.0)) else { return Ok(Vec::new()) };
+        loop {
+            if let Some(errors) = reduction.errors() {
+                let estimate = |(index, &error): (usize, &f64)| (index + 1, Estimate { linear_pct: 100.0 * error });
+                return Ok(errors.iter().enumerate().map(estimate).collect());
+            }
+            if reduction.advance(graph)?.is_some() {
+                return Ok(Vec::new());
+            }
         }
     }
 }

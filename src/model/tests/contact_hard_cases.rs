@@ -185,7 +185,7 @@ fn a_teleport_of_20_mm_stays_finite_and_the_body_recovers() {
 #[test]
 fn an_indentation_to_half_the_body_stays_finite_and_recovers() {
     let mut body = block(STD);
-    let substeps = palpate_model::simulation::stable_substeps(&mut body, 1e-3);
+    let substeps = palpate_model::simulation::Stepping::stable_substeps(&mut body, 1e-3);
     let state = State::at_rest(body.rest());
     let law = Law { friction: 1.0, ..Law::default() };
     let stepping = Stepping { tick: 1e-3, substeps };
@@ -227,7 +227,7 @@ fn very_stiff_light_damped_and_undamped_bodies_are_stable_with_their_own_substep
         [(0.5e-3, 30.0, 0.001), (0.5e-3, 30.0, 2.0), (0.5e-3, 3000.0, 0.3), (0.5e-4, 30.0, 0.3)]
     {
         let mut body = cube(6, (mass, stiffness, zeta));
-        let substeps = palpate_model::simulation::stable_substeps(&mut body, 1e-3);
+        let substeps = palpate_model::simulation::Stepping::stable_substeps(&mut body, 1e-3);
         let stepping = Stepping { tick: 1e-3, substeps };
         let state = State::at_rest(body.rest());
         let law = Law { friction: 1.0, ..Law::default() };

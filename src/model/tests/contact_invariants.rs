@@ -8,7 +8,7 @@ use palpate_model::body::{Block, Body, State};
 use palpate_model::contact::{Contact, ContactMode, Deformable, Law, ToolMotion, step};
 use palpate_model::equilibrium::static_equilibrium;
 use palpate_model::mesh::{Face, Lattice, Surface};
-use palpate_model::simulation::{Simulation, Stepping, stable_substeps};
+use palpate_model::simulation::{Simulation, Stepping};
 use proptest::prelude::*;
 
 const D: f64 = 0.5e-3;
@@ -170,7 +170,7 @@ fn a_static_pull_balances_the_reactions_of_the_held_nodes() {
 /// had put in before (J).
 fn circle(zeta: f64) -> (f64, f64) {
     let mut body = block((0.5e-3, 30.0, zeta));
-    let stepping = Stepping { tick: 1e-3, substeps: stable_substeps(&mut body, 1e-3) };
+    let stepping = Stepping { tick: 1e-3, substeps: Stepping::stable_substeps(&mut body, 1e-3) };
     let state = State::at_rest(body.rest());
     let mut sim = Simulation::new(Box::new(body), state, Contact::default(), Law::default(), stepping).unwrap();
     let centre = Vec3::new(0.05, 0.0512, 0.0);

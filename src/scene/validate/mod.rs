@@ -16,7 +16,7 @@ use crate::model::contact::Equations;
 use crate::model::local::BlendKind;
 use crate::model::local::{Feedback, Kind};
 use crate::model::mesh::Face;
-use crate::model::surroundings::LEAST_PCT;
+use crate::model::surroundings::Size;
 use crate::runtime::Rate;
 use check::{at_most_ms, inside, lengths_within, movable, not_negative, on_surface, positive};
 
@@ -235,9 +235,10 @@ fn error_budget(local: &LocalSpec) -> Result<(), Error> {
     positive("local.error_pct", error_pct)?;
     // Without a basis there is nothing to size a patch by.
     let sizes = local.basis.is_none() || local.patch.is_none() && local.basis != Some(0);
-    if sizes && local.model.named() == Some(Kind::Predictive) && error_pct < LEAST_PCT {
+    let least = Size::LEAST_PCT;
+    if sizes && local.model.named() == Some(Kind::Predictive) && error_pct < least {
         let message = format!(
-            "is {error_pct}, and \"predictive\" keeps {LEAST_PCT} % at best: use that or more, numbers (local.patch and \
+            "is {error_pct}, and \"predictive\" keeps {least} % at best: use that or more, numbers (local.patch and \
              local.basis), or model = \"full\""
         );
         return Err(Error::scene("local.error_pct", message));

@@ -25,7 +25,7 @@ use super::parts::{Options, Parts};
 use crate::error::Error;
 use crate::model::contact::{Equations, Law};
 use crate::model::local::Blend;
-use crate::model::local::{Feedback, Kind, MOST_EXPLICIT_STEPS, Template};
+use crate::model::local::{Feedback, Kind, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::model::surroundings::Size;
@@ -177,7 +177,9 @@ fn template(kind: Kind, scene: &Scene, start: &Start, timing: Timing) -> Result<
     let is_implicit = match scene.local.step {
         StepKind::Explicit => false,
         StepKind::Implicit => true,
-        StepKind::Auto => scene.contact.equations != Equations::Paper && start.stable_substeps > MOST_EXPLICIT_STEPS,
+        StepKind::Auto => {
+            scene.contact.equations != Equations::Paper && start.stable_substeps > Kind::MOST_EXPLICIT_STEPS
+        }
     };
     // The longer one where periods alternate, 33 and 34 ticks at 30 Hz.
     let ticks = (timing.haptic.as_hz() / timing.global.as_hz() - 1e-6).ceil().min(f64::from(u32::MAX)) as u32;

@@ -5,7 +5,7 @@ use crate::log::ModelReason;
 use crate::model::body::Body;
 use crate::model::local::Kind;
 use crate::model::mesh::Lattice;
-use crate::model::surroundings::{Estimate, FLOOR_PCT, Size, SpringGraph, errors_by_states};
+use crate::model::surroundings::{Estimate, Reduction, Size, SpringGraph};
 use crate::scene::{Scene, patch_fits};
 
 /// What is tried, in the order of what a tick costs.
@@ -68,7 +68,7 @@ pub(super) fn choose(scene: &Scene, body: &dyn Body, attached: &[Option<u32>]) -
         }
         last.clone_from(&patch);
         // What cannot be reduced is told by the actor, when it is wanted.
-        let Ok(errors) = errors_by_states(&springs, &patch) else { continue };
+        let Ok(errors) = Reduction::errors_by_states(&springs, &patch) else { continue };
         let (states, expected_pct) = expected(&errors, basis);
         if best.as_ref().is_none_or(|best| expected_pct < best.expected_pct) {
             best = Some(PatchChoice { size, states, expected_pct, budget_pct, place: place.clone() });
@@ -89,7 +89,7 @@ fn expected(errors: &[(usize, Estimate)], basis: Size) -> (usize, f64) {
         }
     };
     // Nothing around the patch can move, so nothing is reduced.
-    found.map_or((0, FLOOR_PCT), |(states, estimate)| (*states, estimate.expected_pct()))
+    found.map_or((0, Estimate::FLOOR_PCT), |(states, estimate)| (*states, estimate.expected_pct()))
 }
 
 #[cfg(test)]
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn the_smallest_patch_that_keeps_the_budget_is_taken() {
-        // The figures are those of `errors_by_states`: 101 states keep 0.5 % around 4 x 4 x 2.
+        // The figures are those of `Reduction::errors_by_states`: 101 states keep 0.5 % around 4 x 4 x 2.
         let loose = chosen(&scene(0.5, None));
         assert!((loose.size, loose.states) == ([4, 4, 2], 101) && loose.expected_pct <= 0.5, "{loose:?}");
         // 150 states do not keep 0.4 % there, nor around 4 x 4 x 3.

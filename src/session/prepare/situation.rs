@@ -3,8 +3,8 @@
 use super::budget::{force_evaluation, nominal_evaluation};
 use super::timing::Timing;
 use crate::model::body::{Body, State};
-use crate::model::local::{Kind, MOST_EXPLICIT_STEPS};
-use crate::model::surroundings::{MOST_STATES, Size};
+use crate::model::local::Kind;
+use crate::model::surroundings::Size;
 use crate::runtime::{Execution, Nanos};
 use crate::scene::Scene;
 
@@ -109,7 +109,7 @@ impl Situation {
             error_pct: scene.local.chosen_within_pct(),
             states: match scene.local.basis_size() {
                 Size::States(states) => states,
-                Size::ErrorPct(_) => MOST_STATES,
+                Size::ErrorPct(_) => Size::MOST_STATES,
             },
             devices: scene.devices.len(),
             possible,
@@ -128,7 +128,7 @@ impl Situation {
 
     /// What a haptic tick of one model of `kind` takes (s).
     fn tick_s(&self, kind: Kind) -> f64 {
-        let substeps = if kind.is_linear() { self.substeps.min(MOST_EXPLICIT_STEPS) } else { self.substeps };
+        let substeps = if kind.is_linear() { self.substeps.min(Kind::MOST_EXPLICIT_STEPS) } else { self.substeps };
         match kind {
             Kind::Full => self.full_tick_s(),
             Kind::Predictive => {

@@ -6,8 +6,8 @@ use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::log::ModelReason;
 use crate::model::Vec3;
+use crate::model::local::Aim;
 use crate::model::local::ToolForecast;
-use crate::model::local::{Aim, wider};
 use crate::model::surroundings::{Bases, Size, SpringGraph};
 use crate::runtime::{Actor, ExchangePort, RuntimeBuilder};
 use crate::session::prepare::{Prepared, extended};
@@ -71,7 +71,7 @@ fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, t
     let aim = Aim::new(body.surface(), &state.positions)?;
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
     let size = prepared.plan.template.patch;
-    let sizes: &[[usize; 3]] = if prepared.plan.prefetches { &[size, wider(size)] } else { &[size] };
+    let sizes: &[[usize; 3]] = if prepared.plan.prefetches { &[size, Aim::wider(size)] } else { &[size] };
     for (index, &tool) in tools.iter().enumerate() {
         let contact = prepared.simulation.contact(index);
         aim.triangles(Some(contact), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);

@@ -12,7 +12,8 @@ use palpate::model::body::InstructionSet;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
 use palpate::scene::Scene;
-use palpate_cli::compare::{CompareOptions, Comparison, Measured, ModelCost, RunOutcome, compare};
+use palpate_cli::compare::{CompareOptions, Comparison, Measured};
+use palpate_cli::drawing::Colour;
 pub use repository::in_repository;
 
 /// What the command line asks for.
@@ -68,36 +69,17 @@ fn today() -> String {
 
 /// `compare`, several times: forces are the same, of each cost the least counts.
 pub fn compared(scene: &Scene, options: &CompareOptions, rounds: usize) -> Result<Comparison, Error> {
-    let mut least = compare(scene, options, |_| ())?;
+    let mut least = Comparison::measure(scene, options, |_| ())?;
     for _ in 1..rounds {
-        let again = compare(scene, options, |_| ())?;
-        least.full.cost = lesser(&least.full.cost, &again.full.cost);
-        for (run, other) in least.runs.iter_mut().zip(&again.runs) {
-            if let (RunOutcome::Measured(run), Some(other)) = (&mut run.outcome, other.measured()) {
-                run.cost = lesser(&run.cost, &other.cost);
-            }
-        }
+        least.keep_least(&Comparison::measure(scene, options, |_| ())?);
     }
     Ok(least)
 }
 
-fn lesser(a: &ModelCost, b: &ModelCost) -> ModelCost {
-    ModelCost {
-        tick_p50: a.tick_p50.min(b.tick_p50),
-        tick_p99: a.tick_p99.min(b.tick_p99),
-        tick_max: a.tick_max.min(b.tick_max),
-        haptic_load: a.haptic_load.min(b.haptic_load),
-        global_load: a.global_load.min(b.global_load),
-        builds: a.builds,
-        build_p50: a.build_p50.min(b.build_p50),
-        build_p99: a.build_p99.min(b.build_p99),
-    }
-}
-
 /// The colour of a model in every picture; 0 is that of `full`.
-pub fn colour(model: &str) -> usize {
+pub fn colour(model: &str) -> Colour {
     let place = LocalModelKind::ALL.iter().position(|kind| kind.name() == model && *kind != LocalModelKind::Full);
-    place.map_or(0, |place| place + 1)
+    Colour::numbered(place.map_or(0, |place| place + 1))
 }
 
 /// Microseconds.

@@ -8,7 +8,7 @@ use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::{Nanos, Rate};
 use palpate::scene::Scene;
 use palpate::session::{Session, Summary};
-use palpate_cli::compare::{ForceDeviation, ForceTrace, one_period};
+use palpate_cli::compare::{CompareOptions, ForceDeviation, ForceTrace};
 
 use crate::common::{figure, scene, table, us};
 
@@ -109,7 +109,7 @@ fn of(case: &Case) -> Result<Scene, Error> {
         scene.run.duration_s = 0.6;
     }
     let global = Rate::from_hz(scene.global.rate_hz).expect("a scene has a rate");
-    scene.global.compute_latency_ms = us(one_period(global)) * 1e-3;
+    scene.global.compute_latency_ms = us(CompareOptions::one_period(global)) * 1e-3;
     Ok(scene)
 }
 

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use palpate::Error;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Rate;
-use palpate_cli::compare::{CompareOptions, Comparison, Measured, one_period};
+use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 use palpate_cli::drawing::{Picture, Series};
 
 use crate::Part;
@@ -32,7 +32,7 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
             eprintln!("{name} at {rate} Hz");
             let mut varied = scene(name)?;
             varied.local.rate_hz = rate;
-            let late = one_period(Rate::from_hz(varied.global.rate_hz).expect("a scene has a rate"));
+            let late = CompareOptions::one_period(Rate::from_hz(varied.global.rate_hz).expect("a scene has a rate"));
             let duration_s = Some(if is_quick { 0.2 } else { varied.run.duration_s.min(DURATION_S) });
             let options = CompareOptions { models: MODELS.into(), latencies: vec![late], duration_s };
             measured.push((rate, compared(&varied, &options, rounds)?));

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use palpate::Error;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
-use palpate_cli::compare::{CompareOptions, Comparison, Measured, conclusions};
+use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 use palpate_cli::drawing::{Picture, Series};
 
 use crate::Part;
@@ -39,7 +39,7 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
         let _ = write!(text, "\n### `{0}`\n\n![Speed against error on {0}](img/{name}.svg)\n\n", comparison.scene);
         text.push_str(&rows(comparison));
         text.push('\n');
-        for line in conclusions(comparison) {
+        for line in comparison.conclusions() {
             let _ = writeln!(text, "- {line}");
         }
         pictures.push((name, picture(comparison).to_svg()));

@@ -5,7 +5,7 @@ use palpate::model::local::Kind as LocalModelKind;
 use palpate::model::local::Prediction;
 use palpate::runtime::Rate;
 use palpate::scene::Scene;
-use palpate_cli::compare::{CompareOptions, Comparison, Measured, one_period};
+use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 use palpate_cli::drawing::{Picture, Series};
 
 use crate::Part;
@@ -63,7 +63,7 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
             eprintln!("{name}: {}", variant.name);
             let mut varied = scene(name)?;
             (variant.change)(&mut varied);
-            let late = one_period(Rate::from_hz(varied.global.rate_hz).expect("a scene has a rate"));
+            let late = CompareOptions::one_period(Rate::from_hz(varied.global.rate_hz).expect("a scene has a rate"));
             let linear = variant.is_for_all.then_some(LocalModelKind::Patch);
             let models = [LocalModelKind::Predictive].into_iter().chain(linear).collect();
             let duration_s = Some(if is_quick { 0.2 } else { varied.run.duration_s.min(DURATION_S) });

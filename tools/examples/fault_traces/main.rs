@@ -10,7 +10,7 @@ mod scenarios;
 use std::path::Path;
 
 use palpate::log::LogRecord;
-use palpate_cli::drawing::{BLUE, Curve, ORANGE, Panel, Sheet};
+use palpate_cli::drawing::{Colour, Curve, Panel, Sheet};
 
 use scenarios::{FAULT_S, Fault, RAMP_S, Trace};
 
@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sheet = Sheet {
         title: "The force at the device through each fault".to_owned(),
         subtitle: format!("magnitude of the commanded force; the fault comes at {FAULT_S} s"),
-        legend: vec![("goes to rest".to_owned(), BLUE), ("stays".to_owned(), ORANGE)],
+        legend: vec![("goes to rest".to_owned(), Colour::BLUE), ("stays".to_owned(), Colour::ORANGE)],
         rows,
     };
     let mut folders = vec!["out/fault_traces"];
@@ -109,7 +109,7 @@ fn panel(fault: Fault, trace: &Trace) -> Panel {
         x_label: "time (s)",
         y_label: "force (N)",
         shown: 0.3..end,
-        curves: vec![Curve::new(&times, values, if fault.leaves_the_force() { ORANGE } else { BLUE })],
+        curves: vec![Curve::new(&times, values, if fault.leaves_the_force() { Colour::ORANGE } else { Colour::BLUE })],
         marks: vec![FAULT_S],
         ..Panel::default()
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use palpate::model::Vec3;
 use palpate::model::local::Kind as LocalModelKind;
-use palpate_cli::drawing::{BLUE, Curve, INK, ORANGE, Panel, Sheet};
+use palpate_cli::drawing::{Colour, Curve, Panel, Sheet};
 
 use crate::runs::{ForceRun, ForceRuns};
 
@@ -147,11 +147,11 @@ fn legend(runs: &ForceRuns, run: &ForceRun) -> String {
     }
 }
 
-fn colour(model: LocalModelKind) -> usize {
+fn colour(model: LocalModelKind) -> Colour {
     match model {
-        LocalModelKind::Full => INK,
-        LocalModelKind::Hold => ORANGE,
-        _ => BLUE,
+        LocalModelKind::Full => Colour::INK,
+        LocalModelKind::Hold => Colour::ORANGE,
+        _ => Colour::BLUE,
     }
 }
 

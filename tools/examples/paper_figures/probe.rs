@@ -8,7 +8,7 @@ use std::path::Path;
 use palpate::log::{LogRecord, ProbeSample};
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate_cli::drawing::{BLUE, Curve, GREEN, INK, ORANGE, Panel, Sheet};
+use palpate_cli::drawing::{Colour, Curve, Panel, Sheet};
 
 use crate::delay::Delay;
 use crate::forces::{Difference, peak};
@@ -94,7 +94,13 @@ impl Probe {
         let height = |positions: &[Vec3], colour| {
             Curve::new(&self.times, positions.iter().map(|x| 1e3 * (x.z - REST_HEIGHT_M)), colour)
         };
-        let curves = || vec![height(&self.global, ORANGE), height(&self.local, BLUE), height(&self.full, INK).wide()];
+        let curves = || {
+            vec![
+                height(&self.global, Colour::ORANGE),
+                height(&self.local, Colour::BLUE),
+                height(&self.full, Colour::INK).wide(),
+            ]
+        };
         let whole = 0.0..self.times.last().copied().unwrap_or_default() + 1e-9;
         let panel = |times, caption: &str| Panel {
             caption: caption.to_owned(),
@@ -108,7 +114,7 @@ impl Probe {
             let shifted: Vec<f64> = self.times.iter().map(|time| time - 1e-3 * ticks).collect();
             let moved = self.local.iter().map(|x| 1e3 * (x.z - REST_HEIGHT_M));
             Panel {
-                curves: vec![Curve::new(&shifted, moved, GREEN), height(&self.full, INK).wide()],
+                curves: vec![Curve::new(&shifted, moved, Colour::GREEN), height(&self.full, Colour::INK).wide()],
                 ..panel(whole.clone(), &format!("the local model's node {ticks:.1} ms earlier (green)"))
             }
         };
@@ -123,9 +129,9 @@ impl Probe {
                        Delay: peak of the cross-correlation with full."
                 .to_owned(),
             legend: vec![
-                ("full: the whole body at 1 kHz".to_owned(), INK),
-                (format!("patch: local model ({:.1} ms late)", delays.local.ticks), BLUE),
-                (format!("patch: its 30 Hz global model ({:.1} ms late)", delays.global.ticks), ORANGE),
+                ("full: the whole body at 1 kHz".to_owned(), Colour::INK),
+                (format!("patch: local model ({:.1} ms late)", delays.local.ticks), Colour::BLUE),
+                (format!("patch: its 30 Hz global model ({:.1} ms late)", delays.global.ticks), Colour::ORANGE),
             ],
             rows: vec![
                 vec![Panel { zoomed: Some(CLOSER), ..panel(whole.clone(), "") }],

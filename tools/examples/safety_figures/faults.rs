@@ -4,7 +4,7 @@ use palpate::log::LogRecord;
 use palpate::prelude::*;
 use palpate::scene::Scene;
 use palpate::session::Summary;
-use palpate_cli::drawing::{BLUE, Curve, ORANGE, Panel, Sheet};
+use palpate_cli::drawing::{Colour, Curve, Panel, Sheet};
 
 use crate::repository::in_repository;
 
@@ -39,13 +39,14 @@ pub fn sheet() -> Result<Sheet, Error> {
         LogRecord::Command(command) => Some((command.time, command.force_n)),
         _ => None,
     });
-    let curve = |points: &[(f64, f64)], colour| Curve { points: points.to_vec(), colour, is_wide: colour == ORANGE };
+    let curve =
+        |points: &[(f64, f64)], colour| Curve { points: points.to_vec(), colour, is_wide: colour == Colour::ORANGE };
     let panel = |caption: &str, times, marks| Panel {
         caption: caption.to_owned(),
         x_label: "time (s)",
         y_label: "force (N)",
         shown: times,
-        curves: vec![curve(&computed, ORANGE), curve(&commanded, BLUE)],
+        curves: vec![curve(&computed, Colour::ORANGE), curve(&commanded, Colour::BLUE)],
         marks,
         ..Panel::default()
     };
@@ -58,7 +59,7 @@ pub fn sheet() -> Result<Sheet, Error> {
     Ok(Sheet {
         title: "device_faults: the force through each fault of the device".to_owned(),
         subtitle: "vertical lines: where a fault begins and ends; start-up ramp shortened to 0.1 s".to_owned(),
-        legend: vec![("computed".to_owned(), ORANGE), ("commanded".to_owned(), BLUE)],
+        legend: vec![("computed".to_owned(), Colour::ORANGE), ("commanded".to_owned(), Colour::BLUE)],
         rows,
     })
 }

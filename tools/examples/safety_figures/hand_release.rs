@@ -5,16 +5,16 @@ use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
 use palpate::scene::{SafetySpec, Scene};
 use palpate::session::Summary;
-use palpate_cli::drawing::{BLUE, Curve, GREEN, INK, ORANGE, Panel, RED, Sheet};
+use palpate_cli::drawing::{Colour, Curve, Panel, Sheet};
 
 use crate::repository::in_repository;
 
 /// The models shown, in the order of the legend.
-const MODELS: [(LocalModelKind, usize); 4] = [
-    (LocalModelKind::Full, BLUE),
-    (LocalModelKind::Predictive, GREEN),
-    (LocalModelKind::Patch, ORANGE),
-    (LocalModelKind::Hold, RED),
+const MODELS: [(LocalModelKind, Colour); 4] = [
+    (LocalModelKind::Full, Colour::BLUE),
+    (LocalModelKind::Predictive, Colour::GREEN),
+    (LocalModelKind::Patch, Colour::ORANGE),
+    (LocalModelKind::Hold, Colour::RED),
 ];
 /// The hand lets go (s).
 const RELEASE_S: f64 = 1.0;
@@ -51,7 +51,7 @@ fn reference() -> Vec<(f64, f64)> {
     text.lines().filter_map(point).collect()
 }
 
-fn curve(points: Vec<(f64, f64)>, colour: usize) -> Curve {
+fn curve(points: Vec<(f64, f64)>, colour: Colour) -> Curve {
     Curve { points, colour, ..Curve::default() }
 }
 
@@ -69,7 +69,7 @@ pub fn sheet() -> Result<Sheet, Error> {
     println!("hand_release, hold with the safety defaults, ticks in which a stage acted: {}\n", acted.join(", "));
     // Before it leaves the picture.
     let shown = |points: &[(f64, f64)]| points.iter().copied().take_while(|point| point.1.abs() < 30.0).collect();
-    let reference = || curve(reference(), INK).wide();
+    let reference = || curve(reference(), Colour::INK).wide();
     let mut whole = vec![reference()];
     whole.extend(bare.iter().rev().map(|(_, colour, points)| curve(shown(points), *colour)));
     let mut closer = vec![reference()];
@@ -84,7 +84,7 @@ pub fn sheet() -> Result<Sheet, Error> {
         marks: vec![RELEASE_S],
         ..Panel::default()
     };
-    let mut legend = vec![("reference".to_owned(), INK)];
+    let mut legend = vec![("reference".to_owned(), Colour::INK)];
     legend.extend(MODELS.map(|(model, colour)| (model.name().to_owned(), colour)));
     Ok(Sheet {
         title: "hand_release: a hand presses 9 mm deep and lets go at 1 s".to_owned(),
@@ -97,7 +97,7 @@ pub fn sheet() -> Result<Sheet, Error> {
             vec![panel(
                 "hold with the safety defaults: the passivity controller bounds it",
                 0.0..2.4,
-                vec![curve(height(&guarded), RED)],
+                vec![curve(height(&guarded), Colour::RED)],
             )],
         ],
     })

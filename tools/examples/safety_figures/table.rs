@@ -5,15 +5,15 @@ use std::{fmt, thread};
 
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate_cli::drawing::{BLUE, Curve, GREEN, GREY, INK, ORANGE, Panel, RED, Sheet};
+use palpate_cli::drawing::{Colour, Curve, Panel, Sheet};
 
 use crate::z_width::{STIFFNESS, Sweep, theory};
 
-const MODELS: [(LocalModelKind, usize); 4] = [
-    (LocalModelKind::Hold, RED),
-    (LocalModelKind::Patch, ORANGE),
-    (LocalModelKind::Predictive, GREEN),
-    (LocalModelKind::Full, BLUE),
+const MODELS: [(LocalModelKind, Colour); 4] = [
+    (LocalModelKind::Hold, Colour::RED),
+    (LocalModelKind::Patch, Colour::ORANGE),
+    (LocalModelKind::Predictive, Colour::GREEN),
+    (LocalModelKind::Full, Colour::BLUE),
 ];
 const RATES_HZ: [f64; 3] = [500.0, 1000.0, 4000.0];
 /// Dampings of the wall (N s/m).
@@ -97,8 +97,8 @@ impl Table {
                 points(&within, &fine)
             };
             let mut curves = vec![
-                Curve { points: passive(0.0), colour: INK, is_wide: true },
-                Curve { points: passive(0.5), colour: GREY, is_wide: true },
+                Curve { points: passive(0.0), colour: Colour::INK, is_wide: true },
+                Curve { points: passive(0.5), colour: Colour::GREY, is_wide: true },
             ];
             curves.extend(MODELS.map(|(model, colour)| Curve {
                 points: points(&|damping| self.border(model, rate_hz, damping), &self.dampings),
@@ -115,7 +115,7 @@ impl Table {
                 ..Panel::default()
             }
         };
-        let mut legend = vec![("b > K T/2 + |B|".to_owned(), INK), ("b > K T + |B|".to_owned(), GREY)];
+        let mut legend = vec![("b > K T/2 + |B|".to_owned(), Colour::INK), ("b > K T + |B|".to_owned(), Colour::GREY)];
         legend.extend(MODELS.map(|(model, colour)| (model.name().to_owned(), colour)));
         Sheet {
             title: "z_width: the stiffest wall without a sustained limit cycle".to_owned(),

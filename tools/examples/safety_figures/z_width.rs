@@ -102,5 +102,5 @@ impl Sweep {
 /// The stiffness (N/m) up to which a sampled wall is passive: b > K (T / 2 + t_d) + |B|, b the damping of the device (N s/m) and
 /// t_d a delay in ticks.
 pub fn theory(device_damping: f64, rate_hz: f64, damping: f64, delay_ticks: f64) -> f64 {
-    palpate::safety::sampled_wall(device_damping, damping, 1.0 / rate_hz, delay_ticks / rate_hz)
+    (rate_hz * (device_damping - damping.abs()) / (0.5 + delay_ticks)).max(0.0)
 }

@@ -12,8 +12,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use palpate::log::LogReader;
 use palpate::{Error, printable};
-use palpate_cli::export::export_rows;
-use palpate_cli::{Output, WindowArgs};
+use palpate_cli::{Output, WindowArgs, export_rows};
 
 use table::ParquetTable;
 

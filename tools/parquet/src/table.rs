@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use palpate::{Error, ErrorKind};
-use palpate_cli::export::{Cell, Column, ColumnType, TableWriter};
+use palpate_cli::{Cell, ColumnType, TableWriter};
 use parquet::basic::{Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
@@ -40,7 +40,7 @@ enum Values {
 }
 
 impl<W: Write + Send> ParquetTable<W> {
-    pub(super) fn new(columns: &[Column], out: W) -> Result<Self, Error> {
+    pub(super) fn new(columns: &[(&'static str, ColumnType)], out: W) -> Result<Self, Error> {
         let fields: Result<Vec<_>, _> = columns.iter().map(|column| field(*column).map(Arc::new)).collect();
         let schema = fields.and_then(|fields| SchemaType::group_type_builder("schema").with_fields(fields).build());
         let properties = columns.iter().fold(
@@ -84,7 +84,7 @@ impl<W: Write + Send> TableWriter for ParquetTable<W> {
 }
 
 /// The field of a column in the file's schema.
-fn field((name, kind): Column) -> Result<SchemaType, ParquetError> {
+fn field((name, kind): (&str, ColumnType)) -> Result<SchemaType, ParquetError> {
     let unsigned = |bit_width| Some(LogicalType::integer(bit_width, false));
     let (physical, logical) = match kind {
         ColumnType::U64 => (Physical::INT64, unsigned(64)),
@@ -98,7 +98,7 @@ fn field((name, kind): Column) -> Result<SchemaType, ParquetError> {
 }
 
 /// How a column is encoded.
-fn encoded(properties: WriterPropertiesBuilder, &(name, kind): &Column) -> WriterPropertiesBuilder {
+fn encoded(properties: WriterPropertiesBuilder, &(name, kind): &(&'static str, ColumnType)) -> WriterPropertiesBuilder {
     let path = ColumnPath::from(name);
     match kind {
         ColumnType::U64 | ColumnType::U32 | ColumnType::OptionalU32 => properties

@@ -7,7 +7,7 @@ use palpate::scene::Scene;
 use palpate::{Error, ErrorKind};
 
 use super::{files, progress, run, shared};
-use crate::compare::{CompareOptions, CompareProgress, compare, to_html, to_json, to_text};
+use crate::compare::{CompareOptions, CompareProgress, Comparison, to_html, to_json, to_text};
 
 /// The arguments of `palpate compare`.
 #[derive(Debug, clap::Args)]
@@ -41,7 +41,7 @@ pub fn run(args: &CompareArgs) -> Result<(), Error> {
     let options =
         CompareOptions { models: args.models.clone(), duration_s: args.duration, ..CompareOptions::default() };
     let mut shown = Shown::default();
-    let compared = compare(&scene, &options, |at| shown.show(at));
+    let compared = Comparison::measure(&scene, &options, |at| shown.show(at));
     shown.clear();
     let mut comparison = compared.map_err(|error| error.at(&name))?;
     comparison.scene = name;

@@ -12,28 +12,31 @@ const MARGIN: f64 = 0.1;
 /// Errors (% rms) that a model is asked to stay within.
 const NEAR: [f64; 2] = [1.0, 5.0];
 
-/// The conclusions, one line each.
-///
-/// `full` has no error, so another model can only win by cost: per haptic tick, which decides whether a rate can be kept,
-/// or in total, haptic and global group together.
-pub fn conclusions(comparison: &Comparison) -> Vec<String> {
-    if comparison.full.trace.peak_n() == 0.0 {
-        return vec!["`full` gives no force on this scene: there is nothing to compare".to_owned()];
+impl Comparison {
+    /// The conclusions, one line each.
+    ///
+    /// `full` has no error, so another model can only win by cost: per haptic tick, which decides whether a rate can be kept,
+    /// or in total, haptic and global group together.
+    pub fn conclusions(&self) -> Vec<String> {
+        if self.full.trace.peak_n() == 0.0 {
+            return vec!["`full` gives no force on this scene: there is nothing to compare".to_owned()];
+        }
+        let mut lines = vec![fit(self)];
+        if self.runs.iter().any(|run| run.measured().is_some()) {
+            lines.extend(against_full(self));
+            lines.extend(NEAR.map(|limit| nearest(self, limit)));
+        }
+        let degraded = self.runs.iter().filter(|run| run.measured().is_some_and(|run| run.degraded > 0));
+        lines.extend(degraded.map(|run| {
+            let count = run.measured().map_or(0, |run| run.degraded);
+            format!("{}: {count} releases gave a degraded result, such as a force that was not finite", name(run))
+        }));
+        if self.is_debug_build {
+            lines
+                .push("measured with a debug build: costs are several times those of `cargo run --release`".to_owned());
+        }
+        lines
     }
-    let mut lines = vec![fit(comparison)];
-    if comparison.runs.iter().any(|run| run.measured().is_some()) {
-        lines.extend(against_full(comparison));
-        lines.extend(NEAR.map(|limit| nearest(comparison, limit)));
-    }
-    let degraded = comparison.runs.iter().filter(|run| run.measured().is_some_and(|run| run.degraded > 0));
-    lines.extend(degraded.map(|run| {
-        let count = run.measured().map_or(0, |run| run.degraded);
-        format!("{}: {count} releases gave a degraded result, such as a force that was not finite", name(run))
-    }));
-    if comparison.is_debug_build {
-        lines.push("measured with a debug build: costs are several times those of `cargo run --release`".to_owned());
-    }
-    lines
 }
 
 /// Does `full` fit the haptic tick, and how large might the body be?
@@ -143,16 +146,16 @@ mod tests {
 
     #[test]
     fn full_is_said_to_fit_or_not_with_the_size_at_which_that_changes() {
-        let fits = conclusions(&comparison(100, &[])).concat();
+        let fits = Comparison::conclusions(&comparison(100, &[])).concat();
         assert!(fits.contains("fits the haptic tick here (CPU p99 100 us of 1.00 ms)"), "{fits}");
         assert!(fits.contains("no other model is needed") && fits.contains("near 10000 nodes"), "{fits}");
-        let not = conclusions(&comparison(4100, &[])).concat();
+        let not = Comparison::conclusions(&comparison(4100, &[])).concat();
         assert!(not.contains("does not fit the haptic tick") && not.contains("near 240 nodes"), "{not}");
     }
 
     #[test]
     fn models_are_named_where_they_win_and_where_they_never_do() {
-        let lines = conclusions(&comparison(
+        let lines = Comparison::conclusions(&comparison(
             100,
             &[
                 ("hold", 0, measured(0.5, 2, 0.2)),
@@ -168,7 +171,7 @@ mod tests {
             "within 1 % rms of `full`: in time hold (0.500 %, 2.00 us per tick); 33 ms late none",
             "within 5 % rms of `full`: in time hold (0.500 %, 2.00 us per tick); 33 ms late none",
         ];
-        let same = conclusions(&comparison(
+        let same = Comparison::conclusions(&comparison(
             100,
             &[("hold", 0, measured(0.5, 99, 0.099)), ("hold", 33, measured(0.5, 99, 0.101))],
         ));
@@ -183,8 +186,12 @@ mod tests {
     fn a_scene_without_force_and_degraded_results_are_said() {
         let mut without = comparison(100, &[]);
         without.full.trace.forces_n = vec![[0.0; 3]];
-        assert!(conclusions(&without).concat().contains("nothing to compare"));
+        assert!(without.conclusions().concat().contains("nothing to compare"));
         let run = Measured { degraded: 3, ..measured(1.0, 2, 0.2) };
-        assert!(conclusions(&comparison(100, &[("patch", 33, run)])).concat().contains("patch 33 ms late: 3 releases"));
+        assert!(
+            Comparison::conclusions(&comparison(100, &[("patch", 33, run)]))
+                .concat()
+                .contains("patch 33 ms late: 3 releases")
+        );
     }
 }

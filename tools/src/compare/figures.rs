@@ -118,6 +118,20 @@ pub struct ModelCost {
 }
 
 impl ModelCost {
+    /// Of each cost of two runs that did the same the least.
+    fn least(a: &Self, b: &Self) -> Self {
+        Self {
+            tick_p50: a.tick_p50.min(b.tick_p50),
+            tick_p99: a.tick_p99.min(b.tick_p99),
+            tick_max: a.tick_max.min(b.tick_max),
+            haptic_load: a.haptic_load.min(b.haptic_load),
+            global_load: a.global_load.min(b.global_load),
+            builds: a.builds,
+            build_p50: a.build_p50.min(b.build_p50),
+            build_p99: a.build_p99.min(b.build_p99),
+        }
+    }
+
     /// CPU time of haptic and global group together per second of simulated time (s/s).
     pub fn total_load(&self) -> f64 {
         self.haptic_load + self.global_load
@@ -212,6 +226,16 @@ impl Comparison {
         latencies.sort_unstable();
         latencies.dedup();
         latencies
+    }
+
+    /// Keeps of each cost the least of this comparison and of `again`, which is the same once more: forces are the same every time.
+    pub fn keep_least(&mut self, again: &Self) {
+        self.full.cost = ModelCost::least(&self.full.cost, &again.full.cost);
+        for (run, other) in self.runs.iter_mut().zip(&again.runs) {
+            if let (RunOutcome::Measured(run), Some(other)) = (&mut run.outcome, other.measured()) {
+                run.cost = ModelCost::least(&run.cost, &other.cost);
+            }
+        }
     }
 
     /// The runs that stopped before their end: the model and the fault.

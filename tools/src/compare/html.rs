@@ -3,7 +3,6 @@
 use std::fmt::Write;
 
 use super::charts::{Plots, colour, models};
-use super::conclusions::conclusions;
 use super::figures::{Comparison, Measured};
 use super::milliseconds;
 use super::table::{COLUMNS, cell, clock, facts};
@@ -28,7 +27,7 @@ fn head(body: &mut String, comparison: &Comparison) {
         escaped(&comparison.instruction_set),
         escaped(&clock(comparison))
     );
-    for line in conclusions(comparison) {
+    for line in comparison.conclusions() {
         let _ = writeln!(body, "<li>{}</li>", sentence(&line));
     }
     body.push_str("</ul>\n");

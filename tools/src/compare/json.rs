@@ -17,7 +17,7 @@
 
 use serde_json::{Value, json};
 
-use super::conclusions::{conclusions, full_fits};
+use super::conclusions::full_fits;
 use super::figures::{Comparison, Measured};
 
 /// The comparison as one JSON document.
@@ -40,7 +40,7 @@ pub fn to_json(comparison: &Comparison) -> String {
         "largest_energy_j": comparison.full.trace.largest_energy_j(),
         "full_fits_tick": full_fits(comparison),
         "models": models,
-        "conclusions": conclusions(comparison),
+        "conclusions": comparison.conclusions(),
     })
     .to_string()
 }

@@ -8,13 +8,12 @@ mod json;
 mod study;
 mod table;
 
-pub use conclusions::conclusions;
 pub(crate) use figures::ComparedRun;
-pub use figures::{Comparison, ForceDeviation, ForceTrace, Measured, ModelCost, RunOutcome};
+pub use figures::{Comparison, ForceDeviation, ForceTrace, Measured};
 pub(crate) use html::to_html;
 pub(crate) use json::to_json;
+pub use study::CompareOptions;
 pub(crate) use study::CompareProgress;
-pub use study::{CompareOptions, compare, one_period};
 pub(crate) use table::to_text;
 
 use palpate::runtime::Nanos;

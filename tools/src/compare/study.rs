@@ -46,65 +46,69 @@ pub struct CompareProgress {
     pub until: Option<Nanos>,
 }
 
-/// The latency of results that take one whole period at `rate`, rounded up to 10 us: 33.34 ms at 30 Hz.
-pub fn one_period(rate: Rate) -> Nanos {
-    Nanos(rate.period().0.div_ceil(LATENCY_GRAIN) * LATENCY_GRAIN)
+impl CompareOptions {
+    /// The latency of results that take one whole period at `rate`, rounded up to 10 us: 33.34 ms at 30 Hz.
+    pub fn one_period(rate: Rate) -> Nanos {
+        Nanos(rate.period().0.div_ceil(LATENCY_GRAIN) * LATENCY_GRAIN)
+    }
 }
 
-/// Runs `scene` with `full` and with each other model in turn, on this thread, in virtual time, and measures error and
-/// cost. Sizes, feedback, blending and substeps are the scene's; its model and its compute latency are not used. `progress`
-/// is called before each run and after every 50 ms of simulated time.
-///
-/// Forces are the same every time; costs are measured and are not. A model that cannot run on this scene, or whose run ends
-/// in a fault, has a row that says so.
-///
-/// # Errors
-/// If `full` cannot run on the scene, or its run ends in a fault.
-pub fn compare(
-    scene: &Scene,
-    options: &CompareOptions,
-    mut progress: impl FnMut(CompareProgress),
-) -> Result<Comparison, Error> {
-    if scene.devices.len() > 1 {
-        let message = "is given several times, and what is compared is the force of one against `full`: leave one";
-        return Err(Error::scene("device", message));
-    }
-    let global = rate("global.rate_hz", scene.global.rate_hz)?;
-    let latencies = match options.latencies.is_empty() {
-        true => vec![Nanos::ZERO, one_period(global)],
-        false => options.latencies.clone(),
-    };
-    let is_compared = |kind: &LocalModelKind| {
-        let asked = options.models.is_empty() || options.models.contains(kind);
-        asked && *kind != LocalModelKind::Full
-    };
-    let pairs: Vec<(LocalModelKind, Nanos)> = LocalModelKind::ALL
-        .into_iter()
-        .filter(is_compared)
-        .flat_map(|kind| latencies.iter().map(move |&latency| (kind, latency)))
-        .collect();
-    let runs = pairs.len() + 1;
-    let mut comparison = Comparison::default();
-    let reference = (LocalModelKind::Full, Nanos::ZERO);
-    for (run, pair) in [reference].into_iter().chain(pairs).enumerate() {
-        let (model, latency) = pair;
-        let mut at_work = |elapsed, until| progress(CompareProgress { run, runs, model, latency, elapsed, until });
-        at_work(Nanos::ZERO, None);
-        let session = build(scene, pair, options.duration_s);
-        if run == 0 {
-            comparison = full(session?, about(scene, global)?, at_work)?;
-            continue;
+impl Comparison {
+    /// Runs `scene` with `full` and with each other model in turn, on this thread, in virtual time, and measures error and
+    /// cost. Sizes, feedback, blending and substeps are the scene's; its model and its compute latency are not used. `progress`
+    /// is called before each run and after every 50 ms of simulated time.
+    ///
+    /// Forces are the same every time; costs are measured and are not. A model that cannot run on this scene, or whose run ends
+    /// in a fault, has a row that says so.
+    ///
+    /// # Errors
+    /// If `full` cannot run on the scene, or its run ends in a fault.
+    pub fn measure(
+        scene: &Scene,
+        options: &CompareOptions,
+        mut progress: impl FnMut(CompareProgress),
+    ) -> Result<Self, Error> {
+        if scene.devices.len() > 1 {
+            let message = "is given several times, and what is compared is the force of one against `full`: leave one";
+            return Err(Error::scene("device", message));
         }
-        let outcome = match session.and_then(|session| execute(session, at_work)) {
-            Err(refusal) => RunOutcome::Refused(refusal.to_string()),
-            Ok((_, summary)) => match &summary.runtime.fault {
-                Some(fault) => RunOutcome::Failed(fault.to_string()),
-                None => RunOutcome::Measured(Box::new(measured(&summary, Some(&comparison.full.trace)))),
-            },
+        let global = rate("global.rate_hz", scene.global.rate_hz)?;
+        let latencies = match options.latencies.is_empty() {
+            true => vec![Nanos::ZERO, CompareOptions::one_period(global)],
+            false => options.latencies.clone(),
         };
-        comparison.runs.push(ComparedRun { model: model.name().to_owned(), latency, outcome });
+        let is_compared = |kind: &LocalModelKind| {
+            let asked = options.models.is_empty() || options.models.contains(kind);
+            asked && *kind != LocalModelKind::Full
+        };
+        let pairs: Vec<(LocalModelKind, Nanos)> = LocalModelKind::ALL
+            .into_iter()
+            .filter(is_compared)
+            .flat_map(|kind| latencies.iter().map(move |&latency| (kind, latency)))
+            .collect();
+        let runs = pairs.len() + 1;
+        let mut comparison = Self::default();
+        let reference = (LocalModelKind::Full, Nanos::ZERO);
+        for (run, pair) in [reference].into_iter().chain(pairs).enumerate() {
+            let (model, latency) = pair;
+            let mut at_work = |elapsed, until| progress(CompareProgress { run, runs, model, latency, elapsed, until });
+            at_work(Nanos::ZERO, None);
+            let session = build(scene, pair, options.duration_s);
+            if run == 0 {
+                comparison = full(session?, about(scene, global)?, at_work)?;
+                continue;
+            }
+            let outcome = match session.and_then(|session| execute(session, at_work)) {
+                Err(refusal) => RunOutcome::Refused(refusal.to_string()),
+                Ok((_, summary)) => match &summary.runtime.fault {
+                    Some(fault) => RunOutcome::Failed(fault.to_string()),
+                    None => RunOutcome::Measured(Box::new(measured(&summary, Some(&comparison.full.trace)))),
+                },
+            };
+            comparison.runs.push(ComparedRun { model: model.name().to_owned(), latency, outcome });
+        }
+        Ok(comparison)
     }
-    Ok(comparison)
 }
 
 /// The reference, and what the runs have in common.

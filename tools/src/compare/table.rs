@@ -1,6 +1,5 @@
 //! The table of a comparison: its columns, and the text for a terminal of 100 columns.
 
-use super::conclusions::conclusions;
 use super::figures::{Comparison, Measured};
 use super::{figure, milliseconds};
 use crate::units::{duration, force};
@@ -111,7 +110,7 @@ pub fn to_text(comparison: &Comparison) -> String {
         });
     }
     lines.push(String::new());
-    lines.extend(conclusions(comparison));
+    lines.extend(comparison.conclusions());
     lines.push(String::new());
     lines.push(format!("{}; {MEANINGS}", clock(comparison)));
     lines.iter().map(|line| wrapped(line)).collect()

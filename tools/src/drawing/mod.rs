@@ -1,9 +1,11 @@
 //! Charts and pages.
 
+mod colour;
 pub(crate) mod html;
 mod picture;
 mod sheet;
 pub(crate) mod svg;
 
-pub use picture::{COLOURS, Picture, Series};
-pub use sheet::{BLUE, Curve, GREEN, GREY, INK, ORANGE, Panel, RED, Sheet};
+pub use colour::Colour;
+pub use picture::{Picture, Series};
+pub use sheet::{Curve, Panel, Sheet};

@@ -1,5 +1,6 @@
 //! A chart as an SVG file of its own, for documents.
 
+use super::Colour;
 use super::svg::{Axis, Chart, Line, Mark, Point, around};
 
 const WIDTH: f64 = 960.0;
@@ -22,16 +23,13 @@ text { font: 11px Helvetica, Arial, sans-serif; fill: #626b79; }
 .c4 { color: #aa4a94; } .c5 { color: #b58900; } .c6 { color: #2a9fd6; } .c7 { color: #7a5230; }
 ";
 
-/// Number of colours that a series can have.
-pub const COLOURS: usize = 8;
-
 /// Points of a [`Picture`] that belong together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     /// Name of the series, read out where it is pointed at.
     pub name: String,
-    /// Number of the colour, below [`COLOURS`]; 0 is for the reference.
-    pub colour: usize,
+    /// Its colour.
+    pub colour: Colour,
     /// True if the points are joined by a line, in the order given, which rises in x.
     pub is_joined: bool,
     /// True if the points are drawn as circles in place of discs.
@@ -61,16 +59,15 @@ impl Picture {
     /// The chart as an SVG document: light, without fonts or styles from elsewhere.
     pub fn to_svg(&self) -> String {
         let points = || self.series.iter().flat_map(|series| &series.points);
-        let class = |series: &Series| format!("c{}", series.colour % COLOURS);
         let lines = self.series.iter().filter(|series| series.is_joined);
         let lines = lines.map(|series| Line {
-            class: class(series),
+            class: series.colour.to_string(),
             name: &series.name,
             points: series.points.iter().map(|(x, y, _)| (*x, *y)).collect(),
         });
         let discs = self.series.iter().flat_map(|series| {
             series.points.iter().map(|(x, y, label)| Point {
-                class: class(series),
+                class: series.colour.to_string(),
                 label: label.clone(),
                 at: (*x, *y),
                 is_hollow: series.is_hollow,
@@ -103,7 +100,8 @@ mod tests {
     #[test]
     fn a_picture_is_a_document_with_its_words_and_no_number_that_nothing_reads() {
         let points = vec![(1.0, 0.0, "full".to_owned()), (100.0, 5.0, "a < b".to_owned()), (2.0, f64::NAN, "x".into())];
-        let series = Series { name: "one".into(), colour: 9, is_joined: true, is_hollow: true, points };
+        let series =
+            Series { name: "one".into(), colour: Colour::numbered(9), is_joined: true, is_hollow: true, points };
         let picture = Picture {
             title: "t".into(),
             x: "us".into(),

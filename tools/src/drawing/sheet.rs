@@ -3,22 +3,10 @@
 use std::fmt::Write;
 use std::ops::Range;
 
+use super::Colour;
 use super::html::escaped;
 use super::picture::STYLE;
 use super::svg::{Axis, Chart, Line, Mark, around};
-
-/// Near black, for a reference.
-pub const INK: usize = 0;
-/// The colour of most curves. People who see colours differently tell it from the others, too.
-pub const BLUE: usize = 1;
-/// A vermilion, for what diverges.
-pub const RED: usize = 2;
-/// A bluish green.
-pub const GREEN: usize = 3;
-/// A dark yellow, for the second curve.
-pub const ORANGE: usize = 5;
-/// A light grey, for what is drawn beside a theory.
-pub const GREY: usize = 8;
 
 const WIDTH: f64 = 1000.0;
 /// Above the rows: title, subtitle, legend.
@@ -39,15 +27,15 @@ const MORE: &str = "\
 pub struct Curve {
     /// x and y, rising in x.
     pub points: Vec<(f64, f64)>,
-    /// One of the colours of a sheet, such as [`BLUE`]; the legend says what has it.
-    pub colour: usize,
+    /// Its colour; the legend says what has it.
+    pub colour: Colour,
     /// Drawn as a wide line, for what lies beneath other curves.
     pub is_wide: bool,
 }
 
 impl Curve {
     /// A curve through a value at each time (s).
-    pub fn new(times: &[f64], values: impl IntoIterator<Item = f64>, colour: usize) -> Self {
+    pub fn new(times: &[f64], values: impl IntoIterator<Item = f64>, colour: Colour) -> Self {
         Self { points: times.iter().copied().zip(values).collect(), colour, is_wide: false }
     }
 
@@ -86,7 +74,7 @@ pub struct Sheet {
     /// The second line, in small print.
     pub subtitle: String,
     /// Names of the curves with the colour of each.
-    pub legend: Vec<(String, usize)>,
+    pub legend: Vec<(String, Colour)>,
     /// Panels from top to bottom, those of a row from left to right.
     pub rows: Vec<Vec<Panel>>,
 }
@@ -107,7 +95,7 @@ impl Sheet {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 svg,
-                "<path class=\"line wide c{colour}\" d=\"M{x} 73h26\"/><text class=\"key\" x=\"{}\" y=\"78\">{}</text>",
+                "<path class=\"line wide {colour}\" d=\"M{x} 73h26\"/><text class=\"key\" x=\"{}\" y=\"78\">{}</text>",
                 x + 34,
                 escaped(name)
             );
@@ -127,7 +115,7 @@ impl Sheet {
 }
 
 impl Panel {
-    fn chart<'a>(&self, legend: &'a [(String, usize)], width: f64) -> Chart<'a> {
+    fn chart<'a>(&self, legend: &'a [(String, Colour)], width: f64) -> Chart<'a> {
         let within = |curve: &Curve| -> Vec<(f64, f64)> {
             curve.points.iter().copied().filter(|(x, _)| self.shown.contains(x)).collect()
         };
@@ -142,7 +130,7 @@ impl Panel {
             (Axis::linear(self.y_label, [low - room, high + room]), (high - low) / ROW / 10.0)
         };
         let lines = curves.iter().map(|(curve, points)| Line {
-            class: format!("c{}{}", curve.colour, if curve.is_wide { " wide" } else { "" }),
+            class: format!("{}{}", curve.colour, if curve.is_wide { " wide" } else { "" }),
             name: legend.iter().find(|(_, colour)| *colour == curve.colour).map_or("", |(name, _)| name),
             points: if self.is_log { points.clone() } else { straightened(points, tolerance) },
         });
@@ -195,11 +183,11 @@ mod tests {
             y_label: "N",
             shown: 0.1..0.9,
             is_log,
-            curves: vec![Curve::new(&times, times.iter().map(|t| t * t), BLUE).wide()],
+            curves: vec![Curve::new(&times, times.iter().map(|t| t * t), Colour::BLUE).wide()],
             marks: vec![0.5, 7.0],
             zoomed: Some(0.2..0.3),
         };
-        let legend = vec![("patch".to_owned(), BLUE)];
+        let legend = vec![("patch".to_owned(), Colour::BLUE)];
         let rows = vec![vec![panel(false)], vec![panel(false), panel(true)]];
         let svg = Sheet { title: "t".into(), subtitle: "s".into(), legend, rows }.to_svg();
         for (words, count) in [

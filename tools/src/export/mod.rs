@@ -9,10 +9,12 @@ use std::fmt::{self, Display, Formatter};
 use std::io::Read;
 use std::path::Path;
 
-pub use columns::{Cell, Column, ColumnType};
-pub use hgrm::{TickDuration, export_percentiles};
-pub use table::{TableWriter, export_rows, export_table};
-pub use trace::export_trace;
+pub use columns::{Cell, ColumnType};
+pub(crate) use hgrm::{TickDuration, export_percentiles};
+pub use table::TableWriter;
+pub use table::export_rows;
+pub(crate) use table::export_table;
+pub(crate) use trace::export_trace;
 
 use palpate::log::LogReader;
 use palpate::{Error, ErrorKind};

@@ -7,10 +7,10 @@ mod salvage;
 mod summary;
 
 pub(crate) use check::CheckReport;
-pub use check::check;
-pub use info::LogInfo;
+pub(crate) use check::check;
+pub(crate) use info::LogInfo;
 pub(crate) use recover::Lost;
-pub use recover::{Recovered, recover};
+pub(crate) use recover::{Recovered, recover};
 
 /// First and last of the times seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

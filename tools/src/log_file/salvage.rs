@@ -9,7 +9,7 @@ use std::path::Path;
 use mcap::records::op;
 
 use palpate::Error;
-use palpate::log::file::{ChunkHead, ChunkRecords, MAX_RECORD_BYTES, RecordStream, Section};
+use palpate::log::file::{ChunkHead, ChunkRecords, RecordStream, Section};
 
 /// How much is looked at at once in the search for a chunk (bytes).
 const WINDOW_BYTES: usize = 1 << 20;
@@ -134,7 +134,7 @@ impl<R: Read + Seek> Salvage<R> {
     fn cost_of(&self, bytes: &[u8], place: u64) -> Option<u64> {
         let length = length_in(bytes).filter(|_| bytes[0] == op::CHUNK)?;
         let head = &bytes[9..bytes.len().min(HEAD_BYTES)];
-        if length > MAX_RECORD_BYTES || place + 9 + length > self.length {
+        if length > ChunkHead::MAX_RECORD_BYTES || place + 9 + length > self.length {
             return None;
         }
         let head = ChunkHead::of(head, length, false).ok()?;
@@ -145,7 +145,7 @@ impl<R: Read + Seek> Salvage<R> {
 /// The most that is read and unpacked in searches through a file of `length` bytes: twice the largest chunk, and for each
 /// byte as much as no log that is merely damaged takes.
 fn most_searched(length: u64) -> u64 {
-    4 * MAX_RECORD_BYTES + 64 * length
+    4 * ChunkHead::MAX_RECORD_BYTES + 64 * length
 }
 
 /// True if there is a chunk at `place` that fits its checksum.
@@ -177,7 +177,7 @@ fn follow<R: Read + Seek>(source: &mut R, mut at: u64, length: u64) -> io::Resul
         source.read_exact(&mut head)?;
         let body = length_in(&head).unwrap_or(u64::MAX);
         let is_known = (op::SCHEMA..=op::DATA_END).contains(&head[0]);
-        if !is_known || body > MAX_RECORD_BYTES || at + 9 + body > length {
+        if !is_known || body > ChunkHead::MAX_RECORD_BYTES || at + 9 + body > length {
             return Ok(false);
         }
         at += 9 + body;

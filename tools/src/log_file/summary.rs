@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom};
 use crc32fast::Hasher;
 use mcap::sans_io::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 
-use palpate::log::file::MAX_RECORD_BYTES;
+use palpate::log::file::ChunkHead;
 
 /// What follows the start of the index in the footer and is under its checksum, the checksum itself, and the magic (bytes).
 const FOOTER_END: u64 = 8 + 4 + mcap::MAGIC.len() as u64;
@@ -16,8 +16,9 @@ pub(super) fn read_summary(source: &mut (impl Read + Seek)) -> Option<mcap::Summ
     if !is_sound(source, size)? {
         return None;
     }
-    let options =
-        SummaryReaderOptions::default().with_file_size(size).with_record_length_limit(MAX_RECORD_BYTES as usize);
+    let options = SummaryReaderOptions::default()
+        .with_file_size(size)
+        .with_record_length_limit(ChunkHead::MAX_RECORD_BYTES as usize);
     let mut reader = SummaryReader::new_with_options(options);
     while let Some(event) = reader.next_event() {
         match event.ok()? {
@@ -59,7 +60,7 @@ pub(super) fn record_at(source: &mut (impl Read + Seek), offset: u64, opcode: u8
     let mut head = [0; 9];
     source.read_exact(&mut head).ok()?;
     let length = u64::from_le_bytes(head[1..].try_into().ok()?);
-    if head[0] != opcode || length > MAX_RECORD_BYTES {
+    if head[0] != opcode || length > ChunkHead::MAX_RECORD_BYTES {
         return None;
     }
     let mut body = Vec::new();

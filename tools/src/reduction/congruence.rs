@@ -85,6 +85,7 @@ impl Congruence {
 
     /// The smallest eigenvalues of M_r, C_r and K_r, each as a share of the largest: all must be above zero, but for the rounding
     /// of a singular C, for the model to be stable and passive.
+    #[cfg(test)]
     pub fn definiteness(&self) -> [f64; 3] {
         [&self.mass, &self.damping, &self.stiffness].map(|matrix| {
             let values = matrix.clone().symmetric_eigenvalues();

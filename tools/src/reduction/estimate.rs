@@ -29,8 +29,6 @@ pub struct ErrorBound {
     shift: f64,
     /// w^2 of the slowest mode, from below.
     slowest: f64,
-    /// True if the bound is rigorous.
-    pub is_rigorous: bool,
 }
 
 impl ErrorBound {
@@ -49,7 +47,7 @@ impl ErrorBound {
         let slowest = CLOSE * slow_modes(system, 1)?.0.first().copied().unwrap_or(0.0);
         let known = system.rayleigh();
         let rayleigh = known.unwrap_or_else(|| Rayleigh { mass: 0.0, stiffness: system.damping_over_stiffness() });
-        Ok(Self { gram, model: model.model.clone(), rayleigh, shift, slowest, is_rigorous: known.is_some() })
+        Ok(Self { gram, model: model.model.clone(), rayleigh, shift, slowest })
     }
 
     /// No entry of the error of the response at s has a larger norm than this; `None` at a pole of the model.

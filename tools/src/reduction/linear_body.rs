@@ -17,8 +17,6 @@ pub struct LinearBody {
     system: SecondOrder,
     /// The place of each node among the movable ones.
     places: Vec<Option<usize>>,
-    /// Ids of the movable nodes.
-    nodes: Vec<u32>,
 }
 
 impl LinearBody {
@@ -58,17 +56,12 @@ impl LinearBody {
         let points: Vec<Vec3> = nodes.iter().map(|&node| state.positions[node as usize]).collect();
         let joined = assembly.places().filter(|(row, column)| row % 3 == 0 && column % 3 == 0 && row != column);
         let order = dissection(&points, joined.map(|(row, column)| [row as u32 / 3, column as u32 / 3]));
-        Ok(Self { system: assembly.build(n, none).eliminated_in(order), places, nodes })
+        Ok(Self { system: assembly.build(n, none).eliminated_in(order), places })
     }
 
     /// M, C and K without ports.
     pub fn system(&self) -> &SecondOrder {
         &self.system
-    }
-
-    /// Ids of the movable nodes, in increasing order.
-    pub fn nodes(&self) -> &[u32] {
-        &self.nodes
     }
 
     /// The coordinates of those of `nodes` that can move, in increasing order.

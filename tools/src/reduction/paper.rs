@@ -50,13 +50,6 @@ impl PaperMesh {
         self
     }
 
-    /// Sets the stiffness of every spring to `k` (N/m).
-    #[must_use]
-    pub fn stiffness(mut self, k: f64) -> Self {
-        self.stiffness = k;
-        self
-    }
-
     /// The number of dimensions: 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.cells.len()

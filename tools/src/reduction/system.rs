@@ -2,10 +2,9 @@
 
 use std::collections::HashMap;
 
-use nalgebra::Complex;
 use palpate::model::ModelError;
 
-use super::linalg::{CMatrix, Matrix, SparseFactor, product_t, side_by_side, span};
+use super::linalg::{Matrix, SparseFactor, product_t, side_by_side, span};
 
 /// How far damping may be from alpha M + beta K, entry by entry and relative to its largest, to count as proportional.
 const PROPORTIONAL: f64 = 1e-9;
@@ -138,6 +137,7 @@ impl SecondOrder {
     ///
     /// # Errors
     /// If an entry lies outside, a number is not finite, or the ports belong to another number of coordinates.
+    #[cfg(test)]
     pub fn new(
         n: usize,
         mass: &[(usize, usize, f64)],
@@ -298,17 +298,6 @@ impl SecondOrder {
         let is_proportional =
             entries().all(|(_, m, c, k)| (c - mass * m - stiffness * k).abs() <= PROPORTIONAL * scale);
         is_proportional.then_some(Rayleigh { mass, stiffness })
-    }
-
-    /// s^2 M + s C + K at a complex s, n x n.
-    pub fn dynamic_stiffness(&self, s: Complex<f64>) -> CMatrix {
-        let mut out = CMatrix::zeros(self.n, self.n);
-        for &((row, column), [m, c, k]) in &self.entries {
-            let value = s * s * m + s * c + k;
-            out[(row, column)] = value;
-            out[(column, row)] = value;
-        }
-        out
     }
 
     /// A frequency that is typical of the system (rad/s): sqrt(k/m) in the paper's meshes, from the diagonals of K and M.

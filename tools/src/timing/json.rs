@@ -25,8 +25,6 @@
 //! | `span_s` | time of the first and of the last record that was looked at |
 //! | `events` | `count`, `worst`, `first[]` with `t_s`, `level`, `message` |
 //!
-//! `figures`, `cores`, `worst` and `span_s` are of [`timing_to_json`] alone, which `palpate timing --json` prints.
-//!
 //! Distributions are `{count, p50, p90, p99, p999, max}`, nearest-rank, all zero if `count` is zero. Causes are
 //! `late_wake`, `long_tick`, `stalled_peer`, `policy`, `fault` and `unattributed`.
 
@@ -35,18 +33,12 @@ use std::collections::BTreeMap;
 use palpate::log::{
     DeviceReport, Environment, GroupSummary, Level, LoggedExecution, Percentiles, RunReport, TextEvent,
 };
-use palpate::report::verdict;
 use palpate::runtime::SlipCounts;
 use palpate::runtime::TickTiming;
 use serde_json::{Map, Value, json};
 
 use super::text::in_words;
 use crate::timing::{Against, ComparedFigure, CoreUse, Figure, FigureValue, TimingReport, WorstTick, cause_name};
-
-/// The report as one JSON document.
-pub fn to_json(report: &RunReport) -> String {
-    document(report).to_string()
-}
 
 /// The timing of a run in detail as one JSON document.
 pub fn timing_to_json(report: &TimingReport) -> String {
@@ -80,7 +72,7 @@ pub fn against_to_json(against: &Against, this: &TimingReport, other: (&str, &Ti
     let mut document = timing_document(this);
     document["against"] = json!({
         "log": other.0,
-        "verdict": verdict(&other.1.run).0.name(),
+        "verdict": other.1.run.verdict().0.name(),
         "figures": against.figures.iter().map(compared).collect::<Map<_, _>>(),
         "unmatched": against.unmatched,
     });
@@ -137,7 +129,7 @@ fn worst_tick(worst: &WorstTick, report: &TimingReport) -> Value {
 }
 
 fn document(report: &RunReport) -> Value {
-    let (verdict, reason) = verdict(report);
+    let (verdict, reason) = report.verdict();
     let mut document = json!({
         "schema_version": 1,
         "verdict": verdict.name(),
@@ -265,7 +257,7 @@ mod tests {
         let mut analysis = Analysis::default();
         let end = Nanos((1 << 53) + 1);
         analysis.push(&LogRecord::Tick(TickTiming { end, deadline: end, ..TickTiming::default() }));
-        let value: Value = serde_json::from_str(&to_json(&analysis.report())).unwrap();
+        let value: Value = serde_json::from_str(&document(&analysis.report()).to_string()).unwrap();
         assert_eq!(value["groups"][0]["execution_ns"]["max"], json!((1_u64 << 53) + 1));
         assert_eq!(value["groups"][0]["missed_by_cause"]["unattributed"], json!(0));
         assert_eq!((&value["damage"], &value["verdict"]), (&Value::Null, &json!("OK")));

@@ -12,9 +12,8 @@ mod html;
 mod json;
 mod text;
 
-pub use analysis::{Selection, TimingAnalysis, TimingReport, WorstTick};
-pub use json::to_json;
-pub use text::timing_to_text;
+pub(crate) use analysis::{Selection, TimingAnalysis, TimingReport, WorstTick};
+pub(crate) use text::timing_to_text;
 
 pub(crate) use against::{Against, ComparedFigure};
 pub(crate) use analysis::{

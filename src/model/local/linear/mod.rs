@@ -12,7 +12,6 @@ use crate::contact::{Contact, Equations, ToolMotion, step_implicit};
 use crate::linear::{Drift, ImplicitStep, PatchTangent};
 
 pub(super) use boundary::{Boundary, Layers, Yielding};
-pub use stable::MOST_EXPLICIT_STEPS;
 
 /// What a linear patch is made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

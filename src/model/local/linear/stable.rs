@@ -2,13 +2,11 @@
 
 use crate::contact::{Equations, Law};
 use crate::linear::PatchTangent;
+use crate::local::kind::Kind;
 use crate::simulation::Stepping;
 
 /// A step above this share of the stability limit is replaced: the limit is known up to a percent.
 const STABLE_SHARE: f64 = 0.98;
-/// A linear patch whose stability asks for more takes one implicit step per tick: that costs as much as two explicit ones,
-/// and damps what four still show.
-pub const MOST_EXPLICIT_STEPS: u32 = 4;
 /// With the paper's equations, which have no implicit step: a tick stays bounded.
 const MOST_SUBSTEPS: u32 = 32;
 
@@ -33,7 +31,7 @@ pub(super) fn stable_stepping(
         return (stepping, false);
     }
     let needed = spectrum.substeps(stepping.tick);
-    if needed > MOST_EXPLICIT_STEPS && law.equations != Equations::Paper {
+    if needed > Kind::MOST_EXPLICIT_STEPS && law.equations != Equations::Paper {
         return implicit;
     }
     (Stepping { substeps: needed.clamp(stepping.substeps, MOST_SUBSTEPS.max(stepping.substeps)), ..stepping }, false)

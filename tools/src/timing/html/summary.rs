@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use palpate::report::{RunVerdict, verdict};
+use palpate::report::RunVerdict;
 
 use super::causes::words;
 use super::named_figures::Numbers;
@@ -18,7 +18,7 @@ const CHAPTERS: &str = "<nav aria-label=\"Chapters\"><a href=\"#groups\">Groups<
 
 /// Verdict, the worst that happened, key figures.
 pub(crate) fn summary(report: &TimingReport, name: &str, numbers: &Numbers) -> String {
-    let (verdict, reason) = verdict(&report.run);
+    let (verdict, reason) = report.run.verdict();
     let class = match verdict {
         RunVerdict::Ok => "good",
         RunVerdict::Incomplete | RunVerdict::Restarted => "fair",

@@ -1,7 +1,6 @@
 //! Two logs side by side, for a terminal.
 
-use palpate::report::text::Page;
-use palpate::report::verdict;
+use palpate::report::Page;
 
 use crate::timing::{Against, ComparedFigure, Figure, TimingReport};
 use crate::units;
@@ -15,7 +14,7 @@ const PERCENTILES: [&str; 3] = ["p50", "p99", "max"];
 pub fn against_to_text(against: &Against, [this, other]: [(&str, &TimingReport); 2]) -> String {
     let mut page = Page::default();
     for (name, (log, report)) in [("this", this), ("other", other)] {
-        let (verdict, reason) = verdict(&report.run);
+        let (verdict, reason) = report.run.verdict();
         page.wrapped(name, &format!("{log}: {}: {reason}", verdict.name()));
     }
     page.line(String::new());

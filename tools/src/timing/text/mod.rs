@@ -5,7 +5,7 @@ mod worst;
 
 pub use self::against::{against_to_text, figure_to_text};
 pub(super) use self::worst::in_words;
-use palpate::report::text::{self, Page};
+use palpate::report::Page;
 
 use super::{CoreUse, TimingReport};
 
@@ -13,17 +13,17 @@ use super::{CoreUse, TimingReport};
 pub fn timing_to_text(report: &TimingReport) -> String {
     let run = &report.run;
     let mut page = Page::default();
-    text::head(&mut page, run);
+    page.head(run);
     worst::sentence(&mut page, report);
-    text::about(&mut page, run);
+    page.about(run);
     page.line(String::new());
-    text::groups(&mut page, run);
+    page.groups(run);
     cores(&mut page, &report.cores);
     page.line(String::new());
     for device in run.devices.iter().filter(|device| device.force.ticks > 0) {
-        text::haptics(&mut page, run, device);
+        page.haptics(run, device);
     }
-    text::events(&mut page, run);
+    page.events(run);
     worst::table(&mut page, report);
     page.text
 }

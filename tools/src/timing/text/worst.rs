@@ -1,6 +1,6 @@
 //! The worst ticks: who was late, why, and what it did to the force.
 
-use palpate::report::text::Page;
+use palpate::report::Page;
 use palpate::runtime::SlipCause;
 
 use crate::timing::{TimingReport, WorstTick};

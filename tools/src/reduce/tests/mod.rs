@@ -1,16 +1,15 @@
 //! When a local model may be trusted: the check of whole scenes against the non-linear simulation.
 
-#[path = "support/repository.rs"]
-mod repository;
-
 use palpate::ErrorKind;
 use palpate::model::body::Shape;
 use palpate::scene::Scene;
-use palpate_cli::reduce::{Locality, ReductionStudy};
-use palpate_cli::reduce::{ReduceOptions, reduce_scene};
+
+use super::findings::Locality;
+use super::*;
+use crate::tests::repository::in_repository;
 
 fn study(name: &str, options: &ReduceOptions) -> ReductionStudy {
-    let path = repository::in_repository(&format!("scenes/{name}.toml"));
+    let path = in_repository(&format!("scenes/{name}.toml"));
     reduce_scene(&Scene::load(path.as_ref()).unwrap(), options, |_| {}).unwrap()
 }
 
@@ -48,7 +47,7 @@ fn soft_tissue_under_a_stiff_skin_is_flagged_as_predicted_and_measured() {
 // Check a nodule that the patch cuts through: its other half, held, holds the half in the patch.
 #[test]
 fn a_stiff_nodule_that_reaches_out_of_the_patch_is_flagged() {
-    let path = repository::in_repository("scenes/nodule.toml");
+    let path = in_repository("scenes/nodule.toml");
     let mut scene = Scene::load(path.as_ref()).unwrap();
     let nodule = &mut scene.body.as_mut().unwrap().regions[0];
     nodule.shape = Shape::Sphere { centre: [0.06, 0.05, 0.085], radius: 0.0175 };
@@ -82,7 +81,7 @@ fn a_budget_names_what_meets_it() {
 
 #[test]
 fn a_contact_that_is_none_is_refused() {
-    let path = repository::in_repository("scenes/drag_friction.toml");
+    let path = in_repository("scenes/drag_friction.toml");
     let scene = Scene::load(path.as_ref()).unwrap();
     for node in [[5, 5, 5], [5, 5, 0], [99, 0, 0]] {
         let error =

@@ -1,16 +1,15 @@
 //! Known faults, put into a run: the report on its log names each of them, with its cause, its time and its size.
 
-#[path = "support/repository.rs"]
-mod repository;
-
 use std::path::Path;
 
+use crate::timing::{Selection, TimingAnalysis, TimingReport, WorstTick, timing_to_text};
 use palpate::log::LogReader;
 use palpate::runtime::SlipCause;
 use palpate::runtime::{Disturbance, Nanos, RateGroup};
 use palpate::scene::Scene;
 use palpate::session::{Session, SessionBuilder};
-use palpate_cli::timing::{Selection, TimingAnalysis, TimingReport, WorstTick, timing_to_text};
+
+use super::repository::in_repository;
 
 const MS: u64 = 1_000_000;
 
@@ -83,7 +82,7 @@ fn finish(session: SessionBuilder) {
 }
 
 fn run(log: &Path) -> TimingReport {
-    let scene = Scene::load(&repository::in_repository("scenes/drag_friction.toml")).unwrap();
+    let scene = Scene::load(&in_repository("scenes/drag_friction.toml")).unwrap();
     let mut session = Session::from_scene(scene).virtual_time().duration_s(2.0).log(log);
     for group in ["local", "global"] {
         session = session.disturb(group, move |release| {
@@ -130,7 +129,7 @@ fn every_injected_fault_is_named_with_its_cause_its_time_and_its_size() {
 fn a_silent_device_is_named_as_the_peer_that_stalled() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("silent.mcap");
-    let scene = Scene::load(&repository::in_repository("scenes/drag_friction.toml")).unwrap();
+    let scene = Scene::load(&in_repository("scenes/drag_friction.toml")).unwrap();
     let paced = RateGroup::hz(1000).device_paced(Nanos(20 * MS));
     let session = Session::from_scene(scene).virtual_time().duration_s(0.5).log(&log).local(paced);
     finish(session.disturb("local", |release| Disturbance {
@@ -147,7 +146,7 @@ fn a_silent_device_is_named_as_the_peer_that_stalled() {
 fn a_run_without_faults_names_none() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("calm.mcap");
-    let scene = Scene::load(&repository::in_repository("scenes/drag_friction.toml")).unwrap();
+    let scene = Scene::load(&in_repository("scenes/drag_friction.toml")).unwrap();
     let session = Session::from_scene(scene).virtual_time().duration_s(0.3).log(&log).local(RateGroup::hz(1000));
     finish(session);
     assert_eq!(read(&log).worst, []);

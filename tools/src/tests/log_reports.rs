@@ -1,15 +1,11 @@
 //! What is reported about a log equals what was logged.
 
-#[path = "../../tests/log_sample/mod.rs"]
-mod log_sample;
-
+use crate::export::export_table;
+use crate::timing::{Selection, TimingAnalysis, timing_to_json};
 use palpate::ErrorKind;
 use palpate::log::{Analysis, LogEntry, LogReader, LogRecord, RunReport, Window};
-use palpate::report::to_text;
-use palpate_cli::export::export_table;
-use palpate_cli::timing::to_json;
 
-use log_sample::{entries, log_of, time_of};
+use super::log_sample::{entries, log_of, time_of};
 
 fn analyse(bytes: &[u8]) -> RunReport {
     let mut reader = LogReader::new(bytes, "memory").unwrap();
@@ -45,8 +41,10 @@ fn percentiles_of_a_log_equal_those_of_the_sorted_records() {
 
 #[test]
 fn json_is_one_document_that_says_what_the_log_says() {
-    let report = analyse(&log_of(&entries(500), 1000));
-    let value: serde_json::Value = serde_json::from_str(&to_json(&report)).unwrap();
+    let bytes = log_of(&entries(500), 1000);
+    let mut analysis = TimingAnalysis::new(Selection::default());
+    LogReader::new(bytes.as_slice(), "memory").unwrap().for_each(|entry| analysis.push_entry(&entry));
+    let value: serde_json::Value = serde_json::from_str(&timing_to_json(&analysis.report())).unwrap();
     assert_eq!(value["verdict"], "FAILED");
     assert_eq!(value["reason"], "global: an actor reported fault 18446744073709551615, in 0.500 s of real time");
     assert_eq!(value["groups"][0]["name"], "haptic");
@@ -63,7 +61,7 @@ fn json_is_one_document_that_says_what_the_log_says() {
     assert_eq!(value["resyncs"]["count"], 15);
     assert_eq!(value["environment"]["granted"]["mlock"], "refused");
     assert_eq!(value["events"]["count"], 2);
-    let text = to_text(&report);
+    let text = analyse(&bytes).to_string();
     assert!(text.starts_with("FAILED: global: an actor reported fault"), "{text}");
     assert!(text.lines().count() <= 40, "{text}");
 }
@@ -75,7 +73,7 @@ fn every_cut_of_a_log_can_be_analysed_and_exported() {
     for cut in (8..bytes.len()).step_by(11) {
         let report = analyse(&bytes[..cut]);
         let forces = table(&bytes[..cut], "/force");
-        assert!(to_text(&report).contains("damage"));
+        assert!(report.to_string().contains("damage"));
         assert_eq!(forces.lines().count() as u64, 1 + report.devices[0].force.ticks);
         assert!(forces.lines().count() >= rows);
         rows = forces.lines().count();

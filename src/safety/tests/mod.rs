@@ -1,9 +1,10 @@
 //! The safety pipeline over random inputs: limits, energy, and that nothing is done in silence. Pure functions of state and
 //! counted time: no session, no threads.
 
+#[path = "../../../tests/random/mod.rs"]
 mod random;
 
-use palpate::safety::{Actions, DeviceLimits, Input, Limits, Pipeline, Request, ToolSpeed};
+use super::*;
 use proptest::prelude::*;
 use random::Random;
 

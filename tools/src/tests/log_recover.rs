@@ -1,17 +1,14 @@
 //! A damaged log is read up to the damage and recovered behind it: cut at every 4 KiB boundary, and with wrong bits anywhere.
 
-#[path = "../../tests/log_sample/mod.rs"]
-mod log_sample;
-
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 
+use crate::log_file::{LogInfo, Recovered, check, recover};
 use palpate::log::{GroupStats, LogEntry, LogReader, LogRecord};
 use palpate::runtime::{Record, TickTiming};
-use palpate_cli::log_file::{LogInfo, Recovered, check, recover};
 use proptest::prelude::*;
 
-use log_sample::log_of;
+use super::log_sample::log_of;
 
 const BOUNDARY: usize = 4096;
 
@@ -24,7 +21,7 @@ fn entries(ticks: u64) -> Vec<LogEntry> {
         LogEntry::Stats(stats) => LogEntry::Stats(GroupStats { lost_records: 0, ..stats }),
         other => other,
     };
-    log_sample::entries(ticks).into_iter().map(even).collect()
+    super::log_sample::entries(ticks).into_iter().map(even).collect()
 }
 
 /// A log of 110 boundaries and more, in some thirty chunks.
