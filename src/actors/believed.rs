@@ -23,6 +23,9 @@ impl Bounds {
     pub const NONE: Self = Self { reach_m: f64::INFINITY, speed_m_s: f64::INFINITY };
 
     /// The bounds of a device that reaches so far (m). One whose tool no hand moves may jump: a path says so.
+    ///
+    /// # Real-time
+    /// A plain value: wait-free, real-time safe.
     pub fn of(reach_m: f64, is_held: bool) -> Self {
         Self { reach_m, speed_m_s: if is_held { FASTEST_HAND_M_S } else { f64::INFINITY } }
     }
@@ -67,6 +70,9 @@ pub struct Believed {
 
 impl Believed {
     /// Believes `first`, read before the start.
+    ///
+    /// # Real-time
+    /// A plain value: wait-free, real-time safe.
     pub fn new(bounds: Bounds, first: &DeviceState) -> Self {
         Self { bounds, first: first.position, last: None }
     }
@@ -76,6 +82,9 @@ impl Believed {
     ///
     /// # Errors
     /// What is not believed, as the first of its kind.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn believe(&mut self, state: &DeviceState, time: Nanos) -> Result<(), Disbelieved> {
         let position = state.position;
         let refused = |from: Vec3, most_m: f64, is_outside| {

@@ -208,7 +208,7 @@ pub fn child() {
         .crossfade_ms(10.0)
         .log(std::env::var_os(LOG).expect("set by the parent"));
     if !case.privileged {
-        session = session.local(RateGroup::hz(1000));
+        session = session.local(RateGroup::hz(1000).best_effort());
     }
     let running = session.build().expect("a good session").start().expect("it starts");
     while !progress.get().is_done {

@@ -5,6 +5,9 @@ use std::fmt::Write;
 
 impl GraphView {
     /// The picture in Graphviz's language: a cluster per rate group, a node per actor, an edge per port.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn to_dot(&self) -> String {
         of(self)
     }

@@ -9,6 +9,9 @@ use crate::reports::group_live::GroupLive;
 impl GraphView {
     /// The picture as JSON: one object with `execution`, `elapsed_ns`, `groups`, `ports` and `warnings`. Times are in
     /// nanoseconds.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn to_json(&self) -> String {
         of(self)
     }

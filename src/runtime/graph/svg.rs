@@ -145,6 +145,9 @@ fn ordered(columns: &[usize], edges: &[Edge]) -> Vec<Vec<usize>> {
 impl GraphView {
     /// The picture as a drawing: a box per rate group with its actors, arrows from left to right for what goes forward
     /// and from right to left for what comes back.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn to_svg(&self) -> String {
         of(self)
     }

@@ -69,6 +69,9 @@ pub enum PortKind {
 
 impl PortKind {
     /// A short name for tables.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn name(self) -> &'static str {
         match self {
             Self::Exchange => "exchange",

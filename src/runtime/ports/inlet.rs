@@ -46,14 +46,17 @@ use std::sync::{Arc, Mutex};
 /// let order = Order::MoveTo { x_m: 0.25 };
 /// assert_eq!(Order::from_words(order.to_words()), order);
 /// ```
-///
-/// # Real-time
-/// Called in ticks, on both ways: wait-free, no allocation.
 pub trait Input: Copy + Send + 'static {
     /// The value as words; every bit of it counts.
+    ///
+    /// # Real-time
+    /// Called in ticks: must be wait-free and allocate nothing.
     fn to_words(self) -> [u64; 5];
 
     /// The value that these words are.
+    ///
+    /// # Real-time
+    /// Called in ticks: must be wait-free and allocate nothing.
     fn from_words(words: [u64; 5]) -> Self;
 }
 

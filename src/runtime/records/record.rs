@@ -92,6 +92,9 @@ pub enum EventCode {
 
 impl EventCode {
     /// The number of the kind in records and logs: below 256 the runtime's, others are the program's.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn code(self) -> u32 {
         match self {
             Self::Panic => 1,

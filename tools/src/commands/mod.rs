@@ -62,8 +62,11 @@ enum Command {
 /// Parses the command line, runs it and says how it ended.
 pub fn main() -> ExitCode {
     // Warnings of actors go to standard error; nothing real-time ever writes there itself.
-    // A log that cannot be written ends the command with an error of its own: once is enough.
-    let shown = Targets::new().with_default(LevelFilter::WARN).with_target(LOG_FAILURE, LevelFilter::OFF);
+    // What the report or the command's own error says, once is enough: what the runtime's books hold, and a log that cannot
+    // be written.
+    let shown = Targets::new()
+        .with_default(LevelFilter::WARN)
+        .with_targets([("palpate_runtime", LevelFilter::OFF), (LOG_FAILURE, LevelFilter::OFF)]);
     tracing_subscriber::fmt()
         .with_target(false)
         .without_time()
