@@ -9,8 +9,7 @@ use palpate::runtime::{Disturbance, Nanos};
 use palpate::scene::SafetyStage;
 use palpate::session::{Session, Summary};
 use session_support::*;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 const MS: u64 = 1_000_000;
 const SUBSTEPS: u64 = 2;
@@ -18,17 +17,18 @@ const SUBSTEPS: u64 = 2;
 /// Two seconds of pressing in virtual time, the global group disturbed; with the number of times that forces were
 /// evaluated.
 fn run(disturb: impl FnMut(u64) -> Disturbance + Send + 'static) -> (Summary, u64) {
-    let evaluated = Arc::new(AtomicU64::new(0));
+    let evaluated = Arc::new(Mutex::new(0));
     let counter = Arc::clone(&evaluated);
     let body = AlteredBlock::new(block(), move |block, state, forces| {
-        counter.fetch_add(1, Ordering::Relaxed);
+        *counter.lock().unwrap() += 1;
         palpate::model::body::Body::forces(block, state, forces);
     });
     let session = Session::builder(body).path(pressing()).model(LocalModelKind::Patch).virtual_time().keep_records();
     let session = session.substeps_per_ms(SUBSTEPS as u32).safety_off([SafetyStage::StartUp]);
     let summary = session.disturb("global", disturb).duration_s(2.0).build().unwrap().run().unwrap();
     assert_eq!(summary.runtime.fault, None);
-    (summary, evaluated.load(Ordering::Relaxed))
+    let evaluated = *evaluated.lock().unwrap();
+    (summary, evaluated)
 }
 
 fn said(summary: &Summary) -> bool {

@@ -10,7 +10,7 @@ use crate::graph::view::PortKind;
 use crate::graph::wiring::Wiring;
 use crate::group::group_run::GroupRun;
 use crate::ports::exchange_port::{Reader, Writer};
-use crate::ports::inlet::{Commands, Input, Parameter};
+use crate::ports::inlet::{Commands, InputValue, Parameter};
 use crate::ports::outlet::{OutletReader, OutletWriter, outlet};
 use crate::ports::port_state::PortPlan;
 use crate::ports::port_traffic::Sides;
@@ -190,7 +190,7 @@ impl RuntimeBuilder {
     /// A value that the program sets from outside while the graph runs.
     ///
     /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
-    pub fn parameter<T: Input>(&mut self, initial: T) -> Parameter<T> {
+    pub fn parameter<T: InputValue>(&mut self, initial: T) -> Parameter<T> {
         let (plan, script) = self.plan_port::<T>(PortKind::Parameter);
         Parameter::new(plan, script, initial)
     }
@@ -199,7 +199,7 @@ impl RuntimeBuilder {
     /// up to a power of two.
     ///
     /// Ports made after [`drain`](Self::drain) record what a [re-execution](Recording) needs.
-    pub fn commands<T: Input>(&mut self, capacity: usize) -> Commands<T> {
+    pub fn commands<T: InputValue>(&mut self, capacity: usize) -> Commands<T> {
         let (plan, script) = self.plan_port::<T>(PortKind::Commands);
         Commands::new(plan, script, capacity)
     }

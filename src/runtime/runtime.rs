@@ -17,7 +17,7 @@ use crate::records::recorder::Registry;
 use crate::reexecution::replay::Reexecution;
 use crate::reports::group_live::GroupLive;
 use crate::reports::live::LiveReader;
-use crate::reports::report::{FaultKind, GroupCost, RuntimeFault, RuntimeReport};
+use crate::reports::report::{GroupCost, RuntimeFault, RuntimeFaultKind, RuntimeReport};
 use crate::reports::tell::Teller;
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND, StopHandle};
@@ -307,7 +307,7 @@ impl RunningGraph {
             RuntimeFault::of_group(
                 &given_up.join("`, `"),
                 at,
-                FaultKind::GivenUp,
+                RuntimeFaultKind::GivenUp,
                 format!("did not end within {STOP_BOUND:?} {what}"),
             )
         };

@@ -24,6 +24,6 @@ mod tests;
 mod timing;
 mod units;
 
-pub use commands::{Output, WindowArgs, main};
+pub use commands::{OutputFile, WindowArgs, main};
 pub use export::{Cell, ColumnType, TableWriter, export_rows};
 pub use reduce::reduction_costs;

@@ -9,7 +9,7 @@ use crate::group::lease::Lease;
 use crate::group::panic_hook;
 use crate::primitives::exchange::ExchangeReader;
 use crate::rate_group::RateGroup;
-use crate::reports::report::{FaultKind, RuntimeFault};
+use crate::reports::report::{RuntimeFault, RuntimeFaultKind};
 use crate::supervision::overdue::{Overdue, OverdueWatch};
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND};
@@ -253,7 +253,7 @@ impl Threads {
         let at = books.next_due().unwrap_or(now);
         restarter.abandoned(at);
         let what = format!("did not return within {} and was left behind", restarter.policy.hung_after);
-        let fault = RuntimeFault::of_group(&restarter.spec.name, at, FaultKind::Hung, what);
+        let fault = RuntimeFault::of_group(&restarter.spec.name, at, RuntimeFaultKind::Hung, what);
         let (report, incarnation) = (books.report(&restarter.spec), seat.incarnation);
         self.succeed(Box::new(Failure { group: index, incarnation, fault, report, books }));
     }

@@ -15,7 +15,7 @@ use crate::records::record::{Event, EventCode};
 use crate::records::recorder::Recorder;
 use crate::records::timing::{ActorTimes, RecordedRelease, TickTiming};
 use crate::reports::live::{LiveReader, LiveWriter, live};
-use crate::reports::report::{FaultKind, GroupReport, RuntimeFault};
+use crate::reports::report::{GroupReport, RuntimeFault, RuntimeFaultKind};
 use crate::time::Nanos;
 use std::sync::Arc;
 
@@ -302,11 +302,11 @@ impl GroupRun {
         let (kind, what) = match fatal {
             Fatal::Panic(text) => {
                 self.event(at, Event::PANIC, index as u64);
-                (FaultKind::Panic, format!("panicked{}: {text}", place()))
+                (RuntimeFaultKind::Panic, format!("panicked{}: {text}", place()))
             }
             Fatal::Fault(code) => {
                 self.event(at, Event::FAULT, code.into());
-                (FaultKind::Reported(code), format!("reported fault {code}"))
+                (RuntimeFaultKind::Reported(code), format!("reported fault {code}"))
             }
         };
         RuntimeFault { group: self.spec.name.clone(), actor, at, kind, what }
@@ -319,7 +319,7 @@ impl GroupRun {
         let at = self.ledger.due(self.ledger.elapsed_periods() - 1);
         self.event(at, Event::STOPPED, skipped);
         let what = format!("stopped by its overrun policy with {skipped} releases due at once");
-        RuntimeFault::of_group(&self.spec.name, at, FaultKind::Overrun { skipped }, what)
+        RuntimeFault::of_group(&self.spec.name, at, RuntimeFaultKind::Overrun { skipped }, what)
     }
 
     fn event(&mut self, stamp: Nanos, code: EventCode, detail: u64) {

@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex};
 /// A value that fits into a record: what a [`Parameter`] or [`Commands`] can carry.
 ///
 /// ```
-/// use palpate_runtime::Input;
+/// use palpate_runtime::InputValue;
 ///
 /// #[derive(Clone, Copy, Debug, PartialEq)]
 /// enum Order {
@@ -30,7 +30,7 @@ use std::sync::{Arc, Mutex};
 ///     MoveTo { x_m: f64 },
 /// }
 ///
-/// impl Input for Order {
+/// impl InputValue for Order {
 ///     fn to_words(self) -> [u64; 5] {
 ///         match self {
 ///             Self::Home => [0; 5],
@@ -46,7 +46,7 @@ use std::sync::{Arc, Mutex};
 /// let order = Order::MoveTo { x_m: 0.25 };
 /// assert_eq!(Order::from_words(order.to_words()), order);
 /// ```
-pub trait Input: Copy + Send + 'static {
+pub trait InputValue: Copy + Send + 'static {
     /// The value as words; every bit of it counts.
     ///
     /// # Real-time
@@ -62,7 +62,7 @@ pub trait Input: Copy + Send + 'static {
 
 macro_rules! input {
     ($($type:ty: |$value:ident| $to:expr, |$word:ident| $from:expr;)*) => {
-        $(impl Input for $type {
+        $(impl InputValue for $type {
             fn to_words(self) -> [u64; 5] {
                 let $value = self;
                 [$to, 0, 0, 0, 0]
@@ -86,7 +86,7 @@ input! {
 
 macro_rules! input_array {
     ($($length:literal)*) => {
-        $(impl Input for [f64; $length] {
+        $(impl InputValue for [f64; $length] {
             fn to_words(self) -> [u64; 5] {
                 std::array::from_fn(|n| self.get(n).map_or(0, |value| value.to_bits()))
             }
@@ -154,7 +154,7 @@ impl<T: Copy> ParameterState<T> {
 /// Takes a lock among those who set it; the actor that reads it never waits.
 pub struct Parameter<T>(Arc<Mutex<ParameterState<T>>>);
 
-impl<T: Input> Parameter<T> {
+impl<T: InputValue> Parameter<T> {
     pub(crate) fn new(plan: PortPlan, script: Option<ScriptedPort>, initial: T) -> Self {
         let mut pair = exchange_pair(move || initial);
         let mut versions = FencedCounter::default();
@@ -210,7 +210,7 @@ pub struct ParameterReader<T> {
     taken: Counter,
 }
 
-impl<T: Input> ParameterReader<T> {
+impl<T: InputValue> ParameterReader<T> {
     /// Takes the value set last if it was not taken yet; returns whether there was one. A release looks once, and a start
     /// never finds one.
     ///
@@ -258,7 +258,7 @@ struct CommandsState<T> {
 /// Takes a lock among those who send; the actor that receives never waits.
 pub struct Commands<T>(Arc<Mutex<CommandsState<T>>>);
 
-impl<T: Input> Commands<T> {
+impl<T: InputValue> Commands<T> {
     pub(crate) fn new(plan: PortPlan, script: Option<ScriptedPort>, capacity: usize) -> Self {
         let mut pair = ring_pair(capacity);
         let mut attempts = FencedCounter::default();
@@ -306,7 +306,7 @@ pub struct CommandReceiver<T> {
     taken: Counter,
 }
 
-impl<T: Input> CommandReceiver<T> {
+impl<T: InputValue> CommandReceiver<T> {
     /// Takes the oldest command that was there when the release looked first; a start never finds one.
     ///
     /// # Real-time

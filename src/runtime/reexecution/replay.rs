@@ -8,7 +8,7 @@ use crate::group::group_run::GroupRun;
 use crate::records::timing::RecordedRelease;
 use crate::reexecution::recording::Recording;
 use crate::reexecution::script::Script;
-use crate::reports::report::{FaultKind, RuntimeFault};
+use crate::reports::report::{RuntimeFault, RuntimeFaultKind};
 use std::collections::VecDeque;
 
 /// A recording that is being re-executed.
@@ -104,5 +104,5 @@ impl Reexecution {
 }
 
 fn fault(group: &GroupRun, release: &RecordedRelease, what: String) -> RuntimeFault {
-    RuntimeFault::of_group(&group.spec.name, release.scheduled, FaultKind::Recording, what)
+    RuntimeFault::of_group(&group.spec.name, release.scheduled, RuntimeFaultKind::Recording, what)
 }

@@ -42,7 +42,7 @@ pub struct GroupReport {
 /// The kind of a fault, as far as a program can act on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum FaultKind {
+pub enum RuntimeFaultKind {
     /// An actor panicked. The sentence has its words and, where known, the place in the source.
     Panic,
     /// An actor reported a [fault](crate::Outcome::Fault) with this code of the program's own.
@@ -70,14 +70,14 @@ pub struct RuntimeFault {
     /// The scheduled time of the release that the fault happened in.
     pub at: Nanos,
     /// The kind of the fault, for programs.
-    pub kind: FaultKind,
+    pub kind: RuntimeFaultKind,
     /// A sentence that says what happened.
     pub what: String,
 }
 
 impl RuntimeFault {
     /// A fault of a group itself, not of an actor in it.
-    pub(crate) fn of_group(group: &str, at: Nanos, kind: FaultKind, what: String) -> Self {
+    pub(crate) fn of_group(group: &str, at: Nanos, kind: RuntimeFaultKind, what: String) -> Self {
         Self { group: group.to_owned(), actor: String::new(), at, kind, what }
     }
 }

@@ -6,8 +6,8 @@ mod support;
 
 use device_clock::DeviceClock;
 use palpate_runtime::{
-    Actor, Disturbance, Execution, FaultKind, GroupMode, Nanos, Outcome, OverrunPolicy, RateGroup, Restart, Runtime,
-    RuntimeBuilder, RuntimeReport, SlipCause, TickContext, actor_fn,
+    Actor, Disturbance, Execution, GroupMode, Nanos, Outcome, OverrunPolicy, RateGroup, Restart, Runtime,
+    RuntimeBuilder, RuntimeFaultKind, RuntimeReport, SlipCause, TickContext, actor_fn,
 };
 use std::collections::HashSet;
 use std::sync::mpsc::channel;
@@ -189,7 +189,7 @@ fn time_lost_in_a_restart_is_no_overrun(execution: Execution) {
         // A stall before the failure has ended the run without a restart.
         assert!(
             report.restarts.len() == 1
-                || report.fault.as_ref().is_some_and(|fault| matches!(fault.kind, FaultKind::Overrun { .. })),
+                || report.fault.as_ref().is_some_and(|fault| matches!(fault.kind, RuntimeFaultKind::Overrun { .. })),
             "{report}"
         );
         report.fault.is_none()

@@ -2,7 +2,7 @@
 //! a group.
 
 use palpate_runtime::{
-    Disturbance, Execution, FaultKind, Nanos, Outcome, RateGroup, Restart, Runtime, RuntimeFault, RuntimeReport,
+    Disturbance, Execution, Nanos, Outcome, RateGroup, Restart, Runtime, RuntimeFault, RuntimeFaultKind, RuntimeReport,
     SlipCause, actor_fn,
 };
 use std::collections::BTreeMap;
@@ -138,8 +138,8 @@ fn slips_restarts_and_faults_of_threads_are_told_while_the_program_does_not_look
     assert!(report.groups[0].skipped > 0);
     // Check that a program need not read sentences
     let kinds = |faults: &[RuntimeFault]| faults.iter().map(|fault| fault.kind).collect::<Vec<_>>();
-    assert_eq!(kinds(&report.restarts), [FaultKind::Panic]);
-    assert_eq!(kinds(report.fault.as_slice()), [FaultKind::Reported(42)]);
+    assert_eq!(kinds(&report.restarts), [RuntimeFaultKind::Panic]);
+    assert_eq!(kinds(report.fault.as_slice()), [RuntimeFaultKind::Reported(42)]);
     let [restart] = &ear.of("restart")[..] else { panic!("{:?}", ear.all()) };
     let [fault] = &ear.of("fault")[..] else { panic!("{:?}", ear.all()) };
     assert!(restart.field("cause").contains("the first one fails"), "{restart:?}");

@@ -79,7 +79,7 @@ impl Cut {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::{FaultKind, GroupReport, Rate};
+    use crate::runtime::{GroupReport, Rate, RuntimeFaultKind};
 
     /// Due every 10 ns; each with the times at which it woke and ended.
     fn group(ran: &[[u64; 2]]) -> Vec<TickTiming> {
@@ -155,7 +155,7 @@ mod tests {
             group: "local".to_owned(),
             actor: String::new(),
             at: Nanos(at),
-            kind: FaultKind::Recording,
+            kind: RuntimeFaultKind::Recording,
             what: "release 3 waits".to_owned(),
         };
         let unrepeated = cut.excuse(&report([3, 4]), ended(30)).unwrap();

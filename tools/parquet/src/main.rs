@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use palpate::log::LogReader;
 use palpate::{Error, printable};
-use palpate_cli::{Output, WindowArgs, export_rows};
+use palpate_cli::{OutputFile, WindowArgs, export_rows};
 
 use table::ParquetTable;
 
@@ -46,7 +46,7 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> Result<(), Error> {
     let window = args.window.window()?;
     let mut reader = LogReader::open(&args.log)?;
-    let output = Output::create(&args.out, &[&args.log])?;
+    let output = OutputFile::create(&args.out, &[&args.log])?;
     export_rows(&mut reader, &args.topic, &window, |columns| ParquetTable::new(columns, BufWriter::new(&output)))?;
     output.finish()?;
     if let Some(damage) = reader.damage() {

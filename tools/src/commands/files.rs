@@ -62,7 +62,7 @@ fn is_one_file(_: &Path, _: &Path) -> bool {
 /// A file in the making beside the one that it becomes: that one appears, or is replaced, once all is written. Dropped
 /// before, it leaves nothing behind. Devices and pipes take what comes.
 #[derive(Debug)]
-pub struct Output {
+pub struct OutputFile {
     file: File,
     /// As the user calls it.
     path: PathBuf,
@@ -70,7 +70,7 @@ pub struct Output {
     part: Option<[PathBuf; 2]>,
 }
 
-impl Output {
+impl OutputFile {
     /// Begins the file `path`, which is none of `inputs`.
     ///
     /// # Errors
@@ -125,7 +125,7 @@ impl Output {
     }
 }
 
-impl Drop for Output {
+impl Drop for OutputFile {
     fn drop(&mut self) {
         if let Some([part, _]) = &self.part {
             // Nobody is left to tell if that fails, too.
@@ -134,7 +134,7 @@ impl Drop for Output {
     }
 }
 
-impl Write for &Output {
+impl Write for &OutputFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         (&self.file).write(bytes)
     }
@@ -147,7 +147,7 @@ impl Write for &Output {
 /// Writes a page to where it was asked for, if it was.
 ///
 /// # Errors
-/// Those of [`Output::create`].
+/// Those of [`OutputFile::create`].
 pub fn write_page(
     path: Option<&Path>,
     inputs: &[impl AsRef<Path>],
@@ -155,7 +155,7 @@ pub fn write_page(
 ) -> Result<(), Error> {
     let Some(path) = path else { return Ok(()) };
     let page = page();
-    let output = Output::create(path, inputs)?;
+    let output = OutputFile::create(path, inputs)?;
     (&output).write_all(page.as_bytes()).map_err(|error| Error::io(path, error))?;
     output.finish()
 }

@@ -19,7 +19,7 @@ mod shared;
 
 use std::process::ExitCode;
 
-pub use files::Output;
+pub use files::OutputFile;
 pub use shared::WindowArgs;
 
 use clap::{CommandFactory, Parser, Subcommand};
