@@ -14,7 +14,7 @@ const ORDER: [(&str, &[&str]); 11] = [
     ("scene", &["devices", "error", "files", "printable"]),
     ("log", &["error", "printable"]),
     ("report", &["error", "log"]),
-    ("actors", &["devices", "error", "log", "report", "safety"]),
+    ("actors", &["devices", "error", "files", "log", "report", "safety"]),
     ("session", &["actors", "devices", "error", "files", "log", "report", "safety", "scene"]),
 ];
 

@@ -3,7 +3,11 @@
 use std::path::PathBuf;
 
 use crate::error::Error;
+use crate::files;
 use crate::model::surroundings::{Basis, Size, SpringGraph};
+
+/// The largest file that may be a basis (bytes).
+const MOST_BYTES: u64 = 1 << 28;
 
 /// Makes the bases of one body, or reads those that it has made before.
 #[derive(Clone, Debug)]
@@ -34,7 +38,7 @@ impl BasisStore {
     /// The basis of `patch`, if it was kept.
     pub(crate) fn read(&self, springs: &SpringGraph, patch: &[u32]) -> Option<Basis> {
         let key = self.key(springs, patch);
-        let stored = Basis::from_bytes(&std::fs::read(self.file(key)?).ok()?, key);
+        let stored = Basis::from_bytes(&files::read(&self.file(key)?, MOST_BYTES).ok()?, key);
         stored.filter(|basis| basis.patch() == patch)
     }
 
@@ -48,6 +52,8 @@ impl BasisStore {
             .and_then(|()| std::fs::write(&part, basis.to_bytes(key)))
             .and_then(|()| std::fs::rename(&part, &file));
         if let Err(error) = written {
+            // What there is of it would take the place that is missing.
+            let _ = std::fs::remove_file(&part);
             tracing::warn!("the basis could not be kept in {}: {error}", folder.display());
         }
     }
@@ -88,6 +94,12 @@ mod tests {
         assert_eq!(store.get(&springs, &patch).unwrap(), first);
         for file in files() {
             std::fs::write(file, b"no basis").unwrap();
+        }
+        assert_eq!(store.get(&springs, &patch).unwrap(), first);
+        // Check that what has no end is as good as damaged.
+        for file in files() {
+            std::fs::remove_file(&file).unwrap();
+            std::os::unix::fs::symlink("/dev/zero", &file).unwrap();
         }
         assert_eq!(store.get(&springs, &patch).unwrap(), first);
         for (count, size) in [Size::States(11), Size::ErrorPct(1.0), Size::ErrorPct(2.0)].into_iter().enumerate() {

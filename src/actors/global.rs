@@ -68,6 +68,9 @@ const PREFETCH_S: [f64; 3] = [0.15, 0.3, 0.6];
 /// starts again from its newest surface and the newest tool, so that under load it does not fall behind without end.
 const LONGEST_BACKLOG_S: f64 = 0.06;
 
+/// The fewest ticks in which such a way is gone.
+const LEAST_WAY: u64 = 8;
+
 /// What a [`GlobalActor`] has to know of the session.
 #[derive(Clone, Debug)]
 pub struct GlobalPlan {
@@ -94,7 +97,7 @@ impl GlobalPlan {
 
     /// Ticks in which a way is gone whose samples are not followed: half a period's.
     fn way_ticks(&self) -> u64 {
-        self.most_ticks() / 4
+        (self.most_ticks() / 4).max(LEAST_WAY)
     }
 
     /// How long a local model serves from its state on (s).
@@ -226,7 +229,9 @@ impl GlobalActor {
 
     /// The way of each tool begins where it is; the tick at which that is.
     fn begin_way(&mut self) -> u64 {
-        self.tools.iter_mut().for_each(|side| side.from = side.tool.position);
+        for side in &mut self.tools {
+            (side.from, side.is_between) = (side.tool.position, false);
+        }
         self.now()
     }
 

@@ -132,10 +132,14 @@ fn run(folder: &Folder) -> Child {
 #[test]
 fn a_second_run_into_the_same_log_is_refused_and_leaves_the_first_alone() {
     let folder = Folder::new();
+    folder.succeed(&["run", "scene.toml", "--virtual", "--out", "old.mcap"]);
     let first = run(&folder);
     let second = folder.call(&["run", "scene.toml", "--virtual", "--out", "./run.mcap"]);
     assert_eq!((second.code, second.err.lines().count()), (Some(2), 1), "{second:?}");
     assert!(second.err.starts_with("error: ./run.mcap: another run is writing it"), "{second:?}");
+    let page = folder.call(&["timing", "old.mcap", "--html", "run.mcap"]);
+    assert_eq!((page.code, page.err.lines().count()), (Some(2), 1), "{page:?}");
+    assert!(page.err.starts_with("error: run.mcap: a run is writing it"), "{page:?}");
     let first = ended(first.wait_with_output().unwrap());
     assert_eq!(first.code, Some(0), "{first:?}");
     folder.succeed(&["log", "check", "run.mcap"]);
@@ -193,7 +197,8 @@ fn an_output_follows_links_keeps_permissions_and_goes_to_devices_as_it_is_writte
     folder.write("table.csv", "old");
     std::fs::set_permissions(folder.path("table.csv"), std::fs::Permissions::from_mode(0o600)).unwrap();
     std::os::unix::fs::symlink("table.csv", folder.path("soft.csv")).unwrap();
-    std::os::unix::fs::symlink("other.csv", folder.path("open.csv")).unwrap();
+    std::os::unix::fs::symlink("next.csv", folder.path("open.csv")).unwrap();
+    std::os::unix::fs::symlink("other.csv", folder.path("next.csv")).unwrap();
     for (out, file) in [("soft.csv", "table.csv"), ("open.csv", "other.csv")] {
         folder.succeed(&["export", "run.mcap", "--topic", "/force", "--out", out]);
         assert_eq!(std::fs::read_to_string(folder.path(file)).unwrap(), table);

@@ -13,7 +13,7 @@ use super::prepare::{Prepared, Tool};
 use super::running::{Memory, Running, Viewer};
 use crate::actors::{LoggerActor, LoggerOutcome, SceneWatch, SurfaceView, first_state};
 use crate::devices::DeviceState;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 use crate::model::Vec3;
 use crate::runtime::{Actor, OutletPort, RecordDrain, Recording, Runtime, RuntimeBuilder, Stopwatch};
 use basis::BasisSide;
@@ -39,7 +39,9 @@ pub(super) struct Rerun {
 /// # Errors
 /// If a device gives no first state, the log cannot be created or a thread cannot be started.
 pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Running, Error> {
-    let first: Vec<DeviceState> = prepared.tools.iter_mut().map(first_of).collect::<Result<_, _>>()?;
+    let rest = prepared.simulation.body().rest();
+    let first: Vec<DeviceState> =
+        prepared.tools.iter_mut().map(|tool| first_of(tool, rest)).collect::<Result<_, _>>()?;
     let places: Vec<Vec3> = first.iter().map(|state| state.position).collect();
     let mut environment = environment::environment(&prepared, &first)?;
     let memory = prepared.options.keep_records.then(Memory::default);
@@ -96,10 +98,21 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     Ok(Running::new(graph.build()?.start()?, outcome, memory, viewer, until, builds))
 }
 
-/// The first state of a tool's device, or why there is none.
-fn first_of(tool: &mut Tool) -> Result<DeviceState, Error> {
-    let Tool { name, device, .. } = tool;
-    first_state(&mut **device).map_err(|error| if name.is_empty() { error } else { error.at(&*name) })
+/// The first state of a tool's device, or why there is none: a device that begins where it reaches no node of the body, at
+/// `rest` (m), tells another unit or nothing true, and everything that it tells later is measured from there.
+fn first_of(tool: &mut Tool, rest: &[Vec3]) -> Result<DeviceState, Error> {
+    let Tool { name, device, bounds, .. } = tool;
+    let first = first_state(&mut **device).and_then(|state| {
+        let away_m = rest.iter().map(|node| (node - state.position).norm()).fold(f64::INFINITY, f64::min);
+        if away_m <= bounds.reach_m {
+            return Ok(state);
+        }
+        let (place, reach_m): ([f64; 3], _) = (state.position.into(), bounds.reach_m);
+        let message =
+            format!("its first position is {place:?} m, {away_m:.3} m from the body, and it reaches {reach_m:.3} m");
+        Err(Error::new(ErrorKind::Device, message).at(format!("device `{}`", device.name())))
+    });
+    first.map_err(|error| if name.is_empty() { error } else { error.at(&*name) })
 }
 
 /// Where the body's surface is seen: by a program that draws, and by the log if it has the topic `/scene`.

@@ -1,6 +1,6 @@
 //! What commands read and write as files: an output is never an input, and it is there whole or not at all.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -11,6 +11,8 @@ use palpate::{Error, ErrorKind};
 const BASIS: &str = "basis";
 /// Names that are tried for a file in the making: as many may be left of programs that were killed.
 const NAMES: u32 = 1000;
+/// Links that are followed to a file that is not there yet.
+const MOST_LINKS: u32 = 40;
 
 /// Everything that the scene at `path` reads: itself, paths and logs of its devices, and the bases that were kept for it.
 pub fn inputs_of(path: &Path, scene: &Scene) -> Vec<PathBuf> {
@@ -88,14 +90,22 @@ impl OutputFile {
                 if !there.is_file() {
                     return Ok(Self { file, path: named, part: None });
                 }
+                // A file system without locks protects no file.
+                if let Err(TryLockError::WouldBlock) = file.try_lock() {
+                    return Err(io::Error::other("a run is writing it, name another file"));
+                }
                 // A link stays one.
                 (path.canonicalize()?, Some(there.permissions()))
             }
             // A link to what is not there yet is followed, too.
-            Err(_) => match fs::read_link(path) {
-                Ok(to) => (path.parent().unwrap_or(Path::new("")).join(to), None),
-                Err(_) => (named.clone(), None),
-            },
+            Err(_) => {
+                let mut target = named.clone();
+                for _ in 0..MOST_LINKS {
+                    let Ok(to) = fs::read_link(&target) else { break };
+                    target = target.parent().unwrap_or(Path::new("")).join(to);
+                }
+                (target, None)
+            }
         };
         for number in 0..NAMES {
             let part = target.with_file_name(format!(".palpate-{}-{number}.part", std::process::id()));
@@ -106,6 +116,11 @@ impl OutputFile {
                     return Ok(output);
                 }
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                // The file may be written though its folder may not.
+                Err(error) if error.kind() == io::ErrorKind::PermissionDenied && permissions.is_some() => {
+                    let file = OpenOptions::new().write(true).truncate(true).open(&target)?;
+                    return Ok(Self { file, path: named, part: None });
+                }
                 Err(error) => return Err(error),
             }
         }
