@@ -18,16 +18,20 @@ use crate::reexecution::replay::Reexecution;
 use crate::reports::group_live::GroupLive;
 use crate::reports::live::LiveReader;
 use crate::reports::report::{GroupCost, RuntimeFault, RuntimeFaultKind, RuntimeReport};
-use crate::reports::tell::Teller;
+use crate::reports::tell::{News, Teller};
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND, StopHandle};
 use crate::system::grant::{GrantHandle, SystemGrant};
 use crate::time::Nanos;
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// How often a waiting program looks at the supervisor's mailbox.
 const POLL: Duration = Duration::from_millis(5);
+
+/// How long a stop waits until the program's subscriber has heard the rest.
+const TOLD_BOUND: Duration = Duration::from_secs(1);
 
 /// A graph that was checked and can be started.
 ///
@@ -102,8 +106,9 @@ impl Runtime {
         let control = Control::new(groups.iter().filter(|group| !group.spec.observer).count());
         let names: Vec<String> = groups.iter().map(|group| group.spec.name.clone()).collect();
         let live: Vec<LiveReader> = groups.iter().map(|group| group.shown.clone()).collect();
-        let teller = Teller::new(&live, &wiring.view(execution, &[]).warnings);
-        let picture = Picture { execution, specs: groups.iter().map(|group| group.spec.clone()).collect(), wiring };
+        let specs: Vec<RateGroup> = groups.iter().map(|group| group.spec.clone()).collect();
+        let teller = Teller::new(&live, &wiring.view(execution, &specs).warnings);
+        let picture = Picture { execution, specs, wiring };
         let executor = match execution {
             Execution::Threaded => {
                 Executor::Threaded(Threads::start(groups, restarters, Arc::clone(&control), &grants)?)
@@ -119,36 +124,48 @@ impl Runtime {
             }
         };
         let executor = Arc::new(Mutex::new(Supervised { executor, teller }));
-        if let Err(error) = watch(&executor) {
+        let telling = watch(&executor).inspect_err(|_| {
             if let Executor::Threaded(threads) = &mut lock(&executor).executor {
                 // Nobody else would: the groups have been released.
                 threads.join(&names, STOP_BOUND);
             }
-            return Err(error);
-        }
-        Ok(RunningGraph { executor, control, names, live, picture, registry, grants })
+        })?;
+        Ok(RunningGraph { executor, control, names, live, picture, registry, grants, telling: Mutex::new(telling) })
     }
 }
 
-/// Starts a thread that answers faults while the program does not look, if there is a group that can be started again, and
-/// that tells the program's subscriber what happens, if it has one.
-/// It ends with the run.
-fn watch(executor: &Arc<Mutex<Supervised>>) -> Result<(), GraphError> {
-    let needed = match &*lock(executor) {
-        Supervised { executor: Executor::Threaded(threads), teller } => threads.need_watching() || teller.is_heard(),
-        _ => false,
+/// Starts a thread that answers faults while the program does not look, if there is a group that can be started again,
+/// and another, which is returned, that tells the program's subscriber what happens, if it has one: a subscriber may
+/// block. They end with the run.
+fn watch(executor: &Arc<Mutex<Supervised>>) -> Result<Option<JoinHandle<()>>, GraphError> {
+    let (watched, heard) = match &*lock(executor) {
+        Supervised { executor: Executor::Threaded(threads), teller } => (threads.need_watching(), teller.is_heard()),
+        _ => (false, false),
     };
-    if !needed {
-        return Ok(());
+    let start = |name: &str, look: fn(&Mutex<Supervised>) -> Option<bool>| {
+        let run = Arc::downgrade(executor);
+        let watch = move || {
+            while run.upgrade().is_some_and(|executor| look(&executor) == Some(false)) {
+                std::thread::park_timeout(POLL);
+            }
+        };
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(watch);
+        thread.map_err(|error| GraphError::refused(format!("no thread for the {name}: {error}")))
+    };
+    if watched {
+        start("supervisor", |executor| lock(executor).poll())?;
     }
-    let watched = Arc::downgrade(executor);
-    let watch = move || {
-        while watched.upgrade().is_some_and(|executor| lock(&executor).poll() == Some(false)) {
-            std::thread::sleep(POLL);
-        }
-    };
-    let thread = std::thread::Builder::new().name("supervisor".to_owned()).spawn(watch);
-    thread.map(drop).map_err(|error| GraphError::refused(format!("no thread for the supervisor: {error}")))
+    heard.then(|| start("teller", poll_and_tell)).transpose()
+}
+
+/// Looks after the threads and tells what is new, the latter without the lock.
+fn poll_and_tell(executor: &Mutex<Supervised>) -> Option<bool> {
+    let mut supervised = lock(executor);
+    let over = supervised.poll();
+    let news = supervised.news(over == Some(true));
+    drop(supervised);
+    news.tell();
+    over
 }
 
 impl_debug!(Runtime, "execution": |own| own.execution, "groups": |own| own.specs());
@@ -163,16 +180,14 @@ impl Supervised {
     /// Looks after the threads; true when the run is over, `None` in virtual time, which nobody has to look after.
     fn poll(&mut self) -> Option<bool> {
         let Executor::Threaded(threads) = &mut self.executor else { return None };
-        let over = threads.poll();
-        self.teller.tell(&threads.supervisor, over);
-        Some(over)
+        Some(threads.poll())
     }
 
-    /// Tells all that is left.
-    fn tell_rest(&mut self) {
+    /// What has not been told.
+    fn news(&mut self, end: bool) -> News {
         match &self.executor {
-            Executor::Threaded(threads) => self.teller.tell(&threads.supervisor, true),
-            Executor::Virtual(run) => self.teller.tell(&run.supervisor, true),
+            Executor::Threaded(threads) => self.teller.news(&threads.supervisor, end),
+            Executor::Virtual(run) => self.teller.news(&run.supervisor, end),
         }
     }
 }
@@ -198,6 +213,8 @@ pub struct RunningGraph {
     picture: Picture,
     registry: Arc<Registry>,
     grants: GrantHandle,
+    /// Tells the program's subscriber, if threads run and there is one.
+    telling: Mutex<Option<JoinHandle<()>>>,
 }
 
 impl RunningGraph {
@@ -211,7 +228,9 @@ impl RunningGraph {
         let mut supervised = lock(&self.executor);
         if let Executor::Virtual(run) = &mut supervised.executor {
             run.advance(Nanos::from_duration(span));
-            return supervised.tell_rest();
+            let news = supervised.news(true);
+            drop(supervised);
+            return news.tell();
         }
         drop(supervised);
         let start = Instant::now();
@@ -334,7 +353,19 @@ impl RunningGraph {
                 Vec::new()
             }
         };
-        supervised.tell_rest();
+        let virtual_time = matches!(supervised.executor, Executor::Virtual(_));
+        let news = virtual_time.then(|| supervised.news(true));
+        drop(supervised);
+        news.into_iter().for_each(News::tell);
+        let telling = lock(&self.telling).take();
+        // A subscriber that stops the run is on that thread, and one that blocks must not keep the program.
+        if let Some(thread) = telling.filter(|telling| telling.thread().id() != std::thread::current().id()) {
+            thread.thread().unpark();
+            let start = Instant::now();
+            while !thread.is_finished() && start.elapsed() < TOLD_BOUND {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
         given_up
     }
 }

@@ -165,3 +165,122 @@ fn a_run_whose_group_cannot_restart_is_told_of_too() {
     });
     assert_eq!(ear.of("fault").len(), 1);
 }
+
+/// Does something with each event, after it was counted.
+#[derive(Clone)]
+struct Handler(Ear, Arc<dyn Fn() + Send + Sync>, &'static str);
+
+impl Subscriber for Handler {
+    fn enabled(&self, event: &Metadata<'_>) -> bool {
+        event.target().contains(self.2)
+    }
+
+    fn new_span(&self, _: &Attributes<'_>) -> Id {
+        Id::from_u64(1)
+    }
+
+    fn record(&self, _: &Id, _: &Record<'_>) {}
+
+    fn record_follows_from(&self, _: &Id, _: &Id) {}
+
+    fn event(&self, event: &Event<'_>) {
+        self.0.event(event);
+        self.1();
+    }
+
+    fn enter(&self, _: &Id) {}
+
+    fn exit(&self, _: &Id) {}
+}
+
+/// A group that fails twice: at its first start and at its second.
+fn fails_twice() -> palpate_runtime::RunningGraph {
+    let mut graph = Runtime::builder(Execution::Threaded);
+    let mut starts = 0;
+    let factory = move || {
+        starts += 1;
+        let fails = starts <= 2;
+        let actor = move |ctx: &palpate_runtime::TickContext| {
+            assert!(!(fails && ctx.tick % 10 == 9), "fails");
+            Outcome::Continue
+        };
+        Ok(vec![actor_fn("actor", actor)])
+    };
+    graph.restartable(RateGroup::hz(200).name("worker"), Restart { at_most: 5, ..Restart::default() }, factory);
+    graph.build().unwrap().start().unwrap()
+}
+
+fn until(what: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !what() && start.elapsed() < Duration::from_secs(30) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(what());
+}
+
+#[test]
+fn a_subscriber_that_blocks_keeps_neither_restarts_nor_questions_nor_the_stop() {
+    let (ear, blocked) = (Ear::default(), Arc::new(Mutex::new(())));
+    let (held, own) = (blocked.lock().unwrap(), Arc::clone(&blocked));
+    let handler = Handler(ear.clone(), Arc::new(move || drop(own.lock())), "");
+    let running = tracing::subscriber::with_default(handler, fails_twice);
+    until(|| !ear.all().is_empty());
+    let before = running.live()[0].released;
+    until(|| running.live()[0].released > before + 40);
+    assert!(!running.finished());
+    let report = running.stop();
+    assert_eq!((report.restarts.len(), report.fault), (2, None));
+    drop(held);
+}
+
+#[test]
+fn a_subscriber_that_panics_loses_its_event_alone() {
+    let ear = Ear::default();
+    let handler = Handler(ear.clone(), Arc::new(|| panic!("the subscriber fails")), "");
+    let running = tracing::subscriber::with_default(handler, fails_twice);
+    until(|| ear.of("restart").len() == 2);
+    assert_eq!(running.stop().restarts.len(), 2);
+}
+
+#[test]
+fn a_subscriber_may_ask_the_run_in_both_executions_and_threads_are_told_of_by_one_thread() {
+    for execution in [Execution::Virtual, Execution::Threaded] {
+        let (ear, slot) = (Ear::default(), Arc::new(Mutex::new(None::<Arc<palpate_runtime::RunningGraph>>)));
+        let asked = Arc::clone(&slot);
+        let ask = move || {
+            let run = asked.lock().unwrap().clone();
+            run.map(|run| (run.elapsed(), run.finished()));
+        };
+        tracing::subscriber::with_default(Handler(ear.clone(), Arc::new(ask), ""), || {
+            let mut graph = Runtime::builder(execution);
+            graph.group(
+                RateGroup::hz(200).name("worker"),
+                vec![actor_fn("actor", |ctx| if ctx.tick == 40 { Outcome::Fault(7) } else { Outcome::Continue })],
+            );
+            let running = Arc::new(graph.build().unwrap().start().unwrap());
+            *slot.lock().unwrap() = Some(Arc::clone(&running));
+            running.wait_for(Duration::from_secs(30));
+            until(|| !ear.of("fault").is_empty());
+            slot.lock().unwrap().take();
+        });
+        let teller = |heard: &Heard| execution == Execution::Virtual || heard.thread == "teller";
+        assert!(ear.all().iter().all(teller), "{:?}", ear.all());
+    }
+}
+
+#[test]
+fn a_subscriber_of_restarts_or_of_faults_alone_hears_them() {
+    for target in ["restart", "fault"] {
+        let ear = Ear::default();
+        let handler = Handler(ear.clone(), Arc::new(|| {}), target);
+        let running = tracing::subscriber::with_default(handler, || {
+            let mut graph = Runtime::builder(Execution::Threaded);
+            let factory = || Ok(vec![actor_fn("actor", |_| Outcome::Fault(7))]);
+            graph.restartable(RateGroup::hz(200).name("worker"), Restart { at_most: 1, ..Restart::default() }, factory);
+            graph.build().unwrap().start().unwrap()
+        });
+        until(|| !ear.of(target).is_empty());
+        drop(running);
+        assert_eq!(ear.all().len(), 1);
+    }
+}
