@@ -244,15 +244,16 @@ impl RateGroup {
     #[must_use]
     pub fn best_effort(mut self) -> Self {
         self.priority = None;
+        self.by_deadline = false;
         self.best_effort = true;
         self
     }
 
-    /// Asks for SCHED_FIFO with this priority unless the group has said what it wants, by [`realtime`](Self::realtime)
-    /// or [`best_effort`](Self::best_effort).
+    /// Asks for SCHED_FIFO with this priority unless the group has said what it wants, by [`realtime`](Self::realtime),
+    /// [`realtime_by_deadline`](Self::realtime_by_deadline) or [`best_effort`](Self::best_effort).
     #[must_use]
     pub fn realtime_by_default(self, priority: u8) -> Self {
-        if self.best_effort || self.priority.is_some() { self } else { self.realtime(priority) }
+        if self.best_effort || self.is_realtime() { self } else { self.realtime(priority) }
     }
 
     /// Sets what becomes of releases that the group could not make in time.

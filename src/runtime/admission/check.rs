@@ -51,13 +51,13 @@ pub(crate) fn admit(groups: &[RateGroup], execution: Execution, cores: Cores<'_>
 /// A core that the machine has not is a mistake, other than one that the process may not use: that is a refusal like any
 /// other.
 fn check_core(group: &RateGroup, there: &[usize]) -> Result<(), GraphError> {
-    match group.cpu {
-        Some(cpu) if !there.is_empty() && !there.contains(&cpu) => {
+    match group.cores().iter().find(|cpu| !there.is_empty() && !there.contains(cpu)) {
+        Some(cpu) => {
             let there: Vec<String> = there.iter().map(usize::to_string).collect();
             let message = format!("there is no core {cpu} to pin it to; the machine has {}", there.join(", "));
             Err(GraphError::refused(message).in_group(&group.name))
         }
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 
@@ -280,6 +280,8 @@ mod tests {
     fn a_core_that_does_not_exist_is_refused_on_threads_with_those_that_do() {
         let far = [named("a").pin(2)];
         refused(&far, &["rate group `a`", "no core 2", "has 0, 1"]);
+        refused(&[named("a").pin_to([998, 999])], &["rate group `a`", "no core 998", "has 0, 1"]);
+        refused(&[named("a").pin_to([1, 999])], &["no core 999"]);
         assert!(admit(&[named("a").pin(1)]).is_ok());
         assert!(super::admit(&far, Execution::Virtual, cores(2)).is_ok());
         // Check that a system which does not say leaves it to the thread

@@ -55,7 +55,10 @@ impl GroupThread {
         let base_ns = self.link.base_ns;
         self.group.time_actors(move || since(base_ns));
         let failed = self.release_all(&mut waiter);
-        if self.link.lease.is_revoked() {
+        // Of a group that ends nobody can take the place any more; one that failed may still hang in its stop.
+        let lease = &self.link.lease;
+        let is_replaced = if failed.is_none() { !lease.begin_booking() } else { lease.is_revoked() };
+        if is_replaced {
             // Its place is taken: it says nothing any more, and its actors go with it.
             return;
         }

@@ -240,7 +240,9 @@ impl Threads {
     fn leave_behind(&mut self, index: usize, now: Nanos) {
         let seat = &mut self.seats[index];
         let Some((restarter, books)) = &mut seat.restart else { return };
-        if !seat.lease.revoke() {
+        let release = books.get().elapsed_periods();
+        books.refresh();
+        if books.get().elapsed_periods() != release || !seat.lease.revoke() {
             // It has just come back.
             return;
         }

@@ -93,8 +93,11 @@ impl Counter {
     /// Wait-free (plain loads and stores), real-time safe.
     #[inline]
     pub(crate) fn pass(&self, ctx: &TickContext) {
-        let place = usize::from(ctx.group) << ACTOR_BITS | usize::from(ctx.actor);
-        self.counts.place.store(place, Ordering::Relaxed);
+        // A context made by hand has no place in the graph.
+        if ctx.execution.is_some() {
+            let place = usize::from(ctx.group) << ACTOR_BITS | usize::from(ctx.actor);
+            self.counts.place.store(place, Ordering::Relaxed);
+        }
         self.pass_outside();
     }
 
@@ -134,13 +137,15 @@ impl Sides {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
+    use crate::executor::Execution;
     use crate::time::Rate;
 
     #[test]
     fn a_side_sums_up_its_halves_and_a_fenced_one_has_no_part_in_it() {
         let side = Side::new();
         assert!(!side.is_held());
-        let ctx = TickContext { group: 3, actor: 7, ..TickContext::by_hand(Rate::hz(10), 0) };
+        let execution = Some(Execution::Threaded);
+        let ctx = TickContext { group: 3, actor: 7, execution, ..TickContext::by_hand(Rate::hz(10), 0) };
         let fenced = side.take();
         (0..2).for_each(|_| fenced.pass(&ctx));
         let next = side.take();

@@ -105,7 +105,20 @@ pub fn exchange<T: Send>(init: impl FnMut() -> T) -> (ExchangeWriter<T>, Exchang
 #[inline(never)]
 unsafe fn fill<T>(place: *mut Slot<T>, init: &mut impl FnMut() -> T) {
     // SAFETY: the caller owns the place.
-    unsafe { place.write(CachePadded(UnsafeCell::new(Stamped::initial(init())))) };
+    #[cfg(loom)]
+    unsafe {
+        place.write(CachePadded(UnsafeCell::new(Stamped::initial(init()))));
+    }
+    // Field by field: without optimization each of the wrappers would be a further copy on the stack.
+    #[cfg(not(loom))]
+    // SAFETY: the caller owns the place, and no field is read or dropped. The padding wraps one field, which begins
+    // where it does, and the cell is transparent.
+    unsafe {
+        let stamped = place.cast::<Stamped<T>>();
+        (&raw mut (*stamped).value).write(init());
+        (&raw mut (*stamped).version).write(0);
+        (&raw mut (*stamped).published).write(Nanos::ZERO);
+    }
 }
 
 fn pair<T>(shared: Arc<Shared<T>>) -> (ExchangeWriter<T>, ExchangeReader<T>) {

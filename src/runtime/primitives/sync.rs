@@ -21,6 +21,7 @@ mod imp {
     pub(crate) type AtomicUsize = std::sync::atomic::AtomicUsize;
 
     /// The standard cell with loom's interface: every access is a closure, so that loom can check it.
+    #[repr(transparent)]
     pub(crate) struct UnsafeCell<T>(std::cell::UnsafeCell<T>);
 
     impl<T> UnsafeCell<T> {
@@ -52,7 +53,7 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Keeps what two threads write on cache lines of their own; two lines, because adjacent lines are fetched in pairs.
 #[derive(Debug, Default)]
-#[repr(align(128))]
+#[repr(C, align(128))]
 pub(crate) struct CachePadded<T>(pub(crate) T);
 
 impl<T> std::ops::Deref for CachePadded<T> {

@@ -52,7 +52,10 @@ pub(crate) fn findings(root: &Path, groups: &[RateGroup]) -> Vec<MachineFinding>
         throttling(read("proc/sys/kernel/sched_rt_runtime_us")),
         smt(read("sys/devices/system/cpu/smt/active")),
         governor(read("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")),
-        idle_states(read("sys/devices/system/cpu/cpuidle/current_driver"), root.join("dev/cpu_dma_latency").exists()),
+        idle_states(
+            read("sys/devices/system/cpu/cpuidle/current_driver"),
+            can_write(&root.join("dev/cpu_dma_latency")),
+        ),
         limit(read("proc/self/limits"), "Max realtime priority", "priority limit", 99),
         limit(read("proc/self/limits"), "Max locked memory", "memory lock", u64::MAX),
         priorities(groups),
@@ -128,13 +131,18 @@ fn governor(governor: Option<String>) -> MachineFinding {
     finding("governor", is, found, "cpupower frequency-set -g performance")
 }
 
+/// Opened as a run opens it, which says more than the file's rights do; closed at once, so that nothing is asked for.
+fn can_write(path: &Path) -> bool {
+    std::fs::File::options().write(true).open(path).is_ok()
+}
+
 fn idle_states(driver: Option<String>, can_hold: bool) -> MachineFinding {
     let is = driver.as_deref().map(|driver| driver == "none" || can_hold);
     let found = match (driver.as_deref(), can_hold) {
         (None, _) => String::new(),
         (Some("none"), _) => "the kernel uses none".to_owned(),
         (Some(driver), true) => format!("{driver}, held off while a run lasts"),
-        (Some(driver), false) => format!("{driver}, and /dev/cpu_dma_latency is not there to hold them off"),
+        (Some(driver), false) => format!("{driver}, and /dev/cpu_dma_latency cannot be written to hold them off"),
     };
     finding("C-states", is, found, "boot with processor.max_cstate=1 or intel_idle.max_cstate=1")
 }
@@ -211,6 +219,14 @@ mod tests {
         ];
         let states = states(&machine("ready", &files), group());
         assert!(states.iter().all(|(_, state)| *state == Readiness::Ready), "{states:?}");
+    }
+
+    #[test]
+    fn idle_states_that_a_file_is_there_for_but_cannot_be_written_are_not_held_off() {
+        let files = [("sys/devices/system/cpu/cpuidle/current_driver", "intel_idle\n"), ("dev/cpu_dma_latency/in", "")];
+        // A folder in its place, which root cannot write either.
+        let states = states(&machine("unwritable", &files), group());
+        assert!(states.contains(&("C-states", Readiness::Missing)), "{states:?}");
     }
 
     #[test]

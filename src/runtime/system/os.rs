@@ -125,7 +125,9 @@ mod imp {
             let mut allowed: libc::cpu_set_t = std::mem::zeroed();
             libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &raw mut allowed);
             if let Some(cpu) = cpus.iter().find(|&&cpu| !libc::CPU_ISSET(cpu, &allowed)) {
-                return refused(&format!("core {cpu} is not available to this process"));
+                return refused(&format!(
+                    "core {cpu} is not open to this process (taskset -pc, or its cgroup's cpuset.cpus)"
+                ));
             }
             libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set)
         };
@@ -235,8 +237,10 @@ mod imp {
         /// Puts the thread behind all others: it may be spinning and would keep its core from its replacement.
         pub(crate) fn put_behind(&self) {
             let parameter = libc::sched_param { sched_priority: 0 };
+            // The flag that the thread may have already: to clear it takes a privilege.
+            let policy = libc::SCHED_IDLE | libc::SCHED_RESET_ON_FORK;
             // SAFETY: the pointer is to a sched_param of our own and outlives the call. A refusal leaves the thread as it is.
-            unsafe { libc::syscall(libc::SYS_sched_setscheduler, self.id, libc::SCHED_IDLE, &raw const parameter) };
+            unsafe { libc::syscall(libc::SYS_sched_setscheduler, self.id, policy, &raw const parameter) };
         }
     }
 

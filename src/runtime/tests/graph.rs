@@ -208,3 +208,25 @@ fn text_json_dot_and_svg_hold_every_group_port_and_figure_and_are_well_formed() 
     }
     assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
 }
+
+#[test]
+fn a_linked_port_used_by_hand_before_the_start_neither_stops_it_nor_contradicts_its_link() {
+    for execution in [Execution::Virtual, Execution::Threaded] {
+        let mut graph = Runtime::builder(execution);
+        graph.link("value", "second", "first");
+        let (mut publish, mut read) = graph.exchange(|| 0.0);
+        publish.publish(&TickContext::by_hand(palpate_runtime::Rate::hz(100), 0));
+        let first = actor_fn("first", move |ctx| {
+            read.refresh(ctx);
+            Outcome::Continue
+        });
+        let second = actor_fn("second", move |_| {
+            let _ = &publish;
+            Outcome::Continue
+        });
+        graph.group(RateGroup::hz(100).name("a"), vec![first]).group(RateGroup::hz(50).name("b"), vec![second]);
+        let graph = graph.build().unwrap();
+        assert_eq!(graph.graph().warnings, Vec::<String>::new());
+        drop(graph.start().unwrap());
+    }
+}
