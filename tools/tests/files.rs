@@ -5,9 +5,7 @@ mod support;
 
 use std::process::{Child, Command, Output, Stdio};
 
-use palpate::log::{Environment, LogEntry, LogReader, McapWriter};
-
-use support::{Called, Folder, SCENE};
+use support::{Called, Folder, SCENE, rewrite_log};
 
 /// A folder with a run's log `drive.mcap` and the scene `replay.toml`, which follows it and has a basis.
 fn folder() -> Folder {
@@ -58,34 +56,6 @@ fn no_output_overwrites_an_input_however_it_is_called() {
     }
 }
 
-/// `drive.mcap` with another text of what was run.
-fn with_session(folder: &Folder, change: impl Fn(&str) -> String) {
-    let log = folder.path("drive.mcap");
-    let entries: Vec<_> = LogReader::open(&log).unwrap().collect();
-    let mut environment = Environment::default();
-    let mut session = None;
-    for entry in &entries {
-        match entry {
-            LogEntry::Environment(found) => environment = found.clone(),
-            LogEntry::Attachment { name, data } if name == Environment::SESSION => {
-                session = Some(change(std::str::from_utf8(data).unwrap()));
-            }
-            _ => {}
-        }
-    }
-    environment.session = session;
-    let mut writer = McapWriter::create(&log, &environment).unwrap();
-    for entry in entries {
-        match entry {
-            LogEntry::Record(record) => writer.write(&record).unwrap(),
-            LogEntry::Text(event) => writer.write_text(&event).unwrap(),
-            LogEntry::Stats(stats) => writer.write_stats(&stats).unwrap(),
-            LogEntry::Environment(_) | LogEntry::Attachment { .. } => {}
-        }
-    }
-    writer.finish().unwrap();
-}
-
 #[test]
 fn a_log_chooses_no_path_where_it_is_replayed() {
     let folder = Folder::new();
@@ -100,10 +70,11 @@ fn a_log_chooses_no_path_where_it_is_replayed() {
     assert!(!folder.files().contains(&"bases".to_owned()));
     // Check that a log that names a folder nevertheless is replayed without it
     let elsewhere = folder.path("elsewhere").display().to_string();
-    with_session(&folder, |session| {
+    let session = |session: String| {
         assert!(session.contains("[local]\n"), "{session}");
         session.replace("[local]\n", &format!("[local]\nbasis_folder = {elsewhere:?}\n"))
-    });
+    };
+    rewrite_log(&folder.path("drive.mcap"), session, |record| record);
     folder.succeed(&["replay", "drive.mcap"]);
     assert!(!folder.path("elsewhere").exists());
 }

@@ -2,10 +2,10 @@
 
 mod support;
 
-use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter};
+use palpate::log::LogRecord;
 use palpate::runtime::Nanos;
 
-use support::{Folder, SCENE};
+use support::{Folder, SCENE, rewrite_log};
 
 /// Records a run and gives the number of its forces.
 fn recorded(folder: &Folder, more: &[&str]) -> usize {
@@ -15,36 +15,14 @@ fn recorded(folder: &Folder, more: &[&str]) -> usize {
 
 /// Changes the last bit of the force at 150 ms.
 fn spoil(folder: &Folder) {
-    let log = folder.path("run.mcap");
-    let entries: Vec<_> = LogReader::open(&log).unwrap().collect();
-    let mut environment = Environment::default();
-    for entry in &entries {
-        match entry {
-            LogEntry::Environment(found) => {
-                environment = Environment { session: environment.session, ..found.clone() };
-            }
-            LogEntry::Attachment { name, data } if name == Environment::SESSION => {
-                environment.session = Some(String::from_utf8(data.clone()).unwrap());
-            }
-            _ => {}
+    let spoiled = |record| match record {
+        LogRecord::Force(mut force) if force.time == Nanos(150_000_000) => {
+            force.force_n[2] = f64::from_bits(force.force_n[2].to_bits() ^ 1);
+            LogRecord::Force(force)
         }
-    }
-    let mut writer = McapWriter::create(&log, &environment).unwrap();
-    for entry in entries {
-        match entry {
-            LogEntry::Record(LogRecord::Force(mut force)) => {
-                if force.time == Nanos(150_000_000) {
-                    force.force_n[2] = f64::from_bits(force.force_n[2].to_bits() ^ 1);
-                }
-                writer.write(&LogRecord::Force(force)).unwrap();
-            }
-            LogEntry::Record(record) => writer.write(&record).unwrap(),
-            LogEntry::Text(event) => writer.write_text(&event).unwrap(),
-            LogEntry::Stats(stats) => writer.write_stats(&stats).unwrap(),
-            LogEntry::Environment(_) | LogEntry::Attachment { .. } => {}
-        }
-    }
-    writer.finish().unwrap();
+        record => record,
+    };
+    rewrite_log(&folder.path("run.mcap"), |session| session, spoiled);
 }
 
 #[test]

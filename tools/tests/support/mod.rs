@@ -1,11 +1,14 @@
 //! Runs the `palpate` command in a folder of its own.
 #![allow(dead_code)]
 
+mod rewritten;
 mod scene;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+#[allow(unused_imports)]
+pub use rewritten::rewrite_log;
 pub use scene::{PATH, SCENE};
 
 /// What a call left behind.
