@@ -7,6 +7,7 @@ mod network;
 mod region;
 mod shape;
 mod spring;
+mod tetrahedra;
 
 pub use block::{Block, BlockBuilder};
 pub use kernel::InstructionSet;
@@ -15,6 +16,7 @@ pub use region::Region;
 pub use shape::Shape;
 pub(crate) use spring::assemble;
 pub use spring::{Spring, SpringTangent};
+pub use tetrahedra::{TetrahedraBuilder, Tissue, TissueRegion, Where};
 
 use crate::mesh::Surface;
 use crate::{Mat3, Vec3};

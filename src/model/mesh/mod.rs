@@ -4,8 +4,10 @@ mod lattice;
 mod lists;
 mod nearest;
 mod surface;
+mod tetrahedral;
 
 pub use lattice::{Face, Lattice};
 pub(crate) use lists::Lists;
 pub(crate) use nearest::NearestTriangle;
 pub use surface::Surface;
+pub use tetrahedral::{Group, TetrahedralMesh};
