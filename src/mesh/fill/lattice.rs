@@ -35,7 +35,7 @@ impl Lattice {
             return Err(MeshError::new(format!("an element size of {cell_m} m: a length above zero is needed")));
         }
         let wanted = extent.map(|x| (x / cell_m).ceil() + 4.0);
-        if !(wanted.product() <= MOST_CELLS) {
+        if wanted.product() > MOST_CELLS {
             let fits = (extent.product() / (0.8 * MOST_CELLS)).cbrt().max(extent.max() / 1e6);
             let message = format!(
                 "an element size of {cell_m} m takes a lattice of {:.1e} cells, above {MOST_CELLS:.0e}: {fits:.2e} m fits",

@@ -105,7 +105,7 @@ fn crossing(depth: impl Fn(f64) -> f64, ends: [f32; 2]) -> f64 {
         let at = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
         middle = if at > low.0 && at < high.0 { at } else { 0.5 * (low.0 + high.0) };
         let value = depth(middle);
-        if !(value.abs() > tolerance) {
+        if value.abs() <= tolerance || value.is_nan() {
             break;
         }
         // An end that stays counts half, so that both close in.
