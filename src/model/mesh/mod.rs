@@ -10,4 +10,4 @@ pub use lattice::{Face, Lattice};
 pub(crate) use lists::Lists;
 pub(crate) use nearest::NearestTriangle;
 pub use surface::Surface;
-pub use tetrahedral::{Group, TetrahedralMesh};
+pub use tetrahedral::{Group, LeftOut, MeshQuality, TetrahedralMesh};

@@ -1,5 +1,13 @@
 //! Volumes of linear tetrahedra, with named groups of nodes and elements.
 
+mod checks;
+mod faces;
+mod parts;
+mod quality;
+
+pub use checks::LeftOut;
+pub use quality::MeshQuality;
+
 use crate::Vec3;
 
 /// A volume of linear tetrahedra as a mesh file holds it.
@@ -31,5 +39,28 @@ impl TetrahedralMesh {
     /// Bounded, by the number of groups.
     pub fn group(&self, name: &str) -> Option<&Group> {
         self.groups.iter().find(|group| group.name == name)
+    }
+
+    /// The mesh with coordinates in metres: those it has, in units of `metres_per_unit`.
+    ///
+    /// # Real-time
+    /// Not for a tick: as long as there are nodes.
+    #[must_use]
+    pub fn scaled(mut self, metres_per_unit: f64) -> Self {
+        self.points.iter_mut().for_each(|point| *point *= metres_per_unit);
+        self
+    }
+
+    /// The mean of the element's corners (m).
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn centroid(&self, element: u32) -> Vec3 {
+        self.corners(element).iter().sum::<Vec3>() / 4.0
+    }
+
+    /// The positions of the element's corners (m).
+    fn corners(&self, element: u32) -> [Vec3; 4] {
+        self.tetrahedra[element as usize].map(|node| self.points[node as usize])
     }
 }
