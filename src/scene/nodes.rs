@@ -91,7 +91,8 @@ impl<'a> Nodes<'a> {
     fn nearest(&self, field: &str, point: Vec3, is_meant: &dyn Fn(u32) -> bool) -> Result<u32, Error> {
         let rest = self.body.rest();
         let away_m = |id: u32| (rest[id as usize] - point).norm();
-        let nearest = (0..rest.len() as u32).filter(|&id| is_meant(id)).min_by(|&a, &b| away_m(a).total_cmp(&away_m(b)));
+        let nearest =
+            (0..rest.len() as u32).filter(|&id| is_meant(id)).min_by(|&a, &b| away_m(a).total_cmp(&away_m(b)));
         let size_m = rest.iter().map(|node| (node - rest[0]).norm()).fold(0.0, f64::max);
         match nearest {
             Some(id) if away_m(id) <= size_m => Ok(id),

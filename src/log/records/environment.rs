@@ -107,7 +107,7 @@ pub struct Environment {
     /// The run as a scene file: the scene with everything that a program or the command line changed. It travels as
     /// the attachment [`SESSION`](Self::SESSION); a reader leaves it empty.
     pub session: Option<String>,
-    /// The mesh of a body of tetrahedra, as a file of Gmsh's in metres. It travels as the attachment [`MESH`](Self::MESH); a
+    /// The mesh of a body of tetrahedra: the file that it was read from, or one of Gmsh's. It travels as the attachment [`MESH`](Self::MESH); a
     /// reader leaves it empty.
     pub mesh: Option<Arc<[u8]>>,
 }
@@ -119,7 +119,7 @@ impl Environment {
     pub const SESSION: &str = "session.toml";
 
     /// The attachment that is the body's mesh.
-    pub const MESH: &str = "mesh.msh";
+    pub const MESH: &str = "mesh";
 
     /// The contents of an attachment, if they are known.
     pub fn attachment(&self, name: &str) -> Option<&[u8]> {

@@ -230,7 +230,7 @@ impl<W: Write> McapWriter<W> {
         }
         self.attach(output, Environment::SCENE, "application/toml")?;
         self.attach(output, Environment::SESSION, "application/toml")?;
-        self.attach(output, Environment::MESH, "text/plain")?;
+        self.attach(output, Environment::MESH, "application/octet-stream")?;
         if self.channels.is_empty() {
             let declared: Vec<Topic> = Topic::declared(&self.environment).collect();
             for topic in declared {

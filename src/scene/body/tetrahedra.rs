@@ -156,12 +156,14 @@ impl TetrahedraSpec {
             density: self.tissue.density_kg_m3,
             viscosity: self.tissue.viscosity_pa_s,
         };
-        let builder = Tetrahedra::builder(volume.mesh().clone()).tissue(tissue).nodal_pressure(self.tissue.nodal_pressure);
+        let builder =
+            Tetrahedra::builder(volume.mesh().clone()).tissue(tissue).nodal_pressure(self.tissue.nodal_pressure);
         let builder = self.fixed.iter().fold(builder, |builder, place| builder.fix(place.clone()));
         let builder = self.regions.iter().fold(builder, |builder, spec| builder.region(spec.region()));
-        builder.build().map_err(|error| match error.place() {
-            "" => Error::scene("body", error.message()),
-            place => Error::scene(&format!("body.{place}"), error.message()),
+        // `fixed[0]: group` as a field of a scene.
+        builder.build().map_err(|error| match error.place().split(':').next() {
+            None | Some("") => Error::scene("body", error.message()),
+            Some(place) => Error::scene(&format!("body.{place}"), error.message()),
         })
     }
 }

@@ -61,12 +61,7 @@ impl Scene {
         Self::from_text(text, name, base, &mut |_| ())
     }
 
-    fn from_text(
-        text: &str,
-        name: &str,
-        base: Option<&Path>,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<Self, Error> {
+    fn from_text(text: &str, name: &str, base: Option<&Path>, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let found = |file: &Path| base.map_or_else(|| file.to_owned(), |base| base.join(file));
         let read_path = |path_csv: &Path| ToolPath::read_csv(&found(path_csv));
         let read_volume = |spec: &TetrahedraSpec, file: &Path| Volume::read(spec, &found(file), progress);
@@ -121,17 +116,11 @@ impl Scene {
             let mut devices = scene.devices.iter().enumerate();
             devices.try_for_each(|(index, device)| tool(device).map_err(|error| numbered(error, index, &scene.devices)))
         };
-        let of_field = |error: Error| {
-            let offset = offset_of(root, error.place());
-            on_line(error, offset)
-        };
+        let at_line = |field: &str, error: Error| on_line(error, offset_of(root, field));
+        let of_field = |error: Error| at_line(&error.place().to_owned(), error);
         scene.validate().and_then(|()| tools()).map_err(of_field)?;
         if let Some(BodySpec::Tetrahedra(spec)) = &mut scene.body {
-            complete(spec, read_volume).map_err(|error| match error.place().starts_with("body") {
-                true => of_field(error),
-                // A mesh that is there but wrong has a place of its own to name.
-                false => error,
-            })?;
+            complete(spec, read_volume, at_line)?;
         }
         Ok(scene)
     }
@@ -178,22 +167,28 @@ impl Scene {
     }
 }
 
-/// Fetches the mesh of `spec`, and makes sure that a body can be made of it.
+/// Fetches the mesh of `spec`, and makes sure that a body can be made of it; `at_line` puts the line of a field to an error.
 fn complete(
     spec: &mut TetrahedraSpec,
     mut read: impl FnMut(&TetrahedraSpec, &Path) -> Result<Volume, Error>,
+    at_line: impl Fn(&str, Error) -> Error,
 ) -> Result<(), Error> {
-    mesh(spec)?;
+    let of_field = |error: Error| at_line(&error.place().to_owned(), error);
+    mesh(spec).map_err(of_field)?;
     let sources = [("body.mesh", &spec.mesh), ("body.surface", &spec.surface)];
-    let found = sources.into_iter().find_map(|(field, file)| Some((field, file.as_ref()?)));
-    if let Some((field, file)) = found {
+    for (field, file) in sources {
+        let Some(file) = file else { continue };
         let volume = read(spec, file).map_err(|error| match error.kind() {
-            ErrorKind::Io => error.at(field),
+            // The field stands in front of the file that cannot be read.
+            ErrorKind::Io => at_line(field, error.at(field)),
+            _ if error.place().starts_with("body.") => of_field(error),
+            // A mesh that is there but wrong has a place of its own to name.
             _ => error,
         })?;
         spec.volume = Some(volume);
+        break;
     }
-    spec.build().map(drop)
+    spec.build().map(drop).map_err(of_field)
 }
 
 /// toml's complaint in the form of ours; a key given twice is named with its table and its first line.

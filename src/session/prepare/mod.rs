@@ -30,7 +30,7 @@ use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::model::surroundings::Size;
 use crate::runtime::{Execution, Nanos, Plan, RateGroup};
-use crate::scene::{BodySpec, NodeSpec, ProbeSpec, Scene, StepKind};
+use crate::scene::{BodySpec, NodeSpec, ProbeSpec, Scene, StepKind, Volume};
 use body::Start;
 use patch::PatchChoice;
 
@@ -163,9 +163,9 @@ pub(super) fn as_run(scene: &Scene, named: Option<(&[Option<u32>], &[u32])>) -> 
     }
     scene.local.basis_folder = None;
     if let Some(BodySpec::Tetrahedra(spec)) = &mut scene.body {
-        // The mesh itself is in the log, in metres.
-        (spec.mesh, spec.surface, spec.unit_m) = (None, None, 1.0);
-        (spec.element_size_m, spec.surface_size_m) = (None, None);
+        // The mesh itself is in the log.
+        (spec.mesh, spec.surface, spec.element_size_m, spec.surface_size_m) = (None, None, None, None);
+        spec.unit_m = spec.volume.as_ref().map_or(spec.unit_m, Volume::unit_m);
     }
     if let (Some(body), Some((attached, probes))) = (&scene.body, named) {
         let lattice = body.mass_spring().map(|spec| Lattice { nodes: spec.block.nodes });

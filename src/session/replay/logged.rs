@@ -142,7 +142,7 @@ impl Gathered {
             let mesh = self.mesh.take().ok_or_else(|| {
                 refusal(format!("it has no attachment {}: the mesh of its body is not known", Environment::MESH))
             })?;
-            let volume = Volume::from_msh(&mesh, Environment::MESH);
+            let volume = Volume::of_file(mesh, Environment::MESH, spec.unit_m);
             spec.volume = Some(volume.map_err(|error| refusal(format!("its mesh cannot be used: {error}")))?);
         }
         let devices = scene.devices.len();

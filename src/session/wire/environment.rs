@@ -6,7 +6,7 @@ use crate::log::{Environment, GroupInfo, LoggedExecution, ModelReason, ToolSampl
 use crate::model::body::Block;
 use crate::runtime::{Execution, Rate};
 use crate::safety::Actions;
-use crate::scene::{BodySpec, TetrahedraSpec, Volume};
+use crate::scene::{BodySpec, TetrahedraSpec};
 use crate::session::prepare::{BASIS, Prepared, Tool};
 
 /// The environment of a run whose devices gave these `first` states.
@@ -14,7 +14,7 @@ pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<
     let session = Some(prepared.scene.to_toml()?);
     let tetrahedra = prepared.scene.body.as_ref().and_then(BodySpec::tetrahedra);
     let volume = tetrahedra.and_then(|spec| spec.volume.as_ref());
-    let mesh = volume.filter(|_| prepared.options.log.is_some()).map(Volume::to_msh).transpose()?;
+    let mesh = volume.filter(|_| prepared.options.log.is_some()).map(|volume| volume.file().into());
     let timing = &prepared.plan.timing;
     Ok(Environment {
         palpate_version: env!("CARGO_PKG_VERSION").to_owned(),
