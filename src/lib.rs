@@ -65,6 +65,7 @@ pub mod safety;
 pub mod scene;
 pub mod session;
 
+pub use palpate_mesh as mesh;
 pub use palpate_model as model;
 pub use palpate_runtime as runtime;
 
@@ -78,7 +79,7 @@ pub mod prelude {
     pub use crate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
     pub use crate::error::Error;
     pub use crate::model::Vec3;
-    pub use crate::model::body::Block;
+    pub use crate::model::body::{Block, Tetrahedra};
     // For its methods; who implements it names it.
     pub use crate::model::body::Body as _;
     pub use crate::model::mesh::Face;

@@ -34,7 +34,7 @@ pub struct CompareArgs {
 /// Input errors of the scene; [`ErrorKind::Io`] if the page cannot be written; [`ErrorKind::Fault`] if a run ended in a
 /// fault, after the others were printed.
 pub fn run(args: &CompareArgs) -> Result<(), Error> {
-    let scene = Scene::load(&args.scene)?;
+    let scene = progress::load(&args.scene)?;
     let inputs = files::inputs_of(&args.scene, &scene);
     args.html.as_ref().map_or(Ok(()), |html| files::keep_inputs(&inputs, html))?;
     let name = shared::name_of(&args.scene);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use palpate::scene::Scene;
 use palpate::{Error, ErrorKind};
 
-use super::progress::StepBar;
+use super::progress::{self, StepBar};
 use super::{files, shared};
 use crate::reduce::ReductionStudy;
 use crate::reduce::{
@@ -80,7 +80,7 @@ pub struct Cells(Vec<usize>);
 /// Input errors of the scene and of the arguments; [`ErrorKind::Io`] if the page cannot be written; [`ErrorKind::Condition`]
 /// with `--fail-if-not-local` if the patch does not capture the force, after the report was printed.
 pub fn run(args: &ReduceArgs) -> Result<(), Error> {
-    let scene = args.scene.as_ref().map(|path| Scene::load(path).map(|scene| (path, scene))).transpose()?;
+    let scene = args.scene.as_ref().map(|path| progress::load(path).map(|scene| (path, scene))).transpose()?;
     let inputs = scene.as_ref().map_or(Vec::new(), |(path, scene)| files::inputs_of(path, scene));
     args.html.as_ref().map_or(Ok(()), |html| files::keep_inputs(&inputs, html))?;
     let mut shown = StepBar::default();

@@ -6,7 +6,7 @@ use palpate::model::body::Block;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Histogram;
 use palpate::runtime::{Nanos, Rate, Stopwatch};
-use palpate::scene::Scene;
+use palpate::scene::{BodySpec, Scene};
 use palpate::session::{Session, Summary};
 use palpate::{Error, ErrorKind};
 
@@ -144,7 +144,7 @@ fn execute(session: Session, mut progress: impl FnMut(Nanos, Option<Nanos>)) -> 
 fn about(scene: &Scene, global: Rate) -> Result<Comparison, Error> {
     let haptic = rate("local.rate_hz", scene.local.rate_hz)?;
     Ok(Comparison {
-        nodes: scene.body.as_ref().map_or(0, |body| body.block.nodes.iter().product()),
+        nodes: scene.body.as_ref().map_or(0, BodySpec::node_count),
         haptic_period: haptic.period(),
         global_period: global.period(),
         clock: Stopwatch::reading(),

@@ -15,8 +15,8 @@ const SOME_CONTACTS: usize = 25;
 /// The contact that stands for a scene: the node that the tool is glued to, else the one that it touches first, else the middle of the top.
 pub(super) fn contact_node(scene: &Scene, block: &Block, wish: Option<[usize; 3]>) -> Result<u32, Error> {
     let lattice = block.lattice();
-    let device = scene.devices.first();
-    let named = wish.map(|node| ("node", node)).or(device.and_then(|d| Some(("device.attach_node", d.attach_node?))));
+    let glued = scene.glued_node(0, block)?.map(|id| ("device.attach_node", lattice.coordinates(id)));
+    let named = wish.map(|node| ("node", node)).or(glued);
     if let Some((field, node)) = named {
         let inside = (0..3).all(|axis| node[axis] < lattice.nodes[axis]);
         let id = if inside { lattice.id(node) } else { u32::MAX };

@@ -114,7 +114,7 @@ fn forces(
     moved.devices.truncate(1);
     let Some(device) = moved.devices.first_mut() else { return Err(Error::scene("device", "is missing")) };
     *device = palpate::scene::DeviceSpec { path: Some(path), ..palpate::scene::DeviceSpec::default() };
-    device.attach_node = Some(block.lattice().coordinates(node));
+    device.attach_node = Some(block.lattice().coordinates(node).into());
     moved.local.rate_hz = RATE_HZ;
     moved.local.patch = Some(patch);
     moved.local.blend = BlendSpec { kind: BlendKind::None, ms: 0.0 };

@@ -55,7 +55,11 @@ pub fn reduce_scene(
     scene.local.patch = options.patch.or(scene.local.patch);
     scene.validate()?;
     let scene = &scene;
-    let spec = scene.body.as_ref().ok_or_else(|| Error::scene("body", "is missing"))?;
+    let body = scene.body.as_ref().ok_or_else(|| Error::scene("body", "is missing"))?;
+    let spec = body.mass_spring().ok_or_else(|| {
+        let message = "is of tetrahedra: the check goes over the faces of a block, use kind = \"mass_spring\"";
+        Error::scene("body", message)
+    })?;
     let block = spec.build()?;
     let node = contact_node(scene, &block, options.node)?;
     let grids = FaceGrid::all(&block, options.every, node);
