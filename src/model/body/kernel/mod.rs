@@ -18,6 +18,9 @@ mod portable;
 mod pull;
 mod simd;
 
+/// What the vector kernels take for a spring on an AVX-512 machine (s; `cargo bench --bench spring_kernel`).
+pub(super) const NOMINAL_SPRING_S: f64 = 2e-9;
+
 pub(super) use lattice::LatticeKernel;
 pub(crate) use network::NetworkKernel;
 pub(crate) use nodes::{LANES, Lane};
