@@ -23,7 +23,8 @@ use palpate::runtime::Disturbance;
 use palpate::runtime::Nanos;
 use palpate::safety::Passivity;
 use palpate::scene::{
-    BlendSpec, BlockSpec, BodySpec, DeviceProfile, Friction, MassSpringSpec, MaterialSpec, ModelChoice, SafetySpec, SafetyStage, Scene,
+    BlendSpec, BlockSpec, BodySpec, DeviceProfile, Friction, MassSpringSpec, MaterialSpec, ModelChoice, SafetySpec,
+    SafetyStage, Scene,
 };
 use random::Random;
 

@@ -8,8 +8,8 @@ use palpate::model::local::BlendKind;
 use palpate::model::local::Feedback;
 use palpate::model::mesh::Face;
 use palpate::scene::{
-    BlendSpec, BlockSpec, BodySpec, Friction, InitialSpec, MassSpringSpec, MaterialSpec, ModelChoice, ProbeSpec, PullSpec, RegionSpec,
-    Scene, StepKind,
+    BlendSpec, BlockSpec, BodySpec, Friction, InitialSpec, MassSpringSpec, MaterialSpec, ModelChoice, ProbeSpec,
+    PullSpec, RegionSpec, Scene, StepKind,
 };
 use proptest::prelude::*;
 
@@ -71,11 +71,13 @@ fn body() -> impl Strategy<Value = BodySpec> {
     let nodes = [6_usize..20, 6_usize..20, 6_usize..20];
     let material = (number(1e-6, 1.0), number(0.1, 1e4), number(0.01, 5.0));
     (nodes, size, fixed, material, prop::collection::vec(region(), 0..4)).prop_map(
-        |(nodes, size_m, fixed, (node_mass_kg, stiffness_n_per_m, damping_ratio), regions)| BodySpec::MassSpring(MassSpringSpec {
-            block: BlockSpec { nodes, size_m, fixed },
-            material: MaterialSpec { node_mass_kg, stiffness_n_per_m, damping_ratio },
-            regions,
-        }),
+        |(nodes, size_m, fixed, (node_mass_kg, stiffness_n_per_m, damping_ratio), regions)| {
+            BodySpec::MassSpring(MassSpringSpec {
+                block: BlockSpec { nodes, size_m, fixed },
+                material: MaterialSpec { node_mass_kg, stiffness_n_per_m, damping_ratio },
+                regions,
+            })
+        },
     )
 }
 

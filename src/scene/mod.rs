@@ -24,7 +24,8 @@ mod safety;
 mod validate;
 
 pub use body::{
-    BlockSpec, BodyKind, BodySpec, MassSpringSpec, MaterialSpec, RegionSpec, TetrahedraSpec, TissueRegionSpec, TissueSpec, Volume,
+    BlockSpec, BodyKind, BodySpec, MassSpringSpec, MaterialSpec, RegionSpec, TetrahedraSpec, TissueRegionSpec,
+    TissueSpec, Volume,
 };
 pub use contact::{ContactSpec, Friction};
 pub use description::{InitialSpec, LogSpec, ProbeSpec, PullSpec, RunSpec, Scene};

@@ -15,7 +15,15 @@ impl Scene {
     pub fn glued_node(&self, index: usize, body: &dyn Body) -> Result<Option<u32>, Error> {
         let Some(node) = self.devices.get(index).and_then(|device| device.attach_node) else { return Ok(None) };
         let field = format!("{}.attach_node", field(index, self.devices.len()));
-        Nodes::of(body, self).of_surface(&field, node).map(Some)
+        self.surface_node(&field, node, body).map(Some)
+    }
+
+    /// The number of a node of the surface of `body`, which `field` names.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`](crate::ErrorKind::Scene) if the body has no such node.
+    pub fn surface_node(&self, field: &str, node: NodeSpec, body: &dyn Body) -> Result<u32, Error> {
+        Nodes::of(body, self).of_surface(field, node)
     }
 }
 
@@ -91,7 +99,8 @@ impl<'a> Nodes<'a> {
     fn nearest(&self, field: &str, point: Vec3, is_meant: &dyn Fn(u32) -> bool) -> Result<u32, Error> {
         let rest = self.body.rest();
         let away_m = |id: u32| (rest[id as usize] - point).norm();
-        let nearest = (0..rest.len() as u32).filter(|&id| is_meant(id)).min_by(|&a, &b| away_m(a).total_cmp(&away_m(b)));
+        let nearest =
+            (0..rest.len() as u32).filter(|&id| is_meant(id)).min_by(|&a, &b| away_m(a).total_cmp(&away_m(b)));
         let size_m = rest.iter().map(|node| (node - rest[0]).norm()).fold(0.0, f64::max);
         match nearest {
             Some(id) if away_m(id) <= size_m => Ok(id),

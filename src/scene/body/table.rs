@@ -34,10 +34,7 @@ pub(in crate::scene) type KeysOf = [(BodyKind, &'static [&'static str]); 2];
 /// Those of `[body]`.
 pub(in crate::scene) const BODY_KEYS: KeysOf = [
     (BodyKind::MassSpring, &["block", "material"]),
-    (
-        BodyKind::Tetrahedra,
-        &["mesh", "surface", "element_size_m", "surface_size_m", "unit_m", "fixed", "tissue"],
-    ),
+    (BodyKind::Tetrahedra, &["mesh", "surface", "element_size_m", "surface_size_m", "unit_m", "fixed", "tissue"]),
 ];
 
 /// Those of `[[body.region]]`.

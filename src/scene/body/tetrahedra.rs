@@ -137,7 +137,8 @@ impl TetrahedraSpec {
             density: self.tissue.density_kg_m3,
             viscosity: self.tissue.viscosity_pa_s,
         };
-        let builder = Tetrahedra::builder(volume.mesh().clone()).tissue(tissue).nodal_pressure(self.tissue.nodal_pressure);
+        let builder =
+            Tetrahedra::builder(volume.mesh().clone()).tissue(tissue).nodal_pressure(self.tissue.nodal_pressure);
         let builder = self.fixed.iter().fold(builder, |builder, place| builder.fix(place.clone()));
         let builder = self.regions.iter().fold(builder, |builder, spec| builder.region(spec.region()));
         builder.build().map_err(|error| match error.place() {

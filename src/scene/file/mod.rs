@@ -61,12 +61,7 @@ impl Scene {
         Self::from_text(text, name, base, &mut |_| ())
     }
 
-    fn from_text(
-        text: &str,
-        name: &str,
-        base: Option<&Path>,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<Self, Error> {
+    fn from_text(text: &str, name: &str, base: Option<&Path>, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let found = |file: &Path| base.map_or_else(|| file.to_owned(), |base| base.join(file));
         let read_path = |path_csv: &Path| ToolPath::read_csv(&found(path_csv));
         let read_volume = |spec: &TetrahedraSpec, file: &Path| Volume::read(spec, &found(file), progress);

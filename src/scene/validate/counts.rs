@@ -1,7 +1,7 @@
 //! How many of each thing a scene may have: looked at first, before anything is read or made for them.
 
-use super::super::{BodySpec, Scene};
 use super::super::device::field;
+use super::super::{BodySpec, Scene};
 use super::devices::MAX_DEVICES;
 use crate::error::Error;
 

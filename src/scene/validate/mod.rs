@@ -12,7 +12,8 @@ pub(super) use tissue::mesh;
 
 use super::device::numbered;
 use super::{
-    BlockSpec, BodySpec, Friction, GlobalSpec, InitialSpec, LocalSpec, MassSpringSpec, ModelChoice, NodeSpec, Scene, StepKind,
+    BlockSpec, BodySpec, Friction, GlobalSpec, InitialSpec, LocalSpec, MassSpringSpec, ModelChoice, NodeSpec, Scene,
+    StepKind,
 };
 use crate::error::Error;
 use crate::model::ModelError;
@@ -81,7 +82,10 @@ fn validate(scene: &Scene) -> Result<(), Error> {
     match &scene.body {
         Some(BodySpec::MassSpring(spec)) => on_block(scene, &spec.block)?,
         Some(BodySpec::Tetrahedra(_)) => {
-            on_no_lattice(scene, "is a place in a block, and the body is of tetrahedra: give the node's number or { near_m = [x, y, z] }")?;
+            on_no_lattice(
+                scene,
+                "is a place in a block, and the body is of tetrahedra: give the node's number or { near_m = [x, y, z] }",
+            )?;
             any_patch(scene)?;
         }
         None => on_no_lattice(scene, "names nodes of a block, and the body is the program's own")?,

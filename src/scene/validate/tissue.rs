@@ -38,12 +38,14 @@ fn source(spec: &TetrahedraSpec) -> Result<(), Error> {
         let message = "is given beside body.mesh, a body has one of them: leave one out";
         return Err(Error::scene("body.surface", message));
     }
-    let sizes =
-        [("body.element_size_m", spec.element_size_m), ("body.surface_size_m", spec.surface_size_m)];
+    let sizes = [("body.element_size_m", spec.element_size_m), ("body.surface_size_m", spec.surface_size_m)];
     for (field, size_m) in sizes {
         let Some(size_m) = size_m else { continue };
         if spec.mesh.is_some() {
-            return Err(Error::scene(field, "belongs to surface, the elements of a mesh are what they are: leave it out"));
+            return Err(Error::scene(
+                field,
+                "belongs to surface, the elements of a mesh are what they are: leave it out",
+            ));
         }
         positive(field, size_m)?;
         if size_m > LARGEST_ELEMENT_M {
