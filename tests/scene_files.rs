@@ -144,6 +144,8 @@ fn the_demo_file_documents_every_key() {
         };
         texts.push((spoilt.clone(), everything.replacen(shape, &spoilt, 1)));
     }
+    let tissue = "[body]\nkind = \"tetrahedra\"\n[body.tissue]\nqqq = 0\n";
+    texts.push(("[body.tissue]".to_owned(), tissue.to_owned()));
     for (table, text) in texts {
         let message = Scene::from_toml(&text, "s", None).unwrap_err().to_string();
         let keys = message.split_once("the keys here are ").unwrap_or_else(|| panic!("{table}: {message}")).1;

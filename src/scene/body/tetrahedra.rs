@@ -122,6 +122,25 @@ impl Serialize for TissueRegionSpec {
 }
 
 impl TetrahedraSpec {
+    /// Elements, tissue, and what was changed of the mesh, in words.
+    pub(crate) fn in_words(&self) -> String {
+        let TissueSpec { young_modulus_pa, poisson_ratio, density_kg_m3, viscosity_pa_s, nodal_pressure } = self.tissue;
+        let elements = self.volume.as_ref().map_or(0, |volume| volume.mesh().tetrahedra.len());
+        let filled = if self.volume.as_ref().is_some_and(Volume::is_filled) { " that fill a surface" } else { "" };
+        let pressure = if nodal_pressure { ", nodal pressure" } else { "" };
+        let changes = self.volume.as_ref().map(Volume::changes).filter(|changes| !changes.is_empty());
+        let regions = match self.regions.len() {
+            0 => String::new(),
+            1 => ", 1 region".to_owned(),
+            count => format!(", {count} regions"),
+        };
+        format!(
+            "{elements} tetrahedra{filled}: E {young_modulus_pa} Pa, nu {poisson_ratio}, {density_kg_m3} kg/m^3, \
+             {viscosity_pa_s} Pa s{pressure}{regions}{}",
+            changes.map_or(String::new(), |changes| format!("; {changes}"))
+        )
+    }
+
     /// Makes the body that this describes.
     ///
     /// # Errors

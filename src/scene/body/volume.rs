@@ -41,7 +41,8 @@ impl Volume {
     }
 
     fn checked(mesh: TetrahedralMesh, others: Vec<(String, usize)>, is_filled: bool) -> Result<Self, Error> {
-        let extent_m = extent_m(&mesh);
+        let (mesh, left_out) = mesh.cleaned()?;
+        let extent_m = mesh.quality().extent().max();
         if !(SMALLEST_M..=LARGEST_M).contains(&extent_m) {
             let message = format!(
                 "makes a body of {extent_m} m, which must be {SMALLEST_M} to {LARGEST_M} m: give the metres per unit of the mesh, \
@@ -49,7 +50,6 @@ impl Volume {
             );
             return Err(Error::scene("body.unit_m", message));
         }
-        let (mesh, left_out) = mesh.cleaned()?;
         Ok(Self(Arc::new(Checked { mesh, left_out, others, is_filled })))
     }
 
@@ -62,9 +62,8 @@ impl Volume {
         let bytes = files::read(path, LARGEST_FILE)?;
         let name = path.display().to_string();
         if spec.surface.is_none() {
-            let mut file = read_volume(&name, &bytes).map_err(mesh_error)?;
-            file.mesh.points.iter_mut().for_each(|point| *point *= spec.unit_m);
-            return Self::checked(file.mesh, file.left_out_elements, false).map_err(|error| of_file(error, &name));
+            let file = read_volume(&name, &bytes).map_err(mesh_error)?;
+            return Self::checked(file.mesh.scaled(spec.unit_m), file.left_out_elements, false).map_err(|error| of_file(error, &name));
         }
         let mut surface = read_surface(&name, &bytes).map_err(mesh_error)?;
         surface.points.iter_mut().for_each(|point| *point *= spec.unit_m);
@@ -107,15 +106,6 @@ impl Volume {
     pub fn is_filled(&self) -> bool {
         self.0.is_filled
     }
-}
-
-/// The longest edge of the box around all nodes (m).
-fn extent_m(mesh: &TetrahedralMesh) -> f64 {
-    let along = |axis: usize| {
-        let places = || mesh.points.iter().map(|point| point[axis]);
-        places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min)
-    };
-    (0..3).map(along).fold(0.0, f64::max)
 }
 
 fn mesh_error(error: MeshError) -> Error {
