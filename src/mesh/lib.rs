@@ -1,7 +1,16 @@
 //! Meshes for bodies of tetrahedra: files of volumes and surfaces, filling of closed surfaces, parametric organs.
 
 mod error;
+mod fill;
 mod surface;
 
 pub use error::MeshError;
+pub use fill::{ImplicitShape, Sizes, fill, fill_shape};
 pub use surface::SurfaceMesh;
+
+// The tests within the crate measure with what its other tests measure with.
+#[cfg(test)]
+extern crate self as palpate_mesh;
+#[cfg(test)]
+#[path = "tests/support/mod.rs"]
+mod support;
