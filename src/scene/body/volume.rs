@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-use palpate_mesh::{MeshError, Sizes, fill, read_surface, read_volume, write_msh};
+use palpate_mesh::{MeshError, Sizes, SurfaceMesh, fill, read_surface, read_volume, write_msh};
 
 use super::TetrahedraSpec;
 use crate::error::{Error, ErrorKind};
@@ -27,7 +27,8 @@ struct Checked {
     left_out: LeftOut,
     /// Elements of other kinds beside the tetrahedra, by their names.
     others: Vec<(String, usize)>,
-    is_filled: bool,
+    /// The surface that was filled (m), if one was.
+    filled: Option<SurfaceMesh>,
 }
 
 impl Volume {
@@ -37,10 +38,14 @@ impl Volume {
     /// # Errors
     /// If an element is inverted or flat, a face belongs to three of them, or it is smaller than 1 mm or larger than 10 m.
     pub fn new(mesh: TetrahedralMesh) -> Result<Self, Error> {
-        Self::checked(mesh, Vec::new(), false)
+        Self::checked(mesh, Vec::new(), None)
     }
 
-    fn checked(mesh: TetrahedralMesh, others: Vec<(String, usize)>, is_filled: bool) -> Result<Self, Error> {
+    fn checked(
+        mesh: TetrahedralMesh,
+        others: Vec<(String, usize)>,
+        filled: Option<SurfaceMesh>,
+    ) -> Result<Self, Error> {
         let (mesh, left_out) = mesh.cleaned()?;
         let extent_m = mesh.quality().extent().max();
         if !(SMALLEST_M..=LARGEST_M).contains(&extent_m) {
@@ -50,7 +55,7 @@ impl Volume {
             );
             return Err(Error::scene("body.unit_m", message));
         }
-        Ok(Self(Arc::new(Checked { mesh, left_out, others, is_filled })))
+        Ok(Self(Arc::new(Checked { mesh, left_out, others, filled })))
     }
 
     /// Reads the file of `spec` at `path`, and fills it if it is a surface; `progress` is told how much of that is done (0 to 1).
@@ -63,19 +68,30 @@ impl Volume {
         let name = path.display().to_string();
         if spec.surface.is_none() {
             let file = read_volume(&name, &bytes).map_err(mesh_error)?;
-            return Self::checked(file.mesh.scaled(spec.unit_m), file.left_out_elements, false).map_err(|error| of_file(error, &name));
+            return Self::checked(file.mesh.scaled(spec.unit_m), file.left_out_elements, None)
+                .map_err(|error| of_file(error, &name));
         }
         let mut surface = read_surface(&name, &bytes).map_err(mesh_error)?;
         surface.points.iter_mut().for_each(|point| *point *= spec.unit_m);
+        Self::filling(surface, spec, progress).map_err(|error| of_file(error, &name))
+    }
+
+    /// Fills `surface` (m) with elements of the sizes of `spec`.
+    fn filling(surface: SurfaceMesh, spec: &TetrahedraSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let sizes = Sizes { element_m: spec.element_size_m.unwrap_or_default(), surface_m: spec.surface_size_m };
-        let mesh = fill(&surface, sizes, progress).map_err(|error| mesh_error(error).at(&name))?;
-        Self::checked(mesh, Vec::new(), true).map_err(|error| of_file(error, &name))
+        let mesh = fill(&surface, sizes, progress).map_err(mesh_error)?;
+        Self::checked(mesh, Vec::new(), Some(surface))
+    }
+
+    /// The surface that this fills, filled with elements of the sizes of `spec`; `None` if it fills none.
+    pub(in crate::scene) fn refilled(&self, spec: &TetrahedraSpec) -> Option<Result<Self, Error>> {
+        self.0.filled.clone().map(|surface| Self::filling(surface, spec, &mut |_| ()))
     }
 
     /// The volume in a log's attachment, which [`to_msh`](Self::to_msh) wrote; `name` stands for it in errors.
     pub(crate) fn from_msh(bytes: &[u8], name: &str) -> Result<Self, Error> {
         let file = read_volume(name, bytes).map_err(mesh_error)?;
-        Self::checked(file.mesh, Vec::new(), false).map_err(|error| of_file(error, name))
+        Self::checked(file.mesh, Vec::new(), None).map_err(|error| of_file(error, name))
     }
 
     /// The mesh as a file of Gmsh's, every number to its last bit.
@@ -104,7 +120,7 @@ impl Volume {
 
     /// True if it was made by filling a surface.
     pub fn is_filled(&self) -> bool {
-        self.0.is_filled
+        self.0.filled.is_some()
     }
 }
 

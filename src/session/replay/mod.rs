@@ -93,7 +93,8 @@ impl Replay {
             let message = format!("it is the log of another session: `{there}` was run, this one has `{here}`");
             return Err(Error::new(ErrorKind::Log, message).at(place));
         }
-        let mesh = |scene: &Scene| scene.body.as_ref().and_then(BodySpec::tetrahedra).and_then(|spec| spec.volume.clone());
+        let mesh =
+            |scene: &Scene| scene.body.as_ref().and_then(BodySpec::tetrahedra).and_then(|spec| spec.volume.clone());
         if mesh(&prepared.scene).zip(mesh(&logged.scene)).is_some_and(|(here, there)| here.mesh() != there.mesh()) {
             let message = "it is the log of another session: its body has another mesh than this one's";
             return Err(Error::new(ErrorKind::Log, message).at(place));
