@@ -17,7 +17,7 @@ pub use region::Region;
 pub use restriction::Restriction;
 pub use shape::Shape;
 pub use spring::{Spring, SpringTangent};
-pub use tetrahedra::{TetrahedraBuilder, Tissue, TissueRegion, Where};
+pub use tetrahedra::{Tetrahedra, TetrahedraBuilder, Tissue, TissueRegion, Where};
 
 use crate::mesh::Surface;
 use crate::{Mat3, Vec3};
