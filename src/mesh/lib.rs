@@ -2,6 +2,7 @@
 
 mod error;
 mod fill;
+pub mod organs;
 mod surface;
 
 pub use error::MeshError;

@@ -76,3 +76,74 @@ pub(super) fn fill_one(at: &[Steps; 4], signs: [i8; 4], mut make: impl FnMut([Co
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use palpate_model::Vec3;
+    use palpate_model::mesh::TetrahedralMesh;
+
+    use super::super::lattice::FORWARD;
+    use super::super::stuff::NEAR;
+    use super::*;
+    use crate::support::angles;
+
+    /// Calls `visit` with every way to choose one of `choices` for each of `places`.
+    fn each_choice(places: usize, choices: usize, mut visit: impl FnMut(&[usize])) {
+        for n in 0..choices.pow(places as u32) {
+            let chosen: Vec<usize> = (0..places).map(|place| n / choices.pow(place as u32) % choices).collect();
+            visit(&chosen);
+        }
+    }
+
+    /// Check that every element of every pattern of signs is positive and of the promised angles, with the corners on the surface drawn
+    /// as far as they ever are along any edge, and the cuts at either end of where they may lie.
+    #[test]
+    fn every_stencil_keeps_the_bounds_at_its_extremes() {
+        let ways: Vec<Steps> = FORWARD.iter().flat_map(|way| [*way, way.map(|step| -step)]).collect();
+        let place = |steps: Steps| Vec3::from(steps.map(f64::from));
+        let near = |is_long: bool| NEAR[usize::from(!is_long)];
+        let mut worst = [180.0_f64, 0.0];
+        // The cells along one axis; the others follow by turning, but the parity rule has two cases.
+        for at in [[[1, 1, 1], [3, 1, 1], [2, 2, 0], [2, 2, 2]], [[1, 1, 1], [3, 1, 1], [2, 0, 0], [2, 2, 0]]] {
+            each_choice(4, 3, |signs| {
+                let signs = [0, 1, 2, 3].map(|n| signs[n] as i8 - 1);
+                let drawn: Vec<usize> = (0..4).filter(|&n| signs[n] == 0).collect();
+                if drawn.len() == 4 || !signs.contains(&1) {
+                    return;
+                }
+                let cuts =
+                    signs.iter().filter(|&&sign| sign > 0).count() * signs.iter().filter(|&&sign| sign < 0).count();
+                let mut mesh = TetrahedralMesh::default();
+                each_choice(drawn.len(), ways.len() + 1, |way| {
+                    each_choice(cuts, 2, |end| {
+                        let mut corners = at.map(place);
+                        for (&n, &way) in drawn.iter().zip(way).filter(|(_, way)| **way > 0) {
+                            let way = ways[way - 1];
+                            corners[n] += place(way) * near(way.contains(&0));
+                        }
+                        let cut = |a: usize, b: usize| {
+                            let number = (0..4).flat_map(|a| (0..4).map(move |b| (a, b)));
+                            let number = number
+                                .filter(|&(a, b)| signs[a] > 0 && signs[b] < 0)
+                                .position(|cut| cut == (a, b))
+                                .unwrap();
+                            let near = near(a ^ b == 1);
+                            corners[a] + (corners[b] - corners[a]) * if end[number] == 0 { near } else { 1.0 - near }
+                        };
+                        fill_one(&at, signs, |element| {
+                            let first = mesh.points.len() as u32;
+                            mesh.points.extend(element.map(|corner| match corner {
+                                Own(n) => corners[n],
+                                Cut(a, b) => cut(a, b),
+                            }));
+                            mesh.tetrahedra.push([0, 1, 2, 3].map(|n| first + n));
+                        });
+                    });
+                });
+                let [smallest, largest] = angles(&mesh);
+                worst = [worst[0].min(smallest), worst[1].max(largest)];
+            });
+        }
+        assert!(worst[0] > 10.75 && worst[1] < 164.8, "{worst:?}");
+    }
+}
