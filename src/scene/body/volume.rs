@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-use palpate_mesh::{MeshError, Sizes, SurfaceMesh, fill, read_surface, read_volume, write_msh};
+use palpate_mesh::{Sizes, SurfaceMesh, fill, read_surface, read_volume, write_msh};
 
 use super::TetrahedraSpec;
 use crate::error::{Error, ErrorKind};
@@ -67,11 +67,11 @@ impl Volume {
         let bytes = files::read(path, LARGEST_FILE)?;
         let name = path.display().to_string();
         if spec.surface.is_none() {
-            let file = read_volume(&name, &bytes).map_err(mesh_error)?;
+            let file = read_volume(&name, &bytes)?;
             return Self::checked(file.mesh.scaled(spec.unit_m), file.left_out_elements, None)
                 .map_err(|error| of_file(error, &name));
         }
-        let mut surface = read_surface(&name, &bytes).map_err(mesh_error)?;
+        let mut surface = read_surface(&name, &bytes)?;
         surface.points.iter_mut().for_each(|point| *point *= spec.unit_m);
         Self::filling(surface, spec, progress).map_err(|error| of_file(error, &name))
     }
@@ -79,7 +79,7 @@ impl Volume {
     /// Fills `surface` (m) with elements of the sizes of `spec`.
     fn filling(surface: SurfaceMesh, spec: &TetrahedraSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let sizes = Sizes { element_m: spec.element_size_m.unwrap_or_default(), surface_m: spec.surface_size_m };
-        let mesh = fill(&surface, sizes, progress).map_err(mesh_error)?;
+        let mesh = fill(&surface, sizes, progress)?;
         Self::checked(mesh, Vec::new(), Some(surface))
     }
 
@@ -90,7 +90,7 @@ impl Volume {
 
     /// The volume in a log's attachment, which [`to_msh`](Self::to_msh) wrote; `name` stands for it in errors.
     pub(crate) fn from_msh(bytes: &[u8], name: &str) -> Result<Self, Error> {
-        let file = read_volume(name, bytes).map_err(mesh_error)?;
+        let file = read_volume(name, bytes)?;
         Self::checked(file.mesh, Vec::new(), None).map_err(|error| of_file(error, name))
     }
 
@@ -122,10 +122,6 @@ impl Volume {
     pub fn is_filled(&self) -> bool {
         self.0.filled.is_some()
     }
-}
-
-fn mesh_error(error: MeshError) -> Error {
-    Error::new(ErrorKind::Scene, error.to_string())
 }
 
 /// What is wrong with a mesh is so in its file; a wrong unit is the scene's.
