@@ -30,7 +30,7 @@ const QUARANTINE: [(&str, &[&str]); 7] = [
             "src/runtime/system/os.rs",
         ],
     ),
-    ("parry3d_f64", &["src/model/mesh/nearest.rs"]),
+    ("parry3d_f64", &["src/mesh/fill/distance.rs", "src/model/mesh/nearest.rs"]),
     ("faer", &["src/model/linear_algebra/"]),
     ("rayon", &["src/model/body/kernel/cores.rs"]),
     ("atomic", &["src/runtime/primitives/sync.rs"]),

@@ -17,7 +17,6 @@ mod obj;
 mod source;
 mod stl;
 mod vtk;
-mod welded;
 
 use std::path::Path;
 
@@ -66,7 +65,7 @@ pub fn read_volume_file(path: &Path) -> Result<VolumeFile, MeshError> {
 }
 
 /// The surface in `bytes`, the content of the file `name`: OBJ if it is called so, else STL. Nodes at one place are one, triangles
-/// with two corners at one place are left out. In the file's unit of length, unchecked.
+/// with two corners at one place are left out. In the file's unit of length, unchecked: see [`SurfaceMesh::cleaned`].
 ///
 /// # Errors
 /// If the content is of no such format or damaged, or has no triangles. The message begins with `name`.

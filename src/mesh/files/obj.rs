@@ -3,9 +3,9 @@
 use palpate_model::Vec3;
 
 use super::source::Source;
-use super::welded::Welded;
 use crate::SurfaceMesh;
 use crate::error::{MeshError, quoted};
+use crate::surface::Welded;
 
 /// The surface in `bytes`: polygons are cut into triangles around their first corner.
 pub fn read(bytes: &[u8]) -> Result<SurfaceMesh, MeshError> {

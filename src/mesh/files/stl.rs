@@ -4,9 +4,9 @@ use palpate_model::Vec3;
 
 use super::number::Number;
 use super::source::Source;
-use super::welded::Welded;
 use crate::SurfaceMesh;
 use crate::error::MeshError;
+use crate::surface::Welded;
 
 /// Bytes before the triangles of a binary file: a header for people and the number of triangles.
 const HEADER: usize = 84;
