@@ -14,7 +14,7 @@ pub struct AlteredBlock<F> {
     copies: bool,
 }
 
-impl<F: FnMut(&mut Block, &State, &mut [Vec3]) + Clone + Send + 'static> AlteredBlock<F> {
+impl<F: FnMut(&mut Block, &State, &mut [Vec3]) + Clone + Send + Sync + 'static> AlteredBlock<F> {
     /// `forces` is called in place of the block's.
     pub fn new(block: Block, forces: F) -> Self {
         Self { block, forces, copies: false }
@@ -32,7 +32,7 @@ impl<F> fmt::Debug for AlteredBlock<F> {
     }
 }
 
-impl<F: FnMut(&mut Block, &State, &mut [Vec3]) + Clone + Send + 'static> Body for AlteredBlock<F> {
+impl<F: FnMut(&mut Block, &State, &mut [Vec3]) + Clone + Send + Sync + 'static> Body for AlteredBlock<F> {
     fn rest(&self) -> &[Vec3] {
         self.block.rest()
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::basis_store::BasisStore;
 use super::cause::Cause;
 use crate::error::Error;
-use crate::model::surroundings::{Bases, Basis, Reduction, SpringGraph};
+use crate::model::surroundings::{Bases, Basis, Reduction, RestingBody};
 use crate::runtime::{Actor, Outcome, Reader, TickContext, Writer};
 
 /// Patches whose surroundings are wanted.
@@ -30,7 +30,7 @@ pub struct BasisPorts {
 /// Not real-time safe: a release may take a second. Its group needs a core that the haptic group does not use.
 #[derive(Debug)]
 pub struct BasisActor {
-    springs: Arc<SpringGraph>,
+    resting: Arc<RestingBody>,
     store: BasisStore,
     pace: Pace,
     bases: Bases,
@@ -42,25 +42,25 @@ pub struct BasisActor {
 }
 
 impl BasisActor {
-    /// Of a body with `springs`; bases come from `store`, and `bases` are there already.
+    /// Of the body `resting`; bases come from `store`, and `bases` are there already.
     pub(crate) fn new(
-        springs: Arc<SpringGraph>,
+        resting: Arc<RestingBody>,
         store: BasisStore,
         bases: Bases,
         pace: Pace,
         ports: BasisPorts,
     ) -> Self {
-        Self { springs, store, pace, bases, begun: None, hopeless: Vec::new(), ports }
+        Self { resting, store, pace, bases, begun: None, hopeless: Vec::new(), ports }
     }
 
     /// Goes on with what was begun. For a large body it does one part only: a stop does not wait for more.
     fn go_on(&mut self) -> Result<Option<Basis>, Error> {
         while let Some(reduction) = &mut self.begun {
-            let advanced = reduction.advance(&self.springs);
+            let advanced = reduction.advance(&self.resting);
             if !matches!(advanced, Ok(None)) {
                 self.begun = None;
                 let basis = advanced?;
-                basis.iter().for_each(|basis| self.store.keep(&self.springs, basis));
+                basis.iter().for_each(|basis| self.store.keep(&self.resting, basis));
                 return Ok(basis);
             }
             if reduction.is_large() && self.pace == Pace::OneByOne {
@@ -72,10 +72,10 @@ impl BasisActor {
 
     /// The basis of `patch`, if it can be had in this release.
     fn get(&mut self, patch: &[u32]) -> Result<Option<Basis>, Error> {
-        if let Some(basis) = self.store.read(&self.springs, patch) {
+        if let Some(basis) = self.store.read(&self.resting, patch) {
             return Ok(Some(basis));
         }
-        self.begun = Reduction::new(&self.springs, patch, self.store.size);
+        self.begun = Reduction::new(&self.resting, patch, self.store.size);
         if self.begun.is_none() {
             self.hopeless.push(patch.to_vec());
         }

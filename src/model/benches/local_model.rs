@@ -4,6 +4,7 @@
 //! `cargo bench --bench local_model`
 
 use std::hint::black_box;
+use std::sync::Arc;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use palpate_model::Vec3;
@@ -13,7 +14,7 @@ use palpate_model::local::ToolForecast;
 use palpate_model::local::{Kind, LocalModel, ResyncView, Template};
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
-use palpate_model::surroundings::{Bases, Condensation, SpringGraph};
+use palpate_model::surroundings::{Bases, Condensation, RestingBody};
 
 /// The reference material, two substeps per tick, a tool pressed 5 mm into the top.
 fn pressed(nodes: usize) -> (Simulation, Vec3) {
@@ -32,7 +33,7 @@ fn pressed(nodes: usize) -> (Simulation, Vec3) {
 }
 
 fn template(kind: Kind, sim: &Simulation) -> Template {
-    Template::new(kind, [4, 4, 2], sim.body()).expect("a held body of springs")
+    Template::new(kind, [4, 4, 2], sim.body()).expect("a held body of resting")
 }
 
 fn model(template: &Template, sim: &mut Simulation) -> Box<dyn LocalModel> {
@@ -97,12 +98,12 @@ fn patch_build(c: &mut Criterion) {
 fn condense(c: &mut Criterion) {
     let mut group = c.benchmark_group("condensed 4x4x2, 12^3 body");
     let (sim, _) = pressed(12);
-    let springs = SpringGraph::new(sim.body()).expect("a body of springs");
+    let resting = Arc::new(RestingBody::new(sim.body()).expect("a body that can be taken apart"));
     group.sample_size(10);
     group.bench_function("factorise the body", |b| {
-        b.iter_batched(|| springs.clone(), |springs| Condensation::new(springs).expect("held"), BatchSize::LargeInput);
+        b.iter_batched(|| resting.clone(), |resting| Condensation::new(resting).expect("held"), BatchSize::LargeInput);
     });
-    let body = Condensation::new(springs).expect("held");
+    let body = Condensation::new(resting).expect("held");
     let mut nodes = Vec::new();
     sim.body().patch(&[sim.contact(0).triangle.expect("the tool touches")], [4, 4, 2], &mut nodes);
     group.bench_function("a new window", |b| b.iter(|| black_box(body.compliance(&nodes))));

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use palpate_model::body::{Block, Body};
 use palpate_model::mesh::Face;
-use palpate_model::surroundings::{Reduction, Size, SpringGraph};
+use palpate_model::surroundings::{Reduction, RestingBody, Size};
 
 const PATCH: [usize; 3] = [4, 4, 2];
 const STATES: usize = 50;
@@ -35,7 +35,7 @@ fn cpu_s(begun: Instant) -> f64 {
 }
 
 /// Seconds of each part.
-fn parts(graph: &SpringGraph, patch: &[u32], size: Size) -> Vec<f64> {
+fn parts(resting: &RestingBody, patch: &[u32], size: Size) -> Vec<f64> {
     let (mut times, start) = (Vec::new(), Instant::now());
     let mut begun = cpu_s(start);
     let mut lap = |times: &mut Vec<f64>| {
@@ -43,10 +43,10 @@ fn parts(graph: &SpringGraph, patch: &[u32], size: Size) -> Vec<f64> {
         times.push(now - begun);
         begun = now;
     };
-    let mut reduction = Reduction::new(graph, patch, size).expect("the body moves");
+    let mut reduction = Reduction::new(resting, patch, size).expect("the body moves");
     lap(&mut times);
     loop {
-        let basis = reduction.advance(graph).expect("the body is held");
+        let basis = reduction.advance(resting).expect("the body is held");
         lap(&mut times);
         if basis.is_some() {
             return times;
@@ -63,9 +63,9 @@ fn main() {
     for nodes in sizes {
         let builder = Block::builder([nodes; 3], [0.1; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
         let body = builder.fix(Face::ZMin).build().expect("a valid block");
-        let (graph, patch) = (SpringGraph::new(&body).expect("springs"), patch(nodes));
+        let (resting, patch) = (RestingBody::new(&body).expect("springs"), patch(nodes));
         let [by_states, by_budget] = [Size::States(STATES), BUDGET]
-            .map(|size| (0..ROUNDS).map(|_| parts(&graph, &patch, size)).collect::<Vec<Vec<f64>>>());
+            .map(|size| (0..ROUNDS).map(|_| parts(&resting, &patch, size)).collect::<Vec<Vec<f64>>>());
         let median = |rounds: &[Vec<f64>], of: &dyn Fn(&[f64]) -> f64| {
             let mut values: Vec<f64> = rounds.iter().map(|round| 1e3 * of(round)).collect();
             values.sort_by(f64::total_cmp);

@@ -1,9 +1,9 @@
 //! The block of point masses joined by springs to all 26 neighbours: the paper's body.
 
-use super::kernel::{InstructionSet, LatticeKernel};
+use super::kernel::{InstructionSet, LatticeKernel, NOMINAL_SPRING_S};
 use super::lattice_springs::LatticeSprings;
 use super::region::{Material, Region, materials};
-use super::{Body, Link, State, TangentBlock};
+use super::{Body, Restriction, Spring, SpringNetwork, State, TangentBlock};
 use crate::Vec3;
 use crate::error::ModelError;
 use crate::mesh::{Face, Lattice, Surface};
@@ -157,6 +157,16 @@ impl Block {
         self.springs.len()
     }
 
+    /// Every spring once, with the nodes that it joins.
+    pub fn springs(&self) -> Vec<(u32, u32, Spring)> {
+        let mut springs = Vec::with_capacity(self.springs.len());
+        for node in 0..self.rest.len() as u32 {
+            let ahead = self.springs.neighbours(&self.lattice, node).filter(|&(other, _)| other > node);
+            springs.extend(ahead.map(|(other, spring)| (node, other, spring)));
+        }
+        springs
+    }
+
     /// The name of the instruction set that forces of blocks are computed with on this machine.
     pub fn instruction_set() -> &'static str {
         InstructionSet::detect().name()
@@ -226,17 +236,16 @@ impl Body for Block {
         Some(Box::new(self.clone()))
     }
 
-    fn spring_count(&self) -> Option<usize> {
-        Some(self.springs.len())
+    fn restriction(&self, nodes: &[u32]) -> Option<Restriction> {
+        let springs = |node: u32| {
+            let ends = move |(other, spring)| (node.min(other), node.max(other), spring);
+            self.springs.neighbours(&self.lattice, node).map(ends)
+        };
+        Some(SpringNetwork::restricted(&self.rest, &self.inverse_masses, nodes, springs))
     }
 
-    fn springs(&self) -> Option<Vec<Link>> {
-        let mut links = Vec::with_capacity(self.springs.len());
-        for node in 0..self.rest.len() as u32 {
-            let ahead = self.springs.neighbours(&self.lattice, node).filter(|&(other, _)| other > node);
-            links.extend(ahead.map(|(other, spring)| Link { nodes: [node, other], spring }));
-        }
-        Some(links)
+    fn nominal_evaluation(&self) -> f64 {
+        NOMINAL_SPRING_S * self.springs.len() as f64
     }
 
     fn patch(&self, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {

@@ -5,6 +5,7 @@ pub(crate) mod kernel;
 mod lattice_springs;
 mod network;
 mod region;
+mod restriction;
 mod shape;
 mod spring;
 mod tetrahedra;
@@ -13,10 +14,10 @@ pub use block::{Block, BlockBuilder};
 pub use kernel::InstructionSet;
 pub use network::{SpringNetwork, SpringNetworkBuilder};
 pub use region::Region;
+pub use restriction::Restriction;
 pub use shape::Shape;
-pub(crate) use spring::assemble;
 pub use spring::{Spring, SpringTangent};
-pub use tetrahedra::{TetrahedraBuilder, Tissue, TissueRegion, Where};
+pub use tetrahedra::{Tetrahedra, TetrahedraBuilder, Tissue, TissueRegion, Where};
 
 use crate::mesh::Surface;
 use crate::{Mat3, Vec3};
@@ -77,15 +78,6 @@ impl TangentBlock {
     }
 }
 
-/// A spring between two nodes of a body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Link {
-    /// The nodes that it joins.
-    pub nodes: [u32; 2],
-    /// The spring itself.
-    pub spring: Spring,
-}
-
 /// A deformable body: nodes, masses, internal forces, tangent and surface.
 ///
 /// The block of springs is one implementation; a program brings its own by implementing this trait. Forces may be
@@ -105,7 +97,7 @@ pub struct Link {
 /// # Ok(())
 /// # }
 /// ```
-pub trait Body: Send + std::fmt::Debug {
+pub trait Body: Send + Sync + std::fmt::Debug {
     /// Rest positions (m), one per node.
     ///
     /// # Real-time
@@ -145,8 +137,8 @@ pub trait Body: Send + std::fmt::Debug {
     /// For the global actor, at each resync: bounded.
     fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock));
 
-    /// A copy for a global model that is started again after a fault; `None`, the default, if there cannot be one: a
-    /// fault of the global model then stops the run.
+    /// A copy, for a global model that is started again after a fault and for models that reduce the body; `None`, the
+    /// default, if there cannot be one: a fault of the global model then stops the run.
     ///
     /// # Real-time
     /// Not called in a tick: may allocate.
@@ -154,21 +146,23 @@ pub trait Body: Send + std::fmt::Debug {
         None
     }
 
-    /// Every spring once, if the body is made of nothing else; `None`, the default, if it is not. Models that keep the
-    /// springs around the tool as they are need them.
+    /// What of the body depends on `nodes` (ids, each once), as a body of its own; `None`, the default, if it cannot be taken
+    /// apart. Models that keep the body around the tool as it is, and what reduces the rest, need it, and a
+    /// [`duplicate`](Self::duplicate).
     ///
     /// # Real-time
-    /// Not called in a tick: may allocate.
-    fn springs(&self) -> Option<Vec<Link>> {
+    /// For the global actor, when the window of a local model moves: bounded by the nodes, may allocate.
+    fn restriction(&self, _nodes: &[u32]) -> Option<Restriction> {
         None
     }
 
-    /// The number of springs that [`springs`](Self::springs) gives; `None` if it has none to give.
+    /// What one evaluation of all forces takes (s) on no machine in particular, for runs that must be the same on all of
+    /// them. The default is 0.3 us for each node.
     ///
     /// # Real-time
-    /// Not called in a tick: may allocate.
-    fn spring_count(&self) -> Option<usize> {
-        self.springs().map(|springs| springs.len())
+    /// Not called in a tick.
+    fn nominal_evaluation(&self) -> f64 {
+        0.3e-6 * self.rest().len() as f64
     }
 
     /// Puts the nodes of a patch around surface triangles `triangles` in place of `nodes`, each once, in increasing order

@@ -1,7 +1,9 @@
 //! A body of any nodes and springs.
 
-use super::kernel::{InstructionSet, NetworkKernel};
-use super::{Body, Link, Spring, State, TangentBlock};
+use std::collections::HashMap;
+
+use super::kernel::{InstructionSet, NOMINAL_SPRING_S, NetworkKernel};
+use super::{Body, Restriction, Spring, State, TangentBlock};
 use crate::Vec3;
 use crate::error::ModelError;
 use crate::mesh::{Lists, Surface};
@@ -24,7 +26,7 @@ use crate::mesh::{Lists, Surface};
 /// let springs = [spring(0, 1), spring(0, 2), spring(0, 3), spring(1, 2), spring(2, 3), spring(3, 1)];
 /// let builder = SpringNetwork::builder(corners.to_vec()).masses(vec![1e-3; 4]).springs(springs).fix(0);
 /// let network = builder.surface(vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).build()?;
-/// assert_eq!(network.spring_count(), Some(6));
+/// assert_eq!(network.springs().len(), 6);
 /// # Ok(())
 /// # }
 /// ```
@@ -193,6 +195,38 @@ impl SpringNetwork {
         Ok(self)
     }
 
+    /// The restriction to `asked` of a body of springs with nodes at `rest`; `springs` gives those at a node.
+    pub(super) fn restricted<I: Iterator<Item = (u32, u32, Spring)>>(
+        rest: &[Vec3],
+        inverse_masses: &[f64],
+        asked: &[u32],
+        springs: impl Fn(u32) -> I,
+    ) -> Restriction {
+        let ends = asked.iter().flat_map(|&node| springs(node).flat_map(|(i, j, _)| [i, j]));
+        let nodes = Restriction::order(asked, ends, inverse_masses);
+        let place: HashMap<u32, u32> = nodes.iter().copied().zip(0..).collect();
+        let mut near = Vec::new();
+        for (at, &node) in asked.iter().enumerate() {
+            for (i, j, spring) in springs(node) {
+                let other = place[&if i == node { j } else { i }];
+                // One between two of the nodes is met from both.
+                if other as usize >= asked.len() || at < other as usize {
+                    near.push((place[&i], place[&j], spring));
+                }
+            }
+        }
+        let ends = near.iter().zip(0..).flat_map(|(&(i, j, _), spring)| [(i, spring), (j, spring)]);
+        let body = Self {
+            rest: nodes.iter().map(|&node| rest[node as usize]).collect(),
+            inverse_masses: nodes.iter().map(|&node| inverse_masses[node as usize]).collect(),
+            surface: Surface::default(),
+            at_node: Lists::new(nodes.len(), ends),
+            kernel: NetworkKernel::new(nodes.len(), &near),
+            springs: near,
+        };
+        Restriction { nodes, body: Box::new(body) }
+    }
+
     /// The springs at `node` and their other ends, with the differences of position and velocity to there.
     fn around<'a>(&'a self, state: &'a State, node: u32) -> impl Iterator<Item = (u32, Spring, Vec3, Vec3)> + 'a {
         self.at_node.of(node).iter().map(move |&spring| {
@@ -238,12 +272,13 @@ impl Body for SpringNetwork {
         }
     }
 
-    fn spring_count(&self) -> Option<usize> {
-        Some(self.springs.len())
+    fn restriction(&self, nodes: &[u32]) -> Option<Restriction> {
+        let springs = |node| self.at_node.of(node).iter().map(|&spring| self.springs[spring as usize]);
+        Some(Self::restricted(&self.rest, &self.inverse_masses, nodes, springs))
     }
 
-    fn springs(&self) -> Option<Vec<Link>> {
-        Some(self.springs.iter().map(|&(a, b, spring)| Link { nodes: [a, b], spring }).collect())
+    fn nominal_evaluation(&self) -> f64 {
+        NOMINAL_SPRING_S * self.springs.len() as f64
     }
 
     fn duplicate(&self) -> Option<Box<dyn Body>> {

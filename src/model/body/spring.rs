@@ -31,7 +31,7 @@ impl Spring {
 
     /// The unit vector along a spring whose second node is `along` (m) from the first, and its length (m); `None` for one that
     /// is too short to have a direction.
-    pub(crate) fn direction(&self, along: Vec3) -> Option<(Vec3, f64)> {
+    fn direction(&self, along: Vec3) -> Option<(Vec3, f64)> {
         let length = along.norm();
         (length >= Self::COLLAPSED * self.rest_length).then(|| (along / length, length))
     }
@@ -59,24 +59,6 @@ impl Spring {
         SpringTangent {
             position: axial * self.stiffness + (Mat3::identity() - axial) * geometric + turning,
             velocity: axial * self.damping,
-        }
-    }
-}
-
-/// Adds what a spring along the unit vector `direction` gives to a symmetric matrix, `weight` times u u^T: its blocks at the
-/// `places` of its two nodes, as far as these have one, and the opposite between them.
-pub(crate) fn assemble(
-    direction: Vec3,
-    weight: f64,
-    places: [Option<usize>; 2],
-    mut add: impl FnMut(usize, usize, Mat3),
-) {
-    let block = direction * direction.transpose() * weight;
-    for (end, row) in places.into_iter().enumerate() {
-        for (other, column) in places.into_iter().enumerate() {
-            if let (Some(row), Some(column)) = (row, column) {
-                add(row, column, if end == other { block } else { -block });
-            }
         }
     }
 }

@@ -65,13 +65,6 @@ fn gram(a: &Matrix) -> Matrix {
     out
 }
 
-/// A^T A.
-pub(crate) fn symmetric_product(a: &Matrix) -> Matrix {
-    let mut out = gram(a);
-    out.fill_upper_triangle_with_lower_triangle();
-    out
-}
-
 /// Eigenvalues in increasing order and orthonormal eigenvectors of a symmetric matrix, of which the lower triangle is read;
 /// `None` if a number is not finite.
 ///

@@ -12,7 +12,7 @@ mod sparse;
 pub use dense::{
     Matrix, cholesky, eigenvalues, lower_factor, product, product_t, solve_positive, svd, symmetric_eigen,
 };
-pub(crate) use dense::{eliminate, leading_combinations, leading_left_singular_vectors, modes, symmetric_product};
+pub(crate) use dense::{eliminate, leading_combinations, leading_left_singular_vectors, modes};
 pub use dissection::dissection;
 pub use sparse::SparseFactor;
 pub(crate) use sparse::push_block;

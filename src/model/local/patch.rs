@@ -7,7 +7,6 @@ use crate::body::{Body, State};
 use crate::contact::{Contact, Deformable, Law, ToolMotion, step};
 use crate::mesh::Surface;
 use crate::simulation::Stepping;
-use crate::surroundings::SpringGraph;
 
 /// A patch of a body and its contact, in the numbering of its window.
 #[derive(Clone, Debug, Default)]
@@ -100,8 +99,8 @@ impl Patch {
     }
 }
 
-/// Patch nodes first; then, if the model asks for them, the nodes that a spring joins to the patch: the ring, which can
-/// move, and held ones; then the rim: surface nodes that contact needs for normals and walking.
+/// Patch nodes first; then, if the model asks for them, the other nodes of the body's restriction to the patch: the ring,
+/// which can move, and held ones; then the rim: surface nodes that contact needs for normals and walking.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Window {
     /// Global id of each local node.
@@ -121,19 +120,17 @@ pub(super) struct Window {
     /// Local place of each global node and triangle, or [`Surface::NONE`]; as long as the body, only touched entries change.
     local_node: Vec<u32>,
     local_triangle: Vec<u32>,
-    /// Of the patch: the ring, and held nodes.
-    neighbours: [Vec<u32>; 2],
 }
 
 impl Window {
-    /// Makes the window anew around surface triangles `triangles` for the nodes that `patch` gives, in increasing order, with
-    /// the ring if `springs` are given; costs as much as the patch, whatever the body.
-    pub(super) fn rebuild(
+    /// Makes the window anew around surface triangles `triangles` for the nodes that `patch` gives, in increasing order, and
+    /// those that `neighbours` gives for them, the ring and held ones; costs as much as the patch, whatever the body.
+    pub(super) fn rebuild<'a>(
         &mut self,
         body: &dyn Body,
         triangles: &[u32],
-        springs: Option<&SpringGraph>,
         patch: impl FnOnce(&mut Vec<u32>),
+        neighbours: impl FnOnce(&[u32]) -> [&'a [u32]; 2],
     ) {
         let whole = body.surface();
         self.forget();
@@ -144,17 +141,9 @@ impl Window {
         for (place, &node) in self.nodes.iter().enumerate() {
             self.local_node[node as usize] = place as u32;
         }
-        self.neighbours.iter_mut().for_each(Vec::clear);
-        if let Some(springs) = springs {
-            let [ring, held] = &mut self.neighbours;
-            springs.neighbours(&self.nodes, ring, held);
-        }
-        self.ring = self.neighbours[0].len();
-        for list in 0..self.neighbours.len() {
-            for place in 0..self.neighbours[list].len() {
-                self.add_node(self.neighbours[list][place]);
-            }
-        }
+        let [ring, held] = neighbours(&self.nodes);
+        self.ring = ring.len();
+        ring.iter().chain(held).for_each(|&node| self.add_node(node));
         // On a held face nothing moves, but the tool is to be found there too.
         for &triangle in triangles {
             for node in whole.triangles[triangle as usize] {

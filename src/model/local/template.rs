@@ -8,7 +8,7 @@ use super::predictive::{Prediction, Predictive};
 use super::{Feedback, Kind, LocalModel};
 use crate::body::Body;
 use crate::error::ModelError;
-use crate::surroundings::{Condensation, SpringGraph};
+use crate::surroundings::{Condensation, RestingBody};
 
 /// The recipe for the local models of a session: what they are made from.
 ///
@@ -45,8 +45,8 @@ pub struct Template {
     pub kind: Kind,
     /// Patch nodes along the surface, along it, into depth.
     pub patch: [usize; 3],
-    /// The body's springs, for the models that need them.
-    pub springs: Option<Arc<SpringGraph>>,
+    /// The body around its rest state, for the models that need it.
+    pub resting: Option<Arc<RestingBody>>,
     feedback: Feedback,
     prediction: Prediction,
     is_implicit: bool,
@@ -59,27 +59,28 @@ impl Template {
     /// the model is best with, takes the global model's explicit steps, and expects a resync every 33 ticks.
     ///
     /// # Errors
-    /// If the model needs springs and the body has none, or needs a body that is held.
+    /// If the model needs a body that can be restricted or one that is held, and this is none.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn new(kind: Kind, patch: [usize; 3], body: &dyn Body) -> Result<Self, ModelError> {
-        let springs = || {
-            SpringGraph::new(body).ok_or_else(|| {
-                let message = format!("{:?} needs a body of springs, use another model", kind.name());
+        let resting = || {
+            RestingBody::new(body).ok_or_else(|| {
+                let message =
+                    format!("{:?} needs a body with `restriction` and `duplicate`, use another model", kind.name());
                 ModelError::of("local.model", message)
             })
         };
         let boundary = match kind {
             Kind::LinearBoundary => Boundary::Drifting { ticks: 33 },
             Kind::ScaledBoundary => Boundary::Layered(Layers::new(body)),
-            Kind::Condensed => Boundary::Yielding(Yielding::new(Condensation::new(springs()?)?)),
+            Kind::Condensed => Boundary::Yielding(Yielding::new(Condensation::new(resting()?.into())?)),
             _ => Boundary::Still,
         };
-        let springs =
-            if matches!(kind, Kind::Predicted | Kind::Predictive) { Some(Arc::new(springs()?)) } else { None };
+        let resting =
+            if matches!(kind, Kind::Predicted | Kind::Predictive) { Some(Arc::new(resting()?)) } else { None };
         let (feedback, prediction) = (Feedback::of(kind), Prediction::default());
-        Ok(Self { kind, patch, springs, feedback, prediction, is_implicit: false, boundary })
+        Ok(Self { kind, patch, resting, feedback, prediction, is_implicit: false, boundary })
     }
 
     /// Lets the models tell the global one `feedback`.
@@ -138,12 +139,10 @@ impl Template {
     /// Not real-time safe: allocates.
     pub fn empty(&self) -> Option<Box<dyn LocalModel>> {
         let spec = LinearSpec { size: self.patch, feedback: self.feedback, is_implicit: self.is_implicit };
-        Some(match (self.kind, &self.springs) {
-            (Kind::Full, _) => return None,
-            (Kind::Predicted | Kind::Predictive, Some(springs)) => {
-                Box::new(Predictive::new(self.patch, self.prediction, Arc::clone(springs)))
-            }
-            (kind, _) if kind.is_linear() => Box::new(LinearPatch::new(spec, self.boundary.clone())),
+        Some(match self.kind {
+            Kind::Full => return None,
+            Kind::Predicted | Kind::Predictive => Box::new(Predictive::new(self.patch, self.prediction)),
+            kind if kind.is_linear() => Box::new(LinearPatch::new(spec, self.boundary.clone())),
             _ => Box::new(Hold::default()),
         })
     }

@@ -34,6 +34,11 @@ impl Lists {
         first.pop();
     }
 
+    /// The number of owners.
+    pub(crate) fn owners(&self) -> usize {
+        self.first.len().saturating_sub(1)
+    }
+
     /// The list of an owner.
     pub(crate) fn of(&self, owner: u32) -> &[u32] {
         &self.items[self.first[owner as usize] as usize..self.first[owner as usize + 1] as usize]

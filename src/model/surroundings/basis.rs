@@ -7,7 +7,7 @@ use super::accuracy::Estimate;
 use super::products::Columns;
 use super::reduced::{Reduced, ReducedMotion};
 use crate::Vec3;
-use crate::body::State;
+use crate::body::{Body, State};
 
 /// A forecast is used where what it leaves out moves less than this share of what there is.
 const LEFT_OUT: f64 = 0.02;
@@ -15,8 +15,8 @@ const LEFT_OUT: f64 = 0.02;
 /// The surroundings of one patch, linear around rest, in few states.
 ///
 /// The answers to forces on the ring span the leading left singular vectors of `[Z_0/|Z_0|, Z_1/|Z_1|, Z_2/|Z_2|]`,
-/// Z_0 = A^-1 B the answers to unit forces on the ring, Z_(i+1) = A^-1 M Z_i, A = s0^2 M - s0 C - K over the springs that
-/// touch no patch node, at rest: moment matching at a real frequency (Grimme 1997) with a singular value truncation. It
+/// Z_0 = A^-1 B the answers to unit forces on the ring, Z_(i+1) = A^-1 M Z_i, A = s0^2 M - s0 C - K of what does not
+/// depend on the patch, at rest: moment matching at a real frequency (Grimme 1997) with a singular value truncation. It
 /// depends on patch, material and topology, not on time. The forecast adds smooth fields, for what is under way already.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Basis {
@@ -64,16 +64,15 @@ pub(crate) struct Forecast {
 }
 
 impl Forecast {
-    /// Sets `motion` to the present `state` of a body with nodes at rest at `rest` (m), with the forces in it (N); `span` is
-    /// how far the forecast has to reach (s). False if the states leave out too much of the present motion.
+    /// Sets `motion` to the present state of a body, with the forces in it (N); `span` is how far the forecast has to reach
+    /// (s). False if the states leave out too much of the present motion.
     ///
     /// # Real-time
     /// For the global actor: reads all modes once; may allocate.
     pub(crate) fn launch(
         &self,
         motion: &mut ReducedMotion,
-        (state, rest): (&State, &[Vec3]),
-        forces: &[Vec3],
+        (body, state, forces): (&dyn Body, &State, &[Vec3]),
         span: f64,
     ) -> bool {
         let (mut momentum, mut force) =
@@ -83,7 +82,7 @@ impl Forecast {
         for (&node, mass) in self.nodes.iter().zip(&self.masses) {
             let node = node as usize;
             let (v, f) = (state.velocities[node], forces[node]);
-            displacement += mass * (state.positions[node] - rest[node]).norm_squared();
+            displacement += mass * (state.positions[node] - body.rest()[node]).norm_squared();
             speed += mass * v.norm_squared();
             acceleration += f.norm_squared() / mass;
             momentum.extend((v * *mass).iter());

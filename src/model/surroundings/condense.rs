@@ -1,7 +1,9 @@
 //! Static condensation: what the surroundings of a patch yield when it is pushed.
 
-use super::graph::SpringGraph;
-use crate::body::assemble;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::resting::RestingBody;
 use crate::error::ModelError;
 use crate::linear_algebra::{Matrix, SparseFactor, push_block};
 
@@ -15,37 +17,36 @@ pub struct Condensation {
     /// Place of each node among those that can move.
     places: Vec<Option<usize>>,
     movable: usize,
-    springs: SpringGraph,
+    body: Arc<RestingBody>,
 }
 
 impl Condensation {
-    /// Factorises the body of `springs`.
+    /// Factorises `body`.
     ///
     /// # Errors
     /// If nothing holds the body: pushed, it would drift away.
     ///
     /// # Real-time
     /// Not real-time safe: allocates, and factorises a sparse matrix of three rows per node.
-    pub fn new(springs: SpringGraph) -> Result<Self, ModelError> {
-        let is_movable = |&node: &usize| springs.inverse_masses()[node] > 0.0;
-        let mut places = vec![None; springs.rest().len()];
+    pub fn new(body: Arc<RestingBody>) -> Result<Self, ModelError> {
+        let is_movable = |&node: &usize| body.inverse_masses()[node] > 0.0;
+        let mut places = vec![None; body.rest().len()];
         (0..places.len()).filter(is_movable).enumerate().for_each(|(place, node)| places[node] = Some(place));
         let movable = places.iter().flatten().count();
-        let mut entries = Vec::with_capacity(24 * springs.links().len());
-        for link in springs.links() {
-            let Some(direction) = springs.direction(link) else { continue };
-            let rows = link.nodes.map(|node| places[node as usize].map(|place| 3 * place));
-            assemble(direction, link.spring.stiffness, rows, |row, column, block| {
-                push_block(&mut entries, row, column, &block);
-            });
+        let mut entries = Vec::with_capacity(9 * body.couplings().len());
+        for ((row, column), coupling) in body.couplings() {
+            // Nodes that can move have a place, in the same order.
+            if let (Some(row), Some(column)) = (places[*row as usize], places[*column as usize]) {
+                push_block(&mut entries, 3 * row, 3 * column, &coupling.stiffness);
+            }
         }
         let factor = Some(&places)
             .filter(|places| places.contains(&None))
             .and_then(|_| SparseFactor::new(3 * movable, &entries, None));
         match factor {
-            Some(factor) => Ok(Self { factor, places, movable, springs }),
+            Some(factor) => Ok(Self { factor, places, movable, body }),
             None => {
-                let message = "\"condensed\" needs a body that is held, set body.block.fixed or use another model";
+                let message = "\"condensed\" needs a body that is held, set what is fixed or use another model";
                 Err(ModelError::of("local.model", message))
             }
         }
@@ -71,18 +72,11 @@ impl Condensation {
     /// A_LL: the stiffness of the patch while all others are held.
     fn held(&self, nodes: &[u32]) -> Matrix {
         let mut held = Matrix::zeros(3 * nodes.len(), 3 * nodes.len());
-        for (place, &node) in nodes.iter().enumerate() {
-            for &link in self.springs.at_node(node) {
-                let link = &self.springs.links()[link as usize];
-                let Some(direction) = self.springs.direction(link) else { continue };
-                let places = link.nodes.map(|node| nodes.binary_search(&node).ok());
-                assemble(direction, link.spring.stiffness, places, |row, column, block| {
-                    // The other rows come with their own nodes.
-                    if row == place {
-                        let mut part = held.fixed_view_mut::<3, 3>(3 * row, 3 * column);
-                        part += block;
-                    }
-                });
+        let place: HashMap<u32, usize> = nodes.iter().copied().zip((0..).step_by(3)).collect();
+        for ((row, column), coupling) in self.body.couplings() {
+            if let (Some(&row), Some(&column)) = (place.get(row), place.get(column)) {
+                held.fixed_view_mut::<3, 3>(row, column).copy_from(&coupling.stiffness);
+                held.fixed_view_mut::<3, 3>(column, row).copy_from(&coupling.stiffness.transpose());
             }
         }
         held
@@ -102,7 +96,7 @@ mod tests {
     fn a_patch_with_its_condensed_surroundings_yields_as_the_whole_body_does() {
         let mut block = Block::builder([6; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
         let (nodes, _) = patch_of(&block, &State::at_rest(block.rest()));
-        let condensation = Condensation::new(SpringGraph::new(&block).unwrap()).unwrap();
+        let condensation = Condensation::new(RestingBody::new(&block).unwrap().into()).unwrap();
         let schur = condensation.held(&nodes) - condensation.compliance(&nodes).unwrap();
 
         // A small pull: the force on the pulled node of the whole body, and of the patch whose other nodes are free.
@@ -126,7 +120,7 @@ mod tests {
     #[test]
     fn a_body_that_floats_is_refused() {
         let block = Block::builder([3; 3], [0.05; 3]).build().unwrap();
-        let error = Condensation::new(SpringGraph::new(&block).unwrap()).unwrap_err().to_string();
+        let error = Condensation::new(RestingBody::new(&block).unwrap().into()).unwrap_err().to_string();
         assert!(error.contains("held"), "{error}");
     }
 }

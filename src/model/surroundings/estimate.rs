@@ -2,9 +2,10 @@
 //! number of states, in one pass.
 
 use super::far::Far;
-use super::graph::SpringGraph;
 use super::near::Near;
+use super::resting::RestingBody;
 use crate::Mat3;
+use crate::body::Restriction;
 use crate::linear_algebra::{Matrix, eliminate};
 
 /// Real frequencies (1/s) at which the force is compared, evenly on a logarithmic scale. What the tool does differently from
@@ -34,9 +35,16 @@ pub(super) struct Contacts {
 }
 
 impl Contacts {
-    /// Of `patch` in its `ring`, with surroundings `far` in the span of the columns of `states`.
-    pub(super) fn new(graph: &SpringGraph, [patch, ring]: [&[u32]; 2], far: &Far, states: &Matrix) -> Self {
-        let near = Near::new(graph, patch, ring);
+    /// Of the `restriction` of `body` to a patch of so many nodes, with surroundings `far` in the span of the columns of
+    /// `states`.
+    pub(super) fn new(
+        body: &RestingBody,
+        (restriction, patch): (&Restriction, usize),
+        far: &Far,
+        states: &Matrix,
+    ) -> Self {
+        let near = Near::new(restriction, patch);
+        let ring = restriction.ring(patch);
         let (count, on_ring) = (states.ncols(), states.select_rows(&far.unknowns_of(ring)));
         let (k, c) = far.stiffness_and_damping(states);
         Self {
@@ -46,15 +54,15 @@ impl Contacts {
             states: count,
             squares: vec![vec![0.0; count]; near.pressed.len()],
             done: 0,
-            body: Far::new(graph, &[]),
+            body: Far::whole(body),
             near,
         }
     }
 
     /// Compares at the next frequency; true after the last. `None` if the numbers do not allow it.
-    pub(super) fn advance(&mut self, graph: &SpringGraph) -> Option<bool> {
+    pub(super) fn advance(&mut self, body: &RestingBody) -> Option<bool> {
         let s = FREQUENCIES[self.done];
-        let exact = self.exact(graph, s)?;
+        let exact = self.exact(body, s)?;
         let compliances = self.compliances(s)?;
         for ((squares, of_node), exact) in self.squares.iter_mut().zip(compliances).zip(exact) {
             let exact = exact.try_inverse()?;
@@ -74,9 +82,9 @@ impl Contacts {
     }
 
     /// G D(s)^-1 G^T of the body itself, for each pressed node.
-    fn exact(&self, graph: &SpringGraph, s: f64) -> Option<Vec<Mat3>> {
+    fn exact(&self, body: &RestingBody, s: f64) -> Option<Vec<Mat3>> {
         let nodes: Vec<u32> = self.near.pressed.iter().map(|pressed| pressed.node).collect();
-        let answers = self.body.factorised(graph, s)?.solve(self.body.unit_forces(&nodes));
+        let answers = self.body.factorised(body, s)?.solve(self.body.unit_forces(&nodes));
         let rows = self.body.unknowns_of(&nodes);
         let entry = |node: usize, row: usize, column: usize| answers[(rows[3 * node + row], 3 * node + column)];
         Some((0..nodes.len()).map(|node| Mat3::from_fn(|row, column| entry(node, row, column))).collect())
@@ -116,7 +124,7 @@ mod tests {
     use nalgebra::{DMatrix, Matrix3};
 
     use super::super::reduced::Damping;
-    use super::super::{Basis, Estimate, Reduction, Size, SpringGraph};
+    use super::super::{Basis, Estimate, Reduction, RestingBody, Size};
     use super::FREQUENCIES;
     use crate::Vec3;
     use crate::body::{Block, Body, Spring, SpringNetwork};
@@ -129,31 +137,30 @@ mod tests {
     }
 
     /// A block whose springs and masses differ by up to ten times, damped out of all proportion; and its patch.
-    fn uneven(seed: &mut u64) -> (SpringGraph, Vec<u32>) {
+    fn uneven(seed: &mut u64) -> (SpringNetwork, Vec<u32>) {
         let block = Block::builder([6, 5, 5], [0.05, 0.04, 0.04]).fix(Face::ZMin).build().unwrap();
         let mut patch = Vec::new();
         block.patch(&[block.surface().triangles.len() as u32 - 9], [3, 3, 2], &mut patch);
         let mut builder = SpringNetwork::builder(block.rest().to_vec());
         builder = builder.masses(block.rest().iter().map(|_| 1e-4 * (1.0 + 9.0 * random(seed))).collect());
-        for link in block.springs().unwrap() {
+        for (i, j, spring) in block.springs() {
             let (stiffness, damping) = (10.0 + 90.0 * random(seed), 0.3 * random(seed));
-            let rest_length = link.spring.rest_length;
-            builder = builder.spring(link.nodes[0], link.nodes[1], Spring { stiffness, damping, rest_length });
+            builder = builder.spring(i, j, Spring { stiffness, damping, ..spring });
         }
         let held = (0..block.rest().len() as u32).filter(|&node| block.inverse_masses()[node as usize] == 0.0);
         let builder = held.fold(builder, |builder, node| builder.fix(node));
         let body = builder.surface(block.surface().triangles.clone()).build().unwrap();
-        (SpringGraph::new(&body).unwrap(), patch)
+        (body, patch)
     }
 
     /// Adds the springs that `is_one_of` picks to s^2 M + s C + K over all coordinates.
-    fn add_springs(d: &mut DMatrix<f64>, graph: &SpringGraph, s: f64, is_one_of: impl Fn([u32; 2]) -> bool) {
-        for link in graph.links().iter().filter(|link| is_one_of(link.nodes)) {
-            let along: Vec3 = graph.rest()[link.nodes[1] as usize] - graph.rest()[link.nodes[0] as usize];
+    fn add_springs(d: &mut DMatrix<f64>, body: &SpringNetwork, s: f64, is_one_of: impl Fn([u32; 2]) -> bool) {
+        for &(i, j, spring) in body.springs().iter().filter(|(i, j, _)| is_one_of([*i, *j])) {
+            let along: Vec3 = body.rest()[j as usize] - body.rest()[i as usize];
             let u = along.normalize();
-            let block = u * u.transpose() * (link.spring.stiffness + s * link.spring.damping);
+            let block = u * u.transpose() * (spring.stiffness + s * spring.damping);
             for (a, b, sign) in [(0, 0, 1.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)] {
-                let [a, b] = [a, b].map(|end: usize| 3 * link.nodes[end] as usize);
+                let [a, b] = [a, b].map(|end: usize| 3 * [i, j][end] as usize);
                 let mut part = d.fixed_view_mut::<3, 3>(a, b);
                 part += block * sign;
             }
@@ -168,28 +175,28 @@ mod tests {
     }
 
     /// The relative error at `node` of the patch in the states of `basis`, by dense matrices of all coordinates and states.
-    fn dense_error(graph: &SpringGraph, patch: &[u32], basis: &Basis, node: u32) -> f64 {
-        let nodes = graph.rest().len();
-        let (mut ring, mut held) = (Vec::new(), Vec::new());
-        graph.neighbours(patch, &mut ring, &mut held);
-        let movable = |node: &u32| graph.inverse_masses()[*node as usize] > 0.0;
+    fn dense_error(body: &SpringNetwork, patch: &[u32], basis: &Basis, node: u32) -> f64 {
+        let nodes = body.rest().len();
+        let restriction = body.restriction(patch).unwrap();
+        let ring = restriction.ring(patch.len());
+        let movable = |node: &u32| body.inverse_masses()[*node as usize] > 0.0;
         let coordinates = |node: u32| (0..3).map(move |axis| 3 * node as usize + axis);
         let is_near = |nodes: [u32; 2]| nodes.iter().any(|node| patch.contains(node));
         let mut square = 0.0;
         for s in FREQUENCIES {
             let mut whole = DMatrix::zeros(3 * nodes, 3 * nodes);
-            add_springs(&mut whole, graph, s, |_| true);
+            add_springs(&mut whole, body, s, |_| true);
             for node in (0..nodes as u32).filter(movable) {
-                coordinates(node).for_each(|at| whole[(at, at)] += s * s / graph.inverse_masses()[node as usize]);
+                coordinates(node).for_each(|at| whole[(at, at)] += s * s / body.inverse_masses()[node as usize]);
             }
             let free: Vec<usize> = (0..nodes as u32).filter(movable).flat_map(coordinates).collect();
             let exact = impedance(&whole, &free, node);
 
             // Near springs and the patch's masses; the ring's coordinates are then replaced by those of the states.
             let mut near = DMatrix::zeros(3 * nodes, 3 * nodes);
-            add_springs(&mut near, graph, s, is_near);
+            add_springs(&mut near, body, s, is_near);
             for &node in patch.iter().filter(|node| movable(node)) {
-                coordinates(node).for_each(|at| near[(at, at)] += s * s / graph.inverse_masses()[node as usize]);
+                coordinates(node).for_each(|at| near[(at, at)] += s * s / body.inverse_masses()[node as usize]);
             }
             let on_patch: Vec<usize> = patch.iter().copied().filter(movable).flat_map(coordinates).collect();
             let on_ring: Vec<usize> = ring.iter().copied().flat_map(coordinates).collect();
@@ -222,12 +229,13 @@ mod tests {
     fn the_estimate_is_the_error_that_dense_matrices_give_for_uneven_bodies() {
         let mut seed = 7;
         for _ in 0..3 {
-            let (graph, patch) = uneven(&mut seed);
-            let estimates = Reduction::errors_by_states(&graph, &patch).unwrap();
+            let (body, patch) = uneven(&mut seed);
+            let resting = RestingBody::new(&body).unwrap();
+            let estimates = Reduction::errors_by_states(&resting, &patch).unwrap();
             for states in [3, 10, 25] {
-                let basis = Basis::compute(&graph, &patch, states).unwrap().unwrap();
-                let pressed = super::Near::new(&graph, &patch, &[]).pressed;
-                let errors = pressed.iter().map(|pressed| dense_error(&graph, &patch, &basis, pressed.node));
+                let basis = Basis::compute(&resting, &patch, states).unwrap().unwrap();
+                let pressed = super::Near::new(&body.restriction(&patch).unwrap(), patch.len()).pressed;
+                let errors = pressed.iter().map(|pressed| dense_error(&body, &patch, &basis, pressed.node));
                 let worst = errors.fold(0.0, f64::max);
                 let estimate = 0.01 * estimates[states - 1].1.linear_pct;
                 assert!((estimate / worst - 1.0).abs() < 1e-4, "{states} states: {estimate} against {worst}");
@@ -238,12 +246,13 @@ mod tests {
     #[test]
     fn a_smaller_budget_takes_more_states_and_is_kept() {
         let mut seed = 3;
-        let (graph, patch) = uneven(&mut seed);
-        let estimates = Reduction::errors_by_states(&graph, &patch).unwrap();
+        let (body, patch) = uneven(&mut seed);
+        let resting = RestingBody::new(&body).unwrap();
+        let estimates = Reduction::errors_by_states(&resting, &patch).unwrap();
         assert!(estimates.windows(2).all(|pair| pair[0].1.linear_pct >= pair[1].1.linear_pct * (1.0 - 1e-6)));
         let mut last = 0;
         for budget in [5.0, 2.0, 1.0, 0.5] {
-            let basis = Basis::compute(&graph, &patch, Size::ErrorPct(budget)).unwrap().unwrap();
+            let basis = Basis::compute(&resting, &patch, Size::ErrorPct(budget)).unwrap().unwrap();
             let estimate = basis.estimate().unwrap();
             assert!(basis.states() > last && estimate.expected_pct() <= budget, "{budget}: {estimate:?}");
             assert_eq!(estimate, estimates[basis.states() - 1].1);
@@ -251,7 +260,7 @@ mod tests {
             last = basis.states();
         }
         // What cannot be kept takes all there are, and says what that comes to.
-        let all = Basis::compute(&graph, &patch, Size::ErrorPct(0.1)).unwrap().unwrap();
+        let all = Basis::compute(&resting, &patch, Size::ErrorPct(0.1)).unwrap().unwrap();
         assert!(all.states() >= last && all.estimate().unwrap().expected_pct() >= Estimate::FLOOR_PCT);
     }
 }

@@ -1,22 +1,14 @@
-//! The part of a body that no spring of a patch touches, linear around its rest state.
+//! The part of a body that does not depend on a patch, linear around its rest state.
 
-use super::graph::SpringGraph;
-use crate::Vec3;
-use crate::body::{Spring, assemble};
-use crate::linear_algebra::{Matrix, SparseFactor, dissection, product_t, push_block, symmetric_product};
+use super::resting::{Coupling, RestingBody};
+use crate::body::Restriction;
+use crate::linear_algebra::{Matrix, SparseFactor, dissection, product_t, push_block};
+use crate::{Mat3, Vec3};
 
-/// Damping over stiffness may differ by this much between springs and still count as proportional.
+/// Damping over stiffness may differ by this much from node to node and still count as proportional.
 const PROPORTIONAL: f64 = 1e-9;
 
-/// A spring in the direction that it has at rest, between places in [`Far::nodes`]; `None` is a node that does not move.
-#[derive(Debug)]
-struct FarSpring {
-    places: [Option<u32>; 2],
-    direction: Vec3,
-    spring: Spring,
-}
-
-/// The movable nodes outside a patch, and the springs between them.
+/// The movable nodes outside a patch, and what couples them.
 #[derive(Debug)]
 pub(super) struct Far {
     /// Ids, in increasing order.
@@ -24,30 +16,34 @@ pub(super) struct Far {
     /// Their masses (kg).
     pub(super) masses: Vec<f64>,
     place: Vec<Option<u32>>,
-    springs: Vec<FarSpring>,
+    /// Between places in `nodes`, the higher one first.
+    couplings: Vec<((u32, u32), Coupling)>,
 }
 
 impl Far {
-    /// Outside `patch` (ids in increasing order).
-    pub(super) fn new(graph: &SpringGraph, patch: &[u32]) -> Self {
-        let mut place = vec![None; graph.rest().len()];
+    /// All of `body`.
+    pub(super) fn whole(body: &RestingBody) -> Self {
+        Self::of(body, &[], body.couplings().to_vec())
+    }
+
+    /// What is outside `patch` (ids in increasing order), less the `restriction` to it.
+    pub(super) fn new(body: &RestingBody, patch: &[u32], restriction: &Restriction) -> Self {
+        Self::of(body, patch, body.couplings_without(patch, restriction))
+    }
+
+    fn of(body: &RestingBody, patch: &[u32], mut couplings: Vec<((u32, u32), Coupling)>) -> Self {
+        let mut place = vec![None; body.rest().len()];
         let mut nodes = Vec::new();
-        let outside = |node: u32| patch.binary_search(&node).is_err();
-        for (node, &w) in graph.inverse_masses().iter().enumerate() {
-            if w > 0.0 && outside(node as u32) {
+        for (node, &w) in body.inverse_masses().iter().enumerate() {
+            if w > 0.0 && patch.binary_search(&(node as u32)).is_err() {
                 place[node] = Some(nodes.len() as u32);
                 nodes.push(node as u32);
             }
         }
-        let masses = nodes.iter().map(|&node| 1.0 / graph.inverse_masses()[node as usize]).collect();
-        let springs = graph.links().iter().filter(|link| link.nodes.iter().all(|&node| outside(node)));
-        let springs = springs.filter_map(|link| {
-            let places = link.nodes.map(|node| place[node as usize]);
-            let direction = graph.direction(link).filter(|_| places != [None; 2])?;
-            Some(FarSpring { places, direction, spring: link.spring })
-        });
-        let springs = springs.collect();
-        Self { nodes, masses, place, springs }
+        let masses = nodes.iter().map(|&node| 1.0 / body.inverse_masses()[node as usize]).collect();
+        let at = |node: u32| place[node as usize].expect("it is far and can move");
+        couplings.iter_mut().for_each(|((row, column), _)| (*row, *column) = (at(*row), at(*column)));
+        Self { nodes, masses, place, couplings }
     }
 
     /// Three unknowns per node.
@@ -68,27 +64,24 @@ impl Far {
         forces
     }
 
-    /// Entries (row, column, value) of the lower triangle of s^2 M - s C - K.
+    /// Entries (row, column, value) of the lower triangle of s^2 M + s C + K.
     fn shifted(&self, s: f64) -> Vec<(usize, usize, f64)> {
-        let mut entries = Vec::with_capacity(self.springs.len() * 21 + self.unknowns());
+        let mut entries = Vec::with_capacity(self.couplings.len() * 9 + self.unknowns());
         for (place, mass) in self.masses.iter().enumerate() {
             entries.extend((0..3).map(|axis| (3 * place + axis, 3 * place + axis, s * s * mass)));
         }
-        for spring in &self.springs {
-            let rows = spring.places.map(|place| place.map(|place| 3 * place as usize));
-            let weight = spring.spring.stiffness + s * spring.spring.damping;
-            assemble(spring.direction, weight, rows, |row, column, block| {
-                push_block(&mut entries, row, column, &block);
-            });
+        for ((row, column), Coupling { stiffness, damping }) in &self.couplings {
+            push_block(&mut entries, 3 * *row as usize, 3 * *column as usize, &(stiffness + damping * s));
         }
         entries
     }
 
-    /// s^2 M - s C - K, factorised. `None` if nothing holds the body.
-    pub(super) fn factorised(&self, graph: &SpringGraph, s: f64) -> Option<SparseFactor> {
+    /// s^2 M + s C + K, factorised. `None` if nothing holds the body.
+    pub(super) fn factorised(&self, body: &RestingBody, s: f64) -> Option<SparseFactor> {
         // In an order of elimination with little fill, if the places of the nodes give one.
-        let points: Vec<Vec3> = self.nodes.iter().map(|&node| graph.rest()[node as usize]).collect();
-        let pairs = self.springs.iter().filter_map(|spring| Some([spring.places[0]?, spring.places[1]?]));
+        let points: Vec<Vec3> = self.nodes.iter().map(|&node| body.rest()[node as usize]).collect();
+        let pairs =
+            self.couplings.iter().map(|&((row, column), _)| [row, column]).filter(|[row, column]| row != column);
         SparseFactor::new(self.unknowns(), &self.shifted(s), dissection(&points, pairs).as_deref())
     }
 
@@ -108,47 +101,57 @@ impl Far {
         product_t(shapes, &weighted)
     }
 
-    /// Phi^T K Phi and Phi^T C Phi: K and C answer to displacements and velocities with a force, so both are negative.
+    /// -Phi^T K Phi and -Phi^T C Phi for the columns of `shapes`: what the states do to their own accelerations.
     pub(super) fn stiffness_and_damping(&self, shapes: &Matrix) -> (Matrix, Matrix) {
-        let of = |weight: fn(&Spring) -> f64| {
-            // How far each shape stretches each spring, times the root of the weight.
-            let mut stretches = Matrix::zeros(self.springs.len(), shapes.ncols());
-            for (shape, mut stretches) in shapes.column_iter().zip(stretches.column_iter_mut()) {
-                let at = |place: Option<u32>| {
-                    place.map_or_else(Vec3::zeros, |place| shape.fixed_rows::<3>(3 * place as usize).into_owned())
-                };
-                for (FarSpring { places, direction, spring }, stretch) in self.springs.iter().zip(&mut stretches) {
-                    let [a, b] = places.map(at);
-                    *stretch = direction.dot(&(b - a)) * weight(spring).sqrt();
+        let of = |matrix: fn(&Coupling) -> &Mat3| {
+            let mut forces = Matrix::zeros(shapes.nrows(), shapes.ncols());
+            for (shape, mut force) in shapes.column_iter().zip(forces.column_iter_mut()) {
+                for ((row, column), coupling) in &self.couplings {
+                    let (block, row, column) = (matrix(coupling), 3 * *row as usize, 3 * *column as usize);
+                    let mut add = |to: usize, answer: Vec3| {
+                        let mut part = force.fixed_rows_mut::<3>(to);
+                        part -= answer;
+                    };
+                    add(row, block * shape.fixed_rows::<3>(column));
+                    if row != column {
+                        add(column, block.tr_mul(&shape.fixed_rows::<3>(row)));
+                    }
                 }
             }
-            -symmetric_product(&stretches)
+            let projected = product_t(shapes, &forces);
+            (&projected + projected.transpose()) * 0.5
         };
-        let stiffness = of(|spring| spring.stiffness);
+        let stiffness = of(|coupling| &coupling.stiffness);
         let damping = match self.proportional_damping() {
             Some(share) => &stiffness * share,
-            None => of(|spring| spring.damping),
+            None => of(|coupling| &coupling.damping),
         };
         (stiffness, damping)
     }
 
     /// False if its nodes hang on the patch alone, as around a patch that is nearly all of a small body.
-    pub(super) fn has_springs(&self) -> bool {
-        !self.springs.is_empty()
+    pub(super) fn is_held_together(&self) -> bool {
+        !self.couplings.is_empty()
     }
 
-    /// Damping over stiffness, if it is the same for every spring.
+    /// Damping over stiffness, if it is the same everywhere.
     pub(super) fn proportional_damping(&self) -> Option<f64> {
-        let first = self.springs.first().map(|first| first.spring).filter(|first| first.stiffness > 0.0)?;
-        let share = first.damping / first.stiffness;
-        let same = |spring: &Spring| (spring.damping - share * spring.stiffness).abs() <= PROPORTIONAL * spring.damping;
-        self.springs.iter().all(|other| same(&other.spring)).then_some(share)
+        let (mut product, mut square) = (0.0, 0.0);
+        for (_, Coupling { stiffness, damping }) in &self.couplings {
+            product += stiffness.dot(damping);
+            square += stiffness.norm_squared();
+        }
+        let share = Some(product / square).filter(|share| share.is_finite())?;
+        let is_proportional = |(_, Coupling { stiffness, damping }): &(_, Coupling)| {
+            (damping - stiffness * share).amax() <= PROPORTIONAL * share * stiffness.amax()
+        };
+        self.couplings.iter().all(is_proportional).then_some(share)
     }
 
     /// Columns of smooth displacements, polynomials of the position up to `degree` along each axis: what waves of the
     /// whole body look like.
-    pub(super) fn smooth_fields(&self, graph: &SpringGraph, degree: i32) -> Matrix {
-        let rest = |node: u32| graph.rest()[node as usize];
+    pub(super) fn smooth_fields(&self, body: &RestingBody, degree: i32) -> Matrix {
+        let rest = |node: u32| body.rest()[node as usize];
         let low = self.nodes.iter().fold(Vec3::repeat(f64::INFINITY), |low, &node| low.inf(&rest(node)));
         let high = self.nodes.iter().fold(Vec3::repeat(f64::NEG_INFINITY), |high, &node| high.sup(&rest(node)));
         let extent = (high - low).map(|length| length.max(f64::MIN_POSITIVE));

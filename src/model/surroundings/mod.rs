@@ -1,4 +1,4 @@
-//! What lies around a patch: the springs that reach out of it, the ring of nodes that they reach, and a reduced model of
+//! What lies around a patch: the part of the body that depends on it, the ring of nodes that this part reaches, and a reduced model of
 //! everything beyond.
 
 mod accuracy;
@@ -6,16 +6,16 @@ mod basis;
 mod condense;
 mod estimate;
 mod far;
-mod graph;
 mod near;
 mod products;
 mod reduced;
 mod reduction;
+mod resting;
 mod stored;
 
 pub use accuracy::{Estimate, Size};
 pub use basis::{Bases, Basis};
 pub use condense::Condensation;
-pub use graph::SpringGraph;
 pub(crate) use reduced::ReducedMotion;
 pub use reduction::Reduction;
+pub use resting::RestingBody;

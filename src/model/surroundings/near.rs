@@ -1,7 +1,7 @@
-//! A patch and the springs that touch it, linear around rest.
+//! A patch and what of the body depends on it, linear around rest.
 
-use super::graph::SpringGraph;
-use crate::body::assemble;
+use super::resting::couplings;
+use crate::body::Restriction;
 use crate::linear_algebra::Matrix;
 
 /// At most so many nodes of a patch are pressed.
@@ -31,39 +31,35 @@ pub(super) struct Pressed {
 }
 
 impl Near {
-    /// Of `patch` and its `ring` (ids in increasing order).
-    pub(super) fn new(graph: &SpringGraph, patch: &[u32], ring: &[u32]) -> Self {
-        let movable: Vec<u32> =
-            patch.iter().copied().filter(|&node| graph.inverse_masses()[node as usize] > 0.0).collect();
-        let on_patch = 3 * movable.len();
-        let place = |node: u32| {
-            let of_ring = || ring.binary_search(&node).ok().map(|place| on_patch + 3 * place);
-            movable.binary_search(&node).ok().map(|place| 3 * place).or_else(of_ring)
-        };
-        let total = on_patch + 3 * ring.len();
+    /// The `restriction` of a body to a patch of so many nodes.
+    pub(super) fn new(restriction: &Restriction, patch: usize) -> Self {
+        let Restriction { nodes, body } = restriction;
+        let inverse_masses = body.inverse_masses();
+        let is_movable = |node: &usize| inverse_masses[*node] > 0.0;
+        let movable: Vec<usize> = (0..patch).filter(is_movable).collect();
+        let ring = (patch..nodes.len()).filter(is_movable);
+        let mut place = vec![None; nodes.len()];
+        movable.iter().copied().chain(ring).enumerate().for_each(|(at, node)| place[node] = Some(3 * at));
+        let (on_patch, total) = (3 * movable.len(), 3 * place.iter().flatten().count());
         let [mut mass, mut damping, mut stiffness] = [0; 3].map(|_| Matrix::zeros(total, total));
         let mut outward = vec![0.0; movable.len()];
         for (at, &node) in movable.iter().enumerate() {
-            (0..3).for_each(|axis| mass[(3 * at + axis, 3 * at + axis)] = 1.0 / graph.inverse_masses()[node as usize]);
+            (0..3).for_each(|axis| mass[(3 * at + axis, 3 * at + axis)] = 1.0 / inverse_masses[node]);
         }
-        for link in graph.links() {
-            let is_near = link.nodes.map(|node| patch.binary_search(&node).is_ok());
-            let Some(direction) = graph.direction(link).filter(|_| is_near[0] || is_near[1]) else { continue };
-            let places = link.nodes.map(place);
-            for (matrix, weight) in [(&mut stiffness, link.spring.stiffness), (&mut damping, link.spring.damping)] {
-                assemble(direction, weight, places, |row, column, block| {
-                    let mut part = matrix.fixed_view_mut::<3, 3>(row, column);
-                    part += block;
-                });
+        for ((row, column), coupling) in couplings(&**body) {
+            let (Some(row), Some(column)) = (place[row as usize], place[column as usize]) else { continue };
+            for (matrix, block) in [(&mut stiffness, coupling.stiffness), (&mut damping, coupling.damping)] {
+                matrix.fixed_view_mut::<3, 3>(row, column).copy_from(&block);
+                matrix.fixed_view_mut::<3, 3>(column, row).copy_from(&block.transpose());
             }
-            if is_near[0] != is_near[1] {
-                let inner = places[usize::from(is_near[1])].filter(|place| *place < on_patch);
-                inner.into_iter().for_each(|place| outward[place / 3] += link.spring.stiffness);
+            let (inner, outer) = (row.min(column), row.max(column));
+            if inner < on_patch && outer >= on_patch {
+                outward[inner / 3] += coupling.stiffness.norm();
             }
         }
         let least = outward.iter().copied().fold(f64::INFINITY, f64::min);
         let inner = (0..movable.len()).filter(|&at| outward[at] <= least * (1.0 + 1e-9));
-        let pressed: Vec<Pressed> = inner.map(|at| Pressed { node: movable[at], coordinate: 3 * at }).collect();
+        let pressed: Vec<Pressed> = inner.map(|at| Pressed { node: nodes[movable[at]], coordinate: 3 * at }).collect();
         let stride = pressed.len().div_ceil(CONTACTS).max(1);
         Self { mass, damping, stiffness, patch: on_patch, pressed: pressed.into_iter().step_by(stride).collect() }
     }

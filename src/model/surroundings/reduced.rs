@@ -28,7 +28,7 @@ impl Reduced {
     /// The surroundings `far` in the span of the columns of `shapes`, with its modes there on all of `far` as columns.
     /// `None` if there is no motion in that span, nothing that holds it or a number is not finite.
     pub(super) fn new(far: &Far, ring: &[u32], shapes: &Matrix) -> Option<(Self, Matrix)> {
-        if !far.has_springs() {
+        if !far.is_held_together() {
             return None;
         }
         let (stiffness, damping) = far.stiffness_and_damping(shapes);

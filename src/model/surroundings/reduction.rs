@@ -4,9 +4,10 @@ use super::accuracy::{Estimate, Size, states_within};
 use super::basis::{Basis, Forecast};
 use super::estimate::Contacts;
 use super::far::Far;
-use super::graph::SpringGraph;
 use super::products::Columns;
 use super::reduced::Reduced;
+use super::resting::RestingBody;
+use crate::body::Restriction;
 use crate::error::ModelError;
 use crate::linear_algebra::{Matrix, SparseFactor, leading_combinations, leading_left_singular_vectors};
 
@@ -30,6 +31,7 @@ pub struct Reduction {
     ring: Vec<u32>,
     size: Size,
     far: Far,
+    restriction: Restriction,
     stage: Stage,
     errors: Option<Vec<f64>>,
 }
@@ -64,17 +66,18 @@ impl Reduction {
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(graph: &SpringGraph, patch: &[u32], size: impl Into<Size>) -> Option<Self> {
+    pub fn new(body: &RestingBody, patch: &[u32], size: impl Into<Size>) -> Option<Self> {
         let size = size.into();
-        let (mut ring, mut held) = (Vec::new(), Vec::new());
-        graph.neighbours(patch, &mut ring, &mut held);
+        let restriction = body.restriction(patch)?;
+        let ring: Vec<u32> = restriction.ring(patch.len()).to_vec();
         let can_move = !ring.is_empty() && size != Size::States(0);
         can_move.then(|| Self {
             patch: patch.to_vec(),
             ring,
             size,
             errors: None,
-            far: Far::new(graph, patch),
+            far: Far::new(body, patch, &restriction),
+            restriction,
             stage: Stage::Factorise,
         })
     }
@@ -102,30 +105,30 @@ impl Reduction {
     ///
     /// # Real-time
     /// Not real-time safe: allocates, and takes a second for a large body.
-    pub fn advance(&mut self, graph: &SpringGraph) -> Result<Option<Basis>, ModelError> {
+    pub fn advance(&mut self, body: &RestingBody) -> Result<Option<Basis>, ModelError> {
         let (far, ring) = (&self.far, &self.ring);
         match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Factorise => {
-                let factor = far.factorised(graph, EXPANSION).ok_or_else(indefinite)?;
+                let factor = far.factorised(body, EXPANSION).ok_or_else(indefinite)?;
                 let all = Matrix::zeros(far.unknowns(), 0);
                 self.stage = Stage::Moments { factor, count: 0, last: far.unit_forces(ring), all };
             }
             Stage::Moments { factor, count, last, mut all } => {
                 let last = append_moment(far, factor.solve(last), &mut all, count);
                 self.stage = match count + 1 {
-                    MOMENTS => self.span(graph, factor, &all),
+                    MOMENTS => self.span(body, factor, &all),
                     count => Stage::Moments { factor, count, last, all },
                 };
             }
             Stage::Compare { factor, wide, mut contacts } => {
-                self.stage = if contacts.advance(graph).ok_or_else(indefinite)? {
+                self.stage = if contacts.advance(body).ok_or_else(indefinite)? {
                     self.errors = Some(contacts.errors());
                     Stage::Project { factor, wide }
                 } else {
                     Stage::Compare { factor, wide, contacts }
                 };
             }
-            Stage::Project { factor, wide } => return self.project(graph, &factor, &wide).map(Some),
+            Stage::Project { factor, wide } => return self.project(body, &factor, &wide).map(Some),
             Stage::Done => {}
         }
         Ok(None)
@@ -137,8 +140,8 @@ impl Reduction {
     }
 
     /// The states, the most important first.
-    fn span(&self, graph: &SpringGraph, factor: SparseFactor, moments: &Matrix) -> Stage {
-        let Self { far, ring, patch, size, .. } = self;
+    fn span(&self, body: &RestingBody, factor: SparseFactor, moments: &Matrix) -> Stage {
+        let Self { far, restriction, patch, size, .. } = self;
         let most = match size {
             Size::States(states) => *states,
             Size::ErrorPct(_) => Size::MOST_STATES,
@@ -147,13 +150,13 @@ impl Reduction {
         match size {
             Size::States(_) => Stage::Project { factor, wide },
             Size::ErrorPct(_) => {
-                let contacts = Box::new(Contacts::new(graph, [patch, ring], far, &wide));
+                let contacts = Box::new(Contacts::new(body, (restriction, patch.len()), far, &wide));
                 Stage::Compare { factor, wide, contacts }
             }
         }
     }
 
-    fn project(&self, graph: &SpringGraph, factor: &SparseFactor, wide: &Matrix) -> Result<Basis, ModelError> {
+    fn project(&self, body: &RestingBody, factor: &SparseFactor, wide: &Matrix) -> Result<Basis, ModelError> {
         let Self { far, ring, size, errors, .. } = self;
         let states = match *size {
             Size::States(states) => states,
@@ -164,7 +167,7 @@ impl Reduction {
         let columns = |count: usize| wide.columns(0, count.min(wide.ncols())).into_owned();
         let (answers, _) = Reduced::new(far, ring, &columns(states)).ok_or_else(indefinite)?;
         let mut shapes = columns(states.max(FORECAST_STATES));
-        append(&mut shapes, &factor.solve(far.smooth_fields(graph, SMOOTH_DEGREE)));
+        append(&mut shapes, &factor.solve(far.smooth_fields(body, SMOOTH_DEGREE)));
         // Directions count, not lengths.
         for mut shape in shapes.column_iter_mut() {
             let norm = shape.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
@@ -209,10 +212,10 @@ impl Basis {
     /// # Real-time
     /// Not real-time safe: factorises a matrix of the whole body's size, seconds of work for a large one. [`Reduction`] does
     /// the same in parts.
-    pub fn compute(graph: &SpringGraph, patch: &[u32], size: impl Into<Size>) -> Result<Option<Self>, ModelError> {
-        let Some(mut reduction) = Reduction::new(graph, patch, size) else { return Ok(None) };
+    pub fn compute(body: &RestingBody, patch: &[u32], size: impl Into<Size>) -> Result<Option<Self>, ModelError> {
+        let Some(mut reduction) = Reduction::new(body, patch, size) else { return Ok(None) };
         loop {
-            if let Some(basis) = reduction.advance(graph)? {
+            if let Some(basis) = reduction.advance(body)? {
                 return Ok(Some(basis));
             }
         }
@@ -228,15 +231,15 @@ impl Reduction {
     ///
     /// # Real-time
     /// Not real-time safe: factorises the body several times.
-    pub fn errors_by_states(graph: &SpringGraph, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, ModelError> {
+    pub fn errors_by_states(body: &RestingBody, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, ModelError> {
         // No number of states keeps this budget, so that all are looked at.
-        let Some(mut reduction) = Self::new(graph, patch, Size::ErrorPct(0.0)) else { return Ok(Vec::new()) };
+        let Some(mut reduction) = Self::new(body, patch, Size::ErrorPct(0.0)) else { return Ok(Vec::new()) };
         loop {
             if let Some(errors) = reduction.errors() {
                 let estimate = |(index, &error): (usize, &f64)| (index + 1, Estimate { linear_pct: 100.0 * error });
                 return Ok(errors.iter().enumerate().map(estimate).collect());
             }
-            if reduction.advance(graph)?.is_some() {
+            if reduction.advance(body)?.is_some() {
                 return Ok(Vec::new());
             }
         }
@@ -256,8 +259,8 @@ mod tests {
         let corner = block.lattice().id([0, 0, 2]);
         let is_in_patch = |node: &u32| *node != corner && block.inverse_masses()[*node as usize] > 0.0;
         let patch: Vec<u32> = (0..block.rest().len() as u32).filter(is_in_patch).collect();
-        let graph = SpringGraph::new(&block).unwrap();
-        let refused = Basis::compute(&graph, &patch, 20).unwrap_err().to_string();
+        let resting = RestingBody::new(&block).unwrap();
+        let refused = Basis::compute(&resting, &patch, 20).unwrap_err().to_string();
         assert!(refused.contains("not held together"), "{refused}");
     }
 }

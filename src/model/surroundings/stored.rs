@@ -2,9 +2,9 @@
 
 use super::accuracy::Estimate;
 use super::basis::{Basis, Forecast};
-use super::graph::digest;
 use super::products::Columns;
 use super::reduced::{Damping, Reduced};
+use super::resting::digest;
 use crate::linear_algebra::Matrix;
 
 /// What the bytes begin with; its number changes with what follows.
@@ -136,7 +136,7 @@ impl Reader<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Size, SpringGraph};
+    use super::super::{RestingBody, Size};
     use super::*;
     use crate::body::{Block, Body};
     use crate::mesh::Face;
@@ -144,10 +144,10 @@ mod tests {
     #[test]
     fn a_basis_comes_back_whole_and_a_damaged_one_not_at_all() {
         let block = Block::builder([5; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
-        let graph = SpringGraph::new(&block).unwrap();
+        let resting = RestingBody::new(&block).unwrap();
         let mut patch = Vec::new();
         block.patch(&[block.surface().triangles.len() as u32 - 5], [2, 2, 1], &mut patch);
-        let basis = Basis::compute(&graph, &patch, Size::ErrorPct(2.0)).unwrap().unwrap();
+        let basis = Basis::compute(&resting, &patch, Size::ErrorPct(2.0)).unwrap().unwrap();
         assert!(basis.estimate().is_some());
         let bytes = basis.to_bytes(7);
         assert_eq!(Basis::from_bytes(&bytes, 7).as_ref(), Some(&basis));

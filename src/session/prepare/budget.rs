@@ -53,19 +53,6 @@ pub(super) fn force_evaluation(body: &mut dyn Body, state: &State) -> Nanos {
     Nanos::from_duration(least)
 }
 
-/// The same on no machine in particular, for runs that must be the same on all of them.
-pub(super) fn nominal_evaluation(body: &dyn Body) -> Nanos {
-    match body.spring_count() {
-        Some(springs) => Nanos(springs as u64 * NOMINAL_SPRING_NS),
-        None => Nanos(body.rest().len() as u64 * NOMINAL_NODE_NS),
-    }
-}
-
-/// What the vector kernels take for a spring on an AVX-512 machine (`cargo bench --bench spring_kernel`).
-const NOMINAL_SPRING_NS: u64 = 2;
-/// A body of something else: some ten springs at each node, and without vector instructions.
-const NOMINAL_NODE_NS: u64 = 300;
-
 struct Cost {
     /// One evaluation of all forces.
     evaluation: Nanos,

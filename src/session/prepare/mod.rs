@@ -109,7 +109,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let mut start = Start::new(body, &scene, &attached, probes, rates[0])?;
     let global = groups::global_group(global, &scene.global, rates[1], execution)?;
     let blend_ticks = (scene.local.blend.ms * 1e-3 / rates[0].period_s()).round().max(1.0) as u32;
-    let work = Nanos(budget::nominal_evaluation(&*start.body).0 * u64::from(start.substeps));
+    let work = Nanos::from_secs_f64(start.body.nominal_evaluation() * f64::from(start.substeps));
     let lateness = timing::lateness(&global, rates[0], work, options.in_real_time);
     let timing = Timing::new(rates, start.substeps, lateness, blend_ticks);
 

@@ -5,7 +5,7 @@ use crate::log::ModelReason;
 use crate::model::body::Body;
 use crate::model::local::Kind;
 use crate::model::mesh::Lattice;
-use crate::model::surroundings::{Estimate, Reduction, Size, SpringGraph};
+use crate::model::surroundings::{Estimate, Reduction, RestingBody, Size};
 use crate::scene::{Scene, patch_fits};
 
 /// What is tried, in the order of what a tick costs.
@@ -51,7 +51,7 @@ pub(super) fn choose(scene: &Scene, body: &dyn Body, attached: &[Option<u32>]) -
     if scene.local.model.named() != Some(Kind::Predictive) || basis == Size::States(0) {
         return None;
     }
-    let springs = SpringGraph::new(body)?;
+    let resting = RestingBody::new(body)?;
     let node = attached.first().copied().flatten().or_else(|| scene.first_touched(body))?;
     let triangle = *body.surface().at_node(node).first()?;
     let place = match &scene.body {
@@ -68,7 +68,7 @@ pub(super) fn choose(scene: &Scene, body: &dyn Body, attached: &[Option<u32>]) -
         }
         last.clone_from(&patch);
         // What cannot be reduced is told by the actor, when it is wanted.
-        let Ok(errors) = Reduction::errors_by_states(&springs, &patch) else { continue };
+        let Ok(errors) = Reduction::errors_by_states(&resting, &patch) else { continue };
         let (states, expected_pct) = expected(&errors, basis);
         if best.as_ref().is_none_or(|best| expected_pct < best.expected_pct) {
             best = Some(PatchChoice { size, states, expected_pct, budget_pct, place: place.clone() });

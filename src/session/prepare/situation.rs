@@ -1,10 +1,10 @@
 //! What each local model would cost on this body and this machine.
 
-use super::budget::{force_evaluation, nominal_evaluation};
+use super::budget::force_evaluation;
 use super::timing::Timing;
 use crate::model::body::{Body, State};
 use crate::model::local::Kind;
-use crate::model::surroundings::Size;
+use crate::model::surroundings::{RestingBody, Size};
 use crate::runtime::{Execution, Nanos};
 use crate::scene::Scene;
 
@@ -72,16 +72,16 @@ impl Situation {
     /// Of `scene` with `body` as it is at the start. On threads the forces are evaluated and timed; in virtual time all costs
     /// are nominal, so that a run is the same everywhere.
     pub(super) fn of(scene: &Scene, body: &mut dyn Body, state: &State, timing: Timing, execution: Execution) -> Self {
-        let has_springs = body.spring_count().is_some();
+        let is_restrictable = RestingBody::is_of(body);
         let is_held = body.inverse_masses().contains(&0.0);
         let is_possible = |kind: &Kind| {
             let suits_body = match kind {
                 // One model of the whole body, and each device needs its own.
                 Kind::Full => scene.devices.len() == 1,
                 Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
-                Kind::Condensed => has_springs && is_held,
-                Kind::Predicted => has_springs,
-                Kind::Predictive => has_springs && scene.local.basis_size() != Size::States(0),
+                Kind::Condensed => is_restrictable && is_held,
+                Kind::Predicted => is_restrictable,
+                Kind::Predictive => is_restrictable && scene.local.basis_size() != Size::States(0),
             };
             let mut named = scene.clone().with_model(*kind);
             named.local.name_chosen(*kind);
@@ -89,7 +89,7 @@ impl Situation {
         };
         let possible = Kind::ALL.into_iter().filter(is_possible).collect();
         let (evaluation, origin, cores) = match execution {
-            Execution::Virtual => (nominal_evaluation(body), "nominal", NOMINAL_CORES),
+            Execution::Virtual => (Nanos::from_secs_f64(body.nominal_evaluation()), "nominal", NOMINAL_CORES),
             Execution::Threaded => {
                 let cores = std::thread::available_parallelism().map_or(1, usize::from);
                 (force_evaluation(body, state), "measured", cores)

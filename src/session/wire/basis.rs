@@ -8,7 +8,7 @@ use crate::log::ModelReason;
 use crate::model::Vec3;
 use crate::model::local::Aim;
 use crate::model::local::ToolForecast;
-use crate::model::surroundings::{Bases, Size, SpringGraph};
+use crate::model::surroundings::{Bases, RestingBody, Size};
 use crate::runtime::{Actor, ExchangePort, RuntimeBuilder};
 use crate::session::prepare::{Prepared, extended};
 
@@ -18,7 +18,7 @@ pub(super) struct BasisSide {
     pub(super) bases: ExchangePort<Bases>,
     /// Those that are there before the start.
     pub(super) known: Bases,
-    springs: Arc<SpringGraph>,
+    resting: Arc<RestingBody>,
     store: BasisStore,
     pace: BasisPace,
 }
@@ -29,7 +29,7 @@ impl BasisSide {
     /// # Errors
     /// If the surface cannot be searched.
     pub(super) fn new(graph: &mut RuntimeBuilder, prepared: &Prepared, tools: &[Vec3]) -> Result<Option<Self>, Error> {
-        let Some(springs) = prepared.plan.template.springs.clone().filter(|_| prepared.reduces()) else {
+        let Some(resting) = prepared.plan.template.resting.clone().filter(|_| prepared.reduces()) else {
             return Ok(None);
         };
         let folder = prepared.plan.basis_folder.clone();
@@ -38,9 +38,9 @@ impl BasisSide {
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
-            known: first_bases(prepared, &springs, &store, tools)?,
+            known: first_bases(prepared, &resting, &store, tools)?,
             store,
-            springs,
+            resting,
             pace,
         }))
     }
@@ -61,12 +61,12 @@ impl BasisSide {
 
     pub(super) fn actor(&self) -> Box<dyn Actor> {
         let ports = BasisPorts { wishes: self.wishes.reader(), bases: self.bases.writer() };
-        Box::new(BasisActor::new(Arc::clone(&self.springs), self.store.clone(), self.known.clone(), self.pace, ports))
+        Box::new(BasisActor::new(Arc::clone(&self.resting), self.store.clone(), self.known.clone(), self.pace, ports))
     }
 }
 
 /// The basis where each tool is, and before a run on threads one that holds a cell more around it.
-fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, tools: &[Vec3]) -> Result<Bases, Error> {
+fn first_bases(prepared: &Prepared, resting: &RestingBody, store: &BasisStore, tools: &[Vec3]) -> Result<Bases, Error> {
     let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
     let aim = Aim::new(body.surface(), &state.positions)?;
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
@@ -79,7 +79,7 @@ fn first_bases(prepared: &Prepared, springs: &SpringGraph, store: &BasisStore, t
             body.patch(&triangles[..1], size, &mut patch);
             // What cannot be reduced is told by the actor, when it is wanted.
             if bases.get(&patch).is_none()
-                && let Ok(Some(basis)) = store.get(springs, &patch)
+                && let Ok(Some(basis)) = store.get(resting, &patch)
             {
                 bases.insert(Arc::new(basis));
             }

@@ -11,7 +11,7 @@ use palpate::model::local::ToolForecast;
 use palpate::model::local::{Kind, LocalModel, Prediction, ResyncView, Template};
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
-use palpate::model::surroundings::{Bases, Basis, SpringGraph};
+use palpate::model::surroundings::{Bases, Basis, RestingBody};
 use palpate::runtime::{Nanos, Stopwatch};
 use palpate::{Error, ErrorKind};
 use palpate_cli::drawing::{Picture, Series};
@@ -62,7 +62,7 @@ impl Surroundings {
         let touched = sim.contact(0).triangle.ok_or_else(no_contact)?;
         let mut patch = Vec::new();
         sim.body().patch(&[touched], PATCH, &mut patch);
-        let springs = SpringGraph::new(sim.body()).ok_or_else(no_contact)?;
+        let resting = RestingBody::new(sim.body()).ok_or_else(no_contact)?;
         // A direct factorisation of a body in space grows with the sixth power of its edge.
         let last = smaller.last().and_then(|last| Some((last.nodes, last.seconds?)));
         let expected = match (last, smaller.is_empty()) {
@@ -76,7 +76,7 @@ impl Surroundings {
         }
         let begun = Instant::now();
         let mut bases = Bases::default();
-        if let Some(basis) = Basis::compute(&springs, &patch, STATES)? {
+        if let Some(basis) = Basis::compute(&resting, &patch, STATES)? {
             bases.insert(Arc::new(basis));
         }
         let seconds = begun.elapsed().as_secs_f64();
@@ -139,7 +139,7 @@ impl Costs {
 
 pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<Costs, Error> {
     let body = block(nodes)?;
-    let springs = body.spring_count();
+    let springs = body.springs().len();
     let (mut sim, ticks_per_step) = simulation(body, rate)?;
     let tick = 1.0 / rate;
     advance(&mut sim, 0.0, BEGIN);

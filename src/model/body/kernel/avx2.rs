@@ -129,10 +129,10 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Pair; 3]; 2] {
+    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Pair; 4]; 2] {
         // SAFETY: the features were detected; a motion is eight doubles.
         unsafe {
-            let mut differences = [[[_mm256_setzero_pd(); 2]; 3]; 2];
+            let mut differences = [[[_mm256_setzero_pd(); 2]; 4]; 2];
             for half in 0..2 {
                 let mut rows = [[_mm256_setzero_pd(); 4]; 2];
                 for lane in 0..4 {
@@ -142,13 +142,26 @@ impl Simd for Avx2 {
                     rows[1][lane] = _mm256_sub_pd(there[1], here[1]);
                 }
                 for kind in 0..2 {
-                    let [x, y, z, _] = self.transpose(rows[kind]);
-                    differences[kind][0][half] = x;
-                    differences[kind][1][half] = y;
-                    differences[kind][2][half] = z;
+                    let columns = self.transpose(rows[kind]);
+                    for (number, &column) in columns.iter().enumerate() {
+                        differences[kind][number][half] = column;
+                    }
                 }
             }
             differences
+        }
+    }
+
+    #[inline(always)]
+    fn fourth(self, nodes: &[Motion], at: &Numbers) -> Pair {
+        // SAFETY: the features were detected; a motion is eight doubles.
+        unsafe {
+            let mut fourth = [_mm256_setzero_pd(); 2];
+            for half in 0..2 {
+                let row = |lane: usize| _mm256_loadu_pd(nodes[at[4 * half + lane] as usize].0.as_ptr());
+                fourth[half] = self.transpose([row(0), row(1), row(2), row(3)])[3];
+            }
+            fourth
         }
     }
 
@@ -163,6 +176,20 @@ impl Simd for Avx2 {
                     _mm256_storeu_pd(own.as_mut_ptr(), _mm256_add_pd(_mm256_loadu_pd(own.as_ptr()), rows[lane]));
                     let other = &mut forces[to[4 * half + lane] as usize].0;
                     _mm256_storeu_pd(other.as_mut_ptr(), _mm256_sub_pd(_mm256_loadu_pd(other.as_ptr()), rows[lane]));
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn push(self, [x, y, z]: [Pair; 3], forces: &mut [Push], to: &Numbers) {
+        // SAFETY: the features were detected; a push is four doubles.
+        unsafe {
+            for half in 0..2 {
+                let rows = self.transpose([x[half], y[half], z[half], _mm256_setzero_pd()]);
+                for lane in 0..4 {
+                    let own = &mut forces[to[4 * half + lane] as usize].0;
+                    _mm256_storeu_pd(own.as_mut_ptr(), _mm256_add_pd(_mm256_loadu_pd(own.as_ptr()), rows[lane]));
                 }
             }
         }

@@ -26,6 +26,30 @@ impl Avx512 {
         // SAFETY: a value of this type exists only where the features were detected.
         unsafe { compiled(self, work) }
     }
+
+    /// Eight vectors, each as x y z 0.
+    #[inline(always)]
+    fn quads(self, [x, y, z]: [__m512d; 3]) -> [__m256d; LANES] {
+        // SAFETY: the features were detected.
+        unsafe {
+            // By quarters x y of vectors 0 2 4 6 and 1 3 5 7, and z 0.
+            let zero = _mm512_setzero_pd();
+            let xy = [_mm512_unpacklo_pd(x, y), _mm512_unpackhi_pd(x, y)];
+            let z0 = [_mm512_unpacklo_pd(z, zero), _mm512_unpackhi_pd(z, zero)];
+            let mut quads = [_mm256_setzero_pd(); LANES];
+            for odd in 0..2 {
+                // Halves: vectors 0 and 2 (1 and 3), 4 and 6 (5 and 7).
+                let low = _mm512_shuffle_f64x2::<0b01_00_01_00>(xy[odd], z0[odd]);
+                let high = _mm512_shuffle_f64x2::<0b11_10_11_10>(xy[odd], z0[odd]);
+                // low: xy0 xy2 z0 z2, high: xy4 xy6 z4 z6.
+                quads[odd] = _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b10_00_10_00>(low, low));
+                quads[2 + odd] = _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b11_01_11_01>(low, low));
+                quads[4 + odd] = _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b10_00_10_00>(high, high));
+                quads[6 + odd] = _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b11_01_11_01>(high, high));
+            }
+            quads
+        }
+    }
 }
 
 #[target_feature(enable = "avx512f,avx512dq,avx2,fma")]
@@ -139,7 +163,7 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[__m512d; 3]; 2] {
+    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[__m512d; 4]; 2] {
         // SAFETY: the features were detected.
         unsafe {
             let mut d = [_mm512_setzero_pd(); LANES];
@@ -160,7 +184,7 @@ impl Simd for Avx512 {
                 _mm512_unpackhi_pd(d[4], d[5]),
                 _mm512_unpackhi_pd(d[6], d[7]),
             ];
-            // low[n] has the quarters x, z, u, w of two pairs; high[n] y, -, v, -.
+            // low[n] has the quarters x, z, u, w of two pairs; high[n] y, fourth, v, fourth.
             let xz = [
                 _mm512_shuffle_f64x2::<0b10_00_10_00>(low[0], low[1]),
                 _mm512_shuffle_f64x2::<0b10_00_10_00>(low[2], low[3]),
@@ -173,43 +197,56 @@ impl Simd for Avx512 {
                 _mm512_shuffle_f64x2::<0b10_00_10_00>(high[0], high[1]),
                 _mm512_shuffle_f64x2::<0b10_00_10_00>(high[2], high[3]),
             ];
-            // Each now x u x u (z w z w, y v y v) by quarters.
+            let fourths = [
+                _mm512_shuffle_f64x2::<0b11_01_11_01>(high[0], high[1]),
+                _mm512_shuffle_f64x2::<0b11_01_11_01>(high[2], high[3]),
+            ];
+            // Each now x u x u (z w z w, y v y v, and the fourths) by quarters.
             let even = |a, b| _mm512_shuffle_f64x2::<0b10_00_10_00>(a, b);
             let odd = |a, b| _mm512_shuffle_f64x2::<0b11_01_11_01>(a, b);
             [
-                [even(xz[0], xz[1]), even(yv[0], yv[1]), even(zw[0], zw[1])],
-                [odd(xz[0], xz[1]), odd(yv[0], yv[1]), odd(zw[0], zw[1])],
+                [even(xz[0], xz[1]), even(yv[0], yv[1]), even(zw[0], zw[1]), even(fourths[0], fourths[1])],
+                [odd(xz[0], xz[1]), odd(yv[0], yv[1]), odd(zw[0], zw[1]), odd(fourths[0], fourths[1])],
             ]
         }
     }
 
     #[inline(always)]
-    fn exchange(self, [x, y, z]: [__m512d; 3], forces: &mut [Push], from: &Numbers, to: &Numbers) {
+    fn fourth(self, nodes: &[Motion], at: &Numbers) -> __m512d {
+        // SAFETY: the features were detected; a motion is eight doubles.
+        unsafe {
+            let row = |lane: usize| _mm256_loadu_pd(nodes[at[lane] as usize].0.as_ptr());
+            // Of four rows: second and fourth of two, and of these the upper halves.
+            let four = |n: usize| {
+                let (ab, cd) = (_mm256_unpackhi_pd(row(n), row(n + 1)), _mm256_unpackhi_pd(row(n + 2), row(n + 3)));
+                _mm256_permute2f128_pd::<0x31>(ab, cd)
+            };
+            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(four(0)), four(4))
+        }
+    }
+
+    #[inline(always)]
+    fn exchange(self, pull: [__m512d; 3], forces: &mut [Push], from: &Numbers, to: &Numbers) {
+        let quads = self.quads(pull);
         // SAFETY: the features were detected; a push is four doubles.
         unsafe {
-            // By quarters x y of pairs 0 2 4 6 and 1 3 5 7, and z 0.
-            let zero = _mm512_setzero_pd();
-            let xy = [_mm512_unpacklo_pd(x, y), _mm512_unpackhi_pd(x, y)];
-            let z0 = [_mm512_unpacklo_pd(z, zero), _mm512_unpackhi_pd(z, zero)];
-            for odd in 0..2 {
-                // Halves: pairs 0 and 4 (1 and 5), 2 and 6 (3 and 7).
-                let (a, b) = (xy[odd], z0[odd]);
-                let low = _mm512_shuffle_f64x2::<0b01_00_01_00>(a, b);
-                let high = _mm512_shuffle_f64x2::<0b11_10_11_10>(a, b);
-                // low: xy0 xy2 z0 z2, high: xy4 xy6 z4 z6.
-                let quads = [
-                    _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b10_00_10_00>(low, low)),
-                    _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b11_01_11_01>(low, low)),
-                    _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b10_00_10_00>(high, high)),
-                    _mm512_castpd512_pd256(_mm512_shuffle_f64x2::<0b11_01_11_01>(high, high)),
-                ];
-                for (n, &quad) in quads.iter().enumerate() {
-                    let lane = 2 * n + odd;
-                    let own = &mut forces[from[lane] as usize].0;
-                    _mm256_storeu_pd(own.as_mut_ptr(), _mm256_add_pd(_mm256_loadu_pd(own.as_ptr()), quad));
-                    let other = &mut forces[to[lane] as usize].0;
-                    _mm256_storeu_pd(other.as_mut_ptr(), _mm256_sub_pd(_mm256_loadu_pd(other.as_ptr()), quad));
-                }
+            for lane in 0..LANES {
+                let own = &mut forces[from[lane] as usize].0;
+                _mm256_storeu_pd(own.as_mut_ptr(), _mm256_add_pd(_mm256_loadu_pd(own.as_ptr()), quads[lane]));
+                let other = &mut forces[to[lane] as usize].0;
+                _mm256_storeu_pd(other.as_mut_ptr(), _mm256_sub_pd(_mm256_loadu_pd(other.as_ptr()), quads[lane]));
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn push(self, force: [__m512d; 3], forces: &mut [Push], to: &Numbers) {
+        let quads = self.quads(force);
+        // SAFETY: the features were detected; a push is four doubles.
+        unsafe {
+            for lane in 0..LANES {
+                let own = &mut forces[to[lane] as usize].0;
+                _mm256_storeu_pd(own.as_mut_ptr(), _mm256_add_pd(_mm256_loadu_pd(own.as_ptr()), quads[lane]));
             }
         }
     }

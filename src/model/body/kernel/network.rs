@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use super::super::super::Vec3;
 use super::super::Spring;
+use super::colouring::colour;
 use super::cores::Cores;
 use super::nodes::{LANES, Lane, Motion, Push};
 use super::numbering::near_first;
@@ -15,9 +16,6 @@ use super::pull::{Springs, scale};
 use super::simd::{InstructionSet, Numbers, Simd, Work};
 #[cfg(feature = "parallel")]
 use crate::error::ModelError;
-
-/// Springs that a batch is chosen from: enough to find eight without a common node, few enough to stay near.
-const WINDOW: usize = 512;
 
 /// Evaluates a list of springs.
 #[derive(Clone, Debug)]
@@ -33,7 +31,7 @@ pub(crate) struct NetworkKernel {
 
 impl NetworkKernel {
     pub(crate) fn new(nodes: usize, springs: &[(u32, u32, Spring)]) -> Self {
-        let order = near_first(nodes, springs);
+        let order = near_first(nodes, springs.iter().map(|&(i, j, _)| [i, j]));
         let mut place = vec![0; nodes];
         for (new, &old) in order.iter().enumerate() {
             place[old as usize] = new as u32;
@@ -125,7 +123,7 @@ impl NetworkPart {
         let end = springs.iter().map(|&(_, j, _)| j as usize + 1).fold(own.end, usize::max);
         let count = end - own.start;
         Self {
-            batches: colour(springs, own.start, count),
+            batches: batches(springs, own.start, count),
             nodes: vec![Motion::default(); count + 1],
             forces: vec![Push::default(); count + 1],
             own,
@@ -154,17 +152,9 @@ impl NetworkPart {
 }
 
 /// Batches of `springs`, sorted by their lower node; `count` nodes from `first` on.
-fn colour(springs: &[(u32, u32, Spring)], first: usize, count: usize) -> Vec<Batch> {
-    let mut batches = Vec::with_capacity(springs.len().div_ceil(LANES));
-    // The number of the last batch that touches a node, counted from 1.
-    let mut touched = vec![0; count];
-    let mut left = springs.iter();
-    let mut window: Vec<&(u32, u32, Spring)> = Vec::new();
-    loop {
-        window.extend(left.by_ref().take(WINDOW - window.len()));
-        if window.is_empty() {
-            return batches;
-        }
+fn batches(springs: &[(u32, u32, Spring)], first: usize, count: usize) -> Vec<Batch> {
+    let nodes: Vec<[u32; 2]> = springs.iter().map(|&(i, j, _)| [i, j].map(|node| node - first as u32)).collect();
+    let fill = |members: Vec<usize>| {
         let lone = count as u32;
         let mut batch = Batch {
             from: [lone; LANES],
@@ -173,22 +163,16 @@ fn colour(springs: &[(u32, u32, Spring)], first: usize, count: usize) -> Vec<Bat
             damping: [0.0; LANES],
             rest_length: [1.0; LANES],
         };
-        let (number, mut lane) = (batches.len() + 1, 0);
-        window.retain(|&&(i, j, spring)| {
-            let [i, j] = [i, j].map(|node| node - first as u32);
-            let is_free = lane < LANES && touched[i as usize] != number && touched[j as usize] != number;
-            if is_free {
-                (touched[i as usize], touched[j as usize]) = (number, number);
-                (batch.from[lane], batch.to[lane]) = (i, j);
-                batch.stiffness[lane] = spring.stiffness;
-                batch.damping[lane] = spring.damping;
-                batch.rest_length[lane] = spring.rest_length;
-                lane += 1;
-            }
-            !is_free
-        });
-        batches.push(batch);
-    }
+        for (lane, member) in members.into_iter().enumerate() {
+            let (.., spring) = springs[member];
+            [batch.from[lane], batch.to[lane]] = nodes[member];
+            batch.stiffness[lane] = spring.stiffness;
+            batch.damping[lane] = spring.damping;
+            batch.rest_length[lane] = spring.rest_length;
+        }
+        batch
+    };
+    colour(&nodes, count).into_iter().map(fill).collect()
 }
 
 struct Evaluation<'a> {
@@ -203,7 +187,8 @@ impl Work for Evaluation<'_> {
         let Self { batches, nodes, forces } = self;
         let share = s.splat(Spring::COLLAPSED);
         for batch in batches {
-            let [along, closing] = s.differences(nodes, &batch.from, &batch.to);
+            let [[x, y, z, _], [u, v, w, _]] = s.differences(nodes, &batch.from, &batch.to);
+            let (along, closing) = ([x, y, z], [u, v, w]);
             let rest_length = s.load(&batch.rest_length);
             let stiffness = s.load(&batch.stiffness);
             let shortest = s.mul(share, rest_length);
@@ -231,7 +216,7 @@ mod tests {
         // Node 0 has springs to all others, which are in a chain.
         let mut springs: Vec<_> = (1..60).map(|n| (0, n, spring(n))).collect();
         springs.extend((1..59).map(|n| (n, n + 1, spring(100 + n))));
-        let batches = colour(&springs, 0, 60);
+        let batches = batches(&springs, 0, 60);
         let mut found = Vec::new();
         for batch in &batches {
             let mut nodes = Vec::new();

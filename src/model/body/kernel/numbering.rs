@@ -1,13 +1,11 @@
 //! An order of nodes in which joined ones are near each other: reverse Cuthill-McKee.
 
-use super::super::Spring;
-
-/// Old numbers in the new order, from springs between `nodes` nodes.
+/// Old numbers in the new order, of `nodes` nodes that `pairs` join.
 ///
 /// Cuthill and McKee 1969, reversed as George 1971: breadth first, neighbours by increasing degree. Each connected piece
 /// begins at the node that a first search from its node of least degree reached last.
-pub(super) fn near_first(nodes: usize, springs: &[(u32, u32, Spring)]) -> Vec<u32> {
-    let neighbours = neighbours(nodes, springs);
+pub(super) fn near_first(nodes: usize, pairs: impl Iterator<Item = [u32; 2]>) -> Vec<u32> {
+    let neighbours = neighbours(nodes, pairs);
     let mut by_degree: Vec<u32> = (0..nodes as u32).collect();
     by_degree.sort_by_key(|&node| neighbours[node as usize].len());
     let mut is_seen = vec![false; nodes];
@@ -29,9 +27,9 @@ pub(super) fn near_first(nodes: usize, springs: &[(u32, u32, Spring)]) -> Vec<u3
 }
 
 /// Each node's neighbours by increasing degree.
-fn neighbours(nodes: usize, springs: &[(u32, u32, Spring)]) -> Vec<Vec<u32>> {
+fn neighbours(nodes: usize, pairs: impl Iterator<Item = [u32; 2]>) -> Vec<Vec<u32>> {
     let mut neighbours = vec![Vec::new(); nodes];
-    for &(i, j, _) in springs {
+    for [i, j] in pairs {
         neighbours[i as usize].push(j);
         neighbours[j as usize].push(i);
     }
@@ -64,13 +62,12 @@ mod tests {
 
     #[test]
     fn a_shuffled_chain_and_a_lone_node_come_out_in_line() {
-        let spring = Spring { stiffness: 1.0, damping: 0.0, rest_length: 1.0 };
         // The chain 0 - 5 - 1 - 4 - 2, and 3 alone.
-        let springs = [(5, 1, spring), (0, 5, spring), (4, 2, spring), (1, 4, spring)];
-        let order = near_first(6, &springs);
+        let pairs = [[5, 1], [0, 5], [4, 2], [1, 4]];
+        let order = near_first(6, pairs.into_iter());
         let place = |node: u32| order.iter().position(|&n| n == node).unwrap();
         assert_eq!(order.len(), 6);
         assert!((0..6).all(|node| order.contains(&node)));
-        assert!(springs.iter().all(|&(i, j, _)| place(i).abs_diff(place(j)) == 1), "{order:?}");
+        assert!(pairs.iter().all(|&[i, j]| place(i).abs_diff(place(j)) == 1), "{order:?}");
     }
 }

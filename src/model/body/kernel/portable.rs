@@ -3,7 +3,8 @@
 use super::nodes::{LANES, Lane, Motion, Push};
 use super::simd::{Numbers, Simd};
 
-/// Plain arithmetic: no fused multiply-add, which a processor may lack, and exact root and division.
+/// Plain arithmetic: no fused multiply-add, which a processor may lack, but where it is asked for by name; exact root and
+/// division.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Portable;
 
@@ -45,6 +46,8 @@ impl Simd for Portable {
         mul(a, b) = a * b;
         mul_add(a, b, c) = a * b + c;
         mul_sub_from(a, b, c) = c - a * b;
+        fused(a, b, c) = a.mul_add(b, c);
+        fused_from(a, b, c) = (-a).mul_add(b, c);
         inverse_root(x) = 1.0 / x.sqrt();
     }
 
@@ -60,11 +63,11 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Lane; 3]; 2] {
-        let mut differences = [[[0.0; LANES]; 3]; 2];
+    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Lane; 4]; 2] {
+        let mut differences = [[[0.0; LANES]; 4]; 2];
         for lane in 0..LANES {
             let (here, there) = (&nodes[from[lane] as usize].0, &nodes[to[lane] as usize].0);
-            for axis in 0..3 {
+            for axis in 0..4 {
                 differences[0][axis][lane] = there[axis] - here[axis];
                 differences[1][axis][lane] = there[4 + axis] - here[4 + axis];
             }
@@ -73,11 +76,25 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn fourth(self, nodes: &[Motion], at: &Numbers) -> Lane {
+        at.map(|node| nodes[node as usize].0[3])
+    }
+
+    #[inline(always)]
     fn exchange(self, pull: [Lane; 3], forces: &mut [Push], from: &Numbers, to: &Numbers) {
         for lane in 0..LANES {
             for (axis, pull) in pull.iter().enumerate() {
                 forces[from[lane] as usize].0[axis] += pull[lane];
                 forces[to[lane] as usize].0[axis] -= pull[lane];
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn push(self, force: [Lane; 3], forces: &mut [Push], to: &Numbers) {
+        for lane in 0..LANES {
+            for (axis, force) in force.iter().enumerate() {
+                forces[to[lane] as usize].0[axis] += force[lane];
             }
         }
     }

@@ -30,6 +30,16 @@ pub(crate) trait Simd: Copy {
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// c - a b.
     fn mul_sub_from(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
+    /// a b + c with one rounding on every set: where the processor family has no instruction for it, a function computes it.
+    #[inline(always)]
+    fn fused(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V {
+        self.mul_add(a, b, c)
+    }
+    /// c - a b with one rounding.
+    #[inline(always)]
+    fn fused_from(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V {
+        self.mul_sub_from(a, b, c)
+    }
     /// 1 / sqrt(x), to 4e-16 of itself.
     fn inverse_root(self, x: Self::V) -> Self::V;
     /// `value` where the bit of the lane is set and `x` is not below `limit` (a NaN is not), else 0.
@@ -59,10 +69,14 @@ pub(crate) trait Simd: Copy {
         }
     }
 
-    /// x_to - x_from and v_to - v_from of eight pairs of nodes.
-    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Self::V; 3]; 2];
+    /// x_to - x_from and v_to - v_from of eight pairs of nodes, with the fourth numbers of both.
+    fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Self::V; 4]; 2];
+    /// What stands behind the positions of eight nodes.
+    fn fourth(self, nodes: &[Motion], at: &Numbers) -> Self::V;
     /// Adds eight forces to the nodes `from` and takes them from the nodes `to`, one pair after the other.
     fn exchange(self, pull: [Self::V; 3], forces: &mut [Push], from: &Numbers, to: &Numbers);
+    /// Adds eight forces to the nodes `to`, one after the other.
+    fn push(self, force: [Self::V; 3], forces: &mut [Push], to: &Numbers);
 }
 
 /// Work that is compiled for each instruction set.

@@ -80,7 +80,7 @@ impl LocalModel for LinearPatch {
     fn rebuild(&mut self, resync: ResyncView<'_>) {
         let (triangles, size) = (&resync.triangles[..1], self.spec.size);
         let body = resync.global.body();
-        self.patch.window.rebuild(body, triangles, None, |nodes| body.patch(triangles, size, nodes));
+        self.patch.window.rebuild(body, triangles, |nodes| body.patch(triangles, size, nodes), |_| [&[], &[]]);
         self.patch.take_present(&resync);
         if self.boundary.moving_ticks() == 0 {
             // The rim stands still, and so must the velocities that a contact on it would see.

@@ -4,13 +4,13 @@ mod ring;
 
 use std::sync::Arc;
 
-use self::ring::{NearSprings, RingPath};
+use self::ring::{NearBody, RingPath};
 use super::patch::Patch;
 use super::{Kind, LocalModel, ResyncView};
 use crate::Vec3;
 use crate::body::State;
 use crate::contact::{Contact, ToolMotion};
-use crate::surroundings::{Basis, ReducedMotion, SpringGraph};
+use crate::surroundings::{Basis, ReducedMotion};
 
 /// The way in which `predictive` finds where its ring will go.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,8 +24,8 @@ pub enum Prediction {
     Full,
 }
 
-/// The patch and every spring that touches it stay non-linear. The ring, the patch's neighbours outside, moves as
-/// predicted for the expected path of the tool, and answers by the reduced surroundings to what the springs do
+/// The patch and what of the body depends on it stay non-linear. The ring, the patch's neighbours outside, moves as
+/// predicted for the expected path of the tool, and answers by the reduced surroundings to what the near part does
 /// differently from the prediction:
 ///
 /// x_ring = x_predicted + Phi eta, eta'' = K eta + C eta' + Phi^T (f_near - f_near,predicted).
@@ -37,10 +37,9 @@ pub enum Prediction {
 pub(super) struct Predictive {
     size: [usize; 3],
     prediction: Prediction,
-    springs: Arc<SpringGraph>,
     /// Its window nodes are the patch, the ring, then what stands still; the ring is moved by its path.
     patch: Patch,
-    near: NearSprings,
+    near: NearBody,
     /// Movable nodes that other tools touch, with the force that they exert at the resync, and are taken to go on with (N).
     others: Vec<(usize, Vec3)>,
     path: RingPath,
@@ -59,14 +58,13 @@ pub(super) struct Predictive {
 impl Predictive {
     /// An empty model with a patch of `size` = nodes along the surface, along it, into depth. Memory comes with the first
     /// [`rebuild`](LocalModel::rebuild).
-    pub(super) fn new(size: [usize; 3], prediction: Prediction, springs: Arc<SpringGraph>) -> Self {
+    pub(super) fn new(size: [usize; 3], prediction: Prediction) -> Self {
         let (patch, near, path, surroundings, present) = Default::default();
         let (ring_positions, ring_velocities, ring_forces) = Default::default();
         let (others, substep, basis) = Default::default();
         Self {
             size,
             prediction,
-            springs,
             patch,
             near,
             others,
@@ -113,7 +111,7 @@ impl Predictive {
         resync.global.look_ahead(resync.horizon, motion, present, |global| {
             window.gather(&global.positions, &mut state.positions);
             window.gather(&global.velocities, &mut state.velocities);
-            near.forces(&state.positions, &state.velocities, forces);
+            near.forces(state, forces);
             path.push(state, forces, ring.clone());
         });
         self.take_present(resync);
@@ -124,8 +122,7 @@ impl Predictive {
     fn predict_by_forecast(&mut self, basis: &Basis, resync: &mut ResyncView<'_>) -> bool {
         let (ring, forecast, stepping) = (self.ring(), &basis.forecast, self.patch.stepping);
         let span = f64::from(resync.horizon) * stepping.tick;
-        let (state, forces) = resync.global.forces_without(resync.index);
-        if !forecast.launch(&mut self.surroundings, (state, self.springs.rest()), forces, span) {
+        if !forecast.launch(&mut self.surroundings, resync.global.with_forces_but_of(resync.index), span) {
             return false;
         }
         self.path.clear(ring.len(), stepping.step(), (resync.horizon * stepping.substeps) as usize + 1);
@@ -184,7 +181,7 @@ impl Predictive {
 
     fn take_near_forces(&mut self) {
         let Patch { state, forces, .. } = &mut self.patch;
-        self.near.forces(&state.positions, &state.velocities, forces);
+        self.near.forces(state, forces);
         for &(place, force) in &self.others {
             forces[place] += force;
         }
@@ -226,11 +223,11 @@ fn deviations(out: &mut [f64], forces: &[Vec3], expected: &[f64]) {
 impl LocalModel for Predictive {
     fn rebuild(&mut self, mut resync: ResyncView<'_>) {
         let (body, triangles, size) = (resync.global.body(), resync.triangles, self.size);
-        self.patch.window.rebuild(body, triangles, Some(&self.springs), |nodes| match resync.patch {
+        let patch = |nodes: &mut Vec<u32>| match resync.patch {
             Some(patch) => nodes.extend_from_slice(patch),
             None => body.patch(triangles, size, nodes),
-        });
-        self.near.rebuild(&self.springs, &self.patch.window);
+        };
+        self.patch.window.rebuild(body, triangles, patch, |nodes| self.near.rebuild(body, nodes));
         let window = &self.patch.window;
         self.patch.forces.resize(window.nodes.len(), Vec3::zeros());
         self.basis = resync.bases.get(&window.nodes[..window.movable]).cloned();

@@ -1,58 +1,50 @@
-//! The ring around a patch: the springs that reach it, as they are, and what is predicted for it, substep by substep.
+//! The ring around a patch: the part of the body that reaches it, as it is, and what is predicted for it, substep by substep.
 
 use std::ops::Range;
 
-use super::super::patch::Window;
 use crate::Vec3;
-use crate::body::State;
-use crate::body::kernel::NetworkKernel;
-use crate::surroundings::SpringGraph;
+use crate::body::{Body, Restriction, State};
 
 /// Past its end the prediction coasts with its last velocity for this long (s), then stands still.
 const COASTING: f64 = 15e-3;
 
-/// Every spring with a node in the patch.
-#[derive(Clone, Debug, Default)]
-pub(super) struct NearSprings {
-    kernel: Option<NetworkKernel>,
-    /// Ids of the window's nodes that the springs were found for.
-    nodes: Vec<u32>,
-    movable: usize,
+/// What of the body depends on the patch, with the body's own law.
+#[derive(Debug, Default)]
+pub(super) struct NearBody {
+    restriction: Option<Restriction>,
+    /// Ids of the patch's nodes, that it was made for.
+    patch: Vec<u32>,
+    /// Working memory, of the restriction's nodes.
+    state: State,
+    forces: Vec<Vec3>,
 }
 
-impl NearSprings {
-    /// Those of `window`, which holds the patch and all its neighbours.
-    pub(super) fn rebuild(&mut self, graph: &SpringGraph, window: &Window) {
-        if self.nodes == window.nodes && self.movable == window.movable {
-            return;
+impl NearBody {
+    /// That of `patch` in `body`; returns its other nodes: the ring, and held ones.
+    pub(super) fn rebuild(&mut self, body: &dyn Body, patch: &[u32]) -> [&[u32]; 2] {
+        if self.restriction.is_none() || self.patch != patch {
+            patch.clone_into(&mut self.patch);
+            self.restriction = body.restriction(patch);
+            let nodes = self.restriction.as_ref().map_or(0, |restriction| restriction.nodes.len());
+            self.forces.resize(nodes, Vec3::zeros());
         }
-        self.nodes.clone_from(&window.nodes);
-        self.movable = window.movable;
-        let mut springs = Vec::new();
-        for place in 0..window.movable {
-            for &link in graph.at_node(window.nodes[place]) {
-                let link = graph.links()[link as usize];
-                let [Some(a), Some(b)] = link.nodes.map(|node| window.node(node)) else { continue };
-                // A spring inside the patch is met from both its nodes.
-                let other = if a as usize == place { b } else { a };
-                if other as usize >= window.movable || place < other as usize {
-                    springs.push((a, b, link.spring));
-                }
-            }
-        }
-        self.kernel = Some(NetworkKernel::new(window.nodes.len(), &springs));
+        self.restriction.as_ref().map_or([&[], &[]], |near| [near.ring(patch.len()), near.held(patch.len())])
     }
 
-    /// Writes the force that these springs put on each local node (N).
-    pub(super) fn forces(&mut self, positions: &[Vec3], velocities: &[Vec3], forces: &mut [Vec3]) {
-        match &mut self.kernel {
-            Some(kernel) => kernel.forces(positions, velocities, forces),
-            None => forces.fill(Vec3::zeros()),
+    /// Writes the force that it puts on each node of the window (N); patch, ring and held nodes come first there as here.
+    pub(super) fn forces(&mut self, window: &State, forces: &mut [Vec3]) {
+        let count = self.forces.len();
+        if let Some(Restriction { body, .. }) = &mut self.restriction {
+            window.positions[..count].clone_into(&mut self.state.positions);
+            window.velocities[..count].clone_into(&mut self.state.velocities);
+            body.forces(&self.state, &mut self.forces);
         }
+        forces[..count].copy_from_slice(&self.forces);
+        forces[count..].fill(Vec3::zeros());
     }
 }
 
-/// The predicted motion of the ring: positions (m), velocities (m/s) and near springs' forces (N), three numbers for each
+/// The predicted motion of the ring: positions (m), velocities (m/s) and near forces (N), three numbers for each
 /// ring node.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RingPath {

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use palpate::Error;
 use palpate::model::body::{Block, Body, State};
-use palpate::model::surroundings::{Reduction, SpringGraph};
+use palpate::model::surroundings::{Reduction, RestingBody};
 use palpate::scene::Scene;
 
 use super::contact::{FaceGrid, contact_node, outward};
@@ -237,8 +237,8 @@ impl Study<'_> {
 
     /// The expected error of `predictive` by the states of its reduced surroundings.
     fn bases(&self, node: u32) -> Result<Vec<BasisError>, Error> {
-        let Some(graph) = SpringGraph::new(self.block) else { return Ok(Vec::new()) };
-        let errors = Reduction::errors_by_states(&graph, &self.patch_nodes(node, self.patch))?.into_iter();
+        let Some(resting) = RestingBody::new(self.block) else { return Ok(Vec::new()) };
+        let errors = Reduction::errors_by_states(&resting, &self.patch_nodes(node, self.patch))?.into_iter();
         Ok(errors.map(|(states, estimate)| BasisError { states, error_pct: estimate.expected_pct() }).collect())
     }
 
