@@ -13,6 +13,7 @@
 //! | [`scene`] | what is simulated, as plain data, and its TOML files |
 //! | [`actors`] | global, local, device, logger: the glue between the layers below; of it, only the log file is for programs |
 //! | [`model`] | physics without threads or clocks: [bodies](model::body), [contact](model::contact), [local models](model::local) |
+//! | [`mesh`] | mesh files, filling of closed surfaces, parametric organs |
 //! | [`runtime`] | actors, rate groups, ports, real and virtual time; without physics, usable on its own |
 //! | [`devices`] | what moves the tool: a path, a simulated hand, a log, or a program's own [`Device`] |
 //! | [`safety`] | what stands between a computed force and a device |

@@ -15,7 +15,15 @@ impl Scene {
     pub fn glued_node(&self, index: usize, body: &dyn Body) -> Result<Option<u32>, Error> {
         let Some(node) = self.devices.get(index).and_then(|device| device.attach_node) else { return Ok(None) };
         let field = format!("{}.attach_node", field(index, self.devices.len()));
-        Nodes::of(body, self).of_surface(&field, node).map(Some)
+        self.surface_node(&field, node, body).map(Some)
+    }
+
+    /// The number of a node of the surface of `body`, which `field` names.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`](crate::ErrorKind::Scene) if the body has no such node.
+    pub fn surface_node(&self, field: &str, node: NodeSpec, body: &dyn Body) -> Result<u32, Error> {
+        Nodes::of(body, self).of_surface(field, node)
     }
 }
 

@@ -141,6 +141,19 @@ impl TetrahedraSpec {
         )
     }
 
+    /// The same body with its surface filled anew, with elements that are `times` smaller; `None` if it fills no surface.
+    ///
+    /// # Errors
+    /// If there is no filling of that size.
+    pub fn refined(&self, times: f64) -> Result<Option<Self>, Error> {
+        let smaller = |size_m: Option<f64>| size_m.map(|size_m| size_m / times);
+        let (element_size_m, surface_size_m) = (smaller(self.element_size_m), smaller(self.surface_size_m));
+        let mut finer = Self { element_size_m, surface_size_m, ..self.clone() };
+        let Some(volume) = self.volume.as_ref().and_then(|volume| volume.refilled(&finer)) else { return Ok(None) };
+        finer.volume = Some(volume?);
+        Ok(Some(finer))
+    }
+
     /// Makes the body that this describes.
     ///
     /// # Errors

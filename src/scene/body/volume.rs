@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-use palpate_mesh::{MeshError, Sizes, SurfaceMesh, VolumeFile, fill, read_surface, read_volume, write_msh};
+use palpate_mesh::{Sizes, SurfaceMesh, VolumeFile, fill, read_surface, read_volume, write_msh};
 
 use super::TetrahedraSpec;
 use crate::error::{Error, ErrorKind};
@@ -27,7 +27,8 @@ struct Checked {
     left_out: LeftOut,
     /// Elements of other kinds beside the tetrahedra, by their names.
     others: Vec<(String, usize)>,
-    is_filled: bool,
+    /// The surface that was filled (m), if one was.
+    filled: Option<SurfaceMesh>,
     /// The file as it was read, or as it would have been written.
     file: Vec<u8>,
     /// Metres per unit of that file.
@@ -44,8 +45,8 @@ impl Volume {
         // Before it is written: what is wrong is told in the program's own numbering.
         let (mesh, left_out) = mesh.cleaned()?;
         let file = written(&mesh)?;
-        let VolumeFile { mesh, .. } = read_volume("the mesh", &file).map_err(mesh_error)?;
-        Ok(Self(Arc::new(Checked { mesh, left_out, others: Vec::new(), is_filled: false, file, unit_m: 1.0 })))
+        let VolumeFile { mesh, .. } = read_volume("the mesh", &file)?;
+        Ok(Self(Arc::new(Checked { mesh, left_out, others: Vec::new(), filled: None, file, unit_m: 1.0 })))
     }
 
     /// Reads the file of `spec` at `path`, and fills it if it is a surface; `progress` is told how much of that is done (0 to 1).
@@ -59,22 +60,33 @@ impl Volume {
         if spec.surface.is_none() {
             return Self::of_file(bytes, &name, spec.unit_m);
         }
-        let mut surface = read_surface(&name, &bytes).map_err(mesh_error)?;
+        let mut surface = read_surface(&name, &bytes)?;
         surface.points.iter_mut().for_each(|point| *point *= spec.unit_m);
         check_unit(&surface)?;
+        Self::filling(surface, spec, progress).map_err(|error| error.at(&name))
+    }
+
+    /// Fills `surface` (m) with elements of the sizes of `spec`.
+    fn filling(surface: SurfaceMesh, spec: &TetrahedraSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let sizes = Sizes { element_m: spec.element_size_m.unwrap_or_default(), surface_m: spec.surface_size_m };
-        let mesh = fill(&surface, sizes, progress).map_err(|error| mesh_error(error).at(&name))?;
+        let mesh = fill(&surface, sizes, progress)?;
         let file = written(&mesh)?;
-        let (mesh, left_out) = mesh.cleaned().map_err(|error| Error::from(error).at(&name))?;
-        Ok(Self(Arc::new(Checked { mesh, left_out, others: Vec::new(), is_filled: true, file, unit_m: 1.0 })))
+        let (mesh, left_out) = mesh.cleaned()?;
+        let (others, filled) = (Vec::new(), Some(surface));
+        Ok(Self(Arc::new(Checked { mesh, left_out, others, filled, file, unit_m: 1.0 })))
+    }
+
+    /// The surface that this fills, filled with elements of the sizes of `spec`; `None` if it fills none.
+    pub(in crate::scene) fn refilled(&self, spec: &TetrahedraSpec) -> Option<Result<Self, Error>> {
+        self.0.filled.clone().map(|surface| Self::filling(surface, spec, &mut |_| ()))
     }
 
     /// The volume in the bytes of a file of which a unit is `unit_m` metres; `name` stands for it in errors.
     pub(crate) fn of_file(file: Vec<u8>, name: &str, unit_m: f64) -> Result<Self, Error> {
-        let VolumeFile { mesh, left_out_elements: others } = read_volume(name, &file).map_err(mesh_error)?;
+        let VolumeFile { mesh, left_out_elements: others } = read_volume(name, &file)?;
         let cleaned = mesh.scaled(unit_m).cleaned();
         let (mesh, left_out) = cleaned.map_err(|error| Error::from(error).at(name))?;
-        Ok(Self(Arc::new(Checked { mesh, left_out, others, is_filled: false, file, unit_m })))
+        Ok(Self(Arc::new(Checked { mesh, left_out, others, filled: None, file, unit_m })))
     }
 
     /// The file that it can be made from again: bit for bit the same, with this [unit](Self::unit_m).
@@ -105,7 +117,7 @@ impl Volume {
 
     /// True if it was made by filling a surface.
     pub fn is_filled(&self) -> bool {
-        self.0.is_filled
+        self.0.filled.is_some()
     }
 }
 
@@ -141,8 +153,4 @@ impl fmt::Debug for Volume {
             .field("elements", &self.mesh().tetrahedra.len())
             .finish_non_exhaustive()
     }
-}
-
-fn mesh_error(error: MeshError) -> Error {
-    Error::new(ErrorKind::Scene, error.to_string())
 }
