@@ -187,10 +187,17 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn elements_that_grow_inside_leave_no_gaps(seed: u64, waves in 1_usize..4, doublings in 1_usize..4) {
+        fn elements_that_grow_inside_leave_no_gaps(
+            seed: u64,
+            waves in 1_usize..4,
+            doublings in 1_usize..4,
+            holes in prop::collection::vec(prop::array::uniform3(-2.0..2.0), 40),
+        ) {
             let shape = noise(seed, waves);
-            // Large enough for all sizes, with caves.
-            let caves = Shape { reach: 3.0, distance: |x: &Vec3| shape.signed_distance(&(x * 0.5)).max(x.norm() - 2.9) };
+            // Large enough for all sizes, with caves, and holes as small as a cell.
+            let caves = |x: &Vec3| shape.signed_distance(&(x * 0.5)).max(x.norm() - 2.9);
+            let hole = |x: &Vec3| holes.iter().map(|&hole| 0.05 - (x - Vec3::from(hole)).norm()).fold(-1.0, f64::max);
+            let caves = Shape { reach: 3.0, distance: |x: &Vec3| caves(x).max(hole(x)) };
             check_stuffed(&caves, 0.12, doublings);
         }
     }
