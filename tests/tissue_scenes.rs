@@ -487,7 +487,8 @@ fn a_node_that_is_not_there_is_refused() {
     let millimetres = "attach_node = { near_m = [20.0, 20.0, 40.0] }";
     refused("path_csv = \"press.csv\"", millimetres, &["from the nearest node", "is it in metres?"]);
     refused("[run]", "[[probe]]\nnode = 48\n[run]", &["probe[0].node: node 48", "0 to 47"]);
-    let pull = |node: &str| format!("[initial]\npull = {{ node = {node}, offset_m = [0, 0, 0.001] }}\nhold = [40]\n[run]");
+    let pull =
+        |node: &str| format!("[initial]\npull = {{ node = {node}, offset_m = [0, 0, 0.001] }}\nhold = [40]\n[run]");
     refused("[run]", &pull("2"), &["initial.pull.node: node 2 is held, it cannot be pulled"]);
     refused("[run]", &pull("40"), &["initial.hold: node 40 is the pulled node"]);
 }
@@ -533,7 +534,10 @@ fn a_mesh_that_can_be_mended_is_and_the_report_says_so() {
     folder.mesh("meshes/block.msh", &mesh);
     let report = run(folder.scene(&pressed()).with_model(Kind::Hold)).to_string();
     let words: String = report.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.contains("left out: 1 nodes of no tetrahedron; turned round, it was inverted throughout"), "{report}");
+    assert!(
+        words.contains("left out: 1 nodes of no tetrahedron; turned round, it was inverted throughout"),
+        "{report}"
+    );
 }
 
 #[test]
