@@ -17,12 +17,13 @@ ROOT = Path(__file__).resolve().parent.parent
 # Crate: the folder of its sources.
 CRATES = {
     "palpate": ROOT / "src",
+    "palpate_mesh": ROOT / "src/mesh",
     "palpate_model": ROOT / "src/model",
     "palpate_runtime": ROOT / "src/runtime",
     "palpate_haply": ROOT / "haply/src",
     "palpate_cli": ROOT / "tools/src",
 }
-ENGINE = ["palpate", "palpate_model", "palpate_runtime"]
+ENGINE = ["palpate", "palpate_mesh", "palpate_model", "palpate_runtime"]
 ASIDE = {"tests", "benches", "examples", "target"}
 # Chosen by a cfg, these files are one: a kernel names its instruction sets and they name it.
 ONE = [re.compile(r"/kernel/(simd|avx2|avx512|portable)\.rs$")]

@@ -6,6 +6,7 @@
 //! | [`compare`] | runs every local model on a scene and measures error and cost against `full` |
 //! | `reduce` | reduces a body's model and says where a local model may be trusted |
 //! | `reduction` | the numerics of that: balanced truncation, Krylov spaces, condensation |
+//! | `mesh` | says what a mesh consists of, how good it is and which step it allows |
 //! | `export` | writes topics of a log as CSV, percentile files and Chrome traces; its rows for other formats |
 //! | `log_file` | looks into a log file, checks it, and saves what is readable of a damaged one |
 //! | [`drawing`] | charts as SVG, pages as HTML |
@@ -17,6 +18,7 @@ pub mod compare;
 pub mod drawing;
 mod export;
 mod log_file;
+mod mesh;
 mod reduce;
 mod reduction;
 #[cfg(test)]

@@ -6,6 +6,7 @@
 pub mod compare;
 pub mod export;
 pub mod log;
+pub mod mesh;
 pub mod mock;
 pub mod reduce;
 pub mod replay;
@@ -49,6 +50,8 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Reduce a body's model: the paper's tables and figures, and when a scene's local model may be trusted
     Reduce(reduce::ReduceArgs),
+    /// Fill a closed surface with tetrahedra, or report on a volume mesh
+    Mesh(mesh::MeshArgs),
     /// Execute a log again in simulated time and compare every force with the logged one, bit for bit
     Replay(replay::ReplayArgs),
     /// Write one topic of a log as a table
@@ -81,6 +84,7 @@ pub fn main() -> ExitCode {
             Some(Command::Run(args)) => run::run(&args),
             Some(Command::Compare(args)) => compare::run(&args),
             Some(Command::Reduce(args)) => reduce::run(&args),
+            Some(Command::Mesh(args)) => mesh::run(&args),
             Some(Command::Timing(args)) => timing::run(&args),
             Some(Command::Export(args)) => export::run(&args),
             Some(Command::Log(args)) => log::run(&args),
