@@ -18,7 +18,7 @@ use palpate::log::LogRecord;
 use palpate::model::Vec3;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate::scene::Scene;
+use palpate::scene::{BodySpec, Scene};
 use palpate::session::Summary;
 
 /// Ticks this long after a skipped period are counted apart (s).
@@ -54,7 +54,7 @@ fn scene(name: &str) -> Result<Scene, Error> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file).with_extension("toml");
     let mut scene = Scene::load(&path)?;
     let numbers = (parts.next().and_then(|n| n.parse().ok()), parts.next().and_then(|hz| hz.parse().ok()));
-    if let ((Some(nodes), Some(hz)), Some(body)) = (numbers, &mut scene.body) {
+    if let ((Some(nodes), Some(hz)), Some(body)) = (numbers, scene.body.as_mut().and_then(BodySpec::mass_spring_mut)) {
         body.block.nodes = [nodes; 3];
         scene.local.rate_hz = hz;
         // As the stability limit asks for.

@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use palpate_mesh::MeshError;
 use palpate_model::ModelError;
 use palpate_runtime::{GraphError, GraphErrorKind};
 
@@ -117,6 +118,12 @@ impl From<ModelError> for Error {
     fn from(error: ModelError) -> Self {
         let own = Self::new(ErrorKind::Scene, error.message());
         if error.place().is_empty() { own } else { own.at(error.place()) }
+    }
+}
+
+impl From<MeshError> for Error {
+    fn from(error: MeshError) -> Self {
+        Self::new(ErrorKind::Scene, error.to_string())
     }
 }
 

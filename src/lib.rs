@@ -13,6 +13,7 @@
 //! | [`scene`] | what is simulated, as plain data, and its TOML files |
 //! | [`actors`] | global, local, device, logger: the glue between the layers below; of it, only the log file is for programs |
 //! | [`model`] | physics without threads or clocks: [bodies](model::body), [contact](model::contact), [local models](model::local) |
+//! | [`mesh`] | mesh files, filling of closed surfaces, parametric organs |
 //! | [`runtime`] | actors, rate groups, ports, real and virtual time; without physics, usable on its own |
 //! | [`devices`] | what moves the tool: a path, a simulated hand, a log, or a program's own [`Device`] |
 //! | [`safety`] | what stands between a computed force and a device |
@@ -65,6 +66,7 @@ pub mod safety;
 pub mod scene;
 pub mod session;
 
+pub use palpate_mesh as mesh;
 pub use palpate_model as model;
 pub use palpate_runtime as runtime;
 
@@ -78,7 +80,7 @@ pub mod prelude {
     pub use crate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
     pub use crate::error::Error;
     pub use crate::model::Vec3;
-    pub use crate::model::body::Block;
+    pub use crate::model::body::{Block, Tetrahedra};
     // For its methods; who implements it names it.
     pub use crate::model::body::Body as _;
     pub use crate::model::mesh::Face;

@@ -23,7 +23,8 @@ use palpate::runtime::Disturbance;
 use palpate::runtime::Nanos;
 use palpate::safety::Passivity;
 use palpate::scene::{
-    BlendSpec, BlockSpec, BodySpec, DeviceProfile, Friction, MaterialSpec, ModelChoice, SafetySpec, SafetyStage, Scene,
+    BlendSpec, BlockSpec, BodySpec, DeviceProfile, Friction, MassSpringSpec, MaterialSpec, ModelChoice, SafetySpec,
+    SafetyStage, Scene,
 };
 use random::Random;
 
@@ -181,7 +182,7 @@ fn safety(random: &mut Random) -> SafetySpec {
 fn scene(random: &mut Random, seconds: f64) -> Scene {
     let mut scene = Scene::of_program();
     let faces = [Face::ZMin, Face::XMin, Face::YMax];
-    scene.body = Some(BodySpec {
+    scene.body = Some(BodySpec::MassSpring(MassSpringSpec {
         block: BlockSpec {
             nodes: std::array::from_fn(|_| 3 + (random.next() * 4.0) as usize),
             size_m: std::array::from_fn(|_| random.sized(0.02, 0.1)),
@@ -192,9 +193,8 @@ fn scene(random: &mut Random, seconds: f64) -> Scene {
             stiffness_n_per_m: random.sized(3.0, 1000.0),
             damping_ratio: random.sized(0.01, 3.0),
         },
-        kind: Default::default(),
         regions: Vec::new(),
-    });
+    }));
     scene.contact.friction =
         if random.chance(0.1) { Friction::Stick } else { Friction::Coefficient(random.within(0.0, 1.5)) };
     scene.local.rate_hz = random.one_of(&[500.0, 1000.0, 1000.0, 2000.0]);
@@ -241,7 +241,7 @@ fn run(seed: u64, with_controller: bool) -> Outcome {
     // The faults of a device lie about where it is, and nobody's books can be right then.
     let is_faulty = random.chance(0.4);
     let most_m_s2 = if is_faulty { random.sized(10.0, 2000.0) } else { random.sized(5.0, 30.0) };
-    let path = path(random, spec.block.size_m, seconds, most_m_s2);
+    let path = path(random, spec.mass_spring().unwrap().block.size_m, seconds, most_m_s2);
     let is_hand = random.chance(0.4);
     let device: Box<dyn Device> = if is_hand {
         let plant = PlantSpec { mass_kg: random.sized(0.075, 0.3), seed, ..PlantSpec::default() };

@@ -166,7 +166,7 @@ fn a_queue_that_overflowed_is_replayed_bit_for_bit() {
 fn a_glued_tool_and_a_changed_scene_are_replayed_from_the_log_alone() {
     let folder = folder();
     let mut scene = Scene::demo();
-    scene.body.as_mut().unwrap().block.nodes = [6; 3];
+    scene.body.as_mut().unwrap().mass_spring_mut().unwrap().block.nodes = [6; 3];
     scene.local.patch = Some([3, 3, 2]);
     scene.probes.clear();
     scene.safety.max_force_n = None;

@@ -8,7 +8,7 @@ use palpate::model::contact::{Equations, Normals};
 use palpate::model::local::BlendKind;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::model::mesh::Face;
-use palpate::scene::{Friction, Scene};
+use palpate::scene::{Friction, NodeSpec, Scene};
 
 #[path = "../examples/scene_paths.rs"]
 #[allow(dead_code, reason = "its main function writes the files that are only compared here")]
@@ -59,7 +59,7 @@ fn every_scene_loads_and_says_what_it_shows() {
         let source = scene.source.as_deref().unwrap();
         assert!(source.starts_with("# ") && source.contains("Look for:"), "{}", file.display());
         assert_eq!(scene.validate().map_err(|error| error.to_string()), Ok(()), "{}", file.display());
-        let is_layered = !scene.body.as_ref().unwrap().regions.is_empty();
+        let is_layered = scene.body.as_ref().unwrap().region_count() > 0;
         let is_predictive = is_layered || scene.devices.len() > 1;
         let model = if is_predictive { LocalModelKind::Predictive } else { LocalModelKind::Patch };
         assert_eq!(scene.local.model, model.into(), "{}", file.display());
@@ -82,10 +82,10 @@ fn the_built_in_demo_is_the_demo_file() {
 #[test]
 fn the_demo_file_reads_as_it_is_written() {
     let scene = Scene::demo();
-    assert_eq!(scene.body.as_ref().unwrap().block.nodes, [12, 12, 12]);
-    assert_eq!(scene.body.as_ref().unwrap().block.size_m, [0.1; 3]);
-    assert_eq!(scene.body.as_ref().unwrap().block.fixed, [Face::ZMin]);
-    assert_eq!(scene.body.as_ref().unwrap().material.node_mass_kg, 0.0005);
+    assert_eq!(scene.body.as_ref().unwrap().mass_spring().unwrap().block.nodes, [12, 12, 12]);
+    assert_eq!(scene.body.as_ref().unwrap().mass_spring().unwrap().block.size_m, [0.1; 3]);
+    assert_eq!(scene.body.as_ref().unwrap().mass_spring().unwrap().block.fixed, [Face::ZMin]);
+    assert_eq!(scene.body.as_ref().unwrap().mass_spring().unwrap().material.node_mass_kg, 0.0005);
     assert_eq!(scene.contact.friction, Friction::Coefficient(0.5));
     assert_eq!(scene.contact.normals, Normals::Interpolated);
     assert_eq!(scene.contact.equations, Equations::Corrected);
@@ -144,6 +144,8 @@ fn the_demo_file_documents_every_key() {
         };
         texts.push((spoilt.clone(), everything.replacen(shape, &spoilt, 1)));
     }
+    let tissue = "[body]\nkind = \"tetrahedra\"\n[body.tissue]\nqqq = 0\n";
+    texts.push(("[body.tissue]".to_owned(), tissue.to_owned()));
     for (table, text) in texts {
         let message = Scene::from_toml(&text, "s", None).unwrap_err().to_string();
         let keys = message.split_once("the keys here are ").unwrap_or_else(|| panic!("{table}: {message}")).1;
@@ -165,7 +167,7 @@ fn the_reference_scenes_have_the_reference_parameters() {
         ("drag_friction", false, Friction::Coefficient(1.0), 2.5),
     ] {
         let scene = load(name);
-        let material = scene.body.as_ref().unwrap().material;
+        let material = scene.body.as_ref().unwrap().mass_spring().unwrap().material;
         let numbers = (material.node_mass_kg, material.stiffness_n_per_m, material.damping_ratio);
         assert_eq!(numbers, if is_slow { (0.001, 6.0, 1.0) } else { (0.0005, 30.0, 0.3) }, "{name}");
         assert_eq!(scene.global.substeps_per_ms, Some(2), "{name}");
@@ -174,10 +176,10 @@ fn the_reference_scenes_have_the_reference_parameters() {
         assert_eq!(scene.run.duration_s, duration_s, "{name}");
     }
     let wave = load("wave");
-    assert_eq!((wave.devices[0].attach_node, &wave.devices[0].path), (Some([8, 5, 11]), &None));
-    assert_eq!(wave.initial.unwrap().hold, [[8, 5, 11]]);
+    assert_eq!((wave.devices[0].attach_node, &wave.devices[0].path), (Some([8, 5, 11].into()), &None));
+    assert_eq!(wave.initial.unwrap().hold, [[8, 5, 11].into()]);
     let probe = load("wave_probe");
-    assert_eq!((probe.probes[0].node, probe.initial.unwrap().hold.len()), ([8, 5, 11], 0));
+    assert_eq!((probe.probes[0].node, probe.initial.unwrap().hold.len()), ([8, 5, 11].into(), 0));
 }
 
 /// A last digit may differ with the platform's sine; anything more is a stale file.
@@ -204,7 +206,8 @@ fn the_path_files_are_what_their_formulas_give() {
 fn a_glued_tool_starts_where_its_node_rests() {
     for name in ["hand", "pull_release"] {
         let scene = load(name);
-        let (block, node) = (&scene.body.as_ref().unwrap().block, scene.devices[0].attach_node.unwrap());
+        let block = &scene.body.as_ref().unwrap().mass_spring().unwrap().block;
+        let Some(NodeSpec::Lattice(node)) = scene.devices[0].attach_node else { panic!("{name}") };
         let start = scene.devices[0].path.as_ref().unwrap().at(0.0);
         for axis in 0..3 {
             let rest = block.size_m[axis] * node[axis] as f64 / (block.nodes[axis] - 1) as f64;

@@ -8,8 +8,8 @@ use palpate::model::local::BlendKind;
 use palpate::model::local::Feedback;
 use palpate::model::mesh::Face;
 use palpate::scene::{
-    BlendSpec, BlockSpec, BodySpec, Friction, InitialSpec, MaterialSpec, ModelChoice, ProbeSpec, PullSpec, RegionSpec,
-    Scene, StepKind,
+    BlendSpec, BlockSpec, BodySpec, Friction, InitialSpec, MassSpringSpec, MaterialSpec, ModelChoice, ProbeSpec,
+    PullSpec, RegionSpec, Scene, StepKind,
 };
 use proptest::prelude::*;
 
@@ -71,11 +71,12 @@ fn body() -> impl Strategy<Value = BodySpec> {
     let nodes = [6_usize..20, 6_usize..20, 6_usize..20];
     let material = (number(1e-6, 1.0), number(0.1, 1e4), number(0.01, 5.0));
     (nodes, size, fixed, material, prop::collection::vec(region(), 0..4)).prop_map(
-        |(nodes, size_m, fixed, (node_mass_kg, stiffness_n_per_m, damping_ratio), regions)| BodySpec {
-            block: BlockSpec { nodes, size_m, fixed },
-            material: MaterialSpec { node_mass_kg, stiffness_n_per_m, damping_ratio },
-            kind: Default::default(),
-            regions,
+        |(nodes, size_m, fixed, (node_mass_kg, stiffness_n_per_m, damping_ratio), regions)| {
+            BodySpec::MassSpring(MassSpringSpec {
+                block: BlockSpec { nodes, size_m, fixed },
+                material: MaterialSpec { node_mass_kg, stiffness_n_per_m, damping_ratio },
+                regions,
+            })
         },
     )
 }
@@ -113,15 +114,15 @@ fn scenes() -> impl Strategy<Value = Scene> {
         scene.contact.equations = if contact.2 { Equations::Paper } else { Equations::Corrected };
         if body.is_some() {
             scene.initial = initial.map(|(node, offset, holds)| InitialSpec {
-                pull: PullSpec { node, offset_m: [offset, -0.0, -offset] },
+                pull: PullSpec { node: node.into(), offset_m: [offset, -0.0, -offset] },
                 hold: if holds {
-                    vec![[2, 2, 2].map(|n: usize| n + usize::from(node == [2, 2, 2]))]
+                    vec![[2, 2, 2].map(|n: usize| n + usize::from(node == [2, 2, 2])).into()]
                 } else {
                     Vec::new()
                 },
             });
-            scene.probes = probes.into_iter().map(|node| ProbeSpec { node }).collect();
-            scene.devices[0].attach_node = scene.initial.is_none().then_some([2, 2, 5]);
+            scene.probes = probes.into_iter().map(|node| ProbeSpec { node: node.into() }).collect();
+            scene.devices[0].attach_node = scene.initial.is_none().then_some([2, 2, 5].into());
         }
         scene.body = body;
         // What does not fit the model is left out.

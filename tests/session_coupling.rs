@@ -15,7 +15,7 @@ const NODES: [usize; 3] = [6; 3];
 fn load(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
     let mut scene = Scene::load(&path).unwrap();
-    scene.body.as_mut().unwrap().block.nodes = NODES;
+    scene.body.as_mut().unwrap().mass_spring_mut().unwrap().block.nodes = NODES;
     scene.global.substeps_per_ms = None;
     scene
 }
@@ -59,7 +59,7 @@ fn a_coupled_tool_is_smoother_than_a_direct_one_on_soft_and_stiff_bodies_at_ever
             for model in MODELS {
                 let mut scene = scene.clone().with_model(model);
                 scene.local.rate_hz = rate_hz;
-                scene.body.as_mut().unwrap().material.stiffness_n_per_m = stiffness;
+                scene.body.as_mut().unwrap().mass_spring_mut().unwrap().material.stiffness_n_per_m = stiffness;
                 let [direct, coupled] = [false, true].map(|coupling| forces(&run(&scene, coupling)));
                 let (rough, bound) = (roughness(&coupled), roughness(&direct).max(SMOOTH * peak(&coupled)));
                 let told =

@@ -49,6 +49,7 @@ impl Page {
                 environment.model, environment.palpate_version, environment.instruction_set
             ),
         );
+        environment.body.iter().for_each(|body| self.wrapped("body", body));
         if let Some(reason) = &environment.model_reason {
             self.wrapped("model", &format!("{}: {}", environment.model, reason.why));
             reason.warning.iter().for_each(|warning| self.wrapped("warning", warning));

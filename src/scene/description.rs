@@ -1,7 +1,7 @@
 //! The whole of a scene, as plain data.
 
 use super::device::{DeviceSpec, one_or_many};
-use super::{BodySpec, ContactSpec, GlobalSpec, LocalSpec, ModelChoice, SafetySpec, StepKind};
+use super::{BodySpec, ContactSpec, GlobalSpec, LocalSpec, ModelChoice, NodeSpec, SafetySpec, StepKind};
 use crate::model::Vec3;
 use crate::model::body::Body;
 use crate::model::local::Kind;
@@ -64,25 +64,25 @@ pub struct InitialSpec {
     pub pull: PullSpec,
     /// Nodes held at their rest position while the equilibrium is found.
     #[serde(default)]
-    pub hold: Vec<[usize; 3]>,
+    pub hold: Vec<NodeSpec>,
 }
 
 /// A node that is pulled from its rest position.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PullSpec {
-    /// Place of the node in the lattice.
-    pub node: [usize; 3],
+    /// The node.
+    pub node: NodeSpec,
     /// Way of the node from its rest position (m).
     pub offset_m: [f64; 3],
 }
 
 /// A node whose position is logged every tick.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeSpec {
-    /// Place of the node in the lattice.
-    pub node: [usize; 3],
+    /// The node.
+    pub node: NodeSpec,
 }
 
 /// The contents of a log beside the records of every tick.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::HaplySpec;
+use super::{HaplySpec, NodeSpec};
 use crate::devices::{Capabilities, FaultSpec, HandSpec, PlantSpec, ToolPath};
 use crate::error::Error;
 
@@ -18,8 +18,8 @@ pub struct DeviceSpec {
     pub path_csv: Option<PathBuf>,
     /// The log whose device is replayed; in a scene file relative to that.
     pub log: Option<PathBuf>,
-    /// The node that the tool is glued to, by its place in the lattice.
-    pub attach_node: Option<[usize; 3]>,
+    /// The node of the surface that the tool is glued to.
+    pub attach_node: Option<NodeSpec>,
     /// The product whose limits the device has.
     #[serde(skip_serializing_if = "is_default")]
     pub profile: DeviceProfile,

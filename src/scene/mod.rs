@@ -18,17 +18,22 @@ mod device;
 mod file;
 mod haply;
 mod models;
-mod region;
+mod node;
+mod nodes;
 mod safety;
 mod validate;
 
-pub use body::{BlockSpec, BodyKind, BodySpec, MaterialSpec};
+pub use body::{
+    BlockSpec, BodyKind, BodySpec, MassSpringSpec, MaterialSpec, RegionSpec, TetrahedraSpec, TissueRegionSpec,
+    TissueSpec, Volume,
+};
 pub use contact::{ContactSpec, Friction};
 pub use description::{InitialSpec, LogSpec, ProbeSpec, PullSpec, RunSpec, Scene};
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub(crate) use device::{field as device_field, numbered};
 pub use haply::HaplySpec;
 pub use models::{BlendSpec, GlobalSpec, LocalSpec, ModelChoice, StepKind};
-pub use region::RegionSpec;
+pub use node::NodeSpec;
+pub(crate) use nodes::Nodes;
 pub use safety::{SafetySpec, SafetyStage};
 pub(crate) use validate::{MAX_DEVICES, patch_fits};

@@ -8,7 +8,7 @@ use palpate::Session;
 use palpate::log::LogRecord;
 use palpate::model::local::BlendKind;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
-use palpate::scene::{BlendSpec, Scene, StepKind};
+use palpate::scene::{BlendSpec, BodySpec, Scene, StepKind};
 use palpate_cli::compare::{ForceDeviation, ForceTrace};
 
 fn scene(name: &str) -> Scene {
@@ -180,7 +180,7 @@ fn a_drag_with_friction_has_the_known_errors() {
 /// A hundred times the stiffness asks for some 15 explicit steps per tick.
 fn stiff(step: StepKind) -> ForceTrace {
     let mut scene = Way { step, ..way(LinearBoundary, Trajectory) }.scene("hand");
-    let body = scene.body.as_mut().expect("a block");
+    let body = scene.body.as_mut().and_then(BodySpec::mass_spring_mut).expect("a block");
     body.material.stiffness_n_per_m *= 100.0;
     body.material.damping_ratio = 1.0;
     scene.global.substeps_per_ms = None;

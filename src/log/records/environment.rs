@@ -1,6 +1,7 @@
 //! What a log says about the run as a whole: who wrote it, on what, and what the system granted.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::{MAX_DEVICES, ToolSample};
 use crate::runtime::GroupGrant;
@@ -78,6 +79,8 @@ pub struct Environment {
     /// The reason for the local model if it was chosen, and for the size of its patch and basis if a budget said so; `None`
     /// otherwise.
     pub model_reason: Option<ModelReason>,
+    /// The body in words: its size, what it is made of, and what was left out of its mesh; `None` in logs that do not say it.
+    pub body: Option<String>,
     /// The haptic rate (Hz).
     pub haptic_hz: f64,
     /// The rate of the global model (Hz).
@@ -104,6 +107,9 @@ pub struct Environment {
     /// The run as a scene file: the scene with everything that a program or the command line changed. It travels as
     /// the attachment [`SESSION`](Self::SESSION); a reader leaves it empty.
     pub session: Option<String>,
+    /// The mesh of a body of tetrahedra: the file that it was read from, or one of Gmsh's. It travels as the attachment [`MESH`](Self::MESH); a
+    /// reader leaves it empty.
+    pub mesh: Option<Arc<[u8]>>,
 }
 
 impl Environment {
@@ -112,11 +118,15 @@ impl Environment {
     /// The attachment that says what was run.
     pub const SESSION: &str = "session.toml";
 
-    /// The text of an attachment, if it is known.
-    pub fn attachment(&self, name: &str) -> Option<&str> {
+    /// The attachment that is the body's mesh.
+    pub const MESH: &str = "mesh";
+
+    /// The contents of an attachment, if they are known.
+    pub fn attachment(&self, name: &str) -> Option<&[u8]> {
         match name {
-            Self::SCENE => self.scene.as_deref(),
-            Self::SESSION => self.session.as_deref(),
+            Self::SCENE => self.scene.as_deref().map(str::as_bytes),
+            Self::SESSION => self.session.as_deref().map(str::as_bytes),
+            Self::MESH => self.mesh.as_deref(),
             _ => None,
         }
     }
@@ -171,6 +181,7 @@ impl Environment {
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .into();
+        map.extend(self.body.iter().map(|body| ("body".to_owned(), body.clone())));
         if let Some(reason) = &self.model_reason {
             map.insert(MODEL_REASON.to_owned(), reason.why.clone());
             map.extend(reason.warning.iter().map(|warning| (MODEL_WARNING.to_owned(), warning.clone())));
@@ -233,6 +244,7 @@ impl Environment {
             model_reason: map
                 .get(MODEL_REASON)
                 .map(|why| ModelReason { why: why.clone(), warning: map.get(MODEL_WARNING).cloned() }),
+            body: map.get("body").cloned(),
             haptic_hz: number("haptic_hz"),
             global_hz: number("global_hz"),
             groups,
@@ -245,6 +257,7 @@ impl Environment {
             first_tools: (0..).map_while(|device| first_tool(map, device)).collect(),
             scene: None,
             session: None,
+            mesh: None,
         }
     }
 }
@@ -302,6 +315,7 @@ mod tests {
             execution: LoggedExecution::Threaded { start_unix_ns: 1_700_000_000_123_456_789 },
             model: "patch".into(),
             model_reason: Some(ModelReason { why: "it is cheap".into(), warning: Some("it is wrong".into()) }),
+            body: Some("1125 nodes".into()),
             haptic_hz: 1000.0,
             global_hz: 29.97,
             groups: vec![
@@ -325,6 +339,7 @@ mod tests {
                 .into(),
             scene: None,
             session: None,
+            mesh: None,
         };
         assert_eq!(Environment::from_map(&environment.to_map(1)), environment);
         let named = Environment { model_reason: None, ..environment.clone() };

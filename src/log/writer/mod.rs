@@ -228,8 +228,9 @@ impl<W: Write> McapWriter<W> {
             output.write_metadata(&Metadata { name: "environment".into(), metadata })?;
             self.environment_is_written = true;
         }
-        self.attach(output, Environment::SCENE)?;
-        self.attach(output, Environment::SESSION)?;
+        self.attach(output, Environment::SCENE, "application/toml")?;
+        self.attach(output, Environment::SESSION, "application/toml")?;
+        self.attach(output, Environment::MESH, "application/octet-stream")?;
         if self.channels.is_empty() {
             let declared: Vec<Topic> = Topic::declared(&self.environment).collect();
             for topic in declared {
@@ -250,9 +251,14 @@ impl<W: Write> McapWriter<W> {
         output.flush()
     }
 
-    /// Attaches the text with this name once it is known.
-    fn attach(&mut self, output: &mut mcap::Writer<NoSeek<W>>, name: &'static str) -> mcap::McapResult<()> {
-        let Some(text) = self.environment.attachment(name).filter(|_| !self.attached.contains(&name)) else {
+    /// Attaches what has this name once it is known.
+    fn attach(
+        &mut self,
+        output: &mut mcap::Writer<NoSeek<W>>,
+        name: &'static str,
+        media_type: &str,
+    ) -> mcap::McapResult<()> {
+        let Some(data) = self.environment.attachment(name).filter(|_| !self.attached.contains(&name)) else {
             return Ok(());
         };
         let time = self.environment.epoch_ns();
@@ -260,8 +266,8 @@ impl<W: Write> McapWriter<W> {
             log_time: time,
             create_time: time,
             name: name.into(),
-            media_type: "application/toml".into(),
-            data: text.as_bytes().into(),
+            media_type: media_type.into(),
+            data: data.into(),
         })?;
         self.attached.push(name);
         Ok(())

@@ -1,4 +1,4 @@
-//! The body-centred cubic lattice: corners and centres of cubic cells, and the tetrahedra between them.
+//! The body-centred cubic lattice: corners and centres of cubic cells.
 
 use palpate_model::Vec3;
 
@@ -30,9 +30,6 @@ impl Lattice {
         let extent = bounds[1] - bounds[0];
         if !(bounds[0].iter().chain(&bounds[1]).all(|x| x.is_finite()) && extent.iter().all(|&x| x > 0.0)) {
             return Err(MeshError::new("the surface to be filled is empty, flat or not finite: nothing is inside it"));
-        }
-        if !(cell_m > 0.0 && cell_m.is_finite()) {
-            return Err(MeshError::new(format!("an element size of {cell_m} m: a length above zero is needed")));
         }
         let wanted = extent.map(|x| (x / cell_m).ceil() + 4.0);
         if wanted.product() > MOST_CELLS {
@@ -94,19 +91,6 @@ impl Lattice {
         let steps = |x: f64, axis: usize| 2 * (x.max(0.0) as i32).min(self.cells[axis] as i32);
         let [low, high] = bounds.map(|x| (x - self.origin) / self.cell_m);
         [[0, 1, 2].map(|axis| steps(low[axis].floor(), axis)), [0, 1, 2].map(|axis| steps(high[axis].ceil(), axis))]
-    }
-
-    /// Calls `visit` with each tetrahedron of cell `cell` and its next along each axis: the two centres, then a long edge of the face
-    /// between them, positively oriented.
-    pub fn tetrahedra_of(&self, cell: [usize; 3], visit: &mut impl FnMut([Steps; 4])) {
-        let centre = cell.map(|n| 2 * n as i32 + 1);
-        for axis in (0..3).filter(|&axis| cell[axis] + 1 < self.cells[axis]) {
-            let next = moved(centre, axis, 2);
-            let ring = face_ring(moved(centre, axis, 1), axis, 1);
-            for (n, &corner) in ring.iter().enumerate() {
-                visit([centre, next, corner, ring[(n + 1) % 4]]);
-            }
-        }
     }
 }
 

@@ -7,6 +7,7 @@
 mod depths;
 mod distance;
 mod lattice;
+mod leaves;
 mod manifold;
 mod stencil;
 mod stuff;
@@ -17,15 +18,19 @@ use palpate_model::mesh::TetrahedralMesh;
 use crate::{MeshError, SurfaceMesh};
 use distance::Closed;
 use lattice::Lattice;
+use leaves::Leaves;
 use stuff::{Elements, Warped};
+
+/// Elements inside are at most this many times doubled: above it the lattice of the fine ones is too large for any body.
+const MOST_DOUBLINGS: usize = 6;
 
 /// How large elements are to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sizes {
     /// The longest edge of an undistorted element; the others are 0.87 of it (m). There are about 12 elements in its cube.
     pub element_m: f64,
-    /// The same for the elements at the surface, where they are to be finer (m); inside they grow to `element_m`, twice as large
-    /// from one layer to the next.
+    /// The same for the elements at the surface, where they are to be finer (m). Inside they double as often as stays within
+    /// `element_m`; each doubling takes a few layers.
     pub surface_m: Option<f64>,
 }
 
@@ -33,6 +38,25 @@ impl Sizes {
     /// Elements of one size throughout (m).
     pub fn uniform(element_m: f64) -> Self {
         Self { element_m, surface_m: None }
+    }
+
+    /// The size at the surface (m), and how often it doubles inside.
+    fn finest(self) -> Result<(f64, usize), MeshError> {
+        let Self { element_m, surface_m } = self;
+        let finest = surface_m.unwrap_or(element_m);
+        for (size, of) in [(element_m, "elements"), (finest, "elements at the surface")] {
+            if !(size > 0.0 && size.is_finite()) {
+                return Err(MeshError::new(format!("{of} of {size} m: a length above zero is needed")));
+            }
+        }
+        if finest > element_m {
+            let message =
+                format!("elements of {finest} m at the surface are larger than those of {element_m} m inside");
+            return Err(MeshError::new(format!("{message}: they can only be finer")));
+        }
+        // A ratio that is a power of two in decimal digits may be a little less.
+        let doublings = (element_m / finest * (1.0 + 1e-9)).log2().floor() as usize;
+        Ok((finest, doublings.min(MOST_DOUBLINGS)))
     }
 }
 
@@ -85,11 +109,12 @@ fn fill_by(
     progress: &mut dyn FnMut(f64),
     depths: impl FnOnce(&Lattice, &mut dyn FnMut(f64)) -> Result<Vec<f32>, MeshError>,
 ) -> Result<TetrahedralMesh, MeshError> {
-    let lattice = Lattice::around(shape.bounds(), sizes.element_m, 1)?;
+    let (finest, doublings) = sizes.finest()?;
+    let lattice = Lattice::around(shape.bounds(), finest, 1 << doublings)?;
     progress(0.0);
     let depths = depths(&lattice, &mut |done| progress(0.4 * done))?;
     let warped = Warped::new(lattice, &depths, shape, &mut |done| progress(0.4 + 0.3 * done));
-    let mesh = manifold::repaired(stuffed(&warped, &mut |done| progress(0.7 + 0.2 * done)));
+    let mesh = manifold::repaired(stuffed(&warped, doublings, &mut |done| progress(0.7 + 0.2 * done)));
     progress(1.0);
     match mesh.tetrahedra.is_empty() {
         true => Err(too_large(sizes, "no element fits into it")),
@@ -98,13 +123,14 @@ fn fill_by(
 }
 
 /// All elements inside the surface.
-fn stuffed(warped: &Warped, progress: &mut dyn FnMut(f64)) -> TetrahedralMesh {
+fn stuffed(warped: &Warped, doublings: usize, progress: &mut dyn FnMut(f64)) -> TetrahedralMesh {
+    let leaves = Leaves::new(&warped.lattice, doublings, |steps| warped.sign(steps) > 0);
     let mut elements = Elements::new(warped);
     let [nx, ny, nz] = warped.lattice.cells;
     for k in 0..nz {
         progress(k as f64 / nz as f64);
         for j in 0..ny {
-            (0..nx).for_each(|i| warped.lattice.tetrahedra_of([i, j, k], &mut |at| elements.add(at)));
+            (0..nx).for_each(|i| leaves.tetrahedra_of([i, j, k], &mut |at| elements.add(at)));
         }
     }
     elements.mesh
@@ -130,25 +156,54 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::support::{angles, noise, outer_faces};
+    use crate::support::{Shape, angles, noise, outer_faces};
+
+    /// Check that every element is positive and of the promised angles, and that neighbours cut their common face alike, before
+    /// anything is repaired: an outer face that comes from two different cuts has a node inside.
+    fn check_stuffed(shape: &impl ImplicitShape, cell: f64, doublings: usize) -> TetrahedralMesh {
+        let lattice = Lattice::around(shape.bounds(), cell, 1 << doublings).unwrap();
+        let depths = depths::everywhere(shape, &lattice, &mut |_| {}).unwrap();
+        let mesh = stuffed(&Warped::new(lattice, &depths, shape, &mut |_| {}), doublings, &mut |_| {});
+        let [smallest, largest] = angles(&mesh);
+        assert!(smallest > 10.7 && largest < 164.8, "{smallest} to {largest} degrees");
+        for node in outer_faces(&mesh).into_iter().flatten() {
+            let distance = shape.signed_distance(&mesh.points[node as usize]);
+            assert!(distance.abs() < 1e-5, "an outer node is {distance} m from the surface");
+        }
+        mesh
+    }
 
     proptest! {
-        #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Check that every element is positive and of the promised angles, and that neighbours cut their common face alike, before
-        /// anything is repaired: an outer face that comes from two different cuts has a node inside.
         #[test]
         fn any_pattern_of_signs_is_filled_without_gaps(seed: u64, waves in 1_usize..8) {
-            let shape = noise(seed, waves);
-            let lattice = Lattice::around(shape.bounds(), 0.5, 1).unwrap();
-            let depths = depths::everywhere(&shape, &lattice, &mut |_| {}).unwrap();
-            let mesh = stuffed(&Warped::new(lattice, &depths, &shape, &mut |_| {}), &mut |_| {});
-            let [smallest, largest] = angles(&mesh);
-            prop_assert!(smallest > 10.7 && largest < 164.8, "{smallest} to {largest} degrees");
-            for node in outer_faces(&mesh).into_iter().flatten() {
-                let distance = shape.signed_distance(&mesh.points[node as usize]);
-                prop_assert!(distance.abs() < 1e-5, "an outer node is {distance} m from the surface");
-            }
+            check_stuffed(&noise(seed, waves), 0.5, 0);
         }
+
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn elements_that_grow_inside_leave_no_gaps(seed: u64, waves in 1_usize..4, doublings in 1_usize..4) {
+            let shape = noise(seed, waves);
+            // Large enough for all sizes, with caves.
+            let caves = Shape { reach: 3.0, distance: |x: &Vec3| shape.signed_distance(&(x * 0.5)).max(x.norm() - 2.9) };
+            check_stuffed(&caves, 0.12, doublings);
+        }
+    }
+
+    #[test]
+    fn every_size_between_the_two_comes_up() {
+        let ball = Shape { reach: 1.0, distance: |x: &Vec3| x.norm() - 1.0 };
+        let mesh = check_stuffed(&ball, 0.04, 3);
+        let edge = |element: &[u32; 4]| (mesh.points[element[0] as usize] - mesh.points[element[1] as usize]).norm();
+        for doublings in 0..=3 {
+            let long = 0.04 * f64::from(1 << doublings);
+            assert!(mesh.tetrahedra.iter().any(|element| (edge(element) / long - 1.0).abs() < 1e-9), "{long}");
+        }
+        assert!(mesh.tetrahedra.len() * 3 < check_stuffed(&ball, 0.04, 0).tetrahedra.len());
     }
 }

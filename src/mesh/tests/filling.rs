@@ -150,6 +150,10 @@ fn what_cannot_be_filled_is_refused_in_one_line() {
         let error = refused(&ring, size);
         assert!(error.contains("element_size_m is too large"), "{error}");
     }
+    let sizes = Sizes { element_m: 0.1, surface_m: Some(0.2) };
+    let error = fill(&ring, sizes, &mut |_| {}).unwrap_err().to_string();
+    assert!(error.contains("only be finer"), "{error}");
+    assert!(fill(&ring, Sizes { surface_m: Some(-0.1), ..sizes }, &mut |_| {}).is_err());
     assert!(refused(&SurfaceMesh::default(), 0.1).contains("no triangles"));
     let mut open = ring.clone();
     open.triangles.pop();
@@ -177,4 +181,18 @@ fn parts_are_kept_and_crumbs_left_out() {
     let mesh = fill_shape(&two, Sizes::uniform(0.1), &mut |_| {}).unwrap();
     assert!(mesh.points.iter().all(|x| x.x.abs() > 0.4));
     assert!(mesh.points.iter().any(|x| x.x > 0.4) && mesh.points.iter().any(|x| x.x < -0.4));
+}
+
+#[test]
+fn a_surface_is_filled_with_elements_that_grow_inside() {
+    let ring = torus(1.0, 0.45, [96, 48], |x| x);
+    let fill =
+        |element_m: f64, surface_m: Option<f64>| fill(&ring, Sizes { element_m, surface_m }, &mut |_| {}).unwrap();
+    let [fine, graded] = [fill(0.05, None), fill(0.1, Some(0.05))];
+    check_valid(&graded, |x| (x.xy().norm() - 1.0).hypot(x.z) - 0.45, 0.002);
+    assert!((volume(&graded) / volume(&fine) - 1.0).abs() < 1e-12);
+    assert_eq!(outer_faces(&graded).len(), outer_faces(&fine).len());
+    assert!(graded.tetrahedra.len() * 4 < fine.tetrahedra.len() * 3);
+    // A size that does not double once is that of all.
+    assert_eq!(fine, fill(0.09, Some(0.05)));
 }

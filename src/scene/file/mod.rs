@@ -5,13 +5,15 @@ use std::path::Path;
 use toml::de::DeTable;
 
 mod fault;
+mod kinds;
 mod locate;
 mod reader;
 mod suggest;
 
-use super::Scene;
+use super::body::Volume;
 use super::device::{field as device_field, numbered};
-use super::validate::tool;
+use super::validate::{mesh, tool};
+use super::{BodySpec, Scene, TetrahedraSpec};
 use crate::devices::ToolPath;
 use crate::error::{Error, ErrorKind};
 use crate::files;
@@ -26,29 +28,44 @@ const LARGEST_FILE: usize = 1 << 20;
 const DEMO_PATH_CSV: &str = include_str!("../../../scenes/paths/demo.csv");
 
 impl Scene {
-    /// Reads, completes and validates a scene file; the tool's path is found relative to it.
+    /// Reads, completes and validates a scene file; the tool's path and the body's mesh are found relative to it. A closed
+    /// surface is filled with elements, which may take seconds.
     ///
     /// # Errors
     /// [`ErrorKind::Io`] if a file cannot be read or is too large (a scene: 1 MiB), [`ErrorKind::Scene`] with file, line, field and what would be right if
     /// it cannot work.
     pub fn load(path: &Path) -> Result<Self, Error> {
+        Self::load_with(path, &mut |_| ())
+    }
+
+    /// Does what [`load`](Self::load) does, and tells `progress` how much of filling a surface is done (0 to 1).
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn load_with(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let name = path.display().to_string();
         let bytes = files::read(path, LARGEST_FILE as u64)?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let line = line_of(error.as_bytes(), error.utf8_error().valid_up_to());
             Error::new(ErrorKind::Scene, "is not UTF-8 text, save the file as UTF-8").at(format!("{name}:{line}"))
         })?;
-        Self::from_toml(&text, &name, path.parent())
+        Self::from_text(&text, &name, path.parent(), progress)
     }
 
-    /// The scene in `text`; `name` stands for the file in errors, and `device.path_csv` and `device.log` are found in the
-    /// folder `base`, or in the current one.
+    /// The scene in `text`; `name` stands for the file in errors, and `device.path_csv`, `device.log`, `body.mesh` and
+    /// `body.surface` are found in the folder `base`, or in the current one.
     ///
     /// # Errors
     /// As [`load`](Self::load).
     pub fn from_toml(text: &str, name: &str, base: Option<&Path>) -> Result<Self, Error> {
+        Self::from_text(text, name, base, &mut |_| ())
+    }
+
+    fn from_text(text: &str, name: &str, base: Option<&Path>, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let found = |file: &Path| base.map_or_else(|| file.to_owned(), |base| base.join(file));
-        let mut scene = Self::from_toml_with(text, name, |path_csv| ToolPath::read_csv(&found(path_csv)))?;
+        let read_path = |path_csv: &Path| ToolPath::read_csv(&found(path_csv));
+        let read_volume = |spec: &TetrahedraSpec, file: &Path| Volume::read(spec, &found(file), progress);
+        let mut scene = Self::from_toml_with(text, name, read_path, read_volume)?;
         // It is read when a session is built.
         for device in &mut scene.devices {
             device.log = device.log.take().map(|log| found(&log));
@@ -58,24 +75,24 @@ impl Scene {
 
     /// The built-in demo: five seconds of pressing, dragging, circling and tapping. Reads no file.
     pub fn demo() -> Self {
-        Self::from_toml_with(DEMO_TOML, "demo.toml", |path_csv| {
-            ToolPath::from_csv(DEMO_PATH_CSV, &path_csv.display().to_string())
-        })
-        .expect("the built-in scene is valid")
+        let path = |path_csv: &Path| ToolPath::from_csv(DEMO_PATH_CSV, &path_csv.display().to_string());
+        let volume = |_: &TetrahedraSpec, _: &Path| Err(Error::scene("body.mesh", "is not part of the program"));
+        Self::from_toml_with(DEMO_TOML, "demo.toml", path, volume).expect("the built-in scene is valid")
     }
 
-    /// The scene in `text`, with the tool's path fetched by `read_path`.
+    /// The scene in `text`, with the tool's path fetched by `read_path` and the body's mesh by `read_volume`.
     fn from_toml_with(
         text: &str,
         name: &str,
         read_path: impl Fn(&Path) -> Result<ToolPath, Error>,
+        read_volume: impl FnMut(&TetrahedraSpec, &Path) -> Result<Volume, Error>,
     ) -> Result<Self, Error> {
         let mut scene = Self::parse(text, name)?;
         let (document, _) = DeTable::parse_recoverable(text);
         let root = document.get_ref();
         let on_line = |error: Error, offset: usize| error.at(format!("{name}:{}", line_of(text, offset)));
         if scene.body.is_none() {
-            let message = "is missing, a scene needs the tables [body.block] and [body.material]";
+            let message = "is missing, a scene needs the tables [body.block] and [body.material], or a [body] of kind = \"tetrahedra\"";
             return Err(on_line(Error::scene("body", message), 0));
         }
         // Before any of their files is read.
@@ -99,10 +116,12 @@ impl Scene {
             let mut devices = scene.devices.iter().enumerate();
             devices.try_for_each(|(index, device)| tool(device).map_err(|error| numbered(error, index, &scene.devices)))
         };
-        scene.validate().and_then(|()| tools()).map_err(|error| {
-            let offset = offset_of(root, error.place());
-            on_line(error, offset)
-        })?;
+        let at_line = |field: &str, error: Error| on_line(error, offset_of(root, field));
+        let of_field = |error: Error| at_line(&error.place().to_owned(), error);
+        scene.validate().and_then(|()| tools()).map_err(of_field)?;
+        if let Some(BodySpec::Tetrahedra(spec)) = &mut scene.body {
+            complete(spec, read_volume, at_line)?;
+        }
         Ok(scene)
     }
 
@@ -122,6 +141,7 @@ impl Scene {
         if let Some(error) = syntax.first() {
             return Err(refuse(syntax_fault(text, root, error)));
         }
+        kinds::first_misplaced(root).map_or(Ok(()), |fault| Err(refuse(fault)))?;
         reader::read(root).map_err(refuse)
     }
 
@@ -145,6 +165,30 @@ impl Scene {
         scene.validate().map_err(|error| error.at(name))?;
         Ok(scene)
     }
+}
+
+/// Fetches the mesh of `spec`, and makes sure that a body can be made of it; `at_line` puts the line of a field to an error.
+fn complete(
+    spec: &mut TetrahedraSpec,
+    mut read: impl FnMut(&TetrahedraSpec, &Path) -> Result<Volume, Error>,
+    at_line: impl Fn(&str, Error) -> Error,
+) -> Result<(), Error> {
+    let of_field = |error: Error| at_line(&error.place().to_owned(), error);
+    mesh(spec).map_err(of_field)?;
+    let sources = [("body.mesh", &spec.mesh), ("body.surface", &spec.surface)];
+    for (field, file) in sources {
+        let Some(file) = file else { continue };
+        let volume = read(spec, file).map_err(|error| match error.kind() {
+            // The field stands in front of the file that cannot be read.
+            ErrorKind::Io => at_line(field, error.at(field)),
+            _ if error.place().starts_with("body.") => of_field(error),
+            // A mesh that is there but wrong has a place of its own to name.
+            _ => error,
+        })?;
+        spec.volume = Some(volume);
+        break;
+    }
+    spec.build().map(drop).map_err(of_field)
 }
 
 /// toml's complaint in the form of ours; a key given twice is named with its table and its first line.

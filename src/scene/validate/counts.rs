@@ -1,7 +1,7 @@
 //! How many of each thing a scene may have: looked at first, before anything is read or made for them.
 
-use super::super::Scene;
 use super::super::device::field;
+use super::super::{BodySpec, Scene};
 use super::devices::MAX_DEVICES;
 use crate::error::Error;
 
@@ -39,8 +39,11 @@ impl Scene {
             return Err(Error::scene("probe", message));
         }
         if let Some(body) = &self.body {
-            at_most("body.region", body.regions.len(), MAX_REGIONS)?;
-            at_most("body.block.fixed", body.block.fixed.len(), MAX_WORDS)?;
+            at_most("body.region", body.region_count(), MAX_REGIONS)?;
+            match body {
+                BodySpec::MassSpring(spec) => at_most("body.block.fixed", spec.block.fixed.len(), MAX_WORDS)?,
+                BodySpec::Tetrahedra(spec) => at_most("body.fixed", spec.fixed.len(), MAX_WORDS)?,
+            }
         }
         at_most("initial.hold", self.initial.as_ref().map_or(0, |initial| initial.hold.len()), MAX_HELD)?;
         at_most("safety.off", self.safety.off.len(), MAX_WORDS)?;

@@ -4,12 +4,17 @@ mod check;
 mod counts;
 mod devices;
 mod safety;
+mod tissue;
 
 pub(crate) use devices::MAX_DEVICES;
 pub(super) use devices::tool;
+pub(super) use tissue::mesh;
 
 use super::device::numbered;
-use super::{BlockSpec, BodySpec, Friction, GlobalSpec, InitialSpec, LocalSpec, ModelChoice, Scene, StepKind};
+use super::{
+    BlockSpec, BodySpec, Friction, GlobalSpec, InitialSpec, LocalSpec, MassSpringSpec, ModelChoice, NodeSpec, Scene,
+    StepKind,
+};
 use crate::error::Error;
 use crate::model::ModelError;
 use crate::model::contact::Equations;
@@ -30,6 +35,8 @@ const MIN_TRIANGLE_M2: f64 = 1e-14;
 const MAX_SUBSTEPS_PER_MS: u32 = 10_000;
 /// A dense tangent of 38 MB, far above what a haptic tick can multiply with.
 const MAX_PATCH_NODES: usize = 512;
+/// The corners of an element.
+const LEAST_PATCH_NODES: usize = 4;
 /// Far above what the ring of a patch can answer with.
 const MAX_BASIS: usize = 500;
 /// Longer than any global model is worth waiting for (ms).
@@ -49,8 +56,10 @@ impl Scene {
 
 fn validate(scene: &Scene) -> Result<(), Error> {
     scene.check_counts()?;
-    if let Some(spec) = &scene.body {
-        body(spec)?;
+    match &scene.body {
+        Some(BodySpec::MassSpring(spec)) => body(spec)?,
+        Some(BodySpec::Tetrahedra(spec)) => tissue::validate(spec)?,
+        None => {}
     }
     if let Friction::Coefficient(coefficient) = scene.contact.friction
         && !(coefficient.is_finite() && coefficient >= 0.0)
@@ -71,8 +80,15 @@ fn validate(scene: &Scene) -> Result<(), Error> {
         lengths_within("initial.pull.offset_m", spec.pull.offset_m, MAX_LENGTH_M)?;
     }
     match &scene.body {
-        Some(spec) => on_block(scene, &spec.block)?,
-        None => on_no_lattice(scene)?,
+        Some(BodySpec::MassSpring(spec)) => on_block(scene, &spec.block)?,
+        Some(BodySpec::Tetrahedra(_)) => {
+            on_no_lattice(
+                scene,
+                "is a place in a block, and the body is of tetrahedra: give the node's number or { near_m = [x, y, z] }",
+            )?;
+            any_patch(scene)?;
+        }
+        None => on_no_lattice(scene, "names nodes of a block, and the body is the program's own")?,
     }
     duration(scene.run.duration_s, scene.local.rate_hz)
 }
@@ -87,7 +103,7 @@ fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
         patch(scene.local.patch_size(), block)?;
     }
     for (index, device) in scene.devices.iter().enumerate() {
-        if let Some(node) = device.attach_node {
+        if let Some(NodeSpec::Lattice(node)) = device.attach_node {
             attached(node, block).map_err(|error| numbered(error, index, &scene.devices))?;
         }
     }
@@ -95,25 +111,44 @@ fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
         initial(spec, block)?;
     }
     for (index, probe) in scene.probes.iter().enumerate() {
-        inside(&format!("probe[{index}].node"), probe.node, block)?;
+        if let NodeSpec::Lattice(node) = probe.node {
+            inside(&format!("probe[{index}].node"), node, block)?;
+        }
     }
     Ok(())
 }
 
-/// A program's own body has node ids and no lattice: the builder's methods name its nodes.
-fn on_no_lattice(scene: &Scene) -> Result<(), Error> {
-    const WHY: &str = "names nodes of a block, and the body is the program's own";
-    if let Some(index) = scene.devices.iter().position(|device| device.attach_node.is_some()) {
-        return Err(numbered(Error::scene("device.attach_node", WHY), index, &scene.devices));
+/// A body that is no block has no places in a lattice; `why` says what it has.
+fn on_no_lattice(scene: &Scene, why: &str) -> Result<(), Error> {
+    let is_place = |node: &NodeSpec| matches!(node, NodeSpec::Lattice(_));
+    if let Some(index) = scene.devices.iter().position(|device| device.attach_node.as_ref().is_some_and(is_place)) {
+        return Err(numbered(Error::scene("device.attach_node", why), index, &scene.devices));
     }
-    let named = [("initial", scene.initial.is_some()), ("probe", !scene.probes.is_empty())];
-    match named.iter().find(|(_, is_used)| *is_used) {
-        None => Ok(()),
-        Some((field, _)) => Err(Error::scene(field, WHY)),
+    let initial = scene.initial.as_ref();
+    let of_initial = || initial.is_some_and(|initial| initial.hold.iter().chain([&initial.pull.node]).any(is_place));
+    let of_probes = || scene.probes.iter().any(|probe| is_place(&probe.node));
+    match () {
+        () if of_initial() => Err(Error::scene("initial", why)),
+        () if of_probes() => Err(Error::scene("probe", why)),
+        () => Ok(()),
     }
 }
 
-fn body(body: &BodySpec) -> Result<(), Error> {
+/// Of a body without a lattice a patch has as many nodes as the product says.
+fn any_patch(scene: &Scene) -> Result<(), Error> {
+    let patch = scene.local.patch_size();
+    let nodes = patch.iter().try_fold(1_usize, |nodes, &along| nodes.checked_mul(along)).unwrap_or(usize::MAX);
+    if (LEAST_PATCH_NODES..=MAX_PATCH_NODES).contains(&nodes) {
+        return Ok(());
+    }
+    let message = format!(
+        "is {patch:?}, must be {LEAST_PATCH_NODES} to {MAX_PATCH_NODES} nodes in all: as many as that, the nearest to the tool, \
+         are the patch of a body of tetrahedra"
+    );
+    Err(Error::scene("local.patch", message))
+}
+
+fn body(body: &MassSpringSpec) -> Result<(), Error> {
     lattice(&body.block)?;
     let material = &body.material;
     positive("body.material.node_mass_kg", material.node_mass_kg)?;
@@ -300,10 +335,13 @@ fn attached(node: [usize; 3], block: &BlockSpec) -> Result<(), Error> {
 
 fn initial(initial: &InitialSpec, block: &BlockSpec) -> Result<(), Error> {
     let pulled = initial.pull.node;
-    movable("initial.pull.node", pulled, block, "it cannot be pulled")?;
-    for &node in &initial.hold {
+    if let NodeSpec::Lattice(node) = pulled {
+        movable("initial.pull.node", node, block, "it cannot be pulled")?;
+    }
+    for &held in &initial.hold {
+        let NodeSpec::Lattice(node) = held else { continue };
         inside("initial.hold", node, block)?;
-        if node == pulled {
+        if held == pulled {
             return Err(Error::scene(
                 "initial.hold",
                 format!("{node:?} is the pulled node, it cannot be held as well"),

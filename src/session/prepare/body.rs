@@ -5,9 +5,8 @@ use crate::model::Vec3;
 use crate::model::body::{Body, State};
 use crate::model::equilibrium::static_equilibrium;
 use crate::model::integrator::Spectrum;
-use crate::model::mesh::Lattice;
 use crate::runtime::Rate;
-use crate::scene::{InitialSpec, Scene, device_field};
+use crate::scene::{Nodes, Scene, device_field};
 
 /// Steps of 0.1 us, the limit of `global.substeps_per_ms` too: a body that needs more would seem to hang.
 const MAX_SUBSTEPS_PER_MS: f64 = 1e4;
@@ -41,21 +40,27 @@ impl Start {
     ) -> Result<Self, Error> {
         let mut body = match (own, &scene.body) {
             (Some(own), _) => own,
-            (None, Some(spec)) => Box::new(spec.build()?) as Box<dyn Body>,
+            (None, Some(spec)) => spec.build()?,
             (None, None) => return Err(Error::scene("body", "is missing")),
         };
         check_body(&*body)?;
-        let lattice = scene.body.as_ref().map(|spec| Lattice { nodes: spec.block.nodes });
-        let id = |node: [usize; 3]| lattice.map_or(0, |lattice| lattice.id(node));
-        let own_node = |index: usize| attached.get(index).copied().flatten();
         let devices = scene.devices.iter().enumerate();
-        let attached: Vec<_> = devices.map(|(index, spec)| own_node(index).or(spec.attach_node.map(id))).collect();
-        let probes: Vec<u32> = probes.into_iter().chain(scene.probes.iter().map(|probe| id(probe.node))).collect();
+        let attached = devices.map(|(index, _)| match attached.get(index).copied().flatten() {
+            None => scene.glued_node(index, &*body),
+            own => Ok(own),
+        });
+        let attached = attached.collect::<Result<Vec<_>, _>>()?;
+        let nodes = Nodes::of(&*body, scene);
+        let named = scene.probes.iter().enumerate();
+        let named = named.map(|(index, probe)| nodes.id(&format!("probe[{index}].node"), probe.node));
+        let probes = probes.into_iter().map(Ok).chain(named).collect::<Result<Vec<u32>, _>>()?;
+        let held = scene.initial.as_ref().map(|initial| nodes.held(initial)).transpose()?;
         check_nodes(&*body, &attached, &probes)?;
         let tick = haptic.period_s();
         let (substeps, stable_substeps) = substeps(&mut *body, scene.global.substeps_per_ms, tick)?;
-        let state = match &scene.initial {
-            Some(initial) => pulled(&mut *body, initial, id)?,
+        let state = match held {
+            // The equilibrium that the run begins from.
+            Some(held) => static_equilibrium(&mut *body, &held)?,
             None => State::at_rest(body.rest()),
         };
         Ok(Self { body, state, attached, probes, tick, substeps, stable_substeps })
@@ -82,11 +87,16 @@ fn check_body(body: &dyn Body) -> Result<(), Error> {
     Ok(())
 }
 
+/// Where the node of the `index`-th of `count` devices stands in a scene.
+fn attach_field(index: usize, count: usize) -> String {
+    format!("{}.attach_node", device_field(index, count))
+}
+
 /// What a program or a scene can get wrong about nodes.
 fn check_nodes(body: &dyn Body, attached: &[Option<u32>], probes: &[u32]) -> Result<(), Error> {
     let nodes = body.rest().len();
-    let field = |index: usize| format!("{}.attach_node", device_field(index, attached.len()));
-    let glued = || attached.iter().enumerate().filter_map(|(index, node)| Some((field(index), (*node)?)));
+    let count = attached.len();
+    let glued = || attached.iter().enumerate().filter_map(|(index, node)| Some((attach_field(index, count), (*node)?)));
     for (field, node) in glued().chain(probes.iter().map(|&node| ("probe".to_owned(), node))) {
         if node as usize >= nodes {
             let message = format!("node {node} is outside the body, nodes run from 0 to {}", nodes - 1);
@@ -133,13 +143,4 @@ fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<(u32,
         return Err(Error::scene("global.substeps_per_ms", message));
     }
     Ok((substeps as u32, spectrum.substeps(tick)))
-}
-
-/// The equilibrium that the run begins from.
-fn pulled(body: &mut dyn Body, initial: &InitialSpec, id: impl Fn([usize; 3]) -> u32) -> Result<State, Error> {
-    let rest = |node: u32| body.rest()[node as usize];
-    let pulled = id(initial.pull.node);
-    let mut held = vec![(pulled, rest(pulled) + Vec3::from(initial.pull.offset_m))];
-    held.extend(initial.hold.iter().map(|&node| (id(node), rest(id(node)))));
-    Ok(static_equilibrium(body, &held)?)
 }

@@ -30,7 +30,7 @@ use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::model::surroundings::Size;
 use crate::runtime::{Execution, Nanos, Plan, RateGroup};
-use crate::scene::{ProbeSpec, Scene, StepKind};
+use crate::scene::{BodySpec, NodeSpec, ProbeSpec, Scene, StepKind, Volume};
 use body::Start;
 use patch::PatchChoice;
 
@@ -155,19 +155,25 @@ fn described(parts: &Parts) -> Result<Scene, Error> {
 }
 
 /// The scene without what a log holds in other places, without what is of this machine alone (a log must not choose a path
-/// where it is read), and with the nodes that a program named, if it has a lattice.
+/// where it is read), and with the nodes that a program named, if the body is the scene's.
 pub(super) fn as_run(scene: &Scene, named: Option<(&[Option<u32>], &[u32])>) -> Scene {
     let mut scene = scene.clone();
     for device in &mut scene.devices {
         (device.path_csv, device.path, device.log) = (None, None, None);
     }
     scene.local.basis_folder = None;
+    if let Some(BodySpec::Tetrahedra(spec)) = &mut scene.body {
+        // The mesh itself is in the log.
+        (spec.mesh, spec.surface, spec.element_size_m, spec.surface_size_m) = (None, None, None, None);
+        spec.unit_m = spec.volume.as_ref().map_or(spec.unit_m, Volume::unit_m);
+    }
     if let (Some(body), Some((attached, probes))) = (&scene.body, named) {
-        let lattice = Lattice { nodes: body.block.nodes };
-        for (device, node) in scene.devices.iter_mut().zip(attached) {
-            device.attach_node = node.map(|node| lattice.coordinates(node));
+        let lattice = body.mass_spring().map(|spec| Lattice { nodes: spec.block.nodes });
+        let node = |id: u32| lattice.map_or(NodeSpec::Number(id), |lattice| lattice.coordinates(id).into());
+        for (device, id) in scene.devices.iter_mut().zip(attached) {
+            device.attach_node = id.map(node);
         }
-        scene.probes = probes.iter().map(|&node| ProbeSpec { node: lattice.coordinates(node) }).collect();
+        scene.probes = probes.iter().map(|&id| ProbeSpec { node: node(id) }).collect();
     }
     scene
 }

@@ -6,7 +6,7 @@ use crate::model::body::Body;
 use crate::model::local::Kind;
 use crate::model::mesh::Lattice;
 use crate::model::surroundings::{Estimate, Reduction, RestingBody, Size};
-use crate::scene::{Scene, patch_fits};
+use crate::scene::{BodySpec, Scene, patch_fits};
 
 /// What is tried, in the order of what a tick costs.
 const SIZES: [[usize; 3]; 5] = [[4, 4, 2], [4, 4, 3], [5, 5, 2], [6, 6, 2], [6, 6, 3]];
@@ -54,11 +54,12 @@ pub(super) fn choose(scene: &Scene, body: &dyn Body, attached: &[Option<u32>]) -
     let resting = RestingBody::new(body)?;
     let node = attached.first().copied().flatten().or_else(|| scene.first_touched(body))?;
     let triangle = *body.surface().at_node(node).first()?;
-    let place = match &scene.body {
-        Some(spec) => format!("node {:?}", Lattice { nodes: spec.block.nodes }.coordinates(node)),
+    let block = scene.body.as_ref().and_then(BodySpec::mass_spring).map(|spec| &spec.block);
+    let place = match block {
+        Some(block) => format!("node {:?}", Lattice { nodes: block.nodes }.coordinates(node)),
         None => format!("node {node}"),
     };
-    let fits = |size: &[usize; 3]| scene.body.as_ref().is_none_or(|spec| patch_fits(*size, &spec.block));
+    let fits = |size: &[usize; 3]| block.is_none_or(|block| patch_fits(*size, block));
     let (mut best, mut patch, mut last) = (None::<PatchChoice>, Vec::new(), Vec::new());
     for size in SIZES.into_iter().filter(fits) {
         body.patch(&[triangle], size, &mut patch);

@@ -13,7 +13,7 @@ use crate::log::{
 };
 use crate::model::body::Block;
 use crate::runtime::{Nanos, Recording, TickTiming};
-use crate::scene::{MAX_DEVICES, Scene};
+use crate::scene::{BodySpec, MAX_DEVICES, Scene, Volume};
 use crate::session::prepare::as_run;
 
 /// The rate group that is no part of what is repeated.
@@ -40,6 +40,7 @@ pub(super) struct Logged {
 struct Gathered {
     environment: Option<Environment>,
     session: Option<String>,
+    mesh: Option<Vec<u8>>,
     recording: Recording,
     /// By device.
     samples: Vec<Vec<ReplayedSample>>,
@@ -88,6 +89,7 @@ impl Gathered {
             LogEntry::Attachment { name, data } if name == Environment::SESSION => {
                 self.session = Some(String::from_utf8_lossy(&data).into_owned());
             }
+            LogEntry::Attachment { name, data } if name == Environment::MESH => self.mesh = Some(data),
             LogEntry::Attachment { .. } => {}
             LogEntry::Stats(stats) => {
                 self.stats.insert(stats.group, stats);
@@ -135,7 +137,14 @@ impl Gathered {
         let scene = Scene::from_session_toml(&session, Environment::SESSION)
             .map_err(|error| refusal(format!("what was run cannot be read: {error}")))?;
         // Whatever a log says, it chooses no path and no device here.
-        let scene = as_run(&scene, None);
+        let mut scene = as_run(&scene, None);
+        if let Some(BodySpec::Tetrahedra(spec)) = &mut scene.body {
+            let mesh = self.mesh.take().ok_or_else(|| {
+                refusal(format!("it has no attachment {}: the mesh of its body is not known", Environment::MESH))
+            })?;
+            let volume = Volume::of_file(mesh, Environment::MESH, spec.unit_m);
+            spec.volume = Some(volume.map_err(|error| refusal(format!("its mesh cannot be used: {error}")))?);
+        }
         let devices = scene.devices.len();
         if environment.first_tools.len() != devices {
             return Err(refusal("it lacks the device's first state"));

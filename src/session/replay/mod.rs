@@ -17,7 +17,7 @@ use super::wire::{Rerun, start};
 use crate::devices::{Capabilities, Device, DeviceState, Replayed, ReplayedSample};
 use crate::error::{Error, ErrorKind};
 use crate::runtime::{Actor, Execution, Nanos, Recording, RuntimeReport};
-use crate::scene::{DeviceKind, DeviceSpec, ModelChoice};
+use crate::scene::{BodySpec, DeviceKind, DeviceSpec, ModelChoice, Scene};
 use compare::{Comparer, Comparison, End};
 use cut::Cut;
 use logged::Logged;
@@ -91,6 +91,12 @@ impl Replay {
         let difference = first_difference(&prepared.scene.to_toml()?, &logged.scene.to_toml()?);
         if let Some((here, there)) = difference {
             let message = format!("it is the log of another session: `{there}` was run, this one has `{here}`");
+            return Err(Error::new(ErrorKind::Log, message).at(place));
+        }
+        let mesh =
+            |scene: &Scene| scene.body.as_ref().and_then(BodySpec::tetrahedra).and_then(|spec| spec.volume.clone());
+        if mesh(&prepared.scene).zip(mesh(&logged.scene)).is_some_and(|(here, there)| here.mesh() != there.mesh()) {
+            let message = "it is the log of another session: its body has another mesh than this one's";
             return Err(Error::new(ErrorKind::Log, message).at(place));
         }
         let Logged { recording, comparison, end, cut, .. } = logged;

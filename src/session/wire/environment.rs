@@ -6,11 +6,15 @@ use crate::log::{Environment, GroupInfo, LoggedExecution, ModelReason, ToolSampl
 use crate::model::body::Block;
 use crate::runtime::{Execution, Rate};
 use crate::safety::Actions;
+use crate::scene::{BodySpec, TetrahedraSpec};
 use crate::session::prepare::{BASIS, Prepared, Tool};
 
 /// The environment of a run whose devices gave these `first` states.
 pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment, Error> {
     let session = Some(prepared.scene.to_toml()?);
+    let tetrahedra = prepared.scene.body.as_ref().and_then(BodySpec::tetrahedra);
+    let volume = tetrahedra.and_then(|spec| spec.volume.as_ref());
+    let mesh = volume.filter(|_| prepared.options.log.is_some()).map(|volume| volume.file().into());
     let timing = &prepared.plan.timing;
     Ok(Environment {
         palpate_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -21,6 +25,7 @@ pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<
         },
         model: prepared.plan.template.kind.name().to_owned(),
         model_reason: model_reason(prepared),
+        body: tetrahedra.map(|spec| body(prepared, spec)),
         haptic_hz: timing.haptic.as_hz(),
         global_hz: if prepared.is_multi_rate() { timing.global.as_hz() } else { 0.0 },
         groups: groups(prepared),
@@ -37,7 +42,15 @@ pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<
         first_tools: (0..).zip(first).map(first_tool).collect(),
         scene: prepared.scene.source.clone(),
         session,
+        mesh,
     })
+}
+
+/// A body of tetrahedra in words.
+fn body(prepared: &Prepared, spec: &TetrahedraSpec) -> String {
+    let body = prepared.simulation.body();
+    let held = body.inverse_masses().iter().filter(|&&w| w == 0.0).count();
+    format!("{} nodes, {held} of them held, {}", body.rest().len(), spec.in_words())
 }
 
 /// The rate groups, in graph order.

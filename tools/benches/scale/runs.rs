@@ -6,7 +6,7 @@ use palpate::Error;
 use palpate::devices::ToolPath;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::{Nanos, Rate};
-use palpate::scene::Scene;
+use palpate::scene::{BodySpec, Scene};
 use palpate::session::{Session, Summary};
 use palpate_cli::compare::{CompareOptions, ForceDeviation, ForceTrace};
 
@@ -96,7 +96,7 @@ pub fn all(is_quick: bool, mut done: impl FnMut(&[Run]) -> Result<(), Error>) ->
 
 fn of(case: &Case) -> Result<Scene, Error> {
     let mut scene = scene(case.scene)?;
-    if let Some(body) = &mut scene.body {
+    if let Some(body) = scene.body.as_mut().and_then(BodySpec::mass_spring_mut) {
         body.block.nodes = [case.nodes; 3];
     }
     scene.local.rate_hz = case.rate;

@@ -34,7 +34,7 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
             varied.local.rate_hz = rate;
             let late = CompareOptions::one_period(Rate::from_hz(varied.global.rate_hz).expect("a scene has a rate"));
             let duration_s = Some(if is_quick { 0.2 } else { varied.run.duration_s.min(DURATION_S) });
-            let options = CompareOptions { models: MODELS.into(), latencies: vec![late], duration_s };
+            let options = CompareOptions { models: MODELS.into(), latencies: vec![late], duration_s, finer: false };
             measured.push((rate, compared(&varied, &options, rounds)?));
         }
         let file = format!("speed_vs_error_rates_{name}");

@@ -67,7 +67,7 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
             let linear = variant.is_for_all.then_some(LocalModelKind::Patch);
             let models = [LocalModelKind::Predictive].into_iter().chain(linear).collect();
             let duration_s = Some(if is_quick { 0.2 } else { varied.run.duration_s.min(DURATION_S) });
-            let options = CompareOptions { models, latencies: vec![late], duration_s };
+            let options = CompareOptions { models, latencies: vec![late], duration_s, finer: false };
             measured.push((variant.name.as_str(), compared(&varied, &options, rounds)?));
         }
         let file = format!("speed_vs_error_sizes_{name}");

@@ -7,7 +7,7 @@ use palpate::log::LogRecord;
 use palpate::model::equilibrium::static_equilibrium;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::prelude::*;
-use palpate::scene::Scene;
+use palpate::scene::{BodySpec, Scene};
 
 use crate::repository::in_repository;
 
@@ -62,7 +62,7 @@ impl Sweep {
     pub fn swing(&self, model: LocalModelKind, rate_hz: f64, wall: Wall) -> Result<f64, Error> {
         let mut scene = self.scene.clone().with_model(model);
         scene.local.rate_hz = rate_hz;
-        if let Some(body) = &mut scene.body {
+        if let Some(body) = scene.body.as_mut().and_then(BodySpec::mass_spring_mut) {
             let (k, b) = (wall.stiffness / self.shape, wall.damping / self.shape);
             body.material.stiffness_n_per_m = k;
             body.material.damping_ratio = b / (2.0 * body.material.node_mass_kg * k).sqrt();

@@ -17,6 +17,9 @@ pub struct CompareArgs {
     /// Compare only these models with `full`, by name and separated by commas
     #[arg(long, value_name = "A,B", value_delimiter = ',', value_parser = run::model)]
     pub models: Vec<LocalModelKind>,
+    /// Leave out the runs of `full` with smaller steps and on a finer mesh
+    #[arg(long)]
+    pub models_only: bool,
     /// Run for this many seconds instead of the scene's own duration
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
@@ -34,12 +37,16 @@ pub struct CompareArgs {
 /// Input errors of the scene; [`ErrorKind::Io`] if the page cannot be written; [`ErrorKind::Fault`] if a run ended in a
 /// fault, after the others were printed.
 pub fn run(args: &CompareArgs) -> Result<(), Error> {
-    let scene = Scene::load(&args.scene)?;
+    let scene = progress::load(&args.scene)?;
     let inputs = files::inputs_of(&args.scene, &scene);
     args.html.as_ref().map_or(Ok(()), |html| files::keep_inputs(&inputs, html))?;
     let name = shared::name_of(&args.scene);
-    let options =
-        CompareOptions { models: args.models.clone(), duration_s: args.duration, ..CompareOptions::default() };
+    let options = CompareOptions {
+        models: args.models.clone(),
+        duration_s: args.duration,
+        finer: !args.models_only,
+        ..CompareOptions::default()
+    };
     let mut shown = Shown::default();
     let compared = Comparison::measure(&scene, &options, |at| shown.show(at));
     shown.clear();
@@ -64,7 +71,7 @@ struct Shown {
 impl Shown {
     fn show(&mut self, at: CompareProgress) {
         let late = at.latency.0 as f64 / 1e6;
-        let what = || format!("{}/{} {}, {late} ms late", at.run + 1, at.runs, at.model.name());
+        let what = || format!("{}/{} {}, {late} ms late", at.run + 1, at.runs, at.model);
         if self.run != Some(at.run) {
             self.clear();
             self.run = Some(at.run);

@@ -4,7 +4,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use palpate::scene::Scene;
+use palpate::scene::{BodySpec, Scene};
 use palpate::{Error, ErrorKind};
 
 /// The extension of what a scene's `basis_folder` keeps.
@@ -14,10 +14,14 @@ const NAMES: u32 = 1000;
 /// Links that are followed to a file that is not there yet.
 const MOST_LINKS: u32 = 40;
 
-/// Everything that the scene at `path` reads: itself, paths and logs of its devices, and the bases that were kept for it.
+/// Everything that the scene at `path` reads: itself, the mesh or surface of its body, paths and logs of its devices, and the
+/// bases that were kept for it.
 pub fn inputs_of(path: &Path, scene: &Scene) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut inputs = vec![path.to_owned()];
+    if let Some(spec) = scene.body.as_ref().and_then(BodySpec::tetrahedra) {
+        inputs.extend([&spec.mesh, &spec.surface].into_iter().flatten().map(|file| folder.join(file)));
+    }
     for device in &scene.devices {
         inputs.extend(device.path_csv.as_ref().map(|path_csv| folder.join(path_csv)));
         // Found relative to the scene when that was read.

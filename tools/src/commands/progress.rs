@@ -9,12 +9,33 @@ use indicatif::{MultiProgress, ProgressBar, ProgressBarIter, ProgressDrawTarget,
 use palpate::Error;
 use palpate::log::LogReader;
 use palpate::runtime::{GroupLive, Nanos};
+use palpate::scene::Scene;
 use palpate::session::Running;
 
 use super::shared::name_of;
 
 /// How much of the run passes between two drawings.
 const STEP: Duration = Duration::from_millis(50);
+
+/// Loads the scene at `path`; a bar shows how far the filling of a surface is.
+///
+/// # Errors
+/// Those of [`Scene::load`].
+pub fn load(path: &Path) -> Result<Scene, Error> {
+    const ALL: f64 = 1000.0;
+    let mut filling = None;
+    let scene = Scene::load_with(path, &mut |done| {
+        let bar = filling.get_or_insert_with(|| {
+            let bar = ProgressBar::with_draw_target(Some(ALL as u64), ProgressDrawTarget::stderr_with_hz(15));
+            let style = ProgressStyle::with_template("{msg} {bar:30} {percent} %");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar.with_message(format!("filling the surface of {}", name_of(path)))
+        });
+        bar.set_position((ALL * done) as u64);
+    });
+    filling.iter().for_each(ProgressBar::finish_and_clear);
+    scene
+}
 
 /// Shows that a scene is being prepared until the returned bar is cleared: a large body's equilibrium takes a while.
 pub fn preparing(what: &str) -> ProgressBar {

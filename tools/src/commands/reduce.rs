@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use palpate::scene::Scene;
+use palpate::scene::{NodeSpec, Scene};
 use palpate::{Error, ErrorKind};
 
-use super::progress::StepBar;
+use super::progress::{self, StepBar};
 use super::{files, shared};
 use crate::reduce::ReductionStudy;
 use crate::reduce::{
@@ -28,9 +28,9 @@ pub struct ReduceArgs {
     /// A patch of so many nodes along the surface, along it and into depth, in place of the scene's
     #[arg(long, value_name = "N,N,N", value_parser = patch, conflicts_with_all = ["paper", "cells"])]
     pub patch: Option<[usize; 3]>,
-    /// Look closely at this surface node; left out: where the scene's tool touches first
-    #[arg(long, value_name = "I,J,K", value_parser = node, conflicts_with_all = ["paper", "cells"])]
-    pub node: Option<[usize; 3]>,
+    /// Look closely at this surface node, by its place in a block or its number; left out: where the scene's tool touches first
+    #[arg(long, value_name = "I,J,K|N", value_parser = node, conflicts_with_all = ["paper", "cells"])]
+    pub node: Option<NodeSpec>,
     /// Look at every so many nodes of the surface along each axis; left out: all of a small surface, fewer of a large one
     #[arg(long, value_name = "N", value_parser = count, conflicts_with_all = ["paper", "cells"])]
     pub every: Option<usize>,
@@ -80,7 +80,7 @@ pub struct Cells(Vec<usize>);
 /// Input errors of the scene and of the arguments; [`ErrorKind::Io`] if the page cannot be written; [`ErrorKind::Condition`]
 /// with `--fail-if-not-local` if the patch does not capture the force, after the report was printed.
 pub fn run(args: &ReduceArgs) -> Result<(), Error> {
-    let scene = args.scene.as_ref().map(|path| Scene::load(path).map(|scene| (path, scene))).transpose()?;
+    let scene = args.scene.as_ref().map(|path| progress::load(path).map(|scene| (path, scene))).transpose()?;
     let inputs = scene.as_ref().map_or(Vec::new(), |(path, scene)| files::inputs_of(path, scene));
     args.html.as_ref().map_or(Ok(()), |html| files::keep_inputs(&inputs, html))?;
     let mut shown = StepBar::default();
@@ -173,8 +173,10 @@ fn patch(text: &str) -> Result<[usize; 3], String> {
     patch.ok_or("three numbers of nodes are needed, such as 4,4,2".to_owned())
 }
 
-fn node(text: &str) -> Result<[usize; 3], String> {
-    three(text).ok_or("the three indices of a node are needed, such as 5,5,11".to_owned())
+fn node(text: &str) -> Result<NodeSpec, String> {
+    let number = || text.trim().parse().ok().map(NodeSpec::Number);
+    let message = "the three indices of a node are needed, such as 5,5,11, or its number";
+    three(text).map(NodeSpec::Lattice).or_else(number).ok_or(message.to_owned())
 }
 
 fn count(text: &str) -> Result<usize, String> {
@@ -202,8 +204,8 @@ mod tests {
     fn values_are_read_or_refused_with_what_is_needed() {
         assert_eq!(cells("12, 12").unwrap().0, [12, 12]);
         assert!(["12", "1,5", "5,5,5,5", "5,x", "", "-5,5"].iter().all(|text| cells(text).is_err()));
-        assert_eq!((patch("4,4,2"), node("0,5,11")), (Ok([4, 4, 2]), Ok([0, 5, 11])));
-        assert!(patch("4,0,2").is_err() && node("1,2").is_err() && count("0").is_err());
+        assert_eq!((patch("4,4,2"), node("0,5,11")), (Ok([4, 4, 2]), Ok([0, 5, 11].into())));
+        assert!(patch("4,0,2").is_err() && node("1,2").is_err() && node("17") == Ok(17.into()) && count("0").is_err());
         assert!(["nan", "inf", "0", "-1", "x"].iter().all(|text| positive(text).is_err()));
         assert_eq!((frequency("0"), positive("1e-3")), (Ok(0.0), Ok(1e-3)));
         assert_eq!(studies("all").unwrap().0.len(), 5);

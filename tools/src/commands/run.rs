@@ -50,7 +50,7 @@ pub fn demo() -> Result<(), Error> {
 /// # Errors
 /// Input errors of the scene, or a failed run.
 pub fn run(args: &RunArgs) -> Result<(), Error> {
-    let mut scene = Scene::load(&args.scene)?;
+    let mut scene = progress::load(&args.scene)?;
     files::keep_inputs(&files::inputs_of(&args.scene, &scene), &args.out)?;
     let name = shared::name_of(&args.scene);
     if let Some(model) = args.model {

@@ -26,6 +26,7 @@ impl Comparison {
             lines.extend(against_full(self));
             lines.extend(NEAR.map(|limit| nearest(self, limit)));
         }
+        lines.extend(own_error(self));
         let degraded = self.runs.iter().filter(|run| run.measured().is_some_and(|run| run.degraded > 0));
         lines.extend(degraded.map(|run| {
             let count = run.measured().map_or(0, |run| run.degraded);
@@ -88,6 +89,18 @@ fn nearest(comparison: &Comparison, limit: f64) -> String {
     };
     let found: Vec<String> = comparison.latencies().into_iter().map(at).collect();
     format!("cheapest tick within {limit} % rms of `full`: {}", found.join("; "))
+}
+
+/// How far the reference is from finer ones, beside what the best local model adds.
+fn own_error(comparison: &Comparison) -> Option<String> {
+    let rms = |run: &ComparedRun| run.measured().map(|run| run.error.rms);
+    let finer = comparison.finer.iter().filter_map(|run| Some((&run.model, rms(run)?)));
+    let finer: Vec<String> = finer.map(|(name, rms)| format!("{name} {} %", figure(rms))).collect();
+    let of_model = |run: &ComparedRun| Some((rms(run)?, name(run)));
+    let best = comparison.runs.iter().filter_map(of_model).min_by(|a, b| a.0.total_cmp(&b.0));
+    let best =
+        best.map_or(String::new(), |(rms, name)| format!("; the nearest local model ({name}) adds {} %", figure(rms)));
+    (!finer.is_empty()).then(|| format!("`full` itself is off from a finer one by (rms): {}{best}", finer.join(", ")))
 }
 
 /// The models of which runs are `asked` for; with the latency where that is not so for all latencies of the model.

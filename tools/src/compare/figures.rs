@@ -217,6 +217,9 @@ pub struct Comparison {
     pub full: Measured,
     /// The other models, each with its latencies.
     pub runs: Vec<ComparedRun>,
+    /// `full` with smaller steps, and with smaller elements where a surface was filled: how far the reference itself is
+    /// from what it stands for. Errors are distances from `full` as those of the models are.
+    pub finer: Vec<ComparedRun>,
 }
 
 impl Comparison {

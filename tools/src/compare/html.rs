@@ -52,7 +52,7 @@ fn table(body: &mut String, comparison: &Comparison) {
         body.push_str("</tr>\n");
     };
     row("full", "", Some(&comparison.full), "");
-    for run in &comparison.runs {
+    for run in comparison.runs.iter().chain(&comparison.finer) {
         row(&run.model, &milliseconds(run.latency), run.measured(), run.missing().unwrap_or_default());
     }
     body.push_str("</tbody>\n</table></div>\n<details><summary>What the columns mean</summary>\n<dl>\n");

@@ -13,17 +13,19 @@
 //! | `models[]` | `full` first; `model`, `latency_ms`, `ok`, `why_not`, `error_percent`, `cost`, `resyncs`, `degraded` |
 //! | `models[].error_percent` | `rms`, `max`, `jump`, `resync_before_p99`, `resync_after_p99`, `energy` |
 //! | `models[].cost` | `tick_p50_ns`, `tick_p99_ns`, `tick_max_ns`, `haptic_s_per_s`, `global_s_per_s`, `total_s_per_s`, `builds`, `build_p50_ns`, `build_p99_ns` |
+//! | `finer[]` | as `models[]`: `full` with smaller steps, and with smaller elements where a surface was filled |
 //! | `conclusions[]` | sentences, not for programs |
 
 use serde_json::{Value, json};
 
 use super::conclusions::full_fits;
-use super::figures::{Comparison, Measured};
+use super::figures::{ComparedRun, Comparison, Measured};
 
 /// The comparison as one JSON document.
 pub fn to_json(comparison: &Comparison) -> String {
     let full = model("full", 0, Some(&comparison.full), None);
-    let models = comparison.runs.iter().map(|run| model(&run.model, run.latency.0, run.measured(), run.missing()));
+    let row = |run: &ComparedRun| model(&run.model, run.latency.0, run.measured(), run.missing());
+    let models = comparison.runs.iter().map(row);
     let models: Vec<Value> = [full].into_iter().chain(models).collect();
     json!({
         "schema_version": 1,
@@ -40,6 +42,7 @@ pub fn to_json(comparison: &Comparison) -> String {
         "largest_energy_j": comparison.full.trace.largest_energy_j(),
         "full_fits_tick": full_fits(comparison),
         "models": models,
+        "finer": comparison.finer.iter().map(row).collect::<Vec<_>>(),
         "conclusions": comparison.conclusions(),
     })
     .to_string()

@@ -3,6 +3,7 @@
 mod charts;
 mod conclusions;
 mod figures;
+mod finer;
 mod html;
 mod json;
 mod study;

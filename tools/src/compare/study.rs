@@ -6,11 +6,12 @@ use palpate::model::body::Block;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Histogram;
 use palpate::runtime::{Nanos, Rate, Stopwatch};
-use palpate::scene::Scene;
+use palpate::scene::{BodySpec, Scene};
 use palpate::session::{Session, Summary};
 use palpate::{Error, ErrorKind};
 
 use super::figures::{ComparedRun, Comparison, ForceDeviation, ForceTrace, Measured, ModelCost, RunOutcome};
+use super::finer::finer;
 
 /// How much of a run passes between two calls of the progress callback.
 const STEP: Duration = Duration::from_millis(50);
@@ -27,6 +28,8 @@ pub struct CompareOptions {
     pub latencies: Vec<Nanos>,
     /// Simulated time in place of the scene's own (s).
     pub duration_s: Option<f64>,
+    /// True if `full` is also run with smaller steps and on a finer mesh.
+    pub finer: bool,
 }
 
 /// How far a comparison is.
@@ -36,8 +39,8 @@ pub struct CompareProgress {
     pub run: usize,
     /// Runs in all.
     pub runs: usize,
-    /// Model of the run that is at work.
-    pub model: LocalModelKind,
+    /// Name of what is at work: a model, or `full` in another size.
+    pub model: &'static str,
     /// Compute latency of the run that is at work.
     pub latency: Nanos,
     /// Simulated time that has passed in it.
@@ -86,28 +89,45 @@ impl Comparison {
             .filter(is_compared)
             .flat_map(|kind| latencies.iter().map(move |&latency| (kind, latency)))
             .collect();
-        let runs = pairs.len() + 1;
-        let mut comparison = Self::default();
+        let finer = if options.finer { finer(scene) } else { Vec::new() };
+        let (runs, last) = (1 + pairs.len() + finer.len(), 1 + pairs.len());
+        let mut report = |run, model, latency, elapsed, until| {
+            progress(CompareProgress { run, runs, model, latency, elapsed, until });
+        };
         let reference = (LocalModelKind::Full, Nanos::ZERO);
-        for (run, pair) in [reference].into_iter().chain(pairs).enumerate() {
-            let (model, latency) = pair;
-            let mut at_work = |elapsed, until| progress(CompareProgress { run, runs, model, latency, elapsed, until });
-            at_work(Nanos::ZERO, None);
-            let session = build(scene, pair, options.duration_s);
-            if run == 0 {
-                comparison = full(session?, about(scene, global)?, at_work)?;
-                continue;
-            }
-            let outcome = match session.and_then(|session| execute(session, at_work)) {
-                Err(refusal) => RunOutcome::Refused(refusal.to_string()),
-                Ok((_, summary)) => match &summary.runtime.fault {
-                    Some(fault) => RunOutcome::Failed(fault.to_string()),
-                    None => RunOutcome::Measured(Box::new(measured(&summary, Some(&comparison.full.trace)))),
-                },
-            };
-            comparison.runs.push(ComparedRun { model: model.name().to_owned(), latency, outcome });
-        }
+        report(0, reference.0.name(), reference.1, Nanos::ZERO, None);
+        let session = build(scene, reference, options.duration_s)?;
+        let at_work = |elapsed, until| report(0, reference.0.name(), reference.1, elapsed, until);
+        let mut comparison = full(session, about(scene, global)?, at_work)?;
+        let full = &comparison.full.trace;
+        type Build<'a> = Box<dyn FnOnce() -> Result<Session, Error> + 'a>;
+        let mut compare = |run, model: &'static str, latency, session: Build<'_>| {
+            report(run, model, latency, Nanos::ZERO, None);
+            let at_work = |elapsed, until| report(run, model, latency, elapsed, until);
+            let ran = session().and_then(|session| execute(session, at_work));
+            ComparedRun { model: model.to_owned(), latency, outcome: outcome(ran, full) }
+        };
+        let models = pairs.into_iter().zip(1..).map(|(pair, run)| {
+            compare(run, pair.0.name(), pair.1, Box::new(move || build(scene, pair, options.duration_s)))
+        });
+        let models = models.collect();
+        let finer = finer.into_iter().zip(last..).map(|(finer, run)| {
+            let session = || build(&finer.scene?, reference, options.duration_s);
+            compare(run, finer.name, Nanos::ZERO, Box::new(session))
+        });
+        (comparison.finer, comparison.runs) = (finer.collect(), models);
         Ok(comparison)
+    }
+}
+
+/// How a run went, with its distance from `full`.
+fn outcome(ran: Result<(Nanos, Summary), Error>, full: &ForceTrace) -> RunOutcome {
+    match ran {
+        Err(refusal) => RunOutcome::Refused(refusal.to_string()),
+        Ok((_, summary)) => match &summary.runtime.fault {
+            Some(fault) => RunOutcome::Failed(fault.to_string()),
+            None => RunOutcome::Measured(Box::new(measured(&summary, Some(full)))),
+        },
     }
 }
 
@@ -144,7 +164,7 @@ fn execute(session: Session, mut progress: impl FnMut(Nanos, Option<Nanos>)) -> 
 fn about(scene: &Scene, global: Rate) -> Result<Comparison, Error> {
     let haptic = rate("local.rate_hz", scene.local.rate_hz)?;
     Ok(Comparison {
-        nodes: scene.body.as_ref().map_or(0, |body| body.block.nodes.iter().product()),
+        nodes: scene.body.as_ref().map_or(0, BodySpec::node_count),
         haptic_period: haptic.period(),
         global_period: global.period(),
         clock: Stopwatch::reading(),

@@ -102,7 +102,7 @@ pub fn to_text(comparison: &Comparison) -> String {
     }
     let full = &comparison.full;
     lines.push(row("full", "", COLUMNS.iter().map(|column| cell(column, full))));
-    for run in &comparison.runs {
+    for run in comparison.runs.iter().chain(&comparison.finer) {
         let latency = milliseconds(run.latency);
         lines.push(match run.measured() {
             Some(measured) => row(&run.model, &latency, COLUMNS.iter().map(|column| cell(column, measured))),

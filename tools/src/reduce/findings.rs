@@ -166,7 +166,7 @@ pub struct Truncation {
 pub struct Locality {
     /// Nodes of the patch along the surface, along it, into depth.
     pub patch: [usize; 3],
-    /// Distance of neighbouring nodes along each axis of the body (m); zero if it is not known.
+    /// Distance of neighbouring nodes along each axis of the body, the mean of its surface's edges for a mesh (m); zero if it is not known.
     pub spacing_m: [f64; 3],
     /// Least and largest frequency of what happens between resyncs (Hz).
     pub band_hz: [f64; 2],
@@ -181,7 +181,7 @@ pub struct Locality {
     pub reference_pct: f64,
     /// Ends of the patch at the contact, its outermost nodes along x, y and z (m).
     pub patch_bounds_m: [[f64; 3]; 2],
-    /// One map per face of the block.
+    /// One map per side of the body.
     pub faces: Vec<FaceMap>,
     /// At the contact that stands for the scene: where its tool touches first, else the middle of the top.
     pub contact: ContactLocality,
@@ -200,7 +200,7 @@ pub struct Locality {
     pub warnings: Vec<String>,
 }
 
-/// Contacts on a face of the block, row by row.
+/// Contacts on a side of the body, row by row: a face of a block, or what is seen of another body from there.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FaceMap {
     /// Name of the face, such as `z_max`.
@@ -211,7 +211,7 @@ pub struct FaceMap {
     pub first_m: Vec<f64>,
     /// Places along the second axis (m).
     pub second_m: Vec<f64>,
-    /// One entry for each pair, the first axis fastest; `None` where the node is held.
+    /// One entry for each pair, the first axis fastest; `None` where the node is held or there is none.
     pub contacts: Vec<Option<ContactLocality>>,
 }
 

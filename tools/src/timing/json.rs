@@ -11,7 +11,7 @@
 //! | `virtual_time` | true if lateness is zero by construction |
 //! | `damage` | what is wrong with the log and where, or `null` |
 //! | `messages` | number of messages read, by topic |
-//! | `environment` | versions, rates, in `model_reason` and `model_warning` why `model` was chosen or its patch and basis are that large (`null` if both were named), in `granted` what the system granted, `safety_off`, `stored_j` and `coupling`; `null` if unknown |
+//! | `environment` | versions, rates, in `body` what a body of tetrahedra is made of (`null` for others), in `model_reason` and `model_warning` why `model` was chosen or its patch and basis are that large (`null` if both were named), in `granted` what the system granted, `safety_off`, `stored_j` and `coupling`; `null` if unknown |
 //! | `groups[]` | `name`, `rate_hz`, `released`, `skipped`, `missed`, `elapsed_periods`, `in_degraded_mode`, `lost_records`, `skipped_by_cause`, `missed_by_cause`, `lateness_ns`, `execution_ns`, `period_error_ns`, `jitter_ns`, `busy_ns` |
 //! | `resyncs` | `count`, `jump_before_n`, `jump_after_n`, `age_ns` |
 //! | `force` | `ticks`, `peak_n`, `peak_commanded_n`, `not_finite`, `model_age_s`, `served` (share of ticks by local model) |
@@ -200,6 +200,7 @@ fn environment(environment: &Environment) -> Value {
             LoggedExecution::Threaded { .. } => "threaded",
         },
         "start_unix_ns": environment.epoch_ns(),
+        "body": environment.body,
         "model": environment.model,
         "model_reason": environment.model_reason.as_ref().map(|reason| &reason.why),
         "model_warning": environment.model_reason.as_ref().and_then(|reason| reason.warning.as_ref()),

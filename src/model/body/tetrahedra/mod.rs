@@ -3,6 +3,7 @@
 mod builder;
 mod element;
 mod places;
+mod restriction;
 mod solid;
 mod tissue;
 mod window;
@@ -11,8 +12,8 @@ pub use builder::{TetrahedraBuilder, Where};
 pub(crate) use element::Element;
 pub use tissue::{Tissue, TissueRegion};
 
-use super::kernel::{InstructionSet, TetrahedraKernel};
-use super::{Body, State, TangentBlock};
+use super::kernel::{InstructionSet, NOMINAL_ELEMENT_S, TetrahedraKernel};
+use super::{Body, Restriction, State, TangentBlock};
 use crate::Vec3;
 use crate::error::ModelError;
 use crate::mesh::{LeftOut, Surface, TetrahedralMesh};
@@ -139,6 +140,14 @@ impl Body for Tetrahedra {
 
     fn duplicate(&self) -> Option<Box<dyn Body>> {
         Some(Box::new(self.clone()))
+    }
+
+    fn restriction(&self, nodes: &[u32]) -> Option<Restriction> {
+        Some(self.restricted(nodes))
+    }
+
+    fn nominal_evaluation(&self) -> f64 {
+        NOMINAL_ELEMENT_S * self.solid.elements.len() as f64
     }
 
     /// The nearest nodes around each triangle's centroid at rest, as many as `size` makes, that it reaches through elements.

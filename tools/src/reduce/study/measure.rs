@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use palpate::devices::ToolPath;
 use palpate::log::LogRecord;
-use palpate::model::body::{Block, Body};
+use palpate::model::body::Body;
 use palpate::model::local::BlendKind;
 use palpate::model::local::Feedback;
 use palpate::model::local::Kind as LocalModelKind;
@@ -33,7 +33,7 @@ const NO_RESYNC_HZ: f64 = 0.25;
 /// are the linear predictions of `full` and of `patch`.
 pub(super) fn measure(
     scene: &Scene,
-    block: &Block,
+    body: &dyn Body,
     node: u32,
     patch: [usize; 3],
     models: (&ContactStiffness, &ContactStiffness),
@@ -41,7 +41,7 @@ pub(super) fn measure(
     let (mut band, mut rest) = (Mean::default(), Mean::default());
     for axis in 0..3 {
         for (tones, mean) in [(true, &mut band), (false, &mut rest)] {
-            let run = |kind| forces(scene, block, (node, axis), (kind, patch), tones);
+            let run = |kind| forces(scene, body, (node, axis), (kind, patch), tones);
             let (full, of_patch) = (run(LocalModelKind::Full)?, run(LocalModelKind::Patch)?);
             if tones {
                 for hz in TONES_HZ {
@@ -87,12 +87,12 @@ impl Mean {
 /// The forces on the tool in the measured part of a run, one per tick.
 fn forces(
     scene: &Scene,
-    block: &Block,
+    body: &dyn Body,
     (node, axis): (u32, usize),
     (kind, patch): (LocalModelKind, [usize; 3]),
     tones: bool,
 ) -> Result<Vec<[f64; 3]>, Error> {
-    let start = block.rest()[node as usize];
+    let start = body.rest()[node as usize];
     let ticks = ((SETTLE_S + MEASURED_S) * RATE_HZ) as usize;
     let place = |tick: usize| {
         let t = tick as f64 / RATE_HZ;
@@ -114,7 +114,7 @@ fn forces(
     moved.devices.truncate(1);
     let Some(device) = moved.devices.first_mut() else { return Err(Error::scene("device", "is missing")) };
     *device = palpate::scene::DeviceSpec { path: Some(path), ..palpate::scene::DeviceSpec::default() };
-    device.attach_node = Some(block.lattice().coordinates(node));
+    device.attach_node = Some(node.into());
     moved.local.rate_hz = RATE_HZ;
     moved.local.patch = Some(patch);
     moved.local.blend = BlendSpec { kind: BlendKind::None, ms: 0.0 };

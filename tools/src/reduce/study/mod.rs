@@ -1,6 +1,7 @@
 //! What `palpate reduce` does: the paper's tables and figures, any of its meshes, and the locality check of a scene.
 
 use palpate::Error;
+use palpate::scene::NodeSpec;
 
 mod contact;
 mod figures;
@@ -74,7 +75,7 @@ pub struct ReduceOptions {
     /// Patch nodes along the surface, along it, into depth, in place of the scene's.
     pub patch: Option<[usize; 3]>,
     /// The contact that is looked at closely, a surface node; left out: where the scene's tool touches first.
-    pub node: Option<[usize; 3]>,
+    pub node: Option<NodeSpec>,
     /// Looks at every so many nodes only of the surface along each axis; left out: all of a small surface, fewer of a large one.
     pub every: Option<usize>,
     /// An error budget (%): which patch and which r it needs.

@@ -3,11 +3,11 @@
 use std::time::Instant;
 
 use palpate::Error;
-use palpate::model::body::{Block, Body, State};
+use palpate::model::body::{Body, State};
 use palpate::model::surroundings::{Reduction, RestingBody};
 use palpate::scene::Scene;
 
-use super::contact::{FaceGrid, contact_node, outward};
+use super::contact::{ContactGrid, Naming, contact_node, outward};
 use super::figures::{FigureOf, hankel_decay};
 use super::measure::measure;
 use super::{ReduceOptions, ReduceProgress, Steps};
@@ -55,28 +55,28 @@ pub fn reduce_scene(
     scene.local.patch = options.patch.or(scene.local.patch);
     scene.validate()?;
     let scene = &scene;
-    let spec = scene.body.as_ref().ok_or_else(|| Error::scene("body", "is missing"))?;
-    let block = spec.build()?;
-    let node = contact_node(scene, &block, options.node)?;
-    let grids = FaceGrid::all(&block, options.every, node);
+    let body = scene.body.as_ref().ok_or_else(|| Error::scene("body", "is missing"))?.build()?;
+    let (body, naming) = (&*body, Naming::of(scene, &*body));
+    let node = contact_node(scene, body, options.node)?;
+    let grids = ContactGrid::all(body, &naming, options.every, node);
     let mut steps = Steps::new(6 + grids.len() + usize::from(options.measure), &mut progress);
     steps.begin("factorising the body");
-    let linear = LinearBody::new(&block, &State::at_rest(block.rest()))?;
+    let linear = LinearBody::new(body, &State::at_rest(body.rest()))?;
     if linear.system().coordinates() > MOST_COORDINATES {
         let message = format!(
-            "{:?}: the check keeps factorisations of at most {MOST_COORDINATES} coordinates, three for each node that moves",
-            spec.block.nodes
+            "has {} coordinates, three for each node that moves: the check keeps factorisations of at most {MOST_COORDINATES}",
+            linear.system().coordinates()
         );
-        return Err(Error::scene("body.block.nodes", message));
+        return Err(Error::scene("body", message));
     }
     let study = Study {
         patch: scene.local.patch_size(),
         check: LocalityCheck::new(&linear, BAND_HZ)?,
         linear: &linear,
-        block: &block,
+        body,
+        naming,
     };
-    let spacing_m = std::array::from_fn(|axis| spec.block.size_m[axis] / (spec.block.nodes[axis] - 1) as f64);
-    let mut out = Locality { patch: study.patch, spacing_m, band_hz: BAND_HZ, ..Locality::default() };
+    let mut out = Locality { patch: study.patch, spacing_m: naming.spacing_m, band_hz: BAND_HZ, ..Locality::default() };
     (out.band_limit_pct, out.at_rest_limit_pct) = (BAND_LIMIT_PCT, REST_LIMIT_PCT);
     out.patch_bounds_m = study.bounds(node);
     steps.begin("the scene's contact");
@@ -84,17 +84,18 @@ pub fn reduce_scene(
     let whole = study.check.finer(&study.direction(node))?;
     out.reference_pct = 100.0 * StiffnessError::between(&coarse, &whole, study.check.frequencies()).band;
     out.contact = study.locality(node, &whole, study.patch)?.0;
-    for grid in &grids {
+    for grid in grids {
         steps.begin(format!("contacts on {}", grid.face.name()));
-        let mut map = grid.map(&block);
-        map.contacts = study.contacts(grid.nodes().collect())?;
+        let contacts = study.contacts(&grid.nodes)?;
+        let mut map = grid.map();
+        map.contacts = contacts;
         out.faces.push(map);
     }
     steps.begin("other patches");
     let contacts = || out.faces.iter().flat_map(|face| &face.contacts).flatten();
     let worst = contacts().max_by(|a, b| a.band_pct.total_cmp(&b.band_pct)).map_or(node, |contact| contact.node);
     let at_worst = study.whole(&[worst]).remove(0);
-    for size in SIZES.into_iter().filter(|size| size.iter().zip(block.lattice().nodes).all(|(&s, n)| s <= n)) {
+    for size in SIZES.into_iter().filter(|&size| naming.has_room(size)) {
         let (contact, nodes) = study.locality(node, &whole, size)?;
         out.sizes.push(PatchError { patch: size, nodes, contact, worst: study.locality(worst, &at_worst, size)?.0 });
     }
@@ -104,7 +105,7 @@ pub fn reduce_scene(
     let hankel = study.decay(node, options.order)?;
     if options.measure {
         steps.begin("measuring in the time domain");
-        match measure(scene, &block, node, study.patch, (&whole, &study.patch_at(node, study.patch)?)) {
+        match measure(scene, body, node, study.patch, (&whole, &study.patch_at(node, study.patch)?)) {
             Ok(measured) => out.measured = Some(measured),
             Err(error) => out.warnings.push(format!("the error could not be measured: {error}")),
         }
@@ -120,7 +121,7 @@ pub fn reduce_scene(
         out.budget = Some(Budget { error_pct, patch, states });
     }
     out.bases = bases.into_iter().filter(|basis| SHOWN_STATES.contains(&basis.states)).collect();
-    judge(&mut out, &block);
+    judge(&mut out, &naming);
     Ok(ReductionStudy {
         subject: "scene".to_owned(),
         responses: vec![figure],
@@ -134,7 +135,8 @@ pub fn reduce_scene(
 /// A body and what is asked about it.
 struct Study<'a> {
     patch: [usize; 3],
-    block: &'a Block,
+    body: &'a dyn Body,
+    naming: Naming,
     linear: &'a LinearBody,
     check: LocalityCheck<'a>,
 }
@@ -151,8 +153,8 @@ impl Study<'_> {
 
     fn patch_nodes(&self, node: u32, size: [usize; 3]) -> Vec<u32> {
         let mut nodes = Vec::new();
-        let triangles: Vec<u32> = self.block.surface().at_node(node).first().copied().into_iter().collect();
-        self.block.patch(&triangles, size, &mut nodes);
+        let triangles: Vec<u32> = self.body.surface().at_node(node).first().copied().into_iter().collect();
+        self.body.patch(&triangles, size, &mut nodes);
         nodes
     }
 
@@ -163,8 +165,8 @@ impl Study<'_> {
     /// The outermost places of the scene's patch at a contact (m).
     fn bounds(&self, node: u32) -> [[f64; 3]; 2] {
         let nodes = self.patch_nodes(node, self.patch);
-        let places = || nodes.iter().map(|&node| self.block.rest()[node as usize]);
-        let first = self.block.rest()[node as usize];
+        let places = || nodes.iter().map(|&node| self.body.rest()[node as usize]);
+        let first = self.body.rest()[node as usize];
         [places().fold(first, |low, x| low.inf(&x)).into(), places().fold(first, |high, x| high.sup(&x)).into()]
     }
 
@@ -184,8 +186,8 @@ impl Study<'_> {
         let error = StiffnessError::between(&patch, whole, self.check.frequencies());
         let locality = ContactLocality {
             node,
-            position_m: self.block.rest()[node as usize].into(),
-            stiffness_n_per_m: stiffness_along(whole, outward(self.block, node)),
+            position_m: self.body.rest()[node as usize].into(),
+            stiffness_n_per_m: stiffness_along(whole, outward(self.body, node)),
             at_rest_pct: 100.0 * error.at_rest,
             band_pct: 100.0 * error.band,
             worst_pct: 100.0 * error.worst,
@@ -193,22 +195,22 @@ impl Study<'_> {
         Ok((locality, coordinates.len() / 3))
     }
 
-    fn contacts(&self, nodes: Vec<u32>) -> Result<Vec<Option<ContactLocality>>, Error> {
-        let is_movable = |node: &u32| self.block.inverse_masses()[*node as usize] > 0.0;
-        let movable: Vec<u32> = nodes.iter().copied().filter(is_movable).collect();
+    /// `None` where there is no node, or it is held.
+    fn contacts(&self, nodes: &[Option<u32>]) -> Result<Vec<Option<ContactLocality>>, Error> {
+        let is_movable = |node: &u32| self.body.inverse_masses()[*node as usize] > 0.0;
+        let movable: Vec<u32> = nodes.iter().flatten().copied().filter(is_movable).collect();
         let mut wholes = self.whole(&movable).into_iter();
-        let of = |node: u32| match is_movable(&node).then(|| wholes.next()).flatten() {
-            Some(whole) => Ok(Some(self.locality(node, &whole, self.patch)?.0)),
-            None => Ok(None),
+        let of = |node: Option<u32>| {
+            let Some(node) = node.filter(is_movable) else { return Ok(None) };
+            wholes.next().map(|whole| Ok(self.locality(node, &whole, self.patch)?.0)).transpose()
         };
-        nodes.into_iter().map(of).collect()
+        nodes.iter().copied().map(of).collect()
     }
 
     /// The dynamic stiffness of the whole body, of patches and of one-shift Krylov at a contact.
     fn responses(&self, node: u32, whole: &ContactStiffness) -> Result<ResponseFigure, Error> {
-        let place = self.block.lattice().coordinates(node);
         let figure = ResponseFigure {
-            title: format!("Dynamic stiffness at node {place:?}"),
+            title: format!("Dynamic stiffness at {}", self.naming.node(node)),
             channels: ["x", "y", "z"].map(str::to_owned).to_vec(),
             unit: "N/m".to_owned(),
             hz: [vec![0.0], log_spaced(1.0, BAND_HZ[1], 61)].concat(),
@@ -217,7 +219,7 @@ impl Study<'_> {
         let order = self.linear.system().order();
         let mut figure = FigureOf::new(figure, whole, (order, 0.0));
         for size in [self.patch, [8, 8, 4]] {
-            if size.iter().zip(self.block.lattice().nodes).any(|(&s, n)| s > n) {
+            if !self.naming.has_room(size) {
                 continue;
             }
             let started = Instant::now();
@@ -237,7 +239,7 @@ impl Study<'_> {
 
     /// The expected error of `predictive` by the states of its reduced surroundings.
     fn bases(&self, node: u32) -> Result<Vec<BasisError>, Error> {
-        let Some(resting) = RestingBody::new(self.block) else { return Ok(Vec::new()) };
+        let Some(resting) = RestingBody::new(self.body) else { return Ok(Vec::new()) };
         let errors = Reduction::errors_by_states(&resting, &self.patch_nodes(node, self.patch))?.into_iter();
         Ok(errors.map(|(states, estimate)| BasisError { states, error_pct: estimate.expected_pct() }).collect())
     }
@@ -246,7 +248,6 @@ impl Study<'_> {
     fn decay(&self, node: u32, order: Option<usize>) -> Result<HankelDecay, Error> {
         let system = self.linear.held(&[node])?;
         let reduced = low_rank(&system, SHIFTS)?;
-        let place = self.block.lattice().coordinates(node);
         let mut orders = vec![2, 4, 6, 10, 15, 20, 30, 50];
         orders.extend(order);
         orders.sort_unstable();
@@ -256,20 +257,20 @@ impl Study<'_> {
             Some(modal) => gain_error(modal, truncated),
             None => typical_gain_error(&system, model, truncated),
         };
-        let title = format!("force on node {place:?} by its displacement");
+        let title = format!("force on {} by its displacement", self.naming.node(node));
         Ok(hankel_decay(title, system.order(), &reduced.balanced, &orders, &hinf_pct))
     }
 }
 
 /// Says whether the paper's assumption holds, and where it does not.
-fn judge(out: &mut Locality, block: &Block) {
+fn judge(out: &mut Locality, naming: &Naming) {
     let contact = out.contact;
     let over = |contact: &ContactLocality| contact.band_pct > BAND_LIMIT_PCT || contact.at_rest_pct > REST_LIMIT_PCT;
     out.is_local = !over(&contact);
-    let place = |contact: &ContactLocality| format!("{:?}", block.lattice().coordinates(contact.node));
+    let place = |contact: &ContactLocality| naming.node(contact.node);
     if contact.at_rest_pct > REST_LIMIT_PCT {
         out.warnings.push(format!(
-            "at node {} the patch is some {:.0} times as stiff at rest as the body: what gives way lies outside of it, as soft deep tissue \
+            "at {} the patch is some {:.0} times as stiff at rest as the body: what gives way lies outside of it, as soft deep tissue \
              under a stiff skin does, or what is soft around a stiff nodule; use `predictive` or `full`",
             place(&contact),
             1.0 + contact.at_rest_pct / 100.0
@@ -277,7 +278,7 @@ fn judge(out: &mut Locality, block: &Block) {
     }
     if contact.band_pct > BAND_LIMIT_PCT {
         out.warnings.push(format!(
-            "at node {} the patch leaves out {:.0} % of the response between resyncs ({} to {} Hz): the force is made outside of it",
+            "at {} the patch leaves out {:.0} % of the response between resyncs ({} to {} Hz): the force is made outside of it",
             place(&contact),
             contact.band_pct,
             BAND_HZ[0],
@@ -305,7 +306,7 @@ fn judge(out: &mut Locality, block: &Block) {
     }
     for (count, of, names, worst) in alike {
         out.warnings.push(format!(
-            "on {} the patch is not enough at {count} of {of} contacts{}, worst at node {}: {:.0} % in the band, {:.0} % at rest",
+            "on {} the patch is not enough at {count} of {of} contacts{}, worst at {}: {:.0} % in the band, {:.0} % at rest",
             names.join(", "),
             if names.len() > 1 { " each" } else { "" },
             place(worst),

@@ -49,9 +49,10 @@ fn soft_tissue_under_a_stiff_skin_is_flagged_as_predicted_and_measured() {
 fn a_stiff_nodule_that_reaches_out_of_the_patch_is_flagged() {
     let path = in_repository("scenes/nodule.toml");
     let mut scene = Scene::load(path.as_ref()).unwrap();
-    let nodule = &mut scene.body.as_mut().unwrap().regions[0];
+    let nodule = &mut scene.body.as_mut().unwrap().mass_spring_mut().unwrap().regions[0];
     nodule.shape = Shape::Sphere { centre: [0.06, 0.05, 0.085], radius: 0.0175 };
-    let options = ReduceOptions { node: Some([6, 5, 11]), every: Some(11), measure: true, ..ReduceOptions::default() };
+    let options =
+        ReduceOptions { node: Some([6, 5, 11].into()), every: Some(11), measure: true, ..ReduceOptions::default() };
     let locality = reduce_scene(&scene, &options, |_| {}).unwrap().locality.unwrap();
     let measured = locality.measured.unwrap();
     assert!(!locality.is_local && locality.warnings[0].contains("nodule"), "{:?}", locality.warnings);

@@ -48,6 +48,7 @@ fn about(environment: &Environment, facts: &mut Vec<(String, String)>) {
         fact("written by", format!("palpate {}", environment.palpate_version));
     }
     fact("instruction set", environment.instruction_set.clone());
+    fact("body", environment.body.clone().unwrap_or_default());
     let reason = environment.model_reason.as_ref();
     fact(
         "local model",

@@ -87,7 +87,7 @@ fn face_map(locality: &Locality, face: &FaceMap, scale: &HeatScale, of: fn(&Cont
                 x: [x[0], x[1]],
                 y: [y[0], y[1]],
                 value: contact.map(of).filter(|value| value.is_finite()),
-                words: contact.map_or("held".to_owned(), in_words),
+                words: contact.map_or("held, or no surface".to_owned(), in_words),
             });
         }
     }

@@ -1,4 +1,4 @@
-//! The body's part of a scene: shape, fixed faces, material.
+//! A block of springs as a scene describes it: shape, fixed faces, material.
 
 use super::RegionSpec;
 use crate::error::Error;
@@ -6,22 +6,18 @@ use crate::model::body::{Block, BlockBuilder};
 use crate::model::mesh::Face;
 
 /// A block of nodes joined by springs to all 26 neighbours.
-#[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct BodySpec {
-    /// The kind of body; `mass_spring` is the only one in scene files.
-    #[serde(default)]
-    pub kind: BodyKind,
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct MassSpringSpec {
     /// The block's lattice: nodes, edge lengths, fixed faces.
     pub block: BlockSpec,
     /// The material of all nodes and springs outside of regions.
     pub material: MaterialSpec,
     /// Parts of the body that differ in material, in order: later ones win.
-    #[serde(default, rename = "region", skip_serializing_if = "Vec::is_empty")]
+    #[serde(rename = "region", skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<RegionSpec>,
 }
 
-impl BodySpec {
+impl MassSpringSpec {
     /// Makes the body that this describes.
     ///
     /// # Errors
@@ -31,7 +27,7 @@ impl BodySpec {
     }
 
     /// The builder of this body.
-    pub(super) fn builder(&self) -> BlockBuilder {
+    pub(in crate::scene) fn builder(&self) -> BlockBuilder {
         let builder = Block::builder(self.block.nodes, self.block.size_m)
             .node_mass(self.material.node_mass_kg)
             .stiffness(self.material.stiffness_n_per_m)
@@ -39,15 +35,6 @@ impl BodySpec {
         let builder = self.regions.iter().fold(builder, |builder, spec| builder.region(spec.region()));
         self.block.fixed.iter().fold(builder, |builder, &face| builder.fix(face))
     }
-}
-
-/// The kinds of body that a scene file can name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BodyKind {
-    /// Point masses and springs.
-    #[default]
-    MassSpring,
 }
 
 /// A block's lattice.
