@@ -13,13 +13,16 @@ const SPACING_M: f64 = 0.1 / 11.0;
 type Formula = fn(f64) -> [f64; 3];
 
 /// Name, length (s) and formula of every path file.
-const PATHS: [(&str, f64, Formula); 10] = [
+const PATHS: [(&str, f64, Formula); 13] = [
+    ("bend.csv", 2.0, bend),
     ("demo.csv", 5.0, demo),
     ("drag.csv", 2.5, drag),
     ("hand.csv", 0.8, hand),
     ("hand_release.csv", 0.4, hand_release),
     ("hold_right.csv", 2.5, hold_right),
     ("hover.csv", 0.0, hover),
+    ("liver.csv", 4.2, liver),
+    ("liver_slide.csv", 3.0, liver_slide),
     ("palpate.csv", 2.3, palpate),
     ("press.csv", 0.4, press),
     ("pull_release.csv", 1.0, pull_release),
@@ -30,6 +33,31 @@ const PATHS: [(&str, f64, Formula); 10] = [
 fn min_jerk(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     u * u * u * (10.0 + u * (6.0 * u - 15.0))
+}
+
+/// The middle of the upper edge at the tip of the cantilever, 15 mm down and back.
+fn bend(t: f64) -> [f64; 3] {
+    [0.1, 0.01, 0.02 - 0.015 * (min_jerk((t - 0.2) / 0.6) - min_jerk((t - 1.2) / 0.6))]
+}
+
+/// The top of the right lobe of the liver in `scenes/meshes` (m): that of its ellipsoid, half a millimetre above the mesh.
+fn dome(x: f64) -> f64 {
+    0.008 + 0.032 * (1.0 - ((x + 0.030) / 0.040).powi(2)).sqrt()
+}
+
+/// Press 6 mm into the liver, drag 24 mm over its dome, lift, tap twice.
+fn liver(t: f64) -> [f64; 3] {
+    let tap = |start_s: f64| 0.008 * (PI * ((t - start_s) / 0.3).clamp(0.0, 1.0)).sin().powi(2);
+    let x = -0.042 + 0.024 * min_jerk((t - 1.0) / 1.2);
+    let depth = -0.003 + 0.009 * (min_jerk((t - 0.2) / 0.4) - min_jerk((t - 2.4) / 0.3)) + tap(3.2) + tap(3.7);
+    [x, 0.0031, dome(x) - depth]
+}
+
+/// Press 5 mm into the liver, slide 44 mm over its dome at that depth, lift.
+fn liver_slide(t: f64) -> [f64; 3] {
+    let x = -0.052 + 0.044 * min_jerk((t - 0.6) / 1.8);
+    let depth = -0.003 + 0.008 * (min_jerk((t - 0.1) / 0.4) - min_jerk((t - 2.6) / 0.3));
+    [x, -0.0037, dome(x) - depth]
 }
 
 /// A press of 10 mm, a drag, a circle, a lift and two taps.

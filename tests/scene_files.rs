@@ -36,6 +36,7 @@ fn every_scene_loads_and_says_what_it_shows() {
     assert_eq!(
         names,
         [
+            "cantilever",
             "demo",
             "device_faults",
             "drag_friction",
@@ -45,6 +46,8 @@ fn every_scene_loads_and_says_what_it_shows() {
             "hand_release",
             "haply",
             "layers",
+            "liver",
+            "liver_tumour",
             "nodule",
             "pull_release",
             "soft_deep",
@@ -59,8 +62,8 @@ fn every_scene_loads_and_says_what_it_shows() {
         let source = scene.source.as_deref().unwrap();
         assert!(source.starts_with("# ") && source.contains("Look for:"), "{}", file.display());
         assert_eq!(scene.validate().map_err(|error| error.to_string()), Ok(()), "{}", file.display());
-        let is_layered = scene.body.as_ref().unwrap().region_count() > 0;
-        let is_predictive = is_layered || scene.devices.len() > 1;
+        let body = scene.body.as_ref().unwrap();
+        let is_predictive = body.tetrahedra().is_some() || body.region_count() > 0 || scene.devices.len() > 1;
         let model = if is_predictive { LocalModelKind::Predictive } else { LocalModelKind::Patch };
         assert_eq!(scene.local.model, model.into(), "{}", file.display());
     }

@@ -400,3 +400,205 @@ fn a_builder_takes_the_body_itself() {
     let session = Session::builder(body).path(path).model(Kind::Patch).virtual_time().duration_s(0.3).keep_records();
     assert!(peak_n(&session.build().unwrap().run().unwrap()) > 0.05);
 }
+
+/// What is said of the scene with `good` replaced by `bad`.
+#[track_caller]
+fn refused(folder: &Folder, good: &str, bad: &str, place: &str, words: &[&str]) {
+    let text = pressed();
+    assert!(text.contains(good), "{good:?} is not in the scene");
+    let message = folder.refusal(&text.replacen(good, bad, 1));
+    assert!(message.starts_with(place), "{bad:?}: {message}");
+    for word in words {
+        assert!(message.contains(word), "{bad:?}: {message} does not say {word:?}");
+    }
+}
+
+// One case a line reads like the table it is.
+#[rustfmt::skip]
+#[test]
+fn a_bad_key_is_refused_with_its_line() {
+    let folder = Folder::new();
+    let case = |good: &str, bad: &str, place: &str, words: &[&str]| refused(&folder, good, bad, place, words);
+    // Keys of the other kind, and of nobody.
+    case("fixed = [", "block = { nodes = [2, 2, 2], size_m = [1, 1, 1] }\nfixed = [", "scene.toml:4: body.block: belongs to kind = \"mass_spring\"", &["set that or leave it out", "mesh, surface, element_size_m"]);
+    case("[body.tissue]", "[body.material]\nnode_mass_kg = 1\n[body.tissue]", "scene.toml:5: body.material: belongs to kind = \"mass_spring\"", &[]);
+    case("[contact]", "[[body.region]]\ngroup = \"core\"\nstiffness_n_per_m = 3\n[contact]", "scene.toml:12: body.region[0].stiffness_n_per_m: belongs to kind = \"mass_spring\"", &["young_modulus_pa"]);
+    case("kind = \"tetrahedra\"", "kind = \"mass_spring\"", "scene.toml:3: body.mesh: belongs to kind = \"tetrahedra\"", &["set that", "block, material"]);
+    case("kind = \"tetrahedra\"\n", "", "scene.toml:2: body.mesh: belongs to kind = \"tetrahedra\"", &[]);
+    case("kind = \"tetrahedra\"", "kind = \"tetrahedral\"", "scene.toml:2: body.kind: is \"tetrahedral\"", &["\"mass_spring\" or \"tetrahedra\""]);
+    case("mesh =", "mash =", "scene.toml:3: body.mash: unknown key", &["did you mean mesh?"]);
+    case("young_modulus_pa", "young_modulus", "scene.toml:6: body.tissue.young_modulus: unknown key", &["did you mean young_modulus_pa?"]);
+    // What is missing.
+    case("mesh = \"meshes/block.msh\"\n", "", "scene.toml:1: body: has no mesh", &[".msh", "surface"]);
+    case("poisson_ratio = 0.45\n", "", "scene.toml:5: body.tissue.poisson_ratio: is missing", &[]);
+    case("fixed = [\"bottom\"]\n", "", "scene.toml:1: body.fixed: ", &["nothing holds", "name a group"]);
+    case("fixed = [\"bottom\"]", "fixed = []", "scene.toml:4: body.fixed: ", &["nothing holds"]);
+    case("[contact]", "[[body.region]]\nyoung_modulus_pa = 3\n[contact]", "scene.toml:10: body.region[0].shape: is missing", &[]);
+    case("[contact]", "[[body.region]]\ngroup = \"core\"\n[contact]", "scene.toml:10: body.region[0]: differs in nothing", &["young_modulus_pa"]);
+    // Numbers.
+    case("poisson_ratio = 0.45", "poisson_ratio = 0.5", "scene.toml:7: body.tissue.poisson_ratio: is 0.5, must be at least 0 and below 0.5", &["0.49"]);
+    case("poisson_ratio = 0.45", "poisson_ratio = -0.1", "scene.toml:7: body.tissue.poisson_ratio: is -0.1", &["at least 0"]);
+    case("poisson_ratio = 0.45", "poisson_ratio = nan", "scene.toml:7: body.tissue.poisson_ratio: is NaN", &[]);
+    case("young_modulus_pa = 5000.0", "young_modulus_pa = 0", "scene.toml:6: body.tissue.young_modulus_pa: is 0, must be a finite number of Pa above 0", &[]);
+    case("density_kg_m3 = 1060.0", "density_kg_m3 = -1", "scene.toml:8: body.tissue.density_kg_m3: is -1, must be a finite number of kg/m^3", &[]);
+    case("viscosity_pa_s = 2.0", "viscosity_pa_s = -2", "scene.toml:9: body.tissue.viscosity_pa_s: is -2", &["at least 0"]);
+    case("viscosity_pa_s = 2.0", "nodal_pressure = 1", "scene.toml:9: body.tissue.nodal_pressure: is 1", &[]);
+    case("[contact]", "[[body.region]]\ngroup = \"core\"\npoisson_ratio = 0.6\n[contact]", "scene.toml:12: body.region[0].poisson_ratio: is 0.6", &["below 0.5"]);
+    case("fixed = [", "unit_m = 0\nfixed = [", "scene.toml:4: body.unit_m: is 0", &["above 0"]);
+    // A mesh and a surface.
+    case("fixed = [", "surface = \"a.stl\"\nfixed = [", "scene.toml:4: body.surface: is given beside body.mesh", &["leave one out"]);
+    case("fixed = [", "element_size_m = 0.004\nfixed = [", "scene.toml:4: body.element_size_m: belongs to surface", &["leave it out"]);
+    case("mesh = \"meshes/block.msh\"", "surface = \"a.stl\"", "scene.toml:1: body.element_size_m: is missing", &["0.004"]);
+    case("mesh = \"meshes/block.msh\"", "surface = \"a.stl\"\nelement_size_m = -1", "scene.toml:4: body.element_size_m: is -1", &["above 0"]);
+    case("mesh = \"meshes/block.msh\"", "surface = \"a.stl\"\nelement_size_m = 0.01\nsurface_size_m = 0.02", "scene.toml:5: body.surface_size_m: is 0.02, must be at most body.element_size_m, 0.01", &[]);
+    // Places in the mesh.
+    case("fixed = [\"bottom\"]", "fixed = [\"bottum\"]", "scene.toml:4: body.fixed[0]: ", &["there is no \"bottum\"", "\"bottom\", \"core\""]);
+    case("fixed = [\"bottom\"]", "fixed = [{ layer = { axis = \"z\", from_m = 1, to_m = 2 } }]", "scene.toml:4: body.fixed[0]: ", &["holds no node"]);
+    case("fixed = [\"bottom\"]", "fixed = [7]", "scene.toml:4: body.fixed[0]: is 7, must be the name of a group of the mesh, or a shape", &[]);
+    case("[contact]", "[[body.region]]\ngroup = \"tumour\"\nyoung_modulus_pa = 3e4\n[contact]", "scene.toml:11: body.region[0].group: ", &["there is no \"tumour\"", "\"core\""]);
+    case("[contact]", "[[body.region]]\ngroup = \"bottom\"\nyoung_modulus_pa = 3e4\n[contact]", "scene.toml:11: body.region[0].group: ", &["has no tetrahedra"]);
+    case("[contact]", "[[body.region]]\nshape = { sphere = { centre_m = [1, 0, 0], radius_m = 0.01 } }\nyoung_modulus_pa = 3e4\n[contact]", "scene.toml:11: body.region[0].shape: ", &["holds no element"]);
+    case("[contact]", "[[body.region]]\ngroup = \"core\"\nshape = { layer = { axis = \"z\", from_m = 0, to_m = 1 } }\nyoung_modulus_pa = 1\n[contact]", "scene.toml:10: body.region[0]: has a shape and a group", &["a region for each"]);
+    // Other units, and steps that no machine can do.
+    case("fixed = [", "unit_m = 0.001\nfixed = [", "scene.toml:4: body.unit_m: ", &["metres per unit"]);
+    case("fixed = [", "unit_m = 1000.0\nfixed = [", "scene.toml:4: body.unit_m: ", &["10 m", "0.001 for millimetres"]);
+    case("young_modulus_pa = 5000.0", "young_modulus_pa = 5e12", "scene.toml:3: body.mesh: ", &["stable step", "element", "worst"]);
+    // Nodes.
+    case("path_csv = \"press.csv\"", "attach_node = [2, 2, 2]", "scene.toml:13: device.attach_node: is a place in a block", &["near_m"]);
+    case("[run]", "[[probe]]\nnode = [2, 2, 2]\n[run]", "scene.toml:", &["probe: is a place in a block"]);
+    case("[run]", "[[probe]]\nnode = 1.5\n[run]", "scene.toml:15: probe[0].node: is 1.5, must be a node: its place", &["near_m"]);
+    case("[run]", "[[probe]]\nnode = { near = [0, 0, 0] }\n[run]", "scene.toml:15: probe[0].node.near: unknown key", &["near_m"]);
+    case("[run]", "[[probe]]\nnode = [1, 2]\n[run]", "scene.toml:15: probe[0].node: has 2 entries, must be an array of 3", &[]);
+    case("[run]", "[local]\npatch = [1, 1, 1]\n[run]", "scene.toml:15: local.patch: ", &["4 to 512 nodes"]);
+}
+
+/// Told when a session is built: before, nobody knows the body.
+#[test]
+fn a_node_that_is_not_there_is_refused() {
+    let folder = Folder::new();
+    let refused = |from: &str, to: &str, words: &[&str]| {
+        let scene = folder.scene(&pressed().replacen(from, to, 1));
+        let message = Session::from_scene(scene).virtual_time().build().unwrap_err().to_string();
+        assert!(words.iter().all(|word| message.contains(word)), "{message}");
+    };
+    refused("path_csv = \"press.csv\"", "attach_node = 500", &["device.attach_node: node 500", "0 to 47"]);
+    refused("path_csv = \"press.csv\"", "attach_node = 2", &["device.attach_node: node 2 is held"]);
+    refused("path_csv = \"press.csv\"", "attach_node = 21", &["device.attach_node: node 21 is inside the body"]);
+    let millimetres = "attach_node = { near_m = [20.0, 20.0, 40.0] }";
+    refused("path_csv = \"press.csv\"", millimetres, &["from the nearest node", "is it in metres?"]);
+    refused("[run]", "[[probe]]\nnode = 48\n[run]", &["probe[0].node: node 48", "0 to 47"]);
+    let pull =
+        |node: &str| format!("[initial]\npull = {{ node = {node}, offset_m = [0, 0, 0.001] }}\nhold = [40]\n[run]");
+    refused("[run]", &pull("2"), &["initial.pull.node: node 2 is held, it cannot be pulled"]);
+    refused("[run]", &pull("40"), &["initial.hold: node 40 is the pulled node"]);
+}
+
+#[test]
+fn a_bad_mesh_file_is_refused_by_its_name() {
+    let folder = Folder::new();
+    let of_file = |words: &[&str]| {
+        let message = folder.refusal(&pressed());
+        assert!(words.iter().all(|word| message.contains(word)), "{message}");
+    };
+    let mut one_inverted = block();
+    one_inverted.tetrahedra[5].swap(0, 1);
+    folder.mesh("meshes/block.msh", &one_inverted);
+    of_file(&["meshes/block.msh: 1 of 108 elements (5 at", "inverted"]);
+    let mut flat = block();
+    let corners = flat.tetrahedra[0];
+    flat.points[corners[3] as usize] = flat.points[corners[2] as usize];
+    folder.mesh("meshes/block.msh", &flat);
+    of_file(&["meshes/block.msh: ", "flat"]);
+    let mut three = block();
+    let [a, b, c, d] = three.tetrahedra[0];
+    three.points.push(three.points[d as usize] * 1.1);
+    three.tetrahedra.push([a, b, c, 48]);
+    folder.mesh("meshes/block.msh", &three);
+    of_file(&["meshes/block.msh: face of nodes"]);
+    folder.write("meshes/block.msh", "$MeshFormat\n4.1 0 8\n");
+    of_file(&["meshes/block.msh"]);
+    folder.write("meshes/block.msh", "no mesh at all");
+    of_file(&["meshes/block.msh", "is no"]);
+    folder.write("meshes/block.msh", "");
+    of_file(&["meshes/block.msh"]);
+    std::fs::remove_file(folder.path("meshes/block.msh")).unwrap();
+    of_file(&["scene.toml:3: body.mesh: ", "meshes/block.msh", "No such file"]);
+}
+
+#[test]
+fn a_mesh_that_can_be_mended_is_and_the_report_says_so() {
+    let folder = Folder::new();
+    let mut mesh = block();
+    mesh.tetrahedra.iter_mut().for_each(|corners| corners.swap(0, 1));
+    mesh.points.push(Vec3::new(0.01, 0.01, 0.01));
+    folder.mesh("meshes/block.msh", &mesh);
+    let report = run(folder.scene(&pressed()).with_model(Kind::Hold)).to_string();
+    let words: String = report.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        words.contains("left out: 1 nodes of no tetrahedron; turned round, it was inverted throughout"),
+        "{report}"
+    );
+}
+
+#[test]
+fn parts_are_held_one_by_one() {
+    let folder = Folder::new();
+    let mut mesh = block();
+    let nodes = mesh.points.len() as u32;
+    let other: Vec<Vec3> = mesh.points.iter().map(|point| point + Vec3::new(0.1, 0.0, 0.0)).collect();
+    mesh.points.extend(other);
+    let other: Vec<[u32; 4]> = mesh.tetrahedra.iter().map(|corners| corners.map(|node| node + nodes)).collect();
+    mesh.tetrahedra.extend(other);
+    folder.mesh("meshes/block.msh", &mesh);
+    let message = folder.refusal(&pressed());
+    assert!(message.starts_with("scene.toml:4: body.fixed: ") && message.contains("2 parts"), "{message}");
+    let all = "fixed = [{ layer = { axis = \"z\", from_m = 0.0, to_m = 0.0 } }]";
+    folder.scene(&pressed().replace("fixed = [\"bottom\"]", all));
+}
+
+/// The triangles of a box in millimetres, as an OBJ file.
+fn box_surface(size_mm: [f64; 3]) -> String {
+    let mut text = String::new();
+    for corner in 0..8 {
+        let at = |axis: usize| size_mm[axis] * f64::from(corner >> axis & 1);
+        text += &format!("v {} {} {}\n", at(0), at(1), at(2));
+    }
+    // Counter-clockwise from outside.
+    for [a, b, c, d] in [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]] {
+        text += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+    }
+    text
+}
+
+#[test]
+fn a_closed_surface_is_filled_on_the_spot() {
+    let folder = Folder::new();
+    folder.write("box.obj", box_surface([60.0, 60.0, 40.0]));
+    let surface = "surface = \"box.obj\"\nunit_m = 0.001\nelement_size_m = 0.012\nsurface_size_m = 0.012";
+    let text = pressed().replace("mesh = \"meshes/block.msh\"", surface);
+    let layer = "fixed = [{ layer = { axis = \"z\", from_m = -0.001, to_m = 0.002 } }]";
+    let text = text.replace("fixed = [\"bottom\"]", layer);
+    folder.write("scene.toml", &text);
+    let mut told = Vec::new();
+    let scene = Scene::load_with(&folder.path("scene.toml"), &mut |done| told.push(done)).unwrap();
+    assert!(told.is_sorted() && told.last() == Some(&1.0), "{told:?}");
+    let spec = scene.body.as_ref().unwrap().tetrahedra().unwrap();
+    let quality = spec.volume.as_ref().unwrap().mesh().quality();
+    assert!((quality.volume / 144e-6 - 1.0).abs() < 0.1, "{quality:?}");
+
+    let log = folder.path("run.mcap");
+    let session = Session::from_scene(scene.with_model(Kind::Patch)).virtual_time().log(&log).build().unwrap();
+    let summary = session.run().unwrap();
+    assert!(summary.to_string().contains("that fill a surface"), "{summary}");
+    std::fs::remove_file(folder.path("box.obj")).unwrap();
+    assert!(Session::replay(&log).unwrap().run().unwrap().is_identical());
+
+    let message = folder.refusal(&text);
+    assert!(message.starts_with("scene.toml:3: body.surface: box.obj: No such file"), "{message}");
+    folder.write("box.obj", box_surface([60.0, 60.0, 40.0]).rsplit_once("f ").unwrap().0);
+    let message = folder.refusal(&text);
+    assert!(message.contains("box.obj"), "an open surface: {message}");
+    folder.write("box.obj", box_surface([60.0, 60.0, 40.0]));
+    let message = folder.refusal(&text.replace("unit_m = 0.001\n", ""));
+    assert!(message.starts_with("scene.toml:1: body.unit_m: the surface is 6.000e1 m large"), "{message}");
+}

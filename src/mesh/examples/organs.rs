@@ -39,7 +39,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     for group in &mesh.groups {
         println!("group {:?}: {} nodes, {} elements", group.name, group.nodes.len(), group.tetrahedra.len());
     }
+    if let Some(path) = option("--out") {
+        let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
+        palpate_mesh::write_msh(&rounded(mesh), &mut file)?;
+    }
     Ok(())
+}
+
+/// With coordinates in whole tenths of a micrometre: a third of the digits, for files that are kept.
+fn rounded(mut mesh: TetrahedralMesh) -> TetrahedralMesh {
+    mesh.points.iter_mut().for_each(|point| *point = point.map(|x| (x * 1e7).round() / 1e7 + 0.0));
+    mesh
 }
 
 fn describe(mesh: &TetrahedralMesh) {

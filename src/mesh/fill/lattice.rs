@@ -40,9 +40,9 @@ impl Lattice {
             );
             return Err(MeshError::new(message));
         }
-        let cells: [usize; 3] = wanted.map(|cells| (cells as usize).next_multiple_of(block)).into();
-        let size = Vec3::from(cells.map(|n| n as f64)) * cell_m;
-        Ok(Self { cells, cell_m, origin: (bounds[0] + bounds[1] - size) / 2.0 })
+        // Cells that are added for the blocks are behind the others: the elements at the surface do not depend on those inside.
+        let cells = wanted.map(|cells| (cells as usize).next_multiple_of(block)).into();
+        Ok(Self { cells, cell_m, origin: (bounds[0] + bounds[1] - wanted * cell_m) / 2.0 })
     }
 
     /// How many corners there are: their ids come first.

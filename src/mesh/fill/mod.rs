@@ -73,12 +73,13 @@ pub trait ImplicitShape {
 /// Fills a closed `surface` with tetrahedra. `progress` is called with the part that is done, from 0 to 1. The result has no groups, and
 /// is the same to the bit in each run.
 ///
-/// What is thinner than an element may vanish; loose crumbs of two dozen elements at most are left out, larger parts are kept. A surface that is
-/// inside out is turned round.
+/// The surface is cleaned first ([`SurfaceMesh::cleaned`]). What is thinner than an element may vanish; loose crumbs of two dozen
+/// elements at most are left out, larger parts are kept.
 ///
 /// # Errors
-/// If the surface is empty, not closed or not finite, a size is not above zero, so small that the lattice would have above 20 million
-/// cells (the size that fits is named), or so large that less than half of the volume would be left.
+/// If the surface cannot be cleaned: it is open, crosses itself, has no triangles. If a size is not above zero, the one at the surface is
+/// the larger, one is so small that the lattice would have above 20 million cells (what fits is named), or so large that less than
+/// half of the volume would be left.
 pub fn fill(surface: &SurfaceMesh, sizes: Sizes, progress: &mut dyn FnMut(f64)) -> Result<TetrahedralMesh, MeshError> {
     let closed = Closed::new(surface)?;
     let mesh = fill_by(&closed, sizes, progress, |lattice, progress| depths::near(&closed, lattice, progress))?;
@@ -187,10 +188,17 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn elements_that_grow_inside_leave_no_gaps(seed: u64, waves in 1_usize..4, doublings in 1_usize..4) {
+        fn elements_that_grow_inside_leave_no_gaps(
+            seed: u64,
+            waves in 1_usize..4,
+            doublings in 1_usize..4,
+            holes in prop::collection::vec(prop::array::uniform3(-2.0..2.0), 40),
+        ) {
             let shape = noise(seed, waves);
-            // Large enough for all sizes, with caves.
-            let caves = Shape { reach: 3.0, distance: |x: &Vec3| shape.signed_distance(&(x * 0.5)).max(x.norm() - 2.9) };
+            // Large enough for all sizes, with caves, and holes as small as a cell.
+            let caves = |x: &Vec3| shape.signed_distance(&(x * 0.5)).max(x.norm() - 2.9);
+            let hole = |x: &Vec3| holes.iter().map(|&hole| 0.05 - (x - Vec3::from(hole)).norm()).fold(-1.0, f64::max);
+            let caves = Shape { reach: 3.0, distance: |x: &Vec3| caves(x).max(hole(x)) };
             check_stuffed(&caves, 0.12, doublings);
         }
     }

@@ -76,10 +76,13 @@ pub fn prostate(sizes: Sizes) -> Result<TetrahedralMesh, MeshError> {
     Ok(mesh)
 }
 
-/// The nodes on the plane z = 0. They are cut points or were drawn to one, so they lie on it to the last digits.
+/// The nodes of the faces on the plane z = 0. They are cut points or were drawn to one, so they lie on it to the last digits.
 fn attached(mesh: &TetrahedralMesh, sizes: Sizes) -> Group {
-    let on_plane = |&node: &u32| mesh.points[node as usize].z < 1e-3 * sizes.element_m;
-    let nodes = (0..mesh.points.len() as u32).filter(on_plane).collect();
+    let on_plane = |node: &u32| mesh.points[*node as usize].z < 1e-3 * sizes.element_m;
+    let faces = mesh.surface_triangles().into_iter().filter(|face| face.iter().all(on_plane));
+    let mut nodes: Vec<u32> = faces.flatten().collect();
+    nodes.sort_unstable();
+    nodes.dedup();
     Group { name: "attached".into(), nodes, tetrahedra: Vec::new() }
 }
 

@@ -63,6 +63,7 @@ impl Volume {
         let mut surface = read_surface(&name, &bytes)?;
         surface.points.iter_mut().for_each(|point| *point *= spec.unit_m);
         check_unit(&surface)?;
+        let (surface, _) = surface.cleaned().map_err(|error| Error::from(error).at(&name))?;
         Self::filling(surface, spec, progress).map_err(|error| error.at(&name))
     }
 

@@ -6,7 +6,10 @@ use std::fmt::Write;
 use palpate_mesh::organs::{self, Organ};
 use palpate_mesh::{ImplicitShape, Sizes};
 use palpate_model::Vec3;
-use palpate_model::mesh::TetrahedralMesh;
+use palpate_model::mesh::{Group, TetrahedralMesh};
+
+/// Cells of the grid along x on which outlines are found.
+const GRID: usize = 150;
 
 /// One drawing: the section of an organ with the plane y = `at`.
 struct Section {
@@ -119,54 +122,55 @@ impl Section {
         )
     }
 
-    /// The polygon in which the plane cuts each element.
+    /// The polygons in which the plane cuts the elements, those of a colour in one path.
     fn elements(&self, svg: &mut String) -> std::fmt::Result {
-        let lump = self.mesh.groups.iter().find(|group| ["tumour", "nodule"].contains(&group.name.as_str()));
+        let lump = self.mesh.group("tumour").or(self.mesh.group("nodule"));
         let capsule = self.mesh.group("capsule");
-        for (n, element) in self.mesh.tetrahedra.iter().enumerate() {
-            let corners = element.map(|node| self.mesh.points[node as usize]);
-            let mut points: Vec<[f64; 2]> = Vec::new();
-            for (a, b) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
-                let (low, high) = (corners[a].y - self.at, corners[b].y - self.at);
-                if (low < 0.0) != (high < 0.0) {
-                    let x = corners[a] + (corners[b] - corners[a]) * (low / (low - high));
-                    points.push(self.pixel(x.x, x.z));
-                }
+        let mut paths = [("#f6e7d8", String::new()), ("#cfe3f1", String::new()), ("#f4a3a3", String::new())];
+        for n in 0..self.mesh.tetrahedra.len() as u32 {
+            let is_in = |group: Option<&Group>| group.is_some_and(|group| group.tetrahedra.binary_search(&n).is_ok());
+            let kind = if is_in(lump) { 2 } else { usize::from(is_in(capsule)) };
+            for (m, [x, y]) in self.polygon(n).into_iter().enumerate() {
+                write!(paths[kind].1, "{}{x:.0} {y:.0}", if m == 0 { "ZM" } else { " " })?;
             }
-            if points.len() < 3 {
-                continue;
-            }
-            let middle = [0, 1].map(|axis| points.iter().map(|p| p[axis]).sum::<f64>() / points.len() as f64);
-            let angle = |p: &[f64; 2]| (p[1] - middle[1]).atan2(p[0] - middle[0]);
-            points.sort_by(|one, other| angle(one).total_cmp(&angle(other)));
-            let is_in = |group: Option<&palpate_model::mesh::Group>| {
-                group.is_some_and(|group| group.tetrahedra.binary_search(&(n as u32)).is_ok())
-            };
-            let fill = match (is_in(lump), is_in(capsule)) {
-                (true, _) => "#f4a3a3",
-                (_, true) => "#cfe3f1",
-                _ => "#f6e7d8",
-            };
-            let points: Vec<String> = points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+        }
+        for (fill, path) in paths.iter().filter(|(_, path)| !path.is_empty()) {
+            let shapes = &path[1..];
             writeln!(
                 svg,
-                "<polygon points=\"{}\" fill=\"{fill}\" stroke=\"#8a8a8a\" stroke-width=\"0.6\"/>",
-                points.join(" ")
+                "<path d=\"{shapes}Z\" transform=\"scale(0.1)\" fill=\"{fill}\" stroke=\"#8a8a8a\" stroke-width=\"6\"/>"
             )?;
         }
         Ok(())
     }
 
+    /// The polygon in which the plane cuts an element, in tenths of pixels; empty where it does not.
+    fn polygon(&self, element: u32) -> Vec<[f64; 2]> {
+        let corners = self.mesh.tetrahedra[element as usize].map(|node| self.mesh.points[node as usize]);
+        let mut points: Vec<[f64; 2]> = Vec::new();
+        for (a, b) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+            let (low, high) = (corners[a].y - self.at, corners[b].y - self.at);
+            if (low < 0.0) != (high < 0.0) {
+                let x = corners[a] + (corners[b] - corners[a]) * (low / (low - high));
+                points.push(self.pixel(x.x, x.z).map(|x| 10.0 * x));
+            }
+        }
+        let middle = [0, 1].map(|axis| points.iter().map(|p| p[axis]).sum::<f64>() / points.len() as f64);
+        let angle = |p: &[f64; 2]| (p[1] - middle[1]).atan2(p[0] - middle[0]);
+        points.sort_by(|one, other| angle(one).total_cmp(&angle(other)));
+        points
+    }
+
     /// Where `distance` is zero in the plane: marching triangles over a fine grid.
     fn contour(&self, svg: &mut String, distance: impl Fn(&Vec3) -> f64, colour: &str, width: f64) -> std::fmt::Result {
-        let step = self.extent[0] / 400.0;
+        let step = self.extent[0] / GRID as f64;
         let rows = (self.extent[1] / step) as usize;
         let at = |[i, j]: [usize; 2]| {
             let x = Vec3::new(self.corner[0] + i as f64 * step, self.at, self.corner[1] + (j as f64 - 1.5) * step);
             (x, distance(&x))
         };
         let mut path = String::new();
-        for [i, j] in (0..400).flat_map(|i| (0..rows + 3).map(move |j| [i, j])) {
+        for [i, j] in (0..GRID).flat_map(|i| (0..rows + 3).map(move |j| [i, j])) {
             for triangle in [[[i, j], [i + 1, j], [i + 1, j + 1]], [[i, j], [i + 1, j + 1], [i, j + 1]]] {
                 let corners = triangle.map(at);
                 let mut ends = Vec::new();
