@@ -101,11 +101,6 @@ def write(folder, size):
     gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
     gmsh.write(str(folder / "gmsh.vtk"))
     expected["gmsh.vtk"] = truth | {"groups": None}
-    for name, binary in [("gmsh_ascii.stl", 0), ("gmsh_binary.stl", 1)]:
-        gmsh.option.setNumber("Mesh.Binary", binary)
-        gmsh.write(str(folder / name))
-        expected[name] = {"surface": True}
-    gmsh.option.setNumber("Mesh.Binary", 0)
     gmsh.model.mesh.setOrder(2)
     gmsh.write(str(folder / "gmsh_second_order.msh"))
     expected["gmsh_second_order.msh"] = {"error": "second-order tetrahedra"}
@@ -113,6 +108,15 @@ def write(folder, size):
     gmsh.option.setNumber("Mesh.SaveAll", 1)
     gmsh.write(str(folder / "gmsh_mixed.msh"))
     expected["gmsh_mixed.msh"] = known() | {"left_out": {"hexahedra": 1, "prisms": 2}}
+    # Of a body with groups it would write the surfaces in them.
+    gmsh.clear()
+    gmsh.model.occ.addBox(0, 0, 0, *BOX)
+    gmsh.model.occ.synchronize()
+    gmsh.model.mesh.generate(2)
+    for name, binary in [("gmsh_ascii.stl", 0), ("gmsh_binary.stl", 1)]:
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.write(str(folder / name))
+        expected[name] = {"surface": True}
     gmsh.finalize()
 
     # The same tetrahedra and a few surface triangles, an array of whole numbers at both.
@@ -186,6 +190,63 @@ def write(folder, size):
     for name in ("pyvista_ascii.stl", "pyvista_binary.stl", "meshio.obj", "pyvista.obj"):
         expected[name] = {"surface": True, "nodes": surface.n_points, "elements": surface.n_cells, "volume": truth["volume"]}
     (folder / "expected.json").write_text(json.dumps(expected, indent=1, default=float) + "\n")
+
+
+def report(palpate, *arguments):
+    """The report of `palpate mesh`, or its complaint."""
+    run = subprocess.run([palpate, "mesh", *map(str, arguments), "--json"], capture_output=True, text=True)
+    return json.loads(run.stdout) if run.returncode == 0 else {"error": run.stderr}
+
+
+def near(value, truth, tolerance):
+    return abs(value - truth) <= tolerance * abs(truth)
+
+
+def compare(name, found, truth):
+    assert "error" not in found, f"{name}: {found}"
+    for key in ("nodes", "elements"):
+        assert found[key] == truth[key], f"{name}: {found[key]} {key}, not {truth[key]}"
+    assert near(found["volume_m3"], truth["volume"], 1e-6), f"{name}: {found['volume_m3']}, not {truth['volume']}"
+    groups = {group["name"]: [group["nodes"], group["elements"]] for group in found["groups"]}
+    if truth["groups"] is not None:
+        assert groups == truth["groups"], f"{name}: {groups}, not {truth['groups']}"
+    if "left_out" in truth:
+        assert found["left_out_elements"] == truth["left_out"], f"{name}: {found['left_out_elements']}"
+
+
+def check(folder, palpate):
+    expected = json.loads((folder / "expected.json").read_text())
+    ours = folder / "ours.msh"
+    for name, truth in expected.items():
+        if "error" in truth:
+            found = report(palpate, folder / name, "--check")
+            assert truth["error"] in found.get("error", ""), f"{name}: {found}"
+        elif "surface" in truth:
+            found = report(palpate, folder / name, "--size-mm", 4, "--out", ours)
+            assert "error" not in found, f"{name}: {found}"
+            surface = found["surface"]
+            assert near(surface["volume_m3"], BOX[0] * BOX[1] * BOX[2], 1e-6), f"{name}: {surface}"
+            if "elements" in truth:
+                assert surface["triangles"] == truth["elements"], f"{name}: {surface}"
+            open_ours(ours, found)
+        else:
+            found = report(palpate, folder / name, "--check")
+            compare(name, found, truth)
+    print(f"{len(expected)} files: as gmsh {gmsh.__version__}, meshio {meshio.__version__} and pyvista {pyvista.__version__} know them")
+
+
+def open_ours(path, found):
+    """Gmsh and meshio find in the file what the report says."""
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.open(str(path))
+    read = known()
+    gmsh.finalize()
+    compare(path.name, found, read)
+    mesh = meshio.read(path)
+    tetrahedra = mesh.get_cells_type("tetra")
+    assert (len(mesh.points), len(tetrahedra)) == (found["nodes"], found["elements"]), path.name
+    assert near(volume(mesh.points, tetrahedra), found["volume_m3"], 1e-9), path.name
 
 
 def main():

@@ -1,4 +1,5 @@
-//! Files as gmsh, meshio and pyvista write them, made by `ci/check_meshes.py write FOLDER 0.02`: two blocks at a common face.
+//! Files as gmsh, meshio and pyvista write them, made by `ci/check_meshes.py write FOLDER 0.02`: two blocks at a common face; the
+//! STL of gmsh has the surfaces in groups alone.
 
 use std::path::Path;
 
