@@ -73,12 +73,13 @@ pub trait ImplicitShape {
 /// Fills a closed `surface` with tetrahedra. `progress` is called with the part that is done, from 0 to 1. The result has no groups, and
 /// is the same to the bit in each run.
 ///
-/// What is thinner than an element may vanish; loose crumbs of two dozen elements at most are left out, larger parts are kept. A surface that is
-/// inside out is turned round.
+/// The surface is cleaned first ([`SurfaceMesh::cleaned`]). What is thinner than an element may vanish; loose crumbs of two dozen
+/// elements at most are left out, larger parts are kept.
 ///
 /// # Errors
-/// If the surface is empty, not closed or not finite, a size is not above zero, so small that the lattice would have above 20 million
-/// cells (the size that fits is named), or so large that less than half of the volume would be left.
+/// If the surface cannot be cleaned: it is open, crosses itself, has no triangles. If a size is not above zero, the one at the surface is
+/// the larger, one is so small that the lattice would have above 20 million cells (what fits is named), or so large that less than
+/// half of the volume would be left.
 pub fn fill(surface: &SurfaceMesh, sizes: Sizes, progress: &mut dyn FnMut(f64)) -> Result<TetrahedralMesh, MeshError> {
     let closed = Closed::new(surface)?;
     let mesh = fill_by(&closed, sizes, progress, |lattice, progress| depths::near(&closed, lattice, progress))?;

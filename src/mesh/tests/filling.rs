@@ -190,7 +190,8 @@ fn a_surface_is_filled_with_elements_that_grow_inside() {
         |element_m: f64, surface_m: Option<f64>| fill(&ring, Sizes { element_m, surface_m }, &mut |_| {}).unwrap();
     let [fine, graded] = [fill(0.05, None), fill(0.1, Some(0.05))];
     check_valid(&graded, |x| (x.xy().norm() - 1.0).hypot(x.z) - 0.45, 0.002);
-    assert!((volume(&graded) / volume(&fine) - 1.0).abs() < 1e-12);
+    // Sums of 400,000 elements: the last digits are rounding.
+    assert!((volume(&graded) / volume(&fine) - 1.0).abs() < 1e-10);
     assert_eq!(outer_faces(&graded).len(), outer_faces(&fine).len());
     assert!(graded.tetrahedra.len() * 4 < fine.tetrahedra.len() * 3);
     // A size that does not double once is that of all.

@@ -78,3 +78,20 @@ fn a_beam_fills_its_block_without_gaps_and_prefers_no_direction() {
         assert!(beam(extent, size).is_err());
     }
 }
+
+#[test]
+fn the_meshes_that_are_kept_for_scenes_are_whole() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/meshes");
+    for (name, groups) in [
+        ("liver", vec!["attached", "tumour"]),
+        ("prostate", vec!["attached", "capsule", "nodule"]),
+        ("cantilever", vec!["attached", "tip"]),
+    ] {
+        let mesh = palpate_mesh::read_volume_file(&folder.join(format!("{name}.msh"))).unwrap().mesh;
+        assert!(groups.iter().all(|group| mesh.group(group).is_some_and(|group| group.nodes.len() > 20)), "{name}");
+        assert_eq!((mesh.parts().len(), mesh.groups.len()), (1, groups.len()));
+        assert!((1_500..4_500).contains(&mesh.tetrahedra.len()), "{name}: {}", mesh.tetrahedra.len());
+        let [smallest, largest] = angles(&mesh);
+        assert!(smallest > 10.7 && largest < 164.8, "{smallest} to {largest} degrees");
+    }
+}

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::Scene;
 use palpate::{Error, ErrorKind};
 
 use super::{files, progress, run, shared};
