@@ -391,11 +391,18 @@ fn a_log_that_names_a_file_reads_none() {
         LogEntry::Environment(environment) => Some(environment),
         _ => None,
     });
-    // The scene as it is in the file, with its path, in place of the one that was run.
+    let session = LogReader::open(&log).unwrap().find_map(|entry| match entry {
+        LogEntry::Attachment { name, data } if name == Environment::SESSION => Some(data),
+        _ => None,
+    });
+    let session = String::from_utf8(session.unwrap()).unwrap();
+    let kind = "kind = \"tetrahedra\"";
+    assert!(session.contains(kind), "{session}");
+    let session = session.replace(kind, &format!("{kind}\nmesh = \"meshes/block.msh\""));
     let volume = scene.body.as_ref().unwrap().tetrahedra().unwrap().volume.as_ref().unwrap();
     for mesh in [None, Some(volume.file().into()), Some(b"no mesh".as_slice().into())] {
         let is_good = mesh.as_ref().is_some_and(|mesh: &std::sync::Arc<[u8]>| &**mesh == volume.file());
-        let named = Environment { session: Some(scene.to_toml().unwrap()), mesh, ..environment.clone().unwrap() };
+        let named = Environment { session: Some(session.clone()), mesh, ..environment.clone().unwrap() };
         let other = folder.path("named.mcap");
         let mut writer = palpate::log::McapWriter::create(&other, &named).unwrap();
         for entry in LogReader::open(&log).unwrap() {
