@@ -86,7 +86,8 @@ fn a_contact_that_is_none_is_refused() {
     let scene = Scene::load(path.as_ref()).unwrap();
     for node in [[5, 5, 5], [5, 5, 0], [99, 0, 0]] {
         let error =
-            reduce_scene(&scene, &ReduceOptions { node: Some(node.into()), ..ReduceOptions::default() }, |_| {}).unwrap_err();
+            reduce_scene(&scene, &ReduceOptions { node: Some(node.into()), ..ReduceOptions::default() }, |_| {})
+                .unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Scene);
         assert!(error.to_string().contains("no node of the surface"), "{error}");
     }
