@@ -1,6 +1,8 @@
 //! What the tests of tetrahedra share: meshes, states, and the forces by a plain loop over the elements.
 #![allow(dead_code)]
 
+pub mod bent;
+
 use std::path::{Path, PathBuf};
 
 use palpate_model::body::{Body, InstructionSet, Shape, State, Tetrahedra, Tissue, Where};
@@ -68,7 +70,7 @@ pub fn organ() -> TetrahedralMesh {
 }
 
 /// Turns inverted elements round.
-fn orient(mesh: &mut TetrahedralMesh) {
+pub fn orient(mesh: &mut TetrahedralMesh) {
     for nodes in &mut mesh.tetrahedra {
         let [a, b, c, d] = nodes.map(|node| mesh.points[node as usize]);
         if Mat3::from_columns(&[b - a, c - a, d - a]).determinant() < 0.0 {
