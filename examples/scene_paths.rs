@@ -35,9 +35,11 @@ fn min_jerk(u: f64) -> f64 {
     u * u * u * (10.0 + u * (6.0 * u - 15.0))
 }
 
-/// The middle of the upper edge at the tip of the cantilever, 15 mm down and back.
+/// The middle of the cantilever's tip, 15 mm down and back, as far back along x as the bent beam is shorter.
 fn bend(t: f64) -> [f64; 3] {
-    [0.1, 0.01, 0.02 - 0.015 * (min_jerk((t - 0.2) / 0.6) - min_jerk((t - 1.2) / 0.6))]
+    const LENGTH_M: f64 = 0.1;
+    let down = 0.015 * (min_jerk((t - 0.2) / 0.6) - min_jerk((t - 1.2) / 0.6));
+    [LENGTH_M - 0.6 * down * down / LENGTH_M, 0.01, 0.01 - down]
 }
 
 /// The top of the right lobe of the liver in `scenes/meshes` (m): that of its ellipsoid, half a millimetre above the mesh.

@@ -232,3 +232,20 @@ fn what_needs_a_thread_only_to_show_progress_goes_on_without() {
     assert_eq!((called.code, called.err.lines().count()), (Some(1), 1), "{called:?}");
     assert!(called.err.starts_with("error: "), "{called:?}");
 }
+
+#[test]
+fn no_output_overwrites_the_mesh_of_a_body() {
+    let folder = folder();
+    let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    folder.write("beam.msh", std::fs::read(scenes.join("meshes/cantilever.msh")).unwrap());
+    folder.write("bend.csv", std::fs::read(scenes.join("paths/bend.csv")).unwrap());
+    let text = std::fs::read_to_string(scenes.join("cantilever.toml")).unwrap();
+    let text = text.replace("meshes/cantilever.msh", "beam.msh").replace("paths/", "");
+    folder.write("cantilever.toml", text);
+    let before = std::fs::read(folder.path("beam.msh")).unwrap();
+    for out in ["beam.msh", "./beam.msh", "bend.csv"] {
+        let called = folder.call(&["run", "cantilever.toml", "--virtual", "--out", out]);
+        assert!(called.code == Some(2) && called.err.contains("is the input itself"), "{out}: {called:?}");
+    }
+    assert!(std::fs::read(folder.path("beam.msh")).unwrap() == before);
+}

@@ -109,7 +109,8 @@ impl Volume {
     pub fn changes(&self) -> String {
         let LeftOut { nodes, turned } = self.0.left_out;
         let others = self.0.others.iter().map(|(kind, count)| format!("{count} {kind}"));
-        let unused = (nodes > 0).then(|| format!("{nodes} nodes of no tetrahedron"));
+        let unused =
+            (nodes > 0).then(|| format!("{nodes} {} of no tetrahedron", if nodes == 1 { "node" } else { "nodes" }));
         let left_out: Vec<String> = others.chain(unused).collect();
         let left_out = (!left_out.is_empty()).then(|| format!("left out: {}", left_out.join(", ")));
         let turned = turned.then(|| "turned round, it was inverted throughout".to_owned());

@@ -116,11 +116,12 @@ impl Scene {
             let mut devices = scene.devices.iter().enumerate();
             devices.try_for_each(|(index, device)| tool(device).map_err(|error| numbered(error, index, &scene.devices)))
         };
-        let at_line = |field: &str, error: Error| on_line(error, offset_of(root, field));
-        let of_field = |error: Error| at_line(&error.place().to_owned(), error);
-        scene.validate().and_then(|()| tools()).map_err(of_field)?;
+        scene.validate().and_then(|()| tools()).map_err(|error| {
+            let offset = offset_of(root, error.place());
+            on_line(error, offset)
+        })?;
         if let Some(BodySpec::Tetrahedra(spec)) = &mut scene.body {
-            complete(spec, read_volume, at_line)?;
+            complete(spec, read_volume, |field| offset_of(root, field), on_line)?;
         }
         Ok(scene)
     }
@@ -167,20 +168,25 @@ impl Scene {
     }
 }
 
-/// Fetches the mesh of `spec`, and makes sure that a body can be made of it; `at_line` puts the line of a field to an error.
+/// Fetches the mesh of `spec`, and makes sure that a body can be made of it; `on_line` tells the line of the offset
+/// that `offset` finds for a field.
 fn complete(
     spec: &mut TetrahedraSpec,
     mut read: impl FnMut(&TetrahedraSpec, &Path) -> Result<Volume, Error>,
-    at_line: impl Fn(&str, Error) -> Error,
+    offset: impl Fn(&str) -> usize,
+    on_line: impl Fn(Error, usize) -> Error,
 ) -> Result<(), Error> {
-    let of_field = |error: Error| at_line(&error.place().to_owned(), error);
-    mesh(spec).map_err(of_field)?;
+    let of_field = |error: Error| {
+        let offset = offset(error.place());
+        on_line(error, offset)
+    };
+    mesh(spec).map_err(&of_field)?;
     let sources = [("body.mesh", &spec.mesh), ("body.surface", &spec.surface)];
     for (field, file) in sources {
         let Some(file) = file else { continue };
         let volume = read(spec, file).map_err(|error| match error.kind() {
             // The field stands in front of the file that cannot be read.
-            ErrorKind::Io => at_line(field, error.at(field)),
+            ErrorKind::Io => on_line(error.at(field), offset(field)),
             _ if error.place().starts_with("body.") => of_field(error),
             // A mesh that is there but wrong has a place of its own to name.
             _ => error,

@@ -102,7 +102,7 @@ fn refusal(error: MeshError) -> Error {
 }
 
 fn at(file: &Path, error: MeshError) -> Error {
-    Error::new(ErrorKind::Scene, error.to_string()).at(&shared::name_of(file))
+    Error::new(ErrorKind::Scene, error.to_string()).at(shared::name_of(file))
 }
 
 fn positive(text: &str) -> Result<f64, String> {

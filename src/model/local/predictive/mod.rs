@@ -126,8 +126,7 @@ impl Predictive {
             return false;
         }
         self.path.clear(ring.len(), stepping.step(), (resync.horizon * stepping.substeps) as usize + 1);
-        // The surroundings take one step per tick if that is stable; within it the ring keeps its velocity.
-        let steps = if stepping.tick < forecast.model.stable_step() { 1 } else { stepping.substeps };
+        let steps = stepping.substeps;
         let (d, each) = (stepping.tick / f64::from(steps), stepping.substeps / steps);
         let origin = flat(&self.patch.state.positions[ring.clone()]);
         self.take_near_forces();
