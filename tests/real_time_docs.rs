@@ -22,7 +22,7 @@ const SPEAK_FOR_ALL: &str = "
     LogRecord ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice Region Shape
     DeviceActor LocalActor GlobalActor LoggerActor LogSink
     Scripted Replayed
-    Block BlockBuilder SpringNetwork SpringNetworkBuilder InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";
+    Block BlockBuilder SpringNetwork SpringNetworkBuilder Tetrahedra TetrahedraBuilder Tissue TissueRegion InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";
 
 /// The name of a public type, trait or function, or `Owner::name` of a public method; and whether its docs have the section,
 /// with a text.

@@ -3,7 +3,7 @@
 use super::Vec3;
 use super::body::{Body, State};
 use crate::error::ModelError;
-use crate::linear_algebra::{Matrix, SparseFactor, push_block};
+use crate::linear_algebra::{Matrix, SparseFactor, dissection, push_block};
 
 /// Residual force per node at which the equilibrium is reached, relative to the largest force in play.
 const TOLERANCE: f64 = 1e-12;
@@ -49,6 +49,7 @@ pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<S
     let mut place = vec![usize::MAX; body.rest().len()];
     free.iter().enumerate().for_each(|(p, &node)| place[node as usize] = p);
 
+    let order = elimination(body, &state, &free, &place);
     let mut forces = vec![Vec3::zeros(); place.len()];
     body.forces(&state, &mut forces);
     // The start is rest with held nodes displaced, so this is the scale of all forces.
@@ -59,8 +60,9 @@ pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<S
         if before <= TOLERANCE * scale {
             return Ok(state);
         }
-        let Some(step) =
-            [false, true].into_iter().find_map(|clamp| newton_step(body, &state, &free, &place, &forces, clamp))
+        let Some(step) = [false, true]
+            .into_iter()
+            .find_map(|clamp| newton_step(body, &state, &free, &place, &forces, (order.as_deref(), clamp)))
         else {
             break;
         };
@@ -88,6 +90,19 @@ pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<S
     Err(ModelError::new(message).at("initial"))
 }
 
+/// An order of elimination of the `free` nodes with little fill, if their places give one.
+fn elimination(body: &dyn Body, state: &State, free: &[u32], place: &[usize]) -> Option<Vec<usize>> {
+    let points: Vec<Vec3> = free.iter().map(|&node| body.rest()[node as usize]).collect();
+    let mut pairs = Vec::new();
+    body.tangent(state, free, false, &mut |block| {
+        let (row, column) = (place[block.row as usize], place[block.column as usize]);
+        if column < row {
+            pairs.push([row as u32, column as u32]);
+        }
+    });
+    dissection(&points, pairs.iter().copied())
+}
+
 /// dx of K dx = f on the free nodes, K = -df/dx.
 fn newton_step(
     body: &dyn Body,
@@ -95,7 +110,7 @@ fn newton_step(
     free: &[u32],
     place: &[usize],
     forces: &[Vec3],
-    clamp: bool,
+    (order, clamp): (Option<&[usize]>, bool),
 ) -> Option<Vec<Vec3>> {
     let mut entries = Vec::new();
     body.tangent(state, free, clamp, &mut |block| {
@@ -105,7 +120,7 @@ fn newton_step(
         }
     });
     let right = Matrix::from_iterator(3 * free.len(), 1, free.iter().flat_map(|&node| &forces[node as usize]).copied());
-    let x = SparseFactor::of_triplets(3 * free.len(), &entries)?.solve(right);
+    let x = SparseFactor::new(3 * free.len(), &entries, order)?.solve(right);
     let is_finite = x.iter().all(|x| x.is_finite());
     is_finite.then(|| x.as_slice().as_chunks::<3>().0.iter().map(|&step| Vec3::from(step)).collect())
 }

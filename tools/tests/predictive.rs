@@ -19,7 +19,12 @@ struct Case {
 
 impl Case {
     fn new(name: &str) -> Self {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(format!("{name}.toml"));
+        Self::of(&format!("scenes/{name}.toml"))
+    }
+
+    /// Of a scene file of the repository.
+    fn of(path: &str) -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
         let scene = Scene::load(&path).expect("a scene of the project");
         let full = forces(scene.clone().with_model(LocalModelKind::Full)).0;
         Self { scene, full }
@@ -84,6 +89,17 @@ fn a_drag_that_sticks_and_slips() {
 #[test]
 fn a_frictionless_drag() {
     assert_late(&Case::new("drag_slip"), [0.4, 3.0]);
+}
+
+/// The scene that an independent implementation computed with plain tetrahedra; the whole body runs ahead, with 100 states. A
+/// prototype of that implementation is 0.33 % off with as many.
+#[test]
+fn a_drag_over_tissue() {
+    let case = Case::of("tests/reference/tissue/t1_drag.toml");
+    let (late, own_jump) = case.error(ONE_PERIOD_MS, |_| ());
+    assert!(late.rms <= 0.4 && late.max <= 2.5 && late.jump <= own_jump + 1.0, "{late:?}");
+    let (in_time, _) = case.error(IN_TIME, |_| ());
+    assert!(in_time.rms <= 0.1 && in_time.max <= 1.3, "{in_time:?}");
 }
 
 /// Running the whole body ahead costs periods of simulation where the reduced prediction costs half of one. It is more

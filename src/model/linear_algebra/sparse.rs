@@ -4,7 +4,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
-use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef, Triplet};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
 use super::Matrix;
@@ -48,14 +48,6 @@ impl SparseFactor {
         order.iter().enumerate().for_each(|(place, &unknown)| places[unknown] = place);
         let is_order = order.len() == n && places.iter().all(|&place| place < n);
         is_order.then(|| Self::factorise(matrix, SymmetricOrdering::Custom(PermRef::new_checked(order, &places, n))))?
-    }
-
-    /// Factorises as [`new`](Self::new) does, with the entries of a place added in the order that faer has for them: the last
-    /// digits of every equilibrium hang on it.
-    pub(crate) fn of_triplets(n: usize, entries: &[(usize, usize, f64)]) -> Option<Self> {
-        let triplets: Vec<_> = entries.iter().map(|&(row, column, value)| Triplet::new(row, column, value)).collect();
-        let matrix = SparseColMat::try_new_from_triplets(n, n, &triplets).ok()?;
-        Self::factorise(matrix.as_ref(), SymmetricOrdering::Amd)
     }
 
     fn factorise(matrix: SparseColMatRef<'_, usize, f64>, ordering: SymmetricOrdering<'_, usize>) -> Option<Self> {

@@ -52,20 +52,6 @@ impl Reduced {
         self.stiffness[self.states / 2].abs().sqrt()
     }
 
-    /// The longest stable step of [`step`](Self::step) (s): w^2 d^2 + 2 c d = 4 of the stiffest state.
-    pub(crate) fn stable_step(&self) -> f64 {
-        let damping = |state: usize| match &self.damping {
-            Damping::Diagonal(damping) => damping[state].abs(),
-            // No eigenvalue is larger than the largest sum of a row.
-            Damping::Full(rows) => rows[state * self.states..][..self.states].iter().map(|c| c.abs()).sum(),
-        };
-        let step = |state: usize| {
-            let c: f64 = damping(state);
-            4.0 / (c + (c * c + 4.0 * self.stiffness[state].abs()).sqrt())
-        };
-        (0..self.states).map(step).fold(f64::INFINITY, f64::min)
-    }
-
     /// One step of `d` seconds under `forces` on the ring (N, three numbers for each node).
     ///
     /// # Real-time

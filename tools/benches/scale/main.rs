@@ -3,12 +3,13 @@
 //! Writes docs/scale.md and its picture.
 //!
 //! `cargo bench --bench scale`; with `-- --quick` a short form that prints and writes nothing, with
-//! `-- --only-errors` only the errors, printed as they come.
+//! `-- --only-errors` only the errors, printed as they come, with `-- --only-tissue` only the bodies of tetrahedra.
 
 #[path = "../common/mod.rs"]
 mod common;
 mod costs;
 mod runs;
+mod tissue;
 mod verdict;
 
 use std::process::ExitCode;
@@ -47,7 +48,8 @@ fn document(is_quick: bool) -> Result<(), Error> {
         common::write("docs/img/scale.svg", &costs::picture(&all).to_svg())?;
     }
     let date = common::measured_on("cargo bench --bench scale");
-    let first = [format!("{HEAD}\n{date}\n"), verdict::text(&all), costs::text(&all, &basis_costs)].join("\n");
+    let costs = costs::text(&all, &basis_costs);
+    let first = [format!("{HEAD}\n{date}\n"), verdict::text(&all), costs, tissue::text(is_quick)?].join("\n");
     // Long: what is there is written after every case.
     runs::all(is_quick, |runs| {
         let text = format!("{first}\n{}", runs::text(runs));
@@ -61,9 +63,11 @@ fn document(is_quick: bool) -> Result<(), Error> {
 
 fn main() -> ExitCode {
     let Some(arguments) = common::arguments() else { return ExitCode::SUCCESS };
-    let done = match arguments.only_errors {
-        true => runs::all(arguments.is_quick, |_| Ok(())),
-        false => document(arguments.is_quick),
+    let is_quick = arguments.is_quick;
+    let done = match (arguments.only_errors, std::env::args().any(|argument| argument == "--only-tissue")) {
+        (true, _) => runs::all(is_quick, |_| Ok(())),
+        (_, true) => tissue::text(is_quick).map(|text| println!("{text}")),
+        _ => document(is_quick),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

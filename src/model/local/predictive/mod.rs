@@ -126,32 +126,27 @@ impl Predictive {
             return false;
         }
         self.path.clear(ring.len(), stepping.step(), (resync.horizon * stepping.substeps) as usize + 1);
-        let steps = stepping.substeps;
-        let (d, each) = (stepping.tick / f64::from(steps), stepping.substeps / steps);
         let origin = flat(&self.patch.state.positions[ring.clone()]);
         self.take_near_forces();
         let resting = flat(&self.patch.forces[ring.clone()]);
-        let mut substep = 0;
         for n in 0..resync.horizon {
             if self.patch.contact_has_left() {
                 // What the patch would do from here on is wrong.
                 self.take_present(resync);
                 return false;
             }
-            stepping.tick(resync.tools[resync.index].motion(n, stepping.tick), |tool, _| {
+            stepping.tick(resync.tools[resync.index].motion(n, stepping.tick), |tool, d| {
                 self.take_near_forces();
                 self.push_path();
                 let Self { patch, ring_forces, surroundings, ring_positions: x, ring_velocities: v, .. } = self;
-                if substep % each == 0 {
-                    deviations(ring_forces, &patch.forces[ring.clone()], &resting);
-                    forecast.model.step(surroundings, ring_forces, d);
-                    x.copy_from_slice(&origin);
-                    v.fill(0.0);
-                    forecast.model.add_ring(surroundings, x, v);
-                }
-                substep += 1;
-                let force = patch.step(tool, stepping.step());
-                self.place_ring_before(f64::from((each - substep % each) % each) * stepping.step());
+                deviations(ring_forces, &patch.forces[ring.clone()], &resting);
+                // A step for each of the body's: together they are a projection of it, so what is stable there is so here.
+                forecast.model.step(surroundings, ring_forces, d);
+                x.copy_from_slice(&origin);
+                v.fill(0.0);
+                forecast.model.add_ring(surroundings, x, v);
+                let force = patch.step(tool, d);
+                self.place_ring();
                 force
             });
         }
@@ -168,13 +163,12 @@ impl Predictive {
         self.path.push(&self.patch.state, &self.patch.forces, ring);
     }
 
-    /// The ring's nodes to where they are `before` seconds before `ring_positions` with `ring_velocities`.
-    fn place_ring_before(&mut self, before: f64) {
+    /// The ring's nodes to `ring_positions` with `ring_velocities`.
+    fn place_ring(&mut self) {
         let ring = self.ring();
         let places = self.ring_positions.as_chunks::<3>().0.iter().zip(self.ring_velocities.as_chunks::<3>().0);
         for (node, (x, v)) in ring.zip(places) {
-            let (x, v) = (Vec3::from(*x), Vec3::from(*v));
-            (self.patch.state.positions[node], self.patch.state.velocities[node]) = (x - v * before, v);
+            (self.patch.state.positions[node], self.patch.state.velocities[node]) = (Vec3::from(*x), Vec3::from(*v));
         }
     }
 
@@ -201,7 +195,7 @@ impl Predictive {
             basis.answers.add_ring(&self.surroundings, &mut self.ring_positions, &mut self.ring_velocities);
         }
         self.basis = basis;
-        self.place_ring_before(0.0);
+        self.place_ring();
         force
     }
 }

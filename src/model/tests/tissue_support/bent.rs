@@ -47,7 +47,7 @@ pub const COOK: Bent = Bent {
 pub enum Split {
     /// The body-centred lattice, of which filled surfaces are made: two centres of cells and an edge of the face between them.
     Centred,
-    /// Six around one diagonal, the same in all cells: as stiff and as one-sided as regular meshes get.
+    /// Six around one diagonal, the same in all cells: stiff, and one-sided.
     Diagonal,
 }
 

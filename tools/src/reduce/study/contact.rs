@@ -18,7 +18,11 @@ const SOME_CONTACTS: usize = 25;
 const TURNED: f64 = 0.5;
 
 /// The contact that stands for a scene: the node that the tool is glued to, else the one that it touches first, else the middle of the top.
-pub(super) fn contact_node(scene: &Scene, body: &dyn Body, wish: Option<NodeSpec>) -> Result<u32, Error> {
+pub(super) fn contact_node(
+    scene: &Scene,
+    (body, naming): (&dyn Body, &Naming),
+    wish: Option<NodeSpec>,
+) -> Result<u32, Error> {
     let glued = || scene.glued_node(0, body).map(|node| node.map(|node| ("device.attach_node", node)));
     let named = match wish {
         Some(node) => Some(("node", scene.surface_node("node", node, body)?)),
@@ -26,7 +30,7 @@ pub(super) fn contact_node(scene: &Scene, body: &dyn Body, wish: Option<NodeSpec
     };
     match named {
         Some((field, id)) if !body.surface().has_node(id) || body.inverse_masses()[id as usize] == 0.0 => {
-            Err(Error::scene(field, format!("node {id} is no node of the surface that can move")))
+            Err(Error::scene(field, format!("{} is no node of the surface that can move", naming.node(id))))
         }
         Some((_, id)) => Ok(id),
         None => scene.first_touched(body).ok_or_else(|| Error::scene("body", "no node of the surface can move")),

@@ -57,7 +57,7 @@ pub fn reduce_scene(
     let scene = &scene;
     let body = scene.body.as_ref().ok_or_else(|| Error::scene("body", "is missing"))?.build()?;
     let (body, naming) = (&*body, Naming::of(scene, &*body));
-    let node = contact_node(scene, body, options.node)?;
+    let node = contact_node(scene, (body, &naming), options.node)?;
     let grids = ContactGrid::all(body, &naming, options.every, node);
     let mut steps = Steps::new(6 + grids.len() + usize::from(options.measure), &mut progress);
     steps.begin("factorising the body");

@@ -84,11 +84,12 @@ fn a_budget_names_what_meets_it() {
 fn a_contact_that_is_none_is_refused() {
     let path = in_repository("scenes/drag_friction.toml");
     let scene = Scene::load(path.as_ref()).unwrap();
-    for node in [[5, 5, 5], [5, 5, 0], [99, 0, 0]] {
+    let no_node = "is no node of the surface";
+    for (node, words) in [([5, 5, 5], no_node), ([5, 5, 0], no_node), ([99, 0, 0], "is outside the body")] {
         let error =
             reduce_scene(&scene, &ReduceOptions { node: Some(node.into()), ..ReduceOptions::default() }, |_| {})
                 .unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Scene);
-        assert!(error.to_string().contains("no node of the surface"), "{error}");
+        assert!(error.to_string().contains(words) && error.to_string().contains(&format!("{node:?}")), "{error}");
     }
 }
