@@ -5,7 +5,7 @@ build_programs
 
 shopt -s nullglob
 names=()
-for folder in examples src/runtime/examples tools/examples haply/examples; do
+for folder in examples src/mesh/examples src/runtime/examples tools/examples haply/examples; do
     for path in "$folder"/*.rs "$folder"/*/main.rs; do
         name=${path#"$folder"/}
         name=${name%/main.rs}

@@ -1,8 +1,11 @@
-//! A perspective camera.
+//! A perspective camera that frames a body.
 
 use palpate::model::Vec3;
 
-/// Looks at a point from a distance.
+/// Distance from the middle of the body in its diagonals.
+const DISTANCE: f64 = 3.0;
+
+/// Looks at a body from a distance.
 pub struct Camera {
     eye: Vec3,
     right: Vec3,
@@ -23,14 +26,26 @@ pub struct Seen {
 }
 
 impl Camera {
-    /// A camera at `distance` (m) from `target`, `azimuth` round from the -y axis and `elevation` up (rad); the target
-    /// appears at `centre` (px), where a metre has `scale` px.
-    pub fn new(target: Vec3, distance: f64, azimuth: f64, elevation: f64, scale: f64, centre: [f64; 2]) -> Self {
+    /// A camera round from the -y axis by `azimuth` and up by `elevation` (rad), at such a place and with such a zoom that
+    /// `points` just fit in the picture's rectangle from `low` to `high` (px).
+    pub fn framing(points: &[Vec3], azimuth: f64, elevation: f64, low: [f64; 2], high: [f64; 2]) -> Self {
+        let (least, largest) = points.iter().fold((points[0], points[0]), |(a, b), point| (a.inf(point), b.sup(point)));
         let away = Vec3::new(azimuth.sin() * elevation.cos(), -azimuth.cos() * elevation.cos(), elevation.sin());
         let forward = -away;
         let right = forward.cross(&Vec3::z()).normalize();
-        let eye = target + away * distance;
-        Self { eye, right, up: right.cross(&forward), forward, zoom: scale * distance, centre }
+        let eye = (least + largest) / 2.0 + away * ((largest - least).norm() * DISTANCE);
+        let up = right.cross(&forward);
+        // What a zoom of 1 shows tells the zoom and the centre that are wanted.
+        let unit = Self { eye, right, up, forward, zoom: 1.0, centre: [0.0; 2] };
+        let shown = |axis: usize| {
+            let range = (f64::INFINITY, f64::NEG_INFINITY);
+            points.iter().map(|point| unit.see(point).at[axis]).fold(range, |(a, b), at| (a.min(at), b.max(at)))
+        };
+        let shown = [shown(0), shown(1)];
+        let zooms = [0, 1].map(|axis| (high[axis] - low[axis]) / (shown[axis].1 - shown[axis].0));
+        let zoom = zooms[0].min(zooms[1]);
+        let middle = |axis: usize| (low[axis] + high[axis] - zoom * (shown[axis].0 + shown[axis].1)) / 2.0;
+        Self { zoom, centre: [middle(0), middle(1)], ..unit }
     }
 
     /// Where `point` appears.

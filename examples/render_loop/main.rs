@@ -1,7 +1,7 @@
 //! A program that draws: a thread of its own reads the newest surface, tool and force at 60 Hz, and the tick never waits
 //! for it.
 //!
-//! The demo scene runs in real time twice, alone and with a renderer that turns every frame into a shaded picture (SVG)
+//! The liver scene runs in real time twice, alone and with a renderer that turns every frame into a shaded picture (SVG)
 //! and writes a few of them to `out/render_loop/`. Reading through the `Viewer` is wait-free on both sides: there is no
 //! lock that a slow frame could hold.
 //!
@@ -32,8 +32,8 @@ const FRAME_RATE: u32 = 60;
 const DURATION_S: f64 = 2.6;
 /// Frames that are written to files: the first at or after each of these times.
 const KEPT: [Nanos; 4] = [Nanos(700_000_000), Nanos(1_300_000_000), Nanos(1_700_000_000), Nanos(2_400_000_000)];
-/// The README's picture: the middle of the demo's drag.
-const README_TIME: Duration = Duration::from_millis(1500);
+/// The README's picture: the end of the drag.
+const README_TIME: Duration = Duration::from_millis(2000);
 
 /// What the renderer did.
 #[derive(Default)]
@@ -52,11 +52,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Runs the demo without and with a renderer.
+/// The scene that is drawn.
+fn liver() -> Result<Scene, palpate::Error> {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/liver.toml"))
+}
+
+/// Runs the scene without and with a renderer.
 fn compare() -> Result<(), Box<dyn Error>> {
     let folder = Path::new("out/render_loop");
     fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let session = || Session::from_scene(Scene::demo()).duration_s(DURATION_S).build();
+    let session = || Session::from_scene(liver()?).duration_s(DURATION_S).build();
 
     eprintln!("{DURATION_S} s without a renderer ...");
     let alone = session()?.run()?;
@@ -88,7 +93,7 @@ fn compare() -> Result<(), Box<dyn Error>> {
 
 /// Draws at the frame rate until the other end of `stopped` is dropped.
 fn render(mut viewer: Viewer, stopped: &Receiver<()>, folder: &Path) -> Result<Frames, std::io::Error> {
-    let triangles = viewer.triangles();
+    let (triangles, rest) = (viewer.triangles(), viewer.surface().positions.clone());
     let mut kept = KEPT.into_iter().peekable();
     let mut frames = Frames::default();
     let start = Instant::now();
@@ -101,7 +106,7 @@ fn render(mut viewer: Viewer, stopped: &Receiver<()>, folder: &Path) -> Result<F
         }
         let begun = Instant::now();
         let tool = viewer.tool();
-        let svg = picture::draw(&triangles, &viewer.surface().positions, &tool);
+        let svg = picture::draw(&triangles, &rest, &viewer.surface().positions, &tool);
         frames.busy += begun.elapsed();
         frames.drawn += 1;
         if let Some(time) = kept.next_if(|&time| tool.time >= time) {
@@ -114,12 +119,12 @@ fn render(mut viewer: Viewer, stopped: &Receiver<()>, folder: &Path) -> Result<F
 
 /// Draws the README's picture, the same at every call.
 fn draw_readme() -> Result<(), Box<dyn Error>> {
-    let mut running = Session::from_scene(Scene::demo()).virtual_time().build()?.start()?;
+    let mut running = Session::from_scene(liver()?).virtual_time().build()?.start()?;
     let mut viewer = running.take_viewer().ok_or("the viewer is already taken")?;
+    let (triangles, rest) = (viewer.triangles(), viewer.surface().positions.clone());
     running.wait_for(README_TIME);
-    let triangles = viewer.triangles();
     let tool = viewer.tool();
-    let svg = picture::draw(&triangles, &viewer.surface().positions, &tool);
+    let svg = picture::draw(&triangles, &rest, &viewer.surface().positions, &tool);
     running.stop();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/img");
     fs::create_dir_all(&folder)?;

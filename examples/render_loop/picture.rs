@@ -6,51 +6,42 @@ use palpate::model::Vec3;
 use palpate::session::ToolView;
 
 use crate::camera::{Camera, Seen};
-use crate::shading::{Facet, facets};
+use crate::shading::{Shaded, shade};
 
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 600.0;
-/// What lies lower (px) is behind the caption's background.
-const HIDDEN_BELOW: f64 = 0.9 * HEIGHT;
+/// The body is shown between these corners (px).
+const FRAME: [[f64; 2]; 2] = [[60.0, 165.0], [900.0, 530.0]];
 /// Radius of the tool's tip as it is drawn (m); the tool itself is the point at its bottom.
-const TIP_RADIUS: f64 = 0.0042;
+const TIP_RADIUS: f64 = 0.0034;
 /// The handle leans this way.
-const HANDLE: Vec3 = Vec3::new(0.026, 0.016, 0.055);
+const HANDLE: Vec3 = Vec3::new(0.044, 0.022, 0.05);
 /// Length of the arrow per force (m/N).
-const ARROW_PER_NEWTON: f64 = 0.028;
+const ARROW_PER_NEWTON: f64 = 0.06;
 /// Below this the arrow has no direction to show (N).
 const NO_FORCE: f64 = 0.02;
-/// How far facets reach over their edges (px), and how much a sliver may grow by that.
+/// How far pieces reach over their edges (px), and how much a sliver may grow by that.
 const OVERLAP: f64 = 0.35;
 const WIDEST: f64 = 1.5;
-/// The block of the demo scene (m).
-const SIDE: f64 = 0.1;
 
-/// Draws the surface and the tool at one moment.
-pub fn draw(triangles: &[[u32; 3]], positions: &[Vec3], tool: &ToolView) -> String {
-    let target = Vec3::new(0.5 * SIDE, 0.5 * SIDE, 0.9 * SIDE);
-    let camera = Camera::new(target, 0.5, 0.46, 0.62, 4300.0, [0.5 * WIDTH, 0.52 * HEIGHT]);
+/// Draws the surface of a body that was at `rest` and the tool at one moment.
+pub fn draw(triangles: &[[u32; 3]], rest: &[Vec3], positions: &[Vec3], tool: &ToolView) -> String {
+    let camera = Camera::framing(rest, 0.35, 0.8, FRAME[0], FRAME[1]);
     let mut svg = String::with_capacity(200_000);
     head(&mut svg);
-    shadow(&mut svg, &camera);
+    shadow(&mut svg, &camera, rest);
 
-    let mut facets: Vec<(Facet, [Seen; 3])> = facets(triangles, positions, SIDE, |point| camera.towards(point))
-        .into_iter()
-        .map(|facet| {
-            let seen = facet.corners.map(|corner| camera.see(&corner));
-            (facet, seen)
-        })
-        .filter(|(_, seen)| seen.iter().any(|corner| corner.at[1] < HIDDEN_BELOW))
-        .collect();
-    let depth = |seen: &[Seen; 3]| seen.iter().map(|corner| corner.depth).sum::<f64>();
-    facets.sort_by(|(_, a), (_, b)| depth(b).total_cmp(&depth(a)));
+    // The painter's algorithm: what is farther away first.
+    let mut triangles = shade(triangles, rest, positions, |point| camera.towards(point));
+    let depth = |triangle: &Shaded| {
+        triangle.outline.iter().map(|point| camera.see(point).depth).sum::<f64>() / triangle.outline.len() as f64
+    };
+    triangles.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
     let tip = camera.see(&(tool.position + Vec3::z() * TIP_RADIUS));
-    let in_front = facets.partition_point(|(_, seen)| depth(seen) / 3.0 > tip.depth);
-    paint(&mut svg, &facets[..in_front]);
+    let in_front = triangles.partition_point(|triangle| depth(triangle) > tip.depth);
+    paint(&mut svg, &camera, &triangles[..in_front]);
     draw_tool(&mut svg, &camera, tool, tip);
-    paint(&mut svg, &facets[in_front..]);
-    // The lower part of the block has nothing to show: it fades out under the caption.
-    put(&mut svg, format_args!("<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" rx=\"18\" fill=\"url(#fade)\"/>\n"));
+    paint(&mut svg, &camera, &triangles[in_front..]);
     arrow(&mut svg, &camera, tool);
     caption(&mut svg, &camera, tip, tool);
     svg + "</svg>\n"
@@ -61,9 +52,8 @@ const DEFINITIONS: &str = r##"<defs>
 <radialGradient id="card" cx=".5" cy=".42" r=".8"><stop offset="0" stop-color="#2c3a4f"/><stop offset="1" stop-color="#131a26"/></radialGradient>
 <radialGradient id="tip" cx=".36" cy=".3" r=".75"><stop offset="0" stop-color="#fff"/><stop offset=".35" stop-color="#b9c7da"/><stop offset="1" stop-color="#3c4a60"/></radialGradient>
 <linearGradient id="handle" x1="0" x2="1" y1="0" y2=".35"><stop offset="0" stop-color="#e6edf7"/><stop offset=".5" stop-color="#9fb0c8"/><stop offset="1" stop-color="#4a5a74"/></linearGradient>
-<linearGradient id="fade" x1="0" x2="0" y1="0" y2="1"><stop offset=".68" stop-color="#161e2b" stop-opacity="0"/><stop offset=".9" stop-color="#161e2b"/></linearGradient>
 <filter id="soft" x="-30%" y="-60%" width="160%" height="220%"><feGaussianBlur stdDeviation="14"/></filter>
-<style>.m{fill:none;stroke:#300;stroke-opacity:.16;stroke-width:.8}text{font-family:Helvetica,Arial,sans-serif}.t{font-size:16px;fill:#c7d2e2}.b{font-size:24px;font-weight:bold}</style>
+<style>.m{fill:none;stroke:#300;stroke-opacity:.16;stroke-width:8}text{font-family:Helvetica,Arial,sans-serif}.t{font-size:16px;fill:#c7d2e2}.b{font-size:24px;font-weight:bold}</style>
 </defs>
 "##;
 
@@ -73,42 +63,53 @@ fn head(svg: &mut String) {
         svg,
         format_args!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
-             role=\"img\" aria-label=\"A soft block, dented by a tool that drags across it, and the force on the tool\">\n\
+             role=\"img\" aria-label=\"A liver, dented by a tool that drags across it, and the force on the tool\">\n\
              {DEFINITIONS}<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" rx=\"18\" fill=\"url(#card)\"/>\n"
         ),
     );
 }
 
-fn shadow(svg: &mut String, camera: &Camera) {
-    let corner = |x: f64, y: f64| camera.see(&Vec3::new(x, y, 0.0)).at;
-    let (low, high) = (-0.06 * SIDE, 1.10 * SIDE);
-    let around = [corner(low, low), corner(high, low), corner(1.2 * SIDE, high), corner(low, high)];
-    let [a, b, c, d] = around.map(|[x, y]| format!("{x:.0} {y:.0}"));
-    put(svg, format_args!("<path d=\"M{a}L{b}L{c}L{d}z\" opacity=\".55\" filter=\"url(#soft)\"/>\n"));
+/// On the ground: an ellipse as wide as the body.
+fn shadow(svg: &mut String, camera: &Camera, rest: &[Vec3]) {
+    let (low, high) = rest.iter().fold((rest[0], rest[0]), |(a, b), point| (a.inf(point), b.sup(point)));
+    let (middle, half) = ((low + high) / 2.0, (high - low) * 0.56);
+    let around = (0..24).map(|n| std::f64::consts::TAU * f64::from(n) / 24.0);
+    let points = around.map(|angle| Vec3::new(middle.x + half.x * angle.cos(), middle.y + half.y * angle.sin(), low.z));
+    let path: Vec<String> = points.map(|point| camera.see(&point).at.map(|x| format!("{x:.0}")).join(" ")).collect();
+    put(svg, format_args!("<path d=\"M{}z\" opacity=\".55\" filter=\"url(#soft)\"/>\n", path.join("L")));
 }
 
-/// Facets in the given order, those of one colour in one path, with the edges of the mesh over them.
-fn paint(svg: &mut String, facets: &[(Facet, [Seen; 3])]) {
-    for same in facets.chunk_by(|(a, _), (b, _)| a.color == b.color) {
-        let [r, g, b] = same[0].0.color;
-        put(svg, format_args!("<path fill=\"#{r:02x}{g:02x}{b:02x}\" d=\""));
-        for (_, seen) in same {
-            let [[ax, ay], [bx, by], [cx, cy]] = widened(seen.map(|corner| corner.at));
-            put(svg, format_args!("M{ax:.1} {ay:.1}l{:.1} {:.1} {:.1} {:.1}z", bx - ax, by - ay, cx - bx, cy - by));
+/// Triangles in the given order, those pieces of one colour in one path, with the edges of the mesh over them.
+fn paint(svg: &mut String, camera: &Camera, triangles: &[Shaded]) {
+    svg.push_str("<g transform=\"scale(.1)\">\n");
+    for triangle in triangles {
+        for same in triangle.pieces.chunk_by(|(_, a), (_, b)| a == b) {
+            let [r, g, b] = same[0].1;
+            put(svg, format_args!("<path fill=\"#{r:02x}{g:02x}{b:02x}\" d=\""));
+            for (corners, _) in same {
+                outline(svg, &widened(corners.map(|corner| camera.see(&corner).at)));
+            }
+            svg.push_str("\"/>\n");
         }
+        let seen: Vec<[f64; 2]> = triangle.outline.iter().map(|point| camera.see(point).at).collect();
+        svg.push_str("<path class=\"m\" d=\"");
+        outline(svg, &seen);
         svg.push_str("\"/>\n");
-        let lines = same.iter().flat_map(|(facet, seen)| {
-            let drawn = (0..3).filter(|&opposite| facet.edges[opposite]);
-            drawn.map(|opposite| (seen[(opposite + 1) % 3].at, seen[(opposite + 2) % 3].at))
-        });
-        let mut path = String::new();
-        for ([ax, ay], [bx, by]) in lines {
-            put(&mut path, format_args!("M{ax:.1} {ay:.1}l{:.1} {:.1}", bx - ax, by - ay));
-        }
-        if !path.is_empty() {
-            put(svg, format_args!("<path class=\"m\" d=\"{path}\"/>\n"));
-        }
     }
+    svg.push_str("</g>\n");
+}
+
+/// A closed path in tenths of a pixel, each corner relative to the one before.
+fn outline(svg: &mut String, corners: &[[f64; 2]]) {
+    let tenths = |corner: &[f64; 2]| corner.map(|x| (10.0 * x).round() as i32);
+    let Some(mut last) = corners.first().map(tenths) else { return };
+    put(svg, format_args!("M{} {}l", last[0], last[1]));
+    for (n, corner) in corners[1..].iter().map(tenths).enumerate() {
+        let space = if n == 0 { "" } else { " " };
+        put(svg, format_args!("{space}{} {}", corner[0] - last[0], corner[1] - last[1]));
+        last = corner;
+    }
+    svg.push('z');
 }
 
 /// Every edge moved outwards a little, so that no gap shows between neighbours: scaled about the centre of the incircle.
@@ -186,8 +187,9 @@ fn caption(svg: &mut String, camera: &Camera, tip: Seen, tool: &ToolView) {
         svg,
         format_args!(
             "<text class=\"b\" x=\"36\" y=\"48\" fill=\"#f4f7fb\">palpate</text>\n\
-             <text class=\"t\" x=\"36\" y=\"74\">a soft block, simulated at 30 Hz and felt at 1 kHz</text>\n\
-             <text class=\"t\" x=\"36\" y=\"{:.0}\">demo scene, t = {:.2} s, contact: {mode}; arrow: force that the hand feels</text>\n\
+             <text class=\"t\" x=\"36\" y=\"74\">a liver of 3,390 tetrahedra,</text>\n\
+             <text class=\"t\" x=\"36\" y=\"96\">simulated at 30 Hz and felt at 1 kHz</text>\n\
+             <text class=\"t\" x=\"36\" y=\"{:.0}\">t = {:.2} s, contact: {mode}; arrow: force that the hand feels</text>\n\
              <path stroke=\"#c7d2e2\" stroke-width=\"2\" d=\"M{left:.1} {:.1}v8m0-4H{right:.1}m0-4v8\"/>\n\
              <text class=\"t\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">20 mm</text>\n",
             HEIGHT - 36.0,

@@ -1,30 +1,36 @@
-//! From triangles to flat coloured patches: normals, light, and splitting where the surface curves.
+//! From triangles to flat coloured pieces: normals, light, and splitting where the surface curves.
 
 use std::collections::HashMap;
 
 use palpate::model::Vec3;
 
-/// A piece of one colour.
-pub struct Facet {
-    pub corners: [Vec3; 3],
-    pub color: [u8; 3],
-    /// Edges of the mesh among its own, by the corner opposite to them.
-    pub edges: [bool; 3],
+/// A triangle of the surface, cut into pieces that follow its curvature.
+pub struct Shaded {
+    /// Pieces that show their outer side, each of one colour.
+    pub pieces: Vec<([Vec3; 3], [u8; 3])>,
+    /// Around the triangle, along its edges.
+    pub outline: Vec<Vec3>,
 }
 
 /// Triangles whose normals have a smaller cosine than this between them meet in a crease.
 const CREASE: f64 = 0.15;
-/// An edge is cut into a piece for each such difference of its ends' normals, up to so many.
-const CURVED: f64 = 0.1;
-const MOST_PIECES: usize = 4;
+/// An edge is cut into a part for each such difference of its ends' normals, up to so many.
+const CURVED: f64 = 0.17;
+const MOST_CUTS: usize = 3;
 
 /// The body's colour, and the colour where it is pressed in by `DEEP` metres.
-const BODY: Vec3 = Vec3::new(222.0, 106.0, 96.0);
-const PRESSED: Vec3 = Vec3::new(255.0, 186.0, 130.0);
-const DEEP: f64 = 0.009;
+const BODY: Vec3 = Vec3::new(190.0, 74.0, 66.0);
+const PRESSED: Vec3 = Vec3::new(255.0, 190.0, 120.0);
+const DEEP: f64 = 0.006;
 
-/// Facets of all triangles, for an eye in direction `towards(point)`; `top` is the height of the body at rest (m).
-pub fn facets(triangles: &[[u32; 3]], positions: &[Vec3], top: f64, towards: impl Fn(&Vec3) -> Vec3) -> Vec<Facet> {
+/// The triangles of a surface whose nodes are at `positions` and were at `rest` (m), for an eye in direction
+/// `towards(point)`; those that turn their back to it are left out.
+pub fn shade(
+    triangles: &[[u32; 3]],
+    rest: &[Vec3],
+    positions: &[Vec3],
+    towards: impl Fn(&Vec3) -> Vec3,
+) -> Vec<Shaded> {
     let corners = |t: &[u32; 3]| t.map(|node| positions[node as usize]);
     // Twice the area long, so that sums are weighted by area.
     let normals: Vec<Vec3> = triangles.iter().map(corners).map(|[a, b, c]| (b - a).cross(&(c - a))).collect();
@@ -51,40 +57,49 @@ pub fn facets(triangles: &[[u32; 3]], positions: &[Vec3], top: f64, towards: imp
         }
         reached.iter().map(|&t| normals[t]).sum::<Vec3>().normalize()
     };
-    let mut facets = Vec::new();
-    for (t, triangle) in triangles.iter().enumerate() {
+    let seen_from_outside = |[a, b, c]: [Vec3; 3]| (b - a).cross(&(c - a)).dot(&towards(&a)) > 0.0;
+    let shaded = triangles.iter().enumerate().map(|(t, triangle)| {
         let points = corners(triangle);
         let at = triangle.map(|node| smooth(t, node));
+        let [a, b, c] = triangle.map(|node| rest[node as usize]);
+        let inwards = (c - a).cross(&(b - a)).normalize();
+        let depths = triangle.map(|node| (positions[node as usize] - rest[node as usize]).dot(&inwards));
         let spread = (0..3).map(|i| (at[i] - at[(i + 1) % 3]).norm()).fold(0.0, f64::max);
-        let pieces = ((spread / CURVED).ceil() as usize).clamp(1, MOST_PIECES);
-        let edges = drawn_edges(&points);
-        for (places, edges) in split(pieces, edges) {
+        let cuts = ((spread / CURVED).ceil() as usize).clamp(1, MOST_CUTS);
+        let piece = |places: [[f64; 3]; 3]| {
             let on_surface = places.map(|weights| rounded(&points, &at, weights));
-            let centre = on_surface.iter().map(|(point, _)| point).sum::<Vec3>() / 3.0;
             let normal = on_surface.iter().map(|(_, normal)| normal).sum::<Vec3>().normalize();
-            let [a, b, c] = on_surface.map(|(point, _)| point);
-            if (b - a).cross(&(c - a)).dot(&towards(&centre)) <= 0.0 {
-                continue;
-            }
-            facets.push(Facet { corners: [a, b, c], color: lit(&centre, &normal, &towards(&centre), top), edges });
-        }
-    }
-    facets
+            let depth =
+                places.iter().flatten().zip(depths.iter().cycle()).map(|(w, depth)| w * depth).sum::<f64>() / 3.0;
+            let corners = on_surface.map(|(point, _)| point);
+            seen_from_outside(corners).then(|| (corners, lit(&normal, &towards(&corners[0]), depth)))
+        };
+        let outline = outline(cuts).map(|weights| rounded(&points, &at, weights).0).collect();
+        Shaded { pieces: split(cuts).filter_map(piece).collect(), outline }
+    });
+    shaded.filter(|triangle| !triangle.pieces.is_empty()).collect()
 }
 
-/// Cuts a triangle's edges into `pieces` each: barycentric corners and drawn edges of the parts.
-fn split(pieces: usize, edges: [bool; 3]) -> impl Iterator<Item = ([[f64; 3]; 3], [bool; 3])> {
+/// Cuts a triangle's edges into `cuts` parts each: barycentric corners of the pieces.
+fn split(cuts: usize) -> impl Iterator<Item = [[f64; 3]; 3]> {
     let place = move |i: usize, j: usize| {
-        let (u, v) = (i as f64 / pieces as f64, j as f64 / pieces as f64);
+        let (u, v) = (i as f64 / cuts as f64, j as f64 / cuts as f64);
         [1.0 - u - v, u, v]
     };
-    (0..pieces).flat_map(move |j| (0..pieces - j).map(move |i| (i, j))).flat_map(move |(i, j)| {
-        // A part has an edge of the whole where its row is the outermost.
-        let outer = [i + j + 1 == pieces && edges[0], i == 0 && edges[1], j == 0 && edges[2]];
-        let upright = ([place(i, j), place(i + 1, j), place(i, j + 1)], outer);
-        let turned =
-            (i + j + 2 <= pieces).then(|| ([place(i + 1, j), place(i + 1, j + 1), place(i, j + 1)], [false; 3]));
+    (0..cuts).flat_map(move |j| (0..cuts - j).map(move |i| (i, j))).flat_map(move |(i, j)| {
+        let upright = [place(i, j), place(i + 1, j), place(i, j + 1)];
+        let turned = (i + j + 2 <= cuts).then(|| [place(i + 1, j), place(i + 1, j + 1), place(i, j + 1)]);
         [Some(upright), turned].into_iter().flatten()
+    })
+}
+
+/// Barycentric places around a triangle, at the corners of the pieces.
+fn outline(cuts: usize) -> impl Iterator<Item = [f64; 3]> {
+    (0..3 * cuts).map(move |n| {
+        let (corner, part) = (n / cuts, (n % cuts) as f64 / cuts as f64);
+        let mut place = [0.0; 3];
+        (place[corner], place[(corner + 1) % 3]) = (1.0 - part, part);
+        place
     })
 }
 
@@ -97,20 +112,13 @@ fn rounded(corners: &[Vec3; 3], normals: &[Vec3; 3], weights: [f64; 3]) -> (Vec3
     (flat.lerp(&mix(&on_plane), 0.6), mix(normals).normalize())
 }
 
-/// Every edge but the longest: on a lattice these are the edges of its cells, without their diagonals.
-fn drawn_edges(corners: &[Vec3; 3]) -> [bool; 3] {
-    let length = |opposite: usize| (corners[(opposite + 1) % 3] - corners[(opposite + 2) % 3]).norm();
-    let longest = (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b)));
-    std::array::from_fn(|opposite| Some(opposite) != longest)
-}
-
 /// Sky light from above, a lamp from the upper left, a highlight.
-fn lit(point: &Vec3, normal: &Vec3, to_eye: &Vec3, top: f64) -> [u8; 3] {
+fn lit(normal: &Vec3, to_eye: &Vec3, depth: f64) -> [u8; 3] {
     let lamp = Vec3::new(-0.55, -0.45, 0.70).normalize();
     let sky = 0.45 + 0.13 * normal.z;
     let diffuse = 0.52 * normal.dot(&lamp).max(0.0);
     let highlight = 46.0 * normal.dot(&(lamp + to_eye).normalize()).max(0.0).powi(24);
-    let depth = if normal.z > 0.5 { ((top - point.z) / DEEP).clamp(0.0, 1.0) } else { 0.0 };
+    let depth = (depth / DEEP).clamp(0.0, 1.0);
     let color = BODY + (PRESSED - BODY) * (depth * depth * (3.0 - 2.0 * depth));
     let color = color * (sky + diffuse) + Vec3::repeat(highlight);
     [color.x, color.y, color.z].map(|channel| channel.round().clamp(0.0, 255.0) as u8)

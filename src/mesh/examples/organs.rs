@@ -1,5 +1,7 @@
 //! Writes a parametric organ at any resolution, prints what its mesh is like, and draws the sections of both organs.
 //!
+//! Without an argument it describes the liver of 6 mm elements.
+//!
 //! ```sh
 //! cargo run -p palpate-mesh --example organs -- liver --size-mm 6 --surface-mm 3 --out liver.msh
 //! cargo run -p palpate-mesh --example organs -- beam --size-mm 5 --out cantilever.msh
@@ -25,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let metres = |name: &str| option(name).map(|text| text.parse::<f64>().map(|mm| mm / 1000.0)).transpose();
     let sizes = Sizes { element_m: metres("--size-mm")?.unwrap_or(0.006), surface_m: metres("--surface-mm")? };
     let mesh = match arguments.first().map(String::as_str) {
-        Some("liver") => organs::liver(sizes)?,
+        None | Some("liver") => organs::liver(sizes)?,
         Some("prostate") => organs::prostate(sizes)?,
         Some("beam") => organs::beam([0.1, 0.02, 0.02], sizes.element_m)?,
         Some("table") => return print_table(),
@@ -33,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let drawing = sections::draw()?;
             return Ok(std::fs::write(option("--out").unwrap_or("organ_sections.svg".into()), drawing)?);
         }
-        _ => return Err("say liver, prostate, beam, table or sections; see the head of this file".into()),
+        Some(_) => return Err("say liver, prostate, beam, table or sections; see the head of this file".into()),
     };
     describe(&mesh);
     for group in &mesh.groups {
