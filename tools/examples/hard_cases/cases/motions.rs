@@ -71,7 +71,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [19.0, 67.0, 15.0, 46.0]),
             run(LinearBoundary, 0.0, [14.0, 70.0, 15.0, 29.0]),
             run(Predictive, 0.0, [0.56, 7.5, 15.0, 1.2]),
-            run(Predictive, 1.0, [0.91, 6.7, 15.0, 2.6]),
+            run(Predictive, 1.0, [0.98, 8.5, 15.0, 2.6]),
         ],
     )
     .ends_free(),

@@ -71,7 +71,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [14.0, 93.0, 37.0, 14.0]),
             run(LinearBoundary, 0.0, [7.6, 69.0, 42.0, 9.5]),
-            run(Predictive, 1.0, [0.68, 7.7, 45.0, 1.7]),
+            run(Predictive, 1.0, [0.56, 2.2, 55.0, 1.7]),
         ],
     ),
     case("rest", "hard/rest", "two minutes without a motion", &[run(Predictive, 1.0, [0.22, 4.6, 8.2, 5.5])]),
