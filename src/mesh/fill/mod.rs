@@ -145,11 +145,10 @@ fn volume(mesh: &TetrahedralMesh) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use palpate_model::Vec3;
     use proptest::prelude::*;
 
     use super::*;
-    use palpate_model::Vec3;
-
     use crate::support::{Shape, angles, noise, outer_faces};
 
     /// Check that every element is positive and of the promised angles, and that neighbours cut their common face alike, before
