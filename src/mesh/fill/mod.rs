@@ -9,16 +9,17 @@ mod distance;
 mod lattice;
 mod leaves;
 mod manifold;
+mod shape;
 mod stencil;
 mod stuff;
 
-use palpate_model::Vec3;
 use palpate_model::mesh::TetrahedralMesh;
 
 use crate::{MeshError, SurfaceMesh};
 use distance::Closed;
 use lattice::Lattice;
 use leaves::Leaves;
+pub use shape::ImplicitShape;
 use stuff::{Elements, Warped};
 
 /// Elements inside are at most this many times doubled: above it the lattice of the fine ones is too large for any body.
@@ -58,16 +59,6 @@ impl Sizes {
         let doublings = (element_m / finest * (1.0 + 1e-9)).log2().floor() as usize;
         Ok((finest, doublings.min(MOST_DOUBLINGS)))
     }
-}
-
-/// A shape given by a function instead of triangles.
-pub trait ImplicitShape {
-    /// Negative inside, positive outside, zero on the surface, and continuous. The distance (m) is best; a value that merely grows with
-    /// it fills as well.
-    fn signed_distance(&self, point: &Vec3) -> f64;
-
-    /// The lowest and the highest corner of a box that the whole shape lies in (m).
-    fn bounds(&self) -> [Vec3; 2];
 }
 
 /// Fills a closed `surface` with tetrahedra. `progress` is called with the part that is done, from 0 to 1. The result has no groups, and
@@ -154,6 +145,7 @@ fn volume(mesh: &TetrahedralMesh) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use palpate_model::Vec3;
     use proptest::prelude::*;
 
     use super::*;

@@ -3,9 +3,8 @@
 use super::element::Element;
 use super::places::Places;
 use super::solid::Solid;
-use super::{Tetrahedra, Tissue, TissueRegion};
+use super::{Tetrahedra, Tissue, TissueRegion, Where};
 use crate::Mat3;
-use crate::body::Shape;
 use crate::body::kernel::TetrahedraKernel;
 use crate::error::ModelError;
 use crate::integrator::Spectrum;
@@ -17,18 +16,6 @@ const EXTENTS: [f64; 2] = [1e-3, 10.0];
 const SHORTEST_STEP: f64 = 5e-6;
 /// The step that the worst element alone allows is good to this factor.
 const DOUBT: f64 = 4.0;
-
-/// A part of a mesh: a shape, or a named group of it.
-///
-/// # Real-time
-/// A plain value: its methods are wait-free and real-time safe.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Where {
-    /// All that lies in a shape.
-    Shape(Shape),
-    /// A group of the mesh.
-    Group(String),
-}
 
 /// Collects what a body of tetrahedra is made of. Defaults: liver, average nodal pressure, nothing held.
 ///

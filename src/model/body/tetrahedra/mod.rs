@@ -2,14 +2,16 @@
 
 mod builder;
 mod element;
+mod part;
 mod places;
 mod restriction;
 mod solid;
 mod tissue;
 mod window;
 
-pub use builder::{TetrahedraBuilder, Where};
+pub use builder::TetrahedraBuilder;
 pub(crate) use element::Element;
+pub use part::Where;
 pub use tissue::{Tissue, TissueRegion};
 
 use super::kernel::{InstructionSet, NOMINAL_ELEMENT_S, TetrahedraKernel};
