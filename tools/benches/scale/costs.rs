@@ -14,7 +14,7 @@ use palpate::model::simulation::{Simulation, Stepping};
 use palpate::model::surroundings::{Bases, Basis, RestingBody};
 use palpate::runtime::{Nanos, Stopwatch};
 use palpate::{Error, ErrorKind};
-use palpate_cli::drawing::{Picture, Series};
+use palpate_cli::drawing::{Picture, Series, Sign};
 
 use crate::common::{colour, figure, table, us};
 
@@ -336,7 +336,14 @@ pub fn picture(all: &[Costs]) -> Picture {
                 (costs.springs as f64, us(ticks[0]), label)
             };
             let points = at.iter().enumerate().map(point).collect();
-            series.push(Series { name: model.to_owned(), colour: colour(model), is_joined: true, is_hollow, points });
+            series.push(Series {
+                name: model.to_owned(),
+                colour: colour(model),
+                is_joined: true,
+                is_hollow,
+                points,
+                sign: Sign::Disc,
+            });
         }
     }
     let mut periods: Vec<Nanos> = all.iter().map(Costs::period).collect();

@@ -1,10 +1,12 @@
 //! Speed against error: what `palpate compare` does, for the reference scenes, for patch and basis sizes, substeps and
-//! haptic rates. Writes docs/speed_vs_error.md and its pictures.
+//! haptic rates, and on organs against the finest solution. Writes docs/speed_vs_error.md and its pictures.
 //!
-//! `cargo bench --bench speed_vs_error`; with `-- --quick` a short form that prints and writes nothing.
+//! `cargo bench --bench speed_vs_error`; with `-- --organs` the section of the organs alone, in place of the one that is there; with
+//! `-- --quick` a short form that prints and writes nothing.
 
 #[path = "../common/mod.rs"]
 mod common;
+mod organs;
 mod rates;
 mod scenes;
 mod sizes;
@@ -19,6 +21,7 @@ struct Part {
     pictures: Vec<(String, String)>,
 }
 
+const DOCUMENT: &str = "docs/speed_vs_error.md";
 const HEAD: &str = "\
 # Speed against error
 
@@ -33,7 +36,7 @@ fn document(is_quick: bool) -> Result<(), Error> {
     let date = common::measured_on("cargo bench --bench speed_vs_error");
     let mut text = format!("{HEAD}\n{date}\n");
     // Long: what is there is written after every part.
-    for part in [scenes::part, sizes::part, rates::part] {
+    for part in [organs::part, scenes::part, sizes::part, rates::part] {
         let part = part(is_quick)?;
         text.push('\n');
         text.push_str(&part.text);
@@ -43,7 +46,7 @@ fn document(is_quick: bool) -> Result<(), Error> {
         for (name, svg) in &part.pictures {
             common::write(&format!("docs/img/{name}.svg"), svg)?;
         }
-        common::write("docs/speed_vs_error.md", &text)?;
+        common::write(DOCUMENT, &text)?;
     }
     if is_quick {
         print!("{text}");
@@ -51,9 +54,24 @@ fn document(is_quick: bool) -> Result<(), Error> {
     Ok(())
 }
 
+fn organs_alone(is_quick: bool) -> Result<(), Error> {
+    let part = organs::part(is_quick)?;
+    if is_quick {
+        print!("{}", part.text);
+        return Ok(());
+    }
+    for (name, svg) in &part.pictures {
+        common::write(&format!("docs/img/{name}.svg"), svg)?;
+    }
+    let path = common::in_repository(DOCUMENT);
+    let text = std::fs::read_to_string(&path).map_err(|error| Error::io(&path, error))?;
+    common::write(DOCUMENT, &organs::replaced(&text, &part.text))
+}
+
 fn main() -> ExitCode {
     let Some(arguments) = common::arguments() else { return ExitCode::SUCCESS };
-    match document(arguments.is_quick) {
+    let only_organs = std::env::args().any(|argument| argument == "--organs");
+    match if only_organs { organs_alone(arguments.is_quick) } else { document(arguments.is_quick) } {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("{error}");

@@ -6,7 +6,7 @@ use palpate::Error;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Rate;
 use palpate_cli::compare::{CompareOptions, Comparison, Measured};
-use palpate_cli::drawing::{Picture, Series};
+use palpate_cli::drawing::{Picture, Series, Sign};
 
 use crate::Part;
 use crate::common::{HEADS, cells, colour, compared, figure, scene, table, us};
@@ -113,6 +113,7 @@ fn picture(scene: &str, measured: &[(f64, Comparison)]) -> Picture {
         name: model.to_owned(),
         colour: colour(model),
         is_joined: true,
+        sign: Sign::Disc,
         is_hollow: false,
         points: measured
             .iter()

@@ -6,7 +6,7 @@ use palpate::Error;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
 use palpate_cli::compare::{CompareOptions, Comparison, Measured};
-use palpate_cli::drawing::{Picture, Series};
+use palpate_cli::drawing::{Picture, Series, Sign};
 
 use crate::Part;
 use crate::common::{HEADS, cells, colour, compared, scene, table, us};
@@ -66,6 +66,7 @@ fn picture(comparison: &Comparison) -> Picture {
         name: model.to_owned(),
         colour: colour(model),
         is_joined: false,
+        sign: Sign::Disc,
         is_hollow,
         // What is exact but for rounding would stretch the axis by ten decades: it lies on the edge.
         points: vec![(us(run.cost.tick_p50), if run.error.rms < EXACT { 0.0 } else { run.error.rms }, label)],

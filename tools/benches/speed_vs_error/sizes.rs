@@ -6,7 +6,7 @@ use palpate::model::local::Prediction;
 use palpate::runtime::Rate;
 use palpate::scene::Scene;
 use palpate_cli::compare::{CompareOptions, Comparison, Measured};
-use palpate_cli::drawing::{Picture, Series};
+use palpate_cli::drawing::{Picture, Series, Sign};
 
 use crate::Part;
 use crate::common::{HEADS, cells, colour, compared, figure, scene, table, us};
@@ -127,6 +127,7 @@ fn picture(scene: &str, measured: &[(&str, Comparison)]) -> Picture {
         name: model.to_owned(),
         colour: colour(model),
         is_joined: false,
+        sign: Sign::Disc,
         is_hollow: false,
         points: measured
             .iter()

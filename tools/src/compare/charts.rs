@@ -5,7 +5,7 @@ use palpate::runtime::Nanos;
 
 use super::figures::{ComparedRun, Comparison, Measured};
 use super::milliseconds;
-use crate::drawing::svg::{Axis, Chart, Line, Mark, Point};
+use crate::drawing::svg::{Axis, Chart, Line, Mark, Point, Sign};
 
 const WIDE: f64 = 960.0;
 /// A force below this part of the peak is no contact to look at.
@@ -160,6 +160,7 @@ impl<'a> Plots<'a> {
                 (model, late) => format!("{model} {} ms", milliseconds(late)),
             },
             at: (us(run), run.error.rms),
+            sign: Sign::Disc,
             is_hollow: late != Nanos::ZERO,
         };
         let runs = measured.iter().map(|(run, measured)| point(&run.model, run.latency, measured));

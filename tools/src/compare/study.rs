@@ -7,7 +7,7 @@ use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Histogram;
 use palpate::runtime::{Nanos, Rate, Stopwatch};
 use palpate::scene::{BodySpec, Scene};
-use palpate::session::{Session, Summary};
+use palpate::session::{Session, SessionBuilder, Summary};
 use palpate::{Error, ErrorKind};
 
 use super::figures::{ComparedRun, Comparison, ForceDeviation, ForceTrace, Measured, ModelCost, RunOutcome};
@@ -120,6 +120,18 @@ impl Comparison {
     }
 }
 
+impl Measured {
+    /// Runs a session of `full` on this thread, in virtual time, and measures it: for a body that no scene describes. Its errors are those
+    /// against itself.
+    ///
+    /// # Errors
+    /// If it cannot be run, or its run ends in a fault.
+    pub fn of_full(session: SessionBuilder) -> Result<Self, Error> {
+        let session = session.model(LocalModelKind::Full).virtual_time().keep_records().measure_cost().build()?;
+        sound(&execute(session, |_, _| ())?.1)
+    }
+}
+
 /// How a run went, with its distance from `full`.
 fn outcome(ran: Result<(Nanos, Summary), Error>, full: &ForceTrace) -> RunOutcome {
     match ran {
@@ -138,9 +150,14 @@ fn full(
     at_work: impl FnMut(Nanos, Option<Nanos>),
 ) -> Result<Comparison, Error> {
     let (duration, summary) = execute(session, at_work)?;
+    Ok(Comparison { full: sound(&summary)?, duration, ..comparison })
+}
+
+/// What a run of `full` says, unless it ended in a fault.
+fn sound(summary: &Summary) -> Result<Measured, Error> {
     match &summary.runtime.fault {
         Some(fault) => Err(Error::new(ErrorKind::Fault, format!("the run of `full`: {fault}"))),
-        None => Ok(Comparison { full: measured(&summary, None), duration, ..comparison }),
+        None => Ok(measured(summary, None)),
     }
 }
 

@@ -9,3 +9,4 @@ pub(crate) mod svg;
 pub use colour::Colour;
 pub use picture::{Picture, Series};
 pub use sheet::{Curve, Panel, Sheet};
+pub use svg::Sign;

@@ -1,7 +1,8 @@
 //! A chart as an SVG file of its own, for documents.
 
 use super::Colour;
-use super::svg::{Axis, Chart, Line, Mark, Point, around};
+use super::html::escaped;
+use super::svg::{Axis, Chart, Line, Mark, Point, Sign, around};
 
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 420.0;
@@ -21,6 +22,7 @@ text { font: 11px Helvetica, Arial, sans-serif; fill: #626b79; }
 .label { fill: currentColor; font-weight: 600; }
 .c0 { color: #1d232d; } .c1 { color: #0072b2; } .c2 { color: #d55e00; } .c3 { color: #009e73; }
 .c4 { color: #aa4a94; } .c5 { color: #b58900; } .c6 { color: #2a9fd6; } .c7 { color: #7a5230; }
+.c8 { color: #969ca6; }
 ";
 
 /// Points of a [`Picture`] that belong together.
@@ -32,7 +34,9 @@ pub struct Series {
     pub colour: Colour,
     /// True if the points are joined by a line, in the order given, which rises in x.
     pub is_joined: bool,
-    /// True if the points are drawn as circles in place of discs.
+    /// The shape of its points.
+    pub sign: Sign,
+    /// True if the points are drawn as outlines, such as circles in place of discs.
     pub is_hollow: bool,
     /// Points by x, y and label, which may be empty. What is not above zero lies on the edge.
     pub points: Vec<(f64, f64, String)>,
@@ -58,6 +62,22 @@ pub struct Picture {
 impl Picture {
     /// The chart as an SVG document: light, without fonts or styles from elsewhere.
     pub fn to_svg(&self) -> String {
+        self.chart().to_file(STYLE)
+    }
+
+    /// One such document of several charts, from top to bottom.
+    pub fn stacked(title: &str, pictures: &[Self]) -> String {
+        let height = HEIGHT * pictures.len() as f64;
+        let charts: String =
+            (0..).zip(pictures).map(|(row, picture)| picture.chart().to_part([0.0, HEIGHT * f64::from(row)])).collect();
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{}\">\n\
+             <style>\n{STYLE}</style>\n<rect class=\"paper\" width=\"{WIDTH}\" height=\"{height}\"/>\n{charts}</svg>\n",
+            escaped(title)
+        )
+    }
+
+    fn chart(&self) -> Chart<'_> {
         let points = || self.series.iter().flat_map(|series| &series.points);
         let lines = self.series.iter().filter(|series| series.is_joined);
         let lines = lines.map(|series| Line {
@@ -70,6 +90,7 @@ impl Picture {
                 class: series.colour.to_string(),
                 label: label.clone(),
                 at: (*x, *y),
+                sign: series.sign,
                 is_hollow: series.is_hollow,
             })
         });
@@ -82,14 +103,13 @@ impl Picture {
         let x = Axis::log(&self.x, [from, to]);
         let y =
             Axis::log(&self.y, around(points().map(|point| point.1).chain(self.levels.iter().map(|level| level.0))));
-        let chart = Chart {
+        Chart {
             marks: marks(&self.marks),
             levels: marks(&self.levels),
             lines: lines.collect(),
             points: discs.filter(|point| point.at.0.is_finite() && point.at.1.is_finite()).collect(),
             ..Chart::new(&*self.title, [WIDTH, HEIGHT], x, y)
-        };
-        chart.to_file(STYLE)
+        }
     }
 }
 
@@ -100,8 +120,14 @@ mod tests {
     #[test]
     fn a_picture_is_a_document_with_its_words_and_no_number_that_nothing_reads() {
         let points = vec![(1.0, 0.0, "full".to_owned()), (100.0, 5.0, "a < b".to_owned()), (2.0, f64::NAN, "x".into())];
-        let series =
-            Series { name: "one".into(), colour: Colour::numbered(9), is_joined: true, is_hollow: true, points };
+        let series = Series {
+            name: "one".into(),
+            colour: Colour::numbered(9),
+            is_joined: true,
+            sign: Sign::Diamond,
+            is_hollow: true,
+            points,
+        };
         let picture = Picture {
             title: "t".into(),
             x: "us".into(),
@@ -116,6 +142,18 @@ mod tests {
             assert!(svg.contains(words), "{words:?} is not in {svg}");
         }
         assert!(!svg.contains(">x<") && !svg.contains("inf"), "{svg}");
+    }
+
+    #[test]
+    fn stacked_pictures_are_one_document_with_a_part_for_each() {
+        let one = Picture { title: "a & b".into(), ..Picture::default() };
+        let svg = Picture::stacked("all < of it", &[one.clone(), one]);
+        assert!(svg.starts_with("<svg xmlns=") && svg.ends_with("</svg>\n"), "{svg}");
+        for (words, count) in
+            [("a &amp; b</text>", 2), ("class=\"frame\"", 2), ("y=\"420\" width=\"960\"", 1), ("all &lt; of it", 1)]
+        {
+            assert_eq!(svg.matches(words).count(), count, "{words:?} in {svg}");
+        }
     }
 
     #[test]

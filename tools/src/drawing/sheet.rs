@@ -19,7 +19,6 @@ const MORE: &str = "\
 .key { fill: #1d232d; }
 .band { fill: #fff3d6; }
 .wide { stroke-width: 2.8; }
-.c8 { color: #969ca6; }
 ";
 
 /// A curve of a [`Panel`].

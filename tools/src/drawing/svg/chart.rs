@@ -15,6 +15,8 @@ const FOOT: f64 = 38.0;
 /// What a letter of a label takes.
 const LETTER: f64 = 6.4;
 const LINE: f64 = 13.0;
+/// Where the label of a point may be, in lines below it: nearest first.
+const LABEL_LINES: [f64; 11] = [-0.1, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0, 5.0, -5.0];
 
 /// A curve.
 #[derive(Clone, Debug)]
@@ -33,6 +35,7 @@ pub(crate) struct Point {
     pub(crate) class: String,
     pub(crate) label: String,
     pub(crate) at: (f64, f64),
+    pub(crate) sign: Sign,
     pub(crate) is_hollow: bool,
 }
 
@@ -251,8 +254,8 @@ impl Chart<'_> {
         for point in &self.points {
             let (x, y) = place(point);
             let long = LETTER * point.label.chars().count() as f64;
-            let right = [-0.1, 1.0, -1.0, 2.0, -2.0].map(|lines| (x + 9.0, y + 4.0 + lines * LINE));
-            let left = [-0.1, 1.0, -1.0, 2.0, -2.0].map(|lines| (x - 9.0 - long, y + 4.0 + lines * LINE));
+            let right = LABEL_LINES.map(|lines| (x + 9.0, y + 4.0 + lines * LINE));
+            let left = LABEL_LINES.map(|lines| (x - 9.0 - long, y + 4.0 + lines * LINE));
             let area = |(x, y): (f64, f64)| Area { left: x, right: x + long, top: y - LINE + 3.0, bottom: y + 3.0 };
             let plot = Area { left: LEFT, right: self.width, top: HEAD, bottom: HEAD + self.down() };
             let is_free =
@@ -261,9 +264,13 @@ impl Chart<'_> {
             taken.push(area(at));
             let (class, hollow) = (&point.class, if point.is_hollow { " hollow" } else { "" });
             let label = escaped(&point.label);
+            let sign = match point.sign {
+                Sign::Disc => format!("<circle class=\"point{hollow}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/>"),
+                sign => format!("<path class=\"point{hollow}\" d=\"{}\"/>", sign.path(x, y)),
+            };
             let _ = writeln!(
                 svg,
-                "<g class=\"{class}\"><circle class=\"point{hollow}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/>\
+                "<g class=\"{class}\">{sign}\
                  <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\">{label}</text></g>",
                 at.0, at.1
             );
@@ -335,7 +342,13 @@ mod tests {
     #[test]
     fn labels_of_points_at_one_place_do_not_lie_on_each_other() {
         let mut chart = chart();
-        let point = |label: &str| Point { class: "c1".into(), label: label.into(), at: (0.5, 1.0), is_hollow: false };
+        let point = |label: &str| Point {
+            class: "c1".into(),
+            label: label.into(),
+            at: (0.5, 1.0),
+            sign: Sign::Disc,
+            is_hollow: false,
+        };
         chart.points = ["one", "two", "six"].map(point).into();
         let svg = chart.to_svg();
         let places: Vec<&str> = svg.lines().filter_map(|line| line.split("class=\"label\"").nth(1)).collect();

@@ -14,4 +14,4 @@ pub(crate) use axis::{Axis, around, power, round_step};
 pub(crate) use chart::{Bars, Chart, Line, Mark, Point, Signs};
 pub(crate) use heat::{HeatScale, heat_style};
 pub(crate) use heat_map::{HeatCell, HeatMap};
-pub(crate) use sign::Sign;
+pub use sign::Sign;

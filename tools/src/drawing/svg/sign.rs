@@ -1,12 +1,18 @@
 //! Small signs that differ in shape: what is told apart by colour must not be told apart by colour alone.
 
 /// The shape of a mark.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sign {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sign {
+    /// A triangle that stands on a side.
     Triangle,
+    /// A square that stands on a side.
     Square,
+    /// A square that stands on a corner.
     Diamond,
+    /// A disc.
+    #[default]
     Disc,
+    /// A diagonal cross.
     Cross,
 }
 

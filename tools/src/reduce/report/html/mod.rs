@@ -11,7 +11,7 @@ use std::fmt::Write;
 use super::table::prose;
 use super::words;
 use crate::drawing::html::{escaped, page};
-use crate::drawing::svg::{Chart, Line, Point, heat_style};
+use crate::drawing::svg::{Chart, Line, Point, Sign, heat_style};
 use crate::reduce::findings::ReductionStudy;
 
 const STYLE: &str = include_str!("reduce.css");
@@ -81,6 +81,7 @@ fn with_points(mut chart: Chart<'_>, curves: &[Curve<'_>], caption: &str) -> Str
             class: class.to_owned(),
             label: String::new(),
             at: *at,
+            sign: Sign::Disc,
             is_hollow: curve.is_hollow,
         });
         chart.points.extend(points);
