@@ -10,7 +10,7 @@ mod tissue_support;
 
 use std::error::Error;
 
-use palpate_cli::drawing::{Colour, Picture, Series};
+use palpate_cli::drawing::{Colour, Picture, Series, Sign};
 use tissue_support::bent::{Bent, CANTILEVER, COOK, Split};
 
 const REFINEMENTS: [usize; 4] = [1, 2, 3, 4];
@@ -72,5 +72,5 @@ fn series(bent: Bent, split: Split, is_averaged: bool, errors: &[f64; 4]) -> Ser
         (Split::Diagonal, true) => Colour::ORANGE,
         (Split::Diagonal, false) => Colour::RED,
     };
-    Series { name, colour, is_joined: true, is_hollow: false, points }
+    Series { name, colour, is_joined: true, is_hollow: false, sign: Sign::Disc, points }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use palpate_mesh::Sizes;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::place::{self, Place};
@@ -141,6 +142,11 @@ impl TetrahedraSpec {
         )
     }
 
+    /// Sizes of the elements that its surface is filled with.
+    pub(in crate::scene) fn sizes(&self) -> Sizes {
+        Sizes { element_m: self.element_size_m.unwrap_or_default(), surface_m: self.surface_size_m }
+    }
+
     /// The same body with its surface filled anew, with elements that are `times` smaller; `None` if it fills no surface.
     ///
     /// # Errors
@@ -149,7 +155,9 @@ impl TetrahedraSpec {
         let smaller = |size_m: Option<f64>| size_m.map(|size_m| size_m / times);
         let (element_size_m, surface_size_m) = (smaller(self.element_size_m), smaller(self.surface_size_m));
         let mut finer = Self { element_size_m, surface_size_m, ..self.clone() };
-        let Some(volume) = self.volume.as_ref().and_then(|volume| volume.refilled(&finer)) else { return Ok(None) };
+        let Some(volume) = self.volume.as_ref().and_then(|volume| volume.refilled(finer.sizes())) else {
+            return Ok(None);
+        };
         finer.volume = Some(volume?);
         Ok(Some(finer))
     }

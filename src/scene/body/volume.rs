@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use palpate_mesh::{Sizes, SurfaceMesh, VolumeFile, fill, read_surface, read_volume, write_msh};
 
-use super::TetrahedraSpec;
 use crate::error::{Error, ErrorKind};
 use crate::files;
 use crate::model::mesh::{LeftOut, TetrahedralMesh};
@@ -49,27 +48,26 @@ impl Volume {
         Ok(Self(Arc::new(Checked { mesh, left_out, others: Vec::new(), filled: None, file, unit_m: 1.0 })))
     }
 
-    /// Reads the file of `spec` at `path`, and fills it if it is a surface; `progress` is told how much of that is done (0 to 1).
+    /// Reads the file at `path`, of which a unit is `unit_m` metres; with sizes it is a surface and is filled, and `progress` is
+    /// told how much of that is done (0 to 1).
     pub(in crate::scene) fn read(
-        spec: &TetrahedraSpec,
         path: &Path,
+        unit_m: f64,
+        filled_with: Option<Sizes>,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Self, Error> {
         let bytes = files::read(path, LARGEST_FILE)?;
         let name = path.display().to_string();
-        if spec.surface.is_none() {
-            return Self::of_file(bytes, &name, spec.unit_m);
-        }
+        let Some(sizes) = filled_with else { return Self::of_file(bytes, &name, unit_m) };
         let mut surface = read_surface(&name, &bytes)?;
-        surface.points.iter_mut().for_each(|point| *point *= spec.unit_m);
+        surface.points.iter_mut().for_each(|point| *point *= unit_m);
         check_unit(&surface)?;
         let (surface, _) = surface.cleaned().map_err(|error| Error::from(error).at(&name))?;
-        Self::filling(surface, spec, progress).map_err(|error| error.at(&name))
+        Self::filling(surface, sizes, progress).map_err(|error| error.at(&name))
     }
 
-    /// Fills `surface` (m) with elements of the sizes of `spec`.
-    fn filling(surface: SurfaceMesh, spec: &TetrahedraSpec, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
-        let sizes = Sizes { element_m: spec.element_size_m.unwrap_or_default(), surface_m: spec.surface_size_m };
+    /// Fills `surface` (m) with elements of `sizes`.
+    fn filling(surface: SurfaceMesh, sizes: Sizes, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let mesh = fill(&surface, sizes, progress)?;
         let file = written(&mesh)?;
         let (mesh, left_out) = mesh.cleaned()?;
@@ -77,9 +75,9 @@ impl Volume {
         Ok(Self(Arc::new(Checked { mesh, left_out, others, filled, file, unit_m: 1.0 })))
     }
 
-    /// The surface that this fills, filled with elements of the sizes of `spec`; `None` if it fills none.
-    pub(in crate::scene) fn refilled(&self, spec: &TetrahedraSpec) -> Option<Result<Self, Error>> {
-        self.0.filled.clone().map(|surface| Self::filling(surface, spec, &mut |_| ()))
+    /// The surface that this fills, filled with elements of `sizes`; `None` if it fills none.
+    pub(in crate::scene) fn refilled(&self, sizes: Sizes) -> Option<Result<Self, Error>> {
+        self.0.filled.clone().map(|surface| Self::filling(surface, sizes, &mut |_| ()))
     }
 
     /// The volume in the bytes of a file of which a unit is `unit_m` metres; `name` stands for it in errors.

@@ -64,7 +64,10 @@ impl Scene {
     fn from_text(text: &str, name: &str, base: Option<&Path>, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
         let found = |file: &Path| base.map_or_else(|| file.to_owned(), |base| base.join(file));
         let read_path = |path_csv: &Path| ToolPath::read_csv(&found(path_csv));
-        let read_volume = |spec: &TetrahedraSpec, file: &Path| Volume::read(spec, &found(file), progress);
+        let read_volume = |spec: &TetrahedraSpec, file: &Path| {
+            let filled_with = spec.surface.is_some().then(|| spec.sizes());
+            Volume::read(&found(file), spec.unit_m, filled_with, progress)
+        };
         let mut scene = Self::from_toml_with(text, name, read_path, read_volume)?;
         // It is read when a session is built.
         for device in &mut scene.devices {
