@@ -5,7 +5,7 @@ use palpate_model::Vec3;
 use super::{SurfaceMesh, Welded};
 use crate::error::MeshError;
 
-/// What [`SurfaceMesh::cleaned`] found and changed.
+/// A record of the changes that [`SurfaceMesh::cleaned`] made to a surface, and of the parts that it found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurfaceFindings {
     /// The parts that do not touch each other, the largest first.

@@ -14,7 +14,7 @@ const MOST: usize = 1 << 30;
 /// Elements that a message names.
 const NAMED: usize = 3;
 
-/// What [`TetrahedralMesh::cleaned`] changed.
+/// A record of the changes that [`TetrahedralMesh::cleaned`] made to a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LeftOut {
     /// Nodes that no element uses: they are left out.

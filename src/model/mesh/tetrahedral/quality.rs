@@ -3,7 +3,7 @@
 use super::TetrahedralMesh;
 use crate::Vec3;
 
-/// What a mesh consists of and how good its worst elements are.
+/// Counts, size and volume of a mesh, with the quality of its worst elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshQuality {
     /// Number of nodes.
