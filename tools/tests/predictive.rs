@@ -116,6 +116,21 @@ fn a_circle_over_nearly_incompressible_tissue() {
     assert!(late.rms <= 0.4 && late.max <= 2.0 && late.jump <= own_jump + 1.0, "{late:?}");
 }
 
+/// Surroundings that give way once left the patch without what holds it: `scaled_boundary` and `condensed` diverged here.
+#[test]
+fn every_other_model_stays_bounded_on_nearly_incompressible_tissue() {
+    let mut scene = scene("tests/reference/tissue/t2_circle_incompressible.toml");
+    scene.run.duration_s = 0.5;
+    let case = Case::of(scene);
+    for model in LocalModelKind::ALL {
+        if matches!(model, LocalModelKind::Full | LocalModelKind::Predictive) {
+            continue;
+        }
+        let (late, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.model = model.into());
+        assert!(late.rms <= 30.0 && late.max <= 100.0, "{}: {late:?}", model.name());
+    }
+}
+
 /// Running the whole body ahead costs periods of simulation where the reduced prediction costs half of one. It is more
 /// exact, as the surroundings are linear around rest in the other.
 #[test]

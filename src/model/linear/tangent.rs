@@ -5,7 +5,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::body::{Body, State};
 use crate::integrator::{Spectrum, largest_eigenvalue};
+use crate::linear_algebra::cholesky;
 use crate::{Mat3, Vec3};
+
+/// The share of a matrix's largest number that may be missing to definiteness.
+const ROUNDING: f64 = 1e-9;
 
 /// Force on the n nodes of a patch as a linear function of their motion and of the time that their surroundings move on.
 ///
@@ -119,15 +123,15 @@ impl PatchTangent {
         rows += force;
     }
 
-    /// Adds `stiffness` (N/m, 3n x 3n, a derivative of the force as K is) to K.
+    /// Adds `share` of `stiffness` (N/m, 3n x 3n, a derivative of the force as K is) to K.
     ///
     /// # Real-time
     /// For the global actor: bounded.
-    pub(crate) fn add_stiffness(&mut self, stiffness: &DMatrix<f64>) {
+    pub(crate) fn add_stiffness(&mut self, stiffness: &DMatrix<f64>, share: f64) {
         let n = self.force.len();
         if stiffness.shape() == (n, n) {
             let mut position = self.matrix.columns_mut(0, n);
-            position += stiffness;
+            position += stiffness * share;
         }
     }
 
@@ -182,6 +186,22 @@ impl PatchTangent {
             })
         };
         Spectrum { stiffness: largest(0), damping: largest(3 * n) }
+    }
+
+    /// True if K draws every displacement back and C slows every motion: both negative definite but for rounding.
+    ///
+    /// # Real-time
+    /// For the global actor: allocates; bounded, some 20 n^3 multiply-adds.
+    pub(crate) fn is_stable(&self) -> bool {
+        let n = self.force.len();
+        [0, n].into_iter().all(|first| {
+            let matrix = self.matrix.columns(first, n);
+            let mut positive = (&matrix + matrix.transpose()) * -0.5;
+            // What does not move at all, such as without damping, is no fault.
+            let shift = ROUNDING * positive.amax() + f64::MIN_POSITIVE;
+            (0..n).for_each(|at| positive[(at, at)] += shift);
+            cholesky(&positive).is_some()
+        })
     }
 
     /// K and C side by side (N/m, N s/m), 3n x 6n.

@@ -48,6 +48,11 @@ impl Boundary {
         if let Self::Yielding(yielding) = self { yielding.compliance(nodes) } else { None }
     }
 
+    /// True if they answer to the patch's motion within a period.
+    pub(super) fn gives_way(&self) -> bool {
+        matches!(self, Self::Layered(_) | Self::Yielding(_))
+    }
+
     /// Haptic ticks for which outside nodes move on with their velocity at the resync.
     pub(super) fn moving_ticks(&self) -> u32 {
         if let Self::Drifting { ticks } = *self { ticks } else { 0 }

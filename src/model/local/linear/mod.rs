@@ -13,6 +13,9 @@ use crate::linear::{Drift, ImplicitStep, PatchTangent};
 
 pub(super) use boundary::{Boundary, Layers, Yielding};
 
+/// How far surroundings give way, of what they would: the first that leaves the patch stable.
+const WEAKENED: [f64; 5] = [1.0, 0.75, 0.5, 0.25, 0.0];
+
 /// What a linear patch is made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct LinearSpec {
@@ -90,15 +93,23 @@ impl LocalModel for LinearPatch {
         let window = &patch.window;
         let nodes = &window.nodes[..window.movable];
         patch.forces.resize(nodes.len(), Vec3::zeros());
-        let share = |row, column| boundary.share(body, row, column);
-        tangent.rebuild(body, resync.global.state(), nodes, &|node| window.movable(node), &share);
+        // Surroundings that give way take stiffness from the patch. Of springs at rest it is left with enough; of elements, or
+        // far from rest, it may be left without what holds it.
+        let compliance = boundary.compliance(nodes);
+        for &weakened in if boundary.gives_way() { &WEAKENED[..] } else { &[0.0] } {
+            let share = |row, column| 1.0 - weakened * (1.0 - boundary.share(body, row, column));
+            tangent.rebuild(body, resync.global.state(), nodes, &|node| window.movable(node), &share);
+            if let Some(stiffness) = &compliance {
+                tangent.add_stiffness(stiffness, weakened);
+            }
+            if weakened == 0.0 || tangent.is_stable() {
+                break;
+            }
+        }
         for (node, force) in resync.global.exerted_beside(resync.index) {
             if let Some(place) = window.movable(node) {
                 tangent.add_force(place, force);
             }
-        }
-        if let Some(stiffness) = boundary.compliance(nodes) {
-            tangent.add_stiffness(&stiffness);
         }
         self.ticks = 0;
         (patch.stepping, self.is_implicit) =
