@@ -196,7 +196,7 @@ impl PatchTangent {
         let n = self.force.len();
         [0, n].into_iter().all(|first| {
             let matrix = self.matrix.columns(first, n);
-            let mut positive = (&matrix + matrix.transpose()) * -0.5;
+            let mut positive = (matrix + matrix.transpose()) * -0.5;
             // What does not move at all, such as without damping, is no fault.
             let shift = ROUNDING * positive.amax() + f64::MIN_POSITIVE;
             (0..n).for_each(|at| positive[(at, at)] += shift);
