@@ -8,13 +8,11 @@ use palpate_mesh::{Sizes, SurfaceMesh, VolumeFile, fill, read_surface, read_volu
 
 use crate::error::{Error, ErrorKind};
 use crate::files;
+use crate::model::body::TetrahedraBuilder;
 use crate::model::mesh::{LeftOut, TetrahedralMesh};
 
 /// Largest mesh file (bytes): a log holds it in one record of 64 MiB.
 const LARGEST_FILE: u64 = 63 << 20;
-/// Largest and smallest body (m): what is beyond has another unit.
-const LARGEST_M: f64 = 10.0;
-const SMALLEST_M: f64 = 1e-3;
 
 /// A mesh that has been checked, what was left out of it, and the file that it can be made from again. Copies share it.
 #[derive(Clone, PartialEq)]
@@ -136,11 +134,12 @@ fn check_unit(surface: &SurfaceMesh) -> Result<(), Error> {
         places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min)
     };
     let extent_m = (0..3).map(along).fold(0.0, f64::max);
-    if (SMALLEST_M..=LARGEST_M).contains(&extent_m) {
+    let [least, most] = TetrahedraBuilder::EXTENT_M;
+    if (least..=most).contains(&extent_m) {
         return Ok(());
     }
     let message = format!(
-        "the surface is {extent_m:.3e} m large, {SMALLEST_M} to {LARGEST_M} m are possible: give the metres per unit of its file, \
+        "the surface is {extent_m:.3e} m large, {least} to {most} m are possible: give the metres per unit of its file, \
          0.001 for millimetres"
     );
     Err(Error::scene("body.unit_m", message))

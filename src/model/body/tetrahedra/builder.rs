@@ -10,8 +10,6 @@ use crate::error::ModelError;
 use crate::integrator::Spectrum;
 use crate::mesh::{MeshQuality, Surface, TetrahedralMesh};
 
-/// Largest and smallest extent of a body (m): beyond them its file is most likely in another unit.
-const EXTENTS: [f64; 2] = [1e-3, 10.0];
 /// Shortest stable step (s): a tick of 1 ms would have more than two hundred substeps.
 const SHORTEST_STEP: f64 = 5e-6;
 /// The step that the worst element alone allows is good to this factor.
@@ -31,6 +29,9 @@ pub struct TetrahedraBuilder {
 }
 
 impl TetrahedraBuilder {
+    /// Smallest and largest extent of a body (m): beyond them its file is most likely in another unit.
+    pub const EXTENT_M: [f64; 2] = [1e-3, 10.0];
+
     /// What the body is made of.
     #[must_use]
     pub fn tissue(mut self, tissue: Tissue) -> Self {
@@ -121,11 +122,11 @@ fn element(mesh: &TetrahedralMesh, nodes: [u32; 4], tissue: &Tissue) -> Element 
 
 fn check_extent(quality: &MeshQuality) -> Result<(), ModelError> {
     let extent = quality.extent();
-    if extent.max() >= EXTENTS[0] && extent.max() <= EXTENTS[1] {
+    let [least, most] = TetrahedraBuilder::EXTENT_M;
+    if extent.max() >= least && extent.max() <= most {
         return Ok(());
     }
     let [x, y, z] = extent.into();
-    let [least, most] = EXTENTS;
     let message = format!(
         "the body is {x:.3e} x {y:.3e} x {z:.3e} m large, {least} to {most} m are possible: give the metres per unit of the mesh, 0.001 for millimetres"
     );
@@ -173,8 +174,7 @@ fn check_step(body: &mut Tetrahedra) -> Result<(), ModelError> {
         return Ok(());
     }
     let height = smallest_height(&body.solid.elements[worst]);
-    let sum: crate::Vec3 = body.mesh.tetrahedra[worst].iter().map(|&node| body.mesh.points[node as usize]).sum();
-    let [x, y, z] = (sum / 4.0).into();
+    let [x, y, z] = body.mesh.centroid(worst as u32).into();
     let message = format!(
         "the longest stable step is {:.2} us, at least {:.0} us are needed: element {worst} at ({x:.4}, {y:.4}, {z:.4}) m is the worst, {:.2e} m high; mend the mesh, or take a softer or less viscous tissue",
         step * 1e6,

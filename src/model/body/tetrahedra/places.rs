@@ -35,7 +35,7 @@ impl Places<'_> {
         let elements = match &region.place {
             Where::Shape(shape) => {
                 self.check(shape)?;
-                let is_in = |&element: &u32| self.holds(shape, &self.centroid(element));
+                let is_in = |&element: &u32| self.holds(shape, &self.mesh.centroid(element));
                 let elements: Vec<u32> = (0..tissues.len() as u32).filter(is_in).collect();
                 if elements.is_empty() {
                     let message = "holds no element's centroid: move or enlarge it, or refine the mesh";
@@ -107,11 +107,6 @@ impl Places<'_> {
 
     fn holds(&self, shape: &Shape, point: &Vec3) -> bool {
         shape.holds((*point).into(), [self.tolerance; 3])
-    }
-
-    fn centroid(&self, element: u32) -> Vec3 {
-        let corners = self.mesh.tetrahedra[element as usize].map(|node| self.mesh.points[node as usize]);
-        corners.iter().sum::<Vec3>() / 4.0
     }
 }
 
