@@ -68,10 +68,11 @@ impl Work {
 /// What the actors of a session record in a tick.
 fn record(recorder: &mut Recorder, ctx: &TickContext, sum: f64) {
     let (time, force_n) = (ctx.scheduled, [sum, 1.0, 2.0]);
-    recorder.push(LogRecord::Tool(ToolSample { time, position_m: force_n, ..ToolSample::default() }));
-    recorder.push(LogRecord::Force(ForceSample { time, force_n, ..ForceSample::default() }));
-    recorder.push(LogRecord::Contact(ContactSample { time, normal: force_n, ..ContactSample::default() }));
-    recorder.push(LogRecord::Command(CommandSample { time, force_n, ..CommandSample::default() }));
+    LogRecord::Tool(ToolSample { time, position_m: force_n, ..ToolSample::default() }).push_to(recorder);
+    LogRecord::Force(ForceSample { time, force_n, ..ForceSample::default() }).push_to(recorder);
+    LogRecord::Contact(ContactSample { time, normal: force_n.map(|f| f as f32), ..ContactSample::default() })
+        .push_to(recorder);
+    LogRecord::Command(CommandSample { time, force_n, ..CommandSample::default() }).push_to(recorder);
 }
 
 fn haptic(mut recorder: Option<Recorder>) -> Box<dyn Actor> {
@@ -177,7 +178,7 @@ fn actor_times() -> Vec<f64> {
 
 fn pushes() -> Vec<f64> {
     per_call(|recorder, i, _| {
-        recorder.push(black_box(LogRecord::Force(ForceSample { time: Nanos(i), ..ForceSample::default() })));
+        black_box(LogRecord::Force(ForceSample { time: Nanos(i), ..ForceSample::default() })).push_to(recorder);
     })
 }
 

@@ -76,7 +76,7 @@ impl Device for Hand {
         if self.reads.is_multiple_of(Self::STALE_EVERY) {
             return Err(DeviceFault::Stale);
         }
-        Ok(DeviceState { position: self.position, velocity: self.velocity, buttons: 0 })
+        Ok(DeviceState { position: self.position, velocity: self.velocity, ..DeviceState::default() })
     }
 
     fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {

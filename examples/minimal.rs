@@ -13,12 +13,13 @@ fn main() -> Result<(), Error> {
         .node_mass(0.5e-3) // kg
         .fix(Face::ZMin)
         .build()?;
-    // Press 9 mm into the top, drag 3 cm along x, lift. Seconds and metres.
-    let (over, pressed) = ([0.03, 0.05, 0.105], [0.03, 0.05, 0.091]);
-    let (dragged, lifted) = ([0.06, 0.05, 0.091], [0.06, 0.05, 0.105]);
+    // Press a sphere of 8 mm 9 mm into the top, drag it 3 cm along x, lift. Seconds and metres, of its centre.
+    let (over, pressed) = ([0.03, 0.05, 0.113], [0.03, 0.05, 0.099]);
+    let (dragged, lifted) = ([0.06, 0.05, 0.099], [0.06, 0.05, 0.113]);
     let path = ToolPath::new(vec![0.0, 0.6, 1.8, 2.2], vec![over, pressed, dragged, lifted])?;
     let session = Session::builder(body)
         .path(path) // or .device(...): anything that implements `Device`
+        .tool(ToolShape::Sphere { radius: 0.008 })
         .global(RateGroup::hz(30))
         .local(RateGroup::hz(1000).pin(1).realtime(80))
         .friction(0.5)

@@ -13,10 +13,13 @@ const SPACING_M: f64 = 0.1 / 11.0;
 type Formula = fn(f64) -> [f64; 3];
 
 /// Name, length (s) and formula of every path file.
-const PATHS: [(&str, f64, Formula); 13] = [
+const PATHS: [(&str, f64, Formula); 17] = [
     ("bend.csv", 2.0, bend),
     ("demo.csv", 5.0, demo),
     ("drag.csv", 2.5, drag),
+    ("finger.csv", 5.0, finger),
+    ("forceps_left.csv", 3.2, forceps_left),
+    ("forceps_right.csv", 3.2, forceps_right),
     ("hand.csv", 0.8, hand),
     ("hand_release.csv", 0.4, hand_release),
     ("hold_right.csv", 2.5, hold_right),
@@ -27,6 +30,7 @@ const PATHS: [(&str, f64, Formula); 13] = [
     ("press.csv", 0.4, press),
     ("pull_release.csv", 1.0, pull_release),
     ("slide.csv", 2.7, slide),
+    ("stick_slip.csv", 3.6, stick_slip),
 ];
 
 /// The minimum-jerk step from 0 to 1: how a hand moves from one point to another.
@@ -62,14 +66,48 @@ fn liver_slide(t: f64) -> [f64; 3] {
     [x, -0.0037, dome(x) - depth]
 }
 
-/// A press of 10 mm, a drag, a circle, a lift and two taps.
+/// A sphere of 8 mm: press 5 mm beside the tumour, 5 mm over it, slide 44 mm over all at that depth, lift. Along the dome's normal.
+fn finger(t: f64) -> [f64; 3] {
+    const TOOL_M: f64 = 0.008;
+    let x = -0.010 - 0.020 * min_jerk((t - 1.0) / 0.4) - 0.022 * min_jerk((t - 2.4) / 0.4)
+        + 0.044 * min_jerk((t - 3.1) / 1.4);
+    let press = |from: f64, to: f64| min_jerk((t - from) / 0.3) - min_jerk((t - to) / 0.3);
+    let depth = -0.003 + 0.008 * (press(0.2, 0.7) + press(1.5, 2.1) + press(2.8, 4.5));
+    let slope = -0.8 * (x + 0.030) / (0.040_f64.powi(2) - (x + 0.030).powi(2)).sqrt();
+    let out = (TOOL_M - depth) / slope.hypot(1.0);
+    [x - slope * out, -0.004, dome(x) + out]
+}
+
+/// The left jaw of a pair of forceps, a sphere of 6 mm: close on the fold from beside it, lift, open, leave.
+fn forceps_left(t: f64) -> [f64; 3] {
+    let closed = min_jerk((t - 0.1) / 0.7) - min_jerk((t - 2.3) / 0.5);
+    let lifted = min_jerk((t - 0.9) / 0.7) - min_jerk((t - 1.8) / 0.4);
+    [-0.008 + 0.013 * closed, 0.0276, 0.0452 + 0.008 * lifted]
+}
+
+/// The right jaw, in the mirror.
+fn forceps_right(t: f64) -> [f64; 3] {
+    let [x, y, z] = forceps_left(t);
+    [0.03 - x, y, z]
+}
+
+/// A sphere of 8 mm: press 5 mm deep, drag 24 mm along x at 1 cm/s, lift.
+fn stick_slip(t: f64) -> [f64; 3] {
+    let x = 0.037 + 0.01 * (t - 0.6).clamp(0.0, 2.4);
+    let z = 0.109 - 0.006 * min_jerk((t - 0.1) / 0.3) + 0.008 * min_jerk((t - 3.2) / 0.3);
+    [x, 0.0512, z]
+}
+
+/// A sphere of 8 mm: a press of 7 mm, a drag, a circle, a lift and two taps.
 fn demo(t: f64) -> [f64; 3] {
+    const TOOL_M: f64 = 0.008;
     const RADIUS_M: f64 = 0.012;
     let angle = 2.0 * PI * min_jerk((t - 2.0) / 1.4);
     let tap = |start_s: f64| 0.011 * (PI * ((t - start_s) / 0.4).clamp(0.0, 1.0)).sin().powi(2);
     let x = 0.03 + 0.035 * min_jerk((t - 1.0) / 1.0) - RADIUS_M * (1.0 - angle.cos());
     let y = 0.0512 + RADIUS_M * angle.sin();
-    let z = 0.105 - 0.015 * min_jerk((t - 0.2) / 0.6) + 0.015 * min_jerk((t - 3.4) / 0.4) - tap(4.0) - tap(4.5);
+    let z =
+        0.105 + TOOL_M - 0.012 * min_jerk((t - 0.2) / 0.6) + 0.012 * min_jerk((t - 3.4) / 0.4) - tap(4.0) - tap(4.5);
     [x, y, z]
 }
 

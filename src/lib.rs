@@ -83,6 +83,7 @@ pub mod prelude {
     pub use crate::model::body::{Block, Tetrahedra};
     // For its methods; who implements it names it.
     pub use crate::model::body::Body as _;
+    pub use crate::model::contact::ToolShape;
     pub use crate::model::mesh::Face;
     pub use crate::runtime::{Nanos, RateGroup};
     pub use crate::scene::Scene;

@@ -5,8 +5,8 @@ mod session_support;
 use palpate::actors::Cause;
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use palpate::log::LogReader;
-use palpate::model::Vec3;
 use palpate::model::local::Kind;
+use palpate::model::{Vec3, turn_of};
 use palpate::runtime::Nanos;
 use palpate::scene::SafetyStage;
 use palpate::session::Session;
@@ -70,6 +70,59 @@ fn a_device_that_tells_a_place_where_it_cannot_be_makes_no_force() {
     }
 }
 
+/// Tells an orientation of `length` from some time on, and exerts torque.
+#[derive(Debug)]
+struct Crooked {
+    length: f64,
+    from: Nanos,
+}
+
+impl Device for Crooked {
+    fn name(&self) -> &str {
+        "crooked"
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { max_torque_n_m: Some(0.1), ..Capabilities::TOUCH }
+    }
+
+    fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
+        let length = if time >= self.from { self.length } else { 1.0 };
+        let orientation = turn_of([0.6 * length, 0.0, 0.8 * length, 0.0]);
+        Ok(DeviceState { position: Vec3::new(0.05, 0.05, 0.2), orientation, ..DeviceState::default() })
+    }
+
+    fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {
+        if command.is_finite() { Ok(()) } else { Err(DeviceFault::Refused) }
+    }
+}
+
+// Check that few digits of an orientation are made of length one, and that four numbers that are no turn are a fault.
+#[test]
+fn an_orientation_is_a_turn_or_no_state() {
+    let turned = turn_of([0.6, 0.0, 0.8, 0.0]);
+    for (length, is_turn) in [(1.0005, true), (1.01, false)] {
+        let device = Crooked { length, from: Nanos(50_500_000) };
+        let session = Session::builder(block()).device(device).model(Kind::Full).virtual_time();
+        let summary = session.duration_s(0.1).keep_records().build().unwrap().run().unwrap();
+        let told: Vec<_> = summary
+            .records
+            .iter()
+            .filter_map(|record| match record {
+                palpate::log::LogRecord::Tool(row) => Some(row.orientation),
+                _ => None,
+            })
+            .collect();
+        assert!(told.iter().all(|turn| turn.angle_to(&turned) < 1e-7 && (turn.norm() - 1.0).abs() < 1e-12));
+        assert!(told.len() > 100);
+        assert_eq!(summary.runtime.groups[0].degraded == 0, is_turn, "{length}");
+        assert!(commands(&summary).iter().all(|row| row.torque_n_m == [0.0; 3]));
+    }
+    let error = refused(Session::builder(block()).device(Crooked { length: 0.5, from: Nanos::ZERO }));
+    assert_eq!(error.kind(), ErrorKind::Device);
+    assert!(error.to_string().contains("orientation") && error.to_string().contains("length 1"), "{error}");
+}
+
 fn told(entry: palpate::log::LogEntry) -> Option<String> {
     match entry {
         palpate::log::LogEntry::Text(text) => Some(text.message),
@@ -117,6 +170,7 @@ fn a_view_tells_the_computed_force_from_the_one_that_the_hand_feels() {
     let commanded = commands(&summary).into_iter().find(|row| row.time == tool.time).unwrap();
     assert_eq!(<[f64; 3]>::from(tool.computed_force), computed.force_n);
     assert_eq!(<[f64; 3]>::from(tool.commanded_force), commanded.force_n);
+    assert_eq!((tool.computed_torque, tool.commanded_torque), (Vec3::zeros(), Vec3::zeros()), "a point has none");
     // The force comes in over two seconds.
     assert!(norm(commanded.force_n) < 0.1 * norm(computed.force_n), "{commanded:?} of {computed:?}");
 }

@@ -93,6 +93,7 @@ mod logged {
     use palpate::actors::Cause;
     use palpate::devices::{DeviceFault, SafetyStop};
     use palpate::log::{LogEntry, LogReader};
+    use palpate::model::Turn;
     use palpate::scene::DeviceKind;
 
     fn commands(summary: &Summary) -> Vec<(u64, Vec3)> {
@@ -150,6 +151,50 @@ mod logged {
         let report = Session::replay(&log).unwrap().run().unwrap();
         assert_eq!(report.first_difference, None);
         assert!(report.force.logged > 1400 && report.force.identical == report.force.logged, "{report:?}");
+    }
+
+    // Check that a hand turns its device along a turned path, that the log holds every bit of it, and that both ways to use a log
+    // find it: the run executed again, and the tool as a device at another rate.
+    #[test]
+    fn a_turned_tool_is_logged_and_replayed_as_it_was_turned() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scene = load("hand_release");
+        scene.run.duration_s = 0.3;
+        let straight = tools(&run(scene.clone()));
+        let device = &mut scene.devices[0];
+        device.plant.max_torque_n_m = Some(0.05);
+        let path = device.path.take().unwrap();
+        let angle = |time_s: f64| 0.5 * time_s.min(0.2);
+        let quaternions: Vec<[f64; 4]> =
+            path.times_s().iter().map(|&t| [angle(t).cos(), angle(t).sin(), 0.0, 0.0]).collect();
+        device.path = Some(path.turned(&quaternions).unwrap());
+        let (summary, log) = recorded(scene.clone(), folder.path());
+        assert_eq!(tools(&summary), straight, "it moves as it did");
+        let told = turns(&summary);
+        assert!((told[300].angle() - 0.2).abs() < 0.01 && told[50].angle() > 0.01, "{}", told[300]);
+        let logged = LogReader::open(&log).unwrap().filter_map(|entry| match entry {
+            LogEntry::Record(LogRecord::Tool(row)) => Some(row.orientation),
+            _ => None,
+        });
+        assert_eq!(logged.collect::<Vec<_>>(), told);
+        let report = Session::replay(&log).unwrap().run().unwrap();
+        assert_eq!(report.first_difference, None);
+        scene.devices[0] = palpate::scene::DeviceSpec {
+            kind: DeviceKind::Replay,
+            log: Some(log),
+            ..palpate::scene::DeviceSpec::default()
+        };
+        scene.local.rate_hz = 2000.0;
+        let finer = turns(&run(scene));
+        assert!((1..300).all(|tick| finer[2 * tick].angle_to(&told[tick]) < 1e-7));
+    }
+
+    fn turns(summary: &Summary) -> Vec<Turn> {
+        let turn = |record: &LogRecord| match record {
+            LogRecord::Tool(row) => Some(row.orientation),
+            _ => None,
+        };
+        summary.records.iter().filter_map(turn).collect()
     }
 
     // Check that the tool of a log moves another model as it moved its own, and that at another rate it is on the same way.

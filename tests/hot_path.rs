@@ -87,6 +87,20 @@ fn a_tick_with_the_whole_body_makes_no_system_call_and_never_allocates() {
     assert_silent(Case::new(LocalModelKind::Full, Guard::SystemCalls));
 }
 
+/// Of a sphere that touches in several places; one of the models is stepped implicitly.
+#[test]
+fn a_tick_of_a_tool_with_a_shape_makes_no_system_call_and_never_allocates() {
+    for model in
+        [LocalModelKind::Patch, LocalModelKind::ScaledBoundary, LocalModelKind::Predictive, LocalModelKind::Full]
+    {
+        let case = Case::new(model, Guard::SystemCalls).with_shape();
+        if let Some(found) = end_well(case) {
+            assert_at_work(&found, case);
+            assert!(found.places > 1, "{found:?}");
+        }
+    }
+}
+
 #[test]
 fn a_tick_without_privileges_makes_no_system_call_and_never_allocates() {
     assert_silent(Case::new(LocalModelKind::Patch, Guard::SystemCalls).unprivileged());

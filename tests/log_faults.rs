@@ -132,7 +132,8 @@ fn run(execution: Execution, ms: u64, buffered_ms: u64, sink: Option<Box<dyn Log
             let noise =
                 |k: u64| f64::from_bits((ctx.tick * 31 + i * 7 + k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 2);
             let force_n = [noise(1), noise(2), noise(3)];
-            recorder.push(LogRecord::Force(ForceSample { time: ctx.scheduled, force_n, ..ForceSample::default() }));
+            LogRecord::Force(ForceSample { time: ctx.scheduled, force_n, ..ForceSample::default() })
+                .push_to(&mut recorder);
         }
         Outcome::Continue
     });
@@ -410,7 +411,7 @@ fn a_killed_logger_costs_records_and_no_tick() {
         let seen = Arc::clone(&ticks);
         let haptic = actor_fn("haptic", move |ctx| {
             *seen.lock().unwrap() += 1;
-            recorder.push(LogRecord::Force(ForceSample { time: ctx.scheduled, ..ForceSample::default() }));
+            LogRecord::Force(ForceSample { time: ctx.scheduled, ..ForceSample::default() }).push_to(&mut recorder);
             Outcome::Continue
         });
         graph.group(RateGroup::hz(1000).name("local"), vec![haptic]);

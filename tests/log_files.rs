@@ -6,7 +6,9 @@ use std::io::{self, Write};
 
 use log_sample::{entries, environment, log_of, time_of};
 use palpate::ErrorKind;
-use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter, SceneFrame};
+use palpate::log::{
+    ContactPointSample, ContactSample, Environment, LogEntry, LogReader, LogRecord, McapWriter, SceneFrame,
+};
 use palpate::runtime::Nanos;
 use palpate::runtime::Record;
 use proptest::prelude::*;
@@ -18,10 +20,10 @@ fn read(bytes: &[u8]) -> (Vec<LogEntry>, Option<String>) {
 }
 
 /// Entries as bits, so that -0.0 differs from 0.0.
-fn bits(entries: &[LogEntry]) -> Vec<(String, Option<Record>)> {
+fn bits(entries: &[LogEntry]) -> Vec<(String, [Option<Record>; 2])> {
     let of = |entry: &LogEntry| match entry {
-        LogEntry::Record(record) => (String::new(), Some(Record::from(*record))),
-        other => (format!("{other:?}"), None),
+        LogEntry::Record(record) => (String::new(), record.to_records()),
+        other => (format!("{other:?}"), [None; 2]),
     };
     entries.iter().map(of).collect()
 }
@@ -33,6 +35,32 @@ fn every_kind_of_entry_comes_back_bit_for_bit() {
     assert_eq!(damage, None);
     assert_eq!(got[0], LogEntry::Environment(environment()));
     assert!(bits(&got[1..]) == bits(&sent));
+}
+
+// Check that what a full ring left of a tick is never read as that of another tick or device.
+#[test]
+fn places_of_a_contact_that_was_lost_are_no_other_contacts() {
+    let point = |ms: u64, device, triangle| {
+        let time = Nanos(ms * 1_000_000);
+        LogRecord::ContactPoint(ContactPointSample { time, device, triangle, ..ContactPointSample::default() })
+    };
+    let contact = |ms: u64, device, count| {
+        let time = Nanos(ms * 1_000_000);
+        LogRecord::Contact(ContactSample { time, device, count, area_m2: 1e-6, ..ContactSample::default() })
+    };
+    let sent = [
+        point(1, 0, 10),
+        point(1, 1, 11),
+        // The contact of device 0 is missing in tick 1, one of two places in tick 2, both in tick 3.
+        contact(1, 1, 1),
+        point(2, 0, 20),
+        contact(2, 0, 2),
+        contact(3, 0, 2),
+        point(4, 0, 40),
+    ];
+    let (got, damage) = read(&log_of(&sent.map(LogEntry::Record), 100));
+    let expected = [point(1, 1, 11), contact(1, 1, 1), point(2, 0, 20), contact(2, 0, 2), contact(3, 0, 2)];
+    assert_eq!((&got[1..], damage), (&expected.map(LogEntry::Record)[..], None));
 }
 
 #[test]

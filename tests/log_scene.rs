@@ -4,6 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use palpate::log::{LogEntry, LogReader, LogRecord};
+use palpate::model::Vec3;
+use palpate::model::contact::ToolShape;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::{Nanos, Rate};
 use palpate::scene::Scene;
@@ -41,6 +43,14 @@ struct Arrow {
 struct Sphere {
     #[prost(message, optional, tag = 1)]
     pose: Option<Pose>,
+    #[prost(message, optional, tag = 2)]
+    size: Option<Vector>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct Cylinder {
+    #[prost(message, optional, tag = 2)]
+    size: Option<Vector>,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -60,6 +70,8 @@ struct Entity {
     arrows: Vec<Arrow>,
     #[prost(message, repeated, tag = 9)]
     spheres: Vec<Sphere>,
+    #[prost(message, repeated, tag = 10)]
+    cylinders: Vec<Cylinder>,
     #[prost(message, repeated, tag = 12)]
     triangles: Vec<Triangles>,
 }
@@ -178,6 +190,31 @@ fn every_device_has_a_tool_and_a_force_of_its_own() {
     for (_, update) in &pictures {
         let ids: Vec<_> = update.entities.iter().map(|entity| entity.id.clone()).collect();
         assert_eq!(ids, expected);
+    }
+}
+
+#[test]
+fn a_tool_with_a_shape_is_drawn_in_its_size_and_the_log_says_which_it_is() {
+    let sphere = ToolShape::Sphere { radius: 0.004 };
+    let capsule = ToolShape::Capsule { radius: 0.003, half_axis: Vec3::new(0.0, 0.01, 0.0) };
+    for (shape, sizes) in [(sphere, &[0.008][..]), (capsule, &[0.006, 0.006][..])] {
+        let folder = tempfile::tempdir().unwrap();
+        let log = recorded(demo(0.2).model(LocalModelKind::Patch).tool(shape).log_scene(), &folder);
+        for (time, update) in &pictures(&log) {
+            let drawn = update.entity("tool");
+            let diameters: Vec<f64> = drawn.spheres.iter().map(|ball| ball.size.as_ref().unwrap().x).collect();
+            assert_eq!(diameters, sizes, "at {time}");
+            let lengths: Vec<f64> = drawn.cylinders.iter().map(|cylinder| cylinder.size.as_ref().unwrap().z).collect();
+            assert_eq!(lengths, if shape == capsule { vec![0.02] } else { vec![] }, "at {time}");
+            let contacts = update.entity("contacts");
+            assert_eq!(contacts.spheres.len(), contacts.arrows.len());
+        }
+        let mut shapes = LogReader::open(&log).unwrap().filter_map(|entry| match entry {
+            LogEntry::Environment(environment) => Some(environment.shape(0)),
+            _ => None,
+        });
+        assert_eq!(shapes.next(), Some(shape));
+        assert!(Session::replay(&log).unwrap().run().unwrap().is_identical());
     }
 }
 

@@ -23,7 +23,7 @@ use palpate::runtime::Disturbance;
 use palpate::runtime::Nanos;
 use palpate::safety::Passivity;
 use palpate::scene::{
-    BlendSpec, BlockSpec, BodySpec, DeviceProfile, Friction, MassSpringSpec, MaterialSpec, ModelChoice, SafetySpec,
+    BlendSpec, BlockSpec, BodySpec, DeviceProfile, FrictionSpec, MassSpringSpec, MaterialSpec, ModelChoice, SafetySpec,
     SafetyStage, Scene,
 };
 use random::Random;
@@ -196,7 +196,7 @@ fn scene(random: &mut Random, seconds: f64) -> Scene {
         regions: Vec::new(),
     }));
     scene.contact.friction =
-        if random.chance(0.1) { Friction::Stick } else { Friction::Coefficient(random.within(0.0, 1.5)) };
+        if random.chance(0.1) { FrictionSpec::Stick } else { FrictionSpec::Coefficient(random.within(0.0, 1.5)) };
     scene.local.rate_hz = random.one_of(&[500.0, 1000.0, 1000.0, 2000.0]);
     scene.global.rate_hz = random.one_of(&[10.0, 30.0, 30.0, 60.0]);
     // Some of these steps are too long for the body, which then explodes.

@@ -6,8 +6,16 @@
 use std::path::{Path, PathBuf};
 
 /// Where such functions are, below `src/`. Nothing public in there is left out.
-const SCANNED: [&str; 7] =
-    ["actors", "devices", "log/records/mod.rs", "log/records/samples.rs", "model", "runtime", "safety"];
+const SCANNED: [&str; 8] = [
+    "actors",
+    "devices",
+    "log/records/contact.rs",
+    "log/records/mod.rs",
+    "log/records/samples.rs",
+    "model",
+    "runtime",
+    "safety",
+];
 
 /// What a tick lives on: where the scan finds no function of one of these, it looks in the wrong place.
 const USED_BY_TICKS: &str = "
@@ -19,7 +27,7 @@ const USED_BY_TICKS: &str = "
 /// Types whose own section speaks for all of their methods: plain values, actors, what is gone before a run.
 const SPEAK_FOR_ALL: &str = "
     Nanos Rate TickContext Record TickTiming Event PortUse PortUseKind SlipCause SlipCounts Histogram GraphError ModelError
-    LogRecord ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice Region Shape
+    LogRecord ContactSample ContactPointSample ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact Friction ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice Region Shape ToolShape Pose Wrench
     DeviceActor LocalActor GlobalActor LoggerActor LogSink
     Scripted Replayed
     Block BlockBuilder SpringNetwork SpringNetworkBuilder Tetrahedra TetrahedraBuilder Tissue TissueRegion InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";

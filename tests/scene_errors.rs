@@ -80,7 +80,7 @@ const CASES: &[Case] = &[
     case("nodes = [12, 12, 12]", "nodes = [12,\n12,\n-3]", "scene.toml:6: body.block.nodes[2]: ", &["is -3", "at least 0"]),
     case("stiffness_n_per_m = 30.0", "stiffness_n_per_m = \"30\"", "scene.toml:9: body.material.stiffness_n_per_m: ", &["is \"30\"", "must be a number"]),
     case("stiffness_n_per_m = 30.0", "stiffness_n_per_m = true", "scene.toml:9: body.material.stiffness_n_per_m: ", &["is true"]),
-    case("[contact]", "[[contact]]", "scene.toml:11: ", &["contact", "table with the keys friction, normals, equations"]),
+    case("[contact]", "[[contact]]", "scene.toml:11: ", &["contact", "table with the keys friction, static_friction, stribeck_m_s, normals, equations"]),
     case("friction = 1.0", "friction = \"sticky\"", "scene.toml:12: contact.friction: ", &["is \"sticky\"", "at least 0", "\"stick\""]),
     case("friction = 1.0", "friction = [1.0]", "scene.toml:12: contact.friction: ", &["is an array", "\"stick\""]),
     case("friction = 1.0", "friction = 1979-05-27", "scene.toml:12: contact.friction: ", &["a date", "\"stick\""]),
@@ -120,6 +120,23 @@ const CASES: &[Case] = &[
     case("kind = \"scripted\"", "kind = \"scripted\"\nhaply = { address = \"x\" }", "scene.toml:26: device.haply.max_force_n: ", &["missing"]),
     case("kind = \"scripted\"", "kind = \"haply\"\nhaply = { max_force_n = 3 }", "scene.toml:27: device.attach_node: ", &["glues a tool"]),
     case("kind = \"scripted\"\nattach_node = [5, 5, 11]", "kind = \"haply\"\nprofile = \"touch\"\nhaply = { max_force_n = 3 }", "scene.toml:26: device.profile: ", &["simulated device"]),
+    // The shape of a tool.
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = \"sphere\"", "scene.toml:26: device.tool: ", &["is \"sphere\"", "\"point\" or a table", "radius_m"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = 5", "scene.toml:26: device.tool: ", &["is 5", "\"point\" or a table"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"cube\" }", "scene.toml:26: device.tool.shape: ", &["is \"cube\"", "\"point\", \"sphere\" or \"capsule\""]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { radius_m = 0.004 }", "scene.toml:26: device.tool.shape: ", &["missing"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"sphere\" }", "scene.toml:26: device.tool.radius_m: ", &["missing"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"sphere\", radius = 0.004 }", "scene.toml:26: device.tool.radius: ", &["did you mean radius_m?"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"sphere\", radius_m = 0.004, length_m = 0.02 }", "scene.toml:26: device.tool: ", &["length_m belongs to shape = \"capsule\""]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"point\", radius_m = 0.004 }", "scene.toml:26: device.tool: ", &["radius_m belongs to shape = \"sphere\" or \"capsule\""]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"sphere\", radius_m = 0 }", "scene.toml:26: device.tool.radius_m: ", &["is 0", "above 0"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"sphere\", radius_m = 1e-5 }", "scene.toml:26: device.tool.radius_m: ", &["is 0.00001", "at least 0.0001 m", "tool = \"point\""]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"sphere\", radius_m = 4 }", "scene.toml:26: device.tool.radius_m: ", &["is 4", "at most 1 m", "metres"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"capsule\", radius_m = 0.004 }", "scene.toml:26: device.tool.length_m: ", &["missing"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"capsule\", radius_m = 0.004, length_m = -1 }", "scene.toml:26: device.tool.length_m: ", &["is -1", "at least 0"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"capsule\", radius_m = 0.004, length_m = 20 }", "scene.toml:26: device.tool.length_m: ", &["is 20", "below 1 m"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"capsule\", radius_m = 0.004, length_m = 0.02, axis = [0, 0, 0] }", "scene.toml:26: device.tool.axis: ", &["not all 0", "direction"]),
+    case("kind = \"scripted\"", "kind = \"scripted\"\ntool = { shape = \"capsule\", radius_m = 0.004, length_m = 0.02, axis = [0, 1] }", "scene.toml:26: device.tool.axis: ", &["array of 3"]),
     // TOML itself.
     case("nodes = [12, 12, 12]", "nodes = [12, 12, 12", "scene.toml:5: ", &["TOML syntax"]),
     case("rate_hz = 30", "rate_hz 30", "scene.toml:15: ", &["TOML syntax"]),
@@ -161,6 +178,17 @@ const CASES: &[Case] = &[
     case("[contact]", "[[body.region]]\nnode_mass_kg = 1e-320\nshape = { layer = { axis = \"z\", from_m = 0, to_m = 1 } }\n[contact]", "scene.toml:11: body.region[0]: ", &["beyond all numbers"]),
     // Contact, global, local.
     case("friction = 1.0", "friction = -1", "scene.toml:12: contact.friction: ", &["is -1", "at least 0", "\"stick\""]),
+    case("friction = 1.0", "friction = 1.0\nstatic_friction = 0.5", "scene.toml:13: contact.static_friction: ", &["is 0.5", "at least contact.friction, 1"]),
+    case("friction = 1.0", "friction = 1.0\nstatic_friction = nan", "scene.toml:13: contact.static_friction: ", &["is NaN", "finite"]),
+    case("friction = 1.0", "friction = 1.0\nstatic_friction = inf", "scene.toml:13: contact.static_friction: ", &["is inf", "finite"]),
+    case("friction = 1.0", "friction = 1.0\nstatic = 2", "scene.toml:13: contact.static: ", &["static_friction"]),
+    case("friction = 1.0", "friction = \"stick\"\nstatic_friction = 2", "scene.toml:13: contact.static_friction: ", &["never slides", "leave one of them out"]),
+    case("friction = 1.0", "friction = 1.0\nstatic_friction = 2\nequations = \"paper\"", "scene.toml:13: contact.static_friction: ", &["one coefficient", "\"corrected\""]),
+    case("friction = 1.0", "friction = 1.0\nstatic_friction = 2\nstribeck_m_s = -1", "scene.toml:14: contact.stribeck_m_s: ", &["is -1", "0 to 10 m/s"]),
+    case("friction = 1.0", "friction = 1.0\nstatic_friction = 2\nstribeck_m_s = nan", "scene.toml:14: contact.stribeck_m_s: ", &["is NaN", "0 to 10 m/s"]),
+    case("friction = 1.0", "friction = 1.0\nstatic_friction = 2\nstribeck_m_s = 11", "scene.toml:14: contact.stribeck_m_s: ", &["is 11", "0 to 10 m/s"]),
+    case("friction = 1.0", "friction = 1.0\nstribeck_m_s = 0.01", "scene.toml:13: contact.stribeck_m_s: ", &["static_friction above friction", "leave it out"]),
+    case("friction = 1.0", "friction = 1.0\nstatic_friction = 1.0\nstribeck_m_s = 0.01", "scene.toml:14: contact.stribeck_m_s: ", &["static_friction above friction"]),
     case("friction = 1.0", "friction = nan", "scene.toml:12: contact.friction: ", &["is NaN"]),
     case("rate_hz = 30", "rate_hz = 0", "scene.toml:15: global.rate_hz: ", &["is 0", "1000000 Hz"]),
     case("rate_hz = 1000", "rate_hz = 20", "scene.toml:19: local.rate_hz: ", &["is 20", "at least global.rate_hz, 30"]),
@@ -393,6 +421,22 @@ proptest! {
             prop_assert!(is_one_line(&error.to_string()), "{error}");
         }
     }
+}
+
+#[test]
+fn the_paper_equations_are_for_a_point() {
+    let paper = GOOD.replace("normals = \"interpolated\"", "equations = \"paper\"");
+    for (tool, name) in [
+        ("{ shape = \"sphere\", radius_m = 0.004 }", "sphere"),
+        ("{ shape = \"capsule\", radius_m = 0.003, length_m = 0.02 }", "capsule"),
+    ] {
+        let with = |text: &str| text.replace("kind = \"scripted\"", &format!("kind = \"scripted\"\ntool = {tool}"));
+        let message = refusal(&with(&paper)).to_string();
+        assert!(message.starts_with(&format!("scene.toml:26: device.tool: is a {name}")), "{message}");
+        assert!(message.contains("use \"corrected\" there or tool = \"point\""), "{message}");
+        Scene::from_toml(&with(GOOD), "scene.toml", None).unwrap();
+    }
+    Scene::from_toml(&paper.replace("kind = \"scripted\"", "tool = \"point\""), "scene.toml", None).unwrap();
 }
 
 #[test]

@@ -8,7 +8,7 @@ use palpate::model::contact::{Equations, Normals};
 use palpate::model::local::BlendKind;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::model::mesh::Face;
-use palpate::scene::{Friction, NodeSpec, Scene};
+use palpate::scene::{FrictionSpec, NodeSpec, Scene};
 
 #[path = "../examples/scene_paths.rs"]
 #[allow(dead_code, reason = "its main function writes the files that are only compared here")]
@@ -42,6 +42,8 @@ fn every_scene_loads_and_says_what_it_shows() {
             "drag_friction",
             "drag_slip",
             "drag_stick",
+            "finger",
+            "forceps",
             "hand",
             "hand_release",
             "haply",
@@ -51,6 +53,7 @@ fn every_scene_loads_and_says_what_it_shows() {
             "nodule",
             "pull_release",
             "soft_deep",
+            "stick_slip",
             "two_hands",
             "wave",
             "wave_probe",
@@ -63,7 +66,10 @@ fn every_scene_loads_and_says_what_it_shows() {
         assert!(source.starts_with("# ") && source.contains("Look for:"), "{}", file.display());
         assert_eq!(scene.validate().map_err(|error| error.to_string()), Ok(()), "{}", file.display());
         let body = scene.body.as_ref().unwrap();
-        let is_predictive = body.tetrahedra().is_some() || body.region_count() > 0 || scene.devices.len() > 1;
+        let is_predictive = body.tetrahedra().is_some()
+            || body.region_count() > 0
+            || scene.devices.len() > 1
+            || scene.contact.static_friction.is_some();
         let model = if is_predictive { LocalModelKind::Predictive } else { LocalModelKind::Patch };
         assert_eq!(scene.local.model, model.into(), "{}", file.display());
     }
@@ -89,7 +95,7 @@ fn the_demo_file_reads_as_it_is_written() {
     assert_eq!(scene.body.as_ref().unwrap().mass_spring().unwrap().block.size_m, [0.1; 3]);
     assert_eq!(scene.body.as_ref().unwrap().mass_spring().unwrap().block.fixed, [Face::ZMin]);
     assert_eq!(scene.body.as_ref().unwrap().mass_spring().unwrap().material.node_mass_kg, 0.0005);
-    assert_eq!(scene.contact.friction, Friction::Coefficient(0.5));
+    assert_eq!(scene.contact.friction, FrictionSpec::Coefficient(0.5));
     assert_eq!(scene.contact.normals, Normals::Interpolated);
     assert_eq!(scene.contact.equations, Equations::Corrected);
     assert_eq!((scene.global.rate_hz, scene.global.substeps_per_ms), (30.0, Some(2)));
@@ -161,13 +167,13 @@ fn the_demo_file_documents_every_key() {
 #[test]
 fn the_reference_scenes_have_the_reference_parameters() {
     for (name, is_slow, friction, duration_s) in [
-        ("pull_release", false, Friction::Coefficient(0.0), 1.1),
-        ("hand", false, Friction::Coefficient(0.0), 0.8),
-        ("wave", true, Friction::Coefficient(0.0), 1.0),
-        ("wave_probe", true, Friction::Coefficient(0.0), 1.0),
-        ("drag_slip", false, Friction::Coefficient(0.0), 2.5),
-        ("drag_stick", false, Friction::Stick, 2.5),
-        ("drag_friction", false, Friction::Coefficient(1.0), 2.5),
+        ("pull_release", false, FrictionSpec::Coefficient(0.0), 1.1),
+        ("hand", false, FrictionSpec::Coefficient(0.0), 0.8),
+        ("wave", true, FrictionSpec::Coefficient(0.0), 1.0),
+        ("wave_probe", true, FrictionSpec::Coefficient(0.0), 1.0),
+        ("drag_slip", false, FrictionSpec::Coefficient(0.0), 2.5),
+        ("drag_stick", false, FrictionSpec::Stick, 2.5),
+        ("drag_friction", false, FrictionSpec::Coefficient(1.0), 2.5),
     ] {
         let scene = load(name);
         let material = scene.body.as_ref().unwrap().mass_spring().unwrap().material;

@@ -8,8 +8,8 @@ use palpate::model::local::BlendKind;
 use palpate::model::local::Feedback;
 use palpate::model::mesh::Face;
 use palpate::scene::{
-    BlendSpec, BlockSpec, BodySpec, Friction, InitialSpec, MassSpringSpec, MaterialSpec, ModelChoice, ProbeSpec,
-    PullSpec, RegionSpec, Scene, StepKind,
+    BlendSpec, BlockSpec, BodySpec, FrictionSpec, InitialSpec, MassSpringSpec, MaterialSpec, ModelChoice, ProbeSpec,
+    PullSpec, RegionSpec, Scene, StepKind, ToolSpec,
 };
 use proptest::prelude::*;
 
@@ -81,13 +81,28 @@ fn body() -> impl Strategy<Value = BodySpec> {
     )
 }
 
+fn tool() -> impl Strategy<Value = ToolSpec> {
+    let radius = || number(1e-3, 0.5);
+    prop_oneof![
+        Just(ToolSpec::Point),
+        radius().prop_map(|radius_m| ToolSpec::Sphere { radius_m }),
+        (radius(), number(1e-3, 0.5), number(0.1, 10.0)).prop_map(|(radius_m, length_m, x)| ToolSpec::Capsule {
+            radius_m,
+            length_m,
+            axis: [x, -0.0, -1.0 / x],
+        }),
+    ]
+}
+
 fn scenes() -> impl Strategy<Value = Scene> {
     let friction = prop_oneof![
-        Just(Friction::Stick),
-        Just(Friction::Coefficient(0.0)),
-        number(1e-3, 10.0).prop_map(Friction::Coefficient)
+        Just(FrictionSpec::Stick),
+        Just(FrictionSpec::Coefficient(0.0)),
+        number(1e-3, 10.0).prop_map(FrictionSpec::Coefficient)
     ];
-    let contact = (friction, any::<bool>(), any::<bool>());
+    // A share of the coefficient, and a speed.
+    let breakaway = prop::option::of((number(1e-3, 2.0), prop_oneof![Just(0.0), number(1e-4, 1.0)]));
+    let contact = (friction, any::<bool>(), any::<bool>(), breakaway, tool());
     let node = [1_usize..5, 1_usize..5, 1_usize..5];
     let initial = prop::option::of((node.clone(), number(1e-4, 0.1), any::<bool>()));
     let local = (
@@ -112,6 +127,15 @@ fn scenes() -> impl Strategy<Value = Scene> {
         scene.contact.friction = contact.0;
         scene.contact.normals = if contact.1 { Normals::Face } else { Normals::Interpolated };
         scene.contact.equations = if contact.2 { Equations::Paper } else { Equations::Corrected };
+        if let (FrictionSpec::Coefficient(kinetic), false, Some((more, stribeck_m_s))) =
+            (contact.0, contact.2, contact.3)
+        {
+            scene.contact.static_friction = Some(kinetic + more);
+            scene.contact.stribeck_m_s = if more > 0.0 { stribeck_m_s } else { 0.0 };
+        }
+        if !contact.2 {
+            scene.devices[0].tool = contact.4;
+        }
         if body.is_some() {
             scene.initial = initial.map(|(node, offset, holds)| InitialSpec {
                 pull: PullSpec { node: node.into(), offset_m: [offset, -0.0, -offset] },

@@ -104,7 +104,10 @@ fn a_constant_path_stays() {
 #[test]
 fn bad_rows_are_named_with_their_line() {
     for (text, expected) in [
-        ("", "p.csv:1: found no header, must be exactly t_s,x_m,y_m,z_m (seconds and metres)"),
+        (
+            "",
+            "p.csv:1: found no header, must be exactly t_s,x_m,y_m,z_m (seconds and metres), or t_s,x_m,y_m,z_m,qw,qx,qy,qz",
+        ),
         ("t_s,x_mm,y_mm,z_mm\n0,0,0,0\n", "p.csv:1: found the header \"t_s,x_mm,y_mm,z_mm\", must be exactly"),
         ("0,0,0,0\n", "p.csv:1: found the header \"0,0,0,0\""),
         ("t_s,x_m,y_m,z_m\n", "p.csv:1: the header has no row below it"),

@@ -55,7 +55,7 @@ fn the_model_sees_the_tool_at_the_scheduled_time_of_each_release() {
     let contact = Contact::glued(triangle, corners.map(|corner| f64::from(u8::from(corner == node))));
     let mut own = body.clone();
     let substeps = Spectrum::estimate(&mut own).substeps(1e-3);
-    let law = Law { friction: 0.5, ..Law::default() };
+    let law = Law { friction: 0.5.into(), ..Law::default() };
     let state = State::at_rest(body.rest());
     let stepping = Stepping { tick: 1e-3, substeps };
     let mut simulation = Simulation::new(Box::new(own), state, contact, law, stepping).unwrap();
@@ -67,7 +67,7 @@ fn the_model_sees_the_tool_at_the_scheduled_time_of_each_release() {
     let felt = forces(&summary);
     assert_eq!(felt.len(), 400);
     for (n, row) in (1..).zip(&felt) {
-        let force = simulation.tick(ToolMotion { from: tool(n - 1), to: tool(n) });
+        let force = simulation.tick(ToolMotion::straight(tool(n - 1), tool(n))).force;
         assert_eq!(bits(row.force_n), bits(force.into()), "tick {n}");
     }
     assert!(felt.iter().any(|row| norm(row.force_n) > 0.1));

@@ -10,7 +10,7 @@ use crate::pulse::Pulse;
 use crate::watch::Watch;
 use crate::wire::Wire;
 use palpate::devices::{Calibration, Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
-use palpate::model::Vec3;
+use palpate::model::{Turn, Vec3, turn_of};
 use palpate::runtime::Nanos;
 use palpate::{Error, ErrorKind};
 use std::time::{Duration, Instant};
@@ -70,6 +70,8 @@ pub struct Haply {
     pulse: Pulse,
     /// What the last reply says of the device, if it lists it.
     device: Option<Inverse>,
+    /// How its grip was turned when one last told it.
+    orientation: Turn,
     /// What the last reply that lists it is to a read, until it was read.
     fresh: Option<Result<DeviceState, DeviceFault>>,
     /// There is a reply that [`Device::wait`] has not told of.
@@ -126,6 +128,7 @@ impl Haply {
             guard: Guard::default(),
             pulse: Pulse::new(options.period),
             device: None,
+            orientation: Turn::identity(),
             fresh: None,
             is_new: false,
             due: None,
@@ -184,9 +187,13 @@ impl Haply {
 
     fn accept(&mut self, reply: Reply) {
         self.device = reply.device;
+        if let Some(told) = reply.orientation {
+            self.orientation = turn_of(told);
+        }
         if let Some(device) = reply.device {
             let position = Vec3::from(device.position_m) + self.options.origin_m;
-            let state = DeviceState { position, velocity: device.velocity_m_s.into(), buttons: reply.buttons };
+            let (velocity, orientation) = (device.velocity_m_s.into(), self.orientation);
+            let state = DeviceState { position, velocity, orientation, buttons: reply.buttons };
             self.fresh = Some(if device.is_ready { Ok(state) } else { Err(DeviceFault::NotReady) });
         }
         self.is_new = true;

@@ -21,6 +21,8 @@ pub(crate) struct Reply {
     pub(crate) device: Option<Inverse>,
     /// Buttons of the first grip with one pressed, a bit each: a (or the only one), b, c.
     pub(crate) buttons: u16,
+    /// How the first grip that tells it is turned: a quaternion (w, x, y, z).
+    pub(crate) orientation: Option<[f64; 4]>,
 }
 
 /// One Inverse3.
@@ -104,6 +106,8 @@ struct Grip {
 #[serde(default)]
 struct Held {
     button: Option<bool>,
+    #[serde(deserialize_with = "if_a_turn")]
+    orientation: Option<Quaternion>,
     #[serde(deserialize_with = "if_known")]
     buttons: Buttons,
     transform: Option<Nested>,
@@ -115,6 +119,26 @@ struct Buttons {
     a: bool,
     b: bool,
     c: bool,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+struct Quaternion {
+    w: f64,
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+impl From<Quaternion> for [f64; 4] {
+    fn from(Quaternion { w, x, y, z }: Quaternion) -> Self {
+        [w, x, y, z]
+    }
+}
+
+/// A grip that is not tracked yet tells zeros, or something else that is no quaternion: then it tells none.
+fn if_a_turn<'de, D: serde::Deserializer<'de>>(raw: D) -> Result<Option<Quaternion>, D::Error> {
+    let told: Option<Quaternion> = serde_json::from_str(<&RawValue>::deserialize(raw)?.get()).unwrap_or_default();
+    Ok(told.filter(|&quaternion| <[f64; 4]>::from(quaternion) != [0.0; 4]))
 }
 
 /// They are of many shapes, not all of them known.
@@ -148,7 +172,9 @@ pub(crate) fn reply(frame: &[u8], id: &str) -> Option<Reply> {
     };
     let mut grips = state.verse_grip.iter().chain(&state.wireless_verse_grip).chain(&state.custom_verse_grip);
     let buttons = grips.find_map(|grip| Some(grip.pressed()).filter(|pressed| *pressed != 0));
-    Some(Reply { device, buttons: buttons.unwrap_or(0) })
+    let mut grips = state.verse_grip.iter().chain(&state.wireless_verse_grip);
+    let orientation = grips.find_map(|grip| grip.state.orientation).map(Into::into);
+    Some(Reply { device, buttons: buttons.unwrap_or(0), orientation })
 }
 
 /// The ids in an inventory, in its order.
@@ -254,10 +280,25 @@ mod tests {
         let position_m = [0.12794551, 0.038903017, -0.05089721];
         let velocity_m_s = [-0.00018, -2.3e-5, 0.0];
         let device = Inverse { position_m, velocity_m_s, is_calibrated: true, is_ready: true, is_powered: true };
-        assert_eq!(reply(STATE.as_bytes(), "049D"), Some(Reply { device: Some(device), buttons: 0b101 }));
+        assert_eq!(
+            reply(STATE.as_bytes(), "049D"),
+            Some(Reply { device: Some(device), buttons: 0b101, orientation: None })
+        );
         assert_eq!(device_ids(STATE.as_bytes()).unwrap(), ["04C3", "049D"]);
         let one = STATE.replace(r#"{"a":true,"b":false,"c":true}"#, r#"null,"button":true"#);
         assert_eq!(reply(one.as_bytes(), "049D").unwrap().buttons, 1);
+    }
+
+    #[test]
+    fn a_grip_tells_how_it_is_turned_or_nothing() {
+        let told = |orientation: &str| {
+            let state = STATE.replace(r#""hall":16"#, &format!(r#""hall":16,"orientation":{orientation}"#));
+            reply(state.as_bytes(), "049D").unwrap().orientation
+        };
+        assert_eq!(told(r#"{"x":0,"y":0.6,"z":0,"w":0.8}"#), Some([0.8, 0.0, 0.6, 0.0]));
+        for none in [r#"{"x":0,"y":0,"z":0,"w":0}"#, "{}", "null", "[1,0,0]", r#"{"a0":0,"a1":1}"#] {
+            assert_eq!(told(none), None, "{none}");
+        }
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use palpate::ErrorKind;
 use palpate::devices::conformance::{Conformance, Verdict};
 use palpate::devices::{Calibration, Capabilities, ForceCommand, SafetyStop};
+use palpate::model::wxyz;
 use palpate::prelude::*;
 use palpate::runtime::{Actor, Execution, Outcome, RateGroup, Runtime, TickContext};
 use palpate_haply::mock::{MockFault, MockFaultKind, MockOptions, MockService};
@@ -124,6 +125,26 @@ fn ends_in_zero_force_and_comes_back(kind: MockFaultKind, message: &str) {
     let seen = service.counts();
     assert_eq!((seen.conflicts, seen.malformed), (0, 0));
     assert!(seen.connections >= 2 && seen.sessions >= 2, "each connection begins with its session: {seen:?}");
+}
+
+// Check that the tool is turned as the grip of the service, and not turned without a grip.
+#[test]
+fn a_grip_turns_the_tool() {
+    for grip in [None, Some([0.6, 0.0, -0.8, 0.0])] {
+        let service =
+            MockService::start(MockOptions { port: 0, events_port: 0, grip, ..MockOptions::default() }).unwrap();
+        let mut device = Haply::connect(options(&service)).unwrap();
+        let begun = Instant::now();
+        let state = loop {
+            if let Ok(state) = device.read(Nanos::ZERO) {
+                break state;
+            }
+            assert!(begun.elapsed() < PATIENCE, "no state comes");
+            tick(&mut device);
+        };
+        assert_eq!(wxyz(&state.orientation), grip.unwrap_or([1.0, 0.0, 0.0, 0.0]));
+        assert_eq!((state.upright(), device.capabilities().max_torque_n_m), (Some(state), None));
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::cause::Cause;
 use super::messages::{ComputedForce, DeviceSample, ToolView};
 use crate::devices::{Calibration, Device, DeviceFault, DeviceState, ForceCommand};
 use crate::error::{Error, ErrorKind};
-use crate::log::{CommandSample, ToolSample};
+use crate::log::{CommandSample, LogRecord, ToolSample};
 use crate::model::Vec3;
 use crate::runtime::Nanos;
 use crate::runtime::{Actor, GroupMode, Outcome, OutletWriter, Reader, Recorder, TickContext, Writer};
@@ -89,8 +89,8 @@ impl DeviceActor {
         self.reading = true;
         let state = self.device.read(ctx.scheduled);
         self.reading = false;
-        match state {
-            Ok(state) if state.is_finite() => {
+        match state.map(DeviceState::upright) {
+            Ok(Some(state)) if state.is_finite() => {
                 if let Err(wrong) = self.believed.believe(&state, ctx.scheduled) {
                     self.disbelieved += 1;
                     *self.ports.disbelieved.buffer() = Disbelieved { count: self.disbelieved, ..wrong };
@@ -101,6 +101,7 @@ impl DeviceActor {
                 self.stale_ticks = 0;
                 Outcome::Continue
             }
+            // No number, or four of an orientation that are no turn.
             Ok(_) => Outcome::Degraded(Cause::DeviceNotFinite.code()),
             Err(fault) => degraded(fault),
         }
@@ -118,6 +119,7 @@ impl DeviceActor {
         // What happened in a tick counts once, however often its command is used.
         let is_new = self.missed_commands == 0;
         self.safety.apply(&Input {
+            torque: command.torque.into(),
             stale_ticks: self.stale_ticks,
             model_age_ticks: command.age_ticks.saturating_add(self.missed_commands),
             swap_step: if is_new { command.swap_step.into() } else { [0.0; 3] },
@@ -141,14 +143,16 @@ impl Actor for DeviceActor {
         *self.ports.samples.buffer() = self.last;
         self.ports.samples.publish(ctx);
         let DeviceSample { id, state } = self.last;
-        self.ports.recorder.push(ToolSample {
+        let sample = ToolSample {
             time: ctx.scheduled,
             id,
             position_m: state.position.into(),
             velocity_m_s: state.velocity.into(),
             buttons: state.buttons,
+            orientation: state.orientation,
             device: self.number,
-        });
+        };
+        LogRecord::Tool(sample).push_to(&mut self.ports.recorder);
         outcome
     }
 
@@ -162,17 +166,26 @@ impl Actor for DeviceActor {
             self.missed_commands = self.missed_commands.saturating_add(1);
         }
         let command = *self.ports.commands.get();
-        let Output { force, actions, energy_j, tank_j } = self.safety_output(ctx, &command);
+        let Output { force, torque, actions, energy_j, tank_j } = self.safety_output(ctx, &command);
         // As long as the force would be taken up where it was, and no longer.
         let expires = ctx.scheduled + Nanos::from_secs_f64(GAP_S);
-        let exerted = ForceCommand::until(Vec3::from(force), expires);
+        let exerted = ForceCommand::until(Vec3::from(force), expires).with_torque(Vec3::from(torque));
         let outcome = self.device.write(exerted).map_or_else(degraded, |()| Outcome::Continue);
         let time = if self.missed_commands == 0 { command.time } else { ctx.scheduled };
         let (limits, device) = (actions.0, self.number);
-        self.ports.recorder.push(CommandSample { time, force_n: force, limits, energy_j, tank_j, device });
-        let ComputedForce { position, mode, force: computed_force, .. } = command;
-        let commanded_force = Vec3::from(force);
-        *self.ports.view.buffer() = ToolView { time, position, computed_force, commanded_force, mode };
+        let sample = CommandSample { time, force_n: force, limits, energy_j, tank_j, torque_n_m: torque, device };
+        LogRecord::Command(sample).push_to(&mut self.ports.recorder);
+        let ComputedForce { position, mode, force: computed_force, torque: computed_torque, .. } = command;
+        *self.ports.view.buffer() = ToolView {
+            time,
+            position,
+            orientation: self.last.state.orientation,
+            computed_force,
+            commanded_force: exerted.force,
+            computed_torque,
+            commanded_torque: exerted.torque,
+            mode,
+        };
         self.ports.view.publish(ctx);
         outcome
     }
@@ -192,7 +205,7 @@ impl Actor for DeviceActor {
 /// body, and the first local model is built around it.
 ///
 /// # Errors
-/// [`ErrorKind::Device`] if it is not calibrated, gives none or one that is not finite or a kilometre away.
+/// [`ErrorKind::Device`] if it is not calibrated, gives none or one that is not finite, no turn or a kilometre away.
 ///
 /// # Real-time
 /// Not called in a tick: an error allocates.
@@ -200,11 +213,14 @@ pub fn first_state(device: &mut dyn Device) -> Result<DeviceState, Error> {
     let message = match (device.calibration(), device.read(Nanos::ZERO)) {
         (Calibration::Needed, _) => "it is not calibrated: calibrate it, then start again".to_owned(),
         (Calibration::Running, _) => "it is being calibrated: start again when that is done".to_owned(),
-        (_, Ok(state)) if state.is_finite() && state.position.amax() <= FARTHEST_M => return Ok(state),
-        (_, Ok(state)) if state.is_finite() => {
+        (_, Ok(state)) if state.is_finite() && state.position.amax() > FARTHEST_M => {
             let place: [f64; 3] = state.position.into();
             format!("its first position is {place:?}, must lie within {FARTHEST_M} m of the origin")
         }
+        (_, Ok(state)) if state.is_finite() => match state.upright() {
+            Some(state) => return Ok(state),
+            None => format!("its first orientation is {}, must be of length 1", state.orientation.coords),
+        },
         (_, Ok(_)) => "its first state is not finite".to_owned(),
         (_, Err(fault)) => format!("no first state: {fault}"),
     };

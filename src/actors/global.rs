@@ -3,11 +3,11 @@
 use super::basis::Wishes;
 use super::cause::Cause;
 use super::messages::{Checkpoint, SurfaceView, ToolTick};
+use super::wish_list::WishList;
 use crate::error::Error;
 use crate::log::GlobalTick;
-use crate::model::Vec3;
-use crate::model::body::Body;
-use crate::model::contact::ToolMotion;
+use crate::model::Pose;
+use crate::model::contact::{ToolMotion, ToolShape};
 use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView};
 use crate::model::local::{ToolForecast, ToolHistory};
 use crate::model::simulation::Simulation;
@@ -112,8 +112,8 @@ struct ToolSide {
     ports: ToolPorts,
     /// The tool at the last tick taken: the state's own time.
     tool: ToolTick,
-    /// Where it comes from (m).
-    from: Vec3,
+    /// Where it comes from.
+    from: Pose,
     /// Its sample of the last tick was missing.
     is_between: bool,
     history: ToolHistory,
@@ -137,14 +137,16 @@ impl ToolSide {
 
     /// The patch that the next model is made for: the one around the triangles, or if there is no basis for this and there is
     /// one for another, that: a larger one, or one that at least holds the triangles.
-    fn choose_patch(&mut self, body: &dyn Body, plan: &GlobalPlan) {
-        body.patch(&self.triangles, plan.patch, &mut self.patch);
+    fn choose_patch(&mut self, (simulation, index): (&Simulation, usize), plan: &GlobalPlan) {
+        simulation.patch(index, &self.triangles, plan.patch, &mut self.patch);
         let bases = &plan.bases;
         if bases.get(&self.patch).is_some() {
             return;
         }
-        let corners = || self.triangles.iter().flat_map(|&t| body.surface().triangles[t as usize]);
-        if let Some(other) = bases.around(&self.patch).or_else(|| bases.holding(corners, &self.patch)) {
+        let mut pressed = Vec::new();
+        simulation.pressed_at(index, &self.triangles, &mut pressed);
+        let held = || bases.holding(|| pressed.iter().copied(), &self.patch);
+        if let Some(other) = bases.around(&self.patch).or_else(held) {
             self.patch = other.to_vec();
         }
     }
@@ -190,9 +192,9 @@ impl GlobalActor {
         let side = |(&tool, ports): (&ToolTick, ToolPorts)| ToolSide {
             ports,
             tool,
-            from: tool.position,
+            from: tool.pose,
             is_between: false,
-            history: ToolHistory::new(tool.position, plan.haptic.period_s()),
+            history: ToolHistory::new(tool.pose, plan.haptic.period_s()),
             triangles: Vec::new(),
             patch: Vec::new(),
         };
@@ -230,7 +232,7 @@ impl GlobalActor {
     /// The way of each tool begins where it is; the tick at which that is.
     fn begin_way(&mut self) -> u64 {
         for side in &mut self.tools {
-            (side.from, side.is_between) = (side.tool.position, false);
+            (side.from, side.is_between) = (side.tool.pose, false);
         }
         self.now()
     }
@@ -245,8 +247,7 @@ impl GlobalActor {
             side.is_between = sample.tick > next;
             side.tool = if side.is_between {
                 let share = next.saturating_sub(side.tool.tick) as f64 / (sample.tick - side.tool.tick) as f64;
-                let position = side.tool.position + (sample.position - side.tool.position) * share;
-                ToolTick { tick: next, position }
+                ToolTick { tick: next, pose: side.tool.pose.towards(&sample.pose, share) }
             } else {
                 side.ports.ticks.pop(ctx);
                 sample
@@ -261,7 +262,7 @@ impl GlobalActor {
         let ticks = passed.min(self.plan.way_ticks());
         for i in 0..ticks {
             let part = |side: &mut ToolSide| {
-                let way = ToolMotion { from: side.from, to: side.tool.position };
+                let way = ToolMotion { from: side.from, to: side.tool.pose };
                 let motion = way.part(i as f64 / ticks as f64, (i + 1) as f64 / ticks as f64);
                 side.history.push(motion.to);
                 motion
@@ -272,7 +273,7 @@ impl GlobalActor {
         }
         if passed > ticks {
             // Nobody moved as the tools did here: what they will do is not to be told from it.
-            self.tools.iter_mut().for_each(|side| side.history.restart(side.tool.position));
+            self.tools.iter_mut().for_each(|side| side.history.restart(side.tool.pose));
             return Some(Cause::PathDropped);
         }
         let is_interpolated = passed > 1 || self.tools.iter().any(|side| side.is_between);
@@ -293,14 +294,14 @@ impl GlobalActor {
         self.aim.refit(&self.simulation.state().positions);
         let now = [0.0, self.plan.lead_s()];
         for (index, (side, tool)) in self.tools.iter_mut().zip(&self.forecasts).enumerate() {
-            self.aim.triangles(Some(self.simulation.contact(index)), tool, now, &mut side.triangles);
+            self.aim.triangles((&self.simulation, index), tool, now, &mut side.triangles);
         }
         self.publish_wishes(ctx);
         let mut version = 0;
         for (index, side) in self.tools.iter_mut().enumerate() {
             let has_bases = self.ports.surroundings.is_some();
             if has_bases {
-                side.choose_patch(self.simulation.body(), &self.plan);
+                side.choose_patch((&self.simulation, index), &self.plan);
             }
             let resync = ResyncView {
                 global: &mut self.simulation,
@@ -333,9 +334,12 @@ impl GlobalActor {
         let Some(ports) = &mut self.ports.surroundings else { return };
         let wishes = ports.wishes.buffer();
         wishes.patches.clear();
-        let mut list = WishList { body: self.simulation.body(), bases: &self.plan.bases, wishes };
+        let mut list = WishList { simulation: &self.simulation, index: 0, bases: &self.plan.bases, wishes };
         let (aim, size, lead, ahead) = (&self.aim, self.plan.patch, self.plan.lead_s(), &mut self.others);
         for (index, (ToolSide { triangles, .. }, tool)) in self.tools.iter().zip(&self.forecasts).enumerate() {
+            list.index = index;
+            let of_tool = (&self.simulation, index);
+            let has_shape = self.simulation.shape(index) != ToolShape::Point;
             if self.simulation.contact(index).glued {
                 // The tool stays where it is.
                 list.wish(triangles, size);
@@ -345,23 +349,31 @@ impl GlobalActor {
                 if !list.is_covered(triangles, size) {
                     list.wish(triangles, size);
                 }
-                list.wish(&triangles[..1], wide);
-                aim.heading(list.body, tool, triangles[0], ahead);
+                // A point is over one triangle, a tool with a shape over many.
+                let under = |triangles: &[u32]| if has_shape { triangles.len() } else { 1 };
+                list.wish(&triangles[..under(triangles)], wide);
+                aim.heading(self.simulation.body(), tool, triangles[0], ahead);
                 list.wish(&ahead[ahead.len() - 1..], wide);
                 for seconds in PREFETCH_S {
-                    aim.triangles(None, tool, [seconds, 0.0], ahead);
-                    list.wish(&ahead[..1], wide);
+                    aim.triangles(of_tool, tool, [seconds, 0.0], ahead);
+                    list.wish(&ahead[..under(ahead)], wide);
                 }
                 list.wish(triangles, size);
             } else {
-                list.wish(triangles, size);
-                aim.triangles(None, tool, [self.plan.global.period_s(), lead], ahead);
-                list.wish(ahead, size);
-                // It may leave for the next cells sooner or later than expected.
-                aim.heading(list.body, tool, triangles[0], ahead);
-                for last in 1..=ahead.len() {
-                    list.wish(&ahead[..last], size);
-                    list.wish(&ahead[last - 1..], size);
+                if !has_shape || !list.is_covered(triangles, size) {
+                    list.wish(triangles, size);
+                }
+                aim.triangles(of_tool, tool, [self.plan.global.period_s(), lead], ahead);
+                if !has_shape || !list.is_covered(ahead, size) {
+                    list.wish(ahead, size);
+                }
+                // It may leave for the next cells sooner or later than expected: the room around a shape holds that.
+                if !has_shape {
+                    aim.heading(self.simulation.body(), tool, triangles[0], ahead);
+                    for last in 1..=ahead.len() {
+                        list.wish(&ahead[..last], size);
+                        list.wish(&ahead[last - 1..], size);
+                    }
                 }
             }
         }
@@ -387,33 +399,6 @@ impl GlobalActor {
             view.time = time;
             view.positions.clone_from(&self.simulation.state().positions);
             surface.publish(ctx);
-        }
-    }
-}
-
-/// Collects the patches whose bases are missing.
-struct WishList<'a> {
-    body: &'a dyn Body,
-    bases: &'a Bases,
-    wishes: &'a mut Wishes,
-}
-
-impl WishList<'_> {
-    fn patch(&self, triangles: &[u32], size: [usize; 3]) -> Vec<u32> {
-        let mut patch = Vec::new();
-        self.body.patch(triangles, size, &mut patch);
-        patch
-    }
-
-    /// True if there is a basis for the patch around `triangles`, or for one that holds it.
-    fn is_covered(&self, triangles: &[u32], size: [usize; 3]) -> bool {
-        self.bases.around(&self.patch(triangles, size)).is_some()
-    }
-
-    fn wish(&mut self, triangles: &[u32], size: [usize; 3]) {
-        let patch = self.patch(triangles, size);
-        if self.bases.get(&patch).is_none() && !self.wishes.patches.contains(&patch) {
-            self.wishes.patches.push(patch);
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use super::cause::Cause;
 use super::messages::{ComputedForce, DeviceSample, SurfaceView, ToolTick};
-use crate::log::{ContactSample, ForceSample, ProbeSample, Resync, ServedBy};
-use crate::model::Vec3;
+use super::touched::{self, single};
+use crate::log::{ContactSample, ForceSample, LogRecord, ProbeSample, Resync, ServedBy};
 use crate::model::contact::{Contact, ContactMode};
 use crate::model::local::{Kind, LocalModel, PatchGeometry, Resynced, Served, Succession};
+use crate::model::{Pose, Vec3, Wrench};
 use crate::runtime::{Actor, GroupMode, Outcome, OutletWriter, QueueWriter, Reader, Recorder, TickContext, Writer};
 use crate::runtime::{Nanos, Rate};
 use crate::safety::coupling::CoupledTool;
@@ -94,9 +95,9 @@ impl LocalActor {
     /// Release 0: the first sample and the first model, no force.
     fn begin(&mut self, ctx: &TickContext) {
         self.begun = true;
-        let tool = self.ports.samples.get().state.position;
+        let tool = self.target();
         if let Some(coupled) = &mut self.coupled {
-            coupled.begin(tool.into());
+            coupled.begin(tool.position.into());
         }
         match &mut self.ports.source {
             ModelSource::Global { models, .. } => {
@@ -109,8 +110,13 @@ impl LocalActor {
         self.publish_state(ctx);
     }
 
+    /// Where the device has the tool.
+    fn target(&self) -> Pose {
+        self.ports.samples.get().state.pose()
+    }
+
     /// Advances the model to this release, or as far towards it as one release may.
-    fn advance(&mut self, ctx: &TickContext, target: Vec3) -> (Served, f64) {
+    fn advance(&mut self, ctx: &TickContext, target: Pose) -> (Served, f64) {
         let (mut served, mut dissipated_j) = (Served::default(), 0.0);
         let owed = ctx.tick.saturating_sub(self.models.now());
         let most = match ctx.mode {
@@ -121,20 +127,25 @@ impl LocalActor {
             // The tool is interpolated over all periods that are owed.
             let from = self.models.tool();
             let tool = match &mut self.coupled {
-                None => from + (target - from) / (owed - i) as f64,
-                Some(coupled) => coupled.follow(target.into(), owed - i, ctx.dt_nominal).into(),
+                None => from.towards_in(&target, owed - i),
+                // The coupling is one of places: the tool turns with the device.
+                Some(coupled) => Pose {
+                    position: coupled.follow(target.position.into(), owed - i, ctx.dt_nominal).into(),
+                    ..from.towards_in(&target, owed - i)
+                },
             };
             let before = served;
             served = self.models.tick(tool);
             served.resync = served.resync.or(before.resync);
             served.swap_step += before.swap_step;
-            let force = finite_or_zero(served.force);
-            self.energy -= force.dot(&(tool - from));
-            dissipated_j += friction_work(&self.models.serving().contact(), force, tool - from);
+            let Wrench { force, torque } = finite_or_none(served.wrench);
+            let moved = tool.position - from.position;
+            self.energy -= force.dot(&moved) + torque.dot(&tool.turned_since(&from));
+            dissipated_j += friction_work(&self.models.serving().contact(), force, moved);
             if let Some(coupled) = &mut self.coupled
-                && force == served.force
+                && force == served.wrench.force
             {
-                served.force = coupled.feel(force.into()).into();
+                served.wrench.force = coupled.feel(force.into()).into();
             }
             self.publish_state(ctx);
         }
@@ -143,7 +154,7 @@ impl LocalActor {
 
     /// Tells the global model where the tool and the patch are.
     fn publish_state(&mut self, ctx: &TickContext) {
-        let (tick, position) = (self.models.now(), self.models.tool());
+        let (tick, pose) = (self.models.now(), self.models.tool());
         let is_resync = tick == self.haptic.last_release(self.global.release(self.resync));
         if is_resync {
             self.resync += 1;
@@ -169,7 +180,7 @@ impl LocalActor {
                     }
                 }
                 // A full queue is counted; the global model sees the gap and interpolates over it.
-                ticks.push(ctx, ToolTick { tick, position });
+                ticks.push(ctx, ToolTick { tick, pose });
             }
         }
     }
@@ -182,21 +193,26 @@ impl LocalActor {
         }
     }
 
-    fn record(&mut self, time: Nanos, force: Vec3, resync: Option<Resynced>) {
+    fn record(&mut self, time: Nanos, Wrench { force, torque }: Wrench, resync: Option<Resynced>) {
         let age = |ticks: u64| self.haptic.release(ticks);
         let model_age_s = age(self.age_ticks()).as_secs_f64();
         let (model, device) = (self.models.serving(), self.number);
         let recorder = &mut self.ports.recorder;
-        recorder.push(ForceSample {
+        let sample = ForceSample {
             time,
             force_n: force.into(),
             model_version: self.models.version(),
             served_by: served_by(model.serves_as()),
             model_age_s,
             energy_j: self.energy,
+            torque_n_m: torque.into(),
             device,
-        });
-        recorder.push(ContactSample { device, ..contact_sample(time, &model.contact(), force) });
+        };
+        LogRecord::Force(sample).push_to(recorder);
+        let (points, contact) = (model.contact_points(), contact_sample(time, &model.contact(), force));
+        touched::records(points, time, device, |point| recorder.push(point));
+        let (count, area_m2) = (touched::count(points, &model.contact()), model.contact_area() as f32);
+        recorder.push(ContactSample { count, area_m2, device, ..contact });
         for (place, &node) in self.probes.iter().enumerate() {
             let global = model.global_position(place).unwrap_or_default();
             let local = model.position(node).unwrap_or(global);
@@ -238,17 +254,17 @@ impl Actor for LocalActor {
             let version = models.version() as u32;
             self.models.offer(models.get_mut(), version);
         }
-        let target = self.ports.samples.get().state.position;
-        let (Served { force: computed, resync, swap_step }, dissipated_j) = self.advance(ctx, target);
-        let force = finite_or_zero(computed);
+        let target = self.target();
+        let (Served { wrench: computed, resync, swap_step }, dissipated_j) = self.advance(ctx, target);
+        let Wrench { force, torque } = finite_or_none(computed);
         let time = self.haptic.release(self.models.now());
         let age_ticks = u32::try_from(self.age_ticks()).unwrap_or(u32::MAX);
-        let (position, mode) = (self.models.tool(), self.models.serving().contact().mode);
+        let (position, mode) = (self.models.tool().position, self.models.serving().contact().mode);
         *self.ports.commands.buffer() =
-            ComputedForce { time, force, age_ticks, swap_step, dissipated_j, position, mode };
+            ComputedForce { time, force, torque, age_ticks, swap_step, dissipated_j, position, mode };
         self.ports.commands.publish(ctx);
-        self.record(time, force, resync);
-        match (force == computed, &self.ports.source) {
+        self.record(time, Wrench { force, torque }, resync);
+        match (computed.is_finite(), &self.ports.source) {
             (true, _) => Outcome::Continue,
             // The next resync brings a good model; without a global model nothing would.
             (false, ModelSource::Global { .. }) => Outcome::Degraded(Cause::LocalNotFinite.code()),
@@ -270,8 +286,8 @@ fn served_by(kind: Kind) -> ServedBy {
     }
 }
 
-fn finite_or_zero(force: Vec3) -> Vec3 {
-    if force.iter().all(|c| c.is_finite()) { force } else { Vec3::zeros() }
+fn finite_or_none(wrench: Wrench) -> Wrench {
+    if wrench.is_finite() { wrench } else { Wrench::default() }
 }
 
 /// What sliding took of the tool's motion `moved` (m) under `force` (N).
@@ -290,10 +306,10 @@ fn contact_sample(time: Nanos, contact: &Contact, force: Vec3) -> ContactSample 
         mode: contact.mode,
         triangle: contact.triangle.unwrap_or(u32::MAX),
         weights: [contact.weights[1], contact.weights[2]],
-        normal: contact.normal.into(),
+        normal: single(contact.normal),
         normal_force_n: along as f32,
         tangential_force_n: (force - contact.normal * along).norm() as f32,
-        device: 0,
+        ..ContactSample::default()
     }
 }
 

@@ -10,7 +10,7 @@ use super::log_sink::{LogSink, Loss};
 use super::scene_watch::SceneWatch;
 use super::throttle::Throttle;
 use crate::error::{Error, ErrorKind};
-use crate::log::{Analysis, Environment, Level, LogRecord, RunReport, StatsCounter, TextEvent};
+use crate::log::{Analysis, Environment, JoinedRecords, Level, LogRecord, RunReport, StatsCounter, TextEvent};
 use crate::runtime::Event;
 use crate::runtime::Nanos;
 use crate::runtime::{
@@ -56,6 +56,7 @@ pub struct LoggerActor {
     /// Taken and not yet passed on, but for the first `passed`.
     records: Vec<Record>,
     passed: usize,
+    joined: JoinedRecords,
     /// Records that the sink could not keep.
     lost_by_sink: u64,
     /// The sink panicked: it is not called any more.
@@ -97,6 +98,7 @@ impl LoggerActor {
             failure: None,
             records: Vec::new(),
             passed: 0,
+            joined: JoinedRecords::default(),
             lost_by_sink: 0,
             sink_failed: false,
             log_time: Nanos::ZERO,
@@ -178,7 +180,7 @@ impl LoggerActor {
         while self.passed < ready {
             let record = self.records[self.passed];
             self.passed += 1;
-            if let Some(record) = LogRecord::from_record(&record) {
+            if let Some(record) = self.joined.read(&record) {
                 self.pass_on(&record);
             }
         }

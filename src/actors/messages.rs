@@ -1,9 +1,9 @@
 //! What actors say to each other and to programs that watch.
 
 use crate::devices::DeviceState;
-use crate::model::Vec3;
 use crate::model::body::State;
 use crate::model::contact::{Contact, ContactMode};
+use crate::model::{Pose, Turn, Vec3};
 use crate::runtime::Nanos;
 
 /// The device's newest state, numbered.
@@ -20,8 +20,8 @@ pub struct DeviceSample {
 pub struct ToolTick {
     /// The haptic tick.
     pub tick: u64,
-    /// Position (m).
-    pub position: Vec3,
+    /// The tool.
+    pub pose: Pose,
 }
 
 /// The newest force for the device, as the local model computed it. What is written is a
@@ -35,6 +35,8 @@ pub struct ComputedForce {
     pub time: Nanos,
     /// Mean force over that tick (N).
     pub force: Vec3,
+    /// Mean torque about the tool's centre over that tick (N m).
+    pub torque: Vec3,
     /// Age of the local model that it comes from (ticks of the local group).
     pub age_ticks: u32,
     /// How much of its change a swap of local models made (N).
@@ -54,11 +56,17 @@ pub struct ToolView {
     pub time: Nanos,
     /// Tool position (m).
     pub position: Vec3,
+    /// The turn from the tool's own axes to those of the world, as the device told it last.
+    pub orientation: Turn,
     /// Force on the tool that the model computed (N), before the safety pipeline: nobody feels it.
     pub computed_force: Vec3,
     /// Force that the device was commanded (N): what the hand feels. It is zero while nothing may be felt, such as at the start
     /// or after a fault, however large the computed one is.
     pub commanded_force: Vec3,
+    /// Torque about the tool's centre that the model computed (N m), before the safety pipeline.
+    pub computed_torque: Vec3,
+    /// Torque that the device was commanded (N m); zero for a device that exerts none.
+    pub commanded_torque: Vec3,
     /// State of the contact.
     pub mode: ContactMode,
 }

@@ -22,6 +22,8 @@ mod logger;
 mod messages;
 mod scene_watch;
 mod throttle;
+mod touched;
+mod wish_list;
 
 pub(crate) use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub(crate) use basis_store::BasisStore;

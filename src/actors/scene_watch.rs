@@ -7,12 +7,12 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use super::messages::SurfaceView;
-use crate::log::{Environment, LogRecord, SceneFrame, SceneTool};
-use crate::model::Vec3;
+use crate::log::{Environment, LogRecord, SceneFrame, SceneTool, WaitingPoints};
+use crate::model::{Vec3, wxyz};
 use crate::runtime::Nanos;
 use crate::runtime::{OutletReader, TickContext};
 
-/// Diameter of a drawn tool, in the largest extent of the body.
+/// Diameter of a drawn tool that is a point, in the largest extent of the body.
 const TOOL_SIZE: f64 = 0.04;
 
 /// Takes a picture per release of the logger.
@@ -28,6 +28,7 @@ pub struct SceneWatch {
     tool_size_m: f64,
     /// By device, once there was a sample.
     tools: BTreeMap<u16, SceneTool>,
+    points: WaitingPoints,
     /// With their surface, waiting for the tools' records of their time.
     taken: VecDeque<SceneFrame>,
 }
@@ -41,7 +42,15 @@ impl SceneWatch {
         let point = |node: u32| nodes.binary_search(&node).map_or(0, |point| point as u32);
         let triangles = triangles.iter().map(|triangle| triangle.map(point)).collect();
         let tool_size_m = TOOL_SIZE * largest_extent(&surface.get().positions);
-        Self { surface, nodes, triangles, tool_size_m, tools: BTreeMap::new(), taken: VecDeque::new() }
+        Self {
+            surface,
+            nodes,
+            triangles,
+            tool_size_m,
+            tools: BTreeMap::new(),
+            points: WaitingPoints::default(),
+            taken: VecDeque::new(),
+        }
     }
 
     /// Takes the newest surface.
@@ -68,12 +77,21 @@ impl SceneWatch {
                         "" => String::new(),
                         name => format!("{name}/"),
                     },
+                    shape: environment.shape(sample.device),
                     ..SceneTool::default()
                 });
                 (tool.time, tool.position_m) = (sample.time, sample.position_m);
+                tool.orientation = wxyz(&sample.orientation);
             }
             LogRecord::Force(sample) => {
                 self.tools.get_mut(&sample.device).into_iter().for_each(|tool| tool.force_n = sample.force_n);
+            }
+            LogRecord::ContactPoint(point) => self.points.add(*point),
+            LogRecord::Contact(sample) => {
+                let contacts = self.points.take(sample);
+                if let Some(tool) = self.tools.get_mut(&sample.device) {
+                    tool.contacts = contacts;
+                }
             }
             _ => {}
         }

@@ -33,6 +33,8 @@ pub struct Capabilities {
     pub max_force_n: f64,
     /// Largest force that it exerts for as long as it is asked to (N), if its motors grow hot above.
     pub continuous_force_n: Option<f64>,
+    /// Largest torque that the device can or may exert (N m); `None` for one that exerts none, as those of the table.
+    pub max_torque_n_m: Option<f64>,
     /// Largest stiffness that it renders without a limit cycle (N/m).
     pub max_stiffness_n_per_m: f64,
     /// Largest damping that it renders without a limit cycle (N s/m).
@@ -77,6 +79,7 @@ impl Capabilities {
             degrees_of_freedom: 3,
             max_force_n,
             continuous_force_n: None,
+            max_torque_n_m: None,
             max_stiffness_n_per_m: stiffness,
             max_damping_n_s_per_m: damping,
             damping_n_s_per_m: None,
@@ -103,6 +106,7 @@ impl Capabilities {
                 self.continuous_force_n.is_none_or(|continuous_n| continuous_n <= self.max_force_n),
                 "continuous_force_n must be at most max_force_n",
             ),
+            (is_size_if_known(self.max_torque_n_m), "max_torque_n_m must be a finite number above 0"),
             (is_size(self.max_stiffness_n_per_m), "max_stiffness_n_per_m must be a finite number above 0"),
             (is_size(self.max_damping_n_s_per_m), "max_damping_n_s_per_m must be a finite number above 0"),
             (is_size_if_known(self.damping_n_s_per_m), "damping_n_s_per_m must be a finite number above 0"),
@@ -140,7 +144,7 @@ mod tests {
     fn the_default_promises_less_than_any_device_of_the_table() {
         let least = Capabilities::default();
         for device in TABLE {
-            assert_eq!(device.fault(), None);
+            assert_eq!((device.fault(), device.max_torque_n_m), (None, None));
             assert!(least.max_force_n <= device.max_force_n);
             assert!(least.max_stiffness_n_per_m <= device.max_stiffness_n_per_m);
             assert!(least.max_damping_n_s_per_m <= device.max_damping_n_s_per_m);
@@ -155,6 +159,7 @@ mod tests {
             (Capabilities { degrees_of_freedom: 0, ..good }, "degrees_of_freedom"),
             (Capabilities { max_force_n: f64::NAN, ..good }, "max_force_n"),
             (Capabilities { continuous_force_n: Some(4.0), ..good }, "continuous_force_n"),
+            (Capabilities { max_torque_n_m: Some(0.0), ..good }, "max_torque_n_m"),
             (Capabilities { max_stiffness_n_per_m: 0.0, ..good }, "max_stiffness_n_per_m"),
             (Capabilities { max_damping_n_s_per_m: -1.0, ..good }, "max_damping_n_s_per_m"),
             (Capabilities { damping_n_s_per_m: Some(f64::NAN), ..good }, "damping_n_s_per_m"),

@@ -34,7 +34,7 @@ use crate::runtime::Nanos;
 ///         let (t, amplitude, rate) = (time.as_secs_f64(), 0.02, 6.0);
 ///         let position = Vec3::new(amplitude * (rate * t).sin(), 0.0, 0.1);
 ///         let velocity = Vec3::new(amplitude * rate * (rate * t).cos(), 0.0, 0.0);
-///         Ok(DeviceState { position, velocity, buttons: 0 })
+///         Ok(DeviceState { position, velocity, ..DeviceState::default() })
 ///     }
 ///
 ///     fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {
@@ -103,14 +103,15 @@ pub trait Device: Send + std::fmt::Debug {
     /// Called in the haptic tick: must neither allocate nor block.
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault>;
 
-    /// Exerts a force until the next call, or until the command expires.
+    /// Exerts a force, and a torque if it can, until the next call, or until the command expires.
     ///
     /// A device that has a clock of its own drops to zero at the expiry by itself. One that sees time only through
     /// [`read`](Self::read) does so at the first read from then on.
     ///
     /// # Errors
-    /// A [`DeviceFault`]; it is counted and reported. A force that is not finite is [`DeviceFault::Refused`] and leaves
-    /// none behind; one above the limit is refused or shortened.
+    /// A [`DeviceFault`]; it is counted and reported. A force or torque that is not finite is [`DeviceFault::Refused`]
+    /// and leaves none behind; one above the limit is refused or shortened. A device that exerts no torque
+    /// ([`Capabilities::max_torque_n_m`]) is given none.
     ///
     /// # Real-time
     /// Called in the haptic tick: must neither allocate nor block.
@@ -122,6 +123,14 @@ pub trait Device: Send + std::fmt::Debug {
     /// # Real-time
     /// Not called in a tick.
     fn exerted(&self) -> Option<Vec3> {
+        None
+    }
+
+    /// The torque that it exerts at the time of the last read (N m), if it measures or simulates that.
+    ///
+    /// # Real-time
+    /// Not called in a tick.
+    fn exerted_torque(&self) -> Option<Vec3> {
         None
     }
 }
@@ -157,6 +166,10 @@ impl<D: Device + ?Sized> Device for Box<D> {
 
     fn exerted(&self) -> Option<Vec3> {
         (**self).exerted()
+    }
+
+    fn exerted_torque(&self) -> Option<Vec3> {
+        (**self).exerted_torque()
     }
 }
 

@@ -218,6 +218,10 @@ impl<D: Device> Device for Faulty<D> {
     fn exerted(&self) -> Option<Vec3> {
         self.device.exerted()
     }
+
+    fn exerted_torque(&self) -> Option<Vec3> {
+        self.device.exerted_torque()
+    }
 }
 
 #[cfg(test)]

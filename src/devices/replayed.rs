@@ -2,6 +2,7 @@
 
 use super::device::take_nothing;
 use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
+use crate::model::Pose;
 use crate::runtime::Nanos;
 
 /// A state that was read from a device once, with the number of the read.
@@ -37,7 +38,7 @@ impl Replayed {
         Self { first: Some(first), samples, next: 0, last_id: 0, capabilities, is_exact: true }
     }
 
-    /// Answers other releases too: between two samples the tool moves in a straight line, after the last it stays.
+    /// Answers other releases too: between two samples the tool moves in a straight line and turns the shorter way, after the last it stays.
     #[must_use]
     pub fn at_any_rate(self) -> Self {
         Self { is_exact: false, ..self }
@@ -105,8 +106,10 @@ impl Device for Replayed {
 fn between(from: &ReplayedSample, to: &ReplayedSample, time: Nanos) -> DeviceState {
     let seconds = |time: Nanos| time.saturating_sub(from.time).as_secs_f64();
     let share = seconds(time) / seconds(to.time);
+    let Pose { position, orientation } = from.state.pose().towards(&to.state.pose(), share);
     DeviceState {
-        position: from.state.position + (to.state.position - from.state.position) * share,
+        position,
+        orientation,
         velocity: from.state.velocity + (to.state.velocity - from.state.velocity) * share,
         buttons: from.state.buttons,
     }
@@ -115,7 +118,7 @@ fn between(from: &ReplayedSample, to: &ReplayedSample, time: Nanos) -> DeviceSta
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Vec3;
+    use crate::model::{Turn, Vec3};
 
     const LIMITS: Capabilities = Capabilities::TOUCH;
 
@@ -146,5 +149,23 @@ mod tests {
         let expected =
             [Ok(9.0), Ok(0.0), Ok(1.0), Ok(4.0), Ok(6.0), Err(DeviceFault::Stale), Ok(10.0), Ok(10.0), Ok(10.0)];
         assert_eq!(reads, expected);
+    }
+
+    // Check that orientations are those of the log at its times, and half a turn between them otherwise.
+    #[test]
+    fn it_is_turned_as_it_was_logged() {
+        let turn = |angle: f64| Turn::from_axis_angle(&Vec3::y_axis(), angle);
+        let sample = |ms: u64, id, angle| ReplayedSample {
+            time: Nanos(ms),
+            id,
+            state: DeviceState { orientation: turn(angle), ..state(0.0) },
+        };
+        let samples = vec![sample(0, 1, 0.3), sample(4, 2, 0.7)];
+        let mut device = Replayed::new(state(9.0), samples.clone(), LIMITS);
+        let reads = [0, 0, 4].map(|time| device.read(Nanos(time)).unwrap().orientation);
+        assert_eq!(reads, [Turn::identity(), turn(0.3), turn(0.7)]);
+        let mut device = Replayed::new(state(9.0), samples, LIMITS).at_any_rate();
+        let reads = [0, 0, 2].map(|time| device.read(Nanos(time)).unwrap().orientation);
+        assert!(reads[2].angle_to(&turn(0.5)) < 1e-7, "{reads:?}");
     }
 }

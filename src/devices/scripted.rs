@@ -2,7 +2,7 @@
 
 use super::device::take_nothing;
 use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
-use crate::model::Vec3;
+use crate::model::{Pose, Vec3};
 use crate::runtime::Nanos;
 
 /// A tool that follows a path and exerts nothing.
@@ -43,13 +43,13 @@ impl Device for Scripted {
     }
 
     fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
-        let position = Vec3::from(self.path.at(time.as_secs_f64()));
+        let Pose { position, orientation } = self.path.pose_at(time.as_secs_f64());
         let velocity = match self.last {
             Some((before, was)) if time > before => (position - was) / time.saturating_sub(before).as_secs_f64(),
             _ => Vec3::zeros(),
         };
         self.last = Some((time, position));
-        Ok(DeviceState { position, velocity, buttons: 0 })
+        Ok(DeviceState { position, velocity, orientation, buttons: 0 })
     }
 
     fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {

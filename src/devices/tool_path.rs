@@ -2,11 +2,15 @@
 
 use std::path::Path;
 
+use super::state::ROUGH_TURN;
 use crate::error::{Error, ErrorKind, quoted};
 use crate::files;
+use crate::model::{Pose, Turn, turn_of};
 
-/// The first line of every path file; the units in it are the reason that it must be exactly this.
+/// The first line of a path file; the units in it are the reason that it must be exactly this.
 const HEADER: &str = "t_s,x_m,y_m,z_m";
+/// The first line of a path file that says how the tool is turned.
+const TURNED_HEADER: &str = "t_s,x_m,y_m,z_m,qw,qx,qy,qz";
 
 /// No coordinate of a tool lies farther out than this (m); it keeps every difference of positions finite.
 const FARTHEST_M: f64 = 1e6;
@@ -17,7 +21,7 @@ const MOST_SAMPLES: usize = 4_000_000;
 /// Room for so many samples of 64 characters (bytes).
 const LARGEST_FILE: u64 = 64 * MOST_SAMPLES as u64;
 
-/// Tool positions over time, linear in between, held after the last and before the first.
+/// Tool positions and orientations over time, linear in between, held after the last and before the first.
 ///
 /// ```
 /// use palpate::devices::ToolPath;
@@ -35,6 +39,8 @@ pub struct ToolPath {
     times_s: Vec<f64>,
     /// Positions (m), one per time.
     positions_m: Vec<[f64; 3]>,
+    /// Orientations, one per time, each of the sign that is nearer to the one before; empty if the tool is never turned.
+    orientations: Vec<Turn>,
 }
 
 impl ToolPath {
@@ -61,7 +67,29 @@ impl ToolPath {
                 .map_err(|message| Error::new(ErrorKind::Scene, message).at(format!("sample {index}")))?;
             before_s = Some(time_s);
         }
-        Ok(Self { times_s, positions_m })
+        Ok(Self { times_s, positions_m, orientations: Vec::new() })
+    }
+
+    /// The path with the tool turned by `quaternions` (w, x, y, z), one per time: evenly and on the shorter way in between.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Scene`] if there is not one per time, or one is not of length one within 1e-3.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn turned(self, quaternions: &[[f64; 4]]) -> Result<Self, Error> {
+        if quaternions.len() != self.times_s.len() {
+            let (times, turns) = (self.times_s.len(), quaternions.len());
+            let message = format!("{times} times and {turns} orientations, there must be one orientation per time");
+            return Err(Error::new(ErrorKind::Scene, message));
+        }
+        let mut orientations: Vec<Turn> = Vec::with_capacity(quaternions.len());
+        for (index, quaternion) in quaternions.iter().enumerate() {
+            let turn = turn(orientations.last(), *quaternion)
+                .map_err(|message| Error::new(ErrorKind::Scene, message).at(format!("sample {index}")))?;
+            orientations.push(turn);
+        }
+        Ok(Self { orientations, ..self })
     }
 
     /// A tool that stays at `position_m` (m).
@@ -75,7 +103,7 @@ impl ToolPath {
         Self::new(vec![0.0], vec![position_m])
     }
 
-    /// Reads a file with the columns `t_s,x_m,y_m,z_m`.
+    /// Reads a file with the columns `t_s,x_m,y_m,z_m`, or `t_s,x_m,y_m,z_m,qw,qx,qy,qz` for a tool that turns.
     ///
     /// # Errors
     /// [`ErrorKind::Io`] if the file cannot be read or is larger than 244 MiB, [`ErrorKind::Scene`] with its name and line
@@ -90,7 +118,7 @@ impl ToolPath {
         Self::from_csv(&text, &name)
     }
 
-    /// Reads the text of a file with the columns `t_s,x_m,y_m,z_m`; `name` stands for the file in errors.
+    /// Reads the text of a file with the columns of [`read_csv`](Self::read_csv); `name` stands for the file in errors.
     ///
     /// # Errors
     /// [`ErrorKind::Scene`] with `name` and the line if the header or a row is unusable.
@@ -98,8 +126,7 @@ impl ToolPath {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn from_csv(text: &str, name: &str) -> Result<Self, Error> {
-        let (times_s, positions_m) = parse(text, name)?;
-        Ok(Self { times_s, positions_m })
+        parse(text, name)
     }
 
     /// The position (m) at `time_s` (s): a sample's own value at its time, linear in between, held outside.
@@ -119,6 +146,26 @@ impl ToolPath {
         let (to_s, to_m) = (self.times_s[next], self.positions_m[next]);
         let share = (time_s - from_s) / (to_s - from_s);
         std::array::from_fn(|axis| from_m[axis] + share * (to_m[axis] - from_m[axis]))
+    }
+
+    /// The pose at `time_s` (s): [`at`](Self::at) for the position, and the orientation likewise, on the shorter way between
+    /// two samples.
+    ///
+    /// # Real-time
+    /// Real-time safe: allocates nothing, bounded by a binary search over the samples.
+    pub fn pose_at(&self, time_s: f64) -> Pose {
+        let position = self.at(time_s).into();
+        if self.orientations.is_empty() {
+            return Pose::at(position);
+        }
+        let next = self.times_s.partition_point(|&sample_s| sample_s <= time_s);
+        let from = next.saturating_sub(1);
+        let turned = |sample: usize| Pose { position, orientation: self.orientations[sample] };
+        if next == 0 || next == self.times_s.len() || time_s == self.times_s[from] {
+            return turned(from);
+        }
+        let share = (time_s - self.times_s[from]) / (self.times_s[next] - self.times_s[from]);
+        Pose { position, ..turned(from).towards(&turned(next), share) }
     }
 
     /// The time of the last sample (s); the tool stays there from then on.
@@ -143,6 +190,14 @@ impl ToolPath {
     /// Wait-free, real-time safe.
     pub fn positions_m(&self) -> &[[f64; 3]] {
         &self.positions_m
+    }
+
+    /// The orientations of the samples, one per time; none for a tool that is never turned.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn orientations(&self) -> &[Turn] {
+        &self.orientations
     }
 }
 
@@ -172,45 +227,118 @@ fn check_sample(before_s: Option<f64>, time_s: f64, position_m: &[f64; 3]) -> Re
     Ok(())
 }
 
-/// The times (s) and positions (m) in `text`, checked row by row so that every error names its line.
-fn parse(text: &str, name: &str) -> Result<(Vec<f64>, Vec<[f64; 3]>), Error> {
+/// The turn of a quaternion (w, x, y, z) of length one, of the sign that is nearer to the turn `before`; or what is wrong with it.
+fn turn(before: Option<&Turn>, wxyz: [f64; 4]) -> Result<Turn, String> {
+    let quaternion = turn_of(wxyz).into_inner();
+    let length = quaternion.norm();
+    if !length.is_finite() || (length - 1.0).abs() > ROUGH_TURN {
+        return Err(format!("qw,qx,qy,qz have the length {length}, must be of length 1 within {ROUGH_TURN}"));
+    }
+    let turn = Turn::new_normalize(quaternion);
+    let is_far = before.is_some_and(|before| before.dot(&turn) < 0.0);
+    Ok(if is_far { Turn::new_unchecked(-turn.into_inner()) } else { turn })
+}
+
+/// The path in `text`, checked row by row so that every error names its line.
+fn parse(text: &str, name: &str) -> Result<ToolPath, Error> {
     let at = |line: usize, message: String| Error::new(ErrorKind::Scene, message).at(format!("{name}:{line}"));
-    let (mut times_s, mut positions_m) = (Vec::new(), Vec::new());
+    let mut path = ToolPath { times_s: Vec::new(), positions_m: Vec::new(), orientations: Vec::new() };
     // Spreadsheets put a byte order mark in front and empty lines behind.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text).trim_end();
     let mut lines = text.lines();
     let header = lines.next().unwrap_or_default().trim_end();
-    if header != HEADER {
+    let is_turned = header == TURNED_HEADER;
+    if header != HEADER && !is_turned {
         let found = if header.is_empty() { "no header".to_owned() } else { format!("the header {}", quoted(header)) };
-        return Err(at(1, format!("found {found}, must be exactly {HEADER} (seconds and metres)")));
+        let message = format!("found {found}, must be exactly {HEADER} (seconds and metres), or {TURNED_HEADER}");
+        return Err(at(1, message));
     }
     for (index, row) in lines.enumerate() {
         let line = index + 2;
         if index == MOST_SAMPLES {
             return Err(at(line, format!("is one row too many, a path has at most {MOST_SAMPLES}")));
         }
-        let [time_s, position_m @ ..] = numbers(row).map_err(|message| at(line, message))?;
-        check_sample(times_s.last().copied(), time_s, &position_m).map_err(|message| at(line, message))?;
-        times_s.push(time_s);
-        positions_m.push(position_m);
+        let wrong = |message| at(line, message);
+        let [time_s, x, y, z, quaternion @ ..] = numbers(row, header).map_err(wrong)?;
+        let position_m = [x, y, z];
+        check_sample(path.times_s.last().copied(), time_s, &position_m).map_err(wrong)?;
+        path.times_s.push(time_s);
+        path.positions_m.push(position_m);
+        if is_turned {
+            path.orientations.push(turn(path.orientations.last(), quaternion).map_err(wrong)?);
+        }
     }
-    if times_s.is_empty() {
+    if path.times_s.is_empty() {
         return Err(at(1, "the header has no row below it, a path needs at least one sample".to_owned()));
     }
-    Ok((times_s, positions_m))
+    Ok(path)
 }
 
-fn numbers(row: &str) -> Result<[f64; 4], String> {
+/// The numbers of a row, as many as `header` has names; the rest is zero.
+fn numbers(row: &str, header: &str) -> Result<[f64; 8], String> {
     if row.trim().is_empty() {
-        return Err("the line is empty, must be a row t_s,x_m,y_m,z_m".to_owned());
+        return Err(format!("the line is empty, must be a row {header}"));
     }
-    let columns = row.split(',').count();
-    if columns != 4 {
-        return Err(format!("found {columns} columns, must be 4: {HEADER}"));
+    let (columns, named) = (row.split(',').count(), header.split(',').count());
+    if columns != named {
+        return Err(format!("found {columns} columns, must be {named}: {header}"));
     }
-    let mut values = [0.0; 4];
-    for ((value, column), field) in values.iter_mut().zip(HEADER.split(',')).zip(row.split(',')) {
+    let mut values = [0.0; 8];
+    for ((value, column), field) in values.iter_mut().zip(header.split(',')).zip(row.split(',')) {
         *value = field.trim().parse().map_err(|_| format!("{column} is {}, must be a number", quoted(field.trim())))?;
     }
     Ok(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Vec3;
+
+    fn read(text: &str) -> Result<ToolPath, String> {
+        ToolPath::from_csv(text, "path.csv").map_err(|error| error.to_string())
+    }
+
+    fn about_z(angle: f64) -> Turn {
+        Turn::from_axis_angle(&Vec3::z_axis(), angle)
+    }
+
+    // Check that the sign in which a file writes a turn makes no way round, and that positions are those of `at`.
+    #[test]
+    fn a_turned_tool_goes_the_shorter_way_and_keeps_its_positions() {
+        let (s, c) = (0.2_f64.sin(), 0.2_f64.cos());
+        let path =
+            read(&format!("{TURNED_HEADER}\n0,0,0,0,1,0,0,0\n1,0.3,0,0,{},0,0,{}\n2,0.3,0,0,{c},0,0,{s}\n", -c, -s));
+        let path = path.unwrap();
+        for time_s in [0.0, 0.1, 0.5, 1.0, 1.7, 2.0, 9.0] {
+            let Pose { position, orientation } = path.pose_at(time_s);
+            assert_eq!(position, Vec3::from(path.at(time_s)));
+            assert!((orientation.angle_to(&about_z(0.4 * time_s.min(1.0)))).abs() < 2e-3, "{time_s}: {orientation}");
+        }
+        assert!(path.pose_at(0.5).orientation.angle_to(&about_z(0.2)) < 1e-7);
+        assert_eq!(path.orientations()[1], path.pose_at(1.0).orientation);
+        let turned =
+            ToolPath::new(vec![0.0, 1.0], vec![[0.0; 3]; 2]).unwrap().turned(&[[1.0, 0.0, 0.0, 0.0], [c, 0.0, 0.0, s]]);
+        assert_eq!(turned.unwrap().orientations()[1], path.orientations()[1]);
+    }
+
+    #[test]
+    fn what_is_no_turn_is_named_with_its_line() {
+        let row = |quaternion: &str| read(&format!("{TURNED_HEADER}\n0,0,0,0,1,0,0,0\n1,0,0,0,{quaternion}\n"));
+        assert!(row("0.9995,0,0,0").unwrap().orientations()[1].coords.norm() == 1.0);
+        let error = row("0.9,0,0,0").unwrap_err();
+        assert_eq!(error, "path.csv:3: qw,qx,qy,qz have the length 0.9, must be of length 1 within 0.001");
+        assert!(row("NaN,0,0,0").unwrap_err().contains("path.csv:3: qw,qx,qy,qz"));
+        assert!(row("1,0,0").unwrap_err().contains("found 7 columns, must be 8"));
+        assert!(row("1,0,up,0").unwrap_err().contains("qy is \"up\", must be a number"));
+        let few = ToolPath::constant([0.0; 3]).unwrap().turned(&[]).unwrap_err().to_string();
+        assert_eq!(few, "1 times and 0 orientations, there must be one orientation per time");
+    }
+
+    #[test]
+    fn a_path_without_orientations_turns_nothing() {
+        let path = read("t_s,x_m,y_m,z_m\n0,0.1,0.2,0.3\n").unwrap();
+        assert_eq!(path.pose_at(0.5), Pose::at(Vec3::new(0.1, 0.2, 0.3)));
+        assert!(path.orientations().is_empty());
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! | to | there is |
 //! | --- | --- |
-//! | hold what a tick did | [`LogRecord`] and the samples in it |
+//! | hold what a tick did | [`LogRecord`] and the samples in it; [`JoinedRecords`] reads them from the runtime's records |
 //! | write a log | [`McapWriter`], after an [`Environment`] that says what was run |
 //! | read one | [`LogReader`], which gives a [`LogEntry`] after the other |
 //! | sum a run up | [`Analysis`], which gives a [`RunReport`] |
@@ -24,16 +24,17 @@ mod writer;
 
 pub use self::analysis::{
     Analysis, ContactReport, DeviceReport, EnergyReport, ForceReport, GroupCounter, GroupSummary, LimitReport,
-    ResyncReport, RunReport, TickFigures, TickGauge, magnitude,
+    ResyncReport, RunReport, TickFigures, TickGauge, TouchReport, magnitude,
 };
 pub use self::entry::{LogEntry, Window};
 pub use self::percentiles::{Distribution, Magnitudes, Percentiles};
 pub use self::reader::{LogReader, TopicKind};
-pub(crate) use self::records::MAX_DEVICES;
 pub use self::records::{
-    CommandSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, Level, LogRecord, LoggedExecution,
-    ModelReason, ProbeSample, Resync, SceneFrame, SceneTool, ServedBy, TextEvent, ToolSample,
+    CommandSample, ContactPointSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, JoinedRecords,
+    Level, LogRecord, LoggedExecution, ModelReason, ProbeSample, Resync, SceneFrame, SceneTool, ServedBy, TextEvent,
+    ToolSample,
 };
+pub(crate) use self::records::{MAX_DEVICES, WaitingPoints};
 pub(crate) use self::stats::StatsCounter;
 pub use self::stats::{EventSum, GroupStats};
 pub use self::writer::McapWriter;

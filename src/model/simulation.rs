@@ -1,10 +1,14 @@
 //! A whole body with its contacts, advanced tick by tick: the global model, and `full` at the haptic rate.
 
-use crate::Vec3;
+use std::sync::Arc;
+
 use crate::body::{Body, State};
-use crate::contact::{Contact, Deformable, Law, ToolMotion, Touch, step_all};
+use crate::contact::{
+    Coarseness, Contact, ContactPoint, Deformable, Law, Rows, Skin, ToolMotion, ToolShape, Touch, step_all,
+};
 use crate::error::ModelError;
 use crate::integrator::Spectrum;
+use crate::{Pose, Vec3, Wrench};
 
 /// How time is divided: ticks of the haptic rate, each of several explicit substeps.
 ///
@@ -39,10 +43,10 @@ impl Stepping {
         self.tick / f64::from(self.substeps)
     }
 
-    /// Runs one tick: calls `substep` for each part of the tool's motion and returns the mean force (N).
-    pub(crate) fn tick(&self, tool: ToolMotion, mut substep: impl FnMut(ToolMotion, f64) -> Vec3) -> Vec3 {
+    /// Runs one tick: calls `substep` for each part of the tool's motion and returns the mean of what it gives.
+    pub(crate) fn tick(&self, tool: ToolMotion, mut substep: impl FnMut(ToolMotion, f64) -> Wrench) -> Wrench {
         let n = f64::from(self.substeps);
-        let sum = (0..self.substeps).fold(Vec3::zeros(), |sum, u| {
+        let sum = (0..self.substeps).fold(Wrench::default(), |sum, u| {
             let u = f64::from(u);
             sum + substep(tool.part(u / n, (u + 1.0) / n), self.step())
         });
@@ -57,13 +61,14 @@ pub struct Simulation {
     state: State,
     forces: Vec<Vec3>,
     touches: Vec<Touch>,
+    rows: Rows,
     law: Law,
     stepping: Stepping,
     /// All surface triangles: a tool may touch anywhere.
     candidates: Vec<u32>,
     inverse_masses: Vec<f64>,
-    /// On each tool: mean force of the last tick, or of the resting contact before the first (N).
-    means: Vec<Vec3>,
+    /// On each tool: mean force and torque of the last tick, or of the resting contact before the first.
+    means: Vec<Wrench>,
 }
 
 impl Simulation {
@@ -93,8 +98,8 @@ impl Simulation {
         let candidates = (0..body.surface().triangles.len() as u32).collect();
         let inverse_masses = body.inverse_masses().to_vec();
         let forces = vec![Vec3::zeros(); nodes];
-        let (touches, means) = (Vec::new(), Vec::new());
-        let new = Self { body, state, forces, touches, law, stepping, candidates, inverse_masses, means };
+        let (touches, rows, means) = Default::default();
+        let new = Self { body, state, forces, touches, rows, law, stepping, candidates, inverse_masses, means };
         Ok(new.with_tool(contact))
     }
 
@@ -104,9 +109,23 @@ impl Simulation {
     /// Not real-time safe: allocates.
     #[must_use]
     pub fn with_tool(mut self, contact: Contact) -> Self {
-        self.touches.push(Touch { contact, force: Vec3::zeros() });
+        self.touches.push(Touch::new(ToolShape::Point, Arc::default(), contact));
         let force = self.resting_force(&contact);
-        self.means.push(force);
+        self.means.push(force.into());
+        self.rows = Rows::with_room(self.touches.len());
+        self.rows.make_room(self.inverse_masses.len());
+        self
+    }
+
+    /// Gives a tool the shape; one that is glued keeps its one contact, at its centre.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates, and looks at every node of the surface.
+    #[must_use]
+    pub fn with_shape(mut self, tool: usize, shape: ToolShape) -> Self {
+        let skin = if shape == ToolShape::Point { Skin::default() } else { Skin::new(&*self.body, shape.radius()) };
+        self.touches[tool] = Touch::new(shape, Arc::new(skin), self.touches[tool].contact);
+        self.rows.make_room(self.inverse_masses.len());
         self
     }
 
@@ -115,11 +134,14 @@ impl Simulation {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn duplicate(&self) -> Option<Self> {
+        let mut rows = Rows::with_room(self.touches.len());
+        rows.make_room(self.inverse_masses.len());
         Some(Self {
             body: self.body.duplicate()?,
             state: self.state.clone(),
             forces: self.forces.clone(),
             touches: self.touches.clone(),
+            rows,
             law: self.law,
             stepping: self.stepping,
             candidates: self.candidates.clone(),
@@ -142,11 +164,12 @@ impl Simulation {
         if compliance > 0.0 { acceleration / compliance } else { Vec3::zeros() }
     }
 
-    /// Advances one haptic tick while the one tool moves along `tool`; returns the force on it, its mean over the tick (N).
+    /// Advances one haptic tick while the one tool moves along `tool`; returns the force and the torque on it, their means over
+    /// the tick.
     ///
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
-    pub fn tick(&mut self, tool: ToolMotion) -> Vec3 {
+    pub fn tick(&mut self, tool: ToolMotion) -> Wrench {
         self.tick_all(&[tool]);
         self.means[0]
     }
@@ -163,9 +186,10 @@ impl Simulation {
     }
 
     fn advance(&mut self, motion: impl Fn(usize) -> ToolMotion, watch: &mut impl FnMut(&State)) {
-        let Self { body, state, forces, touches, law, candidates, inverse_masses, stepping, means } = self;
+        let Self { body, state, forces, touches, rows, law, candidates, inverse_masses, stepping, means } = self;
         let (n, d) = (f64::from(stepping.substeps), stepping.step());
-        means.fill(Vec3::zeros());
+        means.fill(Wrench::default());
+        touches.iter_mut().for_each(Touch::begin);
         for u in 0..stepping.substeps {
             let u = f64::from(u);
             watch(state);
@@ -178,10 +202,11 @@ impl Simulation {
                 candidates,
             };
             let part = |tool| motion(tool).part(u / n, (u + 1.0) / n);
-            step_all(&mut deformable, forces, touches, law, part, d);
-            means.iter_mut().zip(&*touches).for_each(|(sum, touch)| *sum += touch.force);
+            step_all(&mut deformable, forces, touches, rows, law, part, d);
+            means.iter_mut().zip(&*touches).for_each(|(sum, touch)| *sum += touch.wrench);
         }
-        means.iter_mut().for_each(|sum| *sum /= n);
+        means.iter_mut().for_each(|sum| *sum = *sum / n);
+        touches.iter_mut().for_each(|touch| touch.end(stepping.substeps, |triangle| triangle));
     }
 
     /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the state at the
@@ -228,12 +253,17 @@ impl Simulation {
         (0..self.touches.len()).filter(move |&other| other != tool).flat_map(|other| self.exerted(other))
     }
 
-    /// The three nodes that `tool` touches with the force on each (N), its mean over the last tick.
-    fn exerted(&self, tool: usize) -> impl Iterator<Item = (u32, Vec3)> + use<> {
-        let Contact { triangle, weights, .. } = self.touches[tool].contact;
-        let force = self.means[tool];
+    /// The nodes that `tool` touches with the force on each (N): of a point its mean over the last tick, of a tool with a shape
+    /// that of the last step.
+    fn exerted(&self, tool: usize) -> Vec<(u32, Vec3)> {
+        let touch = &self.touches[tool];
+        if touch.has_shape() {
+            return touch.pressed().to_vec();
+        }
+        let Contact { triangle, weights, .. } = touch.contact;
+        let force = self.means[tool].force;
         let nodes = triangle.map(|triangle| self.body.surface().triangles[triangle as usize]);
-        nodes.into_iter().flat_map(move |nodes| (0..3).map(move |i| (nodes[i], -force * weights[i])))
+        nodes.into_iter().flat_map(|nodes| (0..3).map(move |i| (nodes[i], -force * weights[i]))).collect()
     }
 
     /// The body that is simulated.
@@ -286,7 +316,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn restore_tool(&mut self, tool: usize, contact: Contact, force: Vec3) {
-        (self.touches[tool].contact, self.means[tool]) = (contact, force);
+        (self.touches[tool].contact, self.means[tool]) = (contact, force.into());
     }
 
     /// The law by which contacts are resolved.
@@ -310,6 +340,89 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn force(&self, tool: usize) -> Vec3 {
+        self.means[tool].force
+    }
+
+    /// Mean force and torque of the last tick on a tool.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn wrench(&self, tool: usize) -> Wrench {
         self.means[tool]
+    }
+
+    /// How coarse the surface is against a tool with a shape; `None` for a point, and for a tool that is glued.
+    ///
+    /// # Real-time
+    /// Not for a tick: looks at every triangle of the surface.
+    pub fn coarseness(&self, tool: usize) -> Option<Coarseness> {
+        let touch = &self.touches[tool];
+        touch.has_shape().then(|| touch.skin.coarseness(&*self.body))
+    }
+
+    /// The shape of a tool.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn shape(&self, tool: usize) -> ToolShape {
+        self.touches[tool].shape
+    }
+
+    /// Puts the nodes of a patch for `tool` around surface triangles in place of `nodes`, in increasing order: those of
+    /// [`Body::patch`], and all that the tool presses where it touches these triangles.
+    ///
+    /// # Real-time
+    /// For the global actor, at each resync: bounded; `nodes` may grow.
+    pub fn patch(&self, tool: usize, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
+        self.body.patch(triangles, size, nodes);
+        self.touches[tool].complete(&*self.body, triangles, nodes);
+    }
+
+    /// Puts the nodes that `tool` presses where it touches `triangles` in place of `nodes`, in increasing order: a patch without one
+    /// of them does not hold the contact.
+    ///
+    /// # Real-time
+    /// For the global actor, at each resync: bounded; `nodes` may grow.
+    pub fn pressed_at(&self, tool: usize, triangles: &[u32], nodes: &mut Vec<u32>) {
+        nodes.clear();
+        let corners = triangles.iter().flat_map(|&triangle| self.body.surface().triangles[triangle as usize]);
+        nodes.extend(corners.filter(|&node| self.inverse_masses[node as usize] > 0.0));
+        nodes.sort_unstable();
+        nodes.dedup();
+        self.touches[tool].complete(&*self.body, triangles, nodes);
+    }
+
+    /// Appends the triangles that `tool` touches, or may touch soon, at `pose`, or if its radius were larger by `margin` (m), each
+    /// once; none for a point, which is over one.
+    ///
+    /// # Real-time
+    /// For the global actor: looks at every triangle; `triangles` may grow.
+    pub fn footprint(&self, tool: usize, pose: &Pose, margin: f64, triangles: &mut Vec<u32>) {
+        if self.touches[tool].has_shape() {
+            let surface = (self.body.surface(), &self.state.positions[..]);
+            self.touches[tool].footprint(surface, pose, margin, triangles);
+        }
+    }
+
+    /// What is known of a tool.
+    pub(crate) fn touch(&self, tool: usize) -> &Touch {
+        &self.touches[tool]
+    }
+
+    /// The places where a tool with a shape touched in the last tick; none for a point, whose one place
+    /// [`contact`](Self::contact) tells.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn contact_points(&self, tool: usize) -> &[ContactPoint] {
+        self.touches[tool].points()
+    }
+
+    /// The area that a tool with a shape touches (m^2), as fine as the triangles tell.
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
+    pub fn contact_area(&self, tool: usize) -> f64 {
+        self.touches[tool].area(self.body.surface(), &self.state.positions)
     }
 }

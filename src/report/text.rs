@@ -50,6 +50,7 @@ impl Page {
             ),
         );
         environment.body.iter().for_each(|body| self.wrapped("body", body));
+        environment.tools.iter().for_each(|tools| self.wrapped("tool", tools));
         if let Some(reason) = &environment.model_reason {
             self.wrapped("model", &format!("{}: {}", environment.model, reason.why));
             reason.warning.iter().for_each(|warning| self.wrapped("warning", warning));
@@ -145,6 +146,15 @@ impl Page {
                 contact.free, contact.stick, contact.slip, contact.lost
             ),
         );
+        if let Some(touch) = &report.touch {
+            let pressure = Quantity::Pascals(touch.peak_pressure_pa);
+            let area = Quantity::SquareMetres(touch.area_at_peak_m2);
+            let places = touch.most_places;
+            self.named(
+                "touch",
+                format!("{places} places at most, mean pressure up to {pressure}, {area} at the largest force"),
+            );
+        }
         let not_finite = match report.force.not_finite {
             0 => String::new(),
             count => format!(", {count} not finite"),

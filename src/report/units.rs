@@ -11,6 +11,10 @@ pub enum Quantity {
     Seconds(f64),
     /// A force in newtons, as `0 N`, `850 uN`, `12.3 mN` or `1.23 N`.
     Newtons(f64),
+    /// A pressure in pascals, as `850 Pa`, `12.3 kPa` or `1.23 MPa`.
+    Pascals(f64),
+    /// An area in square metres, as `1.23 mm2` or `12.3 cm2`.
+    SquareMetres(f64),
 }
 
 impl Display for Quantity {
@@ -27,6 +31,15 @@ impl Display for Quantity {
                 ..1e-3 => scaled(f, n * 1e6, "uN"),
                 ..1.0 => scaled(f, n * 1e3, "mN"),
                 _ => scaled(f, n, "N"),
+            },
+            Self::Pascals(pa) => match pa.abs() {
+                ..1e3 => scaled(f, pa, "Pa"),
+                ..1e6 => scaled(f, pa * 1e-3, "kPa"),
+                _ => scaled(f, pa * 1e-6, "MPa"),
+            },
+            Self::SquareMetres(m2) => match m2.abs() {
+                ..1e-3 => scaled(f, m2 * 1e6, "mm2"),
+                _ => scaled(f, m2 * 1e4, "cm2"),
             },
         }
     }
@@ -59,6 +72,14 @@ mod tests {
         assert_eq!(
             [0.0, 8.5e-4, 0.0123, 1.234].map(|n| Quantity::Newtons(n).to_string()),
             ["0 N", "850 uN", "12.3 mN", "1.23 N"]
+        );
+        assert_eq!(
+            [850.0, 12_340.0, 1.234e6].map(|pa| Quantity::Pascals(pa).to_string()),
+            ["850 Pa", "12.3 kPa", "1.23 MPa"]
+        );
+        assert_eq!(
+            [0.0, 1.234e-6, 1.234e-3].map(|m2| Quantity::SquareMetres(m2).to_string()),
+            ["0.00 mm2", "1.23 mm2", "12.3 cm2"]
         );
         assert_eq!(Quantity::Seconds(f64::NAN).to_string(), "NaN s");
     }

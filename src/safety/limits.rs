@@ -12,6 +12,8 @@ use super::watchdog::Watchdog;
 pub struct DeviceLimits {
     /// Largest force (N).
     pub max_force_n: f64,
+    /// Largest torque (N m); `None` if it exerts none.
+    pub max_torque_n_m: Option<f64>,
     /// Largest stiffness that it renders stably at its own rate (N/m).
     pub max_stiffness_n_per_m: f64,
     /// Largest damping that it renders stably (N s/m).
@@ -36,6 +38,7 @@ impl DeviceLimits {
     pub fn of_force(max_force_n: f64) -> Self {
         Self {
             max_force_n,
+            max_torque_n_m: None,
             max_stiffness_n_per_m: 400.0,
             max_damping_n_s_per_m: 4.0,
             damping_n_s_per_m: 400.0 * 1e-3 / 2.0,
@@ -51,7 +54,9 @@ impl DeviceLimits {
 pub struct Limits {
     /// Largest force (N).
     pub max_force_n: f64,
-    /// Largest change of the force (N/s); infinite if there is none.
+    /// Largest torque (N m); without one none is commanded.
+    pub max_torque_n_m: Option<f64>,
+    /// Largest change of the force (N/s), infinite if there is none; the torque may change by the same share of its largest.
     pub max_slew_n_per_s: f64,
     /// Time in which the force goes to zero when it has to, and comes back afterwards (s).
     pub ramp_s: f64,
@@ -89,6 +94,7 @@ impl Limits {
             model_age: Some(ModelAge::default()),
             start_up: Some(StartUp::default()),
             watchdog: Some(Watchdog::default()),
+            max_torque_n_m: device.max_torque_n_m,
             ..Self::bare(device.max_force_n)
         }
     }
@@ -100,6 +106,7 @@ impl Limits {
     pub fn bare(max_force_n: f64) -> Self {
         Self {
             max_force_n,
+            max_torque_n_m: None,
             max_slew_n_per_s: 500.0,
             ramp_s: 0.1,
             tick_s: 1e-3,

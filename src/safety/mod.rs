@@ -15,6 +15,7 @@ mod tank;
 #[cfg(test)]
 mod tests;
 mod tool_speed;
+mod torque;
 mod watchdog;
 
 pub use actions::Actions;

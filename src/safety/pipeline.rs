@@ -8,6 +8,7 @@ use super::passivity::{Ledger, control};
 use super::start_up::{Engagement, Ramp};
 use super::tank::TankState;
 use super::tool_speed::speed_gain;
+use super::torque::TorqueStages;
 
 /// The force that a tick asks of the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub enum Request {
 pub struct Input {
     /// The force that is asked for.
     pub request: Request,
+    /// The computed torque that belongs to it (N m); none is asked for at rest.
+    pub torque: Force,
     /// Time since the tick before (s).
     pub dt: f64,
     /// Position of the tool (m), as the device said last.
@@ -43,8 +46,8 @@ impl Input {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn new(request: Request, position: [f64; 3], dt: f64) -> Self {
-        let (stale_ticks, model_age_ticks, swap_step, dissipated_j) = (0, 0, [0.0; 3], 0.0);
-        Self { request, dt, position, stale_ticks, model_age_ticks, swap_step, dissipated_j }
+        let (stale_ticks, model_age_ticks, swap_step, dissipated_j, torque) = (0, 0, [0.0; 3], 0.0, [0.0; 3]);
+        Self { request, torque, dt, position, stale_ticks, model_age_ticks, swap_step, dissipated_j }
     }
 }
 
@@ -53,6 +56,8 @@ impl Input {
 pub struct Output {
     /// The force for the device (N).
     pub force: Force,
+    /// The torque for the device (N m); zero for one that exerts none.
+    pub torque: Force,
     /// The stages that acted.
     pub actions: Actions,
     /// Balance of the ledger: what the environment has taken in less what it gave out, and what it stored at the start (J).
@@ -68,6 +73,8 @@ pub struct Output {
 ///        -> finite -> clamp -> slew -> watchdog
 /// ```
 ///
+/// A torque passes the same stages but tank and passivity, with its own limits and with the gains of the force.
+///
 /// The first slew limit compares with the force that was asked for before, the last one with the command that was given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pipeline {
@@ -80,6 +87,7 @@ pub struct Pipeline {
     /// The last force asked for, behind the first three stages.
     held: Force,
     last: Force,
+    torque: TorqueStages,
 }
 
 impl Pipeline {
@@ -97,6 +105,7 @@ impl Pipeline {
             ledger: Ledger::new(limits.passivity.map_or(0.0, |passivity| passivity.stored_j)),
             held: [0.0; 3],
             last: [0.0; 3],
+            torque: TorqueStages::default(),
         }
     }
 
@@ -120,24 +129,29 @@ impl Pipeline {
             self.held = force;
             // Of a step that the slew limit spreads only what it lets through now can be held back.
             swap_step = if norm(swap_step).is_finite() { clamp(swap_step, changed).0 } else { [0.0; 3] };
+            self.torque.ask(&limits, input.torque, dt, &mut actions);
         }
         // A position that is not finite is none: the ledger waits for the next.
         let (velocity, believed) = match finite(input.position) {
             (position, false) => self.ledger.book(self.last, position, dt),
             (_, true) => ([0.0; 3], true),
         };
-        let force = self.by_speed(norm(velocity), &mut actions);
+        let gain = self.by_speed(norm(velocity), &mut actions);
+        let force = scaled(self.held, gain);
         // Against a motion that did not happen nothing is damped.
         let velocity = if believed { velocity } else { [0.0; 3] };
         let force = self.by_energy(&Input { swap_step, ..*input }, force, velocity, &mut actions);
-        let force = self.by_time(input, force, &mut actions);
+        let [age, start_up, ramp] = self.by_time(input, &mut actions);
+        let force = scaled(scaled(scaled(force, age), start_up), ramp);
+        let gain = gain * age * start_up * ramp;
+        self.torque.finish(&limits, gain, input.stale_ticks, dt, &mut self.ramp, &mut actions);
         self.finish(input, force, step_limit, actions)
     }
 
-    fn by_speed(&self, speed: f64, actions: &mut Actions) -> Force {
+    fn by_speed(&self, speed: f64, actions: &mut Actions) -> f64 {
         let gain = self.limits.tool_speed.map_or(1.0, |limits| speed_gain(limits, speed));
         actions.note(gain < 1.0, Actions::TOOL_SPEED);
-        scaled(self.held, gain)
+        gain
     }
 
     /// Tank and passivity.
@@ -161,20 +175,17 @@ impl Pipeline {
     }
 
     /// Model age, start-up and ramp: gains that depend on counted time alone.
-    fn by_time(&mut self, input: &Input, mut force: Force, actions: &mut Actions) -> Force {
-        if let Some(limits) = self.limits.model_age {
-            let gain = self.age.advance(limits, input.model_age_ticks, input.dt / self.limits.tick_s);
-            actions.note(gain < 1.0, Actions::MODEL_AGE);
-            force = scaled(force, gain);
-        }
-        if let Some(limits) = self.limits.start_up {
-            let gain = self.engagement.advance(limits, self.held, input.dt);
-            actions.note(gain < 1.0, Actions::START_UP);
-            force = scaled(force, gain);
-        }
-        let gain = self.ramp.advance(input.request != Request::Rest, input.dt);
-        actions.note(gain < 1.0, Actions::RAMP);
-        scaled(force, gain)
+    fn by_time(&mut self, input: &Input, actions: &mut Actions) -> [f64; 3] {
+        let age = self
+            .limits
+            .model_age
+            .map_or(1.0, |limits| self.age.advance(limits, input.model_age_ticks, input.dt / self.limits.tick_s));
+        actions.note(age < 1.0, Actions::MODEL_AGE);
+        let start_up = self.limits.start_up.map_or(1.0, |limits| self.engagement.advance(limits, self.held, input.dt));
+        actions.note(start_up < 1.0, Actions::START_UP);
+        let ramp = self.ramp.advance(input.request != Request::Rest, input.dt);
+        actions.note(ramp < 1.0, Actions::RAMP);
+        [age, start_up, ramp]
     }
 
     /// The last checks: whatever the stages before have made of it.
@@ -202,11 +213,18 @@ impl Pipeline {
         self.ramp.release();
         self.ledger.forget_position();
         self.last = [0.0; 3];
+        self.torque.release();
         self.output(Actions::RAMP)
     }
 
     fn output(&self, actions: Actions) -> Output {
-        Output { force: self.last, actions, energy_j: self.ledger.balance_j(), tank_j: self.tank.energy_j() }
+        Output {
+            force: self.last,
+            torque: self.torque.last(),
+            actions,
+            energy_j: self.ledger.balance_j(),
+            tank_j: self.tank.energy_j(),
+        }
     }
 }
 

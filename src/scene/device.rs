@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{HaplySpec, NodeSpec};
+use super::{HaplySpec, NodeSpec, ToolSpec};
 use crate::devices::{Capabilities, FaultSpec, HandSpec, PlantSpec, ToolPath};
 use crate::error::Error;
 
@@ -14,12 +14,16 @@ pub struct DeviceSpec {
     pub name: Option<String>,
     /// The kind of device.
     pub kind: DeviceKind,
-    /// A CSV file `t_s,x_m,y_m,z_m`, relative to the scene file: where the tool goes, or where the hand wants to be.
+    /// A CSV file `t_s,x_m,y_m,z_m`, with `,qw,qx,qy,qz` for a tool that turns, relative to the scene file: where the tool goes, or
+    /// where the hand wants to be.
     pub path_csv: Option<PathBuf>,
     /// The log whose device is replayed; in a scene file relative to that.
     pub log: Option<PathBuf>,
     /// The node of the surface that the tool is glued to.
     pub attach_node: Option<NodeSpec>,
+    /// The shape of the tool. One that is glued to a node is glued by its centre, and nothing else of it touches.
+    #[serde(skip_serializing_if = "is_default")]
+    pub tool: ToolSpec,
     /// The product whose limits the device has.
     #[serde(skip_serializing_if = "is_default")]
     pub profile: DeviceProfile,

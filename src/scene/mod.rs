@@ -21,13 +21,14 @@ mod models;
 mod node;
 mod nodes;
 mod safety;
+mod tool;
 mod validate;
 
 pub use body::{
     BlockSpec, BodyKind, BodySpec, MassSpringSpec, MaterialSpec, RegionSpec, TetrahedraSpec, TissueRegionSpec,
     TissueSpec, Volume,
 };
-pub use contact::{ContactSpec, Friction};
+pub use contact::{ContactSpec, FrictionSpec};
 pub use description::{InitialSpec, LogSpec, ProbeSpec, PullSpec, RunSpec, Scene};
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub(crate) use device::{field as device_field, numbered};
@@ -36,4 +37,5 @@ pub use models::{BlendSpec, GlobalSpec, LocalSpec, ModelChoice, StepKind};
 pub use node::NodeSpec;
 pub(crate) use nodes::Nodes;
 pub use safety::{SafetySpec, SafetyStage};
+pub use tool::ToolSpec;
 pub(crate) use validate::{MAX_DEVICES, patch_fits};

@@ -6,7 +6,9 @@
 pub struct SafetySpec {
     /// Largest force (N); the device's own limit if absent.
     pub max_force_n: Option<f64>,
-    /// Largest change of the force (N/ms).
+    /// Largest torque (N m); the device's own limit if absent, and none where the device exerts none.
+    pub max_torque_n_m: Option<f64>,
+    /// Largest change of the force (N/ms); the torque may change by the same share of its largest.
     pub max_slew_n_per_ms: f64,
     /// Time in which the force goes to zero when the run stops or fails, and comes back after a gap (ms).
     pub ramp_ms: f64,
@@ -62,6 +64,7 @@ impl Default for SafetySpec {
     fn default() -> Self {
         Self {
             max_force_n: None,
+            max_torque_n_m: None,
             max_slew_n_per_ms: 0.5,
             ramp_ms: 100.0,
             fade_speed_m_s: 1.0,

@@ -3,10 +3,11 @@
 use super::parts::{OpenHaply, Parts};
 use crate::devices::{Device, ToolPath};
 use crate::model::body::Body;
+use crate::model::contact::ToolShape;
 use crate::model::local::BlendKind;
 use crate::model::local::Feedback;
 use crate::runtime::{Disturbance, Execution, RateGroup};
-use crate::scene::{BlendSpec, Friction, ModelChoice, SafetyStage, Scene, StepKind};
+use crate::scene::{BlendSpec, FrictionSpec, ModelChoice, SafetyStage, Scene, StepKind};
 
 /// Collects the parts of a session; fills a [`Scene`] as a scene file does, and passes the same validation.
 ///
@@ -69,6 +70,17 @@ impl SessionBuilder {
         let attached = &mut self.parts.attached;
         attached.resize(attached.len().max(device + 1), None);
         attached[device] = Some(node);
+        self
+    }
+
+    /// Gives the tool of the device given last a shape, in place of the scene's; without, it is a point. One that is glued to
+    /// a node is glued by its centre, and nothing else of it touches.
+    #[must_use]
+    pub fn tool(mut self, shape: ToolShape) -> Self {
+        let device = self.parts.devices.len().saturating_sub(1);
+        let shapes = &mut self.parts.shapes;
+        shapes.resize(shapes.len().max(device + 1), None);
+        shapes[device] = Some(shape);
         self
     }
 
@@ -169,7 +181,22 @@ impl SessionBuilder {
     #[must_use]
     pub fn friction(mut self, mu: f64) -> Self {
         self.parts.scene.contact.friction =
-            if mu == f64::INFINITY { Friction::Stick } else { Friction::Coefficient(mu) };
+            if mu == f64::INFINITY { FrictionSpec::Stick } else { FrictionSpec::Coefficient(mu) };
+        self
+    }
+
+    /// Sets the coefficient that breaks a sticking tool loose, at least that of [`friction`](Self::friction), which remains that of
+    /// sliding.
+    #[must_use]
+    pub fn static_friction(mut self, mu: f64) -> Self {
+        self.parts.scene.contact.static_friction = Some(mu);
+        self
+    }
+
+    /// Sets the speed (m/s) over which the coefficient falls from the static one to that of sliding; without, it falls at once.
+    #[must_use]
+    pub fn stribeck_m_s(mut self, speed: f64) -> Self {
+        self.parts.scene.contact.stribeck_m_s = speed;
         self
     }
 

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use crate::devices::Device;
 use crate::error::Error;
 use crate::model::body::Body;
+use crate::model::contact::ToolShape;
 use crate::runtime::{Disturbance, Execution, RateGroup, RuntimeBuilder};
 use crate::scene::{HaplySpec, Scene};
 
@@ -22,6 +23,8 @@ pub(super) struct Parts {
     pub(super) devices: Vec<(Option<String>, Box<dyn Device>)>,
     /// The nodes that the program glues tools to, by device.
     pub(super) attached: Vec<Option<u32>>,
+    /// The shapes that the program gives tools, by device.
+    pub(super) shapes: Vec<Option<ToolShape>>,
     pub(super) probes: Vec<u32>,
     pub(super) global: Option<RateGroup>,
     pub(super) local: Option<RateGroup>,
@@ -40,6 +43,7 @@ impl Parts {
             body,
             devices: Vec::new(),
             attached: Vec::new(),
+            shapes: Vec::new(),
             probes: Vec::new(),
             global: None,
             local: None,

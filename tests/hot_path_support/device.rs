@@ -42,6 +42,8 @@ pub struct GuardedDevice {
     /// Held by the main thread.
     pub lock: Arc<Mutex<()>>,
     pub told: ExchangeWriter<Progress>,
+    /// How far above its way the centre of the tool is (m).
+    above: f64,
     progress: Progress,
     reads: u64,
     before: kernel::Usage,
@@ -49,9 +51,15 @@ pub struct GuardedDevice {
 }
 
 impl GuardedDevice {
-    pub fn new(guard: Guard, offence: Offence, lock: Arc<Mutex<()>>, told: ExchangeWriter<Progress>) -> Self {
+    pub fn new(
+        guard: Guard,
+        offence: Offence,
+        lock: Arc<Mutex<()>>,
+        told: ExchangeWriter<Progress>,
+        above: f64,
+    ) -> Self {
         let (progress, before, treasure) = (Progress::default(), kernel::Usage::default(), Some(Box::new(7)));
-        Self { guard, offence, lock, told, progress, reads: 0, before, treasure }
+        Self { guard, offence, lock, told, above, progress, reads: 0, before, treasure }
     }
 
     fn arm(&mut self, time: Nanos) {
@@ -120,7 +128,7 @@ impl Device for GuardedDevice {
         }
         *self.told.buffer() = self.progress;
         self.told.publish(time);
-        Ok(DeviceState { position: tool(time.as_secs_f64()), ..DeviceState::default() })
+        Ok(DeviceState { position: tool(time.as_secs_f64()) + Vec3::z() * self.above, ..DeviceState::default() })
     }
 
     fn write(&mut self, _: ForceCommand) -> Result<(), DeviceFault> {

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use palpate::log::{LogEntry, LogReader, LogRecord};
 use palpate::model::body::Block;
-use palpate::model::contact::ContactMode;
+use palpate::model::contact::{ContactMode, ToolShape};
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::model::mesh::Face;
 use palpate::runtime::Nanos;
@@ -56,6 +56,8 @@ pub struct Case {
     pub offence: Offence,
     /// Ask for a real-time policy and for locked memory.
     pub privileged: bool,
+    /// The tool is a sphere that touches in several places.
+    pub has_shape: bool,
 }
 
 const VARIABLE: &str = "PALPATE_HOT_PATH_CHILD";
@@ -79,6 +81,8 @@ pub struct Found {
     pub logged: u64,
     pub resyncs: u64,
     pub in_contact: u64,
+    /// The most places that touched at once.
+    pub places: u16,
 }
 
 /// How a child ended.
@@ -90,7 +94,7 @@ pub enum Ended {
 
 impl Case {
     pub fn new(model: LocalModelKind, guard: Guard) -> Self {
-        Self { model, guard, offence: Offence::None, privileged: true }
+        Self { model, guard, offence: Offence::None, privileged: true, has_shape: false }
     }
 
     pub fn with(self, offence: Offence) -> Self {
@@ -99,6 +103,10 @@ impl Case {
 
     pub fn unprivileged(self) -> Self {
         Self { privileged: false, ..self }
+    }
+
+    pub fn with_shape(self) -> Self {
+        Self { has_shape: true, ..self }
     }
 
     /// Runs it in a process of its own; `None`, with the reason printed, where the kernel refuses the filter.
@@ -138,6 +146,7 @@ impl Case {
             logged: 0,
             resyncs: 0,
             in_contact: 0,
+            places: 0,
         };
         found.read_log(&log, [from, to].map(|time| Nanos(time as u64)));
         Some(Ended::Well(found))
@@ -150,6 +159,7 @@ impl Case {
             place(GUARDS.iter().position(|guard| *guard == self.guard)),
             place(OFFENCES.iter().position(|offence| *offence == self.offence)),
             usize::from(self.privileged).to_string(),
+            usize::from(self.has_shape).to_string(),
         ]
         .join(" ")
     }
@@ -157,12 +167,13 @@ impl Case {
     fn of_environment() -> Option<Self> {
         let text = std::env::var(VARIABLE).ok()?;
         let places: Vec<usize> = text.split(' ').map(|word| word.parse().expect("numbers")).collect();
-        let [model, guard, offence, privileged] = places[..] else { panic!("{text:?} is no case") };
+        let [model, guard, offence, privileged, has_shape] = places[..] else { panic!("{text:?} is no case") };
         Some(Self {
             model: MODELS[model],
             guard: GUARDS[guard],
             offence: OFFENCES[offence],
             privileged: privileged == 1,
+            has_shape: has_shape == 1,
         })
     }
 }
@@ -180,6 +191,7 @@ impl Found {
                 LogRecord::Resync(_) => self.resyncs += 1,
                 LogRecord::Contact(contact) if matches!(contact.mode, ContactMode::Stick | ContactMode::Slip) => {
                     self.in_contact += 1;
+                    self.places = self.places.max(contact.count);
                 }
                 _ => {}
             }
@@ -196,11 +208,13 @@ pub fn child() {
     let (told, mut progress) = exchange(Progress::default);
     let lock = Arc::new(Mutex::new(()));
     let _held = lock.lock().expect("nobody else has it yet");
-    let device = GuardedDevice::new(case.guard, case.offence, Arc::clone(&lock), told);
+    let shape = if case.has_shape { ToolShape::Sphere { radius: 0.03 } } else { ToolShape::Point };
+    let device = GuardedDevice::new(case.guard, case.offence, Arc::clone(&lock), told, shape.radius());
     let block = Block::builder([6; 3], [0.1; 3]).node_mass(0.5e-3).stiffness(30.0).damping_ratio(0.3);
     let block = block.fix(Face::ZMin).fix(Face::XMax).build().expect("a good block");
     let mut session = Session::builder(block)
         .device(device)
+        .tool(shape)
         .friction(0.5)
         .model(case.model)
         // One of the linear patches shows the implicit step.

@@ -1,9 +1,11 @@
 //! A small run for the log tests: every kind of record, at the rates of a real one.
 
 use palpate::log::{
-    CommandSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, GroupStats, Level, LogEntry,
-    LogRecord, LoggedExecution, McapWriter, Percentiles, ProbeSample, Resync, ServedBy, TextEvent, ToolSample,
+    CommandSample, ContactPointSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, GroupStats,
+    Level, LogEntry, LogRecord, LoggedExecution, McapWriter, Percentiles, ProbeSample, Resync, ServedBy, TextEvent,
+    ToolSample,
 };
+use palpate::model::Turn;
 use palpate::model::contact::ContactMode;
 use palpate::runtime::{Event, SlipCause, TickTiming};
 use palpate::runtime::{GroupMode, PortUse};
@@ -49,9 +51,20 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
             mode: ContactMode::from_code((n % 4) as u16),
             triangle: if n % 4 == 0 { u32::MAX } else { n as u32 },
             weights: [phase.fract(), -0.0],
-            normal: [0.0, phase.sin(), phase.cos()],
+            normal: [0.0, phase.sin() as f32, phase.cos() as f32],
             normal_force_n: phase as f32,
             tangential_force_n: -0.0,
+            area_m2: 1e-6 * (n % 3) as f32,
+            count: (n % 3) as u16,
+            device: 0,
+        };
+        let point = |k: u64| ContactPointSample {
+            time,
+            place_m: [phase as f32, -0.0, k as f32],
+            normal: [0.0, 0.0, -1.0],
+            force_n: [0.1, f32::MIN_POSITIVE, -0.0],
+            triangle: (n + k) as u32,
+            mode: ContactMode::Slip,
             device: 0,
         };
         let force_n = [phase.sin(), -0.0, f64::MIN_POSITIVE * n as f64];
@@ -64,6 +77,7 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
                     served_by: ServedBy::Patch,
                     model_age_s: (n % 33) as f64 * 1e-3,
                     energy_j: -phase,
+                    torque_n_m: [0.0, -0.0, 1e-3 * (n % 3) as f64],
                     device: 0,
                 }),
                 LogRecord::Command(CommandSample {
@@ -72,6 +86,7 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
                     limits: (n % 5) as u16,
                     energy_j: 1e-3 * n as f64,
                     tank_j: 1e-4,
+                    torque_n_m: [phase, 0.0, -0.0],
                     device: 0,
                 }),
                 LogRecord::Tool(ToolSample {
@@ -80,8 +95,16 @@ pub fn entries(ticks: u64) -> Vec<LogEntry> {
                     position_m: [phase, 0.1, -phase],
                     velocity_m_s: [0.0, -0.0, 1.0 / 3.0],
                     buttons: 3,
+                    orientation: Turn::from_euler_angles(phase, -0.0, 0.1),
                     device: 0,
                 }),
+            ]
+            .map(LogEntry::Record),
+        );
+        // A message of several records, which come back as they were given.
+        entries.extend((0..n % 3).map(|k| LogEntry::Record(LogRecord::ContactPoint(point(k)))));
+        entries.extend(
+            [
                 LogRecord::Contact(contact),
                 LogRecord::Port(PortUse { time, port: 2, tick: n, count: n + 1, sequence: n, ..PortUse::default() }),
                 LogRecord::Probe(ProbeSample { time, node: 851, local_m: [phase; 3], global_m: [0.1; 3], device: 0 }),

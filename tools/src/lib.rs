@@ -27,5 +27,5 @@ mod timing;
 mod units;
 
 pub use commands::{OutputFile, WindowArgs, main};
-pub use export::{Cell, ColumnType, TableWriter, export_rows};
+pub use export::{Cell, ColumnType, TableWriter, export_rows, is_turned};
 pub use reduce::reduction_costs;

@@ -43,7 +43,7 @@ fn scenes() -> Vec<PathBuf> {
 
 /// What the topics of the first device begin with.
 fn device(scene: &str) -> &'static str {
-    if scene.ends_with("two_hands.toml") { "/left" } else { "" }
+    if scene.ends_with("two_hands.toml") || scene.ends_with("forceps.toml") { "/left" } else { "" }
 }
 
 /// Two runs of a scene, byte for byte the same file; gives the exported forces.

@@ -163,16 +163,16 @@ fn a_disturbance_of_a_group_that_is_not_there_is_refused() {
 fn a_body_at_rest_for_minutes_has_no_subnormal_state() {
     let body = Block::builder([6; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
     let state = State::at_rest(body.rest());
-    let law = Law { friction: 0.3, ..Law::default() };
+    let law = Law { friction: 0.3.into(), ..Law::default() };
     let stepping = Stepping { tick: 1e-3, substeps: 2 };
     let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).unwrap();
     let at = |z| Vec3::new(0.0225, 0.0238, z);
-    sim.tick(ToolMotion { from: at(0.051), to: at(0.050_5) });
+    sim.tick(ToolMotion::straight(at(0.051), at(0.050_5)));
     for tick in 0..10 {
         let z = |tick: i32| 0.0505 - 5e-4 * f64::from(tick);
-        sim.tick(ToolMotion { from: at(z(tick)), to: at(z(tick + 1)) });
+        sim.tick(ToolMotion::straight(at(z(tick)), at(z(tick + 1))));
     }
-    let rest = ToolMotion { from: at(0.0455), to: at(0.0455) };
+    let rest = ToolMotion::straight(at(0.0455), at(0.0455));
     let mut before = State::default();
     for second in 0..120 {
         for _ in 0..1000 {

@@ -4,13 +4,16 @@
 use std::path::Path;
 
 use palpate::Session;
+use palpate::devices::ToolPath;
 use palpate::model::local::{Kind as LocalModelKind, Prediction};
-use palpate::scene::Scene;
+use palpate::scene::{Scene, ToolSpec};
 use palpate_cli::compare::{ForceDeviation, ForceTrace};
 
 const IN_TIME: f64 = 0.0;
 /// A period of 30 Hz is 33.33 ms.
 const ONE_PERIOD_MS: f64 = 33.34;
+/// Of the spheres (m).
+const RADIUS: f64 = 8e-3;
 
 struct Case {
     scene: Scene,
@@ -20,6 +23,18 @@ struct Case {
 impl Case {
     fn new(name: &str) -> Self {
         Self::of(scene(&format!("scenes/{name}.toml")))
+    }
+
+    /// The first `duration_s` seconds of a scene with a sphere in place of its point: as deep, so with its centre higher.
+    fn with_sphere(path: &str, duration_s: f64) -> Self {
+        let mut scene = scene(path);
+        scene.run.duration_s = duration_s;
+        let device = &mut scene.devices[0];
+        let path = device.path.take().expect("a scripted tool");
+        let raised = path.positions_m().iter().map(|&[x, y, z]| [x, y, z + RADIUS]).collect();
+        device.path = Some(ToolPath::new(path.times_s().to_vec(), raised).expect("a path"));
+        device.tool = ToolSpec::Sphere { radius_m: RADIUS };
+        Self::of(scene)
     }
 
     fn of(scene: Scene) -> Self {
@@ -187,4 +202,20 @@ fn a_late_basis_is_waited_for() {
     let (late, shares) = forces(scene);
     assert!(late.forces_n.iter().flatten().all(|c| c.is_finite()));
     assert!(shares.contains("predicted") && shares.contains("predictive"), "{shares}");
+}
+
+/// A sphere is dragged over the lattice, sticks and slips: its footprint changes with every triangle, and the window holds it.
+#[test]
+fn a_sphere_that_is_dragged() {
+    let case = Case::with_sphere("scenes/drag_friction.toml", 1.0);
+    let (late, own_jump) = case.error(ONE_PERIOD_MS, |scene| scene.local.basis = Some(100));
+    assert!(late.rms <= 1.0 && late.jump <= own_jump + 1.5, "{late:?}");
+}
+
+/// The same over an organ.
+#[test]
+fn a_sphere_over_tissue() {
+    let case = Case::with_sphere("tests/reference/tissue/t1_drag.toml", 0.6);
+    let (late, own_jump) = case.error(ONE_PERIOD_MS, |scene| scene.local.basis = Some(150));
+    assert!(late.rms <= 1.0 && late.jump <= own_jump + 1.5, "{late:?}");
 }

@@ -41,8 +41,7 @@ fn reference(paths: [fn(f64) -> Vec3; 2]) -> [Vec<Vec3>; 2] {
     let mut both = simulation(block(STD), Contact::default(), 0.5).with_tool(Contact::default());
     let mut forces = [Vec::new(), Vec::new()];
     for n in 0..TICKS {
-        let motion =
-            |at: fn(f64) -> Vec3| ToolMotion { from: at(f64::from(n) * 1e-3), to: at(f64::from(n + 1) * 1e-3) };
+        let motion = |at: fn(f64) -> Vec3| ToolMotion::straight(at(f64::from(n) * 1e-3), at(f64::from(n + 1) * 1e-3));
         both.tick_all(&paths.map(motion));
         forces.iter_mut().enumerate().for_each(|(tool, forces)| forces.push(both.force(tool)));
     }

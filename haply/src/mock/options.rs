@@ -3,7 +3,7 @@
 use super::fault::MockFault;
 
 /// The settings of a mock service: its ports, its device and what goes wrong.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MockOptions {
     /// Port of the simulation channel on this machine; any free one if 0.
     pub port: u16,
@@ -11,13 +11,15 @@ pub struct MockOptions {
     pub events_port: u16,
     /// The id of its one Inverse3.
     pub device_id: String,
+    /// How its grip is turned: a quaternion (w, x, y, z) of length one; without, it has no grip.
+    pub grip: Option<[f64; 4]>,
     /// What it does wrong.
     pub fault: Option<MockFault>,
 }
 
 impl Default for MockOptions {
     fn default() -> Self {
-        Self { port: 10001, events_port: 10020, device_id: "049D".to_owned(), fault: None }
+        Self { port: 10001, events_port: 10020, device_id: "049D".to_owned(), grip: None, fault: None }
     }
 }
 

@@ -214,7 +214,8 @@ impl World {
             }
             devices.push(device);
         }
-        json!({"session_id": session, "inverse3": devices, "verse_grip": [], "wireless_verse_grip": [], "custom_verse_grip": []})
+        let grips: Vec<Value> = self.options.grip.iter().map(grip).collect();
+        json!({"session_id": session, "inverse3": devices, "verse_grip": grips, "wireless_verse_grip": [], "custom_verse_grip": []})
             .to_string()
     }
 
@@ -251,6 +252,12 @@ impl World {
             },
         })
     }
+}
+
+/// A grip that is turned like this (w, x, y, z), with no button pressed.
+fn grip([w, x, y, z]: &[f64; 4]) -> Value {
+    let orientation = json!({"x": x, "y": y, "z": z, "w": w});
+    json!({"device_id": "61548", "state": {"orientation": orientation, "button": false, "hall": 0}})
 }
 
 /// True for a fault that the status alone tells of.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::devices::DeviceState;
-use crate::log::LogRecord;
+use crate::log::{JoinedRecords, LogRecord};
 use crate::model::body::{Block, Body, State};
 use crate::model::contact::{Law, ToolMotion};
 use crate::model::local::Blend;
@@ -62,7 +62,7 @@ impl ByHand {
         };
         let spare = || Box::new(Hold::default()) as Box<dyn LocalModel>;
         let full = Box::new(Full::new(glued_simulation()));
-        let models = Succession::new([full, spare(), spare()], Blend::default(), Vec3::zeros());
+        let models = Succession::new([full, spare(), spare()], Blend::default(), Pose::default());
         let actor = LocalActor::new(models, HAPTIC, Rate::hz(30), Vec::new(), ports);
         Self { actor, samples, commands: command_reader, drain, simulation: glued_simulation() }
     }
@@ -75,9 +75,10 @@ impl ByHand {
         assert_eq!(self.actor.tick(&ctx), Outcome::Continue);
         let mut records = Vec::new();
         self.drain.drain(&mut records);
+        let mut joined = JoinedRecords::default();
         let rows: Vec<ForceSample> = records
             .iter()
-            .filter_map(|record| match LogRecord::from_record(record) {
+            .filter_map(|record| match joined.read(record) {
                 Some(LogRecord::Force(row)) => Some(row),
                 _ => None,
             })
@@ -102,7 +103,7 @@ fn skipped_periods_are_made_up_with_the_tool_interpolated_and_eight_ticks_a_rele
         let mut force = Vec3::zeros();
         for k in 0..ticks {
             let next = at + (tool(n) - at) / (n - simulated - k) as f64;
-            force = hand.simulation.tick(ToolMotion { from: at, to: next });
+            force = hand.simulation.tick(ToolMotion::straight(at, next)).force;
             at = next;
         }
         simulated += ticks;

@@ -18,7 +18,7 @@ pub(super) type Seen = Result<(), Fail>;
 type CheckFn = fn(&mut dyn Device) -> Seen;
 
 /// Every check by its name, but that of a device that is cut off.
-pub(super) const ALL: [(&str, CheckFn); 13] = [
+pub(super) const ALL: [(&str, CheckFn); 14] = [
     ("it has a name", has_a_name),
     ("what it can do is possible", capabilities),
     ("it says whether it is calibrated, and is not ready before", calibration),
@@ -29,6 +29,7 @@ pub(super) const ALL: [(&str, CheckFn); 13] = [
     ("it exerts no more than its limit", limit),
     ("a force ends when it expires", expiry),
     ("a force that has expired does nothing", expired),
+    ("its torque is a number, within its limit, and ends when it expires", torque),
     ("one that exerts nothing says so", exerts_nothing),
     ("it waits no longer than it is told", waits),
     ("it goes on after every fault", after_faults),
@@ -48,10 +49,10 @@ fn wrong<T>(message: impl Into<String>) -> Result<T, Fail> {
     Err(Fail::Wrong(message.into()))
 }
 
-/// Reads at `tick`; a state must be finite.
+/// Reads at `tick`; a state must be finite, and its orientation a turn.
 fn read(device: &mut dyn Device, tick: u64) -> Result<bool, Fail> {
     match device.read(at(tick)) {
-        Ok(state) if state.is_finite() => Ok(true),
+        Ok(state) if state.is_finite() && state.upright().is_some() => Ok(true),
         Ok(state) => wrong(format!("its state at {} is {state:?}", at(tick))),
         Err(_) => Ok(false),
     }
@@ -194,6 +195,52 @@ fn expired(device: &mut dyn Device) -> Seen {
         }
     }
     Ok(())
+}
+
+/// One that has no torque is given none.
+fn torque(device: &mut dyn Device) -> Seen {
+    let Some(limit) = device.capabilities().max_torque_n_m else { return Ok(()) };
+    read(device, 0)?;
+    let command = |torque: Vec3, expires: Nanos| ForceCommand::until(Vec3::zeros(), expires).with_torque(torque);
+    for bad in [f64::NAN, f64::INFINITY] {
+        if device.write(command(Vec3::new(0.0, bad, 0.0), Nanos(u64::MAX))).is_ok() {
+            return wrong(format!("it took a torque of {bad} N m"));
+        }
+    }
+    if device.write(command(Vec3::x() * limit, at(1))) == Err(DeviceFault::Refused) {
+        return wrong(format!("it refused {limit} N m, which is its limit"));
+    }
+    let exerted = |device: &dyn Device| {
+        device.exerted_torque().ok_or_else(|| Fail::Unseen("it does not tell what torque it exerts".to_owned()))
+    };
+    exerted(device)?;
+    let mut acted = false;
+    for tick in 1..SETTLED {
+        read(device, tick)?;
+        let torque = exerted(device)?;
+        if !torque.norm().is_finite() || torque.norm() > limit * ROUNDING {
+            return wrong(format!("it exerts {} N m, its limit is {limit} N m", torque.norm()));
+        }
+        acted |= torque != Vec3::zeros();
+        // Refused or shortened, both are right.
+        let _ = device.write(command(Vec3::new(10.0 * limit, -limit, limit), at(tick + 5)));
+    }
+    let expires = at(2 * SETTLED);
+    if let Err(fault) = device.write(command(Vec3::z() * (0.5 * limit), expires)) {
+        return Err(Fail::Unseen(format!("it took no torque: {fault}")));
+    }
+    for tick in SETTLED..2 * SETTLED {
+        read(device, tick)?;
+        acted |= exerted(device)? != Vec3::zeros();
+    }
+    if device.exerts_force() && !acted {
+        return wrong("it exerts nothing of the torque that it takes");
+    }
+    read(device, 2 * SETTLED)?;
+    match exerted(device)? {
+        left if left == Vec3::zeros() => Ok(()),
+        left => wrong(format!("it exerts {left:?} N m at {expires}, when the command has expired")),
+    }
 }
 
 fn exerts_nothing(device: &mut dyn Device) -> Seen {

@@ -4,22 +4,27 @@
 //! a spring to where it wants to be. Around it: what a real device adds to a loop, which is an encoder step, a velocity
 //! from differences, a command that is held until the next, a transport with delay and jitter, and a largest force.
 //!
+//! It turns as it moves, about its own place and as easily about every axis: I w' = T_command + T_hand - c w, with the hand an
+//! inertia, a damper and a spring to how it wants the device to be turned. The orientation is told as it is.
+//!
 //! Everything is a function of scheduled times and commands: a run in virtual time, or one that is executed again, meets
 //! the same hand.
 
 mod plant;
 mod spec;
 mod transport;
+mod turning;
 
 pub(crate) use spec::SpecFault;
 pub use spec::{Axis, HandSpec, PlantSpec};
 
 use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
 use crate::error::Error;
-use crate::model::Vec3;
+use crate::model::{Pose, Vec3};
 use crate::runtime::Nanos;
 use plant::{Load, Motion};
 use transport::Transport;
+use turning::{Turning, Twist};
 
 /// A simulated device in a simulated hand.
 ///
@@ -27,7 +32,7 @@ use transport::Transport;
 /// Real-time safe: allocates nothing, bounded by the time since the last read over the step of the integration.
 #[derive(Clone, Debug)]
 pub struct Hand {
-    /// Where the hand wants to be.
+    /// Where the hand wants to be, and how turned.
     intended: ToolPath,
     plant: PlantSpec,
     hand: HandSpec,
@@ -37,6 +42,7 @@ pub struct Hand {
     step: Nanos,
     now: Nanos,
     axes: [Motion; 3],
+    turning: Turning,
     /// What the motors do.
     command: ForceCommand,
     told: Told,
@@ -69,7 +75,8 @@ impl Hand {
         if let Some((field, message)) = fault {
             return Err(Error::scene(field, message));
         }
-        let start = Vec3::from(plant.start_m.unwrap_or_else(|| intended.at(0.0)));
+        let Pose { position, orientation } = intended.pose_at(0.0);
+        let start = plant.start_m.map_or(position, Vec3::from);
         let axes = std::array::from_fn(|axis| Motion { place: start[axis], velocity: 0.0 });
         let delay = Nanos::from_secs_f64(plant.delay_ms * 1e-3);
         let mut device = Self {
@@ -82,6 +89,7 @@ impl Hand {
             capabilities,
             now: Nanos::ZERO,
             axes,
+            turning: Turning { orientation, ..Turning::default() },
             command: ForceCommand::ZERO,
             told: Told { time: Nanos::ZERO, position: start, velocity: Vec3::zeros() },
         };
@@ -110,26 +118,41 @@ impl Hand {
     fn step_to(&mut self, end: Nanos) {
         let (start_s, dt) = (self.now.as_secs_f64(), end.saturating_sub(self.now).as_secs_f64());
         let grip = if self.now < self.release { self.hand.level_at(start_s) } else { 0.0 };
-        let (intended, force) = (self.intended.at(start_s), self.saturated(self.now));
+        let (intended, force) = (self.intended.pose_at(start_s), self.saturated(self.now));
         for axis in &self.plant.axes {
             let axis = *axis as usize;
             let load = Load {
                 mass_kg: self.plant.mass_kg + grip * self.hand.mass_kg,
                 damping_n_s_per_m: self.plant.damping_n_s_per_m + grip * self.hand.damping_n_s_per_m,
                 stiffness_n_per_m: grip * self.hand.stiffness_n_per_m,
-                intended_m: intended[axis],
+                intended_m: intended.position[axis],
                 force_n: force[axis] + self.plant.bias_n[axis],
                 friction_n: self.plant.friction_n,
             };
             self.axes[axis] = self.axes[axis].after(dt, &load);
         }
+        let twist = Twist {
+            inertia_kg_m2: self.plant.inertia_kg_m2 + grip * self.hand.inertia_kg_m2,
+            damping_n_m_s_per_rad: self.plant.turning_damping_n_m_s_per_rad
+                + grip * self.hand.turning_damping_n_m_s_per_rad,
+            stiffness_n_m_per_rad: grip * self.hand.turning_stiffness_n_m_per_rad,
+            intended: intended.orientation,
+            torque_n_m: self.saturated_torque(self.now),
+        };
+        self.turning = self.turning.after(dt, &twist);
     }
 
     /// The force of the motors at `time` (N).
     fn saturated(&self, time: Nanos) -> Vec3 {
-        let force = self.command.at(time);
-        let norm = force.norm();
-        if norm <= self.capabilities.max_force_n { force } else { force * (self.capabilities.max_force_n / norm) }
+        shortened(self.command.at(time), self.capabilities.max_force_n)
+    }
+
+    /// The torque of the motors at `time` (N m).
+    fn saturated_torque(&self, time: Nanos) -> Vec3 {
+        match self.plant.max_torque_n_m.or(self.capabilities.max_torque_n_m) {
+            Some(most) => shortened(self.command.torque_at(time), most),
+            None => Vec3::zeros(),
+        }
     }
 
     fn place(&self) -> Vec3 {
@@ -163,7 +186,8 @@ impl Device for Hand {
             let velocity = self.told.velocity + (difference - self.told.velocity) * share;
             self.told = Told { time, position, velocity };
         }
-        Ok(DeviceState { position, velocity: self.told.velocity, buttons: 0 })
+        let orientation = self.turning.orientation;
+        Ok(DeviceState { position, velocity: self.told.velocity, orientation, buttons: 0 })
     }
 
     fn write(&mut self, command: ForceCommand) -> Result<(), DeviceFault> {
@@ -178,6 +202,16 @@ impl Device for Hand {
     fn exerted(&self) -> Option<Vec3> {
         Some(self.saturated(self.now))
     }
+
+    fn exerted_torque(&self) -> Option<Vec3> {
+        Some(self.saturated_torque(self.now))
+    }
+}
+
+/// `vector`, no longer than `most`.
+fn shortened(vector: Vec3, most: f64) -> Vec3 {
+    let norm = vector.norm();
+    if norm <= most { vector } else { vector * (most / norm) }
 }
 
 #[cfg(test)]

@@ -46,10 +46,16 @@ pub struct PlantSpec {
     pub seed: u64,
     /// Longest step of the integration (ms).
     pub step_ms: f64,
+    /// Moment of inertia about every axis through the tool (kg m^2).
+    pub inertia_kg_m2: f64,
+    /// Viscous friction of its turning (N m s/rad).
+    pub turning_damping_n_m_s_per_rad: f64,
+    /// Largest torque of its motors (N m); those of the profile if absent, which have none.
+    pub max_torque_n_m: Option<f64>,
 }
 
 impl Default for PlantSpec {
-    /// A small device of 100 g with an encoder step of 30 um, without delay.
+    /// A small device of 100 g with an encoder step of 30 um, without delay. It turns as a pen of 30 g and 14 cm does.
     fn default() -> Self {
         Self {
             mass_kg: 0.1,
@@ -64,6 +70,9 @@ impl Default for PlantSpec {
             jitter_ms: 0.0,
             seed: 0,
             step_ms: 0.1,
+            inertia_kg_m2: 5e-5,
+            turning_damping_n_m_s_per_rad: 1e-4,
+            max_torque_n_m: None,
         }
     }
 }
@@ -83,6 +92,7 @@ impl PlantSpec {
             position_resolution_m: known(self.encoder_step_m).or(profile.position_resolution_m),
             damping_n_s_per_m: known(self.damping_n_s_per_m).or(profile.damping_n_s_per_m),
             friction_n: known(self.friction_n).or(profile.friction_n),
+            max_torque_n_m: self.max_torque_n_m.or(profile.max_torque_n_m),
             delay_s: known(1e-3 * (self.delay_ms + self.jitter_ms)).or(profile.delay_s),
             ..profile
         }
@@ -95,8 +105,12 @@ impl PlantSpec {
             ("encoder_step_m", self.encoder_step_m),
             ("delay_ms", self.delay_ms),
             ("jitter_ms", self.jitter_ms),
+            ("turning_damping_n_m_s_per_rad", self.turning_damping_n_m_s_per_rad),
         ];
-        if let Some(fault) = not_positive("mass_kg", self.mass_kg) {
+        let positive = [("mass_kg", Some(self.mass_kg)), ("inertia_kg_m2", Some(self.inertia_kg_m2))];
+        let positive = positive.into_iter().chain([("max_torque_n_m", self.max_torque_n_m)]);
+        let positive = positive.filter_map(|(field, value)| Some((field, value?)));
+        if let Some(fault) = positive.into_iter().find_map(|(field, value)| not_positive(field, value)) {
             return Some(fault);
         }
         if let Some(fault) = not_negative.into_iter().find_map(|(field, value)| negative(field, value)) {
@@ -137,17 +151,32 @@ pub struct HandSpec {
     pub damping_n_s_per_m: f64,
     /// Stiffness of the spring to the intended place (N/m).
     pub stiffness_n_per_m: f64,
-    /// Firmness of the grip over time: rows of time (s) and level. The level multiplies mass, damping and stiffness; linear
-    /// in between, held outside; 1 throughout if empty.
+    /// Firmness of the grip over time: rows of time (s) and level. The level multiplies mass, inertia, both dampings and both
+    /// stiffnesses; linear in between, held outside; 1 throughout if empty.
     pub grip: Vec<[f64; 2]>,
     /// Time at which the hand lets go for good (s); never if absent.
     pub release_s: Option<f64>,
+    /// Moment of inertia of the fingers that turn with the device (kg m^2).
+    pub inertia_kg_m2: f64,
+    /// Damping of the hand's turning, against rest (N m s/rad).
+    pub turning_damping_n_m_s_per_rad: f64,
+    /// Stiffness of the spring to the intended orientation (N m/rad).
+    pub turning_stiffness_n_m_per_rad: f64,
 }
 
 impl Default for HandSpec {
     /// A light grip.
     fn default() -> Self {
-        Self { mass_kg: 0.1, damping_n_s_per_m: 4.0, stiffness_n_per_m: 300.0, grip: Vec::new(), release_s: None }
+        Self {
+            mass_kg: 0.1,
+            damping_n_s_per_m: 4.0,
+            stiffness_n_per_m: 300.0,
+            grip: Vec::new(),
+            release_s: None,
+            inertia_kg_m2: 1e-4,
+            turning_damping_n_m_s_per_rad: 0.015,
+            turning_stiffness_n_m_per_rad: 1.0,
+        }
     }
 }
 
@@ -158,6 +187,9 @@ impl HandSpec {
             ("damping_n_s_per_m", self.damping_n_s_per_m),
             ("stiffness_n_per_m", self.stiffness_n_per_m),
             ("release_s", self.release_s.unwrap_or_default()),
+            ("inertia_kg_m2", self.inertia_kg_m2),
+            ("turning_damping_n_m_s_per_rad", self.turning_damping_n_m_s_per_rad),
+            ("turning_stiffness_n_m_per_rad", self.turning_stiffness_n_m_per_rad),
         ];
         if let Some(fault) = numbers.into_iter().find_map(|(field, value)| negative(field, value)) {
             return Some(fault);
@@ -215,12 +247,17 @@ mod tests {
             (PlantSpec { velocity_cutoff_hz: Some(0.0), ..plant.clone() }, "velocity_cutoff_hz"),
             (PlantSpec { jitter_ms: 101.0, ..plant.clone() }, "delay_ms"),
             (PlantSpec { step_ms: 0.0, ..plant.clone() }, "step_ms"),
+            (PlantSpec { inertia_kg_m2: 0.0, ..plant.clone() }, "inertia_kg_m2"),
+            (PlantSpec { turning_damping_n_m_s_per_rad: -1.0, ..plant.clone() }, "turning_damping_n_m_s_per_rad"),
+            (PlantSpec { max_torque_n_m: Some(f64::NAN), ..plant.clone() }, "max_torque_n_m"),
         ] {
             assert_eq!(bad.fault().map(|fault| fault.0), Some(field));
         }
         let hand = HandSpec::default();
         for (bad, field) in [
             (HandSpec { stiffness_n_per_m: f64::NAN, ..hand.clone() }, "stiffness_n_per_m"),
+            (HandSpec { inertia_kg_m2: -1.0, ..hand.clone() }, "inertia_kg_m2"),
+            (HandSpec { turning_stiffness_n_m_per_rad: f64::NAN, ..hand.clone() }, "turning_stiffness_n_m_per_rad"),
             (HandSpec { release_s: Some(-1.0), ..hand.clone() }, "release_s"),
             (HandSpec { grip: vec![[0.0, -1.0]], ..hand.clone() }, "grip"),
             (HandSpec { grip: vec![[1.0, 1.0], [1.0, 0.5]], ..hand.clone() }, "grip"),

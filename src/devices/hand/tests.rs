@@ -1,6 +1,7 @@
 //! The simulated device as a whole: expiry, saturation, encoder, velocity, release, and that time is all it depends on.
 
 use super::*;
+use crate::model::Turn;
 use proptest::prelude::*;
 
 const MS: u64 = 1_000_000;
@@ -108,6 +109,39 @@ fn a_parameter_that_cannot_be_is_refused_by_name() {
     let bad = PlantSpec { mass_kg: -1.0, ..plant() };
     let error = Hand::new(path, bad, HandSpec::default(), Capabilities::TOUCH).unwrap_err();
     assert!(error.to_string().starts_with("mass_kg: is -1"), "{error}");
+}
+
+// Check that the hand turns the device to where its path is turned, that a torque turns it against the hand's spring, and that
+// neither moves it.
+#[test]
+fn a_hand_turns_the_device_and_a_torque_turns_it_against_the_hand() {
+    let quaternion = |angle: f64| [(0.5 * angle).cos(), 0.0, 0.0, (0.5 * angle).sin()];
+    let path = ToolPath::new(vec![0.0, 0.2], vec![[0.0; 3]; 2]).unwrap();
+    let path = path.turned(&[quaternion(0.0), quaternion(0.3)]).unwrap();
+    let spec = PlantSpec { max_torque_n_m: Some(0.05), ..plant() };
+    let mut device = Hand::new(path, spec, HandSpec::default(), Capabilities::TOUCH).unwrap();
+    assert_eq!(device.capabilities().max_torque_n_m, Some(0.05));
+    let state = device.read(Nanos(800 * MS)).unwrap();
+    assert!((state.orientation.angle() - 0.3).abs() < 1e-6, "{}", state.orientation.angle());
+    // Ten times as much as it can: 0.05 N m on 1 N m/rad are 0.05 rad.
+    let torque = Vec3::new(0.0, 0.0, 0.5);
+    device.write(ForceCommand::until(Vec3::zeros(), Nanos(1600 * MS)).with_torque(torque)).unwrap();
+    let state = device.read(Nanos(1599 * MS)).unwrap();
+    assert!((state.orientation.angle() - 0.35).abs() < 1e-6, "{}", state.orientation.angle());
+    assert_eq!(device.exerted_torque(), Some(Vec3::new(0.0, 0.0, 0.05)));
+    assert_eq!(state.position, Vec3::zeros());
+    device.read(Nanos(1600 * MS)).unwrap();
+    assert_eq!(device.exerted_torque(), Some(Vec3::zeros()), "it has expired");
+}
+
+// Check that a device without motors that turn it is turned by no command, whatever it says.
+#[test]
+fn a_device_that_exerts_no_torque_exerts_none() {
+    let mut device = device(plant(), no_hand());
+    device.read(Nanos::ZERO).unwrap();
+    device.write(ForceCommand::until(Vec3::zeros(), FOR_GOOD).with_torque(Vec3::x())).unwrap();
+    let state = device.read(Nanos(50 * MS)).unwrap();
+    assert_eq!((device.exerted_torque(), state.orientation), (Some(Vec3::zeros()), Turn::identity()));
 }
 
 proptest! {

@@ -58,6 +58,17 @@ pub struct ContactReport {
     pub lost: u64,
 }
 
+/// The contact of a tool with a shape over a run: most places, most pressure, area.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TouchReport {
+    /// The largest number of places that touched at once.
+    pub most_places: u16,
+    /// The largest mean pressure (Pa).
+    pub peak_pressure_pa: f64,
+    /// The area at the largest force (m^2).
+    pub area_at_peak_m2: f64,
+}
+
 /// The actions of the safety pipeline in a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LimitReport {
@@ -100,6 +111,8 @@ pub struct DeviceReport {
     pub force: ForceReport,
     /// The contact of its tool.
     pub contact: ContactReport,
+    /// What its tool touched with, if it has a shape and has touched.
+    pub touch: Option<TouchReport>,
     /// The actions of its safety pipeline.
     pub limits: LimitReport,
 }
@@ -113,6 +126,9 @@ pub(super) struct HapticsCounter {
     model_age: Magnitudes,
     force: ForceReport,
     contact: ContactReport,
+    touch: Option<TouchReport>,
+    /// The largest force of a tool with a shape (N).
+    peak_touch_n: f32,
     commands: u64,
     limited: u64,
     limits: [u64; LIMIT_BITS],
@@ -164,6 +180,17 @@ impl HapticsCounter {
             ContactMode::Lost => &mut self.contact.lost,
         };
         *ticks += 1;
+        // A point has no area.
+        if sample.area_m2 > 0.0 {
+            let touch = self.touch.get_or_insert_default();
+            touch.most_places = touch.most_places.max(sample.count);
+            touch.peak_pressure_pa = touch.peak_pressure_pa.max(sample.mean_pressure_pa().into());
+            let force_n = sample.normal_force_n.hypot(sample.tangential_force_n);
+            if force_n >= self.peak_touch_n {
+                self.peak_touch_n = force_n;
+                touch.area_at_peak_m2 = sample.area_m2.into();
+            }
+        }
     }
 
     pub(super) fn push_resync(&mut self, resync: &Resync) {
@@ -185,6 +212,7 @@ impl HapticsCounter {
             },
             force: ForceReport { model_age_s: self.model_age.percentiles(), ..self.force },
             contact: self.contact,
+            touch: self.touch,
             limits: LimitReport {
                 ticks: self.commands,
                 limited: self.limited,

@@ -7,7 +7,9 @@ use std::collections::BTreeMap;
 
 pub use self::group::{GroupCounter, GroupSummary, TickFigures, TickGauge};
 use self::haptics::HapticsCounter;
-pub use self::haptics::{ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport, magnitude};
+pub use self::haptics::{
+    ContactReport, DeviceReport, EnergyReport, ForceReport, LimitReport, ResyncReport, TouchReport, magnitude,
+};
 use super::entry::LogEntry;
 use super::records::{Environment, Level, LogRecord, LoggedExecution, TextEvent};
 use crate::runtime::Nanos;
@@ -129,6 +131,7 @@ impl Analysis {
             LogRecord::Resync(r) => self.device(record).push_resync(r),
             LogRecord::Actors(_)
             | LogRecord::Tool(_)
+            | LogRecord::ContactPoint(_)
             | LogRecord::Global(_)
             | LogRecord::Port(_)
             | LogRecord::Probe(_) => {}
@@ -247,7 +250,7 @@ impl Analysis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::{CommandSample, ContactReport, ContactSample, ForceSample, GroupInfo, Resync};
+    use crate::log::{CommandSample, ContactReport, ContactSample, ForceSample, GroupInfo, Resync, TouchReport};
     use crate::model::contact::ContactMode;
     use crate::runtime::GroupMode;
     use crate::runtime::{SlipCause, TickTiming};
@@ -338,6 +341,23 @@ mod tests {
         assert_eq!(report.devices[0].limits.share(), 0.1);
         assert_eq!((report.devices[0].resyncs.jump_before_n.max, report.devices[0].resyncs.age_ns.p50), (0.5, 7));
         assert_eq!((report.groups[0].name.as_str(), report.groups[0].released), ("haptic", 0));
+    }
+
+    #[test]
+    fn a_tool_with_a_shape_is_summed_up_by_places_pressure_and_area() {
+        let mut analysis = Analysis::default();
+        let contact = |count, normal_force_n, area_m2| {
+            LogRecord::Contact(ContactSample { count, normal_force_n, area_m2, ..ContactSample::default() })
+        };
+        [contact(1, 3.0, 0.0), contact(0, 0.0, 0.0)].iter().for_each(|record| analysis.push(record));
+        assert_eq!(analysis.report().devices[0].touch, None, "a point");
+        [contact(7, 0.5, 1.0), contact(3, 2.0, 0.5), contact(5, 1.0, 0.125), contact(0, f32::NAN, 0.25)]
+            .iter()
+            .for_each(|record| analysis.push(record));
+        let expected = TouchReport { most_places: 7, peak_pressure_pa: 8.0, area_at_peak_m2: 0.5 };
+        assert_eq!(analysis.report().devices[0].touch, Some(expected));
+        let text = analysis.report().to_string();
+        assert!(text.contains("touch      7 places at most, mean pressure up to 8.00 Pa"), "{text}");
     }
 
     #[test]

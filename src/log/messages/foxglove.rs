@@ -87,7 +87,7 @@ messages! {
         a: f64 = 4,
     }
 
-    /// `/tool`: the raw device sample. The orientation is always the identity: the tool is a point.
+    /// `/tool`: the raw device sample.
     message PoseInFrame {
         timestamp: Timestamp = 1,
         frame_id: String = 2,
@@ -128,7 +128,7 @@ messages! {
         id: String = 3,
     }
 
-    /// One thing to see. The schema's other primitives (6, 8, 10, 11, 13, 14) are never written and left out.
+    /// One thing to see. The schema's other primitives (8, 11, 13, 14) are never written and left out.
     message SceneEntity {
         timestamp: Timestamp = 1,
         frame_id: String = 2,
@@ -138,6 +138,7 @@ messages! {
         metadata: Vec<KeyValuePair> = 6,
         arrows: Vec<ArrowPrimitive> = 7,
         spheres: Vec<SpherePrimitive> = 9,
+        cylinders: Vec<CylinderPrimitive> = 10,
         triangles: Vec<TriangleListPrimitive> = 12,
     }
 
@@ -162,6 +163,15 @@ messages! {
         pose: Pose = 1,
         size: Vector3 = 2,
         color: Color = 3,
+    }
+
+    /// A cylinder along z, around its pose; its size is that of the box around it, and the scales are those of its ends.
+    message CylinderPrimitive {
+        pose: Pose = 1,
+        size: Vector3 = 2,
+        bottom_scale: f64 = 3,
+        top_scale: f64 = 4,
+        color: Color = 5,
     }
 
     /// A mesh: three indices into the points for each triangle.
@@ -202,6 +212,7 @@ pub(crate) fn files() -> Vec<FileDescriptorProto> {
         KeyValuePair::descriptor(),
         ArrowPrimitive::descriptor(),
         SpherePrimitive::descriptor(),
+        CylinderPrimitive::descriptor(),
         TriangleListPrimitive::descriptor(),
     ];
     vec![

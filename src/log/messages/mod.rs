@@ -2,6 +2,7 @@
 //!
 //! Fields are only ever added, with new numbers.
 
+mod contact;
 pub(crate) mod foxglove;
 mod scene_update;
 pub(crate) mod topic;
@@ -10,16 +11,18 @@ pub(crate) mod wire;
 
 use prost_types::{FileDescriptorProto, FileDescriptorSet};
 
+pub(crate) use self::contact::Contact;
+use self::contact::ContactPoint;
 pub(crate) use self::wire::LogMessage;
 use self::wire::{Uint64s, WireEnum, message, messages, wire_enum};
 use super::percentiles::Percentiles;
-use super::records::{CommandSample, ContactSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy};
+use super::records::{CommandSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy};
 use super::stats::GroupStats;
 use crate::model::contact::ContactMode;
 use crate::runtime::{self, GroupMode, Nanos, PortUse, PortUseKind, SlipCause, TickTiming};
 
 /// The version of the schema that this build writes.
-pub(crate) const SCHEMA_VERSION: u32 = 2;
+pub(crate) const SCHEMA_VERSION: u32 = 3;
 
 wire_enum! { "palpate.SlipCause" for SlipCause { None, LateWake, LongTick, StalledPeer, Policy, Fault } }
 wire_enum! { "palpate.PortUseKind" for PortUseKind { Took, Saw, Dropped } }
@@ -87,20 +90,6 @@ impl From<ActorTimes> for runtime::ActorTimes {
     }
 }
 
-// `/contact`: the state of the contact.
-message! { "palpate.Contact" => for ContactSample {
-    time_ns = 1 (.time),
-    mode = 2 (.mode),
-    triangle = 3 (.triangle),
-    weight_a = 4 [|r: &Self| 1.0 - r.weights[0] - r.weights[1]],
-    weight_b = 5 (.weights[0]),
-    weight_c = 6 (.weights[1]),
-    normal = 7 (.normal),
-    normal_force_n = 8 (.normal_force_n),
-    tangential_force_n = 9 (.tangential_force_n),
-    device = 10 (.device),
-} }
-
 // `/ports`: what a release saw through a port from another group; see `PortUseKind` for the count.
 message! { "palpate.PortUse" => for PortUse {
     time_ns = 1 (.time),
@@ -143,7 +132,9 @@ fn file() -> FileDescriptorProto {
             ActorTimes::descriptor(),
             ForceSample::descriptor(),
             CommandSample::descriptor(),
-            ContactSample::descriptor(),
+            <[f32; 3]>::descriptor(),
+            ContactPoint::descriptor(),
+            Contact::descriptor(),
             Resync::descriptor(),
             GlobalTick::descriptor(),
             PortUse::descriptor(),
@@ -175,7 +166,7 @@ mod tests {
 
     #[test]
     fn the_descriptor_names_every_field_with_the_number_on_the_wire() {
-        let set = FileDescriptorSet::decode(descriptor_set(ContactSample::NAME).as_slice()).unwrap();
+        let set = FileDescriptorSet::decode(descriptor_set(Contact::NAME).as_slice()).unwrap();
         let contact = set.file[0].message_type.iter().find(|m| m.name() == "Contact").unwrap();
         let fields: Vec<_> = contact.field.iter().map(|f| (f.name(), f.number(), f.r#type())).collect();
         assert_eq!(fields[1], ("mode", 2, Type::Enum));

@@ -1,10 +1,8 @@
 //! The topics of a log: what each is called and which message it carries.
 
 use super::foxglove::{Log, PoseInFrame, SceneUpdate};
-use super::{ActorTimes, LogMessage};
-use crate::log::records::{
-    CommandSample, ContactSample, Environment, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync,
-};
+use super::{ActorTimes, Contact, LogMessage};
+use crate::log::records::{CommandSample, Environment, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync};
 use crate::log::stats::GroupStats;
 use crate::runtime::PortUse;
 use crate::runtime::TickTiming;
@@ -64,6 +62,7 @@ impl Topic {
             LogRecord::Force(r) => Self(Kind::Force, r.device),
             LogRecord::Command(r) => Self(Kind::ForceCommanded, r.device),
             LogRecord::Tool(r) => Self(Kind::Tool, r.device),
+            LogRecord::ContactPoint(r) => Self(Kind::Contact, r.device),
             LogRecord::Contact(r) => Self(Kind::Contact, r.device),
             LogRecord::Resync(r) => Self(Kind::Resync, r.device),
             LogRecord::Global(_) => Self(Kind::Global, 0),
@@ -93,7 +92,7 @@ impl TopicKind {
             Self::Force => ("force", ForceSample::NAME),
             Self::ForceCommanded => ("force_commanded", CommandSample::NAME),
             Self::Tool => ("tool", PoseInFrame::NAME),
-            Self::Contact => ("contact", ContactSample::NAME),
+            Self::Contact => ("contact", Contact::NAME),
             Self::Resync => ("resync", Resync::NAME),
             Self::Global => ("global", GlobalTick::NAME),
             Self::Ports => ("ports", PortUse::NAME),

@@ -2,6 +2,7 @@
 
 use super::foxglove::{self, Log, Pose, PoseInFrame, Quaternion, Timestamp, Vector3};
 use crate::log::records::{Level, TextEvent, ToolSample};
+use crate::model::{Turn, turn_of};
 use crate::runtime::Event;
 use crate::runtime::Nanos;
 
@@ -27,13 +28,23 @@ fn array(v: Vector3) -> [f64; 3] {
     [v.x, v.y, v.z]
 }
 
+pub(super) fn quaternion(turn: &Turn) -> Quaternion {
+    Quaternion { x: turn.i, y: turn.j, z: turn.k, w: turn.w }
+}
+
+/// The turn, bit for bit; none where a log says nothing.
+fn turn(q: &Quaternion) -> Turn {
+    let Quaternion { x, y, z, w } = *q;
+    if [x, y, z, w] == [0.0; 4] { Turn::identity() } else { turn_of([w, x, y, z]) }
+}
+
 impl PoseInFrame {
     /// The sample of a run that started at `epoch_ns`.
     pub(crate) fn of(r: &ToolSample, epoch_ns: u64) -> Self {
         Self {
             timestamp: timestamp(epoch_ns, r.time),
             frame_id: FRAME.into(),
-            pose: Pose { position: vector(r.position_m), orientation: UPRIGHT },
+            pose: Pose { position: vector(r.position_m), orientation: quaternion(&r.orientation) },
             time_ns: r.time,
             id: r.id,
             velocity_m_s: vector(r.velocity_m_s),
@@ -51,6 +62,7 @@ impl From<PoseInFrame> for ToolSample {
             position_m: array(m.pose.position),
             velocity_m_s: array(m.velocity_m_s),
             buttons: m.buttons,
+            orientation: turn(&m.pose.orientation),
             device: m.device,
         }
     }

@@ -5,10 +5,9 @@
 //! ([`Wire`]). Every log embeds the descriptors and needs no plugin in a viewer.
 //!
 //! ```text
-//! message! { "palpate.Contact" for ContactSample {
-//!     time_ns = 1 (.time),                  the field `time`
-//!     weight_a = 4 [first_weight],          computed by a function, not read back
-//!     weight_b = 5 (.weights[0]),
+//! message! { "palpate.TickTiming" => for TickTiming {
+//!     scheduled_ns = 3 (.scheduled),        the field `scheduled`
+//!     lateness_ns = 1001 [lateness],        computed by a function, not read back
 //! } }
 //! messages! { package "foxglove"; message Point3 { x: f64 = 1, y: f64 = 2, z: f64 = 3, } }    with a struct of its own
 //! ```
@@ -172,6 +171,19 @@ impl<M: LogMessage> Wire for Vec<M> {
         message.merge_field(wire, from)?;
         self.push(message);
         Ok(())
+    }
+}
+
+/// A number that older logs do not have.
+impl Wire for Option<u16> {
+    const TYPE: Type = u16::TYPE;
+
+    fn encode_field(&self, number: u32, to: &mut Vec<u8>) {
+        self.iter().for_each(|value| value.encode_field(number, to));
+    }
+
+    fn merge_field(&mut self, wire: WireType, from: &mut &[u8]) -> Result<(), DecodeError> {
+        self.get_or_insert_default().merge_field(wire, from)
     }
 }
 

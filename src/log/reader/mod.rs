@@ -4,7 +4,7 @@ mod chunk;
 mod foreign;
 mod framing;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -56,6 +56,8 @@ pub struct LogReader<R> {
     channels: HashMap<u16, Channel>,
     topic: String,
     messages: u64,
+    /// What is left of the message just read.
+    left: VecDeque<LogEntry>,
     /// What other programs' channels together say of the run; `None` in a log of palpate's.
     foreign: Option<Environment>,
     foreign_base: Option<u64>,
@@ -96,6 +98,7 @@ impl<R: Read> LogReader<R> {
             channels: HashMap::new(),
             topic: String::new(),
             messages: 0,
+            left: VecDeque::new(),
             foreign: Some(foreign_environment()),
             foreign_base: None,
         })
@@ -223,8 +226,16 @@ impl<R: Read> LogReader<R> {
             }
             (None, None) => return Ok(None),
         };
-        let entry = LogEntry::decode(kind, &data);
-        entry.map_err(|e| format!("a message on {} does not decode: {e}", channel.topic))
+        let place = &channel.topic;
+        let damaged = |e: &dyn std::fmt::Display| format!("a message on {place} does not decode: {e}");
+        if kind == TopicKind::Contact {
+            // The places come first, as they were recorded.
+            let contact = messages::Contact::decode(&data).map_err(|e| damaged(&e))?;
+            let records = contact.points().map(LogRecord::ContactPoint).chain([LogRecord::Contact(contact.sample())]);
+            self.left.extend(records.map(LogEntry::Record));
+            return Ok(self.left.pop_front());
+        }
+        LogEntry::decode(kind, &data).map_err(|e| damaged(&e))
     }
 }
 
@@ -232,6 +243,9 @@ impl<R: Read> Iterator for LogReader<R> {
     type Item = LogEntry;
 
     fn next(&mut self) -> Option<LogEntry> {
+        if let Some(entry) = self.left.pop_front() {
+            return Some(entry);
+        }
         loop {
             let opcode = self.records.read_next()?;
             match self.decode(opcode) {
@@ -265,7 +279,8 @@ fn foreign_environment() -> Environment {
 }
 
 impl LogEntry {
-    /// Reads the entry in the data of a message of this kind; `None` for what is there to be seen only.
+    /// Reads the entry in the data of a message of this kind, of a contact the last one; `None` for what is there to be seen
+    /// only.
     ///
     /// # Errors
     /// What is damaged, in a line.
@@ -280,7 +295,7 @@ impl LogEntry {
             TopicKind::Force => LogRecord::Force(LogMessage::decode(data)?),
             TopicKind::ForceCommanded => LogRecord::Command(LogMessage::decode(data)?),
             TopicKind::Tool => LogRecord::Tool(foxglove::PoseInFrame::decode(data)?.into()),
-            TopicKind::Contact => LogRecord::Contact(LogMessage::decode(data)?),
+            TopicKind::Contact => LogRecord::Contact(messages::Contact::decode(data)?.sample()),
             TopicKind::Resync => LogRecord::Resync(LogMessage::decode(data)?),
             TopicKind::Global => LogRecord::Global(LogMessage::decode(data)?),
             TopicKind::Ports => LogRecord::Port(LogMessage::decode(data)?),

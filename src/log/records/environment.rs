@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{MAX_DEVICES, ToolSample};
+use crate::model::contact::ToolShape;
+use crate::model::{Turn, Vec3, turn_of, wxyz};
 use crate::runtime::GroupGrant;
 use crate::runtime::Nanos;
 
@@ -81,6 +83,8 @@ pub struct Environment {
     pub model_reason: Option<ModelReason>,
     /// The body in words: its size, what it is made of, and what was left out of its mesh; `None` in logs that do not say it.
     pub body: Option<String>,
+    /// The tools in words: their shapes, and how coarse the body is against each; `None` if all are points.
+    pub tools: Option<String>,
     /// The haptic rate (Hz).
     pub haptic_hz: f64,
     /// The rate of the global model (Hz).
@@ -89,6 +93,8 @@ pub struct Environment {
     pub groups: Vec<GroupInfo>,
     /// The names of the devices, if there are several: the topics of each are `/NAME/force` and so on.
     pub devices: Vec<String>,
+    /// The shapes of the tools, by device; empty if all are points.
+    pub shapes: Vec<ToolShape>,
     /// The names of the bits in [`CommandSample::limits`](crate::log::CommandSample::limits), lowest first.
     pub limit_stages: Vec<String>,
     /// The names of the safety stages that the scene switched off.
@@ -155,6 +161,11 @@ impl Environment {
         }
     }
 
+    /// The shape of the tool of device `device`.
+    pub fn shape(&self, device: u16) -> ToolShape {
+        self.shapes.get(usize::from(device)).copied().unwrap_or_default()
+    }
+
     /// The Unix time of the start (ns), which is added to the time of a record to give its log time.
     pub fn epoch_ns(&self) -> u64 {
         match self.execution {
@@ -182,6 +193,7 @@ impl Environment {
         .map(|(key, value)| (key.to_owned(), value))
         .into();
         map.extend(self.body.iter().map(|body| ("body".to_owned(), body.clone())));
+        map.extend(self.tools.iter().map(|tools| ("tools".to_owned(), tools.clone())));
         if let Some(reason) = &self.model_reason {
             map.insert(MODEL_REASON.to_owned(), reason.why.clone());
             map.extend(reason.warning.iter().map(|warning| (MODEL_WARNING.to_owned(), warning.clone())));
@@ -195,6 +207,9 @@ impl Environment {
             map.extend(numbered(&format!("group.{i}.actor"), &group.actors));
         }
         map.extend(numbered("device", &self.devices));
+        for (device, shape) in self.shapes.iter().enumerate() {
+            map.extend(shape_entries(device, shape));
+        }
         map.extend(numbered("limit_stage", &self.limit_stages));
         map.extend(numbered("safety_off", &self.safety_off));
         map.insert("stored_j".to_owned(), self.stored_j.to_string());
@@ -204,6 +219,7 @@ impl Environment {
             map.insert(format!("{of}.position_m"), spaced(first.position_m));
             map.insert(format!("{of}.velocity_m_s"), spaced(first.velocity_m_s));
             map.insert(format!("{of}.buttons"), first.buttons.to_string());
+            map.insert(format!("{of}.orientation"), spaced(wxyz(&first.orientation)));
         }
         map.extend(self.granted.iter().map(|(key, value)| (format!("granted.{key}"), value.clone())));
         map
@@ -245,10 +261,12 @@ impl Environment {
                 .get(MODEL_REASON)
                 .map(|why| ModelReason { why: why.clone(), warning: map.get(MODEL_WARNING).cloned() }),
             body: map.get("body").cloned(),
+            tools: map.get("tools").cloned(),
             haptic_hz: number("haptic_hz"),
             global_hz: number("global_hz"),
             groups,
             devices: listed("device").into_iter().take(MAX_DEVICES.into()).collect(),
+            shapes: (0..MAX_DEVICES.into()).map_while(|device| shape(map, device)).collect(),
             limit_stages: listed("limit_stage"),
             safety_off: listed("safety_off"),
             stored_j: number("stored_j"),
@@ -282,22 +300,59 @@ fn first_tool_key(device: usize) -> String {
     if device == 0 { "first_tool".to_owned() } else { format!("first_tool.{device}") }
 }
 
+/// A tool's shape as keys and values; the numbers are those of [`ToolShape`].
+fn shape_entries(device: usize, shape: &ToolShape) -> Vec<(String, String)> {
+    let name = match shape {
+        ToolShape::Point => "point",
+        ToolShape::Sphere { .. } => "sphere",
+        ToolShape::Capsule { .. } => "capsule",
+    };
+    let mut entries = vec![("shape", name.to_owned())];
+    if *shape != ToolShape::Point {
+        entries.push(("radius_m", shape.radius().to_string()));
+    }
+    if let ToolShape::Capsule { half_axis, .. } = shape {
+        entries.push(("half_axis_m", spaced((*half_axis).into())));
+    }
+    entries.into_iter().map(|(key, value)| (format!("tool.{device}.{key}"), value)).collect()
+}
+
+/// Reads [`shape_entries`] back; what cannot be read is a point.
+fn shape(map: &BTreeMap<String, String>, device: usize) -> Option<ToolShape> {
+    let text = |key: &str| map.get(&format!("tool.{device}.{key}"));
+    let radius = || text("radius_m")?.parse().ok();
+    let half_axis = || vector(text("half_axis_m")?).map(Vec3::from);
+    let known = match text("shape")?.as_str() {
+        "sphere" => radius().map(|radius| ToolShape::Sphere { radius }),
+        "capsule" => radius().zip(half_axis()).map(|(radius, half_axis)| ToolShape::Capsule { radius, half_axis }),
+        _ => None,
+    };
+    Some(known.unwrap_or_default())
+}
+
+/// Reads [`spaced`] back.
+fn vector(text: &str) -> Option<[f64; 3]> {
+    let numbers: Option<Vec<f64>> = text.split(' ').map(|number| number.parse().ok()).collect();
+    numbers?.try_into().ok()
+}
+
 /// Numbers as text that reads back exactly.
-fn spaced(vector: [f64; 3]) -> String {
+fn spaced<const N: usize>(vector: [f64; N]) -> String {
     vector.map(|component| component.to_string()).join(" ")
 }
 
 fn first_tool(map: &BTreeMap<String, String>, device: usize) -> Option<ToolSample> {
     let of = first_tool_key(device);
     let text = |key: &str| map.get(&format!("{of}.{key}"));
-    let vector = |key: &str| -> Option<[f64; 3]> {
-        let numbers: Option<Vec<f64>> = text(key)?.split(' ').map(|number| number.parse().ok()).collect();
-        numbers?.try_into().ok()
-    };
+    let vector = |key: &str| vector(text(key)?);
+    let numbers = |key: &str| -> Option<Vec<f64>> { text(key)?.split(' ').map(|number| number.parse().ok()).collect() };
+    // Logs before the third schema know no orientation.
+    let turn = || -> Option<Turn> { Some(turn_of(numbers("orientation")?.try_into().ok()?)) };
     Some(ToolSample {
         position_m: vector("position_m")?,
         velocity_m_s: vector("velocity_m_s")?,
         buttons: text("buttons")?.parse().ok()?,
+        orientation: turn().unwrap_or_default(),
         device: u16::try_from(device).ok()?,
         ..ToolSample::default()
     })
@@ -316,6 +371,7 @@ mod tests {
             model: "patch".into(),
             model_reason: Some(ModelReason { why: "it is cheap".into(), warning: Some("it is wrong".into()) }),
             body: Some("1125 nodes".into()),
+            tools: Some("sphere of 4.0 mm".into()),
             haptic_hz: 1000.0,
             global_hz: 29.97,
             groups: vec![
@@ -323,6 +379,11 @@ mod tests {
                 GroupInfo { background: true, budget: Some(Nanos(7)), ..GroupInfo::new("global", 29.97) },
             ],
             devices: vec!["left".into(), "right".into()],
+            shapes: vec![
+                ToolShape::Point,
+                ToolShape::Sphere { radius: 0.1 + 0.2 },
+                ToolShape::Capsule { radius: 3e-3, half_axis: Vec3::new(-0.0, 1.0 / 3.0, 1e-300) },
+            ],
             limit_stages: vec!["clamp".into(), "slew".into()],
             safety_off: vec!["tank".into()],
             stored_j: 0.125,
@@ -333,6 +394,7 @@ mod tests {
                     position_m: [0.1, -0.0, 1.0 / 3.0],
                     velocity_m_s: [1e-300, 5.0, -1e12],
                     buttons: 3,
+                    orientation: Turn::from_euler_angles(0.1, -0.2, f64::from(device)),
                     device,
                     ..ToolSample::default()
                 })

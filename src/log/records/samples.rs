@@ -1,7 +1,8 @@
-//! What a haptic tick leaves behind: one declaration for each record gives the plain struct, its form as one of the
+//! What a haptic tick leaves behind: one declaration for each record gives the plain struct, its form as one or two of the
 //! runtime's 64-byte records, and, unless viewers have a message of their own for it, its protobuf message.
 
 use super::packing::{packed, packed_field, record};
+use crate::model::Turn;
 use crate::model::contact::ContactMode;
 use crate::runtime::Nanos;
 use crate::runtime::Record;
@@ -88,6 +89,9 @@ record! {
         energy_j: f64 = 5,
         /// The kind of that model in this tick.
         served_by: ServedBy = 6,
+    } and {
+        /// The torque on the tool about its centre, mean over the tick (N m); zero for a point.
+        torque_n_m: [f64; 3] = 8,
     } of device 7
 }
 
@@ -105,6 +109,9 @@ record! {
         energy_j: f64 = 4,
         /// The energy in the tank of model swaps (J).
         tank_j: f64 = 5,
+    } and {
+        /// The torque after the safety pipeline (N m); zero for a device that exerts none.
+        torque_n_m: [f64; 3] = 7,
     } of device 6
 }
 
@@ -121,34 +128,13 @@ pub struct ToolSample {
     pub velocity_m_s: [f64; 3],
     /// The pressed buttons, a bit each.
     pub buttons: u16,
+    /// The turn from the tool's own axes to those of the world.
+    pub orientation: Turn,
     /// The number of the device in the scene, from 0.
     pub device: u16,
 }
 
-packed! { ToolSample on 1 { id, position_m, velocity_m_s, buttons } of device }
-
-/// The contact at the end of one haptic tick, on the topic `/contact`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactSample {
-    /// The end of the tick.
-    pub time: Nanos,
-    /// The mode of the contact.
-    pub mode: ContactMode,
-    /// The global triangle id; `u32::MAX` without one.
-    pub triangle: u32,
-    /// The barycentric weights of the triangle's second and third node; the first is one minus both.
-    pub weights: [f64; 2],
-    /// The outward unit normal that was used.
-    pub normal: [f64; 3],
-    /// The force along the normal, mean over the tick (N).
-    pub normal_force_n: f32,
-    /// The magnitude of the force across it (N).
-    pub tangential_force_n: f32,
-    /// The number of the device in the scene, from 0.
-    pub device: u16,
-}
-
-packed! { ContactSample on 2 { mode, triangle, weights, normal, normal_force_n, tangential_force_n } of device }
+packed! { ToolSample on 1 { id, position_m, velocity_m_s, buttons } and { orientation } of device }
 
 record! {
     /// The replacement of a local model by a newer one, on the topic `/resync`.

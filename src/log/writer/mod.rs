@@ -17,8 +17,8 @@ use mcap::{Attachment, Compression, WriteOptions};
 pub use self::backlog::{Backlog, BacklogProgress};
 use super::messages::foxglove::{Log, PoseInFrame, SceneUpdate};
 use super::messages::topic::{Topic, TopicKind};
-use super::messages::{ActorTimes, LogMessage, SCHEMA_VERSION, descriptor_set};
-use super::records::{Environment, LogRecord, SceneFrame, TextEvent};
+use super::messages::{ActorTimes, Contact, LogMessage, SCHEMA_VERSION, descriptor_set};
+use super::records::{Environment, LogRecord, SceneFrame, TextEvent, WaitingPoints};
 use super::stats::GroupStats;
 use crate::error::{Error, ErrorKind};
 use crate::runtime::Nanos;
@@ -63,6 +63,7 @@ pub struct McapWriter<W: Write> {
     environment_is_written: bool,
     attached: Vec<&'static str>,
     channels: BTreeMap<Topic, (u16, u32)>,
+    points: WaitingPoints,
     pending: Vec<Pending>,
     bytes: Vec<u8>,
     flushed_at: (Nanos, Nanos),
@@ -102,6 +103,7 @@ impl<W: Write> McapWriter<W> {
             environment_is_written: false,
             attached: Vec::new(),
             channels: BTreeMap::new(),
+            points: WaitingPoints::default(),
             pending: Vec::new(),
             bytes: Vec::with_capacity(CHUNK_BYTES),
             flushed_at: (Nanos::ZERO, Nanos::ZERO),
@@ -115,7 +117,8 @@ impl<W: Write> McapWriter<W> {
         self.environment_is_written = false;
     }
 
-    /// Adds a record.
+    /// Adds a record. A [`LogRecord::ContactPoint`] is written with the [`LogRecord::Contact`] of its device and time that
+    /// follows, and is lost without it.
     ///
     /// # Errors
     /// [`ErrorKind::Io`] if a chunk was full and could not be written. The log is then given up: further calls fail at
@@ -133,7 +136,14 @@ impl<W: Write> McapWriter<W> {
             LogRecord::Force(r) => self.push(topic, time, r),
             LogRecord::Command(r) => self.push(topic, time, r),
             LogRecord::Tool(r) => self.push(topic, time, &PoseInFrame::of(r, self.environment.epoch_ns())),
-            LogRecord::Contact(r) => self.push(topic, time, r),
+            LogRecord::ContactPoint(r) => {
+                self.points.add(*r);
+                Ok(())
+            }
+            LogRecord::Contact(r) => {
+                let points = self.points.take(r);
+                self.push(topic, time, &Contact::of(r, &points))
+            }
             LogRecord::Resync(r) => self.push(topic, time, r),
             LogRecord::Global(r) => self.push(topic, time, r),
             LogRecord::Port(r) => self.push(topic, time, r),

@@ -21,12 +21,12 @@ fn pressed(nodes: usize) -> (Simulation, Vec3) {
     let builder = Block::builder([nodes; 3], [0.1; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
     let body = builder.fix(Face::ZMin).build().expect("a valid block");
     let state = State::at_rest(body.rest());
-    let law = Law { friction: 0.5, ..Law::default() };
+    let law = Law { friction: 0.5.into(), ..Law::default() };
     let stepping = Stepping { tick: 1e-3, substeps: 2 };
     let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).expect("it fits");
     let at = |k: i32| Vec3::new(0.047, 0.0512, 0.101 - 0.006 * f64::from(k) / 100.0);
     for k in 0..100 {
-        sim.tick(ToolMotion { from: at(k), to: at(k + 1) });
+        sim.tick(ToolMotion::straight(at(k), at(k + 1)));
     }
     assert!(sim.contact(0).is_touching());
     (sim, at(100))
@@ -68,7 +68,7 @@ fn patch_tick(c: &mut Criterion) {
         c.bench_function(&format!("patch 4x4x2: one 1 kHz tick with contact, {name}"), |b| {
             b.iter(|| {
                 k += 1;
-                black_box(patch.tick(ToolMotion { from: circle(k - 1), to: circle(k) }))
+                black_box(patch.tick(ToolMotion::straight(circle(k - 1), circle(k))))
             });
         });
         assert!(patch.contact().is_touching(), "the tick measured has a contact in it");
@@ -112,7 +112,7 @@ fn condense(c: &mut Criterion) {
 
 fn whole_body(c: &mut Criterion) {
     let (mut sim, tool) = pressed(12);
-    let resting = ToolMotion { from: tool, to: tool };
+    let resting = ToolMotion::straight(tool, tool);
     c.bench_function("12^3 body: one substep with contact (half a tick)", |b| {
         // A tick is two substeps; criterion's time per iteration is for one.
         b.iter_custom(|iterations| {

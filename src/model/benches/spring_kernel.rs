@@ -155,7 +155,7 @@ fn two_cores(nodes: usize) {
 fn full_tick() -> f64 {
     let body = block(12);
     let state = State::at_rest(body.rest());
-    let law = Law { friction: 0.5, ..Law::default() };
+    let law = Law { friction: 0.5.into(), ..Law::default() };
     let stepping = Stepping { tick: 1e-3, substeps: 2 };
     let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).expect("it fits");
     let path = |k: usize| {
@@ -164,7 +164,7 @@ fn full_tick() -> f64 {
     };
     let tick = |k: usize, sim: &mut Simulation| {
         let start = Instant::now();
-        black_box(sim.tick(ToolMotion { from: path(k), to: path(k + 1) }));
+        black_box(sim.tick(ToolMotion::straight(path(k), path(k + 1))));
         start.elapsed().as_secs_f64()
     };
     (0..200).for_each(|k| {

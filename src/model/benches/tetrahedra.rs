@@ -201,7 +201,7 @@ fn per_millisecond(elements: usize) {
 fn full_tick(elements: usize) -> [f64; 2] {
     let body = cube(elements, 0.08, true);
     let state = State::at_rest(body.rest());
-    let law = Law { friction: 0.5, ..Law::default() };
+    let law = Law { friction: 0.5.into(), ..Law::default() };
     let stepping = Stepping { tick: 1e-3, substeps: 3 };
     let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).expect("it fits");
     let path = |k: usize| {
@@ -211,7 +211,7 @@ fn full_tick(elements: usize) -> [f64; 2] {
     let mut times = Vec::new();
     for k in 0..3000 {
         let start = Instant::now();
-        black_box(sim.tick(ToolMotion { from: path(k), to: path(k + 1) }));
+        black_box(sim.tick(ToolMotion::straight(path(k), path(k + 1))));
         times.push(start.elapsed().as_secs_f64());
     }
     assert!(sim.contact(0).is_touching(), "the ticks measured have a contact in them");

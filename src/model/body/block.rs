@@ -244,6 +244,25 @@ impl Body for Block {
         Some(SpringNetwork::restricted(&self.rest, &self.inverse_masses, nodes, springs))
     }
 
+    fn contact_moduli(&self) -> Vec<f64> {
+        // Springs in all directions are, on the mean of these, an elastic continuum with nu = 1/4: its shear modulus is the sum of
+        // k L^2 over the springs of a cell, by its volume, by 15.
+        let node = |at: [usize; 3]| self.rest[self.lattice.id(at) as usize];
+        let step = node([1, 1, 1]) - node([0, 0, 0]);
+        let squares: f64 = Lattice::FORWARD
+            .iter()
+            .map(|offset| (0..3).map(|axis| (offset[axis] as f64 * step[axis]).powi(2)).sum::<f64>())
+            .sum();
+        let shear = squares / (step.x * step.y * step.z) / 15.0;
+        let of_node = |node: u32| {
+            let springs = || self.springs.neighbours(&self.lattice, node);
+            let stiffness: f64 = springs().map(|(_, spring)| spring.stiffness).sum::<f64>() / springs().count() as f64;
+            // E = 2 (1 + nu) G.
+            2.5 * shear * stiffness / (1.0 - 0.25 * 0.25)
+        };
+        (0..self.rest.len() as u32).map(of_node).collect()
+    }
+
     fn nominal_evaluation(&self) -> f64 {
         NOMINAL_SPRING_S * self.springs.len() as f64
     }

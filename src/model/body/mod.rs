@@ -156,6 +156,15 @@ pub trait Body: Send + Sync + std::fmt::Debug {
         None
     }
 
+    /// Contact modulus E / (1 - nu^2) of the material at each node (Pa), one per node; empty, the default, if it is not known. A
+    /// tool with a shape sinks in as deep as this says where the body's elements are too coarse to show it.
+    ///
+    /// # Real-time
+    /// Not called in a tick: allocates.
+    fn contact_moduli(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// What one evaluation of all forces takes (s) on no machine in particular, for runs that must be the same on all of
     /// them. The default is 0.3 us for each node.
     ///

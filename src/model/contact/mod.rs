@@ -14,19 +14,35 @@
 //! Several tools are resolved one after the other. An implicit step differs in v*, which comes from a linear system, and in the
 //! impulse, which moves every node.
 
+mod closest;
 mod coupled;
 mod deformable;
+mod friction;
+mod nearness;
 mod paper;
+mod passing;
 mod resolve;
+mod row;
+mod rows;
+mod shape;
+mod skin;
+mod solve;
 mod step;
 mod swept;
+mod touch;
 mod triangle;
 
-use crate::Vec3;
+use crate::{Pose, Vec3};
 
 pub use deformable::Deformable;
+pub use friction::Friction;
+pub(crate) use rows::Rows;
+pub use shape::ToolShape;
+pub use skin::Coarseness;
+pub(crate) use skin::Skin;
 pub use step::step;
-pub(crate) use step::{Touch, step_all, step_implicit};
+pub(crate) use step::{step_all, step_implicit};
+pub(crate) use touch::Touch;
 
 /// The state of a contact.
 ///
@@ -83,8 +99,8 @@ pub enum Equations {
 /// The law by which contacts are resolved.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Law {
-    /// Coulomb coefficient mu; infinite for a tool that sticks until pulled off.
-    pub friction: f64,
+    /// Friction between tool and body.
+    pub friction: Friction,
     /// The normal that contacts use.
     pub normals: Normals,
     /// The equations that resolve them.
@@ -121,26 +137,54 @@ impl Contact {
     }
 }
 
-/// The tool's motion during one step: a straight line.
+/// One of the places at which a tool with a shape touches.
+///
+/// # Real-time
+/// A plain value.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactPoint {
+    /// The surface triangle.
+    pub triangle: u32,
+    /// The place (m).
+    pub place: Vec3,
+    /// The unit normal, from the surface to the tool.
+    pub normal: Vec3,
+    /// The force on the tool (N).
+    pub force: Vec3,
+    /// Its state.
+    pub mode: ContactMode,
+}
+
+/// The tool's motion during one step: a straight line, and an even turn.
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolMotion {
-    /// The tool's position at the start of the step (m).
-    pub from: Vec3,
-    /// The tool's position at the end of the step (m).
-    pub to: Vec3,
+    /// The tool at the start of the step.
+    pub from: Pose,
+    /// The tool at the end of the step.
+    pub to: Pose,
 }
 
 impl ToolMotion {
+    /// From one position to another (m), not turned.
+    pub fn straight(from: Vec3, to: Vec3) -> Self {
+        Self { from: Pose::at(from), to: Pose::at(to) }
+    }
+
     /// The part from share `a` to share `b` of the motion.
     pub fn part(&self, a: f64, b: f64) -> Self {
         Self { from: self.at(a), to: self.at(b) }
     }
 
-    /// The position at share `s`.
-    pub fn at(&self, s: f64) -> Vec3 {
-        self.from + (self.to - self.from) * s
+    /// The tool at share `s` of the way.
+    pub fn at(&self, s: f64) -> Pose {
+        self.from.towards(&self.to, s)
+    }
+
+    /// How far its centre moves (m).
+    pub fn way(&self) -> Vec3 {
+        self.to.position - self.from.position
     }
 }

@@ -3,7 +3,7 @@
 //! Literal: the un-weighted projections P and Q of (10) to (22), the contact point held still while the tool moves
 //! (p-dot = 0 in (6)), the stick update (13) with the *old* velocity and the slip updates (21), (29) with the new one,
 //! the net node forces (15), (23), (31) as the force on the tool, friction scaled to its limit by (27) even when it is
-//! below, and the geometric push of section 4.1, split as w_i / sum w^2. Not literal, because nothing runs without:
+//! below, with one coefficient, that of sliding, and the geometric push of section 4.1, split as w_i / sum w^2. Not literal, because nothing runs without:
 //! internal forces are those of the body (f_0 of (3) is missing in (11)); detection, release and edge crossing, which
 //! the paper does not give, are those of the corrected equations.
 
@@ -34,7 +34,7 @@ pub(super) fn step(
     let Some(point) = Point::new(body, triangle, contact.weights) else {
         contact.mode = ContactMode::Lost;
         body.drift(d);
-        body.reseat(contact, law, triangle, &tool.to);
+        body.reseat(contact, law, triangle, &tool.to.position);
         return Vec3::zeros();
     };
     let velocity = point.of(body.velocities);
@@ -44,7 +44,7 @@ pub(super) fn step(
     } else if was_touching && velocity.dot(&contact.normal) <= 0.0 {
         (ContactMode::Free, Vec3::zeros())
     } else {
-        cone(velocity, &contact.normal, law.friction, was_slipping)
+        cone(velocity, &contact.normal, law.friction.kinetic, was_slipping)
     };
     if contact.mode == ContactMode::Stick {
         drift_with_old_velocities(body, forces, d);
@@ -55,12 +55,12 @@ pub(super) fn step(
     }
     if contact.mode != ContactMode::Free {
         // Section 4.1: the surface is pushed to the tool, along the normal without friction, along its motion with it.
-        let gap = tool.to - point.of(body.positions);
-        let follows = contact.glued || law.friction > 0.0;
+        let gap = tool.to.position - point.of(body.positions);
+        let follows = contact.glued || law.friction.kinetic > 0.0;
         point.push(body, if follows { gap } else { contact.normal * gap.dot(&contact.normal) });
     }
     if contact.mode != ContactMode::Stick {
-        body.reseat(contact, law, triangle, &tool.to);
+        body.reseat(contact, law, triangle, &tool.to.position);
     }
     point.net_force(slowed, d)
 }

@@ -6,9 +6,9 @@ use super::{ContactMode, Law, ToolMotion};
 use crate::Vec3;
 
 /// Penetration is recovered at this speed (m/s); an open gap is closed in full.
-const RECOVERY: f64 = 0.1;
+pub(super) const RECOVERY: f64 = 0.1;
 /// Below this compliance S (1/kg) all nodes are held and no force can be computed.
-const IMMOVABLE: f64 = 1e-9;
+pub(super) const IMMOVABLE: f64 = 1e-9;
 /// A remaining step shorter than this cannot carry an impulse (s).
 const NO_TIME: f64 = 1e-12;
 
@@ -35,6 +35,8 @@ pub(super) struct Place<'a> {
     pub triangle: u32,
     pub weights: &'a [f64; 3],
     pub is_glued: bool,
+    /// It stuck in the step before.
+    pub was_sticking: bool,
 }
 
 /// The normal of a contact whose point has the `compliance` (1/kg), and its closing velocity G v* - v_t (m/s) over the last `d_c`
@@ -59,12 +61,12 @@ pub(super) fn approach(
         // Found at the very end of the step: tracked, and resolved in the next one.
         return Err(Resolution::without_force(ContactMode::Free, normal));
     }
-    let mut drift = tool.from - interpolate(weights, &nodes.map(|node| body.positions[node]));
+    let mut drift = tool.from.position - interpolate(weights, &nodes.map(|node| body.positions[node]));
     let (length, cap) = (drift.norm(), RECOVERY * d);
     if length > cap && drift.dot(&normal) < 0.0 {
         drift *= cap / length;
     }
-    let target = (tool.to - tool.from + drift) / d_c;
+    let target = (tool.way() + drift) / d_c;
     Ok((normal, interpolate(weights, &nodes.map(|node| body.velocities[node])) - target))
 }
 
@@ -95,11 +97,13 @@ pub(super) fn resolve(
             return Resolution::without_force(ContactMode::Free, normal);
         }
         let tangential = impulse - normal * along;
-        let limit = law.friction * along;
-        if tangential.norm() > limit {
-            mode = ContactMode::Slip;
-            impulse = normal * along + tangential * (limit / tangential.norm());
+        let (outcome, friction) = law.friction.resolve(place.was_sticking, tangential, along, compliance);
+        match outcome {
+            ContactMode::Stick => {}
+            ContactMode::Slip => impulse = normal * along + friction,
+            ContactMode::Free | ContactMode::Lost => return Resolution::without_force(ContactMode::Free, normal),
         }
+        mode = outcome;
     }
     for (&node, w) in nodes.iter().zip(weights) {
         body.velocities[node] -= impulse * (w * body.inverse_masses[node]);

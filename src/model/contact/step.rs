@@ -3,18 +3,11 @@
 use super::coupled::resolve_coupled;
 use super::deformable::Deformable;
 use super::resolve::{Place, Resolution, resolve};
+use super::rows::Rows;
+use super::touch::Touch;
 use super::{Contact, ContactMode, Equations, Law, ToolMotion, paper};
 use crate::linear::ImplicitStep;
 use crate::{Vec3, integrator};
-
-/// A tool on a body: where it touches, and what it felt in the last step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Touch {
-    /// The contact.
-    pub(crate) contact: Contact,
-    /// The force on the tool (N), the impulse over the full step.
-    pub(crate) force: Vec3,
-}
 
 /// One explicit step of `d` seconds: velocities take `forces`, the tool's contact is found and resolved, positions move.
 /// Returns the force on the tool (N), the impulse over the full step.
@@ -38,7 +31,7 @@ pub(crate) struct Touch {
 ///     candidates: &(0..block.surface().triangles.len() as u32).collect::<Vec<_>>(),
 /// };
 /// // From 1 mm above the block to 1 mm below its top.
-/// let tool = ToolMotion { from: Vec3::new(0.014, 0.016, 0.031), to: Vec3::new(0.014, 0.016, 0.029) };
+/// let tool = ToolMotion::straight(Vec3::new(0.014, 0.016, 0.031), Vec3::new(0.014, 0.016, 0.029));
 /// let force = step(&mut body, &forces, &mut Contact::default(), &Law::default(), tool, 1e-3);
 /// assert!(force.z > 0.0, "the surface pushes the tool out");
 /// # Ok(())
@@ -62,56 +55,124 @@ pub fn step(
     move_with_tool(body, contact, law, tool, d, |body, place, tool, d_c| resolve(body, law, place, tool, d_c, d))
 }
 
-/// One explicit step of `d` seconds with several tools, each with its own contact; `motion` is that of the tool at a place of
+/// One explicit step of `d` seconds with several tools, or with one that has a shape; `motion` is that of the tool at a place of
 /// `touches`.
 ///
-/// They are resolved one after the other: exact as long as no two of them touch the same node, else the later one has its
-/// way. The equations of the paper are for one tool, and for one alone.
+/// All places at which they touch are resolved together, whichever tool they are of. The equations of the paper are for one
+/// point, and for one alone.
 ///
 /// # Real-time
-/// Bounded, real-time safe.
+/// Bounded, real-time safe if `rows` has room.
 pub(crate) fn step_all(
     body: &mut Deformable<'_>,
     forces: &[Vec3],
     touches: &mut [Touch],
+    rows: &mut Rows,
     law: &Law,
     motion: impl Fn(usize) -> ToolMotion,
     d: f64,
 ) {
-    if let [touch] = touches {
-        touch.force = step(body, forces, &mut touch.contact, law, motion(0), d);
+    if let [touch] = &mut *touches
+        && !touch.has_shape()
+    {
+        touch.wrench = step(body, forces, &mut touch.contact, law, motion(0), d).into();
         return;
     }
     integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
-    for (k, touch) in touches.iter_mut().enumerate() {
-        touch.force = press(body, &mut touch.contact, motion(k), d, |body, place, tool, d_c| {
-            resolve(body, law, place, tool, d_c, d)
-        });
-    }
-    body.drift(d);
-    for (k, touch) in touches.iter_mut().enumerate() {
-        follow(body, &mut touch.contact, law, motion(k));
-    }
+    press_all(body, touches, rows, law, &motion, d, |rows, body| rows.solve(body, law, d));
 }
 
 /// One step by the implicit `system` of a linear patch, explicit but for that: `forces` are those at its end for unchanged velocities, and
 /// every node answers to the tool's impulse. The equations are the corrected ones.
 ///
 /// # Real-time
-/// Bounded, real-time safe: 9 n^2 multiply-adds for n nodes, and what detection costs.
+/// Bounded, real-time safe if `rows` has room: 9 n^2 multiply-adds for n nodes, and what detection costs.
 pub(crate) fn step_implicit(
     body: &mut Deformable<'_>,
     system: &mut ImplicitStep,
     forces: &[Vec3],
-    contact: &mut Contact,
+    touch: &mut Touch,
+    rows: &mut Rows,
     law: &Law,
     tool: ToolMotion,
-) -> Vec3 {
+) {
     let d = system.step();
     system.accelerate(body.velocities, forces);
-    move_with_tool(body, contact, law, tool, d, |body, place, tool, d_c| {
+    if touch.has_shape() {
+        let touches = std::slice::from_mut(touch);
+        press_all(body, touches, rows, law, &|_| tool, d, |rows, body| rows.solve_coupled(body, system, law));
+        return;
+    }
+    let force = move_with_tool(body, &mut touch.contact, law, tool, d, |body, place, tool, d_c| {
         resolve_coupled(body, system, law, place, tool, d_c)
+    });
+    touch.wrench = force.into();
+}
+
+/// From the velocities without contact on: detection, `solution` for all places, motion, tracking.
+fn press_all(
+    body: &mut Deformable<'_>,
+    touches: &mut [Touch],
+    rows: &mut Rows,
+    law: &Law,
+    motion: &impl Fn(usize) -> ToolMotion,
+    d: f64,
+    solution: impl FnOnce(&mut Rows, &mut Deformable<'_>),
+) {
+    rows.clear();
+    if touches.iter().all(|touch| !touch.has_shape()) && !share_nodes(body, touches, motion, d) {
+        press_apart(body, touches, law, motion, d);
+        return;
+    }
+    for (tool, touch) in touches.iter_mut().enumerate() {
+        if touch.has_shape() {
+            rows.add_shape(body, (tool, touch), motion(tool), d);
+        } else {
+            rows.add_point(body, (tool, touch), law, motion(tool), d);
+        }
+    }
+    solution(rows, body);
+    body.drift(d);
+    for (tool, touch) in touches.iter_mut().enumerate() {
+        if touch.has_shape() {
+            touch.feel(rows.of(tool), &motion(tool).to, d);
+        } else {
+            touch.feel_point(rows.of(tool).next().map(|(row, _)| row), d);
+            follow(body, &mut touch.contact, law, motion(tool));
+        }
+    }
+}
+
+/// True if two points touch, or come in at, triangles with a node in common.
+fn share_nodes(body: &Deformable<'_>, touches: &[Touch], motion: &impl Fn(usize) -> ToolMotion, d: f64) -> bool {
+    let corners = |tool: usize| {
+        let mut contact = touches[tool].contact;
+        body.detect(&mut contact, motion(tool), d).map(|(triangle, _)| body.corners(triangle))
+    };
+    (0..touches.len()).any(|one| {
+        let Some(nodes) = corners(one) else { return false };
+        (0..one).filter_map(corners).any(|others| others.iter().any(|node| nodes.contains(node)))
     })
+}
+
+/// Points that share no node: each as if it were alone.
+fn press_apart(
+    body: &mut Deformable<'_>,
+    touches: &mut [Touch],
+    law: &Law,
+    motion: &impl Fn(usize) -> ToolMotion,
+    d: f64,
+) {
+    for (tool, touch) in touches.iter_mut().enumerate() {
+        let force = press(body, &mut touch.contact, motion(tool), d, |body, place, tool, d_c| {
+            resolve(body, law, place, tool, d_c, d)
+        });
+        touch.wrench = force.into();
+    }
+    body.drift(d);
+    for (tool, touch) in touches.iter_mut().enumerate() {
+        follow(body, &mut touch.contact, law, motion(tool));
+    }
 }
 
 /// From the velocities without contact on: detection, `resolution`, motion, tracking.
@@ -144,7 +205,8 @@ fn press(
     if share > 0.0 {
         body.drift(share * d);
     }
-    let place = Place { triangle, weights: &contact.weights, is_glued: contact.glued };
+    let was_sticking = contact.mode == ContactMode::Stick;
+    let place = Place { triangle, weights: &contact.weights, is_glued: contact.glued, was_sticking };
     let Resolution { mode, impulse, normal } = resolution(body, place, tool.part(share, 1.0), (1.0 - share) * d);
     (contact.mode, contact.normal) = (mode, normal);
     if share > 0.0 {
@@ -158,6 +220,6 @@ fn follow(body: &Deformable<'_>, contact: &mut Contact, law: &Law, tool: ToolMot
     if let Some(triangle) = contact.triangle
         && contact.mode != ContactMode::Stick
     {
-        body.reseat(contact, law, triangle, &tool.to);
+        body.reseat(contact, law, triangle, &tool.to.position);
     }
 }

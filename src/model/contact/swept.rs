@@ -42,7 +42,7 @@ pub(super) fn find(
             best = Some(hit);
         }
     }
-    best.or_else(|| inside(surface, candidates, x, &tool.to))
+    best.or_else(|| inside(surface, candidates, x, &tool.to.position))
 }
 
 /// The tool against one moving triangle x(s) = x + s d v, s in [0, 1].
@@ -53,10 +53,17 @@ fn swept(surface: &Surface, t: u32, x: &[Vec3], v: &[Vec3], tool: ToolMotion, d:
     if !reaches(&start, &motion, tool) {
         return None;
     }
-    let seen_at = |share: f64| {
-        let corners: [Vec3; 3] = std::array::from_fn(|i| start[i] + motion[i] * share);
-        Projection::new(&corners, &tool.at(share))
-    };
+    let corners = |share: f64| std::array::from_fn(|i| start[i] + motion[i] * share);
+    let (weights, share) = passed_through(corners, |share| tool.at(share).position)?;
+    Some(Hit { triangle: t, weights, share })
+}
+
+/// When a moving point comes in through a moving triangle, and where in it.
+pub(super) fn passed_through(
+    corners: impl Fn(f64) -> [Vec3; 3],
+    point: impl Fn(f64) -> Vec3,
+) -> Option<([f64; 3], f64)> {
+    let seen_at = |share: f64| Projection::new(&corners(share), &point(share));
     // A sliver has no side; it counts as "outside" at both ends and is never hit.
     if seen_at(0.0).is_some_and(|seen| seen.distance < -ON_SURFACE)
         || !seen_at(1.0).is_some_and(|seen| seen.distance < 0.0)
@@ -73,7 +80,7 @@ fn swept(surface: &Surface, t: u32, x: &[Vec3], v: &[Vec3], tool: ToolMotion, d:
         }
     }
     let seen = seen_at(low)?;
-    seen.is_inside(1e-6).then_some(Hit { triangle: t, weights: seen.weights, share: low })
+    seen.is_inside(1e-6).then_some((seen.weights, low))
 }
 
 /// Cheap and safe rejection: the boxes around the moving triangle and the moving tool must touch.
@@ -87,7 +94,8 @@ fn reaches(start: &[Vec3; 3], motion: &[Vec3; 3], tool: ToolMotion) -> bool {
         }
         // Weights a little outside are accepted, so the box grows by a little of its size.
         let margin = 1e-5 * (high - low) + 2.0 * ON_SURFACE;
-        tool.from[axis].min(tool.to[axis]) <= high + margin && tool.from[axis].max(tool.to[axis]) >= low - margin
+        let (from, to) = (tool.from.position[axis], tool.to.position[axis]);
+        from.min(to) <= high + margin && from.max(to) >= low - margin
     })
 }
 

@@ -1,14 +1,17 @@
 //! Which part of the surface the next local models have to hold.
 
 use super::forecast::ToolForecast;
-use crate::Vec3;
 use crate::body::Body;
-use crate::contact::Contact;
 use crate::error::ModelError;
 use crate::mesh::{NearestTriangle, Surface};
+use crate::simulation::Simulation;
+use crate::{Pose, Vec3};
 
 /// Slower tools have no direction (m/s).
 const AT_REST: f64 = 1e-3;
+/// A window that is made ahead has room around a tool with a shape, in tool radii: where that goes a little aside or sooner, the
+/// same window serves.
+const ROOM: f64 = 0.3;
 /// Places on that way that are looked at, besides the present one.
 const LOOKS: u32 = 3;
 
@@ -46,28 +49,33 @@ impl Aim {
         self.nearest.refit(positions);
     }
 
-    /// Puts the triangles for a window that is made `after` seconds from now in place of `triangles`: the one under the
-    /// tool then, and those that it comes over in the `lead` seconds that follow. `contact` is the contact at the time, if
-    /// that is known; a tool that is glued to it goes nowhere else.
+    /// Puts the triangles for a window of tool number `index` that is made `after` seconds from now in place of `triangles`: the
+    /// one under the tool then, those that it comes over in the `lead` seconds that follow, and all that its shape may touch
+    /// there. One that is made now begins with the triangle of the contact, one that is made ahead has room around the shape; a tool
+    /// that is glued goes nowhere else.
     ///
     /// # Real-time
     /// For the global actor: bounded; `triangles` may grow.
     pub fn triangles(
         &self,
-        contact: Option<&Contact>,
+        (simulation, index): (&Simulation, usize),
         tool: &ToolForecast,
         [after, lead]: [f64; 2],
         triangles: &mut Vec<u32>,
     ) {
         triangles.clear();
-        let touched = contact.and_then(|contact| contact.triangle);
+        let contact = simulation.contact(index);
+        let touched = contact.triangle.filter(|_| after == 0.0);
         triangles.push(touched.unwrap_or_else(|| self.nearest.find(&tool.unbraked(after))));
-        if contact.is_some_and(|contact| contact.glued) {
+        if contact.glued {
             return;
         }
-        for look in 1..=LOOKS {
-            let ahead = after + lead * f64::from(look) / f64::from(LOOKS);
-            triangles.push(self.nearest.find(&tool.unbraked(ahead)));
+        let ahead = |look: u32| after + lead * f64::from(look) / f64::from(LOOKS);
+        triangles.extend((1..=LOOKS).map(|look| self.nearest.find(&tool.unbraked(ahead(look)))));
+        let margin = if after == 0.0 { 0.0 } else { ROOM * simulation.shape(index).radius() };
+        for look in 0..=LOOKS {
+            let pose = Pose { position: tool.unbraked(ahead(look)), orientation: tool.orientation };
+            simulation.footprint(index, &pose, margin, triangles);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Where the tool is expected to go, from where it was: a prediction runs along it.
 
-use crate::Vec3;
 use crate::contact::ToolMotion;
+use crate::{Pose, Turn, Vec3};
 
 /// The velocity dies away in about this time (s): a hand does not go on as it went for longer.
 const DECAY: f64 = 60e-3;
@@ -28,12 +28,19 @@ pub struct ToolForecast {
     pub velocity: Vec3,
     /// Present acceleration (m/s^2).
     pub acceleration: Vec3,
+    /// Present orientation: a tool is expected to keep it.
+    pub orientation: Turn,
 }
 
 impl ToolForecast {
     /// The forecast for a tool that rests at `position` (m).
     pub fn at_rest(position: Vec3) -> Self {
         Self { position, ..Self::default() }
+    }
+
+    /// The tool that is expected `t` seconds from now.
+    fn pose(&self, t: f64) -> Pose {
+        Pose { position: self.at(t), orientation: self.orientation }
     }
 
     /// The position expected `t` seconds from now.
@@ -51,7 +58,7 @@ impl ToolForecast {
     /// The motion expected in the n-th tick of `tick` seconds from now.
     pub fn motion(&self, n: u32, tick: f64) -> ToolMotion {
         let t = f64::from(n) * tick;
-        ToolMotion { from: self.at(t), to: self.at(t + tick) }
+        ToolMotion { from: self.pose(t), to: self.pose(t + tick) }
     }
 }
 
@@ -60,34 +67,38 @@ impl ToolForecast {
 pub struct ToolHistory {
     /// Newest first.
     positions: Vec<Vec3>,
+    orientation: Turn,
     /// Ticks that are known, at most the length of `positions` less one.
     known: usize,
     tick: f64,
 }
 
 impl ToolHistory {
-    /// A tool that has rested at `position` (m); positions will come every `tick` seconds.
+    /// A tool that has rested at `pose`; further ones will come every `tick` seconds.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(position: Vec3, tick: f64) -> Self {
-        Self { positions: vec![position; ticks(CHANGE_SPAN, tick) + 1], known: 0, tick }
+    pub fn new(pose: Pose, tick: f64) -> Self {
+        let positions = vec![pose.position; ticks(CHANGE_SPAN, tick) + 1];
+        Self { positions, orientation: pose.orientation, known: 0, tick }
     }
 
-    /// Forgets the way so far: the tool has rested at `position` (m).
+    /// Forgets the way so far: the tool has rested at `pose`.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn restart(&mut self, position: Vec3) {
-        self.positions.fill(position);
+    pub fn restart(&mut self, pose: Pose) {
+        self.positions.fill(pose.position);
+        self.orientation = pose.orientation;
         self.known = 0;
     }
 
-    /// Adds the tool's position one tick after the last (m).
+    /// Adds the tool one tick after the last.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn push(&mut self, position: Vec3) {
+    pub fn push(&mut self, Pose { position, orientation }: Pose) {
+        self.orientation = orientation;
         self.positions.rotate_right(1);
         self.positions[0] = position;
         self.known = (self.known + 1).min(self.positions.len() - 1);
@@ -98,7 +109,7 @@ impl ToolHistory {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn forecast(&self) -> ToolForecast {
-        let forecast = ToolForecast::at_rest(self.positions[0]);
+        let forecast = ToolForecast { orientation: self.orientation, ..ToolForecast::at_rest(self.positions[0]) };
         let recent = self.known.min(ticks(SPAN, self.tick));
         if recent == 0 {
             return forecast;
@@ -130,19 +141,19 @@ mod tests {
 
     #[test]
     fn velocity_and_acceleration_are_means_of_what_is_known_and_the_motion_dies_away() {
-        let mut history = ToolHistory::new(Vec3::zeros(), 1e-3);
+        let mut history = ToolHistory::new(Pose::default(), 1e-3);
         assert_eq!(history.forecast(), ToolForecast::at_rest(Vec3::zeros()));
-        history.push(Vec3::x() * 1e-3);
+        history.push((Vec3::x() * 1e-3).into());
         assert!((history.forecast().velocity.x - 1.0).abs() < 1e-12, "one tick is known");
         // x = t^2 with t in ms: 2000 m/s^2.
         let at = |n: i32| Vec3::x() * f64::from(n * n) * 1e-3;
-        (2..40).for_each(|n| history.push(at(n)));
+        (2..40).for_each(|n| history.push(at(n).into()));
         let forecast = history.forecast();
         assert!((forecast.velocity.x - (2.0 * 39.0 - 3.0)).abs() < 1e-9);
         assert!((forecast.acceleration.x - 2000.0).abs() < 1e-6);
         assert_eq!(forecast.at(0.0), forecast.position);
         let first = forecast.motion(0, 1e-3);
-        assert!((first.to.x - first.from.x - REACH).abs() < 2e-3, "{first:?}");
+        assert!((first.way().x - REACH).abs() < 2e-3, "{first:?}");
         // 75 m/s: the velocity takes it as far as a fast one may.
         let rest = REACH + forecast.acceleration.x * CHANGE_DECAY * CHANGE_DECAY;
         assert!((forecast.at(3.0).x - forecast.position.x - rest).abs() < 1e-9);

@@ -1,9 +1,9 @@
 //! `full`: the whole body at the haptic rate, the reference that the others are measured against.
 
 use super::{Kind, LocalModel, ResyncView};
-use crate::Vec3;
-use crate::contact::{Contact, ToolMotion};
+use crate::contact::{Contact, ContactPoint, ToolMotion};
 use crate::simulation::Simulation;
+use crate::{Vec3, Wrench};
 
 /// The global model itself, run at the haptic rate. There is nothing to resync with.
 ///
@@ -36,10 +36,10 @@ impl Full {
 impl LocalModel for Full {
     fn rebuild(&mut self, _: ResyncView<'_>) {}
 
-    fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-        let force = self.simulation.tick(tool);
+    fn tick(&mut self, tool: ToolMotion) -> Wrench {
+        let wrench = self.simulation.tick(tool);
         // A state that is not finite touches nothing: its zero force would look like a free tool.
-        if self.simulation.state().is_finite() { force } else { Vec3::repeat(f64::NAN) }
+        if self.simulation.state().is_finite() { wrench } else { Vec3::repeat(f64::NAN).into() }
     }
 
     fn built_at(&self) -> u64 {
@@ -56,6 +56,14 @@ impl LocalModel for Full {
 
     fn contact(&self) -> Contact {
         *self.simulation.contact(0)
+    }
+
+    fn contact_points(&self) -> &[ContactPoint] {
+        self.simulation.contact_points(0)
+    }
+
+    fn contact_area(&self) -> f64 {
+        self.simulation.contact_area(0)
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {

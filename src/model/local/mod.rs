@@ -12,11 +12,11 @@ mod predictive;
 mod succession;
 mod template;
 
-use crate::Vec3;
 use crate::body::State;
-use crate::contact::{Contact, ToolMotion};
+use crate::contact::{Contact, ContactPoint, ToolMotion};
 use crate::simulation::Simulation;
 use crate::surroundings::Bases;
+use crate::{Vec3, Wrench};
 
 pub use aim::Aim;
 pub use feedback::{Feedback, PatchGeometry};
@@ -58,12 +58,12 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// For the global actor: may allocate, at first use and where its size changes.
     fn rebuild(&mut self, resync: ResyncView<'_>);
 
-    /// Advances one haptic tick while the tool moves along `tool`; returns the mean force on the tool (N), which is not
-    /// finite if the model has diverged.
+    /// Advances one haptic tick while the tool moves along `tool`; returns the mean force and torque on the tool, which are
+    /// not finite if the model has diverged.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    fn tick(&mut self, tool: ToolMotion) -> Vec3;
+    fn tick(&mut self, tool: ToolMotion) -> Wrench;
 
     /// The haptic tick that the model's state was built at; catching up starts there.
     ///
@@ -90,6 +90,22 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// # Real-time
     /// Bounded, real-time safe.
     fn contact(&self) -> Contact;
+
+    /// The places where a tool with a shape touches; none for a point, whose one place [`contact`](Self::contact) tells. Triangles are global ids.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    fn contact_points(&self) -> &[ContactPoint] {
+        &[]
+    }
+
+    /// The area in which a tool with a shape touches (m^2), as fine as the surface's triangles tell; zero for a point.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    fn contact_area(&self) -> f64 {
+        0.0
+    }
 
     /// The position of `node` (a global id) in this model (m); `None` if the model does not hold it.
     ///

@@ -2,11 +2,16 @@
 //! compact numbering, and what the tool feels of it.
 
 use super::{PatchGeometry, ResyncView, Watched};
-use crate::Vec3;
+use std::sync::Arc;
+
 use crate::body::{Body, State};
-use crate::contact::{Contact, Deformable, Law, ToolMotion, step};
+use crate::contact::{Contact, ContactPoint, Deformable, Law, Rows, Skin, ToolMotion, Touch, step_all};
 use crate::mesh::Surface;
 use crate::simulation::Stepping;
+use crate::{Vec3, Wrench};
+
+/// A tool that presses more than this share of its force on nodes outside has left the patch.
+const BEYOND: f64 = 0.02;
 
 /// A patch of a body and its contact, in the numbering of its window.
 #[derive(Clone, Debug, Default)]
@@ -17,13 +22,14 @@ pub(super) struct Patch {
     /// Zero for all nodes that the patch does not move (1/kg).
     pub(super) inverse_masses: Vec<f64>,
     pub(super) forces: Vec<Vec3>,
-    pub(super) contact: Contact,
+    pub(super) touch: Touch,
+    rows: Rows,
     pub(super) law: Law,
     pub(super) stepping: Stepping,
     pub(super) built_at: u64,
     pub(super) watched: Watched,
-    /// The force of the last tick whose contact was inside the patch (N).
-    felt: Vec3,
+    /// The force and torque of the last tick whose contact was inside the patch.
+    felt: Wrench,
     has_left: bool,
 }
 
@@ -34,45 +40,66 @@ impl Patch {
         window.gather(&global.state().positions, &mut self.state.positions);
         window.gather(&global.state().velocities, &mut self.state.velocities);
         window.gather_movable(global.body().inverse_masses(), &mut self.inverse_masses);
-        self.contact = window.localised(global.contact(resync.index));
+        let touch = global.touch(resync.index);
+        if self.touch.shape != touch.shape {
+            self.touch = Touch::new(touch.shape, Arc::default(), Contact::default());
+            self.rows = Rows::with_room(1);
+        }
+        if touch.has_shape() {
+            self.rows.make_room(window.nodes.len());
+        }
+        self.touch.restart(touch, |contact| window.localised(contact), |triangle| window.triangle(triangle));
+        let skin = Arc::make_mut(&mut self.touch.skin);
+        touch.skin.localise(&window.nodes, |node| window.node(node), skin);
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
-        (self.felt, self.has_left) = (global.force(resync.index), false);
+        (self.felt, self.has_left) = (global.wrench(resync.index), false);
         self.watched.take(global.state());
     }
 
-    /// The last force, once the contact has left the patch (N).
-    pub(super) fn held(&self) -> Option<Vec3> {
+    /// Makes room for what an implicit step of the tool needs.
+    pub(super) fn reserve_implicit(&mut self) {
+        // A capsule has three places on a triangle.
+        let places = if self.touch.has_shape() { 3 * self.window.candidates.len() } else { 1 };
+        self.rows.reserve_coupling(places);
+    }
+
+    /// The last force and torque, once the contact has left the patch.
+    pub(super) fn held(&self) -> Option<Wrench> {
         self.has_left.then_some(self.felt)
     }
 
-    /// What is felt (N) after a tick with `force`: the patch's own force until the contact leaves it, the last one from then on.
-    pub(super) fn feel(&mut self, force: Vec3) -> Vec3 {
+    /// What is felt after a tick with `wrench`: the patch's own until the contact leaves it, the last one from then on.
+    pub(super) fn feel(&mut self, wrench: Wrench) -> Wrench {
         // A state that is not finite touches nothing: its zero force would look like a free tool.
         if !self.state.is_finite() {
-            return Vec3::repeat(f64::NAN);
+            return Vec3::repeat(f64::NAN).into();
         }
+        let window = &self.window;
+        self.touch.end(self.stepping.substeps, |triangle| window.triangles[triangle as usize]);
         self.has_left = self.contact_has_left();
         if !self.has_left {
-            self.felt = force;
+            self.felt = wrench;
         }
         self.felt
     }
 
     /// True if the contact presses on a node that gives way in the body, but not here.
     pub(super) fn contact_has_left(&self) -> bool {
-        self.window.has_left(&self.contact)
+        self.window.has_left(&self.touch)
     }
 
-    /// One explicit step of `d` seconds under the forces and the tool's; returns the force on the tool (N).
-    pub(super) fn step(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
-        self.with_contact(|body, forces, contact, law| step(body, forces, contact, law, tool, d))
+    /// One explicit step of `d` seconds under the forces and the tool's; returns the force and torque on the tool.
+    pub(super) fn step(&mut self, tool: ToolMotion, d: f64) -> Wrench {
+        self.with_contact(|body, forces, touch, rows, law| {
+            step_all(body, forces, std::slice::from_mut(touch), rows, law, |_| tool, d);
+        })
     }
 
-    /// Does `step` with the patch, its forces, its contact and its law.
+    /// Does `step` with the patch, its forces, its contact and its law; returns the force and torque on the tool.
     pub(super) fn with_contact(
         &mut self,
-        step: impl FnOnce(&mut Deformable<'_>, &[Vec3], &mut Contact, &Law) -> Vec3,
-    ) -> Vec3 {
+        step: impl FnOnce(&mut Deformable<'_>, &[Vec3], &mut Touch, &mut Rows, &Law),
+    ) -> Wrench {
         let mut deformable = Deformable {
             positions: &mut self.state.positions,
             velocities: &mut self.state.velocities,
@@ -80,12 +107,23 @@ impl Patch {
             surface: &self.window.surface,
             candidates: &self.window.candidates,
         };
-        step(&mut deformable, &self.forces, &mut self.contact, &self.law)
+        step(&mut deformable, &self.forces, &mut self.touch, &mut self.rows, &self.law);
+        self.touch.wrench
     }
 
     /// The contact in the body's numbering.
     pub(super) fn global_contact(&self) -> Contact {
-        self.window.globalised(&self.contact)
+        self.window.globalised(&self.touch.contact)
+    }
+
+    /// The places where a tool with a shape touches, in the body's numbering.
+    pub(super) fn contact_points(&self) -> &[ContactPoint] {
+        self.touch.points()
+    }
+
+    /// The area that it touches (m^2).
+    pub(super) fn contact_area(&self) -> f64 {
+        self.touch.area(&self.window.surface, &self.state.positions)
     }
 
     /// Where a node of the body is (m), if the patch moves it.
@@ -129,6 +167,7 @@ impl Window {
         &mut self,
         body: &dyn Body,
         triangles: &[u32],
+        skin: &Skin,
         patch: impl FnOnce(&mut Vec<u32>),
         neighbours: impl FnOnce(&[u32]) -> [&'a [u32]; 2],
     ) {
@@ -162,6 +201,11 @@ impl Window {
             self.add_triangles(whole, node);
         }
         self.add_corners(whole, candidates);
+        // Corners of candidates as a tool with a shape meets them.
+        for place in 0..3 * candidates {
+            let node = whole.triangles[self.triangles[place / 3] as usize][place % 3];
+            skin.corner(node).iter().for_each(|&(other, _)| self.add_node(other));
+        }
         self.candidates.clear();
         self.candidates.extend(0..candidates as u32);
 
@@ -250,8 +294,16 @@ impl Window {
         Contact { triangle: contact.triangle.map(|triangle| self.triangles[triangle as usize]), ..*contact }
     }
 
-    /// True if `contact`, in local numbering, presses on a node that gives way in the body, but not here.
-    pub(super) fn has_left(&self, contact: &Contact) -> bool {
+    /// True if a tool presses on nodes that give way in the body, but not here.
+    pub(super) fn has_left(&self, touch: &Touch) -> bool {
+        let beyond = |&&(node, _): &&(u32, Vec3)| self.beyond[node as usize];
+        if touch.has_shape() {
+            // The far ends of a smoothed corner bear next to nothing.
+            let force = |sum: f64, (_, force): &(u32, Vec3)| sum + force.norm();
+            let outside = touch.pressed().iter().filter(beyond).fold(0.0, force);
+            return outside > BEYOND * touch.pressed().iter().fold(0.0, force);
+        }
+        let contact = &touch.contact;
         let touched = contact.triangle.filter(|_| contact.is_touching());
         touched.is_some_and(|t| self.surface.triangles[t as usize].iter().any(|&node| self.beyond[node as usize]))
     }

@@ -34,7 +34,8 @@ use crate::surroundings::{Condensation, RestingBody};
 /// let tools = &[ToolForecast::at_rest(Vec3::new(0.03, 0.03, 0.05))];
 /// let (triangles, bases) = (&[triangle], &Bases::default());
 /// model.rebuild(ResyncView { global: &mut global, tick: 0, triangles, patch: None, tools, index: 0, horizon: 33, bases });
-/// let force = model.tick(ToolMotion { from: tools[0].position, to: tools[0].position + Vec3::z() * 1e-3 });
+/// let start = tools[0].position;
+/// let force = model.tick(ToolMotion::straight(start, start + Vec3::z() * 1e-3)).force;
 /// assert!(force.z < 0.0, "it pulls the tool back");
 /// # Ok(())
 /// # }

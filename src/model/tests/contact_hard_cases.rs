@@ -75,7 +75,7 @@ fn a_tool_on_a_fixed_face_is_lost_without_force() {
     assert_eq!(sim.contact(0).mode, ContactMode::Lost);
     // It lets go like any other contact: below the face, nothing is tracked any more.
     let away = Vec3::new(0.05, 0.0512, -0.01);
-    sim.tick(ToolMotion { from: *path.last().unwrap(), to: away });
+    sim.tick(ToolMotion::straight(*path.last().unwrap(), away));
     assert_eq!((sim.contact(0).mode, sim.contact(0).triangle), (ContactMode::Lost, None));
 }
 
@@ -103,7 +103,7 @@ fn a_patch_on_a_held_face_reports_the_lost_contact_too() {
     });
     let corners = sim.body().surface().triangles[bottom as usize].map(|n| sim.body().rest()[n as usize]);
     let below = (corners[0] + corners[1] + corners[2]) / 3.0 - Vec3::z() * 0.001;
-    let force = patch.tick(ToolMotion { from: below, to: below + Vec3::z() * 0.002 });
+    let force = patch.tick(ToolMotion::straight(below, below + Vec3::z() * 0.002)).force;
     assert_eq!((force, patch.contact().mode), (Vec3::zeros(), ContactMode::Lost));
     assert_eq!(patch.contact().triangle, Some(bottom));
 }
@@ -114,10 +114,10 @@ fn a_frictionless_tool_that_jumps_far_over_a_flat_surface_feels_no_sideways_forc
     let body = Block::builder([40, 40, 3], [0.1, 0.1, 0.01]).fix(Face::ZMin).build().unwrap();
     let mut sim = simulation(body, Contact::default(), 0.0);
     let at = |x: f64| Vec3::new(x, 0.0512, 0.0099);
-    sim.tick(ToolMotion { from: at(0.02) + Vec3::z() * 0.001, to: at(0.02) });
+    sim.tick(ToolMotion::straight(at(0.02) + Vec3::z() * 0.001, at(0.02)));
     assert!(sim.contact(0).is_touching());
     for (from, to) in [(0.02, 0.08), (0.08, 0.08), (0.08, 0.08)] {
-        let force = sim.tick(ToolMotion { from: at(from), to: at(to) });
+        let force = sim.tick(ToolMotion::straight(at(from), at(to))).force;
         assert!(force.xy().norm() < 0.2 * force.z.abs() + 1e-9, "{force}");
     }
 }
@@ -149,7 +149,7 @@ proptest! {
         let hit = (0.01 / (speed * 1e-3)) as i32 + 1;
         let mut peak = 0.0_f64;
         for k in 0..hit + 4 {
-            let force = sim.tick(ToolMotion { from: position(k), to: position(k + 1) });
+            let force = sim.tick(ToolMotion::straight(position(k), position(k + 1))).force;
             prop_assert!(force.iter().all(|c| c.is_finite()));
             peak = peak.max(force.norm());
             let inside = (position(k + 1) - target).dot(&inward) > 1e-5;
@@ -165,14 +165,14 @@ proptest! {
 fn a_teleport_of_20_mm_stays_finite_and_the_body_recovers() {
     let mut sim = simulation(block(STD), Contact::default(), 1.0);
     let above = Vec3::new(0.045, 0.0512, 0.0995);
-    sim.tick(ToolMotion { from: above + Vec3::z() * 0.001, to: above });
-    let jump = sim.tick(ToolMotion { from: above, to: above - Vec3::z() * 0.02 });
+    sim.tick(ToolMotion::straight(above + Vec3::z() * 0.001, above));
+    let jump = sim.tick(ToolMotion::straight(above, above - Vec3::z() * 0.02)).force;
     assert!(jump.norm() > 8.5 && jump.norm() < 100.0, "far above what a device may exert: {jump}");
     let away = Vec3::new(0.045, 0.0512, 0.12);
     let mut last = jump;
     for k in 0..3000 {
         let from = if k == 0 { above - Vec3::z() * 0.02 } else { away };
-        last = sim.tick(ToolMotion { from, to: away });
+        last = sim.tick(ToolMotion::straight(from, away)).force;
         assert!(last.iter().all(|c| c.is_finite()));
     }
     assert_eq!(last, Vec3::zeros());
@@ -187,7 +187,7 @@ fn an_indentation_to_half_the_body_stays_finite_and_recovers() {
     let mut body = block(STD);
     let substeps = palpate_model::simulation::Stepping::stable_substeps(&mut body, 1e-3);
     let state = State::at_rest(body.rest());
-    let law = Law { friction: 1.0, ..Law::default() };
+    let law = Law { friction: 1.0.into(), ..Law::default() };
     let stepping = Stepping { tick: 1e-3, substeps };
     let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).unwrap();
     let depth = |k: i32| 0.052 * (minjerk(f64::from(k) / 400.0) - minjerk((f64::from(k) - 600.0) / 400.0));
@@ -208,7 +208,7 @@ fn slivers_and_collapsed_springs_stay_finite() {
     // without area.
     state.positions[id(5, 5)] = state.positions[id(6, 5)];
     state.positions[id(4, 4)] = (state.positions[id(4, 3)] + state.positions[id(5, 4)]) / 2.0;
-    let law = Law { friction: 0.5, ..Law::default() };
+    let law = Law { friction: 0.5.into(), ..Law::default() };
     let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, STEPPING).unwrap();
     let path: Vec<Vec3> = (0..=300)
         .map(|k| {
@@ -230,7 +230,7 @@ fn very_stiff_light_damped_and_undamped_bodies_are_stable_with_their_own_substep
         let substeps = palpate_model::simulation::Stepping::stable_substeps(&mut body, 1e-3);
         let stepping = Stepping { tick: 1e-3, substeps };
         let state = State::at_rest(body.rest());
-        let law = Law { friction: 1.0, ..Law::default() };
+        let law = Law { friction: 1.0.into(), ..Law::default() };
         let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).unwrap();
         let path: Vec<Vec3> = (0..=500).map(|k| drag_path(f64::from(k) * 1e-3)).collect();
         let felt = forces(&mut sim, &path);
@@ -248,7 +248,7 @@ fn a_released_tool_is_tracked_without_new_detection_and_dropped_when_it_leaves()
     let run = |sim: &mut Simulation, from: f64, to: f64, ticks: i32| {
         for k in 0..ticks {
             let z = |k: i32| from + (to - from) * f64::from(k) / f64::from(ticks);
-            sim.tick(ToolMotion { from: at(z(k)), to: at(z(k + 1)) });
+            sim.tick(ToolMotion::straight(at(z(k)), at(z(k + 1))));
         }
     };
     run(&mut sim, 0.101, 0.098, 60);

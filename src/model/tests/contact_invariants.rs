@@ -5,7 +5,7 @@ mod common;
 use common::*;
 use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, State};
-use palpate_model::contact::{Contact, ContactMode, Deformable, Law, ToolMotion, step};
+use palpate_model::contact::{Contact, ContactMode, Deformable, Law, ToolMotion, ToolShape, step};
 use palpate_model::equilibrium::static_equilibrium;
 use palpate_model::mesh::{Face, Lattice, Surface};
 use palpate_model::simulation::{Simulation, Stepping};
@@ -93,7 +93,7 @@ proptest! {
         let mut contact = touching(triangle, weights);
         let from = sheet.point(&sheet.positions, &contact) + gap;
         let before = sheet.momentum();
-        let force = sheet.step(&mut contact, &Law { friction: mu, ..Law::default() }, ToolMotion { from, to: from + motion });
+        let force = sheet.step(&mut contact, &Law { friction: mu.into(), ..Law::default() }, ToolMotion::straight(from, from + motion));
         let scale: f64 = before.norm() + (force * D).norm()
             + sheet.velocities.iter().zip(&sheet.inverse_masses).map(|(v, w)| v.norm() / w).sum::<f64>();
         prop_assert!((sheet.momentum() - before + force * D).norm() <= 1e-14 * scale);
@@ -109,7 +109,7 @@ proptest! {
         let from = sheet.point(&sheet.positions, &contact) + gap;
         // |gap| is below the recovery cap of 0.1 m/s, so it is closed in full.
         let target = (motion + gap) / D;
-        sheet.step(&mut contact, &Law { friction: mu, ..Law::default() }, ToolMotion { from, to: from + motion });
+        sheet.step(&mut contact, &Law { friction: mu.into(), ..Law::default() }, ToolMotion::straight(from, from + motion));
         let error = sheet.point(&sheet.velocities, &held) - target;
         let limit = 1e-14 * target.norm().max(1.0);
         match contact.mode {
@@ -127,7 +127,7 @@ proptest! {
         let mut contact = touching(triangle, weights);
         let at = sheet.point(&sheet.positions, &contact);
         let before = sheet.kinetic_energy();
-        sheet.step(&mut contact, &Law { friction: mu, ..Law::default() }, ToolMotion { from: at, to: at });
+        sheet.step(&mut contact, &Law { friction: mu.into(), ..Law::default() }, ToolMotion::straight(at, at));
         prop_assert!(sheet.kinetic_energy() <= before * (1.0 + 1e-14));
     }
 
@@ -138,7 +138,7 @@ proptest! {
         let mut sheet = sheet;
         let mut contact = touching(triangle, weights);
         let from = sheet.point(&sheet.positions, &contact) + gap;
-        let force = sheet.step(&mut contact, &Law { friction: mu, ..Law::default() }, ToolMotion { from, to: from + motion });
+        let force = sheet.step(&mut contact, &Law { friction: mu.into(), ..Law::default() }, ToolMotion::straight(from, from + motion));
         let along = force.dot(&contact.normal);
         let across = (force - contact.normal * along).norm();
         prop_assert!(along >= 0.0);
@@ -160,48 +160,21 @@ fn a_static_pull_balances_the_reactions_of_the_held_nodes() {
     let contact = glued(&body, node);
     let mut sim = Simulation::new(Box::new(body), state, contact, Law::default(), STEPPING).unwrap();
     assert!((sim.force(0) + reactions).norm() < 1e-11 * sim.force(0).norm(), "before the first tick");
-    let resting = ToolMotion { from: pulled, to: pulled };
-    let force = (0..20).map(|_| sim.tick(resting)).last().unwrap();
+    let resting = ToolMotion::straight(pulled, pulled);
+    let force = (0..20).map(|_| sim.tick(resting).force).last().unwrap();
     assert!((force + reactions).norm() < 1e-9 * force.norm(), "and it stays: {force} against {reactions}");
     assert!(force.norm() > 1.0);
-}
-
-/// Work that a frictionless tool gets from the body over one closed circle (after one to settle), and the most that it
-/// had put in before (J).
-fn circle(zeta: f64) -> (f64, f64) {
-    let mut body = block((0.5e-3, 30.0, zeta));
-    let stepping = Stepping { tick: 1e-3, substeps: Stepping::stable_substeps(&mut body, 1e-3) };
-    let state = State::at_rest(body.rest());
-    let mut sim = Simulation::new(Box::new(body), state, Contact::default(), Law::default(), stepping).unwrap();
-    let centre = Vec3::new(0.05, 0.0512, 0.0);
-    let path = |tick: i32| {
-        let t = f64::from(tick) * 1e-3;
-        let angle = std::f64::consts::TAU * (t - 0.4).max(0.0);
-        let around = Vec3::new(angle.cos(), angle.sin(), 0.0) * 0.012;
-        centre + around + Vec3::z() * (0.101 - 0.007 * minjerk(t / 0.3))
-    };
-    let (mut got, mut put_in, mut most) = (0.0, 0.0, 0.0_f64);
-    for tick in 0..2400 {
-        let tool = ToolMotion { from: path(tick), to: path(tick + 1) };
-        let work = sim.tick(tool).dot(&(tool.to - tool.from));
-        put_in -= work;
-        most = most.max(put_in);
-        if tick >= 1400 {
-            got += work;
-        }
-    }
-    (got, most)
 }
 
 #[test]
 fn a_closed_frictionless_circle_gives_the_tool_no_energy() {
     for zeta in [0.01, 0.1, 0.3, 1.0] {
-        let (got, stored) = circle(zeta);
+        let (got, stored) = circle(zeta, ToolShape::Point);
         println!("zeta {zeta}: {:+.3e} of {stored:.3e} J", got);
         assert!(stored > 1e-4, "the tool did press");
         assert!(got <= 0.0, "zeta {zeta}: {got} J");
     }
-    let (got, stored) = circle(0.001);
+    let (got, stored) = circle(0.001, ToolShape::Point);
     println!("zeta 0.001: {:+.3} %", 100.0 * got / stored);
     assert!(got <= 0.01 * stored, "{got} of {stored} J");
 }
@@ -211,7 +184,7 @@ fn forces_converge_under_step_refinement() {
     let body = block(STD);
     let run = |substeps: u32| {
         let stepping = Stepping { tick: 1e-3, substeps };
-        let law = Law { friction: 1.0, ..Law::default() };
+        let law = Law { friction: 1.0.into(), ..Law::default() };
         let state = State::at_rest(body.rest());
         let mut sim = Simulation::new(Box::new(body.clone()), state, Contact::default(), law, stepping).unwrap();
         let path: Vec<Vec3> = (0..=600).map(|k| drag_path(f64::from(k) * 1e-3)).collect();

@@ -26,7 +26,7 @@ fn patch(factor: f64, zeta: f64, friction: f64, is_implicit: bool, ticks: u32) -
     let template = Template::new(Kind::Patch, [4, 4, 2], &body).unwrap();
     let template = if is_implicit { template.with_implicit_steps() } else { template };
     let state = State::at_rest(palpate_model::body::Body::rest(&body));
-    let law = Law { friction, ..Law::default() };
+    let law = Law { friction: friction.into(), ..Law::default() };
     let mut sim = Simulation::new(Box::new(body), state, Contact::default(), law, Stepping { tick, substeps }).unwrap();
     let top = |&t: &u32| {
         let corners = sim.body().surface().triangles[t as usize].map(|n| sim.body().rest()[n as usize]);
@@ -61,7 +61,8 @@ fn run(mut model: Box<dyn LocalModel>, ticks: u32) -> (Vec<Vec3>, Vec<ContactMod
     let at = |tick: u32| tool(f64::from(tick) / f64::from(ticks));
     (0..MS)
         .map(|ms| {
-            let forces = (ms * ticks..(ms + 1) * ticks).map(|n| model.tick(ToolMotion { from: at(n), to: at(n + 1) }));
+            let forces =
+                (ms * ticks..(ms + 1) * ticks).map(|n| model.tick(ToolMotion::straight(at(n), at(n + 1))).force);
             (forces.sum::<Vec3>() / f64::from(ticks), model.contact().mode)
         })
         .unzip()

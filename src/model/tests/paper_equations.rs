@@ -12,7 +12,7 @@ use palpate_model::simulation::Simulation;
 const D: f64 = 0.5e-3;
 
 fn law(equations: Equations, friction: f64) -> Law {
-    Law { equations, friction, ..Law::default() }
+    Law { equations, friction: friction.into(), ..Law::default() }
 }
 
 /// One triangle in the x-y plane, nodes with masses and velocities of their own.
@@ -61,7 +61,7 @@ fn touching() -> Contact {
 
 fn resting_tool(triangle: &Triangle) -> ToolMotion {
     let at = triangle.point(&WEIGHTS);
-    ToolMotion { from: at, to: at }
+    ToolMotion::straight(at, at)
 }
 
 #[test]
@@ -119,13 +119,13 @@ fn the_geometric_push_puts_the_contact_point_on_the_tool() {
     let velocities = [Vec3::z() * 0.2; 3];
     let mut triangle = Triangle::new([0.5e-3, 1e-3, 2e-3], velocities);
     let start = triangle.point(&WEIGHTS);
-    let tool = ToolMotion { from: start, to: start + Vec3::new(2e-5, 1e-5, -4e-5) };
+    let tool = ToolMotion::straight(start, start + Vec3::new(2e-5, 1e-5, -4e-5));
     triangle.step(&mut touching(), &law(Equations::Paper, f64::INFINITY), tool);
-    assert!((triangle.point(&WEIGHTS) - tool.to).norm() < 1e-16, "with friction: along the tool's motion");
+    assert!((triangle.point(&WEIGHTS) - tool.to.position).norm() < 1e-16, "with friction: along the tool's motion");
 
     let mut triangle = Triangle::new([0.5e-3; 3], velocities);
     triangle.step(&mut touching(), &law(Equations::Paper, 0.0), tool);
-    let gap = tool.to - triangle.point(&WEIGHTS);
+    let gap = tool.to.position - triangle.point(&WEIGHTS);
     assert!(gap.z.abs() < 1e-9, "without: along the normal only, {gap}");
     assert!(gap.xy().norm() > 2e-5);
 }

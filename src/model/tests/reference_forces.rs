@@ -74,7 +74,7 @@ fn a_wave_reaches_a_resting_tool_with_the_reference_force() {
     let state = static_equilibrium(&mut body, &held).unwrap();
     let contact = glued(&body, felt);
     let state = State { velocities: vec![Vec3::zeros(); state.positions.len()], ..state };
-    let law = Law { friction: f64::INFINITY, ..Law::default() };
+    let law = Law { friction: f64::INFINITY.into(), ..Law::default() };
     let mut sim = Simulation::new(Box::new(body), state, contact, law, STEPPING).unwrap();
     let path = vec![rest[felt as usize]; rows.len() + 1];
     let along = |f: &Vec3| Vec3::z() * f.z;

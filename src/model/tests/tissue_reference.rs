@@ -15,7 +15,7 @@ fn deviation(name: &str, tissue: Tissue, is_averaged: bool, friction: f64) -> f6
     let body = body(organ(), tissue, is_averaged);
     assert_eq!((body.rest().len(), body.element_count()), (1125, 4238));
     let state = State::at_rest(body.rest());
-    let law = Law { friction, ..Law::default() };
+    let law = Law { friction: friction.into(), ..Law::default() };
     let stepping = Stepping { tick: 1e-3, substeps: 4 };
     let mut simulation = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).expect("it fits");
     let forces = common::forces(&mut simulation, &series(&format!("{name}.path.csv")));

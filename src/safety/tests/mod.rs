@@ -165,6 +165,7 @@ fn run_with_faults(seed: u64) -> Result<(), TestCaseError> {
         }
         let input = Input {
             request: if random.chance(0.03) { Request::Rest } else { Request::Force(wanted) },
+            torque: [0.0; 3],
             dt,
             position,
             stale_ticks: stale,

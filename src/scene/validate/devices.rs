@@ -1,7 +1,8 @@
 //! What can be wrong with the devices of a scene: each by itself, and several together.
 
 use super::super::device::{DeviceKind, DeviceProfile, DeviceSpec, field, numbered};
-use super::check::{at_most_ms, lengths_within, positive};
+use super::super::tool::ToolSpec;
+use super::check::{at_most_ms, lengths_within, not_negative, positive};
 use crate::devices::{HandSpec, PlantSpec};
 use crate::error::Error;
 use crate::model::contact::Equations;
@@ -15,13 +16,21 @@ const LONGEST_WATCHDOG_MS: f64 = 1000.0;
 /// A base that is farther away is a wrong unit (m).
 const FARTHEST_M: f64 = 1e3;
 
+/// A smaller tool is a point (m).
+const LEAST_RADIUS_M: f64 = 1e-4;
+
+/// A larger tool is a wrong unit (m).
+const LARGEST_TOOL_M: f64 = 1.0;
+
 /// First words of topics that a device's own would be mistaken for.
 const TAKEN: [&str; 5] = ["timing", "stats", "global", "ports", "log"];
 
 /// What can be wrong with them.
 pub(super) fn validate(devices: &[DeviceSpec], equations: Equations) -> Result<(), Error> {
     for (index, device) in devices.iter().enumerate() {
-        self::device(device).map_err(|error| numbered(error, index, devices))?;
+        self::device(device)
+            .and_then(|()| shape(device.tool, equations))
+            .map_err(|error| numbered(error, index, devices))?;
     }
     if devices.len() == 1 {
         return Ok(());
@@ -81,6 +90,47 @@ fn device(device: &DeviceSpec) -> Result<(), Error> {
     haply(device)?;
     let mut faults = device.faults.iter().enumerate();
     faults.try_for_each(|(index, spec)| none_of(&format!("fault[{index}]"), spec.fault()))
+}
+
+/// What can be wrong with the shape of a tool.
+fn shape(tool: ToolSpec, equations: Equations) -> Result<(), Error> {
+    let radius_m = match tool {
+        ToolSpec::Point => return Ok(()),
+        ToolSpec::Sphere { radius_m } | ToolSpec::Capsule { radius_m, .. } => radius_m,
+    };
+    let field = "device.tool.radius_m";
+    positive(field, radius_m)?;
+    if radius_m < LEAST_RADIUS_M {
+        let message =
+            format!("is {radius_m}, must be at least {LEAST_RADIUS_M} m: use tool = \"point\" for a smaller one");
+        return Err(Error::scene(field, message));
+    }
+    if radius_m > LARGEST_TOOL_M {
+        return Err(Error::scene(
+            field,
+            format!("is {radius_m}, must be at most {LARGEST_TOOL_M} m: is it in metres?"),
+        ));
+    }
+    if let ToolSpec::Capsule { length_m, axis, .. } = tool {
+        let field = "device.tool.length_m";
+        not_negative(field, length_m)?;
+        if length_m >= LARGEST_TOOL_M {
+            let message = format!("is {length_m}, must be below {LARGEST_TOOL_M} m: is it in metres?");
+            return Err(Error::scene(field, message));
+        }
+        if !axis.iter().all(|c| c.is_finite()) || axis == [0.0; 3] {
+            let message = format!("is {axis:?}, must be three finite numbers that are not all 0: a direction");
+            return Err(Error::scene("device.tool.axis", message));
+        }
+    }
+    if equations == Equations::Paper {
+        let name = tool.name();
+        let message = format!(
+            "is a {name}, and contact.equations = \"paper\" are for a point: use \"corrected\" there or tool = \"point\""
+        );
+        return Err(Error::scene("device.tool", message));
+    }
+    Ok(())
 }
 
 /// A scene file must move its tool itself; a program may bring a device of its own.

@@ -3,6 +3,7 @@
 mod check;
 mod counts;
 mod devices;
+mod friction;
 mod safety;
 mod tissue;
 
@@ -12,8 +13,7 @@ pub(super) use tissue::mesh;
 
 use super::device::numbered;
 use super::{
-    BlockSpec, BodySpec, Friction, GlobalSpec, InitialSpec, LocalSpec, MassSpringSpec, ModelChoice, NodeSpec, Scene,
-    StepKind,
+    BlockSpec, BodySpec, GlobalSpec, InitialSpec, LocalSpec, MassSpringSpec, ModelChoice, NodeSpec, Scene, StepKind,
 };
 use crate::error::Error;
 use crate::model::ModelError;
@@ -61,12 +61,7 @@ fn validate(scene: &Scene) -> Result<(), Error> {
         Some(BodySpec::Tetrahedra(spec)) => tissue::validate(spec)?,
         None => {}
     }
-    if let Friction::Coefficient(coefficient) = scene.contact.friction
-        && !(coefficient.is_finite() && coefficient >= 0.0)
-    {
-        let message = format!("is {coefficient}, must be a finite number of at least 0 or \"stick\" (no bound)");
-        return Err(Error::scene("contact.friction", message));
-    }
+    friction::validate(&scene.contact)?;
     global(&scene.global)?;
     local(&scene.local, &scene.global)?;
     if scene.local.step == StepKind::Implicit && scene.contact.equations == Equations::Paper {

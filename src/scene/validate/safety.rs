@@ -14,6 +14,9 @@ pub(super) fn validate(safety: &SafetySpec) -> Result<(), Error> {
     if let Some(force_n) = safety.max_force_n {
         positive("safety.max_force_n", force_n)?;
     }
+    if let Some(torque_n_m) = safety.max_torque_n_m {
+        positive("safety.max_torque_n_m", torque_n_m)?;
+    }
     positive("safety.max_slew_n_per_ms", safety.max_slew_n_per_ms)?;
     positive("safety.ramp_ms", safety.ramp_ms)?;
     if safety.ramp_ms > LONGEST_RAMP_MS {

@@ -149,5 +149,10 @@ fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<Replayed
 }
 
 fn state(sample: &ToolSample) -> DeviceState {
-    DeviceState { position: sample.position_m.into(), velocity: sample.velocity_m_s.into(), buttons: sample.buttons }
+    DeviceState {
+        position: sample.position_m.into(),
+        velocity: sample.velocity_m_s.into(),
+        orientation: sample.orientation,
+        buttons: sample.buttons,
+    }
 }

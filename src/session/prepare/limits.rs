@@ -29,6 +29,8 @@ pub(super) fn device_limits(safety: &SafetySpec, capabilities: &Capabilities) ->
     let least_damping = 0.5 * stiffness * native_rate_hz.map_or(USUAL_PERIOD_S, f64::recip);
     DeviceLimits {
         max_force_n: safety.max_force_n.unwrap_or(held_n),
+        // No scene makes a device turn a tool that cannot.
+        max_torque_n_m: capabilities.max_torque_n_m.map(|most| safety.max_torque_n_m.unwrap_or(most)),
         max_stiffness_n_per_m: stiffness,
         max_damping_n_s_per_m: safety.max_damping_n_s_per_m.unwrap_or(capabilities.max_damping_n_s_per_m),
         damping_n_s_per_m: safety.device_damping_n_s_per_m.or(capabilities.damping_n_s_per_m).unwrap_or(least_damping),
@@ -44,6 +46,7 @@ pub(super) fn resolved(scene: &Scene, device: &DeviceLimits) -> SafetySpec {
     let old_ms = PERIODS_UNTIL_OLD * 1e3 / global.rate_hz + global.compute_latency_ms;
     let mut safety = scene.safety.clone();
     safety.max_force_n = device.max_force_n.is_finite().then_some(device.max_force_n);
+    safety.max_torque_n_m = device.max_torque_n_m;
     safety.max_damping_n_s_per_m.get_or_insert(device.max_damping_n_s_per_m);
     safety.noise_m_s.get_or_insert(device.resolution_m * scene.local.rate_hz);
     safety.max_age_ms.get_or_insert(old_ms.max(YOUNGEST_OLD_MS));
@@ -78,6 +81,7 @@ pub(super) fn limits(safety: &SafetySpec, device: &DeviceLimits, stored_j: f64, 
     let max_slew_n_per_s = if safety.has(SafetyStage::Slew) { safety.max_slew_n_per_ms * 1e3 } else { f64::INFINITY };
     Limits {
         max_slew_n_per_s,
+        max_torque_n_m: device.max_torque_n_m,
         ramp_s: 1e-3 * safety.ramp_ms,
         tick_s,
         tool_speed: safety.has(SafetyStage::ToolSpeed).then_some(tool_speed),
@@ -260,6 +264,20 @@ mod tests {
         let age = limits.model_age.unwrap();
         assert!((age.max_ticks - 600.0).abs() < 1e-9 && (age.fade_ticks - 400.0).abs() < 1e-9, "{age:?}");
         assert!(limits.start_up.is_some() && limits.watchdog.is_some() && limits.tool_speed.is_some());
+    }
+
+    #[test]
+    fn a_torque_needs_a_device_that_exerts_it() {
+        let said = SafetySpec { max_torque_n_m: Some(0.02), ..SafetySpec::default() };
+        let able = Capabilities { max_torque_n_m: Some(0.05), ..Capabilities::TOUCH };
+        let most = |safety: &SafetySpec, device: &Capabilities| device_limits(safety, device).max_torque_n_m;
+        assert_eq!(most(&SafetySpec::default(), &able), Some(0.05));
+        assert_eq!(most(&said, &able), Some(0.02));
+        assert_eq!(most(&said, &Capabilities::TOUCH), None);
+        let device = device_limits(&said, &able);
+        let resolved = resolved(&Scene::of_program(), &device);
+        assert_eq!(limits(&resolved, &device, 0.0, 1e-3).max_torque_n_m, Some(0.02));
+        assert_eq!(resolved.max_torque_n_m, Some(0.02), "a replay has no device to ask");
     }
 
     #[test]

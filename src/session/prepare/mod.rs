@@ -23,7 +23,7 @@ use std::path::PathBuf;
 
 use super::parts::{Options, Parts};
 use crate::error::Error;
-use crate::model::contact::{Equations, Law};
+use crate::model::contact::Equations;
 use crate::model::local::Blend;
 use crate::model::local::{Feedback, Kind, Template};
 use crate::model::mesh::Lattice;
@@ -198,14 +198,10 @@ fn template(kind: Kind, scene: &Scene, start: &Start, timing: Timing) -> Result<
 
 /// The whole body with its tools, before the first tick.
 fn simulation(start: Start, scene: &Scene, tools: &[Tool]) -> Result<Simulation, Error> {
-    let law = Law {
-        friction: scene.contact.friction.coefficient(),
-        normals: scene.contact.normals,
-        equations: scene.contact.equations,
-    };
     let Start { body, state, tick, substeps, .. } = start;
     let mut contacts = tools.iter().map(|tool| tool.contact);
     let first = contacts.next().unwrap_or_default();
-    let first = Simulation::new(body, state, first, law, Stepping { tick, substeps })?;
-    Ok(contacts.fold(first, Simulation::with_tool))
+    let first = Simulation::new(body, state, first, scene.contact.law(), Stepping { tick, substeps })?;
+    let all = contacts.fold(first, Simulation::with_tool);
+    Ok((0..).zip(tools).fold(all, |all, (index, tool)| all.with_shape(index, tool.shape)))
 }

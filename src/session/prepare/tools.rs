@@ -8,7 +8,7 @@ use crate::actors::Bounds;
 use crate::devices::Device;
 use crate::error::Error;
 use crate::model::body::Body;
-use crate::model::contact::Contact;
+use crate::model::contact::{Contact, ToolShape};
 use crate::runtime::{Execution, Rate};
 use crate::safety::Limits;
 use crate::safety::coupling::Design;
@@ -24,6 +24,7 @@ pub(crate) struct Tool {
     pub(crate) device: Box<dyn Device>,
     /// How it touches the body at the start.
     pub(crate) contact: Contact,
+    pub(crate) shape: ToolShape,
     pub(crate) limits: Limits,
     /// What is believed of its device.
     pub(crate) bounds: Bounds,
@@ -41,9 +42,10 @@ pub(super) struct Making<'a> {
     pub(super) is_replay: bool,
 }
 
-/// Fills in the scene's devices for those that a program brings: one each, with a name if there are several.
+/// Fills in the scene's devices for those that a program brings, one each with a name if there are several, and the shapes of
+/// tools.
 pub(super) fn complete(scene: &mut Scene, parts: &Parts) {
-    let brought = parts.devices.len().max(parts.attached.len());
+    let brought = parts.devices.len().max(parts.attached.len()).max(parts.shapes.len());
     if brought > scene.devices.len() {
         scene.devices.resize_with(brought, DeviceSpec::default);
     }
@@ -51,6 +53,9 @@ pub(super) fn complete(scene: &mut Scene, parts: &Parts) {
         if name.is_some() {
             spec.name.clone_from(name);
         }
+    }
+    for (spec, shape) in scene.devices.iter_mut().zip(&parts.shapes) {
+        spec.tool = shape.map_or(spec.tool, Into::into);
     }
 }
 
@@ -99,7 +104,7 @@ pub(super) fn tools(
             }
         };
         let name = spec.name.clone().filter(|_| scene.devices.len() > 1).unwrap_or_default();
-        tools.push(Tool { name, device, contact, limits, bounds, coupling });
+        tools.push(Tool { name, device, contact, shape: spec.tool.shape(), limits, bounds, coupling });
         all_resolved.push(resolved);
     }
     // What differs between devices stays theirs.

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::fields::{first_difference, in_words};
 use super::report::{Compared, Difference};
-use crate::log::LogRecord;
+use crate::log::{JoinedRecords, LogRecord};
 use crate::runtime::{Actor, Nanos, Outcome, Record, RecordDrain, TickContext};
 use crate::scene::MAX_DEVICES;
 
@@ -23,7 +23,7 @@ fn place(record: &LogRecord) -> Option<usize> {
     match record {
         LogRecord::Force(_) => Some(0),
         LogRecord::Command(_) => Some(1),
-        LogRecord::Contact(_) => Some(2),
+        LogRecord::ContactPoint(_) | LogRecord::Contact(_) => Some(2),
         LogRecord::Resync(_) => Some(3),
         LogRecord::Global(_) => Some(4),
         LogRecord::Probe(_) => Some(5),
@@ -161,11 +161,12 @@ pub(super) struct Comparer {
     drain: RecordDrain,
     comparison: Comparison,
     records: Vec<Record>,
+    joined: JoinedRecords,
 }
 
 impl Comparer {
     pub(super) fn new(drain: RecordDrain, comparison: Comparison) -> Self {
-        Self { drain, comparison, records: Vec::new() }
+        Self { drain, comparison, records: Vec::new(), joined: JoinedRecords::default() }
     }
 }
 
@@ -177,7 +178,8 @@ impl Actor for Comparer {
     fn tick(&mut self, _: &TickContext) -> Outcome {
         self.drain.drain(&mut self.records);
         let mut topics = self.comparison.topics();
-        for computed in self.records.drain(..).filter_map(|record| LogRecord::from_record(&record)) {
+        let joined = &mut self.joined;
+        for computed in self.records.drain(..).filter_map(|record| joined.read(&record)) {
             if let Some(place) = place(&computed) {
                 topics[place].compare(computed);
             }

@@ -278,14 +278,20 @@ fn follows(sample: &ReplayedSample, last: &ReplayedSample) -> bool {
     }
 }
 
-fn bits(state: &DeviceState) -> ([u64; 6], u16) {
+fn bits(state: &DeviceState) -> ([u64; 6], [u64; 4], u16) {
     let [a, b, c]: [f64; 3] = state.position.into();
     let [d, e, f]: [f64; 3] = state.velocity.into();
-    ([a, b, c, d, e, f].map(f64::to_bits), state.buttons)
+    let turn = std::array::from_fn(|place| state.orientation.coords[place].to_bits());
+    ([a, b, c, d, e, f].map(f64::to_bits), turn, state.buttons)
 }
 
 fn state(sample: &ToolSample) -> DeviceState {
-    DeviceState { position: sample.position_m.into(), velocity: sample.velocity_m_s.into(), buttons: sample.buttons }
+    DeviceState {
+        position: sample.position_m.into(),
+        velocity: sample.velocity_m_s.into(),
+        orientation: sample.orientation,
+        buttons: sample.buttons,
+    }
 }
 
 fn refusal(message: impl Into<String>) -> Error {

@@ -60,6 +60,7 @@ impl Replay {
         // What the device of the run was: this one has no force.
         let (safety, logged_safety) = (&mut parts.scene.safety, &logged.scene.safety);
         safety.max_force_n = max_force_n;
+        safety.max_torque_n_m = logged.scene.safety.max_torque_n_m;
         safety.max_damping_n_s_per_m = logged_safety.max_damping_n_s_per_m;
         safety.noise_m_s = logged_safety.noise_m_s;
         safety.max_stiffness_n_per_m = logged_safety.max_stiffness_n_per_m;
@@ -77,7 +78,11 @@ impl Replay {
         }
         let device = |(spec, (first, samples)): (&DeviceSpec, (DeviceState, Vec<ReplayedSample>))| {
             let known = capabilities(spec);
-            let capabilities = Capabilities { max_force_n: max_force_n.unwrap_or(known.max_force_n), ..known };
+            let capabilities = Capabilities {
+                max_force_n: max_force_n.unwrap_or(known.max_force_n),
+                max_torque_n_m: logged.scene.safety.max_torque_n_m.or(known.max_torque_n_m),
+                ..known
+            };
             (spec.name.clone(), Box::new(Replayed::new(first, samples, capabilities)) as Box<dyn Device>)
         };
         parts.devices = logged.scene.devices.iter().zip(logged.tools).map(device).collect();

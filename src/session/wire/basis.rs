@@ -5,7 +5,8 @@ use std::sync::Arc;
 use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::log::ModelReason;
-use crate::model::Vec3;
+use crate::model::Pose;
+use crate::model::contact::ToolShape;
 use crate::model::local::Aim;
 use crate::model::local::ToolForecast;
 use crate::model::surroundings::{Bases, RestingBody, Size};
@@ -28,7 +29,7 @@ impl BasisSide {
     ///
     /// # Errors
     /// If the surface cannot be searched.
-    pub(super) fn new(graph: &mut RuntimeBuilder, prepared: &Prepared, tools: &[Vec3]) -> Result<Option<Self>, Error> {
+    pub(super) fn new(graph: &mut RuntimeBuilder, prepared: &Prepared, tools: &[Pose]) -> Result<Option<Self>, Error> {
         let Some(resting) = prepared.plan.template.resting.clone().filter(|_| prepared.reduces()) else {
             return Ok(None);
         };
@@ -66,17 +67,24 @@ impl BasisSide {
 }
 
 /// The basis where each tool is, and before a run on threads one that holds a cell more around it.
-fn first_bases(prepared: &Prepared, resting: &RestingBody, store: &BasisStore, tools: &[Vec3]) -> Result<Bases, Error> {
+fn first_bases(prepared: &Prepared, resting: &RestingBody, store: &BasisStore, tools: &[Pose]) -> Result<Bases, Error> {
     let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
     let aim = Aim::new(body.surface(), &state.positions)?;
     let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
     let size = prepared.plan.template.patch;
     let sizes: &[[usize; 3]] = if prepared.plan.prefetches { &[size, Aim::wider(size)] } else { &[size] };
     for (index, &tool) in tools.iter().enumerate() {
-        let contact = prepared.simulation.contact(index);
-        aim.triangles(Some(contact), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
+        aim.triangles(
+            (&prepared.simulation, index),
+            &ToolForecast { orientation: tool.orientation, ..ToolForecast::at_rest(tool.position) },
+            [0.0; 2],
+            &mut triangles,
+        );
+        // A point is over one triangle, a tool with a shape over many.
+        let is_point = prepared.simulation.shape(index) == ToolShape::Point;
+        let first = |triangles: &'_ Vec<u32>| if is_point { triangles[..1].to_vec() } else { triangles.clone() };
         for &size in sizes {
-            body.patch(&triangles[..1], size, &mut patch);
+            prepared.simulation.patch(index, &first(&triangles), size, &mut patch);
             // What cannot be reduced is told by the actor, when it is wanted.
             if bases.get(&patch).is_none()
                 && let Ok(Some(basis)) = store.get(resting, &patch)

@@ -4,6 +4,7 @@ use crate::devices::DeviceState;
 use crate::error::Error;
 use crate::log::{Environment, GroupInfo, LoggedExecution, ModelReason, ToolSample};
 use crate::model::body::Block;
+use crate::model::contact::ToolShape;
 use crate::runtime::{Execution, Rate};
 use crate::safety::Actions;
 use crate::scene::{BodySpec, TetrahedraSpec};
@@ -26,6 +27,7 @@ pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<
         model: prepared.plan.template.kind.name().to_owned(),
         model_reason: model_reason(prepared),
         body: tetrahedra.map(|spec| body(prepared, spec)),
+        tools: tools(prepared),
         haptic_hz: timing.haptic.as_hz(),
         global_hz: if prepared.is_multi_rate() { timing.global.as_hz() } else { 0.0 },
         groups: groups(prepared),
@@ -35,6 +37,7 @@ pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<
             [_] => Vec::new(),
             several => several.iter().map(|tool| tool.name.clone()).collect(),
         },
+        shapes: shapes(&prepared.tools),
         // All of it: each device's ledger begins with an even share.
         stored_j: prepared.tools.iter().filter_map(|tool| Some(tool.limits.passivity?.stored_j)).sum(),
         coupling: couplings(&prepared.tools),
@@ -51,6 +54,35 @@ fn body(prepared: &Prepared, spec: &TetrahedraSpec) -> String {
     let body = prepared.simulation.body();
     let held = body.inverse_masses().iter().filter(|&&w| w == 0.0).count();
     format!("{} nodes, {held} of them held, {}", body.rest().len(), spec.in_words())
+}
+
+/// The tools with a shape in words, and whether the elements are fine against each.
+fn tools(prepared: &Prepared) -> Option<String> {
+    let named = |(index, tool): (usize, &Tool)| {
+        let mm = |metres: f64| format!("{:.1} mm", 1e3 * metres);
+        let shape = match tool.shape {
+            ToolShape::Point => return None,
+            ToolShape::Sphere { radius } => format!("sphere of {}", mm(radius)),
+            ToolShape::Capsule { radius, half_axis } => {
+                format!("capsule of {} and {}", mm(radius), mm(2.0 * half_axis.norm()))
+            }
+        };
+        let words = match prepared.simulation.coarseness(index) {
+            None => format!("{shape}, glued by its centre"),
+            Some(found) => {
+                let (edge, sinking) = (mm(found.edge), if found.sinks { ", sinking by Hertz" } else { "" });
+                match 100.0 * found.smoothed {
+                    0.0 => format!("{shape}; elements of {edge} are fine against it"),
+                    share => format!(
+                        "{shape}; elements of {edge} are coarse against it: corners smoothed on {share:.0} % of the surface{sinking}"
+                    ),
+                }
+            }
+        };
+        Some(if tool.name.is_empty() { words } else { format!("{}: {words}", tool.name) })
+    };
+    let all: Vec<String> = prepared.tools.iter().enumerate().filter_map(named).collect();
+    (!all.is_empty()).then(|| all.join("; "))
 }
 
 /// The rate groups, in graph order.
@@ -88,9 +120,16 @@ fn first_tool((device, first): (u16, &DeviceState)) -> ToolSample {
         position_m: first.position.into(),
         velocity_m_s: first.velocity.into(),
         buttons: first.buttons,
+        orientation: first.orientation,
         device,
         ..ToolSample::default()
     }
+}
+
+/// The shapes of the tools, unless all are points.
+fn shapes(tools: &[Tool]) -> Vec<ToolShape> {
+    let has_shape = tools.iter().any(|tool| tool.shape != ToolShape::Point);
+    if has_shape { tools.iter().map(|tool| tool.shape).collect() } else { Vec::new() }
 }
 
 /// The gains of each tool's coupling in words.

@@ -5,7 +5,7 @@ use crate::actors::{
     ToolTick, Wishes,
 };
 use crate::error::{Error, ErrorKind};
-use crate::model::Vec3;
+use crate::model::Pose;
 use crate::model::local::{LocalModel, PatchGeometry};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
@@ -73,11 +73,10 @@ pub(super) struct GlobalMaker {
 }
 
 impl GlobalMaker {
-    /// With the tools at `tools` (m).
-    pub(super) fn new(simulation: Simulation, tools: &[Vec3], plan: GlobalPlan, side: GlobalSide) -> Self {
+    /// With the tools at `tools`.
+    pub(super) fn new(simulation: Simulation, tools: &[Pose], plan: GlobalPlan, side: GlobalSide) -> Self {
         let spare = simulation.duplicate();
-        let contact =
-            |(tool, &position)| (ToolTick { tick: 0, position }, *simulation.contact(tool), simulation.force(tool));
+        let contact = |(tool, &pose)| (ToolTick { tick: 0, pose }, *simulation.contact(tool), simulation.force(tool));
         let tools = tools.iter().enumerate().map(contact).collect();
         let last = Checkpoint { tools, state: simulation.state().clone() };
         let saved = side.checkpoint.reader();

@@ -5,15 +5,20 @@ use crate::actors::{
     ComputedForce, DeviceActor, DevicePorts, DeviceSample, Disbelieved, LocalActor, LocalPorts, ToolView,
 };
 use crate::devices::DeviceState;
-use crate::model::Vec3;
+use crate::log::ContactSample;
+use crate::model::Pose;
+use crate::model::contact::ToolShape;
 use crate::model::local::Succession;
 use crate::runtime::{Actor, OutletReader, OutletWriter, Reader, RuntimeBuilder, Writer};
 use crate::safety::Pipeline;
 use crate::safety::coupling::CoupledTool;
 use crate::session::prepare::{ModelPlan, Tool};
 
-/// Records of a local actor per haptic tick at most, besides one per probe.
-const RECORDS_PER_TICK: usize = 4;
+/// Records of a local actor per haptic tick at most, besides one per probe and one per place that a tool with a shape touches.
+const RECORDS_PER_TICK: usize = 5;
+
+/// Records of a device actor per haptic tick at most: tool and command, of two parts each.
+const DEVICE_RECORDS_PER_TICK: usize = 4;
 
 /// Room for records of one actor, whatever the haptic rate: 64 MiB.
 const MOST_RECORDS: usize = 1 << 20;
@@ -70,16 +75,17 @@ pub(super) fn actors(
             commands: ends.forces,
             view: ends.view_writer,
             disbelieved: ends.disbelieved_writer,
-            recorder: graph.recorder((ticks * 2).min(MOST_RECORDS)),
+            recorder: graph.recorder((ticks * DEVICE_RECORDS_PER_TICK).min(MOST_RECORDS)),
         };
         let device = DeviceActor::new(tool.device, *state, tool.bounds, safety, ports);
+        let places = if tool.shape == ToolShape::Point { 0 } else { ContactSample::MOST_POINTS };
         let ports = LocalPorts {
             samples: ends.samples,
             commands: ends.force_writer,
             source,
-            recorder: graph.recorder((ticks * (RECORDS_PER_TICK + plan.probes.len())).min(MOST_RECORDS)),
+            recorder: graph.recorder((ticks * (RECORDS_PER_TICK + places + plan.probes.len())).min(MOST_RECORDS)),
         };
-        let succession = Succession::new(models, plan.blend, Vec3::zeros());
+        let succession = Succession::new(models, plan.blend, Pose::default());
         let local = LocalActor::new(succession, plan.timing.haptic, plan.timing.global, plan.probes.clone(), ports);
         let local = match &tool.coupling {
             Some(design) => local.coupled(CoupledTool::new(design)),

@@ -14,7 +14,7 @@ use super::running::{Memory, Running, Viewer};
 use crate::actors::{LoggerActor, LoggerOutcome, SceneWatch, SurfaceView, first_state};
 use crate::devices::DeviceState;
 use crate::error::{Error, ErrorKind};
-use crate::model::Vec3;
+use crate::model::{Pose, Vec3};
 use crate::runtime::{Actor, OutletPort, RecordDrain, Recording, Runtime, RuntimeBuilder, Stopwatch};
 use basis::BasisSide;
 use haptic::ToolEnds;
@@ -42,7 +42,7 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     let rest = prepared.simulation.body().rest();
     let first: Vec<DeviceState> =
         prepared.tools.iter_mut().map(|tool| first_of(tool, rest)).collect::<Result<_, _>>()?;
-    let places: Vec<Vec3> = first.iter().map(|state| state.position).collect();
+    let places: Vec<Pose> = first.iter().map(DeviceState::pose).collect();
     let mut environment = environment::environment(&prepared, &first)?;
     let memory = prepared.options.keep_records.then(Memory::default);
     let sinks = Sinks::new(memory.clone(), prepared.options.log.as_deref(), &environment)?;

@@ -3,7 +3,7 @@
 use super::basis::BasisSide;
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
 use crate::actors::{Checkpoint, GlobalPlan, ModelSource, SurfaceView};
-use crate::model::Vec3;
+use crate::model::Pose;
 use crate::model::local::{Full, Hold, LocalModel, PatchGeometry};
 use crate::model::simulation::Simulation;
 use crate::runtime::{ExchangePort, OutletPort, RuntimeBuilder};
@@ -20,7 +20,7 @@ pub(super) fn models(
     graph: &mut RuntimeBuilder,
     plan: &ModelPlan,
     simulation: Simulation,
-    places: &[Vec3],
+    places: &[Pose],
     surfaces: Vec<OutletPort<SurfaceView>>,
     bases: Option<BasisSide>,
     ticks: usize,

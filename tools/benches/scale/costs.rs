@@ -146,10 +146,10 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
     let ticks_of_period = (rate / GLOBAL_HZ).ceil() as usize;
     // The simulation that everything else is built from stays where the drag begins; this one goes on.
     let mut dragged = sim.duplicate().ok_or_else(no_contact)?;
-    let motion = |k: usize| ToolMotion { from: tool(BEGIN + k as f64 * tick), to: tool(BEGIN + (k + 1) as f64 * tick) };
+    let motion = |k: usize| ToolMotion::straight(tool(BEGIN + k as f64 * tick), tool(BEGIN + (k + 1) as f64 * tick));
     let full = least_of_rounds(|round| {
         let first = round * 2 * ticks_of_period;
-        ticks(2 * ticks_of_period, |k| dragged.tick(motion(first + k)))
+        ticks(2 * ticks_of_period, |k| dragged.tick(motion(first + k)).force)
     });
     // Some 90 % of the ticks take no longer than 1.1 times the median; the mean would have the stalls of the machine in it.
     let follow = Nanos(full[0].0 * ticks_of_period as u64);
@@ -165,7 +165,7 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
         let half = horizon as usize / 2;
         let served = least_of_rounds(|_| {
             rebuild(&mut *model, &mut sim, horizon, surroundings, bases);
-            ticks(half, |k| model.tick(motion(k)))
+            ticks(half, |k| model.tick(motion(k)).force)
         });
         Ok((least, served))
     };
@@ -204,7 +204,7 @@ fn simulation(mut body: Block, rate: f64) -> Result<(Simulation, u32), Error> {
     // With the margin that substeps have.
     let span = (1..).take_while(|&ticks| spectrum.substeps(f64::from(ticks) * tick) == 1).last().unwrap_or(1);
     let state = State::at_rest(body.rest());
-    let law = Law { friction: 1.0, ..Law::default() };
+    let law = Law { friction: 1.0.into(), ..Law::default() };
     Ok((Simulation::new(Box::new(body), state, Contact::default(), law, stepping)?, span))
 }
 
@@ -213,7 +213,7 @@ fn advance(sim: &mut Simulation, from: f64, to: f64) {
     let tick = sim.stepping().tick;
     for k in 0..((to - from) / tick).round() as usize {
         let t = from + k as f64 * tick;
-        sim.tick(ToolMotion { from: tool(t), to: tool(t + tick) });
+        sim.tick(ToolMotion::straight(tool(t), tool(t + tick)));
     }
 }
 
@@ -223,7 +223,7 @@ fn no_contact() -> Error {
 
 fn rebuild(model: &mut dyn LocalModel, sim: &mut Simulation, horizon: u32, at: &Surroundings, bases: &Bases) -> Nanos {
     let triangle = sim.contact(0).triangle.unwrap_or_default();
-    let forecast = ToolForecast { position: tool(BEGIN), velocity: Vec3::x() * 0.02, acceleration: Vec3::zeros() };
+    let forecast = ToolForecast { position: tool(BEGIN), velocity: Vec3::x() * 0.02, ..ToolForecast::default() };
     let mut stopwatch = Stopwatch::new();
     let resync = ResyncView {
         global: sim,

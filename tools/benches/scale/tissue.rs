@@ -117,7 +117,7 @@ fn step(body: &Tetrahedra, path: &ToolPath, substeps: u32) -> Result<f64, Error>
     let mut round = |ticks: usize| {
         let begun = Instant::now();
         for _ in 0..ticks {
-            simulation.tick(ToolMotion { from: at(tick), to: at(tick + 1) });
+            simulation.tick(ToolMotion::straight(at(tick), at(tick + 1)));
             tick += 1;
         }
         begun.elapsed().as_secs_f64() / (ticks as f64 * f64::from(substeps))

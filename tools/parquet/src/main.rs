@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use palpate::log::LogReader;
 use palpate::{Error, printable};
-use palpate_cli::{OutputFile, WindowArgs, export_rows};
+use palpate_cli::{OutputFile, WindowArgs, export_rows, is_turned};
 
 use table::ParquetTable;
 
@@ -47,7 +47,10 @@ fn run(args: &Args) -> Result<(), Error> {
     let window = args.window.window()?;
     let mut reader = LogReader::open(&args.log)?;
     let output = OutputFile::create(&args.out, &[&args.log])?;
-    export_rows(&mut reader, &args.topic, &window, |columns| ParquetTable::new(columns, BufWriter::new(&output)))?;
+    let is_turned = is_turned(&args.log, &args.topic)?;
+    export_rows(&mut reader, &args.topic, is_turned, &window, |columns| {
+        ParquetTable::new(columns, BufWriter::new(&output))
+    })?;
     output.finish()?;
     if let Some(damage) = reader.damage() {
         let _ = writeln!(io::stderr(), "warning: {}: {damage}", printable(reader.place()));

@@ -9,7 +9,7 @@ use palpate::{Error, ErrorKind};
 use super::files::OutputFile;
 use super::progress::ReadBar;
 use super::shared::{WindowArgs, forgive_closed_pipe, warn_of_damage};
-use crate::export::{TickDuration, export_percentiles, export_table, export_trace};
+use crate::export::{TickDuration, export_percentiles, export_table, export_trace, is_turned};
 
 /// The formats of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -29,7 +29,7 @@ pub enum ExportFormat {
 pub struct ExportArgs {
     /// The log to read.
     pub log: PathBuf,
-    /// The topic to write as a table, such as /force or /timing/local.
+    /// The topic to write as a table, such as /force or /timing/local; /contact/points are the places that touch.
     #[arg(long)]
     pub topic: Option<String>,
     /// The format.
@@ -50,7 +50,8 @@ pub struct ExportArgs {
 
 /// What is to be written, with everything that it needs.
 enum What<'a> {
-    Table(&'a str),
+    /// A topic, and whether it has columns of torque or orientation.
+    Table(&'a str, bool),
     Percentiles(&'a str, TickDuration),
     Trace,
 }
@@ -104,7 +105,7 @@ fn write<R: Read, W: Write>(
     out: &mut W,
 ) -> Result<(), Error> {
     match *what {
-        What::Table(topic) => export_table(reader, topic, window, out),
+        What::Table(topic, is_turned) => export_table(reader, topic, is_turned, window, out),
         What::Percentiles(group, figure) => export_percentiles(reader, group, figure, window, out),
         What::Trace => export_trace(reader, window, out),
     }
@@ -128,7 +129,10 @@ fn what(args: &ExportArgs) -> Result<What<'_>, Error> {
         return Err(usage(&format!("{option} belongs to --format {fits}, not to {name}: leave one of them out")));
     }
     match args.format {
-        ExportFormat::Csv => Ok(What::Table(topic()?)),
+        ExportFormat::Csv => {
+            let topic = topic()?;
+            Ok(What::Table(topic, is_turned(&args.log, topic)?))
+        }
         ExportFormat::Parquet => {
             let topic = topic()?;
             let message = format!(

@@ -62,6 +62,7 @@ pub fn run(args: &MockArgs) -> Result<(), Error> {
         events_port: args.events_port,
         device_id: args.device_id.clone(),
         fault: kind.map(|kind| MockFault { kind, after: args.after }),
+        ..MockOptions::default()
     })?;
     let interrupt = shared::waits()?;
     shared::print(&format!(

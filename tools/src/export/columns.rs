@@ -1,8 +1,11 @@
 //! The columns of each topic, and its entries as cells: what every table format writes, each in its own way.
 
 use palpate::log::TopicKind;
-use palpate::log::{ContactSample, GroupStats, LogEntry, LogRecord, TextEvent};
+use palpate::log::{
+    CommandSample, ContactPointSample, ContactSample, ForceSample, GroupStats, LogEntry, LogRecord, TextEvent,
+};
 use palpate::model::contact::ContactMode;
+use palpate::model::{Turn, wxyz};
 
 /// The type of a column of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,9 +51,15 @@ macro_rules! table {
     ($($of:ident: $($name:ident)+),*) => { &[$($((stringify!($name), ColumnType::$of)),+),*] };
 }
 
-/// The columns of a topic of this kind.
-pub(super) fn columns(kind: TopicKind) -> &'static [Column] {
+/// The columns of a topic of this kind; `is_turned` if a sample of it has a torque or is turned.
+pub(super) fn columns(kind: TopicKind, is_turned: bool) -> &'static [Column] {
     match kind {
+        TopicKind::Force | TopicKind::ForceCommanded if is_turned => table! {
+            F64: t_s fx_n fy_n fz_n tx_n_m ty_n_m tz_n_m
+        },
+        TopicKind::Tool if is_turned => table! {
+            F64: t_s x_m y_m z_m vx_m_s vy_m_s vz_m_s, U32: sample_id buttons, F64: qw qx qy qz
+        },
         TopicKind::Timing => table! {
             U64: tick scheduled_ns woke_ns start_ns end_ns deadline_ns, U32: slips, Text: cause, U32: given_up,
             Text: mode
@@ -63,8 +72,8 @@ pub(super) fn columns(kind: TopicKind) -> &'static [Column] {
         TopicKind::Force | TopicKind::ForceCommanded => table! { F64: t_s fx_n fy_n fz_n },
         TopicKind::Tool => table! { F64: t_s x_m y_m z_m vx_m_s vy_m_s vz_m_s, U32: sample_id buttons },
         TopicKind::Contact => table! {
-            F64: t_s, Text: mode, OptionalU32: triangle, F64: weight_a weight_b weight_c nx ny nz,
-            F32: normal_force_n tangential_force_n
+            F64: t_s, Text: mode, OptionalU32: triangle, F64: weight_a weight_b weight_c,
+            F32: nx ny nz normal_force_n tangential_force_n, U32: count, F32: area_m2 mean_pressure_pa
         },
         TopicKind::Resync => table! { F64: t_s, U32: version, F64: age_s jump_before_n jump_after_n energy_j },
         TopicKind::Global => table! { F64: t_s, U32: version, U64: first_tick last_tick },
@@ -78,13 +87,44 @@ pub(super) fn columns(kind: TopicKind) -> &'static [Column] {
     }
 }
 
-/// Puts the cells of one entry into `row`, one for each column of its kind, row behind row if it has several; leaves it empty
+/// True if an entry fills the columns that tools without torque and turn do not have.
+pub(super) fn is_turned(entry: &LogEntry) -> bool {
+    match entry {
+        LogEntry::Record(LogRecord::Force(r)) => r.torque_n_m != [0.0; 3],
+        LogEntry::Record(LogRecord::Command(r)) => r.torque_n_m != [0.0; 3],
+        LogEntry::Record(LogRecord::Tool(r)) => r.orientation != Turn::identity(),
+        _ => false,
+    }
+}
+
+/// The columns of the places of a topic with contacts.
+pub(super) const POINT_COLUMNS: &[Column] = table! {
+    F64: t_s, F32: x_m y_m z_m nx ny nz normal_n tangential_n, U32: triangle, Text: mode
+};
+
+/// Puts the cells of a place that touches into `row`; leaves it empty for all else.
+pub(super) fn point_cells(entry: &LogEntry, row: &mut Vec<Cell>) {
+    row.clear();
+    if let LogEntry::Record(LogRecord::ContactPoint(r)) = entry {
+        let ContactPointSample { place_m, normal, triangle, .. } = *r;
+        row.push(Cell::F64(r.time.as_secs_f64()));
+        row.extend(place_m.into_iter().chain(normal).chain(r.normal_and_tangential_n()).map(Cell::F32));
+        row.extend([Cell::U32(triangle), mode(r.mode)]);
+    }
+}
+
+/// Puts the cells of one entry into `row`, one for each column of its kind (`is_turned` or not), row behind row if it has several; leaves it empty
 /// for what belongs in no table.
-pub(super) fn cells(entry: &LogEntry, row: &mut Vec<Cell>) {
+pub(super) fn cells(entry: &LogEntry, is_turned: bool, row: &mut Vec<Cell>) {
     row.clear();
     match entry {
         LogEntry::Environment(_) | LogEntry::Attachment { .. } => {}
-        LogEntry::Record(record) => record_cells(record, row),
+        LogEntry::Record(record) => {
+            record_cells(record, row);
+            if is_turned {
+                turned_cells(record, row);
+            }
+        }
         LogEntry::Stats(stats) => stats_cells(stats, row),
         LogEntry::Text(event) => text_cells(event, row),
     }
@@ -109,6 +149,8 @@ fn record_cells(record: &LogRecord, row: &mut Vec<Cell>) {
             row.extend(r.velocity_m_s.map(F64));
             row.extend([U32(r.id), U32(r.buttons.into())]);
         }
+        // In a table of their own.
+        LogRecord::ContactPoint(_) => {}
         LogRecord::Contact(r) => contact_cells(t_s, r, row),
         LogRecord::Resync(r) => {
             row.extend([t_s, U32(r.version), F64(r.age.as_secs_f64())]);
@@ -127,24 +169,40 @@ fn record_cells(record: &LogRecord, row: &mut Vec<Cell>) {
     }
 }
 
+/// What only tools that are turned have.
+fn turned_cells(record: &LogRecord, row: &mut Vec<Cell>) {
+    match record {
+        LogRecord::Force(ForceSample { torque_n_m, .. }) | LogRecord::Command(CommandSample { torque_n_m, .. }) => {
+            row.extend(torque_n_m.map(Cell::F64));
+        }
+        LogRecord::Tool(r) => row.extend(wxyz(&r.orientation).map(Cell::F64)),
+        _ => {}
+    }
+}
+
 fn floats(t_s: Cell, vector: [f64; 3], row: &mut Vec<Cell>) {
     row.push(t_s);
     row.extend(vector.map(Cell::F64));
 }
 
 fn contact_cells(t_s: Cell, r: &ContactSample, row: &mut Vec<Cell>) {
-    let mode = match r.mode {
+    // No triangle is an empty cell, not the number that stands for it.
+    let triangle = if r.triangle == u32::MAX { Cell::Missing } else { Cell::U32(r.triangle) };
+    let [b, c] = r.weights;
+    row.extend([t_s, mode(r.mode), triangle]);
+    row.extend([1.0 - b - c, b, c].map(Cell::F64));
+    row.extend(r.normal.map(Cell::F32));
+    row.extend([r.normal_force_n, r.tangential_force_n].map(Cell::F32));
+    row.extend([Cell::U32(r.count.into()), Cell::F32(r.area_m2), Cell::F32(r.mean_pressure_pa())]);
+}
+
+fn mode(mode: ContactMode) -> Cell {
+    Cell::Word(match mode {
         ContactMode::Free => "free",
         ContactMode::Stick => "stick",
         ContactMode::Slip => "slip",
         ContactMode::Lost => "lost",
-    };
-    // No triangle is an empty cell, not the number that stands for it.
-    let triangle = if r.triangle == u32::MAX { Cell::Missing } else { Cell::U32(r.triangle) };
-    let ([b, c], [nx, ny, nz]) = (r.weights, r.normal);
-    row.extend([t_s, Cell::Word(mode), triangle]);
-    row.extend([1.0 - b - c, b, c, nx, ny, nz].map(Cell::F64));
-    row.extend([r.normal_force_n, r.tangential_force_n].map(Cell::F32));
+    })
 }
 
 fn stats_cells(s: &GroupStats, row: &mut Vec<Cell>) {

@@ -12,8 +12,8 @@ use std::path::Path;
 pub use columns::{Cell, ColumnType};
 pub(crate) use hgrm::{TickDuration, export_percentiles};
 pub use table::TableWriter;
-pub use table::export_rows;
 pub(crate) use table::export_table;
+pub use table::{export_rows, is_turned};
 pub(crate) use trace::export_trace;
 
 use palpate::log::LogReader;

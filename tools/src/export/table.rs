@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::io::{self, Read, Write};
+use std::path::Path;
 
 use palpate::log::TopicKind;
 use palpate::log::{LogEntry, LogReader, Window};
@@ -16,17 +17,18 @@ use super::{output_error, unknown};
 /// Nothing is written before the topic is known to exist. A topic that the log declares but never uses gives a table
 /// without rows. On a damaged log it writes what is readable; ask [`LogReader::damage`] afterwards. Floats are printed in the
 /// shortest form that reads back exactly; durations and times inside `/timing` stay integer nanoseconds. Memory is bounded by
-/// one chunk of the log.
+/// one chunk of the log. `is_turned` is what [`is_turned`] says: columns of torque and orientation are there only then.
 ///
 /// # Errors
 /// [`ErrorKind::Log`] if the log has no such topic, with the topics that it has; [`ErrorKind::Io`] if `out` cannot be written.
 pub fn export_table<R: Read, W: Write>(
     reader: &mut LogReader<R>,
     topic: &str,
+    is_turned: bool,
     window: &Window,
     out: &mut W,
 ) -> Result<(), Error> {
-    export_rows(reader, topic, window, |columns| {
+    export_rows(reader, topic, is_turned, window, |columns| {
         header(columns, out).map_err(output_error)?;
         Ok(CsvTable(&mut *out))
     })?;
@@ -48,9 +50,13 @@ pub trait TableWriter {
     fn finish(self) -> Result<(), Error>;
 }
 
+/// What is added to a topic with contacts to name the table of the places that touch: a message has several of them.
+const POINTS: &str = "/points";
+
 /// Gives every message of `topic` within `window` to the table that `begin` makes for its columns, in the order of the log.
+/// The places of contacts are the table `/contact/points`, a row for each.
 ///
-/// `begin` is not called before the topic is known to exist.
+/// `begin` is not called before the topic is known to exist; `is_turned` is what [`is_turned`] says.
 ///
 /// # Errors
 /// [`ErrorKind::Log`] if the log has no such topic, with the topics that it has, or if the topic is for viewers only; what
@@ -58,23 +64,30 @@ pub trait TableWriter {
 pub fn export_rows<R: Read, T: TableWriter>(
     reader: &mut LogReader<R>,
     topic: &str,
+    is_turned: bool,
     window: &Window,
     begin: impl FnOnce(&'static [Column]) -> Result<T, Error>,
 ) -> Result<(), Error> {
+    let with_points = topic.strip_suffix(POINTS).filter(|of| TopicKind::of_topic(of) == Some(TopicKind::Contact));
+    let named = topic;
+    let topic = with_points.unwrap_or(topic);
     let mut entry = next_of(reader, topic, window);
     let kind = reader.kind(topic).or_else(|| lost_topic(reader, topic)).ok_or_else(|| {
         let topics: Vec<&str> = reader.topics().into_keys().collect();
-        unknown(reader, "topic", topic, &topics)
+        unknown(reader, "topic", named, &topics)
     })?;
     if kind == TopicKind::Scene {
         let why = format!("{topic} is for viewers (3D), it makes no table");
         return Err(Error::new(ErrorKind::Log, why).at(reader.place()));
     }
-    let columns = columns::columns(kind);
+    let columns = if with_points.is_some() { columns::POINT_COLUMNS } else { columns::columns(kind, is_turned) };
     let mut table = begin(columns)?;
     let (mut cells, mut row) = (Vec::new(), Vec::new());
     while let Some(found) = entry {
-        columns::cells(&found, &mut cells);
+        match with_points {
+            Some(_) => columns::point_cells(&found, &mut cells),
+            None => columns::cells(&found, is_turned, &mut cells),
+        }
         let mut left = cells.drain(..).peekable();
         while left.peek().is_some() {
             row.clear();
@@ -84,6 +97,27 @@ pub fn export_rows<R: Read, T: TableWriter>(
         entry = next_of(reader, topic, window);
     }
     table.finish()
+}
+
+/// True if a sample of `topic` in the log at `log` has a torque other than zero, or a tool that is turned: its table has columns
+/// for that then. Such a log is read up to that sample, any other one to its end.
+///
+/// # Errors
+/// [`ErrorKind::Io`] if the log cannot be read, [`ErrorKind::Log`] if it is no MCAP file.
+pub fn is_turned(log: &Path, topic: &str) -> Result<bool, Error> {
+    let may_be =
+        matches!(TopicKind::of_topic(topic), Some(TopicKind::Force | TopicKind::ForceCommanded | TopicKind::Tool));
+    // A pipe can be read only once.
+    if !may_be || !log.is_file() {
+        return Ok(false);
+    }
+    let mut reader = LogReader::open(log)?;
+    while let Some(entry) = next_of(&mut reader, topic, &Window::default()) {
+        if columns::is_turned(&entry) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// The next entry of `topic` in `window`.

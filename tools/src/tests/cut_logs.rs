@@ -18,7 +18,8 @@ fn log() -> Vec<u8> {
 fn exported(bytes: &[u8], topic: &str) -> (String, Option<String>) {
     let mut reader = LogReader::new(bytes, "cut.mcap").expect("it begins with the magic");
     let mut out = Vec::new();
-    export_table(&mut reader, topic, &Window::default(), &mut out).unwrap_or_else(|error| panic!("{topic}: {error}"));
+    export_table(&mut reader, topic, false, &Window::default(), &mut out)
+        .unwrap_or_else(|error| panic!("{topic}: {error}"));
     (String::from_utf8(out).unwrap(), reader.damage().map(str::to_owned))
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::export::{TickDuration, export_percentiles, export_table, export_trace};
+use crate::export::{TickDuration, export_percentiles, export_table, export_trace, is_turned};
 use palpate::ErrorKind;
 use palpate::log::{LogEntry, LogReader, LogRecord, Window};
 use palpate::runtime::Nanos;
@@ -16,7 +16,7 @@ const ALL: Window = Window { from: Nanos::ZERO, to: Nanos(u64::MAX) };
 
 fn table(bytes: &[u8], topic: &str, window: &Window) -> String {
     let mut out = Vec::new();
-    export_table(&mut reader(bytes), topic, window, &mut out).unwrap();
+    export_table(&mut reader(bytes), topic, false, window, &mut out).unwrap();
     String::from_utf8(out).unwrap()
 }
 
@@ -52,6 +52,42 @@ fn ns(value: &Value) -> u64 {
     (value.as_f64().unwrap() * 1e3).round() as u64
 }
 
+// Check that columns of torque and orientation are there where a log has some, and that a log without keeps its table.
+#[test]
+fn a_turned_tool_has_columns_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = |entries: &[LogEntry], topic: &str| {
+        let path = folder.path().join("run.mcap");
+        std::fs::write(&path, log_of(entries, 1000)).unwrap();
+        let mut out = Vec::new();
+        let is_turned = is_turned(&path, topic).unwrap();
+        export_table(&mut LogReader::open(&path).unwrap(), topic, is_turned, &ALL, &mut out).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let columns = text.lines().next().unwrap().split(',').count();
+        assert!(text.lines().all(|line| line.split(',').count() == columns), "{topic}");
+        (text.lines().next().unwrap().to_owned(), text.lines().nth(2).unwrap().to_owned())
+    };
+    let turned = entries(20);
+    let straight: Vec<LogEntry> = turned.iter().cloned().map(without_turning).collect();
+    let (columns, row) = header(&turned, "/force");
+    assert_eq!(columns, "t_s,fx_n,fy_n,fz_n,tx_n_m,ty_n_m,tz_n_m");
+    assert!(row.ends_with(",0,-0,0.001"), "{row}");
+    assert_eq!(header(&straight, "/force").0, "t_s,fx_n,fy_n,fz_n");
+    assert_eq!(header(&straight, "/force_commanded").0, "t_s,fx_n,fy_n,fz_n");
+    assert!(header(&turned, "/tool").0.ends_with(",sample_id,buttons,qw,qx,qy,qz"));
+    assert!(header(&straight, "/tool").0.ends_with(",sample_id,buttons"));
+}
+
+fn without_turning(mut entry: LogEntry) -> LogEntry {
+    match &mut entry {
+        LogEntry::Record(LogRecord::Force(row)) => row.torque_n_m = [0.0; 3],
+        LogEntry::Record(LogRecord::Command(row)) => row.torque_n_m = [0.0; 3],
+        LogEntry::Record(LogRecord::Tool(row)) => row.orientation = palpate::model::Turn::identity(),
+        _ => {}
+    }
+    entry
+}
+
 #[test]
 fn windows_that_meet_hold_every_row_once() {
     let bytes = log_of(&entries(300), 1000);
@@ -69,6 +105,42 @@ fn windows_that_meet_hold_every_row_once() {
     let part = table(&bytes, "/force", &Window { from: Nanos(40_000_000), to: Nanos(43_000_000) });
     let times: Vec<&str> = part.lines().skip(1).map(|line| line.split(',').next().unwrap()).collect();
     assert_eq!(times, ["0.04", "0.041", "0.042"]);
+}
+
+#[test]
+fn the_places_of_contacts_are_a_table_of_their_own() {
+    let sent = entries(30);
+    let bytes = log_of(&sent, 1000);
+    let (mut contacts, mut points) = (Vec::new(), Vec::new());
+    for entry in &sent {
+        match entry {
+            LogEntry::Record(LogRecord::Contact(r)) => contacts.push(*r),
+            LogEntry::Record(LogRecord::ContactPoint(r)) => points.push(*r),
+            _ => {}
+        }
+    }
+    let text = table(&bytes, "/contact", &ALL);
+    let mut lines = text.lines();
+    let header = "t_s,mode,triangle,weight_a,weight_b,weight_c,nx,ny,nz,normal_force_n,tangential_force_n,count,area_m2,mean_pressure_pa";
+    assert_eq!(lines.next(), Some(header));
+    assert_eq!(lines.clone().count(), contacts.len());
+    for (line, contact) in lines.zip(&contacts) {
+        let expected = format!(",{},{},{}", contact.count, contact.area_m2, contact.mean_pressure_pa());
+        assert!(line.ends_with(&expected), "{line}: {expected}");
+    }
+    let text = table(&bytes, "/contact/points", &ALL);
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("t_s,x_m,y_m,z_m,nx,ny,nz,normal_n,tangential_n,triangle,mode"));
+    assert_eq!(lines.clone().count(), points.len());
+    for (line, point) in lines.zip(&points) {
+        let [x, y, z] = point.place_m;
+        let begin = format!("{},{x},{y},{z},", point.time.as_secs_f64());
+        assert!(line.starts_with(&begin) && line.ends_with(&format!(",{},slip", point.triangle)), "{line}");
+    }
+    for topic in ["/points", "/force/points", "/left/contact/points"] {
+        let error = export_table(&mut reader(&bytes), topic, false, &ALL, &mut Vec::new()).unwrap_err();
+        assert!(error.to_string().contains(&format!("the log has no topic {topic:?}")), "{error}");
+    }
 }
 
 // Check every line of each figure against the sorted values themselves.

@@ -42,10 +42,10 @@ fn recovered(bytes: &[u8]) -> (Recovered, Vec<u8>) {
 }
 
 /// Entries as bits, so that -0.0 differs from 0.0.
-fn bits(entries: &[LogEntry]) -> Vec<(String, Option<Record>)> {
+fn bits(entries: &[LogEntry]) -> Vec<(String, [Option<Record>; 2])> {
     let of = |entry: &LogEntry| match entry {
-        LogEntry::Record(record) => (String::new(), Some(Record::from(*record))),
-        other => (format!("{other:?}"), None),
+        LogEntry::Record(record) => (String::new(), record.to_records()),
+        other => (format!("{other:?}"), [None; 2]),
     };
     entries.iter().map(of).collect()
 }
@@ -133,7 +133,8 @@ fn behind_a_damaged_chunk_the_next_one_is_read() {
         assert_eq!(read(&new).1, None, "{place}");
         let lost = all.len() - raw(&new).len();
         assert_eq!(report.counted, Some(report.messages + lost as u64), "{place}");
-        assert!(lost > 500 && lost < 1100, "{place}: {lost}");
+        // The last chunk ends with the run.
+        assert!((lost > 500 || damaged + 1 == chunks.len()) && lost < 1100, "{place}: {lost}");
         assert!(is_subsequence(&raw(&new), &all), "{place}");
         let found = check(Cursor::new(&wrong), "wrong", |_, _| ()).unwrap();
         assert!(!found.is_sound() && found.messages == report.messages, "{place}: {found:?}");

@@ -16,7 +16,7 @@ fn analyse(bytes: &[u8]) -> RunReport {
 
 fn table(bytes: &[u8], topic: &str) -> String {
     let mut out = Vec::new();
-    export_table(&mut LogReader::new(bytes, "run.mcap").unwrap(), topic, &Window::default(), &mut out).unwrap();
+    export_table(&mut LogReader::new(bytes, "run.mcap").unwrap(), topic, false, &Window::default(), &mut out).unwrap();
     String::from_utf8(out).unwrap()
 }
 
@@ -137,7 +137,7 @@ fn a_topic_without_messages_is_a_header_and_an_unknown_one_an_error_that_lists_t
     for unknown in ["/forces", "force", "", "/timing/device"] {
         let mut out = Vec::new();
         let mut reader = LogReader::new(bytes.as_slice(), "run.mcap").unwrap();
-        let error = export_table(&mut reader, unknown, &Window::default(), &mut out).unwrap_err();
+        let error = export_table(&mut reader, unknown, false, &Window::default(), &mut out).unwrap_err();
         assert_eq!((error.kind(), out.len()), (ErrorKind::Log, 0));
         let text = error.to_string();
         assert!(

@@ -11,13 +11,14 @@
 //! | `virtual_time` | true if lateness is zero by construction |
 //! | `damage` | what is wrong with the log and where, or `null` |
 //! | `messages` | number of messages read, by topic |
-//! | `environment` | versions, rates, in `body` what a body of tetrahedra is made of (`null` for others), in `model_reason` and `model_warning` why `model` was chosen or its patch and basis are that large (`null` if both were named), in `granted` what the system granted, `safety_off`, `stored_j` and `coupling`; `null` if unknown |
+//! | `environment` | versions, rates, in `body` what a body of tetrahedra is made of (`null` for others), in `tools` the shapes of the tools and how coarse the body is against them (`null` if all are points), in `model_reason` and `model_warning` why `model` was chosen or its patch and basis are that large (`null` if both were named), in `granted` what the system granted, `safety_off`, `stored_j` and `coupling`; `null` if unknown |
 //! | `groups[]` | `name`, `rate_hz`, `released`, `skipped`, `missed`, `elapsed_periods`, `in_degraded_mode`, `lost_records`, `skipped_by_cause`, `missed_by_cause`, `lateness_ns`, `execution_ns`, `period_error_ns`, `jitter_ns`, `busy_ns` |
 //! | `resyncs` | `count`, `jump_before_n`, `jump_after_n`, `age_ns` |
 //! | `force` | `ticks`, `peak_n`, `peak_commanded_n`, `not_finite`, `model_age_s`, `served` (share of ticks by local model) |
 //! | `contact` | haptic ticks `free`, `stick`, `slip`, `lost` |
+//! | `touch` | of a tool with a shape `most_places` that touched at once, `peak_pressure_pa` (largest mean pressure), `area_at_peak_m2` (at the largest force); `null` for a point |
 //! | `limits` | `ticks`, `limited`, `share` (0 to 1), `stages` by name, `energy_j` (`least` and `last` of the passivity ledger), `tank_j` (`least`) |
-//! | `devices[]` | of each of several devices `name`, `resyncs`, `force`, `contact` and `limits`; without it these are the only device's, with it they are also the first's |
+//! | `devices[]` | of each of several devices `name`, `resyncs`, `force`, `contact`, `touch` and `limits`; without it these are the only device's, with it they are also the first's |
 //! | `lost_records` | of all groups |
 //! | `figures` | every figure by its name, see [`crate::timing`]: times of releases in ns, all else as in the name's unit |
 //! | `cores[]` | `cpu` (`null`: any), `share`, `groups` by name: share of the time (0 to 1) at work |
@@ -163,7 +164,7 @@ fn document(report: &RunReport) -> Value {
     document
 }
 
-fn device(DeviceReport { resyncs, force, contact, limits, .. }: &DeviceReport) -> Value {
+fn device(DeviceReport { resyncs, force, contact, touch, limits, .. }: &DeviceReport) -> Value {
     json!({
         "resyncs": {
             "count": resyncs.jump_before_n.count,
@@ -180,6 +181,11 @@ fn device(DeviceReport { resyncs, force, contact, limits, .. }: &DeviceReport) -
             "served": force.shares().map(|(model, share)| (model.name(), share)).collect::<BTreeMap<_, _>>(),
         },
         "contact": { "free": contact.free, "stick": contact.stick, "slip": contact.slip, "lost": contact.lost },
+        "touch": touch.map(|touch| json!({
+            "most_places": touch.most_places,
+            "peak_pressure_pa": touch.peak_pressure_pa,
+            "area_at_peak_m2": touch.area_at_peak_m2,
+        })),
         "limits": {
             "ticks": limits.ticks,
             "limited": limits.limited,
@@ -201,6 +207,7 @@ fn environment(environment: &Environment) -> Value {
         },
         "start_unix_ns": environment.epoch_ns(),
         "body": environment.body,
+        "tools": environment.tools,
         "model": environment.model,
         "model_reason": environment.model_reason.as_ref().map(|reason| &reason.why),
         "model_warning": environment.model_reason.as_ref().and_then(|reason| reason.warning.as_ref()),

@@ -148,6 +148,19 @@ impl Body for Tetrahedra {
         Some(self.restricted(nodes))
     }
 
+    fn contact_moduli(&self) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); self.rest().len()];
+        for (element, nodes) in self.mesh.tetrahedra.iter().enumerate() {
+            let tissue = self.tissue_of(element as u32);
+            let modulus = tissue.young_modulus / (1.0 - tissue.poisson_ratio * tissue.poisson_ratio);
+            for &node in nodes {
+                sums[node as usize].0 += modulus;
+                sums[node as usize].1 += 1.0;
+            }
+        }
+        sums.into_iter().map(|(sum, count)| if count > 0.0 { sum / count } else { 0.0 }).collect()
+    }
+
     fn nominal_evaluation(&self) -> f64 {
         NOMINAL_ELEMENT_S * self.solid.elements.len() as f64
     }

@@ -7,9 +7,9 @@ use self::stable::stable_stepping;
 use super::feedback::{Feedback, PatchGeometry};
 use super::patch::Patch;
 use super::{Kind, LocalModel, ResyncView};
-use crate::Vec3;
-use crate::contact::{Contact, Equations, ToolMotion, step_implicit};
+use crate::contact::{Contact, ContactPoint, Equations, ToolMotion, step_implicit};
 use crate::linear::{Drift, ImplicitStep, PatchTangent};
+use crate::{Vec3, Wrench};
 
 pub(super) use boundary::{Boundary, Layers, Yielding};
 
@@ -57,8 +57,8 @@ impl LinearPatch {
         Drift { time: ticks * self.patch.stepping.tick + if is_moving { t } else { 0.0 }, is_moving }
     }
 
-    /// One step from `t` seconds into the present tick; returns the force on the tool (N).
-    fn step(&mut self, tool: ToolMotion, t: f64, d: f64) -> Vec3 {
+    /// One step from `t` seconds into the present tick; returns the force and torque on the tool.
+    fn step(&mut self, tool: ToolMotion, t: f64, d: f64) -> Wrench {
         // An implicit step takes its forces at its end.
         let ahead = if self.is_implicit { d } else { 0.0 };
         let drift = self.drift(t + ahead);
@@ -67,7 +67,9 @@ impl LinearPatch {
         let (x, v) = (&patch.state.positions[..movable], &patch.state.velocities[..movable]);
         tangent.forces(x, v, ahead, drift, &mut patch.forces);
         if self.is_implicit {
-            patch.with_contact(|body, forces, contact, law| step_implicit(body, system, forces, contact, law, tool))
+            patch.with_contact(|body, forces, touch, rows, law| {
+                step_implicit(body, system, forces, touch, rows, law, tool);
+            })
         } else {
             patch.step(tool, d)
         }
@@ -81,9 +83,13 @@ impl LinearPatch {
 
 impl LocalModel for LinearPatch {
     fn rebuild(&mut self, resync: ResyncView<'_>) {
-        let (triangles, size) = (&resync.triangles[..1], self.spec.size);
-        let body = resync.global.body();
-        self.patch.window.rebuild(body, triangles, |nodes| body.patch(triangles, size, nodes), |_| [&[], &[]]);
+        let touch = resync.global.touch(resync.index);
+        // A point's patch is around its triangle; a tool with a shape comes with all that it may touch.
+        let triangles = if touch.has_shape() { resync.triangles } else { &resync.triangles[..1] };
+        let (global, size, tool) = (&*resync.global, self.spec.size, resync.index);
+        let (body, skin) = (global.body(), &touch.skin);
+        let patch = |nodes: &mut Vec<u32>| global.patch(tool, triangles, size, nodes);
+        self.patch.window.rebuild(body, triangles, skin, patch, |_| [&[], &[]]);
         self.patch.take_present(&resync);
         if self.boundary.moving_ticks() == 0 {
             // The rim stands still, and so must the velocities that a contact on it would see.
@@ -115,26 +121,28 @@ impl LocalModel for LinearPatch {
         (patch.stepping, self.is_implicit) =
             stable_stepping(spec.is_implicit, tangent, &patch.inverse_masses, patch.stepping, &patch.law);
         if self.is_implicit {
+            patch.reserve_implicit();
             patch.law.equations = Equations::Corrected;
             self.system.rebuild(tangent, &patch.inverse_masses, patch.stepping.step());
         }
     }
 
-    fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-        if let Some(force) = self.patch.held() {
-            return force;
+    fn tick(&mut self, tool: ToolMotion) -> Wrench {
+        if let Some(wrench) = self.patch.held() {
+            return wrench;
         }
         let (stepping, mut t) = (self.patch.stepping, 0.0);
-        let force = stepping.tick(tool, |tool, d| {
-            let force = self.step(tool, t, d);
+        self.patch.touch.begin();
+        let wrench = stepping.tick(tool, |tool, d| {
+            let wrench = self.step(tool, t, d);
             t += d;
-            force
+            wrench
         });
         self.ticks = self.ticks.saturating_add(1);
         if self.ticks == self.boundary.moving_ticks() {
             self.hold_rim();
         }
-        self.patch.feel(force)
+        self.patch.feel(wrench)
     }
 
     fn built_at(&self) -> u64 {
@@ -147,6 +155,14 @@ impl LocalModel for LinearPatch {
 
     fn contact(&self) -> Contact {
         self.patch.global_contact()
+    }
+
+    fn contact_points(&self) -> &[ContactPoint] {
+        self.patch.contact_points()
+    }
+
+    fn contact_area(&self) -> f64 {
+        self.patch.contact_area()
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {
@@ -171,8 +187,15 @@ impl LocalModel for LinearPatch {
             Feedback::Trajectory => return false,
             Feedback::Geometry => (0..patch.window.movable).for_each(|place| patch.tell(geometry, place)),
             Feedback::ContactNodes => {
-                let touched = patch.contact.triangle.map(|t| patch.window.surface.triangles[t as usize]);
-                for place in touched.into_iter().flatten().filter(|&place| (place as usize) < patch.window.movable) {
+                let touched = patch.touch.contact.triangle.filter(|_| !patch.touch.has_shape());
+                let corners = touched.map(|t| patch.window.surface.triangles[t as usize]);
+                let pressed = patch.touch.pressed().iter().map(|&(node, _)| node);
+                for place in corners
+                    .into_iter()
+                    .flatten()
+                    .chain(pressed)
+                    .filter(|&place| (place as usize) < patch.window.movable)
+                {
                     patch.tell(geometry, place as usize);
                 }
             }
@@ -221,7 +244,7 @@ mod tests {
         let mut seen = Vec::new();
         for _ in 0..5 {
             seen.push((model.drift(0.5e-3), model.patch.state.positions[rim].x - start.x));
-            model.tick(ToolMotion { from: tool, to: tool });
+            model.tick(ToolMotion::straight(tool, tool));
         }
         let near = |a: f64, b: f64| (a - b).abs() < 1e-15;
         for (tick, (drift, moved)) in seen.into_iter().enumerate() {
@@ -231,7 +254,7 @@ mod tests {
             assert!(near(moved, ticks * 1e-3 * 0.1), "tick {tick}: the rim moved {moved}");
         }
         let mut still = rebuilt(Feedback::Trajectory, Boundary::Still, (&mut global, top));
-        still.tick(ToolMotion { from: tool, to: tool });
+        still.tick(ToolMotion::straight(tool, tool));
         assert_eq!((still.drift(0.0), still.patch.state.positions[rim]), (Drift::default(), start));
     }
 

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use self::ring::{NearBody, RingPath};
 use super::patch::Patch;
 use super::{Kind, LocalModel, ResyncView};
-use crate::Vec3;
 use crate::body::State;
-use crate::contact::{Contact, ToolMotion};
+use crate::contact::{Contact, ContactPoint, ToolMotion};
 use crate::surroundings::{Basis, ReducedMotion};
+use crate::{Vec3, Wrench};
 
 /// The way in which `predictive` finds where its ring will go.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -180,7 +180,7 @@ impl Predictive {
         }
     }
 
-    fn substep(&mut self, tool: ToolMotion, d: f64) -> Vec3 {
+    fn substep(&mut self, tool: ToolMotion, d: f64) -> Wrench {
         self.take_near_forces();
         let force = self.patch.step(tool, d);
         let basis = self.basis.take();
@@ -218,9 +218,10 @@ impl LocalModel for Predictive {
         let (body, triangles, size) = (resync.global.body(), resync.triangles, self.size);
         let patch = |nodes: &mut Vec<u32>| match resync.patch {
             Some(patch) => nodes.extend_from_slice(patch),
-            None => body.patch(triangles, size, nodes),
+            None => resync.global.patch(resync.index, triangles, size, nodes),
         };
-        self.patch.window.rebuild(body, triangles, patch, |nodes| self.near.rebuild(body, nodes));
+        let skin = &resync.global.touch(resync.index).skin;
+        self.patch.window.rebuild(body, triangles, skin, patch, |nodes| self.near.rebuild(body, nodes));
         let window = &self.patch.window;
         self.patch.forces.resize(window.nodes.len(), Vec3::zeros());
         self.basis = resync.bases.get(&window.nodes[..window.movable]).cloned();
@@ -235,13 +236,14 @@ impl LocalModel for Predictive {
         self.surroundings.rest(self.basis.as_ref().map_or(0, |basis| basis.answers.states()));
     }
 
-    fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-        if let Some(force) = self.patch.held() {
-            return force;
+    fn tick(&mut self, tool: ToolMotion) -> Wrench {
+        if let Some(wrench) = self.patch.held() {
+            return wrench;
         }
         let stepping = self.patch.stepping;
-        let force = stepping.tick(tool, |tool, d| self.substep(tool, d));
-        self.patch.feel(force)
+        self.patch.touch.begin();
+        let wrench = stepping.tick(tool, |tool, d| self.substep(tool, d));
+        self.patch.feel(wrench)
     }
 
     fn built_at(&self) -> u64 {
@@ -258,6 +260,14 @@ impl LocalModel for Predictive {
 
     fn contact(&self) -> Contact {
         self.patch.global_contact()
+    }
+
+    fn contact_points(&self) -> &[ContactPoint] {
+        self.patch.contact_points()
+    }
+
+    fn contact_area(&self) -> f64 {
+        self.patch.contact_area()
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {

@@ -1,6 +1,6 @@
 //! How the force moves from an old local model to a new one.
 
-use crate::Vec3;
+use crate::{Vec3, Wrench};
 
 /// The ways of blending an old model's force into a new one's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,10 +25,10 @@ pub struct Blend {
     ticks: u32,
     /// Ticks since the swap; `None` when it is over.
     elapsed: Option<u32>,
-    /// The step at the swap: the old model's force less the new one's (N).
-    step: Vec3,
-    /// What the blend added to the new model's force in the last tick (N).
-    residue: Vec3,
+    /// The step at the swap: the old model's force and torque less the new one's.
+    step: Wrench,
+    /// What the blend added to the new model's in the last tick.
+    residue: Wrench,
     /// What the swap and its blend changed in the last tick (N).
     step_now: Vec3,
     jump: Jump,
@@ -73,13 +73,13 @@ impl Blend {
         self.step_now
     }
 
-    /// The blended force of one tick, and the resync's jump when the blend is over. `old` is read where it is
+    /// The blended force and torque of one tick, and the resync's jump when the blend is over. `old` is read where it is
     /// [needed](Self::needs_old).
-    pub(crate) fn mix(&mut self, new: Vec3, old: Vec3) -> (Vec3, Option<Jump>) {
+    pub(crate) fn mix(&mut self, new: Wrench, old: Wrench) -> (Wrench, Option<Jump>) {
         let Some(elapsed) = self.elapsed else { return (new, None) };
         if elapsed == 0 {
             self.step = old - new;
-            self.jump.before = self.step.norm();
+            self.jump.before = self.step.force.norm();
             // Before the swap the force was the old one: as if the blend had added all of the difference.
             self.residue = self.step;
         }
@@ -88,7 +88,7 @@ impl Blend {
             BlendKind::Crossfade => (old - new) * (1.0 - share),
             BlendKind::None | BlendKind::Offset => self.step * (1.0 - minimum_jerk(share)),
         };
-        self.step_now = self.residue - residue;
+        self.step_now = (self.residue - residue).force;
         self.jump.after = self.jump.after.max(self.step_now.norm());
         self.residue = residue;
         let over = share >= 1.0;
@@ -111,8 +111,8 @@ mod tests {
         blend.begin();
         let mut forces = Vec::new();
         loop {
-            let (force, done) = blend.mix(Vec3::x() * 2.0, Vec3::x());
-            forces.push(force.x);
+            let (force, done) = blend.mix((Vec3::x() * 2.0).into(), Vec3::x().into());
+            forces.push(force.force.x);
             if let Some(jump) = done {
                 return (forces, jump);
             }
@@ -149,11 +149,11 @@ mod tests {
         let mut blend = Blend::new(BlendKind::Offset, 4);
         blend.begin();
         assert!(blend.needs_old());
-        blend.mix(Vec3::x(), Vec3::zeros());
+        blend.mix(Vec3::x().into(), Wrench::default());
         for _ in 0..4 {
             assert!(blend.is_under_way() && !blend.needs_old());
             // The old model no longer counts.
-            assert!(blend.mix(Vec3::x(), Vec3::repeat(f64::NAN)).0.x <= 1.0);
+            assert!(blend.mix(Vec3::x().into(), Vec3::repeat(f64::NAN).into()).0.force.x <= 1.0);
         }
         assert!(!blend.is_under_way());
     }

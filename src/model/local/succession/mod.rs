@@ -3,8 +3,8 @@
 mod blend;
 
 use super::LocalModel;
-use crate::Vec3;
 use crate::contact::ToolMotion;
+use crate::{Pose, Vec3, Wrench};
 
 pub use blend::{Blend, BlendKind, Jump};
 
@@ -16,8 +16,8 @@ const HISTORY: usize = 1024;
 /// The result of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
-    /// Mean force on the tool, blended (N); may be other than finite if a model diverged.
-    pub force: Vec3,
+    /// Mean force and torque on the tool, blended; may be other than finite if a model diverged.
+    pub wrench: Wrench,
     /// The resync whose blend ended with this tick.
     pub resync: Option<Resynced>,
     /// How much of the force's change in this tick a swap made (N).
@@ -48,19 +48,19 @@ pub struct Succession {
     blend: Blend,
     version: u32,
     resync: Resynced,
-    /// Tool position at the end of tick t at place t % HISTORY (m).
-    history: Vec<Vec3>,
+    /// The tool at the end of tick t at place t % HISTORY.
+    history: Vec<Pose>,
     /// The last tick.
     now: u64,
 }
 
 impl Succession {
-    /// Starts with `models` to rotate through and resyncs blended by `blend`; the tool is at `tool` (m) at tick 0.
+    /// Starts with `models` to rotate through and resyncs blended by `blend`; the tool is at `tool` at tick 0.
     /// The first serves until another is offered.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(models: [Box<dyn LocalModel>; 3], blend: Blend, tool: Vec3) -> Self {
+    pub fn new(models: [Box<dyn LocalModel>; 3], blend: Blend, tool: Pose) -> Self {
         let [serving, fading, arriving] = models;
         Self {
             serving,
@@ -75,11 +75,11 @@ impl Succession {
         }
     }
 
-    /// Puts the tool at `tool` (m) and lets `model` serve at once: for tick 0. `model` gets a spare in exchange.
+    /// Puts the tool at `tool` and lets `model` serve at once: for tick 0. `model` gets a spare in exchange.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn begin(&mut self, tool: Vec3, first: Option<(&mut Box<dyn LocalModel>, u32)>) {
+    pub fn begin(&mut self, tool: Pose, first: Option<(&mut Box<dyn LocalModel>, u32)>) {
         self.history.fill(tool);
         if let Some((model, version)) = first {
             std::mem::swap(&mut self.serving, model);
@@ -101,25 +101,25 @@ impl Succession {
         self.arrival = Some((version, reached));
     }
 
-    /// Advances one tick: the tool moves in a straight line to `tool` (m).
+    /// Advances one tick: the tool moves in a straight line to `tool`.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn tick(&mut self, tool: Vec3) -> Served {
+    pub fn tick(&mut self, tool: Pose) -> Served {
         self.catch_up();
-        let motion = ToolMotion { from: self.position(self.now), to: tool };
+        let motion = ToolMotion { from: self.at(self.now), to: tool };
         self.now += 1;
         let place = self.now as usize % HISTORY;
         self.history[place] = tool;
         let new = self.serving.tick(motion);
         if !self.blend.is_under_way() {
-            return Served { force: new, ..Served::default() };
+            return Served { wrench: new, ..Served::default() };
         }
         let old = if self.blend.needs_old() { self.fading.tick(motion) } else { new };
         // A diverged old model must not spoil a good new one.
-        let old = if old.iter().all(|c| c.is_finite()) { old } else { new };
-        let (force, jump) = self.blend.mix(new, old);
-        Served { force, resync: jump.map(|jump| Resynced { jump, ..self.resync }), swap_step: self.blend.step_now() }
+        let old = if old.is_finite() { old } else { new };
+        let (wrench, jump) = self.blend.mix(new, old);
+        Served { wrench, resync: jump.map(|jump| Resynced { jump, ..self.resync }), swap_step: self.blend.step_now() }
     }
 
     /// Brings an arrived model nearer to the present; when it is there and no blend is under way, it serves.
@@ -128,7 +128,7 @@ impl Succession {
         if self.arriving.catches_up() {
             let until = self.now.min(reached + CATCH_UP_TICKS);
             while reached < until {
-                self.arriving.tick(ToolMotion { from: self.position(reached), to: self.position(reached + 1) });
+                self.arriving.tick(ToolMotion { from: self.at(reached), to: self.at(reached + 1) });
                 reached += 1;
             }
             self.arrival = Some((version, reached));
@@ -148,7 +148,7 @@ impl Succession {
         self.blend.begin();
     }
 
-    fn position(&self, tick: u64) -> Vec3 {
+    fn at(&self, tick: u64) -> Pose {
         self.history[tick as usize % HISTORY]
     }
 
@@ -176,12 +176,12 @@ impl Succession {
         self.now
     }
 
-    /// The position of the tool at the end of the last tick (m).
+    /// The tool at the end of the last tick.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn tool(&self) -> Vec3 {
-        self.position(self.now)
+    pub fn tool(&self) -> Pose {
+        self.at(self.now)
     }
 }
 
@@ -203,10 +203,10 @@ mod tests {
 
     impl LocalModel for Counting {
         fn rebuild(&mut self, _: ResyncView<'_>) {}
-        fn tick(&mut self, tool: ToolMotion) -> Vec3 {
-            self.travelled += tool.to - tool.from;
+        fn tick(&mut self, tool: ToolMotion) -> Wrench {
+            self.travelled += tool.way();
             self.ticks += 1;
-            Vec3::new(self.base, self.travelled.y, self.ticks as f64)
+            Vec3::new(self.base, self.travelled.y, self.ticks as f64).into()
         }
         fn built_at(&self) -> u64 {
             self.built_at
@@ -228,8 +228,8 @@ mod tests {
 
     fn succession(blend_ticks: u32) -> Succession {
         let blend = Blend::new(BlendKind::Crossfade, blend_ticks);
-        let mut models = Succession::new([1.0, -1.0, -1.0].map(|base| model(base, 0, true)), blend, Vec3::zeros());
-        models.begin(Vec3::zeros(), None);
+        let mut models = Succession::new([1.0, -1.0, -1.0].map(|base| model(base, 0, true)), blend, Pose::default());
+        models.begin(Pose::default(), None);
         models
     }
 
@@ -241,11 +241,11 @@ mod tests {
     #[test]
     fn a_model_that_is_in_time_serves_from_the_next_tick() {
         let mut models = succession(0);
-        (1..=33).for_each(|t| assert_eq!(models.tick(tool(t)).force.x, 1.0));
+        (1..=33).for_each(|t| assert_eq!(models.tick(tool(t).into()).wrench.force.x, 1.0));
         models.offer(&mut model(2.0, 33, true), 7);
-        let served = models.tick(tool(34));
-        assert_eq!((served.force.x, models.version()), (2.0, 7));
-        assert_eq!(served.force.y, tool(34).y - tool(33).y, "its motion is that of the tick alone");
+        let served = models.tick(tool(34).into());
+        assert_eq!((served.wrench.force.x, models.version()), (2.0, 7));
+        assert_eq!(served.wrench.force.y, tool(34).y - tool(33).y, "its motion is that of the tick alone");
         assert_eq!(served.resync.map(|resync| (resync.version, resync.age)), Some((7, 0)));
     }
 
@@ -253,10 +253,10 @@ mod tests {
     fn a_late_model_replays_the_tools_own_path_while_the_old_one_serves() {
         let mut models = succession(0);
         (1..=60).for_each(|t| {
-            models.tick(tool(t));
+            models.tick(tool(t).into());
         });
         models.offer(&mut model(2.0, 33, true), 1);
-        let served: Vec<Vec3> = (61..=70).map(|t| models.tick(tool(t)).force).collect();
+        let served: Vec<Vec3> = (61..=70).map(|t| models.tick(tool(t).into()).wrench.force).collect();
         // 27 ticks late, 8 caught up per tick while one more falls due: the old model serves ticks 61 to 63.
         let swap = served.iter().position(|force| force.x == 2.0).unwrap();
         assert_eq!(swap, 3);
@@ -269,31 +269,31 @@ mod tests {
     fn a_model_without_a_state_of_its_own_serves_at_once() {
         let mut models = succession(0);
         (1..=60).for_each(|t| {
-            models.tick(tool(t));
+            models.tick(tool(t).into());
         });
         models.offer(&mut model(2.0, 33, false), 1);
-        assert_eq!(models.tick(tool(61)).force.x, 2.0);
+        assert_eq!(models.tick(tool(61).into()).wrench.force.x, 2.0);
     }
 
     #[test]
     fn a_newer_model_waits_for_the_end_of_a_blend_and_an_ancient_one_is_refused() {
         let mut models = succession(10);
         (1..=33).for_each(|t| {
-            models.tick(tool(t));
+            models.tick(tool(t).into());
         });
         models.offer(&mut model(2.0, 33, true), 1);
-        assert_eq!(models.tick(tool(34)).force.x, 1.0, "a crossfade begins with the old force");
+        assert_eq!(models.tick(tool(34).into()).wrench.force.x, 1.0, "a crossfade begins with the old force");
         models.offer(&mut model(3.0, 34, true), 2);
-        let forces: Vec<f64> = (35..=60).map(|t| models.tick(tool(t)).force.x).collect();
+        let forces: Vec<f64> = (35..=60).map(|t| models.tick(tool(t).into()).wrench.force.x).collect();
         assert!(forces.windows(2).all(|f| f[1] >= f[0] && f[1] - f[0] < 0.11), "{forces:?}");
         assert_eq!(*forces.last().unwrap(), 3.0);
 
         let mut models = succession(0);
         (1..=2000).for_each(|t| {
-            models.tick(tool(t));
+            models.tick(tool(t).into());
         });
         models.offer(&mut model(2.0, 33, true), 1);
-        assert_eq!(models.tick(tool(2001)).force.x, 1.0);
+        assert_eq!(models.tick(tool(2001).into()).wrench.force.x, 1.0);
     }
 
     #[test]
@@ -301,9 +301,9 @@ mod tests {
         let mut models = succession(10);
         models.offer(&mut model(f64::NAN, 0, true), 1);
         (1..=33).for_each(|t| {
-            models.tick(tool(t));
+            models.tick(tool(t).into());
         });
         models.offer(&mut model(2.0, 33, true), 2);
-        assert!((34..=44).all(|t| models.tick(tool(t)).force.x == 2.0));
+        assert!((34..=44).all(|t| models.tick(tool(t).into()).wrench.force.x == 2.0));
     }
 }

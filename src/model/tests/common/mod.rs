@@ -3,7 +3,7 @@
 
 use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, State};
-use palpate_model::contact::{Contact, Law, ToolMotion};
+use palpate_model::contact::{Contact, Friction, Law, ToolMotion, ToolShape};
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
 
@@ -30,9 +30,10 @@ pub fn glued(body: &dyn Body, node: u32) -> Contact {
     Contact::glued(triangle, weights)
 }
 
-pub fn simulation(body: Block, contact: Contact, friction: f64) -> Simulation {
+pub fn simulation(body: Block, contact: Contact, friction: impl Into<Friction>) -> Simulation {
     let state = State::at_rest(body.rest());
-    Simulation::new(Box::new(body), state, contact, Law { friction, ..Law::default() }, STEPPING).expect("it fits")
+    Simulation::new(Box::new(body), state, contact, Law { friction: friction.into(), ..Law::default() }, STEPPING)
+        .expect("it fits")
 }
 
 /// Columns of a reference series, without the header.
@@ -68,7 +69,7 @@ pub fn hand_path(rest: Vec3, t: f64) -> Vec3 {
 
 /// Forces of every tick along `path` (a position per tick, tick 0 first).
 pub fn forces(simulation: &mut Simulation, path: &[Vec3]) -> Vec<Vec3> {
-    path.windows(2).map(|q| simulation.tick(ToolMotion { from: q[0], to: q[1] })).collect()
+    path.windows(2).map(|q| simulation.tick(ToolMotion::straight(q[0], q[1])).force).collect()
 }
 
 /// Root mean square of the difference, in percent of the reference's peak.
@@ -77,4 +78,33 @@ pub fn rms_percent(forces: &[Vec3], reference: &[Vec3]) -> f64 {
     let peak = reference.iter().map(|f| f.norm()).fold(0.0, f64::max);
     let sum: f64 = forces.iter().zip(reference).map(|(a, b)| (a - b).norm_squared()).sum();
     100.0 * (sum / forces.len() as f64).sqrt() / peak
+}
+
+/// Work that a frictionless tool gets from the body over one closed circle (after one to settle), and the most that it
+/// had put in before (J).
+pub fn circle(zeta: f64, shape: ToolShape) -> (f64, f64) {
+    let mut body = block((0.5e-3, 30.0, zeta));
+    let stepping = Stepping { tick: 1e-3, substeps: Stepping::stable_substeps(&mut body, 1e-3) };
+    let state = State::at_rest(body.rest());
+    let mut sim = Simulation::new(Box::new(body), state, Contact::default(), Law::default(), stepping)
+        .unwrap()
+        .with_shape(0, shape);
+    let centre = Vec3::new(0.05, 0.0512, 0.0);
+    let path = |tick: i32| {
+        let t = f64::from(tick) * 1e-3;
+        let angle = std::f64::consts::TAU * (t - 0.4).max(0.0);
+        let around = Vec3::new(angle.cos(), angle.sin(), 0.0) * 0.012;
+        centre + around + Vec3::z() * (0.101 + shape.radius() - 0.007 * minjerk(t / 0.3))
+    };
+    let (mut got, mut put_in, mut most) = (0.0, 0.0, 0.0_f64);
+    for tick in 0..2400 {
+        let tool = ToolMotion::straight(path(tick), path(tick + 1));
+        let work = sim.tick(tool).force.dot(&tool.way());
+        put_in -= work;
+        most = most.max(put_in);
+        if tick >= 1400 {
+            got += work;
+        }
+    }
+    (got, most)
 }

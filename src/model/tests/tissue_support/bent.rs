@@ -168,7 +168,7 @@ fn diagonal(cells: [usize; 3]) -> Vec<[u32; 4]> {
 }
 
 /// Four tetrahedra on each inner face of cells, two on each outer one. The centres are numbered after the corners.
-fn centred(cells: [usize; 3]) -> Vec<[u32; 4]> {
+pub fn centred(cells: [usize; 3]) -> Vec<[u32; 4]> {
     let corners = cells.map(|count| count + 1);
     let centre = |at| corners.iter().product::<usize>() as u32 + id(at, cells);
     let mut tetrahedra = Vec::new();

@@ -6,7 +6,7 @@ use palpate::model::Vec3;
 use palpate::model::body::{Body, Tissue, Where};
 use palpate::model::local::BlendKind;
 use palpate::model::mesh::TetrahedralMesh;
-use palpate::scene::{BlendSpec, BodySpec, Friction, Scene, TetrahedraSpec, TissueSpec, Volume};
+use palpate::scene::{BlendSpec, BodySpec, FrictionSpec, Scene, TetrahedraSpec, TissueSpec, Volume};
 use palpate::session::{Session, SessionBuilder};
 use palpate_mesh::{ImplicitShape, MeshError, Sizes, organs};
 
@@ -80,7 +80,7 @@ impl Organ {
     /// The tool on `path`, over a body that is still to be given.
     pub fn scene(&self, path: ToolPath) -> Scene {
         let mut scene = Scene::of_program();
-        scene.contact.friction = Friction::Coefficient(FRICTION);
+        scene.contact.friction = FrictionSpec::Coefficient(FRICTION);
         scene.local.basis = Some(BASIS);
         scene.local.blend = BlendSpec { kind: BlendKind::Crossfade, ms: 10.0 };
         scene.devices[0].path = Some(path);

@@ -115,4 +115,28 @@ pub const CASES: &[Case] = &[
             run(Predictive, 1.0, [4.7, 32.0, 56.0, 4.1]),
         ],
     ),
+    case(
+        "stick-slip",
+        "hard/stick_slip",
+        "0.8 to break loose, 0.4 to slide",
+        &[
+            run(Patch, 0.0, [16.0, 45.0, 37.0, 24.0]),
+            run(LinearBoundary, 0.0, [5.0, 34.0, 32.0, 4.3]),
+            run(Predictive, 0.0, [0.2, 1.8, 36.0, 0.58]),
+            run(Predictive, 1.0, [1.0, 32.0, 36.0, 1.1]),
+        ],
+    )
+    .ends_free(),
+    case(
+        "stick-slip, Stribeck",
+        "hard/stick_slip_stribeck",
+        "the same, falling over 10 mm/s",
+        &[
+            run(Patch, 0.0, [16.0, 52.0, 35.0, 20.0]),
+            run(LinearBoundary, 0.0, [7.5, 36.0, 35.0, 3.0]),
+            run(Predictive, 0.0, [0.71, 14.0, 31.0, 0.55]),
+            run(Predictive, 1.0, [2.7, 36.0, 36.0, 2.2]),
+        ],
+    )
+    .ends_free(),
 ];

@@ -49,6 +49,7 @@ fn about(environment: &Environment, facts: &mut Vec<(String, String)>) {
     }
     fact("instruction set", environment.instruction_set.clone());
     fact("body", environment.body.clone().unwrap_or_default());
+    fact("tool", environment.tools.clone().unwrap_or_default());
     let reason = environment.model_reason.as_ref();
     fact(
         "local model",

@@ -1,0 +1,37 @@
+//! One place at which a tool may touch, as a row of the system for the impulses of all of them.
+
+use super::ContactMode;
+use super::skin::{Grain, Sinking, Sunk};
+use crate::Vec3;
+
+/// One place at which a tool may touch: its point of the surface is the mean of some nodes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    pub(super) tool: usize,
+    pub(super) triangle: u32,
+    pub(super) weights: [f64; 3],
+    /// The corners with a weight, in increasing order.
+    pub(super) feature: [u32; 3],
+    /// Where it is at the end of the step if nothing presses (m).
+    pub(super) place: Vec3,
+    /// From the surface to the tool.
+    pub(super) normal: Vec3,
+    /// How fast the tool moves there (m/s).
+    pub(super) target: Vec3,
+    /// At this velocity along the normal, against the tool's, the surface just touches the tool at the end of the step (m/s).
+    pub(super) allowed: f64,
+    /// How much the place gives way to an impulse at most, and along the normal (1/kg).
+    pub(super) compliance: f64,
+    pub(super) along: f64,
+    /// How deep the tool sinks in beside the elements, and how coarse they are, if that is known.
+    pub(super) sinking: Option<(Sinking, Grain)>,
+    /// The same, linear around the force that is expected.
+    pub(super) sunk: Sunk,
+    pub(super) stuck: bool,
+    pub(super) glued: bool,
+    pub(super) mode: ContactMode,
+    /// On the tool (N s).
+    pub(super) impulse: Vec3,
+    /// Its nodes in the list of the system.
+    pub(super) nodes: (usize, usize),
+}

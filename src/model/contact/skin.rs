@@ -1,0 +1,386 @@
+//! The surface as a tool of some size meets it: where its elements are coarse against the tool, corners of triangles are means
+//! of the nodes around them.
+//!
+//! A node that is pressed alone gives way twice as much as the middle of an edge, and four times as much as a place that is
+//! shared by many. A tool that covers many nodes does not notice. One that is as large as an element would: its force would
+//! double between a node and the middle of a face. So each corner k of a triangle is at
+//!
+//! ```text
+//! y_k = sum_j s_kj x_j,   s_kj ~ (1 - |X_j - X_k|^2 / c^2)^2 (N_j . N_k)^2,   sum_j s_kj = 1,   sum_j s_kj (X_j - X_k) || N_k
+//! ```
+//!
+//! over the nodes around it, X at rest, N the normals there. Forces on a corner go to the nodes with the same shares, so
+//! momentum is kept to the last digit. c is 2.8 edges where edges are longer than half the tool's radius, and goes to zero
+//! (y_k = x_k) at a quarter: there the tool meets several triangles at once. Towards sharp edges of the body it goes to zero as
+//! well.
+
+use crate::Vec3;
+use crate::body::Body;
+use crate::mesh::Surface;
+
+/// c, in mean edges at the node.
+const REACH: f64 = 2.8;
+/// Nodes farther away than this share of c would count next to nothing.
+const CUT: f64 = 0.91;
+/// Edges, in tool radii, below which nothing is smoothed, and above which all of it is.
+const EDGES: [f64; 2] = [0.25, 0.5];
+/// The least cosine between a node's normal and those of its triangles, at a sharp edge and on a smooth surface.
+const COSINES: [f64; 2] = [0.75, 0.95];
+/// Squared edges by the mean square of the weights' own spread within a triangle.
+const HAT: f64 = 6.0;
+/// The most that a tool sinks in beside the elements, in edges.
+const MOST_SUNK: f64 = 0.6;
+
+/// The corners of the triangles as a tool of some size meets them, and how deep it sinks in where the elements cannot show it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Skin {
+    /// Where the shares of each node's corner begin; empty if no corner is smoothed.
+    starts: Vec<u32>,
+    shares: Vec<(u32, f64)>,
+    /// How far each corner lies below its node at rest (m): convex surfaces shrink, and the tool is met there all the same.
+    depths: Vec<f64>,
+    /// Of each node; empty if the body's contact modulus is not known.
+    grains: Vec<Grain>,
+}
+
+impl Skin {
+    /// For a tool of `radius` (m) on `body`.
+    pub(crate) fn new(body: &dyn Body, radius: f64) -> Self {
+        let (surface, rest, moduli) = (body.surface(), body.rest(), body.contact_moduli());
+        let normals: Vec<Vec3> = (0..rest.len() as u32).map(|node| normal_at(surface, rest, node)).collect();
+        let (mut starts, mut shares, mut depths) = (vec![0], Vec::new(), Vec::with_capacity(rest.len()));
+        let (mut found, mut grains) = (Vec::new(), Vec::new());
+        for node in 0..rest.len() as u32 {
+            let (edge, sigma) = corner(surface, rest, &normals, node, radius, &mut found);
+            if let Some(&modulus) = moduli.get(node as usize) {
+                grains.push(Grain {
+                    share: ramp(edge / radius, EDGES),
+                    modulus,
+                    spread: (sigma * sigma + edge * edge / HAT).sqrt(),
+                    most: MOST_SUNK * edge,
+                });
+            }
+            let centre =
+                found.iter().fold(Vec3::zeros(), |sum, &(n, s)| sum + (rest[n as usize] - rest[node as usize]) * s);
+            depths.push(-centre.dot(&normals[node as usize]));
+            shares.append(&mut found);
+            starts.push(shares.len() as u32);
+        }
+        if shares.len() == rest.len() {
+            (starts, shares, depths) = Default::default();
+        }
+        Self { starts, shares, depths, grains }
+    }
+
+    /// How coarse the surface is for the tool.
+    pub(crate) fn coarseness(&self, body: &dyn Body) -> Coarseness {
+        let (surface, rest) = (body.surface(), body.rest());
+        let sides = surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let sum: f64 = sides.map(|[a, b]| (rest[a as usize] - rest[b as usize]).norm()).sum();
+        let nodes = || (0..rest.len() as u32).filter(|&node| !surface.at_node(node).is_empty());
+        let smoothed = nodes().filter(|&node| !self.corner(node).is_empty()).count();
+        Coarseness {
+            edge: sum / (3 * surface.triangles.len()).max(1) as f64,
+            smoothed: smoothed as f64 / nodes().count().max(1) as f64,
+            sinks: !self.grains.is_empty(),
+        }
+    }
+
+    /// True if every corner is its node.
+    pub(super) fn is_none(&self) -> bool {
+        self.starts.is_empty()
+    }
+
+    /// The nodes that make the corner of `node`, with their shares; none if it is the node itself.
+    pub(crate) fn corner(&self, node: u32) -> &[(u32, f64)] {
+        match self.starts.get(node as usize..node as usize + 2) {
+            Some(&[from, to]) if to - from > 1 => &self.shares[from as usize..to as usize],
+            _ => &[],
+        }
+    }
+
+    /// The grain of the body at `weights` of three nodes, if it is known.
+    pub(super) fn grain(&self, nodes: [u32; 3], weights: &[f64; 3]) -> Option<Grain> {
+        let mut mean = Grain { modulus: 0.0, spread: 0.0, most: 0.0, share: 0.0 };
+        for (node, weight) in nodes.into_iter().zip(weights) {
+            let grain = self.grains.get(node as usize)?;
+            mean.modulus += grain.modulus * weight;
+            mean.spread += grain.spread * weight;
+            mean.most += grain.most * weight;
+            mean.share += grain.share * weight;
+        }
+        (mean.modulus > 0.0).then_some(mean)
+    }
+
+    /// How far the corner of `node` lies below it at rest (m).
+    pub(super) fn depth(&self, node: usize) -> f64 {
+        self.depths.get(node).copied().unwrap_or(0.0)
+    }
+
+    /// That of a window: `nodes` are the ids of its nodes here, `place` gives the place of an id. Nodes whose corner is made of
+    /// others than these are corners of no triangle that is looked at.
+    pub(crate) fn localise(&self, nodes: &[u32], place: impl Fn(u32) -> Option<u32>, local: &mut Self) {
+        local.starts.clear();
+        local.shares.clear();
+        local.depths.clear();
+        local.grains.clear();
+        if !self.grains.is_empty() {
+            local.grains.extend(nodes.iter().map(|&node| self.grains[node as usize]));
+        }
+        if self.starts.is_empty() {
+            return;
+        }
+        local.starts.push(0);
+        for &node in nodes {
+            let corner = self.corner(node);
+            if corner.iter().all(|&(other, _)| place(other).is_some()) {
+                local.shares.extend(corner.iter().filter_map(|&(other, share)| Some((place(other)?, share))));
+                local.depths.push(self.depth(node as usize));
+            } else {
+                local.depths.push(0.0);
+            }
+            local.starts.push(local.shares.len() as u32);
+        }
+    }
+}
+
+/// The nodes of one corner with their shares, the node alone if it is not smoothed. Returns the mean edge there, and how far its nodes spread
+/// along the surface in every direction (m).
+fn corner(
+    surface: &Surface,
+    rest: &[Vec3],
+    normals: &[Vec3],
+    node: u32,
+    radius: f64,
+    found: &mut Vec<(u32, f64)>,
+) -> (f64, f64) {
+    found.clear();
+    found.push((node, 1.0));
+    let (here, normal) = (rest[node as usize], normals[node as usize]);
+    let triangles = surface.at_node(node);
+    if triangles.is_empty() {
+        return (0.0, 0.0);
+    }
+    let corners = |t: u32| surface.triangles[t as usize];
+    let (mut edges, mut count, mut flatness) = (0.0, 0, 1.0_f64);
+    for &t in triangles {
+        for other in corners(t).into_iter().filter(|&other| other != node) {
+            edges += (rest[other as usize] - here).norm();
+            count += 1;
+        }
+        let [a, b, c] = corners(t).map(|n| rest[n as usize]);
+        let across = (b - a).cross(&(c - a));
+        flatness = flatness.min(across.dot(&normal) / across.norm().max(f64::MIN_POSITIVE));
+    }
+    let edge = edges / f64::from(count.max(1));
+    let reach = REACH * edge * ramp(edge / radius, EDGES) * ramp(flatness, COSINES);
+    if reach < edge {
+        return (edge, 0.0);
+    }
+    // Along the surface from node to node, as far as they count.
+    let mut next = 0;
+    while next < found.len() {
+        for &t in surface.at_node(found[next].0) {
+            for other in corners(t) {
+                let is_new = found.iter().all(|&(known, _)| known != other);
+                if is_new && (rest[other as usize] - here).norm() < CUT * reach {
+                    found.push((other, 0.0));
+                }
+            }
+        }
+        next += 1;
+    }
+    let tangent = if normal.x.abs() < 0.6 { normal.cross(&Vec3::x()) } else { normal.cross(&Vec3::y()) }.normalize();
+    let axes = [tangent, normal.cross(&tangent)];
+    let along = |other: u32| axes.map(|axis| axis.dot(&(rest[other as usize] - here)));
+    for (other, share) in found.iter_mut() {
+        let far = (rest[*other as usize] - here).norm_squared();
+        let alike = normals[*other as usize].dot(&normal).max(0.0);
+        *share = (1.0 - far / (reach * reach)).powi(2) * alike * alike;
+    }
+    // Shares that are tilted so that their centre lies over the node: linear fields are met as they are.
+    let (mut first, mut second) = ([0.0; 2], [[0.0; 2]; 2]);
+    for &(other, share) in found.iter() {
+        let xi = along(other);
+        for i in 0..2 {
+            first[i] += share * xi[i];
+            (0..2).for_each(|j| second[i][j] += share * xi[i] * xi[j]);
+        }
+    }
+    let determinant = second[0][0] * second[1][1] - second[0][1] * second[1][0];
+    let tilt = [
+        -(second[1][1] * first[0] - second[0][1] * first[1]) / determinant,
+        -(second[0][0] * first[1] - second[1][0] * first[0]) / determinant,
+    ];
+    let mut sum = 0.0;
+    for (other, share) in found.iter_mut() {
+        let xi = along(*other);
+        *share *= 1.0 + tilt[0] * xi[0] + tilt[1] * xi[1];
+        sum += *share;
+    }
+    let is_good = determinant > 0.0 && found.iter().all(|&(_, share)| share >= -0.05 * sum) && sum > 0.0;
+    if is_good {
+        found.iter_mut().for_each(|(_, share)| *share /= sum);
+        let squares: f64 =
+            found.iter().map(|&(other, share)| share * along(other).iter().map(|xi| xi * xi).sum::<f64>()).sum();
+        (edge, (0.5 * squares.max(0.0)).sqrt())
+    } else {
+        found.truncate(1);
+        found[0].1 = 1.0;
+        (edge, 0.0)
+    }
+}
+
+/// How coarse the surface of a body is against a tool, and what is done about it.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coarseness {
+    /// The mean edge of the triangles at rest (m).
+    pub edge: f64,
+    /// The share of the surface's nodes whose corner is a mean of the nodes around: 0 where the elements are fine against the tool.
+    pub smoothed: f64,
+    /// True if the tool sinks in beside the elements as deep as they cannot show.
+    pub sinks: bool,
+}
+
+/// How coarse the body is at some place, for a tool that sinks in.
+///
+/// The elements show the sinking of a load that is spread over them, c F with c = 1 / (2 sqrt(pi) sigma E*), sigma the spread of
+/// corners and elements together. A sphere on a half space sinks in by (9 F^2 / (16 R E*^2))^(1/3) (Hertz 1882). What the
+/// elements lack of that the tool sinks in beside them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grain {
+    /// E / (1 - nu^2) (Pa).
+    modulus: f64,
+    /// sigma (m).
+    spread: f64,
+    /// The tool does not sink in deeper than this beside the elements (m).
+    most: f64,
+    /// How coarse the elements are against the tool, from 0 to 1: fine ones show all of it themselves.
+    share: f64,
+}
+
+impl Grain {
+    /// What a sphere of `radius` (m) sinks in beside the elements while `steady` (N) has pressed on the mean of the last
+    /// milliseconds.
+    pub(super) fn sinking(&self, radius: f64, steady: f64) -> Sinking {
+        let shown = 1.0 / (2.0 * std::f64::consts::PI.sqrt() * self.spread * self.modulus);
+        let hertz = (9.0 / (16.0 * radius * self.modulus * self.modulus)).cbrt();
+        // Where both grow alike, for a contact of radius sqrt(pi) sigma, the elements lack most.
+        let turn = (2.0 * hertz / (3.0 * shown)).powi(3);
+        let lacking = |force: f64| hertz * (force * force).cbrt() - shown * force;
+        let share = if steady > turn { (lacking(steady) / lacking(turn)).max(0.0) } else { 1.0 };
+        Sinking { shown, hertz, turn, share: share * self.share, most: self.most }
+    }
+
+    /// How much of a load at that squared distance (m^2) counts as one here.
+    pub(super) fn nearness(&self, squared: f64) -> f64 {
+        (1.0 - squared / (16.0 * self.spread * self.spread)).max(0.0).powi(2)
+    }
+}
+
+/// How deep a tool sinks in beside the elements, by its force: what they lack, up to where they lack most. Beyond, where they
+/// show more and more of it, all of it fades with the steady force and not with that of one step: a depth that shrank under a
+/// growing force would have no single answer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sinking {
+    shown: f64,
+    hertz: f64,
+    turn: f64,
+    share: f64,
+    most: f64,
+}
+
+impl Sinking {
+    /// The depth (m) under `force` (N); it grows with the force.
+    pub(super) fn at(&self, force: f64) -> f64 {
+        let force = force.clamp(0.0, self.turn);
+        (self.share * (self.hertz * (force * force).cbrt() - self.shown * force)).min(self.most)
+    }
+
+    /// The largest depth (m).
+    pub(super) fn most(&self) -> f64 {
+        self.at(self.turn)
+    }
+
+    /// The depth around `force` (N), as linear in it.
+    pub(super) fn tangent(&self, force: f64) -> Sunk {
+        let depth = self.at(force);
+        if force >= self.turn || depth >= self.most {
+            return Sunk { offset: depth, slope: 0.0 };
+        }
+        // At no force it would be infinitely steep.
+        let force = force.max(1e-9 * self.turn);
+        let slope = self.share * (2.0 / 3.0 * self.hertz / force.cbrt() - self.shown);
+        Sunk { offset: self.at(force) - slope * force, slope }
+    }
+}
+
+/// 0 below the first bound, 1 above the second, smooth in between.
+fn ramp(value: f64, [low, high]: [f64; 2]) -> f64 {
+    let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    share * share * (3.0 - 2.0 * share)
+}
+
+/// The unit normal at a node; zero where it has none.
+fn normal_at(surface: &Surface, rest: &[Vec3], node: u32) -> Vec3 {
+    let sum = surface.at_node(node).iter().fold(Vec3::zeros(), |sum, &t| {
+        let [a, b, c] = surface.triangles[t as usize].map(|n| rest[n as usize]);
+        sum + (b - a).cross(&(c - a))
+    });
+    let length = sum.norm();
+    if length > 0.0 { sum / length } else { sum }
+}
+
+/// A depth that is linear in the force.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sunk {
+    /// Without a force (m).
+    offset: f64,
+    /// m/N.
+    pub(super) slope: f64,
+}
+
+impl Sunk {
+    /// The depth (m) under `force` (N).
+    pub(super) fn at(&self, force: f64) -> f64 {
+        self.offset + self.slope * force
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a sphere of 8 mm on elements of 9 mm and 16 kPa.
+    fn sinking(steady: f64) -> Sinking {
+        Grain { modulus: 16e3, spread: 8e-3, most: 3e-3, share: 1.0 }.sinking(8e-3, steady)
+    }
+
+    #[test]
+    fn a_tool_sinks_in_deeper_under_more_force_and_less_where_elements_show_all_of_it() {
+        let depths: Vec<f64> = (0..1000).map(|n| sinking(0.0).at(5e-3 * f64::from(n))).collect();
+        assert!(depths.windows(2).all(|pair| pair[1] >= pair[0]) && depths[0] == 0.0);
+        assert!((depths[60] - 2.3e-3).abs() < 2e-4, "{}", depths[60]);
+        assert!(depths[999] <= 3e-3);
+        // Under a steady force far beyond the turn the elements show all of it.
+        assert_eq!(sinking(1e3).most(), 0.0);
+    }
+
+    #[test]
+    fn the_tangent_touches_the_depth_and_is_never_less() {
+        let sinking = sinking(0.0);
+        for n in 1..400 {
+            let force = 1e-2 * f64::from(n);
+            let tangent = sinking.tangent(force);
+            assert!((tangent.at(force) - sinking.at(force)).abs() < 1e-15);
+            assert!(
+                (0..400).all(|m| tangent.at(1e-2 * f64::from(m)) >= sinking.at(1e-2 * f64::from(m)) - 1e-12),
+                "{force}"
+            );
+        }
+        assert!(sinking.tangent(0.0).offset.abs() < 1e-5);
+    }
+}

@@ -1,0 +1,177 @@
+//! The impulses of all places at which tools touch, found together: projected Gauss-Seidel with Coulomb's cone at each place.
+
+use std::ops::Mul;
+
+use super::deformable::Deformable;
+use super::nearness::Nearness;
+use super::resolve::IMMOVABLE;
+use super::row::Row;
+use super::rows::Rows;
+use super::{ContactMode, Law};
+use crate::Vec3;
+use crate::linear::ImplicitStep;
+
+/// Sweeps to and fro at most for one place, and for however many: few places that lie close together take the most.
+const MOST_SWEEPS: [usize; 2] = [1000, 60];
+/// Sweeps that change how fast places close by less than this share of what the impulses do are the last. Impulses themselves
+/// need not come to rest: places on the same nodes may share theirs in many ways.
+const FOUND: f64 = 1e-8;
+/// Rounds in which the depth that a tool sinks in is found.
+const MOST_ROUNDS: usize = 16;
+
+impl Rows {
+    /// Changes the velocities so that no place is entered, none pulls and each impulse is in its cone. Rows meet at shared nodes;
+    /// sweeps go to and fro, so that none of them has the last word.
+    pub(super) fn solve(&mut self, body: &mut Deformable<'_>, law: &Law, d: f64) {
+        let Self { rows, nodes, at_nodes, shared, closing, before, nearness, .. } = self;
+        let of = |row: &Row| &nodes[row.nodes.0..row.nodes.1];
+        // Masses are lumped: an impulse is felt where its nodes are, along itself.
+        let count = rows.len();
+        shared.resize(count * count, 0.0);
+        for (place, row) in rows.iter().enumerate() {
+            of(row).iter().for_each(|&(node, w)| at_nodes[node as usize] = w * body.inverse_masses[node as usize]);
+            for (other, row) in rows.iter().enumerate().skip(place) {
+                let answer = of(row).iter().map(|&(node, w)| at_nodes[node as usize] * w).sum();
+                (shared[place * count + other], shared[other * count + place]) = (answer, answer);
+            }
+            of(row).iter().for_each(|&(node, _)| at_nodes[node as usize] = 0.0);
+        }
+        find_closing(body, rows, nodes, closing);
+        sweep(rows, nearness, shared, [closing, before], law, d);
+        for row in rows.iter() {
+            for &(node, w) in of(row) {
+                body.velocities[node as usize] -= row.impulse * (w * body.inverse_masses[node as usize]);
+            }
+        }
+    }
+
+    /// The same for an implicit step, in which every node answers to an impulse, and not along it.
+    pub(super) fn solve_coupled(&mut self, body: &mut Deformable<'_>, system: &ImplicitStep, law: &Law) {
+        let Self { rows, nodes, coupling, closing, before, nearness, .. } = self;
+        let of = |row: &Row| &nodes[row.nodes.0..row.nodes.1];
+        let count = rows.len();
+        coupling.clear();
+        for row in rows.iter() {
+            coupling.extend(rows.iter().map(|other| system.coupling(of(other), of(row))));
+        }
+        for (place, row) in rows.iter_mut().enumerate() {
+            let own = coupling[place * count + place];
+            // The steepest answer bounds every other one: the projections stay contractions.
+            row.compliance = own.trace();
+            row.along = row.normal.dot(&(own * row.normal));
+            if row.compliance <= IMMOVABLE || row.along <= 0.0 {
+                (row.mode, row.impulse) = (ContactMode::Lost, Vec3::zeros());
+            }
+        }
+        find_closing(body, rows, nodes, closing);
+        sweep(rows, nearness, coupling, [closing, before], law, system.step());
+        for row in rows.iter() {
+            system.push_all(body.velocities, of(row), row.impulse);
+        }
+    }
+}
+
+/// How fast each place closes on the tool if nothing presses (m/s).
+fn find_closing(body: &Deformable<'_>, rows: &[Row], nodes: &[(u32, f64)], closing: &mut Vec<Vec3>) {
+    closing.clear();
+    closing.extend(rows.iter().map(|row| {
+        let nodes = nodes[row.nodes.0..row.nodes.1].iter();
+        nodes.fold(Vec3::zeros(), |sum, &(node, w)| sum + body.velocities[node as usize] * w) - row.target
+    }));
+}
+
+/// Updates rows to and fro until nothing changes, beginning with what pressed in the last step. `coupling` has how each place
+/// answers to an impulse (1/kg), one after the other for an impulse at each. How deep the tool sinks in is taken as linear in the
+/// force meanwhile, and made anew until it is what it was taken to be.
+fn sweep<C: Copy + Mul<Vec3, Output = Vec3>>(
+    rows: &mut [Row],
+    nearness: &mut Nearness,
+    coupling: &[C],
+    [closing, before]: [&mut Vec<Vec3>; 2],
+    law: &Law,
+    d: f64,
+) {
+    let count = rows.len();
+    let answer = |closing: &mut [Vec3], place: usize, change: Vec3| {
+        for (closing, &coupling) in closing.iter_mut().zip(&coupling[place * count..]) {
+            *closing -= coupling * change;
+        }
+    };
+    for (place, row) in rows.iter().enumerate() {
+        answer(closing, place, row.impulse);
+    }
+    nearness.find(rows);
+    for _ in 0..MOST_ROUNDS {
+        for (place, row) in rows.iter_mut().enumerate() {
+            if let Some((sinking, _)) = &row.sinking {
+                row.sunk = sinking.tangent(nearness.load(place) / d);
+            }
+        }
+        for _ in 0..(MOST_SWEEPS[0] / count.max(1)).max(MOST_SWEEPS[1]) {
+            before.clone_from(closing);
+            for place in (0..count).chain((0..count).rev()) {
+                let row = &mut rows[place];
+                let change = row.update(closing[place], law, nearness.beside(place), d);
+                answer(closing, place, change);
+                nearness.change(place, row.impulse.dot(&row.normal));
+            }
+            let change =
+                closing.iter().zip(&*before).fold(0.0_f64, |most, (now, before)| most.max((now - before).norm()));
+            let done = rows.iter().fold(0.0_f64, |most, row| most.max(row.impulse.norm() * row.compliance));
+            if change <= FOUND * done {
+                break;
+            }
+        }
+        let is_as_taken = |(place, row): (usize, &Row)| {
+            row.sinking.as_ref().is_none_or(|(sinking, _)| {
+                let force = nearness.load(place) / d;
+                let depth = sinking.at(force);
+                (row.sunk.at(force) - depth).abs() <= FOUND * depth || !row.presses()
+            })
+        };
+        if rows.iter().enumerate().all(is_as_taken) {
+            break;
+        }
+    }
+}
+
+impl Row {
+    fn presses(&self) -> bool {
+        self.impulse.dot(&self.normal) > 0.0
+    }
+
+    /// Makes its impulse anew for the surface's velocity `closing` against the tool (m/s); returns the change (N s).
+    fn update(&mut self, closing: Vec3, law: &Law, beside: f64, d: f64) -> Vec3 {
+        if self.mode == ContactMode::Lost {
+            return Vec3::zeros();
+        }
+        let before = self.impulse;
+        if self.glued {
+            self.impulse += closing / self.compliance;
+            self.mode = ContactMode::Stick;
+            return self.impulse - before;
+        }
+        let n = self.normal;
+        let (pressed, speed) = (before.dot(&n), closing.dot(&n));
+        let along = self.normal_impulse(pressed + (speed - self.allowed) / self.along, beside, d);
+        // Written so that what is no number releases.
+        let (mode, impulse) = if along > 0.0 {
+            let across = (before - n * pressed) + (closing - n * speed) / self.compliance;
+            let (mode, across) = law.friction.resolve(self.stuck, across, along, self.compliance);
+            (mode, n * along + across)
+        } else {
+            (ContactMode::Free, Vec3::zeros())
+        };
+        (self.mode, self.impulse) = (mode, impulse);
+        impulse - before
+    }
+
+    /// The impulse along the normal (N s), where `rigid` would be that of a tool that does not sink in beside the elements: so
+    /// much less that what the surface is pushed less is what the tool sinks in.
+    fn normal_impulse(&self, rigid: f64, beside: f64, d: f64) -> f64 {
+        if self.sinking.is_none() {
+            return rigid;
+        }
+        (self.along * rigid - self.sunk.at(beside / d) / d) / (self.along + self.sunk.slope / (d * d))
+    }
+}

@@ -1,0 +1,270 @@
+//! A tool on a body: its shape, where it touches, and what it feels there.
+
+use std::sync::Arc;
+
+use super::closest;
+use super::row::Row;
+use super::skin::Skin;
+use super::triangle::interpolate;
+use super::{Contact, ContactMode, ContactPoint, ToolShape};
+use crate::body::Body;
+use crate::mesh::Surface;
+use crate::{Pose, Vec3, Wrench};
+
+/// Places that a tool can touch at the same time; of more the deepest count. A sphere that is pressed 3 mm into elements of
+/// 1.5 mm touches some 70.
+pub(super) const MOST_POINTS: usize = 192;
+
+/// What is within so many radii of a tool's axis is its footprint.
+const FOOTPRINT: f64 = 1.1;
+
+/// The time over which a force is a steady one (s).
+const STEADY: f64 = 5e-3;
+
+/// A tool on a body: its shape, its contact, and what it felt in the last step.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Touch {
+    pub(crate) shape: ToolShape,
+    /// The corners of the triangles for a tool of this size.
+    pub(crate) skin: Arc<Skin>,
+    /// The contact; of a tool with a shape that of the place with the largest force.
+    pub(crate) contact: Contact,
+    /// On the tool: the impulses over the full step.
+    pub(crate) wrench: Wrench,
+    /// The force that has pressed on the mean of the last milliseconds (N).
+    pub(super) steady: f64,
+    /// Where a tool with a shape touched in this tick; forces are summed over its steps.
+    felt: Vec<Felt>,
+    /// The same for whoever watches: forces are means over the last whole tick, triangles the body's.
+    points: Vec<ContactPoint>,
+    /// The nodes that the tool pressed in the last step, each with the force on it (N).
+    pressed: Vec<(u32, Vec3)>,
+}
+
+/// One place at which a tool touches.
+#[derive(Clone, Copy, Debug)]
+struct Felt {
+    /// The corners that it is between, in increasing order.
+    feature: [u32; 3],
+    weights: [f64; 3],
+    point: ContactPoint,
+    /// It pressed in the last step, with this impulse on the tool (N s).
+    is_pressing: bool,
+    impulse: Vec3,
+}
+
+impl Touch {
+    /// Of a tool with a shape on a whole body.
+    pub(crate) fn new(shape: ToolShape, skin: Arc<Skin>, contact: Contact) -> Self {
+        let room = if shape == ToolShape::Point { 0 } else { MOST_POINTS };
+        let (felt, points) = (Vec::with_capacity(room), Vec::with_capacity(room));
+        Self { shape, skin, contact, felt, points, pressed: Vec::with_capacity(40 * room), ..Self::default() }
+    }
+
+    /// True for a tool that touches with its shape: not a point, and not glued by its centre.
+    pub(crate) fn has_shape(&self) -> bool {
+        self.shape != ToolShape::Point && !self.contact.glued
+    }
+
+    /// A tick begins.
+    pub(crate) fn begin(&mut self) {
+        // What was touched at its end is remembered for one more: who stuck goes on sticking.
+        self.felt.retain(|felt| felt.is_pressing);
+        self.felt.iter_mut().for_each(|felt| felt.point.force = Vec3::zeros());
+    }
+
+    /// A tick of `steps` steps is over: forces are means over it. `id` gives the body's id of a triangle.
+    pub(crate) fn end(&mut self, steps: u32, id: impl Fn(u32) -> u32) {
+        let share = 1.0 / f64::from(steps);
+        self.points.clear();
+        self.points.extend(self.felt.iter().map(|felt| ContactPoint {
+            triangle: id(felt.point.triangle),
+            force: felt.point.force * share,
+            ..felt.point
+        }));
+    }
+
+    /// Goes on from what another one felt: `contact` gives the numbering of a contact here, `id` that of a triangle.
+    pub(crate) fn restart(
+        &mut self,
+        other: &Self,
+        contact: impl Fn(&Contact) -> Contact,
+        id: impl Fn(u32) -> Option<u32>,
+    ) {
+        (self.contact, self.wrench, self.steady) = (contact(&other.contact), Wrench::default(), other.steady);
+        self.points.clone_from(&other.points);
+        self.pressed.clear();
+        // Whether a place stuck is told by its triangle: corners have other numbers here.
+        self.felt.clear();
+        self.felt.extend(other.felt.iter().filter_map(|felt| {
+            let point = ContactPoint { triangle: id(felt.point.triangle)?, ..felt.point };
+            Some(Felt { feature: [u32::MAX; 3], point, ..*felt })
+        }));
+    }
+
+    /// Appends the triangles of a surface with nodes at `positions` (m) that the tool touches, or may touch soon, at `pose`, or if
+    /// its radius were larger by `margin` (m).
+    pub(crate) fn footprint(
+        &self,
+        (surface, positions): (&Surface, &[Vec3]),
+        pose: &Pose,
+        margin: f64,
+        triangles: &mut Vec<u32>,
+    ) {
+        let (axis, near) = (self.shape.axis(pose), FOOTPRINT * self.shape.radius() + margin);
+        for (triangle, corners) in (0..).zip(&surface.triangles) {
+            let corners = corners.map(|node| positions[node as usize]);
+            if is_near(&corners, &axis, near) && !triangles.contains(&triangle) {
+                triangles.push(triangle);
+            }
+        }
+    }
+
+    /// Adds to the `nodes` of a patch around `triangles`, in increasing order, what the corners of these triangles are made of
+    /// for this tool and can move.
+    pub(crate) fn complete(&self, body: &dyn Body, triangles: &[u32], nodes: &mut Vec<u32>) {
+        if self.skin.is_none() || self.contact.glued {
+            return;
+        }
+        let (surface, masses) = (body.surface(), body.inverse_masses());
+        let corners = triangles.iter().flat_map(|&triangle| surface.triangles[triangle as usize]);
+        let made_of = corners.flat_map(|corner| self.skin.corner(corner)).map(|&(node, _)| node);
+        nodes.extend(made_of.filter(|&node| masses[node as usize] > 0.0));
+        nodes.sort_unstable();
+        nodes.dedup();
+    }
+
+    /// The impulse on the tool in the last step at the place between these corners (N s); none if it did not press.
+    pub(super) fn impulse_at(&self, feature: &[u32; 3]) -> Vec3 {
+        let same = self.felt.iter().find(|felt| felt.is_pressing && felt.feature == *feature);
+        same.map_or_else(Vec3::zeros, |felt| felt.impulse)
+    }
+
+    /// True if the place `row` stuck in the last step.
+    pub(super) fn stuck_at(&self, feature: &[u32; 3], triangle: u32) -> bool {
+        let stuck = |felt: &Felt| felt.is_pressing && felt.point.mode == ContactMode::Stick;
+        if let Some(same) = self.felt.iter().find(|felt| felt.is_pressing && felt.feature == *feature) {
+            return stuck(same);
+        }
+        let near = self.felt.iter().find(|felt| felt.is_pressing && felt.point.triangle == triangle);
+        near.map_or(self.contact.mode == ContactMode::Stick, stuck)
+    }
+
+    /// What a tool with a shape, at `pose` after a step of `d` seconds, feels of `rows`.
+    pub(super) fn feel<'a>(&mut self, rows: impl Iterator<Item = (&'a Row, &'a [(u32, f64)])>, pose: &Pose, d: f64) {
+        self.felt.iter_mut().for_each(|felt| felt.is_pressing = false);
+        self.pressed.clear();
+        self.wrench = Wrench::default();
+        let (mut largest, mut pushed, mut sticks, mut count) = (0.0, Vec3::zeros(), true, 0);
+        let mut found = Contact { mode: ContactMode::Free, ..Contact::default() };
+        let mut lost = None;
+        for (row, nodes) in rows {
+            if row.mode == ContactMode::Lost {
+                lost = Some(row);
+            }
+            let along = row.impulse.dot(&row.normal);
+            if along <= 0.0 {
+                continue;
+            }
+            let force = row.impulse / d;
+            self.wrench += Wrench::at(row.place - pose.position, force);
+            self.pressed.extend(nodes.iter().map(|&(node, weight)| (node, -force * weight)));
+            pushed += row.normal * along;
+            sticks &= row.mode == ContactMode::Stick;
+            count += 1;
+            if along > largest {
+                largest = along;
+                found = Contact { triangle: Some(row.triangle), weights: row.weights, ..found };
+            }
+            let point =
+                ContactPoint { triangle: row.triangle, place: row.place, normal: row.normal, force, mode: row.mode };
+            let felt =
+                Felt { feature: row.feature, weights: row.weights, point, is_pressing: true, impulse: row.impulse };
+            if let Some(known) = self.felt.iter_mut().find(|felt| felt.feature == row.feature && !felt.is_pressing) {
+                let force = known.point.force + force;
+                *known = Felt { point: ContactPoint { force, ..point }, ..felt };
+            } else if self.felt.len() < MOST_POINTS {
+                self.felt.push(felt);
+            }
+        }
+        self.steady += (pushed.norm() / d - self.steady) * (d / STEADY).min(1.0);
+        self.contact = match lost {
+            _ if count > 0 => {
+                let mode = if sticks { ContactMode::Stick } else { ContactMode::Slip };
+                Contact { mode, normal: pushed.try_normalize(0.0).unwrap_or_default(), ..found }
+            }
+            Some(row) => Contact {
+                mode: ContactMode::Lost,
+                triangle: Some(row.triangle),
+                weights: row.weights,
+                normal: row.normal,
+                ..found
+            },
+            None => found,
+        };
+    }
+
+    /// What a point tool feels of its `row`, if it has one, in a step of `d` seconds.
+    pub(super) fn feel_point(&mut self, row: Option<&Row>, d: f64) {
+        self.wrench = Wrench::default();
+        if let Some(row) = row {
+            (self.contact.mode, self.contact.normal) = (row.mode, row.normal);
+            self.wrench = (row.impulse / d).into();
+        }
+    }
+
+    /// The places that it touched in the last tick.
+    pub(crate) fn points(&self) -> &[ContactPoint] {
+        &self.points
+    }
+
+    /// The nodes that it pressed in the last step, each with the force on it (N).
+    pub(crate) fn pressed(&self) -> &[(u32, Vec3)] {
+        &self.pressed
+    }
+
+    /// The area that it touches (m^2): a third of the triangles around each node that is touched, and of one that is
+    /// touched in part, that part.
+    pub(crate) fn area(&self, surface: &Surface, positions: &[Vec3]) -> f64 {
+        let mut shares = [(u32::MAX, 0.0); MOST_POINTS];
+        let mut count = 0;
+        for felt in self.felt.iter().filter(|felt| felt.is_pressing) {
+            let corners = surface.triangles[felt.point.triangle as usize];
+            for (node, weight) in corners.into_iter().zip(felt.weights).filter(|&(_, weight)| weight > 0.0) {
+                match shares[..count].iter_mut().find(|(known, _)| *known == node) {
+                    Some((_, share)) => *share += weight,
+                    None if count < MOST_POINTS => {
+                        shares[count] = (node, weight);
+                        count += 1;
+                    }
+                    None => {}
+                }
+            }
+        }
+        shares[..count].iter().map(|&(node, share)| share.min(1.0) * area_at(surface, positions, node)).sum()
+    }
+}
+
+/// True if a triangle comes as near as `distance` (m) to the segment `axis`.
+fn is_near(corners: &[Vec3; 3], axis: &[Vec3; 2], distance: f64) -> bool {
+    let boxes_meet = (0..3).all(|i| {
+        let (low, high) = corners
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), corner| (low.min(corner[i]), high.max(corner[i])));
+        axis[0][i].min(axis[1][i]) <= high + distance && axis[0][i].max(axis[1][i]) >= low - distance
+    });
+    let place = || {
+        let centre = axis[0] + (axis[1] - axis[0]) * closest::share_of_axis(axis, corners);
+        interpolate(&closest::weights(corners, &centre), corners) - centre
+    };
+    boxes_meet && place().norm_squared() <= distance * distance
+}
+
+/// A third of the triangles around a node (m^2).
+fn area_at(surface: &Surface, positions: &[Vec3], node: u32) -> f64 {
+    let area = |&t: &u32| {
+        let [a, b, c] = surface.triangles[t as usize].map(|node| positions[node as usize]);
+        (b - a).cross(&(c - a)).norm() / 6.0
+    };
+    surface.at_node(node).iter().map(area).sum()
+}

@@ -1,0 +1,193 @@
+//! What the tests of tools with a shape share: bodies, and presses and slides that are slow enough to be static.
+#![allow(dead_code)]
+
+use palpate_model::body::{Block, Body, State, Tetrahedra, Tissue, Where};
+use palpate_model::contact::{Contact, Law, ToolMotion, ToolShape};
+use palpate_model::mesh::{Face, Group, TetrahedralMesh};
+use palpate_model::simulation::{Simulation, Stepping};
+use palpate_model::{Vec3, Wrench};
+
+use crate::tissue_support::{bent::centred, body, organ, orient};
+
+/// Young's modulus of the tissue that is pressed (Pa).
+pub const YOUNG: f64 = 5000.0;
+/// Side of the block of springs (m).
+pub const SIDE: f64 = 0.1;
+
+/// A body without contact yet, at rest, with steps that are stable and no friction.
+pub fn resting(mut body: Box<dyn Body>, shape: ToolShape) -> Simulation {
+    let stepping = Stepping { tick: 1e-3, substeps: Stepping::stable_substeps(&mut *body, 1e-3) };
+    let state = State::at_rest(body.rest());
+    Simulation::new(body, state, Contact::default(), Law::default(), stepping).expect("it fits").with_shape(0, shape)
+}
+
+/// What a tool that is pressed in feels at last.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pressed {
+    pub wrench: Wrench,
+    /// Places at which it touches.
+    pub places: usize,
+    /// m^2
+    pub area: f64,
+}
+
+/// Presses a tool until its near side is `depth` (m) below `place`, along `outward`, and waits for the body to come to rest.
+pub fn press(body: Box<dyn Body>, shape: ToolShape, place: Vec3, outward: Vec3, depth: f64) -> Pressed {
+    let mut simulation = resting(body, shape);
+    let above = |tick: u32| {
+        let s = (f64::from(tick) / 60.0).min(1.0);
+        1e-4 - (depth + 1e-4) * s * s * (3.0 - 2.0 * s)
+    };
+    let at = |tick: u32| place + outward * (shape.radius() + above(tick));
+    let (mut wrench, mut before) = (Wrench::default(), f64::NAN);
+    for tick in 0..1000 {
+        wrench = simulation.tick(ToolMotion::straight(at(tick), at(tick + 1)));
+        // Tissue of little viscosity swings for long.
+        simulation.state_mut().velocities.iter_mut().for_each(|v| *v *= 0.93);
+        if tick > 100 && tick % 20 == 0 {
+            let now = wrench.force.norm();
+            if (now - before).abs() < 1e-4 * now {
+                break;
+            }
+            before = now;
+        }
+    }
+    Pressed { wrench, places: simulation.contact_points(0).len(), area: simulation.contact_area(0) }
+}
+
+/// How far below `place` (m), along `outward`, the near side of a tool is that just touches.
+pub fn first_touch(body: Box<dyn Body>, shape: ToolShape, place: Vec3, outward: Vec3) -> f64 {
+    const STEP: f64 = 2e-5;
+    let mut simulation = resting(body, shape);
+    let at = |tick: i32| place + outward * (shape.radius() + 2e-3 - STEP * f64::from(tick));
+    let touches = |&tick: &i32| simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force.norm() > 0.0;
+    let tick = (0..400).find(touches).expect("the tool comes to the body");
+    STEP * (f64::from(tick) + 0.5) - 2e-3
+}
+
+/// Forces along `outward` (N), one per tick, of a tool that is pressed in by `depth` (m), waits for the body to come to rest and
+/// then goes from `from` to `to` (m) in `seconds`.
+pub fn slide(
+    body: Box<dyn Body>,
+    shape: ToolShape,
+    [from, to]: [Vec3; 2],
+    outward: Vec3,
+    depth: f64,
+    seconds: f64,
+) -> Vec<f64> {
+    let mut simulation = resting(body, shape);
+    let in_by = |tick: i32| 1e-4 - (depth + 1e-4) * (f64::from(tick) / 200.0).min(1.0);
+    let along = |tick: i32| (f64::from(tick - 600) * 1e-3 / seconds).clamp(0.0, 1.0);
+    let at = |tick: i32| from + (to - from) * along(tick) + outward * (shape.radius() + in_by(tick));
+    let ticks = 600 + (1e3 * seconds) as i32;
+    let mut forces = Vec::new();
+    for tick in 0..ticks {
+        let force = simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force.dot(&outward);
+        if tick < 600 {
+            simulation.state_mut().velocities.iter_mut().for_each(|v| *v *= 0.93);
+        } else {
+            forces.push(force);
+        }
+    }
+    forces
+}
+
+/// How far some forces are apart, in percent of the middle between the largest and the smallest.
+pub fn spread(forces: &[f64]) -> f64 {
+    let (low, high) = forces.iter().fold((f64::MAX, f64::MIN), |(low, high), &f| (low.min(f), high.max(f)));
+    200.0 * (high - low) / (high + low)
+}
+
+/// A block of springs of 0.1 m with `nodes` per axis, its bottom held: the same material for any number, as that of 12 nodes
+/// with 30 N/m and 0.5 g.
+pub fn lattice(nodes: usize) -> Block {
+    let size = 11.0 / (nodes - 1) as f64;
+    let builder = Block::builder([nodes; 3], [SIDE; 3]).stiffness(30.0 * size).node_mass(0.5e-3 * size.powi(3));
+    builder.damping_ratio(0.3).fix(Face::ZMin).build().expect("a valid block")
+}
+
+/// Places on the top of a lattice with `nodes` per axis, around its middle.
+pub fn on_lattice(nodes: usize) -> [(&'static str, Vec3); 4] {
+    let cell = SIDE / (nodes - 1) as f64;
+    let middle = ((nodes - 1) / 2) as f64;
+    let at = |x: f64, y: f64| Vec3::new((middle + x) * cell, (middle + y) * cell, SIDE);
+    [("node", at(0.0, 0.0)), ("edge", at(0.5, 0.0)), ("diagonal", at(0.5, 0.5)), ("face", at(2.0 / 3.0, 1.0 / 3.0))]
+}
+
+/// A block of tissue, 80 mm wide and deep, its top at z = 0 with its middle at the origin: elements of `size` (m) down to
+/// `fine` (m) around that, coarser ones outside.
+pub fn graded(size: f64, fine: f64, poisson_ratio: f64) -> Tetrahedra {
+    let (half, depth) = (0.04, 0.08);
+    let side = ticks(size, fine, half);
+    let across: Vec<f64> = side.iter().skip(1).rev().map(|x| -x).chain(side.iter().copied()).collect();
+    let down: Vec<f64> = ticks(size, fine, depth).into_iter().rev().map(|z| -z).collect();
+    let axes = [&across, &across, &down];
+    let cells = axes.map(|axis| axis.len() - 1);
+    let places = |counts: [usize; 3], at: &dyn Fn(usize, usize) -> f64| -> Vec<Vec3> {
+        let n = counts.iter().product();
+        let indices = |n: usize| [n % counts[0], n / counts[0] % counts[1], n / (counts[0] * counts[1])];
+        (0..n).map(|n| Vec3::from_fn(|axis, _| at(axis, indices(n)[axis]))).collect()
+    };
+    let mut points = places(cells.map(|count| count + 1), &|axis, n| axes[axis][n]);
+    points.extend(places(cells, &|axis, n| 0.5 * (axes[axis][n] + axes[axis][n + 1])));
+    let is_held = |&node: &u32| points[node as usize].z < 1e-6 - depth;
+    let nodes = (0..points.len() as u32).filter(is_held).collect();
+    let groups = vec![Group { name: "held".to_owned(), nodes, tetrahedra: vec![] }];
+    let mut mesh = TetrahedralMesh { points, tetrahedra: centred(cells), groups };
+    orient(&mut mesh);
+    let tissue = Tissue { young_modulus: YOUNG, poisson_ratio, density: 1060.0, viscosity: 0.0 };
+    Tetrahedra::builder(mesh).tissue(tissue).fix(Where::Group("held".to_owned())).build().expect("a valid body")
+}
+
+/// From 0 to `end`: steps of `size` up to `fine`, growing ones from there.
+fn ticks(size: f64, fine: f64, end: f64) -> Vec<f64> {
+    let mut ticks = vec![0.0];
+    let (mut last, mut step) = (0.0, size);
+    while last < end {
+        if last >= fine {
+            step *= 1.3;
+        }
+        last += step;
+        ticks.push(last);
+    }
+    let from = ticks.iter().copied().find(|&x| x >= fine).unwrap_or(last).min(end);
+    let stretched = |x: f64| if x > from { from + (x - from) * (end - from) / (last - from) } else { x };
+    ticks.into_iter().map(stretched).collect()
+}
+
+/// The force of a sphere on a half space of the tissue (N), and the area that it touches (m^2).
+pub fn hertz(radius: f64, depth: f64, poisson_ratio: f64) -> (f64, f64) {
+    let modulus = YOUNG / (1.0 - poisson_ratio * poisson_ratio);
+    (4.0 / 3.0 * modulus * radius.sqrt() * depth.powf(1.5), std::f64::consts::PI * radius * depth)
+}
+
+/// A sphere in the middle of a block of tissue that is fine where it touches.
+pub fn press_tissue(radius: f64, depth: f64, poisson_ratio: f64, size: f64) -> Pressed {
+    let body = graded(size, 1.6 * (radius * depth).sqrt(), poisson_ratio);
+    press(Box::new(body), ToolShape::Sphere { radius }, Vec3::zeros(), Vec3::z(), depth)
+}
+
+/// The reference organ, held at its bottom.
+pub fn organ_body() -> Tetrahedra {
+    body(organ(), Tissue { young_modulus: YOUNG, poisson_ratio: 0.45, density: 1060.0, viscosity: 2.0 }, true)
+}
+
+/// Places on the upper surface of a body around its node that is nearest to the vertical line through `near`, and the normal
+/// there.
+pub fn on_top(body: &dyn Body, near: Vec3) -> ([(&'static str, Vec3); 3], Vec3) {
+    let (surface, rest) = (body.surface(), body.rest());
+    let corners = |t: u32| surface.triangles[t as usize];
+    let across = |t: u32| {
+        let [a, b, c] = corners(t).map(|node| rest[node as usize]);
+        (b - a).cross(&(c - a))
+    };
+    let normal = |node: u32| surface.at_node(node).iter().map(|&t| across(t)).sum::<Vec3>().normalize();
+    let is_upper = |&node: &u32| surface.has_node(node) && normal(node).z > 0.5;
+    let far = |node: u32| (rest[node as usize] - near).xy().norm();
+    let node = (0..rest.len() as u32).filter(is_upper).min_by(|&a, &b| far(a).total_cmp(&far(b))).expect("a top");
+    let triangle = surface.at_node(node)[0];
+    let [a, b, c] = corners(triangle).map(|node| rest[node as usize]);
+    let other = corners(triangle).into_iter().find(|&other| other != node).expect("three corners");
+    let edge = (rest[node as usize] + rest[other as usize]) / 2.0;
+    ([("node", rest[node as usize]), ("edge", edge), ("face", (a + b + c) / 3.0)], normal(node))
+}

@@ -1,0 +1,130 @@
+//! What a sphere feels against the continuum, wherever the nodes lie, and on finer and finer meshes, and a point beside it: the
+//! tables of docs/tissue.md.
+//!
+//! Look for: ratios to Hertz near one, spreads of a few percent for spheres where points feel a factor, and forces under
+//! refinement that come to a limit.
+//!
+//! `cargo run --release -p palpate-cli --example tool_convergence [-- slide|places|refine|hertz|all]`: without a word the slide,
+//! which takes seconds.
+
+#[path = "../../src/model/tests/tissue_support/mod.rs"]
+mod tissue_support;
+#[path = "../../src/model/tests/tool_support/mod.rs"]
+mod tool_support;
+
+use palpate_model::Vec3;
+use palpate_model::body::Body;
+use palpate_model::contact::ToolShape;
+use tool_support::*;
+
+const DEPTH: f64 = 3e-3;
+/// Sides of elements (m).
+const SIZES: [f64; 4] = [4e-3, 2.5e-3, 1.8e-3, 1.5e-3];
+const RATIOS: [f64; 3] = [0.3, 0.45, 0.49];
+
+fn main() {
+    let asked = std::env::args().nth(1).unwrap_or_else(|| "slide".to_owned());
+    let parts: [(&str, fn()); 4] =
+        [("slide", slides), ("places", places), ("refine", refinement), ("hertz", table_of_hertz)];
+    parts.into_iter().filter(|(name, _)| asked == "all" || asked == *name).for_each(|(_, part)| part());
+}
+
+fn table_of_hertz() {
+    println!("\n| R, depth (mm) | nu | 4.0 mm | 2.5 mm | 1.8 mm | 1.5 mm |");
+    println!("| --- | ---: | {}", "---: | ".repeat(SIZES.len()).trim_end());
+    for (radius, depth) in [(6e-3, 1e-3), (10e-3, 2e-3), (15e-3, 3e-3)] {
+        for ratio in RATIOS {
+            let (force, area) = hertz(radius, depth, ratio);
+            let cells = SIZES.map(|size| {
+                let pressed = press_tissue(radius, depth, ratio, size);
+                let (share, area) = (pressed.wrench.force.z / force, pressed.area / area);
+                format!("{share:.3} ({}, {area:.2})", pressed.places)
+            });
+            println!("| {:.0}, {:.0} | {ratio} | {} |", 1e3 * radius, 1e3 * depth, cells.join(" | "));
+        }
+    }
+}
+
+/// Radii (m) of the spheres, a point first.
+const RADII: [f64; 5] = [0.0, 4e-3, 8e-3, 12e-3, 20e-3];
+
+fn shape(radius: f64) -> ToolShape {
+    if radius > 0.0 { ToolShape::Sphere { radius } } else { ToolShape::Point }
+}
+
+fn name(radius: f64) -> String {
+    if radius > 0.0 { format!("sphere, {:.0} mm", 1e3 * radius) } else { "point".to_owned() }
+}
+
+fn places() {
+    println!("\n| lattice, 3 mm deep | node | edge | diagonal | face | spread (%) |");
+    println!("| --- | ---: | ---: | ---: | ---: | ---: |");
+    for radius in RADII {
+        let forces = on_lattice(12)
+            .map(|(_, place)| press(Box::new(lattice(12)), shape(radius), place, Vec3::z(), DEPTH).wrench.force.z);
+        println!("| {} | {} | {:.1} |", name(radius), newtons(&forces), spread(&forces));
+    }
+    let organ = organ_body();
+    let middle = organ.rest().iter().sum::<Vec3>() / organ.rest().len() as f64;
+    for offset in [Vec3::zeros(), Vec3::x() * 0.015, Vec3::y() * 0.015, Vec3::x() * -0.015, Vec3::y() * -0.015] {
+        let (places, outward) = on_top(&organ, middle + offset);
+        println!(
+            "\n| organ near {:.0?} mm, 3 mm deep | node | edge | face | spread (%) | spread from the facet (%) |",
+            1e3 * places[0].1
+        );
+        println!("| --- | ---: | ---: | ---: | ---: | ---: |");
+        for radius in RADII {
+            let force = |place: Vec3, depth: f64| {
+                press(Box::new(organ_body()), shape(radius), place, outward, depth).wrench.force.dot(&outward)
+            };
+            let touched = |place: Vec3| first_touch(Box::new(organ_body()), shape(radius), place, outward);
+            let forces = places.map(|(_, place)| force(place, DEPTH + touched(place)));
+            let facets = places.map(|(_, place)| force(place, DEPTH));
+            println!("| {} | {} | {:.1} | {:.1} |", name(radius), newtons(&forces), spread(&forces), spread(&facets));
+        }
+    }
+}
+
+fn newtons(forces: &[f64]) -> String {
+    forces.iter().map(|force| format!("{force:.4} N")).collect::<Vec<_>>().join(" | ")
+}
+
+fn slides() {
+    println!("\n| slide over four cells of the lattice | mean (N) | from least to most (%) |");
+    println!("| --- | ---: | ---: |");
+    let cell = SIDE / 11.0;
+    let path = [3.5, 7.5].map(|x| Vec3::new(x * cell, 0.0512, SIDE));
+    for radius in RADII {
+        let forces = slide(Box::new(lattice(12)), shape(radius), path, Vec3::z(), DEPTH, 4.0);
+        let mean = forces.iter().sum::<f64>() / forces.len() as f64;
+        println!("| {} | {mean:.4} | {:.2} |", name(radius), spread(&forces));
+    }
+}
+
+fn refinement() {
+    const NODES: [usize; 5] = [8, 12, 16, 20, 24];
+    println!("\n| middle of the block, 3 mm deep | {} | order |", NODES.map(|n| n.to_string()).join(" | "));
+    println!("| --- | {}---: |", "---: | ".repeat(NODES.len()));
+    for radius in RADII {
+        let middle = Vec3::new(0.5 * SIDE, 0.5 * SIDE, SIDE);
+        let forces =
+            NODES.map(|nodes| press(Box::new(lattice(nodes)), shape(radius), middle, Vec3::z(), DEPTH).wrench.force.z);
+        println!("| {} | {} | {} |", name(radius), newtons(&forces), order(&NODES, &forces));
+    }
+}
+
+/// The order p for which the forces on the last three lattices are f + c h^p.
+fn order(nodes: &[usize; 5], forces: &[f64; 5]) -> String {
+    let size = |n: usize| 1.0 / (nodes[n] - 1) as f64;
+    let ratio = (forces[2] - forces[3]) / (forces[3] - forces[4]);
+    let of = |p: f64| (size(2).powf(p) - size(3).powf(p)) / (size(3).powf(p) - size(4).powf(p));
+    let (mut low, mut high) = (0.01, 8.0);
+    if !(of(low) < ratio && ratio < of(high)) {
+        return "none".to_owned();
+    }
+    for _ in 0..60 {
+        let p = 0.5 * (low + high);
+        if of(p) < ratio { low = p } else { high = p }
+    }
+    format!("{low:.1}")
+}
