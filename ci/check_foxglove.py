@@ -131,6 +131,10 @@ class Scenes:
             along = [1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)]
             if newton > 0 and math.dist([a * newton for a in along], [force.x, force.y, force.z]) > 1e-6 * newton:
                 problems.append(f"/scene: the arrow of {force} points along {along}")
+            # Of a tool with a shape: a ball and an arrow at each place that it touches.
+            touched = entities.pop(f"{of}contacts", None)
+            if touched and len(touched.arrows) != len(touched.spheres):
+                problems.append(f"/scene: {len(touched.arrows)} arrows at {len(touched.spheres)} contacts of {device}")
         return problems + [f"/scene: an entity {name} of no device" for name in entities]
 
 

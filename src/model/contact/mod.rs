@@ -11,7 +11,7 @@
 //! force on the tool: J / d
 //! ```
 //!
-//! Several tools are resolved one after the other. An implicit step differs in v*, which comes from a linear system, and in the
+//! Several tools, and the places of one with a shape, are resolved together. An implicit step differs in v*, which comes from a linear system, and in the
 //! impulse, which moves every node.
 
 mod closest;

@@ -48,6 +48,11 @@ impl Nearness {
         }
     }
 
+    /// True if no place sinks in.
+    pub(super) fn is_none(&self) -> bool {
+        self.is_none
+    }
+
     /// What presses at a place is `load` (N s) now.
     pub(super) fn change(&mut self, place: usize, load: f64) {
         if self.is_none {

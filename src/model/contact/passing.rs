@@ -5,10 +5,16 @@ use super::skin::Skin;
 use super::swept::{Hit, passed_through};
 use crate::Vec3;
 
-/// The earliest triangle, as smoothed for a tool, through which a point of the tool's axis comes in on its straight way.
-pub(super) fn first(body: &Deformable<'_>, skin: &Skin, way: [Vec3; 2], d: f64) -> Option<Hit> {
+/// The earliest of the triangles `candidates`, as smoothed for a tool, through which a point of the tool's axis comes in on its straight way.
+pub(super) fn first(
+    body: &Deformable<'_>,
+    candidates: impl Iterator<Item = u32>,
+    skin: &Skin,
+    way: [Vec3; 2],
+    d: f64,
+) -> Option<Hit> {
     let mut best: Option<Hit> = None;
-    for &triangle in body.candidates {
+    for triangle in candidates {
         if !body.is_within(skin, triangle, &way, 0.0, d) {
             continue;
         }

@@ -18,6 +18,9 @@ const MAX_DEPTH: f64 = 5e-3;
 /// A place of which less than this share can move is held: its few movable nodes would have to fly.
 const HELD: f64 = 0.1;
 
+/// A node that a search has met.
+const MARKED: u8 = 1 << 7;
+
 /// A tool that sinks in less than this beside the elements does not (m).
 const NEXT_TO_NOTHING: f64 = 1e-7;
 
@@ -50,6 +53,12 @@ pub(crate) struct Rows {
     pub(super) before: Vec<Vec3>,
     /// A number for each node of the body; zeros between steps.
     pub(super) at_nodes: Vec<f64>,
+    /// The place of each node in the list of a row, from one on; zeros but while that list is made.
+    listed: Vec<u32>,
+    /// On which sides of the box around a tool each node stays in the step, a bit for each, and `MARKED`.
+    sides: Vec<u8>,
+    /// The corner at each marked node as the tool meets it at the end of the step (m).
+    corners: Vec<Vec3>,
 }
 
 impl Rows {
@@ -66,6 +75,9 @@ impl Rows {
             closing: Vec::with_capacity(rows),
             before: Vec::with_capacity(rows),
             at_nodes: Vec::new(),
+            listed: Vec::new(),
+            sides: Vec::new(),
+            corners: Vec::new(),
         }
     }
 
@@ -79,6 +91,9 @@ impl Rows {
     /// Makes room for a body of `nodes` nodes.
     pub(crate) fn make_room(&mut self, nodes: usize) {
         self.at_nodes.resize(nodes, 0.0);
+        self.listed.resize(nodes, 0);
+        self.sides.resize(nodes, 0);
+        self.corners.resize(nodes, Vec3::zeros());
     }
 
     pub(super) fn clear(&mut self) {
@@ -156,12 +171,33 @@ impl Rows {
         d: f64,
     ) {
         self.near.clear();
+        self.find_sides(body, touch, motion, d);
         if !self.find_passed(body, touch, motion, d) {
             self.find_near(body, touch, &motion.to, d);
         }
         for place in 0..self.near.len() {
             let near = self.near[place];
             self.add(body, (tool, touch), motion, d, near);
+        }
+    }
+
+    /// Tells where nodes stay of the box around the way of a tool with all that it may touch: a triangle whose corners stay on one
+    /// side of it is not looked at again.
+    fn find_sides(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) {
+        let axes = [touch.shape.axis(&motion.from), touch.shape.axis(&motion.to)].into_iter().flatten();
+        let (low, high) = axes
+            .fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(low, high), end| {
+                (low.inf(&end), high.sup(&end))
+            });
+        let around = Vec3::repeat(touch.shape.radius() + MAX_DEPTH + touch.skin.reach());
+        let (low, high) = (low - around, high + around);
+        for ((sides, x), v) in self.sides.iter_mut().zip(&*body.positions).zip(&*body.velocities) {
+            let end = x + v * d;
+            *sides = (0..3).fold(0, |sides, i| {
+                let below = u8::from(x[i].max(end[i]) < low[i]);
+                let above = u8::from(x[i].min(end[i]) > high[i]);
+                sides << 2 | below << 1 | above
+            });
         }
     }
 
@@ -173,7 +209,8 @@ impl Rows {
         for end in 0..ends {
             let share = [0.0, 1.0, 0.5][end];
             let [from, to] = [from, to].map(|[a, b]| a + (b - a) * share);
-            let Some(hit) = passing::first(body, skin, [from, to], d) else { continue };
+            let candidates = body.candidates.iter().copied().filter(|&triangle| meets(&self.sides, body, triangle));
+            let Some(hit) = passing::first(body, candidates, skin, [from, to], d) else { continue };
             let corners = body.smoothed_corners(skin, hit.triangle, d);
             let place = interpolate(&hit.weights, &corners);
             let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
@@ -191,10 +228,20 @@ impl Rows {
         // The nearest place in front of the surface, and the nearest behind it.
         let (mut front, mut behind) = (f64::INFINITY, None::<Near>);
         for &triangle in body.candidates {
-            if !body.is_within(skin, triangle, &axis, radius + MAX_DEPTH, d) {
+            if !meets(&self.sides, body, triangle) {
                 continue;
             }
-            let corners = body.smoothed_corners(skin, triangle, d);
+            // Triangles share corners.
+            let corners = body.corners(triangle).map(|node| {
+                if self.sides[node] & MARKED == 0 {
+                    self.sides[node] |= MARKED;
+                    self.corners[node] = body.smoothed_corner(skin, node as u32, d);
+                }
+                self.corners[node]
+            });
+            if !is_around(&axis, radius + MAX_DEPTH, &corners) {
+                continue;
+            }
             let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
             let depths = body.corners(triangle).map(|node| skin.depth(node));
             let shares = [closest::share_of_axis(&axis, &corners), 0.0, 1.0];
@@ -260,13 +307,17 @@ impl Rows {
             let shares = touch.skin.corner(node);
             let alone = [(node, 1.0)];
             for &(node, share) in if shares.is_empty() { &alone[..] } else { shares } {
-                match self.nodes[first..].iter_mut().find(|(known, _)| *known == node) {
-                    Some((_, known)) => *known += weight * share,
-                    None => self.nodes.push((node, weight * share)),
+                // Corners share nodes.
+                let place = &mut self.listed[node as usize];
+                if *place == 0 {
+                    self.nodes.push((node, 0.0));
+                    *place = (self.nodes.len() - first) as u32;
                 }
+                self.nodes[first + *place as usize - 1].1 += weight * share;
             }
         }
         let nodes = &self.nodes[first..];
+        nodes.iter().for_each(|&(node, _)| self.listed[node as usize] = 0);
         let mean =
             |vectors: &[Vec3]| nodes.iter().fold(Vec3::zeros(), |sum, &(node, w)| sum + vectors[node as usize] * w);
         let compliance: f64 = nodes.iter().map(|&(node, w)| w * w * body.inverse_masses[node as usize]).sum();
@@ -314,4 +365,16 @@ impl Rows {
             nodes: (first, self.nodes.len()),
         });
     }
+}
+
+/// False if the corners of a triangle are all on one side of the box.
+fn meets(sides: &[u8], body: &Deformable<'_>, triangle: u32) -> bool {
+    body.corners(triangle).iter().fold(!MARKED, |common, &node| common & sides[node]) == 0
+}
+
+/// False if a triangle is surely farther than `distance` (m) from the axis.
+fn is_around(axis: &[Vec3; 2], distance: f64, [a, b, c]: &[Vec3; 3]) -> bool {
+    let (low, high) = (a.inf(b).inf(c), a.sup(b).sup(c));
+    let [from, to] = axis;
+    (0..3).all(|i| from[i].min(to[i]) <= high[i] + distance && from[i].max(to[i]) >= low[i] - distance)
 }

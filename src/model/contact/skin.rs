@@ -41,6 +41,8 @@ pub(crate) struct Skin {
     depths: Vec<f64>,
     /// Of each node; empty if the body's contact modulus is not known.
     grains: Vec<Grain>,
+    /// No smoothed corner is farther than this from its node (m), unless its triangles are stretched to more than twice their size.
+    reach: f64,
 }
 
 impl Skin {
@@ -49,9 +51,10 @@ impl Skin {
         let (surface, rest, moduli) = (body.surface(), body.rest(), body.contact_moduli());
         let normals: Vec<Vec3> = (0..rest.len() as u32).map(|node| normal_at(surface, rest, node)).collect();
         let (mut starts, mut shares, mut depths) = (vec![0], Vec::new(), Vec::with_capacity(rest.len()));
-        let (mut found, mut grains) = (Vec::new(), Vec::new());
+        let (mut found, mut grains, mut longest) = (Vec::new(), Vec::new(), 0.0_f64);
         for node in 0..rest.len() as u32 {
             let (edge, sigma) = corner(surface, rest, &normals, node, radius, &mut found);
+            longest = longest.max(edge);
             if let Some(&modulus) = moduli.get(node as usize) {
                 grains.push(Grain {
                     share: ramp(edge / radius, EDGES),
@@ -69,7 +72,8 @@ impl Skin {
         if shares.len() == rest.len() {
             (starts, shares, depths) = Default::default();
         }
-        Self { starts, shares, depths, grains }
+        let reach = if starts.is_empty() { 0.0 } else { 2.0 * longest };
+        Self { starts, shares, depths, grains, reach }
     }
 
     /// How coarse the surface is for the tool.
@@ -112,6 +116,11 @@ impl Skin {
         (mean.modulus > 0.0).then_some(mean)
     }
 
+    /// How far smoothed corners may be from their nodes (m).
+    pub(super) fn reach(&self) -> f64 {
+        self.reach
+    }
+
     /// How far the corner of `node` lies below it at rest (m).
     pub(super) fn depth(&self, node: usize) -> f64 {
         self.depths.get(node).copied().unwrap_or(0.0)
@@ -124,6 +133,7 @@ impl Skin {
         local.shares.clear();
         local.depths.clear();
         local.grains.clear();
+        local.reach = self.reach;
         if !self.grains.is_empty() {
             local.grains.extend(nodes.iter().map(|&node| self.grains[node as usize]));
         }

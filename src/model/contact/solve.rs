@@ -11,11 +11,13 @@ use super::{ContactMode, Law};
 use crate::Vec3;
 use crate::linear::ImplicitStep;
 
-/// Sweeps to and fro at most for one place, and for however many: few places that lie close together take the most.
-const MOST_SWEEPS: [usize; 2] = [1000, 60];
+/// Sweeps to and fro at most, of places on the body's own nodes, and of places that sink in for one and for however many: few of these
+/// that lie close together take the most.
+const MOST_SWEEPS: usize = 20;
+const MOST_SUNKEN_SWEEPS: [usize; 2] = [1000, 60];
 /// Sweeps that change how fast places close by less than this share of what the impulses do are the last. Impulses themselves
 /// need not come to rest: places on the same nodes may share theirs in many ways.
-const FOUND: f64 = 1e-8;
+const FOUND: f64 = 1e-7;
 /// Rounds in which the depth that a tool sinks in is found.
 const MOST_ROUNDS: usize = 16;
 
@@ -101,13 +103,18 @@ fn sweep<C: Copy + Mul<Vec3, Output = Vec3>>(
         answer(closing, place, row.impulse);
     }
     nearness.find(rows);
+    let most = if nearness.is_none() {
+        MOST_SWEEPS
+    } else {
+        (MOST_SUNKEN_SWEEPS[0] / count.max(1)).max(MOST_SUNKEN_SWEEPS[1])
+    };
     for _ in 0..MOST_ROUNDS {
         for (place, row) in rows.iter_mut().enumerate() {
             if let Some((sinking, _)) = &row.sinking {
                 row.sunk = sinking.tangent(nearness.load(place) / d);
             }
         }
-        for _ in 0..(MOST_SWEEPS[0] / count.max(1)).max(MOST_SWEEPS[1]) {
+        for _ in 0..most {
             before.clone_from(closing);
             for place in (0..count).chain((0..count).rev()) {
                 let row = &mut rows[place];
