@@ -17,6 +17,7 @@
 mod closest;
 mod coupled;
 mod deformable;
+mod exact;
 mod friction;
 mod nearness;
 mod paper;

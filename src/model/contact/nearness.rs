@@ -64,6 +64,17 @@ impl Nearness {
         self.beside.iter_mut().zip(shares).for_each(|(beside, share)| *beside += share * more);
     }
 
+    /// How much of a load at one place counts as one at another; all of it at itself.
+    pub(super) fn share(&self, of: usize, at: usize) -> f64 {
+        if of == at {
+            1.0
+        } else if self.is_none {
+            0.0
+        } else {
+            self.shares[of * self.loads.len() + at]
+        }
+    }
+
     /// What presses around a place on the same tool, beside its own load (N s).
     pub(super) fn beside(&self, place: usize) -> f64 {
         self.beside[place]

@@ -2,6 +2,7 @@
 
 use super::closest;
 use super::deformable::Deformable;
+use super::exact::Exact;
 use super::nearness::Nearness;
 use super::passing;
 use super::resolve::{IMMOVABLE, Place, RECOVERY, approach};
@@ -45,6 +46,7 @@ pub(crate) struct Rows {
     pub(super) nodes: Vec<(u32, f64)>,
     near: Vec<Near>,
     pub(super) nearness: Nearness,
+    pub(super) exact: Exact,
     /// How each place answers to an impulse at each (1/kg): in an explicit step, and in an implicit one.
     pub(super) shared: Vec<f64>,
     pub(super) coupling: Vec<Mat3>,
@@ -70,6 +72,7 @@ impl Rows {
             nodes: Vec::with_capacity(40 * rows),
             near: Vec::with_capacity(MOST_POINTS),
             nearness: Nearness::with_room(rows),
+            exact: Exact::default(),
             shared: Vec::with_capacity(rows * rows),
             coupling: Vec::new(),
             closing: Vec::with_capacity(rows),

@@ -3,6 +3,7 @@
 use std::ops::Mul;
 
 use super::deformable::Deformable;
+use super::exact::Exact;
 use super::nearness::Nearness;
 use super::resolve::IMMOVABLE;
 use super::row::Row;
@@ -14,10 +15,13 @@ use crate::linear::ImplicitStep;
 /// Sweeps to and fro at most, of places on the body's own nodes, and of places that sink in for one and for however many: few of these
 /// that lie close together take the most.
 const MOST_SWEEPS: usize = 20;
-const MOST_SUNKEN_SWEEPS: [usize; 2] = [1000, 60];
+const MOST_SUNKEN_SWEEPS: [usize; 2] = [400, 40];
 /// Sweeps that change how fast places close by less than this share of what the impulses do are the last. Impulses themselves
 /// need not come to rest: places on the same nodes may share theirs in many ways.
 const FOUND: f64 = 1e-7;
+/// Sweeps after which what they found of modes is used.
+const SWEEPS_BETWEEN: usize = 3;
+const MOST_EXACT: usize = 8;
 /// Rounds in which the depth that a tool sinks in is found.
 const MOST_ROUNDS: usize = 16;
 
@@ -25,7 +29,7 @@ impl Rows {
     /// Changes the velocities so that no place is entered, none pulls and each impulse is in its cone. Rows meet at shared nodes;
     /// sweeps go to and fro, so that none of them has the last word.
     pub(super) fn solve(&mut self, body: &mut Deformable<'_>, law: &Law, d: f64) {
-        let Self { rows, nodes, at_nodes, shared, closing, before, nearness, .. } = self;
+        let Self { rows, nodes, at_nodes, shared, closing, before, nearness, exact, .. } = self;
         let of = |row: &Row| &nodes[row.nodes.0..row.nodes.1];
         // Masses are lumped: an impulse is felt where its nodes are, along itself.
         let count = rows.len();
@@ -39,7 +43,7 @@ impl Rows {
             of(row).iter().for_each(|&(node, _)| at_nodes[node as usize] = 0.0);
         }
         find_closing(body, rows, nodes, closing);
-        sweep(rows, nearness, shared, [closing, before], law, d);
+        sweep(rows, (nearness, exact), shared, [closing, before], law, d);
         for row in rows.iter() {
             for &(node, w) in of(row) {
                 body.velocities[node as usize] -= row.impulse * (w * body.inverse_masses[node as usize]);
@@ -49,7 +53,7 @@ impl Rows {
 
     /// The same for an implicit step, in which every node answers to an impulse, and not along it.
     pub(super) fn solve_coupled(&mut self, body: &mut Deformable<'_>, system: &ImplicitStep, law: &Law) {
-        let Self { rows, nodes, coupling, closing, before, nearness, .. } = self;
+        let Self { rows, nodes, coupling, closing, before, nearness, exact, .. } = self;
         let of = |row: &Row| &nodes[row.nodes.0..row.nodes.1];
         let count = rows.len();
         coupling.clear();
@@ -66,7 +70,7 @@ impl Rows {
             }
         }
         find_closing(body, rows, nodes, closing);
-        sweep(rows, nearness, coupling, [closing, before], law, system.step());
+        sweep(rows, (nearness, exact), coupling, [closing, before], law, system.step());
         for row in rows.iter() {
             system.push_all(body.velocities, of(row), row.impulse);
         }
@@ -87,7 +91,7 @@ fn find_closing(body: &Deformable<'_>, rows: &[Row], nodes: &[(u32, f64)], closi
 /// force meanwhile, and made anew until it is what it was taken to be.
 fn sweep<C: Copy + Mul<Vec3, Output = Vec3>>(
     rows: &mut [Row],
-    nearness: &mut Nearness,
+    (nearness, exact): (&mut Nearness, &mut Exact),
     coupling: &[C],
     [closing, before]: [&mut Vec<Vec3>; 2],
     law: &Law,
@@ -114,7 +118,7 @@ fn sweep<C: Copy + Mul<Vec3, Output = Vec3>>(
                 row.sunk = sinking.tangent(nearness.load(place) / d);
             }
         }
-        for _ in 0..most {
+        for turn in 1..=most {
             before.clone_from(closing);
             for place in (0..count).chain((0..count).rev()) {
                 let row = &mut rows[place];
@@ -127,6 +131,20 @@ fn sweep<C: Copy + Mul<Vec3, Output = Vec3>>(
             let done = rows.iter().fold(0.0_f64, |most, row| most.max(row.impulse.norm() * row.compliance));
             if change <= FOUND * done {
                 break;
+            }
+            // Sweeps have the last word: they alone keep every place in its cone.
+            let is_due = !nearness.is_none()
+                && turn % SWEEPS_BETWEEN == 0
+                && turn + SWEEPS_BETWEEN <= most.min(MOST_EXACT * SWEEPS_BETWEEN);
+            if is_due && exact.solve(rows, nearness, coupling, closing, d) {
+                let part = exact.part(rows);
+                for (place, change) in exact.changes() {
+                    rows[place].impulse += change * part;
+                    answer(closing, place, change * part);
+                }
+                for (place, row) in rows.iter().enumerate() {
+                    nearness.change(place, row.impulse.dot(&row.normal));
+                }
             }
         }
         let is_as_taken = |(place, row): (usize, &Row)| {

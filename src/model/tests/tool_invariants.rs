@@ -16,8 +16,8 @@ const STEP: Stepping = Stepping { tick: 0.5e-3, substeps: 1 };
 
 /// What the order of places may change: sweeps end before they converge where many places share nodes.
 const ORDER: f64 = 1e-3;
-/// The same for the numbers of triangles, where places of one tool lie nearly on each other and share what it sinks in.
-const TRIANGLES: f64 = 2e-2;
+/// The same for the numbers of triangles.
+const TRIANGLES: f64 = 2e-3;
 
 /// A body whose triangles are numbered in another order, or whose nodes are all free.
 #[derive(Debug)]
@@ -309,8 +309,8 @@ fn a_closed_frictionless_circle_gives_a_sphere_no_energy() {
     }
     for (zeta, (got, stored)) in cases {
         assert!(stored > 1e-4, "the tool did press");
-        // Wanted: nothing from zeta 0.01 on, 1 % below. Reached: 1.7 % at zeta 0.01.
-        assert!(got <= 0.02 * stored, "zeta {zeta}: {got} J");
+        // Wanted: nothing from zeta 0.01 on, 1 % below. Reached: 0.7 % at zeta 0.01.
+        assert!(got <= 0.01 * stored, "zeta {zeta}: {got} J");
     }
 }
 

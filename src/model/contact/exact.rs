@@ -1,0 +1,163 @@
+//! The impulses of places whose modes are known, from one linear system.
+//!
+//! Sweeps are slow where places lie so close together that one can stand for another. Once they have told which places press,
+//! stick and slip, what is left is linear.
+
+use std::ops::Mul;
+
+use super::ContactMode;
+use super::nearness::Nearness;
+use super::row::Row;
+use crate::Vec3;
+
+/// More unknowns than this are left to the sweeps.
+const MOST_UNKNOWNS: usize = 64;
+/// Places that can stand for each other make the system singular; so much more of its diagonal does not.
+const MORE: f64 = 1e-10;
+
+/// One unknown of the system.
+#[derive(Clone, Copy, Debug)]
+struct Unknown {
+    place: usize,
+    /// The impulse for one of it.
+    push: Vec3,
+    /// The direction in which the place must close as it may.
+    test: Vec3,
+    /// It is what presses, and the tool may sink in.
+    presses: bool,
+}
+
+/// The system, with room for the largest.
+#[derive(Clone, Debug)]
+pub(super) struct Exact {
+    unknowns: Vec<Unknown>,
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl Default for Exact {
+    fn default() -> Self {
+        Self {
+            unknowns: Vec::with_capacity(MOST_UNKNOWNS),
+            matrix: Vec::with_capacity(MOST_UNKNOWNS * MOST_UNKNOWNS),
+            right: Vec::with_capacity(MOST_UNKNOWNS),
+        }
+    }
+}
+
+impl Exact {
+    /// The changes of the impulses (N s), place after place, after which `rows` close as their modes demand. Directions of sliding stay
+    /// what they are. `false` if there is no such change, or too many unknowns. `coupling` and `closing` are those of the sweeps.
+    pub(super) fn solve<C: Copy + Mul<Vec3, Output = Vec3>>(
+        &mut self,
+        rows: &[Row],
+        nearness: &Nearness,
+        coupling: &[C],
+        closing: &[Vec3],
+        d: f64,
+    ) -> bool {
+        self.unknowns.clear();
+        for (place, row) in rows.iter().enumerate() {
+            if self.unknowns.len() + 3 > MOST_UNKNOWNS {
+                return false;
+            }
+            let n = row.normal;
+            let pressed = row.impulse.dot(&n);
+            match row.mode {
+                ContactMode::Stick => {
+                    let across = if n.x.abs() < 0.6 { n.cross(&Vec3::x()) } else { n.cross(&Vec3::y()) }.normalize();
+                    let unknown = |axis: Vec3, presses| Unknown { place, push: axis, test: axis, presses };
+                    let presses = !row.glued;
+                    self.unknowns.extend([
+                        unknown(n, presses),
+                        unknown(across, false),
+                        unknown(n.cross(&across), false),
+                    ]);
+                }
+                ContactMode::Slip if pressed > 0.0 => {
+                    self.unknowns.push(Unknown { place, push: row.impulse / pressed, test: n, presses: true });
+                }
+                _ => {}
+            }
+        }
+        let count = rows.len();
+        (self.matrix.clear(), self.right.clear());
+        for one in &self.unknowns {
+            let row = &rows[one.place];
+            let allowed = if one.presses { row.allowed + row.sunk.at(nearness.load(one.place) / d) / d } else { 0.0 };
+            self.right.push(one.test.dot(&closing[one.place]) - allowed);
+            for other in &self.unknowns {
+                let mut answer = one.test.dot(&(coupling[other.place * count + one.place] * other.push));
+                if one.presses && other.presses {
+                    answer += row.sunk.slope / (d * d) * nearness.share(other.place, one.place);
+                }
+                self.matrix.push(answer);
+            }
+        }
+        eliminate(&mut self.matrix, &mut self.right)
+    }
+
+    /// What was found, as a change (N s) of the impulse at each place; a place may come more than once.
+    pub(super) fn changes(&self) -> impl Iterator<Item = (usize, Vec3)> {
+        self.unknowns.iter().zip(&self.right).map(|(unknown, amount)| (unknown.place, unknown.push * *amount))
+    }
+
+    /// The part of the changes, at most all of them, up to which no place pulls.
+    pub(super) fn part(&self, rows: &[Row]) -> f64 {
+        let pressing = self.unknowns.iter().zip(&self.right).filter(|(unknown, _)| unknown.presses);
+        pressing.fold(1.0, |part, (unknown, &more)| {
+            let row = &rows[unknown.place];
+            let pressed = row.impulse.dot(&row.normal);
+            if pressed + more < 0.0 { part.min(pressed / -more) } else { part }
+        })
+    }
+}
+
+/// Solves a dense system in place, row by row, by elimination with row pivots; `false` if it is singular.
+fn eliminate(matrix: &mut [f64], right: &mut [f64]) -> bool {
+    let n = right.len();
+    (0..n).for_each(|i| matrix[i * n + i] *= 1.0 + MORE);
+    for column in 0..n {
+        let size = |row: usize| matrix[row * n + column].abs();
+        let pivot = (column..n).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(column);
+        if !(size(pivot) > 0.0 && size(pivot).is_finite()) {
+            return false;
+        }
+        if pivot != column {
+            (column..n).for_each(|k| matrix.swap(pivot * n + k, column * n + k));
+            right.swap(pivot, column);
+        }
+        let (done, left) = matrix.split_at_mut((column + 1) * n);
+        let upper = &done[column * n..];
+        let known = right[column];
+        for (row, right) in left.chunks_exact_mut(n).zip(&mut right[column + 1..]) {
+            let share = row[column] / upper[column];
+            if share != 0.0 {
+                row[column..].iter_mut().zip(&upper[column..]).for_each(|(value, upper)| *value -= share * upper);
+                *right -= share * known;
+            }
+        }
+    }
+    for row in (0..n).rev() {
+        let known: f64 = (row + 1..n).map(|k| matrix[row * n + k] * right[k]).sum();
+        right[row] = (right[row] - known) / matrix[row * n + row];
+    }
+    right.iter().all(|value| value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn elimination_solves_and_tells_what_it_cannot() {
+        let mut right = [5.0, 10.0, 7.0];
+        // Without row pivots the first would be zero.
+        assert!(eliminate(&mut [0.0, 1.0, 1.0, 2.0, 1.0, 2.0, 1.0, 3.0, 0.0], &mut right));
+        for (found, known) in right.into_iter().zip([1.0, 2.0, 3.0]) {
+            assert!((found - known).abs() < 1e-8, "{right:?}");
+        }
+        assert!(!eliminate(&mut [0.0; 4], &mut [1.0, 1.0]));
+        assert!(!eliminate(&mut [f64::NAN; 1], &mut [1.0]));
+    }
+}
