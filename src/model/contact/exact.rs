@@ -81,7 +81,8 @@ impl Exact {
             }
         }
         let count = rows.len();
-        (self.matrix.clear(), self.right.clear());
+        self.matrix.clear();
+        self.right.clear();
         for one in &self.unknowns {
             let row = &rows[one.place];
             let allowed = if one.presses { row.allowed + row.sunk.at(nearness.load(one.place) / d) / d } else { 0.0 };

@@ -19,6 +19,7 @@ mod coupled;
 mod deformable;
 mod exact;
 mod friction;
+mod near;
 mod nearness;
 mod paper;
 mod passing;

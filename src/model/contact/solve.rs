@@ -19,7 +19,7 @@ const MOST_SUNKEN_SWEEPS: [usize; 2] = [400, 40];
 /// Sweeps that change how fast places close by less than this share of what the impulses do are the last. Impulses themselves
 /// need not come to rest: places on the same nodes may share theirs in many ways.
 const FOUND: f64 = 1e-7;
-/// Sweeps after which what they found of modes is used.
+/// Sweeps after which what they found of modes is used, and how often at most.
 const SWEEPS_BETWEEN: usize = 3;
 const MOST_EXACT: usize = 8;
 /// Rounds in which the depth that a tool sinks in is found.

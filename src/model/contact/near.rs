@@ -1,0 +1,192 @@
+//! The search for the places at which a tool with a shape may touch in a step.
+
+use super::ToolMotion;
+use super::closest;
+use super::deformable::Deformable;
+use super::passing;
+use super::touch::{MOST_POINTS, Touch};
+use super::triangle::interpolate;
+use crate::{Pose, Vec3};
+
+/// A centre that is farther than this below the surface, beside the tool's radius, has lost it (m).
+const MAX_DEPTH: f64 = 5e-3;
+
+/// A node that a search has met.
+const MARKED: u8 = 1 << 7;
+
+/// Where a tool comes near the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Near {
+    pub(super) triangle: u32,
+    pub(super) weights: [f64; 3],
+    pub(super) place: Vec3,
+    pub(super) normal: Vec3,
+    /// From the surface to the tool's (m); negative where they overlap.
+    pub(super) gap: f64,
+    /// Where on the axis, from one end to the other.
+    pub(super) share: f64,
+}
+
+/// The places that were found, and what the search keeps of each node.
+#[derive(Clone, Debug)]
+pub(super) struct Search {
+    pub(super) near: Vec<Near>,
+    /// On which sides of the box around a tool each node stays in the step, a bit for each, and `MARKED`.
+    sides: Vec<u8>,
+    /// The corner at each marked node as the tool meets it at the end of the step (m).
+    corners: Vec<Vec3>,
+}
+
+impl Default for Search {
+    fn default() -> Self {
+        Self { near: Vec::with_capacity(MOST_POINTS), sides: Vec::new(), corners: Vec::new() }
+    }
+}
+
+impl Search {
+    /// Makes room for a body of `nodes` nodes.
+    pub(super) fn make_room(&mut self, nodes: usize) {
+        self.sides.resize(nodes, 0);
+        self.corners.resize(nodes, Vec3::zeros());
+    }
+
+    /// Finds the places that would overlap with the tool at the end of the step if nothing pressed.
+    pub(super) fn find(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) {
+        self.near.clear();
+        self.find_sides(body, touch, motion, d);
+        if !self.find_passed(body, touch, motion, d) {
+            self.find_near(body, touch, &motion.to, d);
+        }
+    }
+
+    /// Tells where nodes stay of the box around the way of a tool with all that it may touch: a triangle whose corners stay on one
+    /// side of it is not looked at again.
+    fn find_sides(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) {
+        let axes = [touch.shape.axis(&motion.from), touch.shape.axis(&motion.to)].into_iter().flatten();
+        let (low, high) = axes
+            .fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(low, high), end| {
+                (low.inf(&end), high.sup(&end))
+            });
+        let around = Vec3::repeat(touch.shape.radius() + MAX_DEPTH + touch.skin.reach());
+        let (low, high) = (low - around, high + around);
+        for ((sides, x), v) in self.sides.iter_mut().zip(&*body.positions).zip(&*body.velocities) {
+            let end = x + v * d;
+            *sides = (0..3).fold(0, |sides, i| {
+                let below = u8::from(x[i].max(end[i]) < low[i]);
+                let above = u8::from(x[i].min(end[i]) > high[i]);
+                sides << 2 | below << 1 | above
+            });
+        }
+    }
+
+    /// A place of the surface that the axis passes within the step; whatever else is near at its end is the far side.
+    fn find_passed(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) -> bool {
+        let (shape, skin) = (&touch.shape, &*touch.skin);
+        let [from, to] = [shape.axis(&motion.from), shape.axis(&motion.to)];
+        let ends = if shape.half_axis() == Vec3::zeros() { 1 } else { 3 };
+        for end in 0..ends {
+            let share = [0.0, 1.0, 0.5][end];
+            let [from, to] = [from, to].map(|[a, b]| a + (b - a) * share);
+            let candidates = body.candidates.iter().copied().filter(|&triangle| meets(&self.sides, body, triangle));
+            let Some(hit) = passing::first(body, candidates, skin, [from, to], d) else { continue };
+            let corners = body.smoothed_corners(skin, hit.triangle, d);
+            let place = interpolate(&hit.weights, &corners);
+            let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            let Some(normal) = across.try_normalize(0.0) else { continue };
+            let gap = (to - place).dot(&normal) - shape.radius();
+            self.near.push(Near { triangle: hit.triangle, weights: hit.weights, place, normal, gap, share });
+        }
+        !self.near.is_empty()
+    }
+
+    fn find_near(&mut self, body: &Deformable<'_>, touch: &Touch, pose: &Pose, d: f64) {
+        let (shape, skin) = (&touch.shape, &*touch.skin);
+        let (radius, axis) = (shape.radius(), shape.axis(pose));
+        let is_long = shape.half_axis() != Vec3::zeros();
+        // The nearest place in front of the surface, and the nearest behind it.
+        let (mut front, mut behind) = (f64::INFINITY, None::<Near>);
+        for &triangle in body.candidates {
+            if !meets(&self.sides, body, triangle) {
+                continue;
+            }
+            // Triangles share corners.
+            let corners = body.corners(triangle).map(|node| {
+                if self.sides[node] & MARKED == 0 {
+                    self.sides[node] |= MARKED;
+                    self.corners[node] = body.smoothed_corner(skin, node as u32, d);
+                }
+                self.corners[node]
+            });
+            if !is_around(&axis, radius + MAX_DEPTH, &corners) {
+                continue;
+            }
+            let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            let depths = body.corners(triangle).map(|node| skin.depth(node));
+            let shares = [closest::share_of_axis(&axis, &corners), 0.0, 1.0];
+            for share in if is_long { &shares[..] } else { &shares[..1] } {
+                let centre = axis[0] + (axis[1] - axis[0]) * *share;
+                let weights = closest::weights(&corners, &centre);
+                let place = interpolate(&weights, &corners);
+                let away = centre - place;
+                let distance = away.norm();
+                let depth: f64 = weights.iter().zip(depths).map(|(w, depth)| w * depth).sum();
+                let near = |normal, distance: f64| Near {
+                    triangle,
+                    weights,
+                    place,
+                    normal,
+                    gap: distance - depth - radius,
+                    share: *share,
+                };
+                if away.dot(&across) < 0.0 {
+                    if behind.is_none_or(|known| -distance > known.gap + radius) {
+                        // Out of the body on the shortest way.
+                        behind = Some(Near { gap: -distance - radius, ..near(away / -distance, 0.0) });
+                    }
+                    continue;
+                }
+                front = front.min(distance);
+                let Some(normal) = away.try_normalize(1e-12).or_else(|| across.try_normalize(0.0)) else { continue };
+                let near = near(normal, distance);
+                if near.gap < 0.0 {
+                    self.keep(near, radius);
+                }
+            }
+        }
+        // A centre inside is nearest to the inner side of some triangle.
+        if let Some(behind) = behind
+            && -(behind.gap + radius) < front * (1.0 - 1e-9)
+            && -(behind.gap + radius) < MAX_DEPTH + radius
+        {
+            self.near.clear();
+            self.near.push(behind);
+        }
+    }
+
+    /// Each place once, and of too many the deepest.
+    fn keep(&mut self, near: Near, radius: f64) {
+        let same = 1e-12 * radius * radius;
+        if self.near.iter().any(|known| (known.place - near.place).norm_squared() < same) {
+            return;
+        }
+        if self.near.len() < MOST_POINTS {
+            self.near.push(near);
+        } else if let Some(shallowest) = self.near.iter_mut().max_by(|a, b| a.gap.total_cmp(&b.gap))
+            && near.gap < shallowest.gap
+        {
+            *shallowest = near;
+        }
+    }
+}
+
+/// False if the corners of a triangle are all on one side of the box.
+fn meets(sides: &[u8], body: &Deformable<'_>, triangle: u32) -> bool {
+    body.corners(triangle).iter().fold(!MARKED, |common, &node| common & sides[node]) == 0
+}
+
+/// False if a triangle is surely farther than `distance` (m) from the axis.
+fn is_around(axis: &[Vec3; 2], distance: f64, [a, b, c]: &[Vec3; 3]) -> bool {
+    let (low, high) = (a.inf(b).inf(c), a.sup(b).sup(c));
+    let [from, to] = axis;
+    (0..3).all(|i| from[i].min(to[i]) <= high[i] + distance && from[i].max(to[i]) >= low[i] - distance)
+}
