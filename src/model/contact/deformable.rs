@@ -1,5 +1,6 @@
 //! What a contact step works on: nodes, their surface, and where on it the tool is.
 
+use super::closest;
 use super::skin::Skin;
 use super::triangle::{contact_normal, interpolate, walk};
 use super::{Contact, Law, ToolMotion, swept};
@@ -61,8 +62,7 @@ impl Deformable<'_> {
         let high = a.sup(&b).sup(&c).sup(&d).sup(&e).sup(&f);
         // A smoothed corner is a mean of what is around it: not farther from its node than another triangle reaches.
         let distance = if skin.is_none() { distance } else { distance + (high - low).max() };
-        let [from, to] = axis;
-        (0..3).all(|i| from[i].min(to[i]) <= high[i] + distance && from[i].max(to[i]) >= low[i] - distance)
+        closest::may_be_near(axis, distance, &low, &high)
     }
 
     /// The share of the step after which the contact acts: 0 for one that exists, the hit's for a new one.

@@ -117,7 +117,8 @@ impl Search {
                 }
                 self.corners[node]
             });
-            if !is_around(&axis, radius + MAX_DEPTH, &corners) {
+            let [a, b, c] = &corners;
+            if !closest::may_be_near(&axis, radius + MAX_DEPTH, &a.inf(b).inf(c), &a.sup(b).sup(c)) {
                 continue;
             }
             let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
@@ -182,11 +183,4 @@ impl Search {
 /// False if the corners of a triangle are all on one side of the box.
 fn meets(sides: &[u8], body: &Deformable<'_>, triangle: u32) -> bool {
     body.corners(triangle).iter().fold(!MARKED, |common, &node| common & sides[node]) == 0
-}
-
-/// False if a triangle is surely farther than `distance` (m) from the axis.
-fn is_around(axis: &[Vec3; 2], distance: f64, [a, b, c]: &[Vec3; 3]) -> bool {
-    let (low, high) = (a.inf(b).inf(c), a.sup(b).sup(c));
-    let [from, to] = axis;
-    (0..3).all(|i| from[i].min(to[i]) <= high[i] + distance && from[i].max(to[i]) >= low[i] - distance)
 }

@@ -247,17 +247,13 @@ impl Touch {
 
 /// True if a triangle comes as near as `distance` (m) to the segment `axis`.
 fn is_near(corners: &[Vec3; 3], axis: &[Vec3; 2], distance: f64) -> bool {
-    let boxes_meet = (0..3).all(|i| {
-        let (low, high) = corners
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), corner| (low.min(corner[i]), high.max(corner[i])));
-        axis[0][i].min(axis[1][i]) <= high + distance && axis[0][i].max(axis[1][i]) >= low - distance
-    });
+    let [a, b, c] = corners;
     let place = || {
         let centre = axis[0] + (axis[1] - axis[0]) * closest::share_of_axis(axis, corners);
         interpolate(&closest::weights(corners, &centre), corners) - centre
     };
-    boxes_meet && place().norm_squared() <= distance * distance
+    closest::may_be_near(axis, distance, &a.inf(b).inf(c), &a.sup(b).sup(c))
+        && place().norm_squared() <= distance * distance
 }
 
 /// A third of the triangles around a node (m^2).

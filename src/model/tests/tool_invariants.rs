@@ -17,7 +17,7 @@ const STEP: Stepping = Stepping { tick: 0.5e-3, substeps: 1 };
 /// What the order of places may change: sweeps end before they converge where many places share nodes.
 const ORDER: f64 = 1e-3;
 /// The same for the numbers of triangles.
-const TRIANGLES: f64 = 2e-3;
+const TRIANGLES: f64 = 2e-2;
 
 /// A body whose triangles are numbered in another order, or whose nodes are all free.
 #[derive(Debug)]
