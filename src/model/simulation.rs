@@ -231,20 +231,6 @@ impl Simulation {
         (self.touches, self.means) = (touches, means);
     }
 
-    /// The body, its state, and the force on every node in it (N): the internal one, and what all tools but `tool` exert.
-    ///
-    /// # Real-time
-    /// Bounded and real-time safe if the body's forces are.
-    pub(crate) fn with_forces_but_of(&mut self, tool: usize) -> (&dyn Body, &State, &[Vec3]) {
-        self.body.forces(&self.state, &mut self.forces);
-        for other in (0..self.touches.len()).filter(|&other| other != tool) {
-            for (node, force) in self.exerted(other) {
-                self.forces[node as usize] += force;
-            }
-        }
-        (&*self.body, &self.state, &self.forces)
-    }
-
     /// The nodes that all tools but `tool` press, each with the force on it (N).
     ///
     /// # Real-time

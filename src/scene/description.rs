@@ -1,6 +1,7 @@
 //! The whole of a scene, as plain data.
 
 use super::device::{DeviceSpec, one_or_many};
+use super::validate::fitting_patch;
 use super::{BodySpec, ContactSpec, GlobalSpec, LocalSpec, ModelChoice, NodeSpec, SafetySpec, StepKind};
 use crate::model::Vec3;
 use crate::model::body::Body;
@@ -143,6 +144,14 @@ impl Scene {
         }
         self.local.model = model;
         self
+    }
+
+    /// The patch window that was asked for, or the usual one of the model (6 x 6 x 3 for `predictive` and `predicted`, 4 x 4 x 2 for
+    /// the others) as far as the body has room for it: what a session takes unless it sizes it by `error_pct`.
+    pub fn patch_size(&self) -> [usize; 3] {
+        let size = self.local.patch_size();
+        let block = self.body.as_ref().and_then(BodySpec::mass_spring).filter(|_| self.local.patch.is_none());
+        block.map_or(size, |spec| fitting_patch(size, &spec.block))
     }
 
     /// The node of the surface of `body` that the first tool's path comes to first, within the body's extents; the middle of the

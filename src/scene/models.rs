@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::model::local::{BlendKind, Feedback, Kind, Prediction};
+use crate::model::local::{BlendKind, Feedback, Kind};
 use crate::model::surroundings::Size;
 
 /// The global model of a scene: the slow, detailed simulation.
@@ -37,15 +37,13 @@ pub struct LocalSpec {
     /// and of `predictive`, whose `patch` and `basis` become that large if they are absent. It sizes no other model.
     pub error_pct: Option<f64>,
     /// Patch window: nodes along the surface, along it, into depth. If absent, what `error_pct` needs with `predictive`, or
-    /// 4 x 4 x 2.
+    /// 6 x 6 x 3 without that, and 4 x 4 x 2 with the other models.
     pub patch: Option<[usize; 3]>,
     /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted. If absent, what
-    /// `error_pct` needs, or 50 without that.
+    /// `error_pct` needs, or 150 without that.
     pub basis: Option<usize>,
     /// Folder in which bases are kept from run to run; relative to the current one.
     pub basis_folder: Option<PathBuf>,
-    /// The way in which `predictive` looks ahead.
-    pub prediction: Prediction,
     /// The data that the global model takes over from the local one; if absent, those that the model is best with.
     pub feedback: Option<Feedback>,
     /// The way in which a linear patch is stepped.
@@ -65,7 +63,6 @@ impl Default for LocalSpec {
             patch: None,
             basis: None,
             basis_folder: None,
-            prediction: Prediction::default(),
             feedback: None,
             step: StepKind::default(),
             blend: BlendSpec::default(),
@@ -80,9 +77,14 @@ impl LocalSpec {
         self.error_pct.unwrap_or(1.0)
     }
 
-    /// The patch window that was asked for, or 4 x 4 x 2: what a session takes unless it sizes it by `error_pct`.
-    pub fn patch_size(&self) -> [usize; 3] {
-        self.patch.unwrap_or([4, 4, 2])
+    /// The patch window that was asked for, or the usual one of the model: 6 x 6 x 3 for `predictive` and `predicted`, 4 x 4 x 2,
+    /// as in the paper, for the others.
+    pub(super) fn patch_size(&self) -> [usize; 3] {
+        let usual = match self.model.named() {
+            Some(Kind::Predicted | Kind::Predictive) => [6, 6, 3],
+            _ => [4, 4, 2],
+        };
+        self.patch.unwrap_or(usual)
     }
 
     /// Names the model that `auto` chose: a budget below what `predictive` keeps was met with a warning, and what it keeps is
@@ -100,7 +102,7 @@ impl LocalSpec {
             (Some(states), _) => Size::States(states),
             // `auto` may choose a model that does not meet less, and says so.
             (None, Some(error_pct)) => Size::ErrorPct(error_pct.max(Size::LEAST_PCT)),
-            (None, None) => Size::States(50),
+            (None, None) => Size::States(Size::MOST_STATES),
         }
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use palpate::Session;
 use palpate::devices::ToolPath;
-use palpate::model::local::{Kind as LocalModelKind, Prediction};
+use palpate::model::local::Kind as LocalModelKind;
 use palpate::scene::{Scene, ToolSpec};
 use palpate_cli::compare::{ForceDeviation, ForceTrace};
 
@@ -144,17 +144,6 @@ fn every_other_model_stays_bounded_on_nearly_incompressible_tissue() {
         let (late, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.model = model.into());
         assert!(late.rms <= 30.0 && late.max <= 100.0, "{}: {late:?}", model.name());
     }
-}
-
-/// Running the whole body ahead costs periods of simulation where the reduced prediction costs half of one. It is more
-/// exact, as the surroundings are linear around rest in the other.
-#[test]
-fn running_the_whole_body_ahead_is_more_exact() {
-    let case = Case::new("hand");
-    let (reduced, _) = case.error(ONE_PERIOD_MS, |_| ());
-    let (full, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.prediction = Prediction::Full);
-    assert!(full.rms <= 0.2 && full.max <= 1.0 && full.jump <= 2.0, "{full:?}");
-    assert!(full.rms < reduced.rms && reduced.rms <= 3.0 * full.rms, "{reduced:?} against {full:?}");
 }
 
 /// Without its basis the ring moves as predicted, whatever the tool does: that is a model too, and the next best.

@@ -24,7 +24,6 @@ pub use forecast::{ToolForecast, ToolHistory};
 pub use full::Full;
 pub use hold::Hold;
 pub use kind::Kind;
-pub use predictive::Prediction;
 pub use succession::{Blend, BlendKind, Jump, Resynced, Served, Succession};
 pub use template::Template;
 

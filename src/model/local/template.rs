@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::hold::Hold;
 use super::linear::{Boundary, Layers, LinearPatch, LinearSpec, Yielding};
-use super::predictive::{Prediction, Predictive};
+use super::predictive::Predictive;
 use super::{Feedback, Kind, LocalModel};
 use crate::body::Body;
 use crate::error::ModelError;
@@ -49,7 +49,6 @@ pub struct Template {
     /// The body around its rest state, for the models that need it.
     pub resting: Option<Arc<RestingBody>>,
     feedback: Feedback,
-    prediction: Prediction,
     is_implicit: bool,
     /// For the linear models.
     boundary: Boundary,
@@ -80,8 +79,7 @@ impl Template {
         };
         let resting =
             if matches!(kind, Kind::Predicted | Kind::Predictive) { Some(Arc::new(resting()?)) } else { None };
-        let (feedback, prediction) = (Feedback::of(kind), Prediction::default());
-        Ok(Self { kind, patch, resting, feedback, prediction, is_implicit: false, boundary })
+        Ok(Self { kind, patch, resting, feedback: Feedback::of(kind), is_implicit: false, boundary })
     }
 
     /// Lets the models tell the global one `feedback`.
@@ -91,16 +89,6 @@ impl Template {
     #[must_use]
     pub fn with_feedback(mut self, feedback: Feedback) -> Self {
         self.feedback = feedback;
-        self
-    }
-
-    /// Lets `predictive` look ahead by `prediction`.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    #[must_use]
-    pub fn with_prediction(mut self, prediction: Prediction) -> Self {
-        self.prediction = prediction;
         self
     }
 
@@ -142,7 +130,7 @@ impl Template {
         let spec = LinearSpec { size: self.patch, feedback: self.feedback, is_implicit: self.is_implicit };
         Some(match self.kind {
             Kind::Full => return None,
-            Kind::Predicted | Kind::Predictive => Box::new(Predictive::new(self.patch, self.prediction)),
+            Kind::Predicted | Kind::Predictive => Box::new(Predictive::new(self.patch)),
             kind if kind.is_linear() => Box::new(LinearPatch::new(spec, self.boundary.clone())),
             _ => Box::new(Hold::default()),
         })

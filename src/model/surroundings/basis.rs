@@ -1,28 +1,21 @@
-//! The surroundings of a patch in few states: how its ring answers to forces, and where it goes by itself.
+//! The surroundings of a patch in few states: how its ring answers to forces.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::accuracy::Estimate;
-use super::products::Columns;
-use super::reduced::{Reduced, ReducedMotion};
-use crate::Vec3;
-use crate::body::{Body, State};
-
-/// A forecast is used where what it leaves out moves less than this share of what there is.
-const LEFT_OUT: f64 = 0.02;
+use super::reduced::Reduced;
 
 /// The surroundings of one patch, linear around rest, in few states.
 ///
 /// The answers to forces on the ring span the leading left singular vectors of `[Z_0/|Z_0|, Z_1/|Z_1|, Z_2/|Z_2|]`,
 /// Z_0 = A^-1 B the answers to unit forces on the ring, Z_(i+1) = A^-1 M Z_i, A = s0^2 M - s0 C - K of what does not
 /// depend on the patch, at rest: moment matching at a real frequency (Grimme 1997) with a singular value truncation. It
-/// depends on patch, material and topology, not on time. The forecast adds smooth fields, for what is under way already.
+/// depends on patch, material and topology, not on time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Basis {
     pub(super) patch: Vec<u32>,
     pub(crate) answers: Reduced,
-    pub(crate) forecast: Forecast,
     pub(super) estimate: Option<Estimate>,
 }
 
@@ -49,54 +42,6 @@ impl Basis {
     /// Wait-free, real-time safe.
     pub fn estimate(&self) -> Option<Estimate> {
         self.estimate
-    }
-}
-
-/// The surroundings as they go on from a given state of the whole body.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Forecast {
-    /// Ids of all movable nodes outside the patch.
-    pub(super) nodes: Vec<u32>,
-    pub(super) masses: Vec<f64>,
-    /// Modes on those nodes as columns, three numbers a node (1/sqrt(kg)).
-    pub(super) modes: Columns,
-    pub(crate) model: Reduced,
-}
-
-impl Forecast {
-    /// Sets `motion` to the present state of a body, with the forces in it (N); `span` is how far the forecast has to reach
-    /// (s). False if the states leave out too much of the present motion.
-    ///
-    /// # Real-time
-    /// For the global actor: reads all modes once; may allocate.
-    pub(crate) fn launch(
-        &self,
-        motion: &mut ReducedMotion,
-        (body, state, forces): (&dyn Body, &State, &[Vec3]),
-        span: f64,
-    ) -> bool {
-        let (mut momentum, mut force) =
-            (Vec::with_capacity(3 * self.nodes.len()), Vec::with_capacity(3 * self.nodes.len()));
-        // In the norm of the mass, in which the modes are orthonormal.
-        let (mut displacement, mut speed, mut acceleration) = (0.0, 0.0, 0.0);
-        for (&node, mass) in self.nodes.iter().zip(&self.masses) {
-            let node = node as usize;
-            let (v, f) = (state.velocities[node], forces[node]);
-            displacement += mass * (state.positions[node] - body.rest()[node]).norm_squared();
-            speed += mass * v.norm_squared();
-            acceleration += f.norm_squared() / mass;
-            momentum.extend((v * *mass).iter());
-            force.extend(f.iter());
-        }
-        let (mut rate, mut load) = (vec![0.0; self.model.states()], vec![0.0; self.model.states()]);
-        self.modes.project_all([&momentum, &force], [&mut rate, &mut load]);
-        motion.launch(&rate, &load);
-        let missing = |all: f64, held: &[f64]| (all - held.iter().map(|x| x * x).sum::<f64>()).max(0.0).sqrt();
-        // What is left out swings as fast as the faster modes, so that it does not come far.
-        let swing = 1.0 / self.model.middle_frequency();
-        let left_out = missing(speed, &rate) * span.min(swing)
-            + missing(acceleration, &load) * (0.5 * span * span).min(2.0 * swing * swing);
-        left_out <= LEFT_OUT * displacement.sqrt()
     }
 }
 

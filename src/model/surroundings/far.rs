@@ -147,26 +147,4 @@ impl Far {
         };
         self.couplings.iter().all(is_proportional).then_some(share)
     }
-
-    /// Columns of smooth displacements, polynomials of the position up to `degree` along each axis: what waves of the
-    /// whole body look like.
-    pub(super) fn smooth_fields(&self, body: &RestingBody, degree: i32) -> Matrix {
-        let rest = |node: u32| body.rest()[node as usize];
-        let low = self.nodes.iter().fold(Vec3::repeat(f64::INFINITY), |low, &node| low.inf(&rest(node)));
-        let high = self.nodes.iter().fold(Vec3::repeat(f64::NEG_INFINITY), |high, &node| high.sup(&rest(node)));
-        let extent = (high - low).map(|length| length.max(f64::MIN_POSITIVE));
-        let powers = (0..=degree).flat_map(|a| (0..=degree - a).map(move |b| (a, b)));
-        let powers = powers.flat_map(|(a, b)| (0..=degree - a - b).map(move |c| [a, b, c]));
-        let mut columns = Vec::new();
-        for [a, b, c] in powers {
-            for axis in 0..3 {
-                for &node in &self.nodes {
-                    let x = (rest(node) - low).component_div(&extent) * 2.0 - Vec3::repeat(1.0);
-                    let value = x.x.powi(a) * x.y.powi(b) * x.z.powi(c);
-                    columns.extend((0..3).map(|along| if along == axis { value } else { 0.0 }));
-                }
-            }
-        }
-        Matrix::from_vec(self.unknowns(), columns.len() / self.unknowns(), columns)
-    }
 }

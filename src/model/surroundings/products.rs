@@ -42,14 +42,8 @@ impl Columns {
 
     /// out += A^T y for each column of A; `y` has a number per row.
     pub(super) fn project(&self, y: &[f64], out: &mut [f64]) {
-        self.project_all([y], [out]);
-    }
-
-    /// Does what [`project`](Self::project) does for several vectors, in one pass over the columns.
-    pub(super) fn project_all<const N: usize>(&self, ys: [&[f64]; N], outs: [&mut [f64]; N]) {
-        debug_assert!(ys.iter().all(|y| y.len() == self.rows));
-        debug_assert!(outs.iter().all(|out| out.len() * self.height == self.lines.len()));
-        self.set.run(Project { columns: self, ys, outs });
+        debug_assert!(y.len() == self.rows && out.len() * self.height == self.lines.len());
+        self.set.run(Project { columns: self, y, out });
     }
 
     /// Adds A a to `x` and A b to `y`; they have a number per row, `a` and `b` one per column.
@@ -59,53 +53,41 @@ impl Columns {
     }
 }
 
-struct Project<'a, const N: usize> {
+struct Project<'a> {
     columns: &'a Columns,
-    ys: [&'a [f64]; N],
-    outs: [&'a mut [f64]; N],
+    y: &'a [f64],
+    out: &'a mut [f64],
 }
 
-impl<const N: usize> Work for Project<'_, N> {
+impl Work for Project<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { columns, ys, mut outs } = self;
-        let parts = ys.map(|y| y.as_chunks::<LANES>());
-        let mut last = [[0.0; LANES]; N];
-        for (last, (_, rest)) in last.iter_mut().zip(&parts) {
-            last[..rest.len()].copy_from_slice(rest);
-        }
+        let Self { columns, y, out } = self;
+        let (y, rest) = y.as_chunks::<LANES>();
+        let mut last = [0.0; LANES];
+        last[..rest.len()].copy_from_slice(rest);
         let whole = columns.rows / LANES;
-        for (at, column) in columns.lines.chunks_exact(columns.height).enumerate() {
+        for (out, column) in out.iter_mut().zip(columns.lines.chunks_exact(columns.height)) {
             // Four sums: an addition has to wait for the one before it.
-            let mut sums = [[s.splat(0.0); 4]; N];
+            let mut sums = [s.splat(0.0); 4];
             let mut quads = column[..whole].chunks_exact(4);
             let mut line = 0;
             for quad in &mut quads {
                 for n in 0..4 {
-                    let shape = s.load(&quad[n].0);
-                    for (sums, (y, _)) in sums.iter_mut().zip(&parts) {
-                        sums[n] = s.mul_add(shape, s.load(&y[line + n]), sums[n]);
-                    }
+                    sums[n] = s.mul_add(s.load(&quad[n].0), s.load(&y[line + n]), sums[n]);
                 }
                 line += 4;
             }
             for shape in quads.remainder() {
-                for (sums, (y, _)) in sums.iter_mut().zip(&parts) {
-                    sums[0] = s.mul_add(s.load(&shape.0), s.load(&y[line]), sums[0]);
-                }
+                sums[0] = s.mul_add(s.load(&shape.0), s.load(&y[line]), sums[0]);
                 line += 1;
             }
             if let Some(shape) = column.get(whole) {
-                for (sums, last) in sums.iter_mut().zip(&last) {
-                    sums[1] = s.mul_add(s.load(&shape.0), s.load(last), sums[1]);
-                }
+                sums[1] = s.mul_add(s.load(&shape.0), s.load(&last), sums[1]);
             }
-            for (out, sums) in outs.iter_mut().zip(&sums) {
-                let mut total = [0.0; LANES];
-                s.store(s.add(s.add(sums[0], sums[1]), s.add(sums[2], sums[3])), &mut total);
-                out[at] +=
-                    (total[0] + total[4]) + (total[1] + total[5]) + ((total[2] + total[6]) + (total[3] + total[7]));
-            }
+            let mut total = [0.0; LANES];
+            s.store(s.add(s.add(sums[0], sums[1]), s.add(sums[2], sums[3])), &mut total);
+            *out += (total[0] + total[4]) + (total[1] + total[5]) + ((total[2] + total[6]) + (total[3] + total[7]));
         }
     }
 }

@@ -25,9 +25,8 @@ pub(crate) struct Reduced {
 }
 
 impl Reduced {
-    /// The surroundings `far` in the span of the columns of `shapes`, with its modes there on all of `far` as columns.
-    /// `None` if there is no motion in that span, nothing that holds it or a number is not finite.
-    pub(super) fn new(far: &Far, ring: &[u32], shapes: &Matrix) -> Option<(Self, Matrix)> {
+    /// The surroundings `far` in the span of the columns of `shapes`. `None` if there is no motion in that span, nothing that holds it or a number is not finite.
+    pub(super) fn new(far: &Far, ring: &[u32], shapes: &Matrix) -> Option<Self> {
         if !far.is_held_together() {
             return None;
         }
@@ -40,16 +39,11 @@ impl Reduced {
             None => Damping::Full(product_t(&modes, &product(&damping, &modes)).data.into()),
         };
         let on_ring = Columns::new(&shapes.select_rows(&far.unknowns_of(ring)));
-        Some((Self { states, shapes: on_ring, stiffness: values, damping }, shapes))
+        Some(Self { states, shapes: on_ring, stiffness: values, damping })
     }
 
     pub(crate) fn states(&self) -> usize {
         self.states
-    }
-
-    /// Half of the modes are slower than this (rad/s).
-    pub(crate) fn middle_frequency(&self) -> f64 {
-        self.stiffness[self.states / 2].abs().sqrt()
     }
 
     /// One step of `d` seconds under `forces` on the ring (N, three numbers for each node).
@@ -57,18 +51,18 @@ impl Reduced {
     /// # Real-time
     /// Bounded, real-time safe.
     pub(crate) fn step(&self, motion: &mut ReducedMotion, forces: &[f64], d: f64) {
-        let ReducedMotion { eta, rate, acceleration, load, rate_origin } = motion;
-        acceleration.copy_from_slice(load);
+        let ReducedMotion { eta, rate, acceleration } = motion;
+        acceleration.fill(0.0);
         self.shapes.project(forces, acceleration);
         match &self.damping {
             Damping::Diagonal(damping) => {
-                for (((a, c), rate), origin) in acceleration.iter_mut().zip(damping).zip(&*rate).zip(&*rate_origin) {
-                    *a += c * (rate - origin);
+                for ((a, c), rate) in acceleration.iter_mut().zip(damping).zip(&*rate) {
+                    *a += c * rate;
                 }
             }
             Damping::Full(damping) => {
                 for (a, row) in acceleration.iter_mut().zip(damping.chunks_exact(self.states)) {
-                    *a += row.iter().zip(&*rate).zip(&*rate_origin).map(|((c, rate), o)| c * (rate - o)).sum::<f64>();
+                    *a += row.iter().zip(&*rate).map(|(c, rate)| c * rate).sum::<f64>();
                 }
             }
         }
@@ -93,32 +87,17 @@ pub(crate) struct ReducedMotion {
     eta: Vec<f64>,
     rate: Vec<f64>,
     acceleration: Vec<f64>,
-    /// Constant part of the acceleration.
-    load: Vec<f64>,
-    /// The velocities that `load` belongs to.
-    rate_origin: Vec<f64>,
 }
 
 impl ReducedMotion {
-    /// At rest, without a load.
+    /// At rest.
     ///
     /// # Real-time
     /// Not called in a tick: may allocate.
     pub(crate) fn rest(&mut self, states: usize) {
-        for vector in [&mut self.eta, &mut self.rate, &mut self.acceleration, &mut self.load, &mut self.rate_origin] {
+        for vector in [&mut self.eta, &mut self.rate, &mut self.acceleration] {
             vector.clear();
             vector.resize(states, 0.0);
         }
-    }
-
-    /// Starts with velocities `rate`, at which the acceleration is `load`.
-    ///
-    /// # Real-time
-    /// Not called in a tick: may allocate.
-    pub(crate) fn launch(&mut self, rate: &[f64], load: &[f64]) {
-        self.rest(rate.len());
-        self.rate.copy_from_slice(rate);
-        self.rate_origin.copy_from_slice(rate);
-        self.load.copy_from_slice(load);
     }
 }

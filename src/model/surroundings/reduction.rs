@@ -1,10 +1,9 @@
 //! The computation of a basis, in parts that end in time.
 
 use super::accuracy::{Estimate, Size, states_within};
-use super::basis::{Basis, Forecast};
+use super::basis::Basis;
 use super::estimate::Contacts;
 use super::far::Far;
-use super::products::Columns;
 use super::reduced::Reduced;
 use super::resting::RestingBody;
 use crate::body::Restriction;
@@ -17,10 +16,6 @@ const EXPANSION: f64 = 2.0 * std::f64::consts::PI * 30.0;
 const MOMENTS: usize = 3;
 /// Combinations of unit forces that are followed to higher moments.
 const LEADING: usize = 110;
-/// The forecast has this many answers of the ring, at most.
-const FORECAST_STATES: usize = 64;
-/// And smooth fields of this degree: the waves of the whole body.
-const SMOOTH_DEGREE: i32 = 2;
 /// More unknowns than this take longer than a stop waits for.
 const LARGE: usize = 20_000;
 
@@ -48,12 +43,10 @@ enum Stage {
     },
     /// How many are enough?
     Compare {
-        factor: SparseFactor,
         wide: Matrix,
         contacts: Box<Contacts>,
     },
     Project {
-        factor: SparseFactor,
         /// Columns that span what the states are taken from, the most important first.
         wide: Matrix,
     },
@@ -116,19 +109,19 @@ impl Reduction {
             Stage::Moments { factor, count, last, mut all } => {
                 let last = append_moment(far, factor.solve(last), &mut all, count);
                 self.stage = match count + 1 {
-                    MOMENTS => self.span(body, factor, &all),
+                    MOMENTS => self.span(body, &all),
                     count => Stage::Moments { factor, count, last, all },
                 };
             }
-            Stage::Compare { factor, wide, mut contacts } => {
+            Stage::Compare { wide, mut contacts } => {
                 self.stage = if contacts.advance(body).ok_or_else(indefinite)? {
                     self.errors = Some(contacts.errors());
-                    Stage::Project { factor, wide }
+                    Stage::Project { wide }
                 } else {
-                    Stage::Compare { factor, wide, contacts }
+                    Stage::Compare { wide, contacts }
                 };
             }
-            Stage::Project { factor, wide } => return self.project(body, &factor, &wide).map(Some),
+            Stage::Project { wide } => return self.project(&wide).map(Some),
             Stage::Done => {}
         }
         Ok(None)
@@ -140,23 +133,23 @@ impl Reduction {
     }
 
     /// The states, the most important first.
-    fn span(&self, body: &RestingBody, factor: SparseFactor, moments: &Matrix) -> Stage {
+    fn span(&self, body: &RestingBody, moments: &Matrix) -> Stage {
         let Self { far, restriction, patch, size, .. } = self;
         let most = match size {
             Size::States(states) => *states,
             Size::ErrorPct(_) => Size::MOST_STATES,
         };
-        let wide = leading_left_singular_vectors(moments, FORECAST_STATES.max(most));
+        let wide = leading_left_singular_vectors(moments, most);
         match size {
-            Size::States(_) => Stage::Project { factor, wide },
+            Size::States(_) => Stage::Project { wide },
             Size::ErrorPct(_) => {
                 let contacts = Box::new(Contacts::new(body, (restriction, patch.len()), far, &wide));
-                Stage::Compare { factor, wide, contacts }
+                Stage::Compare { wide, contacts }
             }
         }
     }
 
-    fn project(&self, body: &RestingBody, factor: &SparseFactor, wide: &Matrix) -> Result<Basis, ModelError> {
+    fn project(&self, wide: &Matrix) -> Result<Basis, ModelError> {
         let Self { far, ring, size, errors, .. } = self;
         let states = match *size {
             Size::States(states) => states,
@@ -164,19 +157,9 @@ impl Reduction {
         };
         let linear = errors.as_ref().and_then(|errors| errors.get(states.checked_sub(1)?));
         let estimate = linear.map(|error| Estimate { linear_pct: 100.0 * error });
-        let columns = |count: usize| wide.columns(0, count.min(wide.ncols())).into_owned();
-        let (answers, _) = Reduced::new(far, ring, &columns(states)).ok_or_else(indefinite)?;
-        let mut shapes = columns(states.max(FORECAST_STATES));
-        append(&mut shapes, &factor.solve(far.smooth_fields(body, SMOOTH_DEGREE)));
-        // Directions count, not lengths.
-        for mut shape in shapes.column_iter_mut() {
-            let norm = shape.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-            shape /= norm;
-        }
-        let (model, modes) = Reduced::new(far, ring, &shapes).ok_or_else(indefinite)?;
-        let modes = Columns::new(&modes);
-        let forecast = Forecast { nodes: far.nodes.clone(), masses: far.masses.clone(), modes, model };
-        Ok(Basis { patch: self.patch.clone(), answers, forecast, estimate })
+        let columns = wide.columns(0, states.min(wide.ncols())).into_owned();
+        let answers = Reduced::new(far, ring, &columns).ok_or_else(indefinite)?;
+        Ok(Basis { patch: self.patch.clone(), answers, estimate })
     }
 }
 

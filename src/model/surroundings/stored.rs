@@ -1,14 +1,14 @@
 //! A basis as bytes, to be kept from run to run.
 
 use super::accuracy::Estimate;
-use super::basis::{Basis, Forecast};
+use super::basis::Basis;
 use super::products::Columns;
 use super::reduced::{Damping, Reduced};
 use super::resting::digest;
 use crate::linear_algebra::Matrix;
 
 /// What the bytes begin with; its number changes with what follows.
-const MAGIC: &[u8; 16] = b"palpate-basis-2\n";
+const MAGIC: &[u8; 16] = b"palpate-basis-3\n";
 const WORD: usize = size_of::<u64>();
 
 impl Basis {
@@ -21,10 +21,6 @@ impl Basis {
         out.word(key);
         out.ids(&self.patch);
         out.reduced(&self.answers);
-        out.ids(&self.forecast.nodes);
-        out.numbers(&self.forecast.masses);
-        out.columns(&self.forecast.modes);
-        out.reduced(&self.forecast.model);
         out.numbers(&self.estimate.map(|estimate| estimate.linear_pct).into_iter().collect::<Vec<_>>());
         let sum = digest(&out.0);
         out.word(sum);
@@ -45,10 +41,8 @@ impl Basis {
             return None;
         }
         let (patch, answers) = (from.ids()?, from.reduced()?);
-        let (nodes, masses, modes) = (from.ids()?, from.numbers()?, from.columns()?);
-        let forecast = Forecast { nodes, masses, modes, model: from.reduced()? };
         let estimate = from.numbers()?.first().map(|&linear_pct| Estimate { linear_pct });
-        Some(Self { patch, answers, forecast, estimate })
+        Some(Self { patch, answers, estimate })
     }
 }
 

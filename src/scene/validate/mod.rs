@@ -90,12 +90,9 @@ fn validate(scene: &Scene) -> Result<(), Error> {
 
 /// What names nodes of the block, or has to fit into it.
 fn on_block(scene: &Scene, block: &BlockSpec) -> Result<(), Error> {
-    // A body too small for the default patch is fine for the models that have none, and for the choice among them; a patch
-    // that was asked for is not.
-    if scene.local.model.named().is_some_and(Kind::has_patch)
-        || scene.local.patch_size() != LocalSpec::default().patch_size()
-    {
-        patch(scene.local.patch_size(), block)?;
+    // A body that is too small even for the least patch is fine for the models that have none.
+    if scene.local.model.named().is_some_and(Kind::has_patch) || scene.local.patch.is_some() {
+        patch(scene.patch_size(), block)?;
     }
     for (index, device) in scene.devices.iter().enumerate() {
         if let Some(NodeSpec::Lattice(node)) = device.attach_node {
@@ -131,7 +128,7 @@ fn on_no_lattice(scene: &Scene, why: &str) -> Result<(), Error> {
 
 /// Of a body without a lattice a patch has as many nodes as the product says.
 fn any_patch(scene: &Scene) -> Result<(), Error> {
-    let patch = scene.local.patch_size();
+    let patch = scene.patch_size();
     let nodes = patch.iter().try_fold(1_usize, |nodes, &along| nodes.checked_mul(along)).unwrap_or(usize::MAX);
     if (LEAST_PATCH_NODES..=MAX_PATCH_NODES).contains(&nodes) {
         return Ok(());
@@ -289,6 +286,12 @@ fn misfit(feedback: Feedback, model: ModelChoice) -> String {
 /// The window is clamped at thin faces, so it has to fit one of the faces that can be touched: those that are not fixed.
 pub(crate) fn patch_fits(patch: [usize; 3], block: &BlockSpec) -> bool {
     free_faces(block).any(|(_, limits)| (0..3).all(|part| (2..=limits[part]).contains(&patch[part])))
+}
+
+/// The largest patch of at most `patch` nodes that fits a free face; of several such faces, that with most nodes.
+pub(in crate::scene) fn fitting_patch(patch: [usize; 3], block: &BlockSpec) -> [usize; 3] {
+    let on = |(_, limits): (_, [usize; 3])| -> [usize; 3] { std::array::from_fn(|part| patch[part].min(limits[part])) };
+    free_faces(block).map(on).max_by_key(|patch| patch.iter().product::<usize>()).unwrap_or(patch)
 }
 
 /// The faces that can be touched, and the largest patch on each.

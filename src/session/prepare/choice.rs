@@ -136,7 +136,7 @@ fn choose(situation: &Situation) -> Choice {
 mod tests {
     use super::*;
 
-    /// Two substeps at 1 kHz and 30 Hz on two cores, 42 ticks ahead, 20^3 nodes, 1 % wanted, every model possible.
+    /// Two substeps at 1 kHz and 30 Hz on two cores, 42 ticks ahead, 1 % wanted, every model possible.
     fn situation(evaluation_us: u64) -> Situation {
         Situation {
             evaluation: Nanos(evaluation_us * 1000),
@@ -145,7 +145,6 @@ mod tests {
             haptic_period_s: 1e-3,
             global_period_s: 1.0 / 30.0,
             ahead_ticks: 42,
-            nodes: 8000,
             cores: 2,
             error_pct: 1.0,
             states: 50,

@@ -116,7 +116,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let (kind, choice, measured) = choice::model(&mut scene, &mut start, timing, execution)?;
     let sized_patch = patch::choose(&scene, &*start.body, &start.attached);
     // Named in the log's scene, so that a replay does not choose again.
-    scene.local.patch = Some(sized_patch.as_ref().map_or(scene.local.patch_size(), |choice| choice.size));
+    scene.local.patch = Some(sized_patch.as_ref().map_or(scene.patch_size(), |choice| choice.size));
 
     let mut as_run = as_run(&scene, Some((&start.attached, &start.probes)));
     let making = tools::Making { scene: &scene, start: &mut start, haptic: rates[0], execution, open_haply, is_replay };
@@ -189,9 +189,8 @@ fn template(kind: Kind, scene: &Scene, start: &Start, timing: Timing) -> Result<
     };
     // The longer one where periods alternate, 33 and 34 ticks at 30 Hz.
     let ticks = (timing.haptic.as_hz() / timing.global.as_hz() - 1e-6).ceil().min(f64::from(u32::MAX)) as u32;
-    let template = Template::new(kind, scene.local.patch_size(), &*start.body)?
+    let template = Template::new(kind, scene.patch_size(), &*start.body)?
         .with_feedback(scene.local.feedback.unwrap_or(Feedback::of(kind)))
-        .with_prediction(scene.local.prediction)
         .with_period(ticks);
     Ok(if is_implicit { template.with_implicit_steps() } else { template })
 }

@@ -19,11 +19,6 @@ const TIGHT_SHARE: f64 = 0.8;
 const GLOBAL_SHARE: f64 = 1.0;
 /// The same for both rates on a single core.
 const SINGLE_CORE_SHARE: f64 = 0.8;
-/// What starting a reduced look ahead costs for each node (s): all modes are read (`cargo bench --bench scale`: 0.2 us with
-/// 12^3 nodes, 0.6 us with 20^3).
-const LAUNCH_S: f64 = 0.5e-6;
-/// The share of models for which the whole body is run ahead after all, as the forecast does not hold.
-const RUN_AHEAD: f64 = 0.1;
 /// In virtual time: one for the haptic thread and one for the others.
 const NOMINAL_CORES: usize = 2;
 
@@ -40,7 +35,6 @@ pub(super) struct Situation {
     pub(super) global_period_s: f64,
     /// Haptic ticks that `predictive` and `predicted` look ahead.
     pub(super) ahead_ticks: u32,
-    pub(super) nodes: usize,
     pub(super) cores: usize,
     pub(super) error_pct: f64,
     /// States of the reduced surroundings; the most there may be where an error budget decides.
@@ -104,7 +98,6 @@ impl Situation {
             haptic_period_s,
             global_period_s,
             ahead_ticks: horizon,
-            nodes: body.rest().len(),
             cores,
             error_pct: scene.local.chosen_within_pct(),
             states: match scene.local.basis_size() {
@@ -145,12 +138,7 @@ impl Situation {
         let run_ahead = f64::from(self.ahead_ticks) * self.full_tick_s();
         let ahead = match kind {
             Kind::Full => return 0.0,
-            Kind::Predicted => run_ahead,
-            Kind::Predictive => {
-                let reduced = f64::from(self.ahead_ticks) * self.tick_s(kind) + self.nodes as f64 * LAUNCH_S;
-                // While another tool presses there is no forecast.
-                reduced + if self.devices > 1 { run_ahead } else { RUN_AHEAD * run_ahead }
-            }
+            Kind::Predicted | Kind::Predictive => run_ahead,
             _ => 0.0,
         };
         follow + self.devices as f64 * ahead

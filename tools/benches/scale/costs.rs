@@ -8,7 +8,7 @@ use palpate::model::body::{Block, Body, State};
 use palpate::model::contact::{Contact, Law, ToolMotion};
 use palpate::model::integrator::Spectrum;
 use palpate::model::local::ToolForecast;
-use palpate::model::local::{Kind, LocalModel, Prediction, ResyncView, Template};
+use palpate::model::local::{Kind, LocalModel, ResyncView, Template};
 use palpate::model::mesh::Face;
 use palpate::model::simulation::{Simulation, Stepping};
 use palpate::model::surroundings::{Bases, Basis, RestingBody};
@@ -21,8 +21,10 @@ use crate::common::{colour, figure, table, us};
 const GLOBAL_HZ: f64 = 30.0;
 /// A model is built for its lateness, its service and catching up: as a session does with results one period late.
 const PERIODS_AHEAD: f64 = 2.25;
-const PATCH: [usize; 3] = [4, 4, 2];
-const STATES: usize = 50;
+/// Of `predictive`, and of the models whose patch is the paper's.
+const PATCH: [usize; 3] = [6, 6, 3];
+const SMALL_PATCH: [usize; 3] = [4, 4, 2];
+const STATES: usize = 150;
 /// A basis is left out if it is expected to take longer (s).
 const LONGEST_BASIS_S: f64 = 120.0;
 const ROUNDS: usize = 3;
@@ -52,6 +54,7 @@ pub struct Surroundings {
     pub cost: BasisCost,
     bases: Bases,
     patch: Vec<u32>,
+    small_patch: Vec<u32>,
 }
 
 impl Surroundings {
@@ -60,8 +63,12 @@ impl Surroundings {
         let (mut sim, _) = simulation(block(nodes)?, 1000.0)?;
         advance(&mut sim, 0.0, BEGIN);
         let touched = sim.contact(0).triangle.ok_or_else(no_contact)?;
-        let mut patch = Vec::new();
-        sim.body().patch(&[touched], PATCH, &mut patch);
+        let around = |size| {
+            let mut patch = Vec::new();
+            sim.body().patch(&[touched], size, &mut patch);
+            patch
+        };
+        let [patch, small_patch] = [PATCH, SMALL_PATCH].map(around);
         let resting = RestingBody::new(sim.body()).ok_or_else(no_contact)?;
         // A direct factorisation of a body in space grows with the sixth power of its edge.
         let last = smaller.last().and_then(|last| Some((last.nodes, last.seconds?)));
@@ -72,7 +79,7 @@ impl Surroundings {
         };
         if expected > LONGEST_BASIS_S {
             eprintln!("{nodes}^3: a basis is expected to take {expected:.0} s, left out");
-            return Ok(Self { cost: BasisCost { nodes, seconds: None }, bases: Bases::default(), patch });
+            return Ok(Self { cost: BasisCost { nodes, seconds: None }, bases: Bases::default(), patch, small_patch });
         }
         let begun = Instant::now();
         let mut bases = Bases::default();
@@ -81,7 +88,7 @@ impl Surroundings {
         }
         let seconds = begun.elapsed().as_secs_f64();
         eprintln!("{nodes}^3: a basis takes {seconds:.2} s");
-        Ok(Self { cost: BasisCost { nodes, seconds: Some(seconds) }, bases, patch })
+        Ok(Self { cost: BasisCost { nodes, seconds: Some(seconds) }, bases, patch, small_patch })
     }
 }
 
@@ -99,9 +106,10 @@ pub struct Costs {
     pub full: Tick,
     pub patch: Tick,
     pub predictive: Tick,
-    /// The next model by a look ahead with the whole body, and by the forecast if there is a basis and it held.
-    pub build_full: Nanos,
-    pub build_reduced: Option<Nanos>,
+    /// The next model of `predictive`, with a look ahead of the whole body.
+    pub build: Nanos,
+    /// True if it has reduced surroundings.
+    pub has_basis: bool,
     pub build_patch: Nanos,
     /// Following the tool for one period of the global model.
     pub follow: Nanos,
@@ -120,20 +128,7 @@ impl Costs {
     /// The same if the global model took the longest stable step in place of one at least per tick.
     pub fn global_load_with_long_steps(&self) -> f64 {
         let ticks = u64::from(self.ticks_per_step);
-        let build = self.build();
-        let attempt = build.saturating_sub(self.build_full);
-        let build = if self.held() { build } else { Nanos(attempt.0 + self.build_full.0 / ticks) };
-        (self.follow.as_secs_f64() / ticks as f64 + build.as_secs_f64()) * GLOBAL_HZ
-    }
-
-    /// True if the reduced forecast was used: what falls back takes at least as long as the look ahead.
-    pub fn held(&self) -> bool {
-        self.build_reduced.is_some_and(|reduced| reduced.0 as f64 <= 0.9 * self.build_full.0 as f64)
-    }
-
-    /// The cheaper of the two ways to build `predictive`, if there are both.
-    pub fn build(&self) -> Nanos {
-        self.build_reduced.unwrap_or(self.build_full)
+        (self.follow.as_secs_f64() + self.build.as_secs_f64()) / ticks as f64 * GLOBAL_HZ
     }
 }
 
@@ -154,31 +149,23 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
     // Some 90 % of the ticks take no longer than 1.1 times the median; the mean would have the stalls of the machine in it.
     let follow = Nanos(full[0].0 * ticks_of_period as u64);
     let horizon = (PERIODS_AHEAD * rate / GLOBAL_HZ).ceil() as u32 + 1;
-    let mut of = |kind: Kind, prediction: Prediction, bases: &Bases| -> Result<(Nanos, Tick), Error> {
-        let template = Template::new(kind, PATCH, sim.body())?.with_prediction(prediction);
+    let mut of = |kind: Kind, patch: &[u32], bases: &Bases| -> Result<(Nanos, Tick), Error> {
+        let template = Template::new(kind, PATCH, sim.body())?;
         let mut model = template.empty().ok_or_else(no_contact)?;
         let mut least = Nanos(u64::MAX);
         // The first build makes memory.
         for _ in 0..=ROUNDS {
-            least = least.min(rebuild(&mut *model, &mut sim, horizon, surroundings, bases));
+            least = least.min(rebuild(&mut *model, &mut sim, horizon, patch, bases));
         }
         let half = horizon as usize / 2;
         let served = least_of_rounds(|_| {
-            rebuild(&mut *model, &mut sim, horizon, surroundings, bases);
+            rebuild(&mut *model, &mut sim, horizon, patch, bases);
             ticks(half, |k| model.tick(motion(k)).force)
         });
         Ok((least, served))
     };
-    let none = Bases::default();
-    let (build_patch, patch) = of(Kind::Patch, Prediction::Full, &none)?;
-    let (build_full, predicted) = of(Kind::Predictive, Prediction::Full, &surroundings.bases)?;
-    let (build_reduced, predictive) = match surroundings.bases.is_empty() {
-        true => (None, predicted),
-        false => {
-            let (build, ticks) = of(Kind::Predictive, Prediction::Reduced, &surroundings.bases)?;
-            (Some(build), ticks)
-        }
-    };
+    let (build_patch, patch) = of(Kind::Patch, &surroundings.small_patch, &Bases::default())?;
+    let (build, predictive) = of(Kind::Predictive, &surroundings.patch, &surroundings.bases)?;
     let substeps = sim.stepping().substeps;
     Ok(Costs {
         nodes,
@@ -189,8 +176,8 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
         full,
         patch,
         predictive,
-        build_full,
-        build_reduced,
+        build,
+        has_basis: !surroundings.bases.is_empty(),
         build_patch,
         follow,
     })
@@ -221,7 +208,7 @@ fn no_contact() -> Error {
     Error::new(ErrorKind::Fault, "the bench's own body does not touch its tool or cannot be copied")
 }
 
-fn rebuild(model: &mut dyn LocalModel, sim: &mut Simulation, horizon: u32, at: &Surroundings, bases: &Bases) -> Nanos {
+fn rebuild(model: &mut dyn LocalModel, sim: &mut Simulation, horizon: u32, patch: &[u32], bases: &Bases) -> Nanos {
     let triangle = sim.contact(0).triangle.unwrap_or_default();
     let forecast = ToolForecast { position: tool(BEGIN), velocity: Vec3::x() * 0.02, ..ToolForecast::default() };
     let mut stopwatch = Stopwatch::new();
@@ -229,7 +216,7 @@ fn rebuild(model: &mut dyn LocalModel, sim: &mut Simulation, horizon: u32, at: &
         global: sim,
         tick: 0,
         triangles: &[triangle],
-        patch: Some(&at.patch),
+        patch: Some(patch),
         tools: &[forecast],
         index: 0,
         horizon,
@@ -270,8 +257,7 @@ pub fn text(all: &[Costs], bases: &[BasisCost]) -> String {
                 pair(costs.predictive),
                 ms(costs.follow),
                 ms(costs.build_patch),
-                costs.build_reduced.map_or("-".to_owned(), ms),
-                ms(costs.build_full),
+                ms(costs.build),
             ]
         })
         .collect();
@@ -285,8 +271,7 @@ pub fn text(all: &[Costs], bases: &[BasisCost]) -> String {
         "`predictive` tick us",
         "follow ms",
         "build `patch` ms",
-        "build reduced ms",
-        "build full ms",
+        "build `predictive` ms",
     ];
     let reduced: Vec<String> = bases
         .iter()
@@ -298,28 +283,11 @@ pub fn text(all: &[Costs], bases: &[BasisCost]) -> String {
     format!(
         "## Costs\n\n![CPU of a haptic tick against the size of the body](img/scale.svg)\n\nTicks with contact, p50 / p99, the least of {ROUNDS} rounds. \
          *Follow* is the global model along the tool's path for one period of 33.3 ms; the next model is built once in that \
-         time, `predictive` either by its reduced forecast or, where that does not hold the present motion, by the whole body \
-         run {PERIODS_AHEAD} periods ahead (*build full*). Without a basis the tick of `predictive` is that without reduced \
+         time, `predictive` by the whole body run {PERIODS_AHEAD} periods ahead. Without a basis the tick of `predictive` is that without reduced \
          surroundings.\n\n{}\nReducing the surroundings of one place of the patch, once and in the background (time on the wall, \
-         one thread): {}.\n\n{}",
+         one thread): {}.\n",
         table(&heads, 2, &rows),
-        reduced.join(", "),
-        forecasts(all)
-    )
-}
-
-/// Where the forecast of `predictive` was used, and where it fell back.
-fn forecasts(all: &[Costs]) -> String {
-    let list = |held: bool| {
-        let at = all.iter().filter(|costs| costs.build_reduced.is_some() && costs.held() == held);
-        let names: Vec<String> = at.map(|costs| format!("{}^3 at {} kHz", costs.nodes, costs.rate * 1e-3)).collect();
-        if names.is_empty() { "none".to_owned() } else { names.join(", ") }
-    };
-    format!(
-        "The reduced forecast was cheaper than the look ahead of the whole body at: {}. It was not, or did not hold the motion \
-         of this drag so that both were paid, at: {}.\n",
-        list(true),
-        list(false)
+        reduced.join(", ")
     )
 }
 

@@ -39,14 +39,14 @@ impl Fit {
         Self {
             full: of_period(costs, costs.full[1]),
             haptic: of_period(costs, catching_up(costs.predictive[0]).max(costs.predictive[1])),
-            global: Share(costs.global_load(costs.build())),
+            global: Share(costs.global_load(costs.build)),
             patch: of_period(costs, catching_up(costs.patch[0]).max(costs.patch[1])),
             global_patch: Share(costs.global_load(costs.build_patch)),
         }
     }
 
     fn verdict(&self, costs: &Costs) -> String {
-        let has_basis = costs.build_reduced.is_some();
+        let has_basis = costs.has_basis;
         if self.full.fits() {
             return "`full`".to_owned();
         }
@@ -75,7 +75,6 @@ fn row(costs: &Costs) -> Vec<String> {
         fit.full.percent(),
         fit.haptic.percent(),
         fit.global.percent(),
-        Share(costs.global_load(costs.build_full)).percent(),
         Share(costs.global_load_with_long_steps()).percent(),
         fit.global_patch.percent(),
         fit.verdict(costs),
@@ -91,7 +90,6 @@ pub fn text(all: &[Costs]) -> String {
         "of the period",
         "`predictive` catching up, of the period",
         "its global group, of a core",
-        "with the full prediction",
         "with the longest stable steps",
         "global group of `patch`",
         "what holds here",

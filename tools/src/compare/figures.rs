@@ -1,6 +1,6 @@
 //! What local models cost and how far their forces are from `full`'s: plain data, and the error of one run against another.
 
-use palpate::log::{LogRecord, Magnitudes, Resync, magnitude};
+use palpate::log::{LogRecord, Magnitudes, Resync, ServedBy, magnitude};
 use palpate::runtime::Nanos;
 
 /// The part of a run that a comparison needs: force and energy of every haptic tick, and the resyncs.
@@ -147,6 +147,8 @@ pub struct Measured {
     pub cost: ModelCost,
     /// Haptic and global releases that reported a degraded result, such as a force that was not finite.
     pub degraded: u64,
+    /// The models that made the force, its own or those that it fell back to, with the share of ticks that each did (0 to 1).
+    pub served: Vec<(ServedBy, f64)>,
     /// Forces and energies of the run.
     pub trace: ForceTrace,
 }

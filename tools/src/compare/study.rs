@@ -201,7 +201,8 @@ fn measured(summary: &Summary, full: Option<&ForceTrace>) -> Measured {
     let trace = ForceTrace::of(&summary.records);
     let error = ForceDeviation::between(&trace, full.unwrap_or(&trace));
     let degraded = summary.runtime.groups.iter().map(|group| group.degraded).sum();
-    Measured { error, cost: cost(summary), degraded, trace }
+    let served = summary.report.devices.first().map_or(Vec::new(), |device| device.force.shares().collect());
+    Measured { error, cost: cost(summary), degraded, served, trace }
 }
 
 fn cost(summary: &Summary) -> ModelCost {

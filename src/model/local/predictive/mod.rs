@@ -12,18 +12,6 @@ use crate::contact::{Contact, ContactPoint, ToolMotion};
 use crate::surroundings::{Basis, ReducedMotion};
 use crate::{Vec3, Wrench};
 
-/// The way in which `predictive` finds where its ring will go.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
-pub enum Prediction {
-    /// A reduced model of the surroundings says it, where that holds the present motion; else the whole body, see
-    /// [`Full`](Self::Full).
-    #[default]
-    Reduced,
-    /// The whole body runs ahead and says it.
-    Full,
-}
-
 /// The patch and what of the body depends on it stay non-linear. The ring, the patch's neighbours outside, moves as
 /// predicted for the expected path of the tool, and answers by the reduced surroundings to what the near part does
 /// differently from the prediction:
@@ -36,7 +24,6 @@ pub enum Prediction {
 #[derive(Debug)]
 pub(super) struct Predictive {
     size: [usize; 3],
-    prediction: Prediction,
     /// Its window nodes are the patch, the ring, then what stands still; the ring is moved by its path.
     patch: Patch,
     near: NearBody,
@@ -58,13 +45,12 @@ pub(super) struct Predictive {
 impl Predictive {
     /// An empty model with a patch of `size` = nodes along the surface, along it, into depth. Memory comes with the first
     /// [`rebuild`](LocalModel::rebuild).
-    pub(super) fn new(size: [usize; 3], prediction: Prediction) -> Self {
+    pub(super) fn new(size: [usize; 3]) -> Self {
         let (patch, near, path, surroundings, present) = Default::default();
         let (ring_positions, ring_velocities, ring_forces) = Default::default();
         let (others, substep, basis) = Default::default();
         Self {
             size,
-            prediction,
             patch,
             near,
             others,
@@ -93,17 +79,8 @@ impl Predictive {
         self.substep = 0;
     }
 
-    /// Finds the ring's path: by the forecast of the surroundings where it holds the present motion, or else by running
-    /// the whole body ahead. The forecast knows no tool but its own: one that presses elsewhere moves on in the whole body.
+    /// Finds the ring's path: the whole body runs ahead.
     fn predict(&mut self, resync: &mut ResyncView<'_>) {
-        let is_alone = resync.global.exerted_beside(resync.index).all(|(_, force)| force == Vec3::zeros());
-        let basis = self.basis.clone().filter(|_| is_alone && self.prediction == Prediction::Reduced);
-        if !basis.is_some_and(|basis| self.predict_by_forecast(&basis, resync)) {
-            self.predict_by_global(resync);
-        }
-    }
-
-    fn predict_by_global(&mut self, resync: &mut ResyncView<'_>) {
         let ring = self.ring();
         let Self { patch: Patch { window, state, forces, stepping, .. }, near, path, present, .. } = self;
         path.clear(window.ring, stepping.step(), (resync.horizon * stepping.substeps + 1) as usize);
@@ -115,52 +92,6 @@ impl Predictive {
             path.push(state, forces, ring.clone());
         });
         self.take_present(resync);
-    }
-
-    /// Does what [`tick`](LocalModel::tick) does, with the forecast in place of the path. False if that does not hold the present
-    /// motion.
-    fn predict_by_forecast(&mut self, basis: &Basis, resync: &mut ResyncView<'_>) -> bool {
-        let (ring, forecast, stepping) = (self.ring(), &basis.forecast, self.patch.stepping);
-        let span = f64::from(resync.horizon) * stepping.tick;
-        if !forecast.launch(&mut self.surroundings, resync.global.with_forces_but_of(resync.index), span) {
-            return false;
-        }
-        self.path.clear(ring.len(), stepping.step(), (resync.horizon * stepping.substeps) as usize + 1);
-        let origin = flat(&self.patch.state.positions[ring.clone()]);
-        self.take_near_forces();
-        let resting = flat(&self.patch.forces[ring.clone()]);
-        for n in 0..resync.horizon {
-            if self.patch.contact_has_left() {
-                // What the patch would do from here on is wrong.
-                self.take_present(resync);
-                return false;
-            }
-            stepping.tick(resync.tools[resync.index].motion(n, stepping.tick), |tool, d| {
-                self.take_near_forces();
-                self.push_path();
-                let Self { patch, ring_forces, surroundings, ring_positions: x, ring_velocities: v, .. } = self;
-                deviations(ring_forces, &patch.forces[ring.clone()], &resting);
-                // A step for each of the body's: together they are a projection of it, so what is stable there is so here.
-                forecast.model.step(surroundings, ring_forces, d);
-                x.copy_from_slice(&origin);
-                v.fill(0.0);
-                forecast.model.add_ring(surroundings, x, v);
-                let force = patch.step(tool, d);
-                self.place_ring();
-                force
-            });
-        }
-        // The end of the path, and all of it for a contact that is outside the patch already.
-        self.take_near_forces();
-        self.push_path();
-        self.take_present(resync);
-        true
-    }
-
-    /// The ring as it is now, to the end of its path.
-    fn push_path(&mut self) {
-        let ring = self.ring();
-        self.path.push(&self.patch.state, &self.patch.forces, ring);
     }
 
     /// The ring's nodes to `ring_positions` with `ring_velocities`.
@@ -198,11 +129,6 @@ impl Predictive {
         self.place_ring();
         force
     }
-}
-
-/// The numbers of `vectors`, one after the other.
-fn flat(vectors: &[Vec3]) -> Vec<f64> {
-    vectors.iter().flat_map(|vector| vector.iter()).copied().collect()
 }
 
 /// out = forces - expected, as far as `expected` reaches.

@@ -70,7 +70,7 @@ pub fn reduce_scene(
         return Err(Error::scene("body", message));
     }
     let study = Study {
-        patch: scene.local.patch_size(),
+        patch: scene.patch_size(),
         check: LocalityCheck::new(&linear, BAND_HZ)?,
         linear: &linear,
         body,

@@ -1,0 +1,76 @@
+//! How local models hold on scenes that nobody tuned them to: random cases, `full` against the others in time and one period
+//! late. Writes docs/population.md and its pictures.
+//!
+//! `cargo bench --bench population`; with `-- --quick` a short form that prints and writes nothing; with `-- --seen` the two
+//! thirds of the cases that may be looked at while working, case by case, written nowhere; `--cases N` how many, `--from N` the first
+//! seed, `--patch A,B,C`, `--basis N` and `--model NAME` in place of the defaults.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod cases;
+mod paths;
+#[path = "../../../tests/random/mod.rs"]
+mod random;
+mod runs;
+mod words;
+
+use std::process::ExitCode;
+
+use palpate::Error;
+
+use cases::is_unseen;
+use runs::{Settings, run_all};
+
+/// Cases of the document.
+const CASES: u64 = 180;
+
+fn document(is_quick: bool, settings: &Settings) -> Result<(), Error> {
+    let seeds: Vec<u64> = if is_quick { vec![0, 5] } else { (0..CASES).collect() };
+    let results = run_all(&seeds, settings, |_| ())?;
+    let document = words::document(&results);
+    if is_quick {
+        print!("{}", document.text);
+        return Ok(());
+    }
+    for (name, svg) in &document.pictures {
+        common::write(&format!("docs/img/{name}.svg"), svg)?;
+    }
+    common::write("docs/population.md", &document.text)
+}
+
+/// What may be looked at while working.
+fn seen(settings: &Settings, from: u64, count: usize) -> Result<(), Error> {
+    let listed = std::env::args().skip_while(|argument| argument != "--only").nth(1);
+    let listed = listed.map(|list| list.split(',').filter_map(|seed| seed.parse().ok()).collect());
+    let seeds: Vec<u64> = listed.unwrap_or_else(|| (from..).filter(|&seed| !is_unseen(seed)).take(count).collect());
+    let results = run_all(&seeds, settings, |result| println!("{result}"))?;
+    print!("{}", words::distributions(&results));
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    let Some(arguments) = common::arguments() else { return ExitCode::SUCCESS };
+    let value = |flag: &str| std::env::args().skip_while(|argument| argument != flag).nth(1);
+    let number = |flag: &str| value(flag).and_then(|value| value.parse::<usize>().ok());
+    let settings = Settings {
+        patch: value("--patch").map(|sizes| {
+            let mut sizes = sizes.split(',').map(|size| size.parse().expect("--patch takes A,B,C"));
+            std::array::from_fn(|_| sizes.next().expect("--patch takes A,B,C"))
+        }),
+        basis: number("--basis"),
+        latency_ms: value("--basis-latency").and_then(|value| value.parse().ok()),
+    };
+    let is_seen = std::env::args().any(|argument| argument == "--seen");
+    let done = match is_seen {
+        true => seen(&settings, number("--from").unwrap_or(0) as u64, number("--cases").unwrap_or(60)),
+        false => document(arguments.is_quick, &settings),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
