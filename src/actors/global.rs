@@ -3,13 +3,11 @@
 use super::basis::Wishes;
 use super::cause::Cause;
 use super::messages::{Checkpoint, SurfaceView, ToolTick};
-use super::wish_list::WishList;
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::Pose;
-use crate::model::contact::{ToolMotion, ToolShape};
-use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView};
-use crate::model::local::{ToolForecast, ToolHistory};
+use crate::model::contact::ToolMotion;
+use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, ToolForecast, ToolHistory, Windows};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{
@@ -61,8 +59,10 @@ pub struct SurroundingsPorts {
     pub bases: Reader<Bases>,
 }
 
-/// Where the tool may be by the time that a basis is ready (s).
+/// Times at which a tool is looked for ahead: by then a basis may be ready (s).
 const PREFETCH_S: [f64; 3] = [0.15, 0.3, 0.6];
+/// Windows around a tool that are made ready before it comes there.
+const NEIGHBOURS: usize = 7;
 
 /// The time whose tool samples a release follows at most, if two periods of its own are less (s): one that finds more
 /// starts again from its newest surface and the newest tool, so that under load it does not fall behind without end.
@@ -84,8 +84,6 @@ pub struct GlobalPlan {
     pub patch: [usize; 3],
     /// Bases that are there from the start.
     pub bases: Bases,
-    /// Bases are wanted for all places that the tool could go to, and not only for where it is going.
-    pub prefetches: bool,
 }
 
 impl GlobalPlan {
@@ -117,6 +115,8 @@ struct ToolSide {
     /// Its sample of the last tick was missing.
     is_between: bool,
     history: ToolHistory,
+    /// Where local models may be made, if there are bases.
+    windows: Windows,
     /// Triangles that the window of its next model has to hold.
     triangles: Vec<u32>,
     /// The patch of its next model.
@@ -135,19 +135,11 @@ impl ToolSide {
         }
     }
 
-    /// The patch that the next model is made for: the one around the triangles, or if there is no basis for this and there is
-    /// one for another, that: a larger one, or one that at least holds the triangles.
-    fn choose_patch(&mut self, (simulation, index): (&Simulation, usize), plan: &GlobalPlan) {
-        simulation.patch(index, &self.triangles, plan.patch, &mut self.patch);
-        let bases = &plan.bases;
-        if bases.get(&self.patch).is_some() {
-            return;
-        }
-        let mut pressed = Vec::new();
-        simulation.pressed_at(index, &self.triangles, &mut pressed);
-        let held = || bases.holding(|| pressed.iter().copied(), &self.patch);
-        if let Some(other) = bases.around(&self.patch).or_else(held) {
-            self.patch = other.to_vec();
+    /// The patch that the next model is made for, if there are bases: the best window that has one, or the best of all.
+    fn choose_patch(&mut self, at: (&Simulation, usize), bases: &Bases) {
+        let has_basis = |patch: &[u32]| bases.get(patch).is_some();
+        if !self.windows.choose(at, &self.triangles, has_basis, &mut self.patch) {
+            self.windows.choose(at, &self.triangles, |_| true, &mut self.patch);
         }
     }
 }
@@ -168,8 +160,9 @@ pub struct GlobalActor {
     forecasts: Vec<ToolForecast>,
     /// Working memory: how each tool moves in a tick.
     motions: Vec<ToolMotion>,
-    /// Working memory: triangles of other windows.
-    others: Vec<u32>,
+    /// Working memory: where a tool is going, and the window there.
+    triangles_ahead: Vec<u32>,
+    patch_ahead: Vec<u32>,
 }
 
 impl GlobalActor {
@@ -189,7 +182,9 @@ impl GlobalActor {
         let GlobalPorts { tools: of_tools, shared } = ports;
         assert_eq!([tools.len(), of_tools.len()], [simulation.tools(); 2], "ports and places for each tool");
         let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
-        let side = |(&tool, ports): (&ToolTick, ToolPorts)| ToolSide {
+        let has_bases = shared.surroundings.is_some();
+        let side = |(index, (&tool, ports)): (usize, (&ToolTick, ToolPorts))| ToolSide {
+            windows: if has_bases { Windows::new(&simulation, index, plan.patch) } else { Windows::default() },
             ports,
             tool,
             from: tool.pose,
@@ -198,9 +193,9 @@ impl GlobalActor {
             triangles: Vec::new(),
             patch: Vec::new(),
         };
-        let tools = tools.iter().zip(of_tools).map(side).collect();
-        let (forecasts, motions) = (Vec::new(), Vec::new());
-        Ok(Self { simulation, aim, ports: shared, plan, tools, forecasts, motions, others: Vec::new() })
+        let tools = tools.iter().zip(of_tools).enumerate().map(side).collect();
+        let (forecasts, motions, triangles_ahead, patch_ahead) = Default::default();
+        Ok(Self { simulation, aim, ports: shared, plan, tools, forecasts, motions, triangles_ahead, patch_ahead })
     }
 
     /// The haptic tick of the state.
@@ -301,7 +296,7 @@ impl GlobalActor {
         for (index, side) in self.tools.iter_mut().enumerate() {
             let has_bases = self.ports.surroundings.is_some();
             if has_bases {
-                side.choose_patch((&self.simulation, index), &self.plan);
+                side.choose_patch((&self.simulation, index), &self.plan.bases);
             }
             let resync = ResyncView {
                 global: &mut self.simulation,
@@ -329,53 +324,34 @@ impl GlobalActor {
         }
     }
 
-    /// Asks for the bases that are missing.
+    /// Asks for the bases that are missing: of the window that is the best now, of those where the tool is going, and of those
+    /// around it.
     fn publish_wishes(&mut self, ctx: &TickContext) {
         let Some(ports) = &mut self.ports.surroundings else { return };
         let wishes = ports.wishes.buffer();
         wishes.patches.clear();
-        let mut list = WishList { simulation: &self.simulation, index: 0, bases: &self.plan.bases, wishes };
-        let (aim, size, lead, ahead) = (&self.aim, self.plan.patch, self.plan.lead_s(), &mut self.others);
-        for (index, (ToolSide { triangles, .. }, tool)) in self.tools.iter().zip(&self.forecasts).enumerate() {
-            list.index = index;
-            let of_tool = (&self.simulation, index);
-            let has_shape = self.simulation.shape(index) != ToolShape::Point;
-            if self.simulation.contact(index).glued {
-                // The tool stays where it is.
-                list.wish(triangles, size);
-            } else if self.plan.prefetches {
-                // In the time that one takes the tool can be in the next cells: a window that is a cell wider serves there too.
-                let wide = Aim::wider(size);
-                if !list.is_covered(triangles, size) {
-                    list.wish(triangles, size);
-                }
-                // A point is over one triangle, a tool with a shape over many.
-                let under = |triangles: &[u32]| if has_shape { triangles.len() } else { 1 };
-                list.wish(&triangles[..under(triangles)], wide);
-                aim.heading(self.simulation.body(), tool, triangles[0], ahead);
-                list.wish(&ahead[ahead.len() - 1..], wide);
-                for seconds in PREFETCH_S {
-                    aim.triangles(of_tool, tool, [seconds, 0.0], ahead);
-                    list.wish(&ahead[..under(ahead)], wide);
-                }
-                list.wish(triangles, size);
-            } else {
-                if !has_shape || !list.is_covered(triangles, size) {
-                    list.wish(triangles, size);
-                }
-                aim.triangles(of_tool, tool, [self.plan.global.period_s(), lead], ahead);
-                if !has_shape || !list.is_covered(ahead, size) {
-                    list.wish(ahead, size);
-                }
-                // It may leave for the next cells sooner or later than expected: the room around a shape holds that.
-                if !has_shape {
-                    aim.heading(self.simulation.body(), tool, triangles[0], ahead);
-                    for last in 1..=ahead.len() {
-                        list.wish(&ahead[..last], size);
-                        list.wish(&ahead[last - 1..], size);
-                    }
-                }
+        let bases = &self.plan.bases;
+        let mut wish = |patch: &[u32]| {
+            if bases.get(patch).is_none() && !wishes.patches.iter().any(|wished| wished == patch) {
+                wishes.patches.push(patch.to_vec());
             }
+        };
+        let (period, lead) = (self.plan.global.period_s(), self.plan.lead_s());
+        for (index, (side, tool)) in self.tools.iter().zip(&self.forecasts).enumerate() {
+            let at = (&self.simulation, index);
+            let (ahead, patch) = (&mut self.triangles_ahead, &mut self.patch_ahead);
+            side.windows.choose(at, &side.triangles, |_| true, patch);
+            wish(patch);
+            if self.simulation.contact(index).glued {
+                // It stays where it is.
+                continue;
+            }
+            for [after, lead] in [[period, lead]].into_iter().chain(PREFETCH_S.map(|after| [after, 0.0])) {
+                self.aim.triangles(at, tool, [after, lead], ahead);
+                side.windows.choose(at, ahead, |_| true, patch);
+                wish(patch);
+            }
+            side.windows.around(side.triangles[0], NEIGHBOURS).for_each(&mut wish);
         }
         if !wishes.patches.is_empty() {
             ports.wishes.publish(ctx);

@@ -23,7 +23,6 @@ mod messages;
 mod scene_watch;
 mod throttle;
 mod touched;
-mod wish_list;
 
 pub(crate) use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub(crate) use basis_store::BasisStore;

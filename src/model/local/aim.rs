@@ -1,14 +1,11 @@
 //! Which part of the surface the next local models have to hold.
 
 use super::forecast::ToolForecast;
-use crate::body::Body;
 use crate::error::ModelError;
 use crate::mesh::{NearestTriangle, Surface};
 use crate::simulation::Simulation;
 use crate::{Pose, Vec3};
 
-/// Slower tools have no direction (m/s).
-const AT_REST: f64 = 1e-3;
 /// A window that is made ahead has room around a tool with a shape, in tool radii: where that goes a little aside or sooner, the
 /// same window serves.
 const ROOM: f64 = 0.3;
@@ -22,14 +19,6 @@ pub struct Aim {
 }
 
 impl Aim {
-    /// The size of a window that is a cell wider on every side than one of `size`.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn wider(size: [usize; 3]) -> [usize; 3] {
-        [size[0] + 2, size[1] + 2, size[2]]
-    }
-
     /// A search over `surface` with nodes at `positions` (m).
     ///
     /// # Errors
@@ -76,28 +65,6 @@ impl Aim {
         for look in 0..=LOOKS {
             let pose = Pose { position: tool.unbraked(ahead(look)), orientation: tool.orientation };
             simulation.footprint(index, &pose, margin, triangles);
-        }
-    }
-
-    /// Puts `present` and the triangles that a tool comes over next if it keeps its direction in place of `triangles`, in
-    /// this order, for two edges of `present`.
-    ///
-    /// # Real-time
-    /// For the global actor: bounded; `triangles` may grow.
-    pub fn heading(&self, body: &dyn Body, tool: &ToolForecast, present: u32, triangles: &mut Vec<u32>) {
-        triangles.clear();
-        triangles.push(present);
-        let speed = tool.velocity.norm();
-        if speed < AT_REST {
-            return;
-        }
-        let [a, b, c] = body.surface().triangles[present as usize].map(|node| body.rest()[node as usize]);
-        let edge = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-        for part in 1..=4 {
-            let next = self.nearest.find(&(tool.position + tool.velocity * (0.5 * f64::from(part) * edge / speed)));
-            if !triangles.contains(&next) {
-                triangles.push(next);
-            }
         }
     }
 }

@@ -11,6 +11,7 @@ mod patch;
 mod predictive;
 mod succession;
 mod template;
+mod windows;
 
 use crate::body::State;
 use crate::contact::{Contact, ContactPoint, ToolMotion};
@@ -26,6 +27,7 @@ pub use hold::Hold;
 pub use kind::Kind;
 pub use succession::{Blend, BlendKind, Jump, Resynced, Served, Succession};
 pub use template::Template;
+pub use windows::Windows;
 
 /// The global model at a resync, and what is expected: what a local model is built from.
 #[derive(Debug)]

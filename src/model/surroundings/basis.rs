@@ -61,25 +61,6 @@ impl Bases {
         self.of.get(patch)
     }
 
-    /// The patch of the smallest basis that holds all nodes of `patch`.
-    ///
-    /// # Real-time
-    /// For the global actor: looks at all bases.
-    pub fn around(&self, patch: &[u32]) -> Option<&[u32]> {
-        let holds = |basis: &&Arc<Basis>| patch.iter().all(|node| basis.patch.binary_search(node).is_ok());
-        self.of.values().filter(holds).map(|basis| &basis.patch[..]).min_by_key(|patch| patch.len())
-    }
-
-    /// The patch that has most nodes of `wanted`, of a basis whose patch holds all of `nodes`.
-    ///
-    /// # Real-time
-    /// For the global actor: looks at all bases.
-    pub fn holding<I: Iterator<Item = u32>>(&self, nodes: impl Fn() -> I, wanted: &[u32]) -> Option<&[u32]> {
-        let holds = |basis: &&Arc<Basis>| nodes().all(|node| basis.patch.binary_search(&node).is_ok());
-        let common = |patch: &&[u32]| wanted.iter().filter(|&node| patch.binary_search(node).is_ok()).count();
-        self.of.values().filter(holds).map(|basis| &basis.patch[..]).max_by_key(common)
-    }
-
     /// All bases, in the order of their patches.
     ///
     /// # Real-time

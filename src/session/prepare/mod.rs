@@ -60,8 +60,8 @@ pub(super) struct ModelPlan {
     pub(super) template: Template,
     pub(super) timing: Timing,
     pub(super) blend: Blend,
-    /// A basis takes its time here: bases are asked for ahead of the tool.
-    pub(super) prefetches: bool,
+    /// A basis takes its time here: they are made one by one.
+    pub(super) in_real_time: bool,
     /// Logged nodes.
     pub(super) probes: Vec<u32>,
     /// Where reduced surroundings are kept from run to run.
@@ -132,9 +132,9 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         Execution::Threaded => budget::declare(evaluation, start.state.positions.len(), timing, kind, [local, global])?,
     };
     let blend = Blend::new(scene.local.blend.kind, blend_ticks);
-    let (probes, prefetches) = (std::mem::take(&mut start.probes), options.in_real_time);
+    let (probes, in_real_time) = (std::mem::take(&mut start.probes), options.in_real_time);
     let basis_folder = scene.local.basis_folder.take();
-    let plan = ModelPlan { template, timing, blend, prefetches, probes, basis_folder };
+    let plan = ModelPlan { template, timing, blend, in_real_time, probes, basis_folder };
     let until = (!endless).then(|| Nanos::from_secs_f64(scene.run.duration_s));
     let simulation = simulation(start, &scene, &tools)?;
     let prepared =

@@ -6,9 +6,7 @@ use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::log::ModelReason;
 use crate::model::Pose;
-use crate::model::contact::ToolShape;
-use crate::model::local::Aim;
-use crate::model::local::ToolForecast;
+use crate::model::local::{Aim, ToolForecast, Windows};
 use crate::model::surroundings::{Bases, RestingBody, Size};
 use crate::runtime::{Actor, ExchangePort, RuntimeBuilder};
 use crate::session::prepare::{Prepared, extended};
@@ -35,7 +33,7 @@ impl BasisSide {
         };
         let folder = prepared.plan.basis_folder.clone();
         let store = BasisStore { size: prepared.scene.local.basis_size(), folder };
-        let pace = if prepared.plan.prefetches { BasisPace::OneByOne } else { BasisPace::All };
+        let pace = if prepared.plan.in_real_time { BasisPace::OneByOne } else { BasisPace::All };
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
@@ -66,31 +64,22 @@ impl BasisSide {
     }
 }
 
-/// The basis where each tool is, and before a run on threads one that holds a cell more around it.
+/// The basis of the window that each tool is over.
 fn first_bases(prepared: &Prepared, resting: &RestingBody, store: &BasisStore, tools: &[Pose]) -> Result<Bases, Error> {
-    let (body, state) = (prepared.simulation.body(), prepared.simulation.state());
-    let aim = Aim::new(body.surface(), &state.positions)?;
-    let (mut triangles, mut patch, mut bases) = (Vec::new(), Vec::new(), Bases::default());
-    let size = prepared.plan.template.patch;
-    let sizes: &[[usize; 3]] = if prepared.plan.prefetches { &[size, Aim::wider(size)] } else { &[size] };
+    let simulation = &prepared.simulation;
+    let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
+    let (mut triangles, mut bases) = (Vec::new(), Bases::default());
     for (index, &tool) in tools.iter().enumerate() {
-        aim.triangles(
-            (&prepared.simulation, index),
-            &ToolForecast { orientation: tool.orientation, ..ToolForecast::at_rest(tool.position) },
-            [0.0; 2],
-            &mut triangles,
-        );
-        // A point is over one triangle, a tool with a shape over many.
-        let is_point = prepared.simulation.shape(index) == ToolShape::Point;
-        let first = |triangles: &'_ Vec<u32>| if is_point { triangles[..1].to_vec() } else { triangles.clone() };
-        for &size in sizes {
-            prepared.simulation.patch(index, &first(&triangles), size, &mut patch);
-            // What cannot be reduced is told by the actor, when it is wanted.
-            if bases.get(&patch).is_none()
-                && let Ok(Some(basis)) = store.get(resting, &patch)
-            {
-                bases.insert(Arc::new(basis));
-            }
+        let at_rest = ToolForecast { orientation: tool.orientation, ..ToolForecast::at_rest(tool.position) };
+        aim.triangles((simulation, index), &at_rest, [0.0; 2], &mut triangles);
+        let windows = Windows::new(simulation, index, prepared.plan.template.patch);
+        let mut patch = Vec::new();
+        windows.choose((simulation, index), &triangles, |_| true, &mut patch);
+        // What cannot be reduced is told by the actor, when it is wanted.
+        if bases.get(&patch).is_none()
+            && let Ok(Some(basis)) = store.get(resting, &patch)
+        {
+            bases.insert(Arc::new(basis));
         }
     }
     Ok(bases)

@@ -65,7 +65,6 @@ pub(super) fn models(
         horizon: plan.timing.horizon,
         patch: plan.template.patch,
         bases: known,
-        prefetches: plan.prefetches,
     };
     (sources, Some(GlobalMaker::new(simulation, places, plan, side)))
 }
