@@ -10,7 +10,7 @@ use crate::{Pose, Vec3};
 /// same window serves.
 const ROOM: f64 = 0.3;
 /// Places on that way that are looked at, besides the present one.
-const LOOKS: u32 = 3;
+pub(super) const LOOKS: u32 = 3;
 
 /// Finds the surface triangles under the tool, now and where it is going.
 #[derive(Clone, Debug)]

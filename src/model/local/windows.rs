@@ -1,6 +1,7 @@
 //! The windows that local models are made for: few, which cover the surface, so that what is made for one serves whenever a
 //! tool comes there.
 
+use super::aim::LOOKS;
 use crate::contact::ToolShape;
 use crate::simulation::Simulation;
 use crate::{Pose, Vec3};
@@ -50,8 +51,7 @@ impl Windows {
     pub fn new(simulation: &Simulation, tool: usize, size: [usize; 3]) -> Self {
         let (body, shape) = (simulation.body(), simulation.shape(tool));
         let (rest, surface) = (body.rest(), &body.surface().triangles);
-        let corners: Vec<[Vec3; 3]> =
-            surface.iter().map(|triangle| triangle.map(|node| rest[node as usize])).collect();
+        let corners: Vec<[Vec3; 3]> = surface.iter().map(|triangle| triangle.map(|node| rest[node as usize])).collect();
         let triangles: Vec<Vec3> = corners.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
         let edges = corners.iter().map(|[a, b, c]| (b - a).norm() + (c - b).norm() + (a - c).norm());
         let edge = edges.sum::<f64>() / (3.0 * corners.len().max(1) as f64);
@@ -96,12 +96,13 @@ impl Windows {
         nodes: &mut Vec<u32>,
     ) -> bool {
         if !simulation.contact(tool).glued {
-            simulation.pressed_at(tool, triangles, nodes);
-            let window = self.best(triangles, nodes, &usable).or_else(|| {
-                simulation.pressed_at(tool, &triangles[..1], nodes);
-                self.best(&triangles[..1], nodes, &usable)
+            // All of a fast tool's way may be in none: then as much of it as one holds.
+            let mut window = (1..=LOOKS as usize + 1).rev().filter_map(|count| {
+                let first = if count > LOOKS as usize { triangles } else { &triangles[..count.min(triangles.len())] };
+                simulation.pressed_at(tool, first, nodes);
+                self.best(first, nodes, &usable)
             });
-            if let Some(window) = window {
+            if let Some(window) = window.next() {
                 window.patch.clone_into(nodes);
                 return true;
             }
@@ -133,7 +134,8 @@ impl Windows {
     pub fn around(&self, triangle: u32, count: usize) -> impl Iterator<Item = &[u32]> {
         let at = self.triangles[triangle as usize];
         let far = |window: &Window| (window.middle - at).norm_squared();
-        let mut all: Vec<(f64, &Window)> = self.windows.iter().take_while(|window| window.layer == 0).map(|window| (far(window), window)).collect();
+        let mut all: Vec<(f64, &Window)> =
+            self.windows.iter().take_while(|window| window.layer == 0).map(|window| (far(window), window)).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         all.truncate(count);
         all.into_iter().map(|(_, window)| &window.patch[..])
