@@ -334,8 +334,9 @@ fn a_small_body_needs_no_patch_for_a_model_without_one() {
         .replace("[7, 5, 11]", "[0, 1, 2]");
     assert!(refusal(&small).to_string().contains("local.patch"));
     let full = small.replace("model = \"patch\"", "model = \"full\"").replace("feedback = \"geometry\"\n", "");
+    let full = full.replace("patch = [4, 4, 2]\n", "");
     Scene::from_toml(&full, "s", None).unwrap();
-    let asked_for = full.replace("patch = [4, 4, 2]", "patch = [4, 4, 4]");
+    let asked_for = full.replace("model = \"full\"", "model = \"full\"\npatch = [4, 4, 2]");
     assert!(refusal(&asked_for).to_string().contains("local.patch"));
 }
 

@@ -146,12 +146,16 @@ impl Scene {
         self
     }
 
-    /// The patch window that was asked for, or the usual one of the model (6 x 6 x 3 for `predictive` and `predicted`, 4 x 4 x 2 for
-    /// the others) as far as the body has room for it: what a session takes unless it sizes it by `error_pct`.
+    /// The patch window that was asked for, or the usual one: 6 x 6 x 3 for `predictive` and `predicted`, 4 x 4 x 3 if the body is of
+    /// tetrahedra, whose nodes have more neighbours, as far as a block has room for it; 4 x 4 x 2, the paper's, for the other models.
     pub fn patch_size(&self) -> [usize; 3] {
-        let size = self.local.patch_size();
-        let block = self.body.as_ref().and_then(BodySpec::mass_spring).filter(|_| self.local.patch.is_none());
-        block.map_or(size, |spec| fitting_patch(size, &spec.block))
+        let looks_ahead = matches!(self.local.model.named(), Some(Kind::Predicted | Kind::Predictive));
+        self.local.patch.unwrap_or_else(|| match &self.body {
+            _ if !looks_ahead => [4, 4, 2],
+            Some(BodySpec::MassSpring(spec)) => fitting_patch([6, 6, 3], &spec.block),
+            Some(BodySpec::Tetrahedra(_)) => [4, 4, 3],
+            None => [6, 6, 3],
+        })
     }
 
     /// The node of the surface of `body` that the first tool's path comes to first, within the body's extents; the middle of the

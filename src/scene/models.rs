@@ -36,8 +36,8 @@ pub struct LocalSpec {
     /// The largest expected error (rms, % of the peak force, see DESIGN.md): of a model that `auto` may choose, 1 if absent;
     /// and of `predictive`, whose `patch` and `basis` become that large if they are absent. It sizes no other model.
     pub error_pct: Option<f64>,
-    /// Patch window: nodes along the surface, along it, into depth. If absent, what `error_pct` needs with `predictive`, or
-    /// 6 x 6 x 3 without that, and 4 x 4 x 2 with the other models.
+    /// Patch window: nodes along the surface, along it, into depth. If absent, what `error_pct` needs with `predictive`, or what
+    /// [`Scene::patch_size`](super::Scene::patch_size) says.
     pub patch: Option<[usize; 3]>,
     /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted. If absent, what
     /// `error_pct` needs, or 150 without that.
@@ -77,16 +77,6 @@ impl LocalSpec {
         self.error_pct.unwrap_or(1.0)
     }
 
-    /// The patch window that was asked for, or the usual one of the model: 6 x 6 x 3 for `predictive` and `predicted`, 4 x 4 x 2,
-    /// as in the paper, for the others.
-    pub(super) fn patch_size(&self) -> [usize; 3] {
-        let usual = match self.model.named() {
-            Some(Kind::Predicted | Kind::Predictive) => [6, 6, 3],
-            _ => [4, 4, 2],
-        };
-        self.patch.unwrap_or(usual)
-    }
-
     /// Names the model that `auto` chose: a budget below what `predictive` keeps was met with a warning, and what it keeps is
     /// asked of it.
     pub(crate) fn name_chosen(&mut self, kind: Kind) {
@@ -96,7 +86,7 @@ impl LocalSpec {
         }
     }
 
-    /// The size that a basis is to have: a number of states that is given counts, then the budget.
+    /// The size that a basis is to have: a number of states that is given counts, then the budget, then 150 states.
     pub fn basis_size(&self) -> Size {
         match (self.basis, self.error_pct) {
             (Some(states), _) => Size::States(states),
