@@ -141,3 +141,83 @@ impl Windows {
         all.into_iter().map(|(_, window)| &window.patch[..])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{Block, Body, State};
+    use crate::contact::{Contact, Law};
+    use crate::mesh::Face;
+    use crate::simulation::Stepping;
+
+    const SIZE: [usize; 3] = [4, 4, 2];
+
+    fn simulation(shape: ToolShape) -> Simulation {
+        let block = Block::builder([9; 3], [0.08; 3]).fix(Face::ZMin).build().unwrap();
+        let (state, stepping) = (State::at_rest(block.rest()), Stepping { tick: 1e-3, substeps: 4 });
+        let sim = Simulation::new(Box::new(block), state, Contact::default(), Law::default(), stepping).unwrap();
+        sim.with_shape(0, shape)
+    }
+
+    /// The triangles of the top.
+    fn top(simulation: &Simulation) -> Vec<u32> {
+        let (rest, triangles) = (simulation.body().rest(), &simulation.body().surface().triangles);
+        let is_on_top = |triangle: &[u32; 3]| triangle.iter().all(|&node| rest[node as usize].z > 0.0799);
+        (0..triangles.len() as u32).filter(|&t| is_on_top(&triangles[t as usize])).collect()
+    }
+
+    #[test]
+    fn every_place_is_well_inside_one_of_few_windows() {
+        for shape in [ToolShape::Point, ToolShape::Sphere { radius: 8e-3 }] {
+            let simulation = simulation(shape);
+            let windows = Windows::new(&simulation, 0, SIZE);
+            let (mut pressed, mut patch, mut used) = (Vec::new(), Vec::new(), Vec::new());
+            let top = top(&simulation);
+            for &triangle in &top {
+                assert!(windows.choose((&simulation, 0), &[triangle], |_| true, &mut patch));
+                simulation.pressed_at(0, &[triangle], &mut pressed);
+                assert!(pressed.iter().all(|node| patch.contains(node)), "{shape:?}: triangle {triangle}");
+                assert!(patch.is_sorted());
+                used.push(patch.clone());
+            }
+            used.sort();
+            used.dedup();
+            assert!(4 * used.len() < top.len(), "{shape:?}: {} windows for {} triangles", used.len(), top.len());
+        }
+    }
+
+    #[test]
+    fn a_way_takes_the_least_window_that_holds_it_or_most_of_it() {
+        let simulation = simulation(ToolShape::Point);
+        let windows = Windows::new(&simulation, 0, SIZE);
+        let nearest = crate::mesh::NearestTriangle::new(simulation.body().surface(), simulation.body().rest()).unwrap();
+        let at = |x: f64| nearest.find(&Vec3::new(x, 0.041, 0.08));
+        let mut patch = Vec::new();
+        let mut chosen = |triangles: &[u32]| {
+            assert!(windows.choose((&simulation, 0), triangles, |_| true, &mut patch));
+            patch.clone()
+        };
+        let resting = chosen(&[at(0.041)]);
+        assert_eq!(resting.len(), SIZE.iter().product::<usize>());
+        let fast = chosen(&[at(0.021), at(0.031), at(0.041), at(0.061)]);
+        assert!(fast.len() > resting.len());
+        // From edge to edge is more than any window holds: it holds the first half.
+        let [edge, middle] = [at(0.001), at(0.031)];
+        let too_far = chosen(&[edge, middle, at(0.061), at(0.079)]);
+        let corners = |triangle: u32| simulation.body().surface().triangles[triangle as usize];
+        assert!([edge, middle].into_iter().flat_map(corners).all(|node| too_far.contains(&node)));
+    }
+
+    #[test]
+    fn a_window_that_is_ready_comes_before_a_better_one_that_is_not() {
+        let simulation = simulation(ToolShape::Point);
+        let windows = Windows::new(&simulation, 0, SIZE);
+        let triangle = top(&simulation)[40];
+        let (mut best, mut ready) = (Vec::new(), Vec::new());
+        windows.choose((&simulation, 0), &[triangle], |_| true, &mut best);
+        assert!(windows.choose((&simulation, 0), &[triangle], |patch| patch != best, &mut ready));
+        assert_ne!(best, ready);
+        assert!(!windows.choose((&simulation, 0), &[triangle], |_| false, &mut ready), "none is ready");
+        assert!(windows.around(triangle, 7).count() == 7 && windows.around(triangle, 1).next().is_some());
+    }
+}

@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn a_cheaper_model_is_chosen_where_so_much_error_is_allowed() {
-        for (error_pct, model) in [(26.0, Kind::LinearBoundary), (40.0, Kind::Hold), (24.0, Kind::Predictive)] {
+        for (error_pct, model) in [(26.0, Kind::LinearBoundary), (40.0, Kind::Hold), (4.0, Kind::Predictive)] {
             let choice = choose(&Situation { error_pct, ..without_full(100) });
             assert!(choice.model == model && choice.reason.warning.is_none(), "{choice}");
         }

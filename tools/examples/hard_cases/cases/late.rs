@@ -14,15 +14,15 @@ pub const CASES: &[Case] = &[
             run(Patch, 2.0, [64.0, 157.0, 9.7, 292.0]),
             run(LinearBoundary, 1.5, [43.0, 105.0, 7.6, 312.0]),
             run(LinearBoundary, 2.0, [52.0, 113.0, 9.2, 290.0]),
-            run(Predictive, 1.5, [0.91, 3.4, 2.4, 2.9]),
-            run(Predictive, 2.0, [1.9, 5.7, 2.4, 4.6]),
+            run(Predictive, 1.5, [0.22, 0.6, 2.4, 0.32]),
+            run(Predictive, 2.0, [0.35, 1.2, 2.4, 0.52]),
         ],
     ),
     case(
         "late drag",
         "hard/drag_100",
         "results 1.5 and 2 periods late",
-        &[run(Predictive, 1.5, [1.4, 9.4, 15.0, 3.1]), run(Predictive, 2.0, [2.7, 11.0, 15.0, 4.8])],
+        &[run(Predictive, 1.5, [0.27, 1.7, 15.0, 0.55]), run(Predictive, 2.0, [2.7, 11.0, 15.0, 4.8])],
     )
     .ends_free(),
     case(
@@ -32,7 +32,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 1.0, [46.0, 102.0, 6.8, 280.0]),
             run(LinearBoundary, 1.0, [41.0, 104.0, 8.6, 292.0]),
-            run(Predictive, 1.0, [1.2, 3.3, 2.5, 3.0]),
+            run(Predictive, 1.0, [0.69, 3.4, 2.4, 0.63]),
         ],
     )
     .upset(Upset::EverySecondLost),
@@ -40,7 +40,7 @@ pub const CASES: &[Case] = &[
         "lost drag 0.1 m/s",
         "hard/drag_100",
         "every second resync is lost",
-        &[run(Predictive, 1.0, [1.9, 9.4, 15.0, 3.8])],
+        &[run(Predictive, 1.0, [0.55, 2.9, 15.0, 0.67])],
     )
     .ends_free()
     .upset(Upset::EverySecondLost),
@@ -48,7 +48,7 @@ pub const CASES: &[Case] = &[
         "lost drag 0.2 m/s",
         "hard/drag_200",
         "every second resync is lost",
-        &[run(Predictive, 1.0, [2.8, 21.0, 35.0, 3.9])],
+        &[run(Predictive, 1.0, [0.97, 11.0, 32.0, 0.73])],
     )
     .ends_free()
     .upset(Upset::EverySecondLost),
@@ -59,7 +59,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 1.0, [37.0, 113.0, 7.4, 340.0]),
             run(LinearBoundary, 1.0, [32.0, 83.0, 7.2, 273.0]),
-            run(Predictive, 1.0, [5.9, 17.0, 3.8, 1.8]),
+            run(Predictive, 1.0, [5.6, 19.0, 5.7, 1.3]),
         ],
     )
     .upset(Upset::Stall(0.5)),
@@ -67,7 +67,7 @@ pub const CASES: &[Case] = &[
         "stalled drag",
         "hard/drag_long",
         "the global model stands still for 1 s",
-        &[run(LinearBoundary, 1.0, [115.0, 188.0, 19.0, 39.0]), run(Predictive, 1.0, [43.0, 75.0, 9.8, 33.0])],
+        &[run(LinearBoundary, 1.0, [115.0, 188.0, 19.0, 39.0]), run(Predictive, 1.0, [45.0, 80.0, 10.0, 34.0])],
     )
     .ends_free()
     .upset(Upset::Stall(0.4)),

@@ -12,8 +12,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [36.0, 108.0, 41.0, 110.0]),
             run(LinearBoundary, 0.0, [7.2, 30.0, 4.4, 15.0]),
-            run(Predictive, 0.0, [0.28, 0.79, 2.4, 0.72]),
-            run(Predictive, 1.0, [0.64, 1.7, 2.5, 0.32]),
+            run(Predictive, 0.0, [0.11, 0.13, 2.4, 0.32]),
+            run(Predictive, 1.0, [0.17, 0.4, 2.4, 0.41]),
         ],
     ),
     case(
@@ -23,8 +23,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [18.0, 44.0, 5.8, 81.0]),
             run(LinearBoundary, 0.0, [8.4, 33.0, 6.5, 22.0]),
-            run(Predictive, 0.0, [0.28, 0.71, 2.4, 0.93]),
-            run(Predictive, 1.0, [0.54, 1.3, 2.4, 1.8]),
+            run(Predictive, 0.0, [0.12, 0.15, 2.4, 0.31]),
+            run(Predictive, 1.0, [0.21, 0.53, 2.4, 0.42]),
         ],
     ),
     case(
@@ -34,8 +34,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [9.9, 28.0, 4.2, 78.0]),
             run(LinearBoundary, 0.0, [5.3, 19.0, 3.2, 22.0]),
-            run(Predictive, 0.0, [0.26, 0.61, 2.3, 0.43]),
-            run(Predictive, 1.0, [0.45, 1.1, 2.3, 1.5]),
+            run(Predictive, 0.0, [0.13, 0.2, 2.3, 0.36]),
+            run(Predictive, 1.0, [0.25, 0.66, 2.3, 0.78]),
         ],
     ),
     case(
@@ -45,8 +45,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [9.7, 28.0, 4.2, 78.0]),
             run(LinearBoundary, 0.0, [5.1, 18.0, 3.2, 21.0]),
-            run(Predictive, 0.0, [0.26, 0.56, 2.3, 0.32]),
-            run(Predictive, 1.0, [0.41, 0.98, 2.3, 1.2]),
+            run(Predictive, 0.0, [0.13, 0.21, 2.3, 0.38]),
+            run(Predictive, 1.0, [0.25, 0.67, 2.3, 0.79]),
         ],
     ),
     Case {
@@ -58,8 +58,8 @@ pub const CASES: &[Case] = &[
             &[
                 run(Patch, 0.0, [13.0, 29.0, 4.0, 26.0]),
                 run(LinearBoundary, 0.0, [6.5, 21.0, 2.5, 12.0]),
-                run(Predictive, 0.0, [1.1, 3.0, 1.9, 2.5]),
-                run(Predictive, 1.0, [2.5, 6.5, 1.9, 5.4]),
+                run(Predictive, 0.0, [0.2, 0.37, 1.8, 0.51]),
+                run(Predictive, 1.0, [0.61, 1.4, 1.8, 1.5]),
             ],
         )
     },
@@ -70,8 +70,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [25.0, 94.0, 40.0, 8.1]),
             run(LinearBoundary, 0.0, [17.0, 91.0, 89.0, 18.0]),
-            run(Predictive, 0.0, [5.4, 88.0, 84.0, 4.6]),
-            run(Predictive, 1.0, [13.0, 109.0, 125.0, 8.6]),
+            run(Predictive, 0.0, [0.13, 0.35, 107.0, 0.31]),
+            run(Predictive, 1.0, [4.2, 45.0, 82.0, 6.5]),
         ],
     ), // The ribbon bends away: at the end the tool hangs under its edge.
     case(
@@ -81,8 +81,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [38.0, 228.0, 76.0, 234.0]),
             run(LinearBoundary, 0.0, [9.2, 132.0, 81.0, 22.0]),
-            run(Predictive, 0.0, [1.6, 31.0, 120.0, 3.5]),
-            run(Predictive, 1.0, [12.0, 126.0, 128.0, 7.7]),
+            run(Predictive, 0.0, [1.8, 31.0, 120.0, 1.4]),
+            run(Predictive, 1.0, [8.1, 103.0, 100.0, 42.0]),
         ],
     )
     .ends_free(),
@@ -93,8 +93,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [11.0, 46.0, 138.0, 69.0]),
             run(LinearBoundary, 0.0, [7.7, 46.0, 109.0, 42.0]),
-            run(Predictive, 0.0, [0.32, 1.3, 112.0, 0.59]),
-            run(Predictive, 1.0, [0.35, 1.3, 113.0, 0.67]),
+            run(Predictive, 0.0, [0.11, 0.13, 112.0, 0.31]),
+            run(Predictive, 1.0, [0.11, 0.13, 112.0, 0.31]),
         ],
     )
     .ends_free(),
