@@ -43,8 +43,8 @@ struct Window {
 }
 
 impl Windows {
-    /// Those of tool number `tool`, of `size` nodes along the surface, along it, into depth around a point; around all that a shape may
-    /// touch two less along the surface, as that is wide by itself.
+    /// Those of tool number `tool`: of `size` nodes along the surface, along it, into depth around a point; around all that a shape may
+    /// touch of three nodes along the surface, as that is wide by itself.
     ///
     /// # Real-time
     /// Not real-time safe: allocates, and looks at all pairs of windows and triangles.
@@ -61,7 +61,7 @@ impl Windows {
             let first = windows.len();
             let size = match shape {
                 ToolShape::Point => [size[0] + more, size[1] + more, size[2]],
-                _ => [2, 2, size[2]],
+                _ => [3, 3, size[2]],
             };
             let margin = (0.5 * spacing + way) * edge + shape.half_axis().norm();
             for (triangle, middle) in (0..).zip(&triangles) {

@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench population`; with `-- --quick` a short form that prints and writes nothing; with `-- --seen` the two
 //! thirds of the cases that may be looked at while working, case by case, written nowhere; `--cases N` how many, `--from N` the first
-//! seed, `--patch A,B,C`, `--basis N` and `--model NAME` in place of the defaults.
+//! seed, or `--only A,B` which; `--patch A,B,C`, `--basis N` and `--basis-latency MS` in place of the defaults.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -45,7 +45,7 @@ fn seen(settings: &Settings, from: u64, count: usize) -> Result<(), Error> {
     let listed = listed.map(|list| list.split(',').filter_map(|seed| seed.parse().ok()).collect());
     let seeds: Vec<u64> = listed.unwrap_or_else(|| (from..).filter(|&seed| !is_unseen(seed)).take(count).collect());
     let results = run_all(&seeds, settings, |result| println!("{result}"))?;
-    print!("{}", words::distributions(&results));
+    print!("{}", words::distributions(&results.iter().collect::<Vec<_>>()));
     Ok(())
 }
 

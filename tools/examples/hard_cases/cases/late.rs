@@ -22,7 +22,7 @@ pub const CASES: &[Case] = &[
         "late drag",
         "hard/drag_100",
         "results 1.5 and 2 periods late",
-        &[run(Predictive, 1.5, [0.27, 1.7, 15.0, 0.55]), run(Predictive, 2.0, [2.7, 11.0, 15.0, 4.8])],
+        &[run(Predictive, 1.5, [0.27, 1.7, 15.0, 0.55]), run(Predictive, 2.0, [0.67, 12.0, 15.0, 0.87])],
     )
     .ends_free(),
     case(
