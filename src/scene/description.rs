@@ -1,7 +1,7 @@
 //! The whole of a scene, as plain data.
 
 use super::device::{DeviceSpec, one_or_many};
-use super::validate::fitting_patch;
+use super::patch::fitting_patch;
 use super::{BodySpec, ContactSpec, GlobalSpec, LocalSpec, ModelChoice, NodeSpec, SafetySpec, StepKind};
 use crate::model::Vec3;
 use crate::model::body::Body;
@@ -147,11 +147,12 @@ impl Scene {
     }
 
     /// The patch window that was asked for, or the usual one: 6 x 6 x 3 for `predictive` and `predicted`, 4 x 4 x 3 if the body is of
-    /// tetrahedra, whose nodes have more neighbours, as far as a block has room for it; 4 x 4 x 2, the paper's, for the other models.
+    /// tetrahedra, whose nodes have more neighbours, as far as a block has room for it; 4 x 4 x 2, the paper's, for the other models, and for
+    /// several devices, whose windows are to hold one tool each.
     pub fn patch_size(&self) -> [usize; 3] {
         let looks_ahead = matches!(self.local.model.named(), Some(Kind::Predicted | Kind::Predictive));
         self.local.patch.unwrap_or_else(|| match &self.body {
-            _ if !looks_ahead => [4, 4, 2],
+            _ if !looks_ahead || self.devices.len() > 1 => [4, 4, 2],
             Some(BodySpec::MassSpring(spec)) => fitting_patch([6, 6, 3], &spec.block),
             Some(BodySpec::Tetrahedra(_)) => [4, 4, 3],
             None => [6, 6, 3],

@@ -203,10 +203,11 @@ fn a_sphere_that_is_dragged() {
     assert!(late.rms <= 1.0 && late.jump <= own_jump + 1.5, "{late:?}");
 }
 
-/// The same over an organ.
+/// The same over tissue: the many nodes under a sphere take 250 states, with 150 it is 1.3 % off.
 #[test]
 fn a_sphere_over_tissue() {
     let case = Case::with_sphere("tests/reference/tissue/t1_drag.toml", 0.6);
-    let (late, own_jump) = case.error(ONE_PERIOD_MS, |scene| (scene.local.patch, scene.local.basis) = (None, None));
+    let (late, own_jump) =
+        case.error(ONE_PERIOD_MS, |scene| (scene.local.patch, scene.local.basis) = (None, Some(250)));
     assert!(late.rms <= 1.0 && late.jump <= own_jump + 1.5, "{late:?}");
 }

@@ -36,7 +36,7 @@ enum Stage {
     Factorise,
     /// So many moments are there; `last` is the right-hand side of the next.
     Moments {
-        factor: SparseFactor,
+        factor: Box<SparseFactor>,
         count: usize,
         last: Matrix,
         all: Matrix,
@@ -102,7 +102,7 @@ impl Reduction {
         let (far, ring) = (&self.far, &self.ring);
         match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Factorise => {
-                let factor = far.factorised(body, EXPANSION).ok_or_else(indefinite)?;
+                let factor = Box::new(far.factorised(body, EXPANSION).ok_or_else(indefinite)?);
                 let all = Matrix::zeros(far.unknowns(), 0);
                 self.stage = Stage::Moments { factor, count: 0, last: far.unit_forces(ring), all };
             }

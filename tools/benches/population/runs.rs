@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use palpate::Error;
@@ -123,17 +122,17 @@ pub fn run_all(
     settings: &Settings,
     told: impl Fn(&CaseResult) + Sync,
 ) -> Result<Vec<CaseResult>, Error> {
-    let (next, results) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let (waiting, results) = (Mutex::new(seeds.iter()), Mutex::new(Vec::new()));
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let work = || -> Result<(), Error> {
-        while let Some(&seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed)) {
+        loop {
+            let Some(&seed) = waiting.lock().expect("no thread panics with it").next() else { return Ok(()) };
             let result = run(seed, settings)?;
             let mut results = results.lock().expect("no thread panics with it");
             results.push(result);
             told(results.last().expect("just pushed"));
             eprintln!("{} of {}", results.len(), seeds.len());
         }
-        Ok(())
     };
     std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
