@@ -111,7 +111,9 @@ proptest! {
         let target = (motion + gap) / D;
         sheet.step(&mut contact, &Law { friction: mu.into(), ..Law::default() }, ToolMotion::straight(from, from + motion));
         let error = sheet.point(&sheet.velocities, &held) - target;
-        let limit = 1e-14 * target.norm().max(1.0);
+        // Rounding is that of the fastest node, and a light one may be far faster than the tool.
+        let fastest = sheet.velocities.iter().map(|v| v.norm()).fold(target.norm(), f64::max);
+        let limit = 1e-14 * fastest.max(1.0);
         match contact.mode {
             ContactMode::Stick => prop_assert!(error.norm() <= limit, "{} > {}", error.norm(), limit),
             ContactMode::Slip => prop_assert!(error.dot(&contact.normal).abs() <= limit),
