@@ -390,13 +390,6 @@ impl Simulation {
         }
     }
 
-    /// Appends what [`footprint`](Self::footprint) does, of the surface at rest.
-    pub(crate) fn resting_footprint(&self, tool: usize, pose: &Pose, margin: f64, triangles: &mut Vec<u32>) {
-        if self.touches[tool].has_shape() {
-            self.touches[tool].footprint((self.body.surface(), self.body.rest()), pose, margin, triangles);
-        }
-    }
-
     /// What is known of a tool.
     pub(crate) fn touch(&self, tool: usize) -> &Touch {
         &self.touches[tool]

@@ -49,7 +49,7 @@ impl Windows {
     /// # Real-time
     /// Not real-time safe: allocates, and looks at all pairs of windows and triangles.
     pub fn new(simulation: &Simulation, tool: usize, size: [usize; 3]) -> Self {
-        let (body, shape) = (simulation.body(), simulation.shape(tool));
+        let (body, shape, touch) = (simulation.body(), simulation.shape(tool), simulation.touch(tool));
         let (rest, surface) = (body.rest(), &body.surface().triangles);
         let corners: Vec<[Vec3; 3]> = surface.iter().map(|triangle| triangle.map(|node| rest[node as usize])).collect();
         let triangles: Vec<Vec3> = corners.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
@@ -73,7 +73,9 @@ impl Windows {
                 let [a, b, c] = corners[triangle as usize];
                 let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
                 let pose = Pose::from(middle + normal * (HEIGHT * shape.radius()));
-                simulation.resting_footprint(tool, &pose, margin, &mut around);
+                if touch.has_shape() {
+                    touch.footprint((body.surface(), rest), &pose, margin, &mut around);
+                }
                 let mut patch = Vec::new();
                 simulation.patch(tool, &around, size, &mut patch);
                 windows.push(Window { middle: *middle, patch, layer: first });

@@ -5,6 +5,8 @@
 
 #[path = "../../tests/support/repository.rs"]
 mod repository;
+pub mod tissue;
+
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use palpate::Error;

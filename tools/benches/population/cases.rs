@@ -4,15 +4,15 @@ use std::fmt;
 
 use palpate::Error;
 use palpate::devices::ToolPath;
-use palpate::model::body::{Shape, Where};
+use palpate::model::body::Shape;
 use palpate::model::local::{BlendKind, Kind};
-use palpate::model::mesh::{Face, TetrahedralMesh};
+use palpate::model::mesh::Face;
 use palpate::scene::{
-    BlendSpec, BlockSpec, BodySpec, FrictionSpec, MassSpringSpec, MaterialSpec, RegionSpec, Scene, TetrahedraSpec,
-    TissueSpec, ToolSpec, Volume,
+    BlendSpec, BlockSpec, BodySpec, FrictionSpec, MassSpringSpec, MaterialSpec, RegionSpec, Scene, TissueSpec, ToolSpec,
 };
 use palpate_mesh::{Sizes, organs};
 
+use super::common::tissue;
 use super::paths::{Ground, Motion};
 use super::random::Random;
 
@@ -86,7 +86,7 @@ impl Case {
         ]);
         let mut scene = Scene::of_program().with_model(Kind::Predictive);
         let (body, inside, ground) = match class {
-            Class::Tissue => tissue(random)?,
+            Class::Tissue => organ(random)?,
             _ => springs(class, random),
         };
         scene.body = Some(body);
@@ -167,7 +167,7 @@ fn springs(class: Class, random: &mut Random) -> (BodySpec, &'static str, Ground
 }
 
 /// An organ or a beam of tetrahedra.
-fn tissue(random: &mut Random) -> Result<(BodySpec, &'static str, Ground), Error> {
+fn organ(random: &mut Random) -> Result<(BodySpec, &'static str, Ground), Error> {
     let kind = random.one_of(&["beam", "prostate", "liver"]);
     let (mesh, cell_m, centre_m, room_m, depth_m) = match kind {
         "beam" => {
@@ -185,7 +185,7 @@ fn tissue(random: &mut Random) -> Result<(BodySpec, &'static str, Ground), Error
             (organs::liver(Sizes::uniform(cell))?, cell, [-0.036, 0.003], [12e-3, 8e-3], random.within(2.5e-3, 5e-3))
         }
     };
-    let tissue = TissueSpec {
+    let material = TissueSpec {
         young_modulus_pa: random.sized(3e3, 15e3),
         poisson_ratio: random.within(0.4, 0.47),
         density_kg_m3: 1060.0,
@@ -194,36 +194,10 @@ fn tissue(random: &mut Random) -> Result<(BodySpec, &'static str, Ground), Error
     };
     let surface = {
         let (mesh, triangles) = (mesh.clone(), mesh.surface_triangles());
-        Box::new(move |at| height(&mesh, &triangles, at))
+        Box::new(move |at| tissue::height(&mesh, &triangles, at))
     };
     let ground = Ground { centre_m, room_m, depth_m, cell_m, surface };
-    let body = BodySpec::Tetrahedra(TetrahedraSpec {
-        mesh: None,
-        surface: None,
-        element_size_m: None,
-        surface_size_m: None,
-        unit_m: 1.0,
-        fixed: vec![Where::Group("attached".into())],
-        tissue,
-        regions: Vec::new(),
-        volume: Some(Volume::new(mesh)?),
-    });
-    Ok((body, kind, ground))
-}
-
-/// The highest point of the surface above x, y (m); not a number beside it.
-fn height(mesh: &TetrahedralMesh, triangles: &[[u32; 3]], at: [f64; 2]) -> f64 {
-    let above = triangles.iter().filter_map(|triangle| {
-        let [a, b, c] = triangle.map(|node| mesh.points[node as usize]);
-        let twice = |p: palpate::model::Vec3, q: palpate::model::Vec3| {
-            (p.x - at[0]) * (q.y - at[1]) - (q.x - at[0]) * (p.y - at[1])
-        };
-        let areas = [twice(b, c), twice(c, a), twice(a, b)];
-        let whole: f64 = areas.iter().sum();
-        let faces_up = whole > 0.0 && areas.iter().all(|&area| area >= 0.0);
-        faces_up.then(|| (areas[0] * a.z + areas[1] * b.z + areas[2] * c.z) / whole)
-    });
-    above.fold(f64::NAN, f64::max)
+    Ok((tissue::body(mesh, material)?, kind, ground))
 }
 
 /// A tool of that radius along `motion`, a sample every millisecond.

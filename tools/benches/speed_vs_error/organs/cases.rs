@@ -3,12 +3,14 @@
 use palpate::Error;
 use palpate::devices::ToolPath;
 use palpate::model::Vec3;
-use palpate::model::body::{Body, Tissue, Where};
+use palpate::model::body::{Body, Tissue};
 use palpate::model::local::BlendKind;
 use palpate::model::mesh::TetrahedralMesh;
-use palpate::scene::{BlendSpec, BodySpec, FrictionSpec, Scene, TetrahedraSpec, TissueSpec, Volume};
+use palpate::scene::{BlendSpec, BodySpec, FrictionSpec, Scene, TissueSpec};
 use palpate::session::{Session, SessionBuilder};
 use palpate_mesh::{ImplicitShape, MeshError, Sizes, organs};
+
+use crate::common::tissue;
 
 /// Simulated time (s), and its parts: press, drag, lift.
 const DURATION_S: f64 = 0.8;
@@ -91,24 +93,14 @@ impl Organ {
     /// The organ as tetrahedra with nodal pressure.
     pub fn body(&self, mesh: TetrahedralMesh) -> Result<BodySpec, Error> {
         let Tissue { young_modulus, poisson_ratio, density, viscosity } = self.tissue;
-        let tissue = TissueSpec {
+        let material = TissueSpec {
             young_modulus_pa: young_modulus,
             poisson_ratio,
             density_kg_m3: density,
             viscosity_pa_s: viscosity,
             nodal_pressure: true,
         };
-        Ok(BodySpec::Tetrahedra(TetrahedraSpec {
-            mesh: None,
-            surface: None,
-            element_size_m: None,
-            surface_size_m: None,
-            unit_m: 1.0,
-            fixed: vec![Where::Group("attached".into())],
-            tissue,
-            regions: Vec::new(),
-            volume: Some(Volume::new(mesh)?),
-        }))
+        tissue::body(mesh, material)
     }
 
     /// Press, drag at the same depth below the surface of `mesh` at rest, lift.
@@ -126,7 +118,7 @@ impl Organ {
             let [x, y] = [0, 1].map(|axis| from[axis] + along * (to[axis] - from[axis]));
             let pressed = smooth(time / PRESS_S) - smooth((time - PRESS_S - DRAG_S) / LIFT_S);
             let depth = self.depth_m * (pressed * (1.0 + ABOVE) - ABOVE);
-            [x, y, height(mesh, &triangles, [x, y]) - depth]
+            [x, y, tissue::height(mesh, &triangles, [x, y]) - depth]
         };
         let positions = times.iter().map(at).collect();
         ToolPath::new(times, positions)
@@ -136,17 +128,4 @@ impl Organ {
 /// The same on a body that no scene describes.
 pub fn session(body: impl Body + 'static, path: ToolPath) -> SessionBuilder {
     Session::builder(body).path(path).friction(FRICTION).duration_s(DURATION_S)
-}
-
-/// The highest point of the surface above x, y (m); not a number beside it.
-fn height(mesh: &TetrahedralMesh, triangles: &[[u32; 3]], at: [f64; 2]) -> f64 {
-    let above = triangles.iter().filter_map(|triangle| {
-        let [a, b, c] = triangle.map(|node| mesh.points[node as usize]);
-        let twice = |p: Vec3, q: Vec3| (p.x - at[0]) * (q.y - at[1]) - (q.x - at[0]) * (p.y - at[1]);
-        let areas = [twice(b, c), twice(c, a), twice(a, b)];
-        let whole: f64 = areas.iter().sum();
-        let faces_up = whole > 0.0 && areas.iter().all(|&area| area >= 0.0);
-        faces_up.then(|| (areas[0] * a.z + areas[1] * b.z + areas[2] * c.z) / whole)
-    });
-    above.fold(f64::NAN, f64::max)
 }
