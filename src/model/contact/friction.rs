@@ -62,6 +62,11 @@ impl Friction {
         self.breakaway > self.kinetic
     }
 
+    /// The same with no coefficient above `most`.
+    pub(super) fn at_most(&self, most: f64) -> Self {
+        Self { kinetic: self.kinetic.min(most), breakaway: self.breakaway.min(most), ..*self }
+    }
+
     /// The coefficient of a contact that slides at `speed` (m/s).
     pub fn sliding(&self, speed: f64) -> f64 {
         if !self.is_gradual() {

@@ -22,6 +22,11 @@ const FOUND: f64 = 1e-7;
 /// Sweeps after which what they found of modes is used, and how often at most.
 const SWEEPS_BETWEEN: usize = 3;
 const MOST_EXACT: usize = 8;
+/// Friction is at most this where sweeps with more run away: a tool that wedges surfaces apart which stick to it pushes each of
+/// them against the others' friction, the more the longer it is swept. Without friction sweeps cannot run away.
+const CALMER: [f64; 4] = [1.0, 0.5, 0.25, 0.0];
+/// Places that close so many times faster after the sweeps than anything did before have run away.
+const RUN_AWAY: f64 = 10.0;
 /// Rounds in which the depth that a tool sinks in is found.
 const MOST_ROUNDS: usize = 16;
 
@@ -42,8 +47,11 @@ impl Rows {
             }
             of(row).iter().for_each(|&(node, _)| at_nodes[node as usize] = 0.0);
         }
-        find_closing(body, rows, nodes, closing);
-        sweep(rows, (nearness, exact), shared, [closing, before], law, d);
+        calm(law, |law| {
+            let fastest = find_closing(body, rows, nodes, closing);
+            sweep(rows, (nearness, exact), shared, [closing, before], law, d);
+            has_run_away(rows, closing, fastest)
+        });
         for row in rows.iter() {
             for &(node, w) in of(row) {
                 body.velocities[node as usize] -= row.impulse * (w * body.inverse_masses[node as usize]);
@@ -69,21 +77,46 @@ impl Rows {
                 (row.mode, row.impulse) = (ContactMode::Lost, Vec3::zeros());
             }
         }
-        find_closing(body, rows, nodes, closing);
-        sweep(rows, (nearness, exact), coupling, [closing, before], law, system.step());
+        calm(law, |law| {
+            let fastest = find_closing(body, rows, nodes, closing);
+            sweep(rows, (nearness, exact), coupling, [closing, before], law, system.step());
+            has_run_away(rows, closing, fastest)
+        });
         for row in rows.iter() {
             system.push_all(body.velocities, of(row), row.impulse);
         }
     }
 }
 
-/// How fast each place closes on the tool if nothing presses (m/s).
-fn find_closing(body: &Deformable<'_>, rows: &[Row], nodes: &[(u32, f64)], closing: &mut Vec<Vec3>) {
+/// Does `sweeps` with the friction of `law`, and with less while they run away.
+fn calm(law: &Law, mut sweeps: impl FnMut(&Law) -> bool) {
+    let mut law = *law;
+    let mut less = CALMER.iter();
+    while sweeps(&law)
+        && let Some(&most) = less.next()
+    {
+        law.friction = law.friction.at_most(most);
+    }
+}
+
+/// How fast each place closes on the tool if nothing presses; returns the fastest of what the sweeps are to end (m/s).
+fn find_closing(body: &Deformable<'_>, rows: &[Row], nodes: &[(u32, f64)], closing: &mut Vec<Vec3>) -> f64 {
     closing.clear();
     closing.extend(rows.iter().map(|row| {
         let nodes = nodes[row.nodes.0..row.nodes.1].iter();
         nodes.fold(Vec3::zeros(), |sum, &(node, w)| sum + body.velocities[node as usize] * w) - row.target
     }));
+    closing.iter().zip(rows).fold(0.0, |most: f64, (closing, row)| most.max(closing.norm()).max(row.allowed.abs()))
+}
+
+/// True if sweeps made places close much faster than the `fastest` before; nothing presses any more then.
+fn has_run_away(rows: &mut [Row], closing: &[Vec3], fastest: f64) -> bool {
+    // Written so that what is no number has run away.
+    let has = !closing.iter().all(|closing| closing.norm() <= RUN_AWAY * fastest);
+    if has {
+        rows.iter_mut().for_each(|row| row.impulse = Vec3::zeros());
+    }
+    has
 }
 
 /// Updates rows to and fro until nothing changes, beginning with what pressed in the last step. `coupling` has how each place

@@ -227,7 +227,9 @@ proptest! {
                 sum += Wrench::at(before.positions[node] + unpressed * d - centre, lost);
                 scale += masses[node] * unpressed.norm() + lost.norm();
             }
-            prop_assert!((sum.force - wrench.force * d).norm() <= 1e-13 * scale);
+            // Places that push against each other at one node leave little of what each of them pushes.
+            scale += simulation.contact_points(0).iter().map(|point| point.force.norm()).sum::<f64>() * d;
+            prop_assert!((sum.force - wrench.force * d).norm() <= 1e-13 * scale, "{} {}", sum.force, wrench.force * d);
             prop_assert!((sum.torque - wrench.torque * d).norm() <= 1e-13 * scale, "{} {}", sum.torque, wrench.torque * d);
         }
     }
@@ -288,14 +290,17 @@ proptest! {
         prop_assert_eq!(run(ToolShape::Sphere { radius }), run(ToolShape::Capsule { radius, half_axis: Vec3::zeros() }));
     }
 
-    /// Check that at any depth, however fast, forces are numbers.
+    /// Check that at any depth, however fast, forces are numbers and no node is shot away.
     #[test]
-    fn forces_are_finite_wherever_a_tool_is(case in case(), factor in 1.0..10.0_f64) {
-        // The tetrahedra are not stable in steps of this length.
-        let case = Case { body: case.body % 2, speed: case.speed * factor, ..case };
+    fn forces_are_bounded_wherever_a_tool_is(case in case(), factor in 1.0..10.0_f64) {
+        let case = Case { speed: case.speed * factor, ..case };
         let mut simulation = case.simulation(body(case.body));
-        for tick in 0..6 {
+        // The tetrahedra are not stable in more steps of this length.
+        for tick in 0..if case.body == 2 { 1 } else { 6 } {
             prop_assert!(simulation.tick(case.motion(tick)).is_finite());
+            // Thirty times what it takes to push a node through the whole body in one step.
+            let fastest = simulation.state().velocities.iter().map(|v| v.norm()).fold(0.0, f64::max);
+            prop_assert!(fastest < 30.0 * 0.03 / STEP.step(), "{fastest} m/s in tick {tick}");
         }
     }
 }
