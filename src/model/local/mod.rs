@@ -1,6 +1,7 @@
 //! Local models: what runs at the haptic rate between two results of the global model. One file per model.
 
 mod aim;
+mod beyond;
 mod feedback;
 mod forecast;
 mod full;

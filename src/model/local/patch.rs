@@ -1,14 +1,15 @@
 //! What the models with a patch have in common: the part of the body that they hold, its nodes and the surface around them in
 //! compact numbering, and what the tool feels of it.
 
-use super::{PatchGeometry, ResyncView, Watched};
 use std::sync::Arc;
 
+use super::beyond::Beyond;
+use super::{PatchGeometry, ResyncView, Watched};
 use crate::body::{Body, State};
 use crate::contact::{Contact, ContactPoint, Deformable, Law, Rows, Skin, ToolMotion, Touch, step_all};
 use crate::mesh::Surface;
 use crate::simulation::Stepping;
-use crate::{Vec3, Wrench};
+use crate::{Pose, Vec3, Wrench};
 
 /// A tool that presses more than this share of its force on nodes outside has left the patch.
 const BEYOND: f64 = 0.02;
@@ -28,9 +29,11 @@ pub(super) struct Patch {
     pub(super) stepping: Stepping,
     pub(super) built_at: u64,
     pub(super) watched: Watched,
-    /// The force and torque of the last tick whose contact was inside the patch.
+    /// In the last tick whose contact was inside the patch.
     felt: Wrench,
-    has_left: bool,
+    /// Of all window nodes (m).
+    rest: Vec<Vec3>,
+    beyond: Beyond,
 }
 
 impl Patch {
@@ -52,8 +55,28 @@ impl Patch {
         let skin = Arc::make_mut(&mut self.touch.skin);
         touch.skin.localise(&window.nodes, |node| window.node(node), skin);
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
-        (self.felt, self.has_left) = (global.wrench(resync.index), false);
+        window.gather(global.body().rest(), &mut self.rest);
+        self.beyond.restart();
+        self.felt = global.wrench(resync.index);
+        self.learn(global.wrench(resync.index), resync.tools[resync.index].position);
         self.watched.take(global.state());
+    }
+
+    /// Where it touches the surface at rest (m), and the outward unit normal there.
+    fn rest_contact(&self) -> Option<(Vec3, Vec3)> {
+        let Contact { triangle, weights, .. } = self.touch.contact;
+        let corners = self.window.surface.triangles[triangle? as usize].map(|node| self.rest[node as usize]);
+        let [a, b, c] = corners;
+        let place = a * weights[0] + b * weights[1] + c * weights[2];
+        Some((place, (b - a).cross(&(c - a)).try_normalize(0.0)?))
+    }
+
+    /// The tool felt `wrench` at `at` (m).
+    fn learn(&mut self, wrench: Wrench, at: Vec3) {
+        if let Some((place, normal)) = self.rest_contact() {
+            let depth = (place - at).dot(&normal) + self.touch.shape.radius();
+            self.beyond.learn(wrench.force.dot(&normal), depth);
+        }
     }
 
     /// Makes room for what an implicit step of the tool needs.
@@ -63,23 +86,31 @@ impl Patch {
         self.rows.reserve_coupling(places);
     }
 
-    /// The last force and torque, once the contact has left the patch.
-    pub(super) fn held(&self) -> Option<Wrench> {
-        self.has_left.then_some(self.felt)
+    /// True once the contact has left the patch.
+    pub(super) fn has_left(&self) -> bool {
+        self.beyond.has_left()
     }
 
-    /// What is felt after a tick with `wrench`: the patch's own until the contact leaves it, the last one from then on.
-    pub(super) fn feel(&mut self, wrench: Wrench) -> Wrench {
+    /// What a tool that goes to `to` feels, once the contact has left the patch.
+    pub(super) fn beyond(&mut self, to: &Pose) -> Option<Wrench> {
+        self.beyond.follow(to.position, &self.law.friction)
+    }
+
+    /// What the tool at `at` feels after a tick with `wrench`: that, or what is beyond the patch if the contact leaves it.
+    pub(super) fn feel(&mut self, wrench: Wrench, at: &Pose) -> Wrench {
         // A state that is not finite touches nothing: its zero force would look like a free tool.
         if !self.state.is_finite() {
             return Vec3::repeat(f64::NAN).into();
         }
         let window = &self.window;
         self.touch.end(self.stepping.substeps, |triangle| window.triangles[triangle as usize]);
-        self.has_left = self.contact_has_left();
-        if !self.has_left {
+        if !self.contact_has_left() {
+            self.learn(wrench, at.position);
             self.felt = wrench;
+            return wrench;
         }
+        let normal = self.rest_contact().map_or(Vec3::zeros(), |(_, normal)| normal);
+        self.beyond.leave(normal, at.position, self.felt);
         self.felt
     }
 

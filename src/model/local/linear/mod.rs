@@ -128,7 +128,7 @@ impl LocalModel for LinearPatch {
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Wrench {
-        if let Some(wrench) = self.patch.held() {
+        if let Some(wrench) = self.patch.beyond(&tool.to) {
             return wrench;
         }
         let (stepping, mut t) = (self.patch.stepping, 0.0);
@@ -142,7 +142,7 @@ impl LocalModel for LinearPatch {
         if self.ticks == self.boundary.moving_ticks() {
             self.hold_rim();
         }
-        self.patch.feel(wrench)
+        self.patch.feel(wrench, &tool.to)
     }
 
     fn built_at(&self) -> u64 {
@@ -150,7 +150,7 @@ impl LocalModel for LinearPatch {
     }
 
     fn serves_as(&self) -> Kind {
-        if self.patch.held().is_some() { Kind::Hold } else { self.boundary.kind() }
+        if self.patch.has_left() { Kind::Hold } else { self.boundary.kind() }
     }
 
     fn contact(&self) -> Contact {
@@ -183,7 +183,7 @@ impl LocalModel for LinearPatch {
         geometry.contact = self.contact();
         match self.spec.feedback {
             // What has left is as it was then.
-            _ if patch.held().is_some() => return false,
+            _ if patch.has_left() => return false,
             Feedback::Trajectory => return false,
             Feedback::Geometry => (0..patch.window.movable).for_each(|place| patch.tell(geometry, place)),
             Feedback::ContactNodes => {

@@ -163,13 +163,13 @@ impl LocalModel for Predictive {
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Wrench {
-        if let Some(wrench) = self.patch.held() {
+        if let Some(wrench) = self.patch.beyond(&tool.to) {
             return wrench;
         }
         let stepping = self.patch.stepping;
         self.patch.touch.begin();
         let wrench = stepping.tick(tool, |tool, d| self.substep(tool, d));
-        self.patch.feel(wrench)
+        self.patch.feel(wrench, &tool.to)
     }
 
     fn built_at(&self) -> u64 {
@@ -178,7 +178,7 @@ impl LocalModel for Predictive {
 
     fn serves_as(&self) -> Kind {
         match &self.basis {
-            _ if self.patch.held().is_some() => Kind::Hold,
+            _ if self.patch.has_left() => Kind::Hold,
             None => Kind::Predicted,
             Some(_) => Kind::Predictive,
         }

@@ -1,0 +1,128 @@
+//! What a tool feels once it has left the patch: a spring as stiff as the surface was, and Coulomb's friction.
+
+use crate::contact::Friction;
+use crate::{Vec3, Wrench};
+
+/// The stiffness of a surface along itself over that towards it, about that of a round contact on an elastic half-space with a
+/// Poisson's ratio of 0.4 (Mindlin 1949).
+const ALONG: f64 = 0.75;
+/// What earlier patches knew of the stiffness counts so much less with each.
+const REMEMBERED: f64 = 0.25;
+/// The spring pushes at most so many times as hard as the surface ever did.
+const MOST: f64 = 1.2;
+
+/// A tool over a surface of which nothing is known any more but how stiff it was.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Beyond {
+    /// Sums over the ticks in contact: force times depth (N m) and depth squared (m^2). Their quotient is the stiffness.
+    work: f64,
+    squares: f64,
+    /// The largest force along the normal (N).
+    most: f64,
+    left: Option<Left>,
+}
+
+/// Where and how the tool left.
+#[derive(Clone, Copy, Debug)]
+struct Left {
+    /// The outward unit normal of the surface at rest.
+    normal: Vec3,
+    /// How high the tool was over it (m), and how hard the spring pushed (N).
+    height: f64,
+    pressed: f64,
+    /// What was felt last, and where (m).
+    felt: Wrench,
+    at: Vec3,
+}
+
+impl Beyond {
+    /// A new patch.
+    pub(super) fn restart(&mut self) {
+        *self = Self {
+            work: REMEMBERED * self.work,
+            squares: REMEMBERED * self.squares,
+            most: REMEMBERED * self.most,
+            left: None,
+        };
+    }
+
+    /// The surface pushed with `force` (N) a tool that was `depth` (m) in the surface at rest.
+    pub(super) fn learn(&mut self, force: f64, depth: f64) {
+        if force > 0.0 && depth > 0.0 {
+            self.work += force * depth;
+            self.squares += depth * depth;
+            self.most = self.most.max(force);
+        }
+    }
+
+    /// The tool leaves the patch at `at` (m), over a surface with the outward unit `normal`; it feels `felt`.
+    pub(super) fn leave(&mut self, normal: Vec3, at: Vec3, felt: Wrench) {
+        let pressed = felt.force.dot(&normal).max(0.0);
+        self.left = Some(Left { normal, height: at.dot(&normal), pressed, felt, at });
+    }
+
+    pub(super) fn has_left(&self) -> bool {
+        self.left.is_some()
+    }
+
+    /// What the tool feels at `to` (m), if it has left.
+    pub(super) fn follow(&mut self, to: Vec3, friction: &Friction) -> Option<Wrench> {
+        let stiffness = if self.squares > 0.0 { self.work / self.squares } else { 0.0 };
+        let most = MOST * self.most;
+        let Left { normal, height, pressed, felt, at } = self.left.as_mut()?;
+        let before = felt.force.dot(normal);
+        let along = (*pressed + stiffness * (*height - to.dot(normal))).clamp(0.0, most.max(*pressed));
+        let way = to - *at;
+        let across = felt.force - *normal * before - (way - *normal * way.dot(normal)) * (ALONG * stiffness);
+        let limit = friction.kinetic * along;
+        let across = if across.norm() > limit { across * (limit / across.norm()) } else { across };
+        let torque = if before > 0.0 { felt.torque * (along / before) } else { Vec3::zeros() };
+        *felt = Wrench { force: *normal * along + across, torque };
+        *at = to;
+        Some(*felt)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn beyond(force: Vec3) -> Beyond {
+        let mut beyond = Beyond::default();
+        (1..=10).for_each(|n| beyond.learn(0.1 * f64::from(n), 1e-4 * f64::from(n)));
+        beyond.leave(Vec3::z(), Vec3::new(0.0, 0.0, -1e-3), force.into());
+        beyond
+    }
+
+    #[test]
+    fn a_tool_that_stays_feels_what_it_felt_and_one_that_lifts_nothing() {
+        let friction = Friction::from(0.5);
+        let mut left = beyond(Vec3::new(0.3, 0.0, 1.0));
+        let stays = left.follow(Vec3::new(0.0, 0.0, -1e-3), &friction).unwrap();
+        assert!((stays.force - Vec3::new(0.3, 0.0, 1.0)).norm() < 1e-12, "{stays:?}");
+        let half = left.follow(Vec3::new(0.0, 0.0, -0.5e-3), &friction).unwrap();
+        assert!((half.force - Vec3::new(0.25, 0.0, 0.5)).norm() < 1e-12, "in the cone: {half:?}");
+        assert_eq!(left.follow(Vec3::new(0.0, 0.0, 1e-3), &friction), Some(Wrench::default()));
+        // 1000 N/m, but never much more than what was felt.
+        let deep = left.follow(Vec3::new(0.0, 0.0, -0.1), &friction).unwrap();
+        assert!((deep.force.z - 1.2).abs() < 1e-12, "{deep:?}");
+    }
+
+    #[test]
+    fn friction_turns_with_the_tool() {
+        let mut left = beyond(Vec3::new(0.5, 0.0, 1.0));
+        let mut force = Vec3::zeros();
+        for n in 1..=20 {
+            force = left.follow(Vec3::new(1e-4 * f64::from(n), 0.0, -1e-3), &Friction::from(0.5)).unwrap().force;
+        }
+        assert!((force - Vec3::new(-0.5, 0.0, 1.0)).norm() < 1e-12, "{force:?}");
+    }
+
+    #[test]
+    fn one_that_never_touched_feels_nothing_and_stays_inside_says_so() {
+        let mut never = Beyond::default();
+        assert!(!never.has_left() && never.follow(Vec3::zeros(), &Friction::default()).is_none());
+        never.leave(Vec3::z(), Vec3::zeros(), Wrench::default());
+        assert_eq!(never.follow(-Vec3::z(), &Friction::default()), Some(Wrench::default()));
+    }
+}
