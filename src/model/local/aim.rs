@@ -59,11 +59,13 @@ impl Aim {
         if contact.glued {
             return;
         }
-        let ahead = |look: u32| after + lead * f64::from(look) / f64::from(LOOKS);
-        triangles.extend((1..=LOOKS).map(|look| self.nearest.find(&tool.unbraked(ahead(look)))));
         let margin = if after == 0.0 { 0.0 } else { ROOM * simulation.shape(index).radius() };
-        for look in 0..=LOOKS {
-            let pose = Pose { position: tool.unbraked(ahead(look)), orientation: tool.orientation };
+        let ways = [1.0, -1.0].into_iter().flat_map(|way| (1..=LOOKS).map(move |look| way * f64::from(look) / f64::from(LOOKS)));
+        let then = tool.unbraked(after);
+        let place = |share: f64| then + tool.velocity * (lead * share);
+        triangles.extend(ways.clone().map(|share| self.nearest.find(&place(share))));
+        for share in std::iter::once(0.0).chain(ways) {
+            let pose = Pose { position: place(share), orientation: tool.orientation };
             simulation.footprint(index, &pose, margin, triangles);
         }
     }

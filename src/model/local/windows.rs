@@ -20,7 +20,11 @@ struct Layer {
 }
 
 /// For a tool that stays near its place, and for one that moves fast.
-const LAYERS: [Layer; 2] = [Layer { spacing: 1.5, more: 0, way: 1.0 }, Layer { spacing: 2.5, more: 3, way: 2.5 }];
+const LAYERS: [Layer; 3] = [
+    Layer { spacing: 1.5, more: 0, way: 1.0 },
+    Layer { spacing: 2.5, more: 3, way: 2.5 },
+    Layer { spacing: 4.0, more: 7, way: 4.5 },
+];
 
 /// Patches of one size whose middles lie all over the surface, for one tool.
 #[derive(Clone, Debug, Default)]
@@ -99,8 +103,8 @@ impl Windows {
     ) -> bool {
         if !simulation.contact(tool).glued {
             // All of a fast tool's way may be in none: then as much of it as one holds.
-            let mut window = (1..=LOOKS as usize + 1).rev().filter_map(|count| {
-                let first = if count > LOOKS as usize { triangles } else { &triangles[..count.min(triangles.len())] };
+            let mut window = (1..=2 * LOOKS as usize + 2).rev().filter_map(|count| {
+                let first = if count > 2 * LOOKS as usize + 1 { triangles } else { &triangles[..count.min(triangles.len())] };
                 simulation.pressed_at(tool, first, nodes);
                 self.best(first, nodes, &usable)
             });
