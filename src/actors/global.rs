@@ -189,7 +189,7 @@ impl GlobalActor {
             tool,
             from: tool.pose,
             is_between: false,
-            history: ToolHistory::new(tool.pose, plan.haptic.period_s()),
+            history: ToolHistory::new(tool.pose, plan.haptic.period_s(), plan.lead_s()),
             triangles: Vec::new(),
             patch: Vec::new(),
         };

@@ -9,9 +9,6 @@ use crate::{Pose, Vec3};
 /// A window that is made ahead has room around a tool with a shape, in tool radii: where that goes a little aside or sooner, the
 /// same window serves.
 const ROOM: f64 = 0.3;
-/// Places on that way that are looked at, besides the present one.
-pub(super) const LOOKS: u32 = 3;
-
 /// Finds the surface triangles under the tool, now and where it is going.
 #[derive(Clone, Debug)]
 pub struct Aim {
@@ -39,8 +36,8 @@ impl Aim {
     }
 
     /// Puts the triangles for a window of tool number `index` that is made `after` seconds from now in place of `triangles`: the
-    /// one under the tool then, those that it comes over in the `lead` seconds that follow, and all that its shape may touch
-    /// there. One that is made now begins with the triangle of the contact, one that is made ahead has room around the shape; a tool
+    /// one under the tool then, those that it comes over in the `lead` seconds that follow if it goes on or back, and all that its
+    /// shape may touch there. One that is made now begins with the triangle of the contact, one that is made ahead has room around the shape; a tool
     /// that is glued goes nowhere else.
     ///
     /// # Real-time
@@ -60,12 +57,10 @@ impl Aim {
             return;
         }
         let margin = if after == 0.0 { 0.0 } else { ROOM * simulation.shape(index).radius() };
-        let ways = [1.0, -1.0].into_iter().flat_map(|way| (1..=LOOKS).map(move |look| way * f64::from(look) / f64::from(LOOKS)));
-        let then = tool.unbraked(after);
-        let place = |share: f64| then + tool.velocity * (lead * share);
-        triangles.extend(ways.clone().map(|share| self.nearest.find(&place(share))));
-        for share in std::iter::once(0.0).chain(ways) {
-            let pose = Pose { position: place(share), orientation: tool.orientation };
+        let ways = tool.ways(after, lead);
+        triangles.extend(ways.clone().skip(1).map(|place| self.nearest.find(&place)));
+        for position in ways {
+            let pose = Pose { position, orientation: tool.orientation };
             simulation.footprint(index, &pose, margin, triangles);
         }
     }

@@ -1,5 +1,7 @@
 //! Where the tool is expected to go, from where it was: a prediction runs along it.
 
+use std::collections::VecDeque;
+
 use crate::contact::ToolMotion;
 use crate::{Pose, Turn, Vec3};
 
@@ -14,6 +16,9 @@ const CHANGE_DECAY: f64 = 30e-3;
 const SPAN: f64 = 3e-3;
 /// The acceleration is the mean over this time (s); shorter, the steps of an encoder would be all of it.
 const CHANGE_SPAN: f64 = 16e-3;
+
+/// Places on the way of a tool that a window is to hold, ahead and behind, besides the present one.
+pub(super) const LOOKS: usize = 3;
 
 /// A tool that runs on with its present velocity and acceleration and comes to rest:
 /// q + v tau (1 - exp(-t / tau)) + a tau_a^2 (1 - (1 + t / tau_a) exp(-t / tau_a)).
@@ -30,6 +35,8 @@ pub struct ToolForecast {
     pub acceleration: Vec3,
     /// Present orientation: a tool is expected to keep it.
     pub orientation: Turn,
+    /// Ways back to where it was (m), evenly over the time for which a window is to hold it.
+    pub back: [Vec3; LOOKS],
 }
 
 impl ToolForecast {
@@ -55,6 +62,15 @@ impl ToolForecast {
         self.position + self.velocity * t
     }
 
+    /// Where a window has to be ready for the tool that is made in `after` seconds and serves for `lead`: there, on the way ahead,
+    /// on the same way back, as a hand that turns round goes, and where it was.
+    pub(super) fn ways(&self, after: f64, lead: f64) -> impl Iterator<Item = Vec3> + Clone {
+        let then = self.unbraked(after);
+        let way = self.velocity * (lead / LOOKS as f64);
+        let along = move |sign: f64| (1..=LOOKS).map(move |look| way * (sign * look as f64));
+        std::iter::once(Vec3::zeros()).chain(along(1.0)).chain(along(-1.0)).chain(self.back).map(move |way| then + way)
+    }
+
     /// The motion expected in the n-th tick of `tick` seconds from now.
     pub fn motion(&self, n: u32, tick: f64) -> ToolMotion {
         let t = f64::from(n) * tick;
@@ -62,25 +78,28 @@ impl ToolForecast {
     }
 }
 
-/// The last positions of the tool, for its mean velocity and acceleration.
+/// The last positions of the tool, for its mean velocity and acceleration, and for the way back.
 #[derive(Clone, Debug)]
 pub struct ToolHistory {
     /// Newest first.
-    positions: Vec<Vec3>,
+    positions: VecDeque<Vec3>,
     orientation: Turn,
-    /// Ticks that are known, at most the length of `positions` less one.
+    /// Ticks that are known, at most those that velocity and acceleration need.
     known: usize,
     tick: f64,
+    /// The ticks of the way back.
+    lead: usize,
 }
 
 impl ToolHistory {
-    /// A tool that has rested at `pose`; further ones will come every `tick` seconds.
+    /// A tool that has rested at `pose`; further ones will come every `tick` seconds. The way back is that of `lead` seconds.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(pose: Pose, tick: f64) -> Self {
-        let positions = vec![pose.position; ticks(CHANGE_SPAN, tick) + 1];
-        Self { positions, orientation: pose.orientation, known: 0, tick }
+    pub fn new(pose: Pose, tick: f64, lead: f64) -> Self {
+        let lead = ticks(lead, tick);
+        let positions = VecDeque::from(vec![pose.position; lead.max(ticks(CHANGE_SPAN, tick)) + 1]);
+        Self { positions, orientation: pose.orientation, known: 0, tick, lead }
     }
 
     /// Forgets the way so far: the tool has rested at `pose`.
@@ -88,7 +107,7 @@ impl ToolHistory {
     /// # Real-time
     /// Bounded, real-time safe.
     pub fn restart(&mut self, pose: Pose) {
-        self.positions.fill(pose.position);
+        self.positions.iter_mut().for_each(|position| *position = pose.position);
         self.orientation = pose.orientation;
         self.known = 0;
     }
@@ -99,9 +118,9 @@ impl ToolHistory {
     /// Bounded, real-time safe.
     pub fn push(&mut self, Pose { position, orientation }: Pose) {
         self.orientation = orientation;
-        self.positions.rotate_right(1);
-        self.positions[0] = position;
-        self.known = (self.known + 1).min(self.positions.len() - 1);
+        self.positions.pop_back();
+        self.positions.push_front(position);
+        self.known = (self.known + 1).min(ticks(CHANGE_SPAN, self.tick));
     }
 
     /// The forecast from the positions that are known.
@@ -109,7 +128,9 @@ impl ToolHistory {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn forecast(&self) -> ToolForecast {
-        let forecast = ToolForecast { orientation: self.orientation, ..ToolForecast::at_rest(self.positions[0]) };
+        let now = self.positions[0];
+        let back = std::array::from_fn(|look| self.positions[self.lead * (look + 1) / LOOKS] - now);
+        let forecast = ToolForecast { orientation: self.orientation, back, ..ToolForecast::at_rest(now) };
         let recent = self.known.min(ticks(SPAN, self.tick));
         if recent == 0 {
             return forecast;
@@ -141,7 +162,7 @@ mod tests {
 
     #[test]
     fn velocity_and_acceleration_are_means_of_what_is_known_and_the_motion_dies_away() {
-        let mut history = ToolHistory::new(Pose::default(), 1e-3);
+        let mut history = ToolHistory::new(Pose::default(), 1e-3, 30e-3);
         assert_eq!(history.forecast(), ToolForecast::at_rest(Vec3::zeros()));
         history.push((Vec3::x() * 1e-3).into());
         assert!((history.forecast().velocity.x - 1.0).abs() < 1e-12, "one tick is known");
@@ -149,6 +170,9 @@ mod tests {
         let at = |n: i32| Vec3::x() * f64::from(n * n) * 1e-3;
         (2..40).for_each(|n| history.push(at(n).into()));
         let forecast = history.forecast();
+        for (back, n) in forecast.back.iter().zip([29, 19, 9]) {
+            assert!((back - (at(n) - at(39))).norm() < 1e-12, "{back:?}");
+        }
         assert!((forecast.velocity.x - (2.0 * 39.0 - 3.0)).abs() < 1e-9);
         assert!((forecast.acceleration.x - 2000.0).abs() < 1e-6);
         assert_eq!(forecast.at(0.0), forecast.position);

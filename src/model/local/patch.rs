@@ -33,6 +33,8 @@ pub(super) struct Patch {
     felt: Wrench,
     /// Of all window nodes (m).
     rest: Vec<Vec3>,
+    /// The normal of the surface at rest where the contact presses on a node that gives way in the body, but not here.
+    strayed: Option<Vec3>,
     beyond: Beyond,
 }
 
@@ -56,6 +58,7 @@ impl Patch {
         touch.skin.localise(&window.nodes, |node| window.node(node), skin);
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
         window.gather(global.body().rest(), &mut self.rest);
+        self.strayed = None;
         self.beyond.restart();
         self.felt = global.wrench(resync.index);
         self.learn(global.wrench(resync.index), resync.tools[resync.index].position);
@@ -104,19 +107,14 @@ impl Patch {
         }
         let window = &self.window;
         self.touch.end(self.stepping.substeps, |triangle| window.triangles[triangle as usize]);
-        if !self.contact_has_left() {
-            self.learn(wrench, at.position);
-            self.felt = wrench;
-            return wrench;
+        match self.strayed.take() {
+            Some(normal) => self.beyond.leave(normal, at.position, self.felt),
+            None => {
+                self.learn(wrench, at.position);
+                self.felt = wrench;
+            }
         }
-        let normal = self.rest_contact().map_or(Vec3::zeros(), |(_, normal)| normal);
-        self.beyond.leave(normal, at.position, self.felt);
         self.felt
-    }
-
-    /// True if the contact presses on a node that gives way in the body, but not here.
-    pub(super) fn contact_has_left(&self) -> bool {
-        self.window.has_left(&self.touch)
     }
 
     /// One explicit step of `d` seconds under the forces and the tool's; returns the force and torque on the tool.
@@ -139,6 +137,9 @@ impl Patch {
             candidates: &self.window.candidates,
         };
         step(&mut deformable, &self.forces, &mut self.touch, &mut self.rows, &self.law);
+        if self.window.has_left(&self.touch) {
+            self.strayed = Some(self.rest_contact().map_or(Vec3::zeros(), |(_, normal)| normal));
+        }
         self.touch.wrench
     }
 

@@ -1,13 +1,16 @@
 //! The windows that local models are made for: few, which cover the surface, so that what is made for one serves whenever a
 //! tool comes there.
 
-use super::aim::LOOKS;
+use super::forecast::LOOKS;
 use crate::contact::ToolShape;
 use crate::simulation::Simulation;
 use crate::{Pose, Vec3};
 
 /// How far from the surface the middle of a tool with a shape is that presses into it, in its radii.
 const HEIGHT: f64 = 0.7;
+
+/// Triangles under the tool that a window is to hold: there, ahead, behind and where it was. Those that a shape touches follow.
+const WAYS: usize = 3 * LOOKS + 1;
 
 /// Windows of one size. Lengths in mean edges of the surface.
 struct Layer {
@@ -19,7 +22,7 @@ struct Layer {
     way: f64,
 }
 
-/// For a tool that stays near its place, and for one that moves fast.
+/// For a tool that stays near its place, one that moves, and one that moves fast.
 const LAYERS: [Layer; 3] = [
     Layer { spacing: 1.5, more: 0, way: 1.0 },
     Layer { spacing: 2.5, more: 3, way: 2.5 },
@@ -103,8 +106,8 @@ impl Windows {
     ) -> bool {
         if !simulation.contact(tool).glued {
             // All of a fast tool's way may be in none: then as much of it as one holds.
-            let mut window = (1..=2 * LOOKS as usize + 2).rev().filter_map(|count| {
-                let first = if count > 2 * LOOKS as usize + 1 { triangles } else { &triangles[..count.min(triangles.len())] };
+            let mut window = (1..=WAYS + 1).rev().filter_map(|count| {
+                let first = if count > WAYS { triangles } else { &triangles[..count.min(triangles.len())] };
                 simulation.pressed_at(tool, first, nodes);
                 self.best(first, nodes, &usable)
             });
