@@ -87,6 +87,11 @@ fn a_tick_with_the_whole_body_makes_no_system_call_and_never_allocates() {
     assert_silent(Case::new(LocalModelKind::Full, Guard::SystemCalls));
 }
 
+#[test]
+fn a_tick_with_the_whole_body_and_two_tools_makes_no_system_call_and_never_allocates() {
+    assert_silent(Case::new(LocalModelKind::Full, Guard::SystemCalls).with_second());
+}
+
 /// Of a sphere that touches in several places; one of the models is stepped implicitly.
 #[test]
 fn a_tick_of_a_tool_with_a_shape_makes_no_system_call_and_never_allocates() {

@@ -2,7 +2,7 @@
 
 use super::basis::Wishes;
 use super::cause::Cause;
-use super::messages::{Checkpoint, SurfaceView, ToolTick};
+use super::messages::{Checkpoint, SurfaceView, ToolTick, show};
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::Pose;
@@ -370,12 +370,7 @@ impl GlobalActor {
 
     fn publish_surface(&mut self, ctx: &TickContext) {
         let time = self.plan.haptic.release(self.now());
-        for surface in &mut self.ports.surfaces {
-            let view = surface.buffer();
-            view.time = time;
-            view.positions.clone_from(&self.simulation.state().positions);
-            surface.publish(ctx);
-        }
+        show(&mut self.ports.surfaces, ctx, time, &self.simulation.state().positions);
     }
 }
 

@@ -4,7 +4,7 @@ use crate::devices::DeviceState;
 use crate::model::body::State;
 use crate::model::contact::{Contact, ContactMode};
 use crate::model::{Pose, Turn, Vec3};
-use crate::runtime::Nanos;
+use crate::runtime::{Nanos, OutletWriter, TickContext};
 
 /// The device's newest state, numbered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -78,6 +78,20 @@ pub struct SurfaceView {
     pub time: Nanos,
     /// Position of every node (m); the triangles are those of the body's surface.
     pub positions: Vec<Vec3>,
+}
+
+/// Shows the nodes at `positions` (m) at `time` to all who look.
+///
+/// # Real-time
+/// Wait-free, real-time safe.
+pub fn show(surfaces: &mut [OutletWriter<SurfaceView>], ctx: &TickContext, time: Nanos, positions: &[Vec3]) {
+    for surface in surfaces {
+        let view = surface.buffer();
+        view.time = time;
+        view.positions.clear();
+        view.positions.extend_from_slice(positions);
+        surface.publish(ctx);
+    }
 }
 
 /// The global model after its last good resync: what it goes on from when it is started again.

@@ -7,7 +7,13 @@
 //! every actor --records--> logger
 //! ```
 //!
-//! There is a device and a local actor for each tool, and one global actor for all.
+//! There is a device and a local actor for each tool, and one global actor for all. For `full` one actor with the whole body stands
+//! in place of local and global ones:
+//!
+//! ```text
+//! devices --DeviceSample---> whole
+//!         <--ComputedForce--
+//! ```
 
 mod basis;
 mod basis_store;
@@ -22,16 +28,21 @@ mod logger;
 mod messages;
 mod scene_watch;
 mod throttle;
+mod ticks;
+mod tool;
 mod touched;
+mod whole;
 
 pub(crate) use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub(crate) use basis_store::BasisStore;
 pub(crate) use believed::{Bounds, Disbelieved};
 pub(crate) use device::{DeviceActor, DevicePorts, GAP_S, first_state};
 pub(crate) use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
-pub(crate) use local::{LocalActor, LocalPorts, ModelSource};
+pub(crate) use local::{LocalActor, LocalPorts};
 pub(crate) use messages::{Checkpoint, ComputedForce, DeviceSample, ToolTick};
 pub(crate) use scene_watch::SceneWatch;
+pub(crate) use tool::{LocalTool, LocalToolPorts};
+pub(crate) use whole::WholeActor;
 
 // Part of what a session shows.
 pub use logger::LOG_FAILURE;

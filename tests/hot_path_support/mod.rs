@@ -11,6 +11,7 @@ use std::process::{Command, Output};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use palpate::devices::{Scripted, ToolPath};
 use palpate::log::{LogEntry, LogReader, LogRecord};
 use palpate::model::body::Block;
 use palpate::model::contact::{ContactMode, ToolShape};
@@ -58,6 +59,8 @@ pub struct Case {
     pub privileged: bool,
     /// The tool is a sphere that touches in several places.
     pub has_shape: bool,
+    /// Another tool presses beside it.
+    pub has_second: bool,
 }
 
 const VARIABLE: &str = "PALPATE_HOT_PATH_CHILD";
@@ -94,7 +97,7 @@ pub enum Ended {
 
 impl Case {
     pub fn new(model: LocalModelKind, guard: Guard) -> Self {
-        Self { model, guard, offence: Offence::None, privileged: true, has_shape: false }
+        Self { model, guard, offence: Offence::None, privileged: true, has_shape: false, has_second: false }
     }
 
     pub fn with(self, offence: Offence) -> Self {
@@ -107,6 +110,10 @@ impl Case {
 
     pub fn with_shape(self) -> Self {
         Self { has_shape: true, ..self }
+    }
+
+    pub fn with_second(self) -> Self {
+        Self { has_second: true, ..self }
     }
 
     /// Runs it in a process of its own; `None`, with the reason printed, where the kernel refuses the filter.
@@ -160,6 +167,7 @@ impl Case {
             place(OFFENCES.iter().position(|offence| *offence == self.offence)),
             usize::from(self.privileged).to_string(),
             usize::from(self.has_shape).to_string(),
+            usize::from(self.has_second).to_string(),
         ]
         .join(" ")
     }
@@ -167,13 +175,16 @@ impl Case {
     fn of_environment() -> Option<Self> {
         let text = std::env::var(VARIABLE).ok()?;
         let places: Vec<usize> = text.split(' ').map(|word| word.parse().expect("numbers")).collect();
-        let [model, guard, offence, privileged, has_shape] = places[..] else { panic!("{text:?} is no case") };
+        let [model, guard, offence, privileged, has_shape, has_second] = places[..] else {
+            panic!("{text:?} is no case")
+        };
         Some(Self {
             model: MODELS[model],
             guard: GUARDS[guard],
             offence: OFFENCES[offence],
             privileged: privileged == 1,
             has_shape: has_shape == 1,
+            has_second: has_second == 1,
         })
     }
 }
@@ -212,9 +223,12 @@ pub fn child() {
     let device = GuardedDevice::new(case.guard, case.offence, Arc::clone(&lock), told, shape.radius());
     let block = Block::builder([6; 3], [0.1; 3]).node_mass(0.5e-3).stiffness(30.0).damping_ratio(0.3);
     let block = block.fix(Face::ZMin).fix(Face::XMax).build().expect("a good block");
-    let mut session = Session::builder(block)
-        .device(device)
-        .tool(shape)
+    let session = Session::builder(block);
+    let session = match case.has_second {
+        true => session.named_device("guarded", device).named_device("second", Scripted::new(pressing())),
+        false => session.device(device).tool(shape),
+    };
+    let mut session = session
         .friction(0.5)
         .model(case.model)
         // One of the linear patches shows the implicit step.
@@ -244,6 +258,11 @@ pub fn child() {
         from.0, to.0
     ));
     kernel::exit_now(0);
+}
+
+/// Comes down on the top within 0.3 s and stays there.
+fn pressing() -> ToolPath {
+    ToolPath::new(vec![0.0, 0.3], vec![[0.03, 0.07, 0.102], [0.03, 0.07, 0.094]]).expect("a good path")
 }
 
 fn tell(words: &str) {

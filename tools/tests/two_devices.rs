@@ -4,16 +4,17 @@
 mod common;
 
 use std::path::Path;
+use std::time::Duration;
 
 use common::{STD, block, drag_path, minjerk, simulation};
 use palpate::Session;
-use palpate::devices::{Scripted, ToolPath};
-use palpate::log::{LogEntry, LogReader, ToolSample};
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, Scripted, ToolPath};
+use palpate::log::{LogEntry, LogReader, LogRecord, ToolSample};
 use palpate::model::Vec3;
 use palpate::model::contact::{Contact, ToolMotion};
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
-use palpate::scene::{DeviceKind, DeviceSpec, Scene};
+use palpate::scene::{DeviceKind, DeviceSpec, ModelChoice, Scene};
 use palpate::session::{SessionBuilder, Summary};
 use palpate_cli::compare::{ForceDeviation, ForceTrace};
 
@@ -31,8 +32,9 @@ fn away(_: f64) -> Vec3 {
 }
 
 fn path(at: fn(f64) -> Vec3) -> ToolPath {
-    let times: Vec<f64> = (0..=TICKS).map(|n| f64::from(n) * 1e-3).collect();
-    let places = times.iter().map(|&t| at(t).into()).collect();
+    // At the ticks' own times, so that a tick sees the places of the reference.
+    let times = (0..=TICKS).map(|n| Nanos(1_000_000 * u64::from(n)).as_secs_f64()).collect();
+    let places = (0..=TICKS).map(|n| at(f64::from(n) * 1e-3).into()).collect();
     ToolPath::new(times, places).unwrap()
 }
 
@@ -48,16 +50,19 @@ fn reference(paths: [fn(f64) -> Vec3; 2]) -> [Vec<Vec3>; 2] {
     forces
 }
 
-fn builder(model: LocalModelKind, late_ms: f64) -> SessionBuilder {
+/// A session without its devices.
+fn without_devices(model: LocalModelKind, late_ms: f64) -> SessionBuilder {
     let mut scene = Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/two_hands.toml")).unwrap();
     scene.devices.truncate(1);
     scene.devices[0] = DeviceSpec::default();
     scene.global.compute_latency_ms = late_ms;
-    Session::from_scene(scene.with_model(model))
+    Session::from_scene(scene.with_model(model)).virtual_time().keep_records()
+}
+
+fn builder(model: LocalModelKind, late_ms: f64) -> SessionBuilder {
+    without_devices(model, late_ms)
         .named_device("left", Scripted::new(path(drag_path)))
         .named_device("right", Scripted::new(path(press_path)))
-        .virtual_time()
-        .keep_records()
 }
 
 fn run(builder: SessionBuilder) -> Summary {
@@ -90,6 +95,74 @@ fn tools_can_be_given_in_any_order() {
     let alone = common::forces(&mut alone, &path);
     let felt = common::rms_percent(&left, &alone);
     assert!(felt > 1.0, "the tools are to feel each other through the body: {felt} %");
+}
+
+fn forces(summary: &Summary, device: u16) -> Vec<Vec3> {
+    ForceTrace::of_device(&summary.records, device).forces_n.into_iter().map(Vec3::from).collect()
+}
+
+#[test]
+fn full_is_the_whole_body_with_all_tools_in_every_bit_and_in_any_order() {
+    let [left, right] = reference([drag_path, press_path]);
+    let summary = run(builder(LocalModelKind::Full, 0.0));
+    assert_eq!([0, 1].map(|device| forces(&summary, device)), [left.clone(), right.clone()]);
+    let commanded = |device: u16| {
+        let of_device = summary.records.iter().filter_map(move |record| match record {
+            LogRecord::Command(sample) if sample.device == device => Some(Vec3::from(sample.force_n).norm()),
+            _ => None,
+        });
+        of_device.fold(0.0, f64::max)
+    };
+    assert!([0, 1].iter().all(|&device| commanded(device) > 0.5), "each device is commanded its own");
+    assert!(summary.report.devices.iter().all(|device| device.resyncs.jump_before_n.count == 0));
+
+    let turned = without_devices(LocalModelKind::Full, 0.0)
+        .named_device("right", Scripted::new(path(press_path)))
+        .named_device("left", Scripted::new(path(drag_path)));
+    let turned = run(turned);
+    assert_eq!([0, 1].map(|device| forces(&turned, device)), [right, left]);
+}
+
+/// Reads along a path until it is pulled out.
+#[derive(Debug)]
+struct PulledOut {
+    path: ToolPath,
+    at: Nanos,
+}
+
+impl Device for PulledOut {
+    fn name(&self) -> &str {
+        "pulled out"
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::default()
+    }
+
+    fn read(&mut self, time: Nanos) -> Result<DeviceState, DeviceFault> {
+        let position = self.path.pose_at(time.as_secs_f64()).position;
+        let state = DeviceState { position, ..DeviceState::default() };
+        if time < self.at { Ok(state) } else { Err(DeviceFault::Disconnected) }
+    }
+
+    fn write(&mut self, _: ForceCommand) -> Result<(), DeviceFault> {
+        Ok(())
+    }
+}
+
+// Check that the one that is left feels a body whose other tool stands still.
+#[test]
+fn a_device_that_fails_does_not_stop_the_other() {
+    fn held(t: f64) -> Vec3 {
+        drag_path(t.min(699.0 * 1e-3))
+    }
+    let summary = run(without_devices(LocalModelKind::Full, 0.0)
+        .named_device("left", PulledOut { path: path(drag_path), at: Nanos(700_000_000) })
+        .named_device("right", Scripted::new(path(press_path))));
+    assert_eq!(forces(&summary, 1), reference([held, press_path])[1]);
+    let degraded: u64 = summary.runtime.groups.iter().map(|group| group.degraded).sum();
+    // The ramp at the end reads too.
+    assert!(degraded > u64::from(TICKS) - 700, "every read that failed is counted: {degraded}");
 }
 
 /// The errors of both tools, in % of each one's peak.
@@ -131,7 +204,7 @@ fn each_device_has_its_topics_and_its_part_of_the_report_and_replays() {
     let tools: Vec<ToolSample> = reader
         .by_ref()
         .filter_map(|entry| match entry {
-            LogEntry::Record(palpate::log::LogRecord::Tool(sample)) => Some(sample),
+            LogEntry::Record(LogRecord::Tool(sample)) => Some(sample),
             _ => None,
         })
         .collect();
@@ -186,6 +259,52 @@ fn a_run_of_unlike_devices_replays_and_its_log_moves_the_tool_that_is_named() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
+/// Check `full` with a hand on one of the devices and a coupling on both: to the end of the scene, and again from its log.
+#[test]
+fn two_hands_on_the_whole_body_run_and_replay() {
+    let folder = std::env::temp_dir().join(format!("palpate-two-hands-full-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let log = folder.join("full.mcap");
+    for coupling in [false, true] {
+        let mut scene = two_hands().with_model(LocalModelKind::Full);
+        scene.local.coupling = coupling;
+        let summary = run(Session::from_scene(scene).virtual_time().log(&log));
+        for device in &summary.report.devices {
+            assert!(device.force.ticks == 2500 && device.force.peak_n > 0.1, "{summary}");
+            assert!(device.force.peak_commanded_n > 0.1 && device.force.not_finite == 0, "{summary}");
+        }
+        let mut reader = LogReader::open(&log).unwrap();
+        assert_eq!(reader.by_ref().filter(|entry| matches!(entry, LogEntry::Record(LogRecord::Resync(_)))).count(), 0);
+        for topic in ["/left/force", "/right/force_commanded", "/left/contact", "/right/tool"] {
+            assert!(reader.topics()[topic] >= 2500, "{topic}: {:?}", reader.topics());
+        }
+        let report = Session::replay(&log).unwrap().run().unwrap();
+        assert!(report.is_identical() && report.commanded.is_identical(), "{report}");
+        assert_eq!(report.force.identical, 5000, "{report}");
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn two_hands_on_the_whole_body_run_live_and_stop() {
+    let scene = two_hands().with_model(LocalModelKind::Full);
+    let running = Session::from_scene(scene).keep_records().build().unwrap().start().unwrap();
+    running.wait_for(Duration::from_millis(700));
+    let summary = running.stop();
+    assert!(summary.runtime.fault.is_none() && summary.log_error.is_none(), "{summary}");
+    let ticks = |device| forces(&summary, device).len();
+    assert!(ticks(0) > 20 && ticks(0) == ticks(1), "{summary}");
+}
+
+#[test]
+fn auto_takes_the_whole_body_for_several_devices_where_it_fits() {
+    let mut scene = two_hands();
+    scene.local.model = ModelChoice::Auto;
+    let session = Session::from_scene(scene).virtual_time().build().unwrap();
+    let choice = session.choice().cloned().unwrap();
+    assert_eq!(choice.model, LocalModelKind::Full, "{choice}");
+}
+
 #[test]
 fn what_cannot_be_is_refused_with_the_device_named() {
     let refused = |change: fn(&mut Scene)| {
@@ -196,7 +315,6 @@ fn what_cannot_be_is_refused_with_the_device_named() {
     assert!(refused(|scene| scene.devices[1].name = None).starts_with("device[1].name: is missing"));
     assert!(refused(|scene| scene.devices[1].name = Some("left".into())).starts_with("device[1].name: is \"left\""));
     assert!(refused(|scene| scene.devices[1].name = Some("/x".into())).starts_with("device[1].name: is \"/x\""));
-    assert!(refused(|scene| scene.local.model = LocalModelKind::Full.into()).starts_with("local.model: is `full`"));
     assert!(refused(|scene| scene.devices[1].plant.mass_kg = -1.0).starts_with("device[1].plant.mass_kg"));
     assert!(refused(|scene| scene.devices.clear()).starts_with("device: is given 0 times"));
 }

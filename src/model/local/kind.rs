@@ -4,7 +4,8 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Kind {
-    /// [`Full`](super::Full): the whole body at the haptic rate, the reference that the others are measured against.
+    /// The whole body at the haptic rate with all tools, a [`Simulation`](crate::simulation::Simulation): the reference that the
+    /// others are measured against.
     Full,
     /// [`Hold`](super::Hold): the last force of the global model.
     Hold,

@@ -122,7 +122,8 @@ impl Template {
         self.kind.is_linear() && self.feedback != Feedback::Trajectory
     }
 
-    /// An empty model, to be rebuilt in place; `None` for [`Full`](super::Full), which is the simulation itself.
+    /// An empty model, to be rebuilt in place; `None` for [`Kind::Full`], which is the [`Simulation`](crate::simulation::Simulation) itself with
+    /// all tools.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.

@@ -5,7 +5,6 @@ use std::fmt;
 use super::body::Start;
 use super::situation::Situation;
 use super::timing::Timing;
-use crate::error::Error;
 use crate::log::ModelReason;
 use crate::model::local::Kind;
 use crate::runtime::{Execution, Nanos};
@@ -55,16 +54,13 @@ fn expected_error_pct(kind: Kind) -> f64 {
 
 /// The model that `scene` names, or the one that is right for it, which it names then. With that the reason, and what a force
 /// evaluation takes if that was measured or taken to be.
-///
-/// # Errors
-/// If a model of the whole body would have to be each tool's own.
 pub(super) fn model(
     scene: &mut Scene,
     start: &mut Start,
     timing: Timing,
     execution: Execution,
-) -> Result<(Kind, Option<Choice>, Option<Nanos>), Error> {
-    let (kind, choice, evaluation) = match scene.local.model {
+) -> (Kind, Option<Choice>, Option<Nanos>) {
+    match scene.local.model {
         ModelChoice::Named(kind) => (kind, None, None),
         ModelChoice::Auto => {
             let situation = Situation::of(scene, &mut *start.body, &start.state, timing, execution);
@@ -73,16 +69,7 @@ pub(super) fn model(
             scene.local.name_chosen(choice.model);
             (choice.model, Some(choice), Some(situation.evaluation))
         }
-    };
-    let devices = scene.devices.len();
-    if kind == Kind::Full && devices > 1 {
-        let message = format!(
-            "is `full`, which is one model of the whole body, and the {devices} devices need one each: use another, such as \
-             \"predictive\""
-        );
-        return Err(Error::scene("local.model", message));
     }
-    Ok((kind, choice, evaluation))
 }
 
 /// The cheapest model that fits the rates and meets `error_pct`; if there is none, the best that fits.
@@ -91,20 +78,20 @@ pub(super) fn model(
 /// meets the error, a tight `full` comes before a model that is wrong.
 fn choose(situation: &Situation) -> Choice {
     let error = situation.error_pct;
-    let is_possible = |kind: &Kind| situation.possible.contains(kind);
-    if is_possible(&Kind::Full) && situation.load(Kind::Full) <= 1.0 {
+    if situation.load(Kind::Full) <= 1.0 {
         let why = format!("{}, and nothing beats full where it fits", situation.full_in_words("takes"));
         return Choice { model: Kind::Full, reason: ModelReason { why, warning: None } };
     }
     let fits = |kind: &Kind| situation.load(*kind) <= 1.0;
-    let others: Vec<Kind> = Kind::ALL.into_iter().filter(is_possible).filter(|kind| *kind != Kind::Full).collect();
+    let is_other = |kind: &Kind| *kind != Kind::Full && situation.possible.contains(kind);
+    let others: Vec<Kind> = Kind::ALL.into_iter().filter(is_other).collect();
     let full = situation.full_in_words("would take");
     if let Some(&model) = others.iter().filter(|kind| fits(kind)).find(|kind| expected_error_pct(**kind) <= error) {
         let why = format!("{full}; {} meets {error} % (expected {} %)", model.name(), expected_error_pct(model));
         return Choice { model, reason: ModelReason { why, warning: None } };
     }
     let by_error = |a: &&Kind, b: &&Kind| expected_error_pct(**a).total_cmp(&expected_error_pct(**b));
-    if let Some(share) = situation.tight_share().filter(|_| is_possible(&Kind::Full)) {
+    if let Some(share) = situation.tight_share() {
         let why = format!("{}, and no other model that fits meets {error} %", situation.full_in_words("takes"));
         let percent = 100.0 * share;
         let warning = Some(format!("the typical tick takes {percent:.0} % of its period, some will be late"));
@@ -153,10 +140,9 @@ mod tests {
         }
     }
 
-    /// As with two devices.
-    fn without_full(evaluation_us: u64) -> Situation {
-        let possible = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Full).collect();
-        Situation { possible, ..situation(evaluation_us) }
+    /// A tick of `full` takes more than half of its period, and the look ahead of the others is short.
+    fn beyond_full() -> Situation {
+        Situation { ahead_ticks: 20, ..situation(220) }
     }
 
     #[track_caller]
@@ -181,15 +167,22 @@ mod tests {
     }
 
     #[test]
-    fn predictive_is_chosen_where_full_is_not_possible_and_the_global_period_holds_the_prediction() {
-        let why = ["would take 250 us of 1 ms (measured)", "predictive meets 1 %", "expected 0.5 %"];
-        assert_chosen(&without_full(100), Kind::Predictive, &why, None);
+    fn full_is_one_model_for_all_devices_and_the_others_are_one_for_each() {
+        let of = |devices| Situation { devices, ..situation(38) };
+        assert_eq!(of(4).load(Kind::Full), of(1).load(Kind::Full));
+        assert_chosen(&of(4), Kind::Full, &["takes 95 us of 1 ms", "nothing beats full"], None);
+    }
+
+    #[test]
+    fn predictive_is_chosen_where_full_does_not_fit_and_the_global_period_holds_the_prediction() {
+        let why = ["would take 550 us of 1 ms (measured)", "predictive meets 1 %", "expected 0.5 %"];
+        assert_chosen(&beyond_full(), Kind::Predictive, &why, None);
     }
 
     #[test]
     fn a_cheaper_model_is_chosen_where_so_much_error_is_allowed() {
         for (error_pct, model) in [(26.0, Kind::LinearBoundary), (40.0, Kind::Hold), (4.0, Kind::Predictive)] {
-            let choice = choose(&Situation { error_pct, ..without_full(100) });
+            let choice = choose(&Situation { error_pct, ..beyond_full() });
             assert!(choice.model == model && choice.reason.warning.is_none(), "{choice}");
         }
     }

@@ -113,7 +113,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let lateness = timing::lateness(&global, rates[0], work, options.in_real_time);
     let timing = Timing::new(rates, start.substeps, lateness, blend_ticks);
 
-    let (kind, choice, measured) = choice::model(&mut scene, &mut start, timing, execution)?;
+    let (kind, choice, measured) = choice::model(&mut scene, &mut start, timing, execution);
     let sized_patch = patch::choose(&scene, &*start.body, &start.attached);
     // Named in the log's scene, so that a replay does not choose again.
     scene.local.patch = Some(sized_patch.as_ref().map_or(scene.patch_size(), |choice| choice.size));

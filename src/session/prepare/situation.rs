@@ -39,7 +39,7 @@ pub(super) struct Situation {
     pub(super) error_pct: f64,
     /// States of the reduced surroundings; the most there may be where an error budget decides.
     pub(super) states: usize,
-    /// Devices, with a local model each.
+    /// Devices, with a local model each unless that is the whole body.
     pub(super) devices: usize,
     /// The models that scene and body allow.
     pub(super) possible: Vec<Kind>,
@@ -70,9 +70,7 @@ impl Situation {
         let is_held = body.inverse_masses().contains(&0.0);
         let is_possible = |kind: &Kind| {
             let suits_body = match kind {
-                // One model of the whole body, and each device needs its own.
-                Kind::Full => scene.devices.len() == 1,
-                Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
+                Kind::Full | Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
                 Kind::Condensed => is_restrictable && is_held,
                 Kind::Predicted => is_restrictable,
                 Kind::Predictive => is_restrictable && scene.local.basis_size() != Size::States(0),
@@ -114,9 +112,10 @@ impl Situation {
         OVERHEAD * f64::from(self.substeps) * self.evaluation.as_secs_f64()
     }
 
-    /// What a haptic tick takes with one model of `kind` for each device (s).
+    /// What a haptic tick takes with one model of `kind` for each device, or with the one whole body for all (s).
     fn haptic_s(&self, kind: Kind) -> f64 {
-        self.devices as f64 * self.tick_s(kind)
+        let models = if kind == Kind::Full { 1 } else { self.devices };
+        models as f64 * self.tick_s(kind)
     }
 
     /// What a haptic tick of one model of `kind` takes (s).

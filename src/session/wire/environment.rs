@@ -91,7 +91,7 @@ fn groups(prepared: &Prepared) -> Vec<GroupInfo> {
     let timing = &prepared.plan.timing;
     let local = GroupInfo {
         budget: prepared.local.declared_budget(),
-        actors: prepared.tools.iter().flat_map(|tool| haptic_actor_names(&tool.name)).collect(),
+        actors: haptic_actors(prepared),
         ..group("local", timing.haptic)
     };
     let basis = || GroupInfo { background: true, ..group(BASIS, timing.global) };
@@ -110,9 +110,13 @@ fn model_reason(prepared: &Prepared) -> Option<ModelReason> {
     }
 }
 
-/// The two actors that each tool has, in the order of their ticks; `tool` is empty for the only one.
-fn haptic_actor_names(tool: &str) -> [String; 2] {
-    ["device", "local"].map(|actor| if tool.is_empty() { actor.to_owned() } else { format!("{tool}/{actor}") })
+/// The haptic actors in the order of their ticks: two for each tool, or one for all after their devices.
+fn haptic_actors(prepared: &Prepared) -> Vec<String> {
+    let named = |tool: &str, actor: &str| if tool.is_empty() { actor.to_owned() } else { format!("{tool}/{actor}") };
+    let (own, shared): (&[_], _) =
+        if prepared.is_multi_rate() { (&["device", "local"], None) } else { (&["device"], Some("local".to_owned())) };
+    let of_tool = |tool: &Tool| own.iter().map(|actor| named(&tool.name, actor)).collect::<Vec<_>>();
+    prepared.tools.iter().flat_map(of_tool).chain(shared).collect()
 }
 
 fn first_tool((device, first): (u16, &DeviceState)) -> ToolSample {

@@ -1,20 +1,20 @@
-//! The haptic group: a device and a local actor for each tool, with what they say to each other.
+//! The haptic group: a device and a local actor for each tool, or one with the whole body for all, with what they say to each
+//! other.
 
-use super::models::Source;
+use super::models::Models;
 use crate::actors::{
-    ComputedForce, DeviceActor, DevicePorts, DeviceSample, Disbelieved, LocalActor, LocalPorts, ToolView,
+    ComputedForce, DeviceActor, DevicePorts, DeviceSample, Disbelieved, LocalActor, LocalTool, LocalToolPorts,
+    ToolView, WholeActor,
 };
 use crate::devices::DeviceState;
 use crate::log::ContactSample;
-use crate::model::Pose;
 use crate::model::contact::ToolShape;
-use crate::model::local::Succession;
 use crate::runtime::{Actor, OutletReader, OutletWriter, Reader, RuntimeBuilder, Writer};
 use crate::safety::Pipeline;
 use crate::safety::coupling::CoupledTool;
 use crate::session::prepare::{ModelPlan, Tool};
 
-/// Records of a local actor per haptic tick at most, besides one per probe and one per place that a tool with a shape touches.
+/// Records of a simulated tool per haptic tick at most, besides one per probe and one per place that a tool with a shape touches.
 const RECORDS_PER_TICK: usize = 5;
 
 /// Records of a device actor per haptic tick at most: tool and command, of two parts each.
@@ -63,12 +63,11 @@ pub(super) fn actors(
     tools: Vec<Tool>,
     ends: Vec<ToolEnds>,
     first: &[DeviceState],
-    sources: Vec<Source>,
+    models: Models,
     ticks: usize,
 ) -> Vec<Box<dyn Actor>> {
-    let mut actors: Vec<Box<dyn Actor>> = Vec::new();
-    let each = tools.into_iter().zip(ends).zip(first).zip(sources);
-    for (number, (((tool, ends), state), Source { models, source })) in (0..).zip(each) {
+    let (mut devices, mut simulated): (Vec<Box<dyn Actor>>, Vec<LocalTool>) = Default::default();
+    for (number, ((tool, ends), state)) in (0..).zip(tools.into_iter().zip(ends).zip(first)) {
         let safety = Pipeline::new(tool.limits);
         let ports = DevicePorts {
             samples: ends.sample_writer,
@@ -79,20 +78,27 @@ pub(super) fn actors(
         };
         let device = DeviceActor::new(tool.device, *state, tool.bounds, safety, ports);
         let places = if tool.shape == ToolShape::Point { 0 } else { ContactSample::MOST_POINTS };
-        let ports = LocalPorts {
+        let ports = LocalToolPorts {
             samples: ends.samples,
             commands: ends.force_writer,
-            source,
             recorder: graph.recorder((ticks * (RECORDS_PER_TICK + places + plan.probes.len())).min(MOST_RECORDS)),
         };
-        let succession = Succession::new(models, plan.blend, Pose::default());
-        let local = LocalActor::new(succession, plan.timing.haptic, plan.timing.global, plan.probes.clone(), ports);
-        let local = match &tool.coupling {
-            Some(design) => local.coupled(CoupledTool::new(design)),
-            None => local,
-        };
-        actors.push(Box::new(device.numbered(number)));
-        actors.push(Box::new(local.numbered(number)));
+        let coupled = tool.coupling.as_ref().map(CoupledTool::new);
+        simulated.push(LocalTool::new(number, plan.timing.haptic, plan.probes.clone(), coupled, ports));
+        devices.push(Box::new(device.numbered(number)));
     }
-    actors
+    let rates = [plan.timing.haptic, plan.timing.global];
+    match models {
+        // It takes the samples of all devices.
+        Models::Whole(simulation, surfaces) => {
+            devices.push(Box::new(WholeActor::new(simulation, simulated, rates, surfaces)));
+            devices
+        }
+        Models::Local(models) => {
+            let local =
+                |(tool, (models, ports))| Box::new(LocalActor::new(models, tool, rates, ports)) as Box<dyn Actor>;
+            let locals = simulated.into_iter().zip(models).map(local);
+            devices.into_iter().zip(locals).flat_map(|(device, local)| [device, local]).collect()
+        }
+    }
 }

@@ -73,8 +73,8 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     let reducing = bases.as_ref().map(|bases| (prepared.basis_group(), bases.actor()));
     let logger_group = prepared.logger_group();
     let Prepared { simulation, tools, plan, local, global, until, .. } = prepared;
-    let (sources, maker) = models::models(&mut graph, &plan, simulation, &places, surfaces, bases, ticks);
-    let haptic = haptic::actors(&mut graph, &plan, tools, ends, &first, sources, ticks);
+    let (models, maker) = models::models(&mut graph, &plan, simulation, &places, surfaces, bases, ticks);
+    let haptic = haptic::actors(&mut graph, &plan, tools, ends, &first, models, ticks);
 
     let outcome = LoggerOutcome::default();
     let logger = match taker {

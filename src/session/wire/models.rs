@@ -1,21 +1,24 @@
-//! Where the local models come from: one model of the whole body, or new ones from a global model.
+//! What computes the forces: the whole body, or local models that a global one sends.
 
 use super::basis::BasisSide;
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
-use crate::actors::{Checkpoint, GlobalPlan, ModelSource, SurfaceView};
+use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, SurfaceView};
 use crate::model::Pose;
-use crate::model::local::{Full, Hold, LocalModel, PatchGeometry};
+use crate::model::local::{Hold, Kind, PatchGeometry, Succession};
 use crate::model::simulation::Simulation;
-use crate::runtime::{ExchangePort, OutletPort, RuntimeBuilder};
+use crate::runtime::{ExchangePort, OutletPort, OutletWriter, RuntimeBuilder};
 use crate::session::prepare::ModelPlan;
 
-/// What a local actor begins with, and where its next models come from.
-pub(super) struct Source {
-    pub(super) models: [Box<dyn LocalModel>; 3],
-    pub(super) source: ModelSource,
+/// What computes the forces at the haptic rate.
+#[expect(clippy::large_enum_variant, reason = "there is one per session, and it goes into an actor")]
+pub(super) enum Models {
+    /// The whole body with all tools, and where its surface is shown.
+    Whole(Simulation, Vec<OutletWriter<SurfaceView>>),
+    /// The models of each tool, and where the next ones come from.
+    Local(Vec<(Succession, LocalPorts)>),
 }
 
-/// The source of each tool's models; and what makes the global actor, unless the local model is the whole body.
+/// What computes the forces; and what makes the global actor, unless that is the whole body.
 pub(super) fn models(
     graph: &mut RuntimeBuilder,
     plan: &ModelPlan,
@@ -24,19 +27,20 @@ pub(super) fn models(
     surfaces: Vec<OutletPort<SurfaceView>>,
     bases: Option<BasisSide>,
     ticks: usize,
-) -> (Vec<Source>, Option<GlobalMaker>) {
-    let spare = || Box::new(Hold::default()) as Box<dyn LocalModel>;
-    if plan.template.empty().is_none() {
-        let full = watching(Box::new(Full::new(simulation)), &plan.probes);
-        let source = ModelSource::Alone(surfaces.iter().map(OutletPort::writer).collect());
-        return (vec![Source { models: [full, spare(), spare()], source }], None);
+) -> (Models, Option<GlobalMaker>) {
+    if plan.template.kind == Kind::Full {
+        return (Models::Whole(simulation, surfaces.iter().map(OutletPort::writer).collect()), None);
     }
     let (surroundings, known) = match bases {
         Some(BasisSide { wishes, bases, known, .. }) => (Some((wishes, bases)), known),
         None => Default::default(),
     };
     let (template, probes) = (plan.template.clone(), plan.probes.clone());
-    let model = move || watching(template.empty().unwrap_or_else(spare), &probes);
+    let model = move || {
+        let mut model = template.empty().unwrap_or_else(|| Box::new(Hold::default()));
+        model.watch(&probes);
+        model
+    };
     let feeds_back = plan.template.feeds_back();
     // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
     let nodes = simulation.state().positions.len();
@@ -52,13 +56,15 @@ pub(super) fn models(
         checkpoint: graph.outlet_port(Checkpoint::default),
         recorder: graph.recorder_port(ticks),
     };
-    let source = |link: &ToolLink| ModelSource::Global {
-        models: link.models.reader(),
-        ticks: link.ticks.writer(),
-        geometry: link.geometry.as_ref().map(ExchangePort::writer),
+    let of_tool = |link: &ToolLink| {
+        let ports = LocalPorts {
+            models: link.models.reader(),
+            ticks: link.ticks.writer(),
+            geometry: link.geometry.as_ref().map(ExchangePort::writer),
+        };
+        (Succession::new([model(), model(), model()], plan.blend, Pose::default()), ports)
     };
-    let begin = |link: &ToolLink| Source { source: source(link), models: [model(), model(), model()] };
-    let sources = side.tools.iter().map(begin).collect();
+    let models = Models::Local(side.tools.iter().map(of_tool).collect());
     let plan = GlobalPlan {
         haptic: plan.timing.haptic,
         global: plan.timing.global,
@@ -66,10 +72,5 @@ pub(super) fn models(
         patch: plan.template.patch,
         bases: known,
     };
-    (sources, Some(GlobalMaker::new(simulation, places, plan, side)))
-}
-
-fn watching(mut model: Box<dyn LocalModel>, probes: &[u32]) -> Box<dyn LocalModel> {
-    model.watch(probes);
-    model
+    (models, Some(GlobalMaker::new(simulation, places, plan, side)))
 }

@@ -79,12 +79,10 @@ impl Succession {
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn begin(&mut self, tool: Pose, first: Option<(&mut Box<dyn LocalModel>, u32)>) {
+    pub fn begin(&mut self, tool: Pose, model: &mut Box<dyn LocalModel>, version: u32) {
         self.history.fill(tool);
-        if let Some((model, version)) = first {
-            std::mem::swap(&mut self.serving, model);
-            self.version = version;
-        }
+        std::mem::swap(&mut self.serving, model);
+        self.version = version;
     }
 
     /// Takes a newer model in exchange for a spare. A model that is still catching up is given up for it.
@@ -175,14 +173,6 @@ impl Succession {
     pub fn now(&self) -> u64 {
         self.now
     }
-
-    /// The tool at the end of the last tick.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn tool(&self) -> Pose {
-        self.at(self.now)
-    }
 }
 
 #[cfg(test)]
@@ -228,8 +218,8 @@ mod tests {
 
     fn succession(blend_ticks: u32) -> Succession {
         let blend = Blend::new(BlendKind::Crossfade, blend_ticks);
-        let mut models = Succession::new([1.0, -1.0, -1.0].map(|base| model(base, 0, true)), blend, Pose::default());
-        models.begin(Pose::default(), None);
+        let mut models = Succession::new([-1.0; 3].map(|base| model(base, 0, true)), blend, Pose::default());
+        models.begin(Pose::default(), &mut model(1.0, 0, true), 0);
         models
     }
 
