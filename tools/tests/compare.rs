@@ -111,6 +111,37 @@ fn the_page_has_every_plot_and_needs_nothing_else() {
 }
 
 #[test]
+fn several_devices_have_their_own_rows_and_plots_and_the_worst_counts() {
+    let folder = Folder::new();
+    let second = "[[device]]\nname = \"right\"\nkind = \"scripted\"\npath_csv = \"right.csv\"\n";
+    folder.spoil("[device]", &format!("{second}[[device]]\nname = \"left\""));
+    // It touches nothing: there is no percentage of it.
+    folder.write("right.csv", "t_s,x_m,y_m,z_m\n0,0.05,0.05,0.3\n");
+
+    let document = compared(&folder, &["--models", "patch", "--html", "page.html"]);
+    let named = |of: &Value| of["devices"].as_array().expect("devices").clone();
+    let peaks: Vec<f64> = named(&document).iter().filter_map(|device| device["peak_n"].as_f64()).collect();
+    assert!(peaks.len() == 2 && peaks[0] == 0.0 && document["peak_n"] == peaks[1] && peaks[1] > 0.01, "{document}");
+    for model in document["models"].as_array().unwrap() {
+        let [right, left] = &named(model)[..] else { panic!("{model}") };
+        assert_eq!((&right["name"], &left["name"]), (&"right".into(), &"left".into()));
+        assert_eq!((&right["error_percent"]["rms"], &left["error_percent"]), (&Value::Null, &model["error_percent"]));
+        let resyncs = |of: &Value| of["resyncs"].as_u64().unwrap();
+        assert_eq!(resyncs(left) + resyncs(right), resyncs(model));
+    }
+    let page = std::fs::read_to_string(folder.path("page.html")).unwrap();
+    for id in ["speed", "left-force-0", "left-error-1", "right-resync-0"] {
+        assert_eq!(page.matches(&format!("<figure id=\"{id}\">")).count(), 1, "{id}");
+    }
+    assert!(!page.contains("NaN"));
+
+    let table = folder.succeed(&["compare", "scene.toml", "--models", "patch", "--models-only"]);
+    let rows = |name: &str| table.lines().filter(|line| line.split_whitespace().next() == Some(name)).count();
+    assert_eq!(["full", "patch", "left", "right"].map(rows), [1, 2, 3, 3], "{table}");
+    assert!(table.contains(" N on left") && table.contains("0 N on right"), "{table}");
+}
+
+#[test]
 fn what_cannot_be_compared_or_written_is_refused_in_one_line() {
     let folder = Folder::new();
     let files = folder.files();

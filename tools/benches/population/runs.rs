@@ -60,9 +60,10 @@ impl Run {
             rms: run.error.rms,
             max: run.error.max,
             jump: (run.error.jump - full.error.jump).max(0.0),
-            peak: run.trace.peak_n() / full.trace.peak_n(),
-            fallen_back: [ServedBy::Predicted, ServedBy::Hold]
-                .map(|model| run.served.iter().find(|(served, _)| *served == model).map_or(0.0, |(_, share)| *share)),
+            peak: run.peak_n() / full.peak_n(),
+            fallen_back: [ServedBy::Predicted, ServedBy::Hold].map(|model| {
+                run.devices[0].served.iter().find(|(served, _)| *served == model).map_or(0.0, |(_, share)| *share)
+            }),
             tick_us: [us(run.cost.tick_p50), us(run.cost.tick_p99)],
             periods: run.cost.global_load / full.cost.haptic_load,
         }
@@ -163,7 +164,7 @@ fn run(seed: u64, settings: &Settings) -> Result<CaseResult, Error> {
         class: case.class,
         motion: case.motion,
         name: case.to_string(),
-        peak_n: full.trace.peak_n(),
+        peak_n: full.peak_n(),
         runs: options.models.iter().map(|&kind| of(kind)).collect(),
         seconds: begun.elapsed().as_secs_f64(),
     })

@@ -12,7 +12,7 @@ use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
 use palpate::scene::Scene;
 use palpate::session::Session;
-use palpate_cli::compare::{CompareOptions, Comparison, ForceTrace, Measured};
+use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 
 use crate::{Part, common};
 use cases::{ORGANS, Organ};
@@ -61,9 +61,10 @@ struct Distance {
 
 impl Study {
     fn distance(&self, run: &Measured, from: &Measured) -> Distance {
-        let scale = 100.0 / self.finest.measured.trace.peak_n();
-        let ticks = run.trace.forces_n.len().max(1) as f64;
-        let errors = || ForceTrace::differences_n(&run.trace, &from.trace);
+        let scale = 100.0 / self.finest.measured.peak_n();
+        let [run, from] = [run, from].map(|run| &run.devices[0].trace);
+        let ticks = run.forces_n.len().max(1) as f64;
+        let errors = || run.differences_n(from);
         Distance {
             rms: scale * (errors().map(|error| error * error).sum::<f64>() / ticks).sqrt(),
             max: scale * errors().fold(0.0, f64::max),

@@ -3,7 +3,7 @@
 use palpate::log::magnitude;
 use palpate::runtime::Nanos;
 
-use super::figures::{ComparedRun, Comparison, Measured};
+use super::figures::{ComparedRun, Comparison, ForceTrace, Measured};
 use super::milliseconds;
 use crate::drawing::svg::{Axis, Chart, Line, Mark, Point, Sign};
 
@@ -36,26 +36,49 @@ pub(super) fn colour(model: usize) -> usize {
     if model == 0 { 0 } else { (model - 1) % COLOURS + 1 }
 }
 
-/// Draws the plots of one comparison.
+/// The style of a model.
+fn class(models: &[&str], model: &str) -> String {
+    let number = models.iter().position(|known| *known == model).unwrap_or(0);
+    format!("m{number} c{}", colour(number))
+}
+
+/// Draws the plots of one device in a comparison.
 pub(super) struct Plots<'a> {
     comparison: &'a Comparison,
     models: Vec<&'a str>,
+    device: usize,
+    full: &'a ForceTrace,
     peak: f64,
 }
 
 impl<'a> Plots<'a> {
-    pub(super) fn new(comparison: &'a Comparison) -> Self {
-        Self { comparison, models: models(comparison), peak: comparison.full.trace.peak_n() }
+    /// # Panics
+    /// If there is no such device.
+    pub(super) fn new(comparison: &'a Comparison, device: usize) -> Self {
+        let full = &comparison.full.devices[device].trace;
+        Self { comparison, models: models(comparison), device, full, peak: full.peak_n() }
     }
 
-    fn class(&self, model: &str) -> String {
-        let number = self.models.iter().position(|known| *known == model).unwrap_or(0);
-        format!("m{number} c{}", colour(number))
+    /// The device's name, if there are several.
+    fn name(&self) -> Option<&'a str> {
+        self.comparison.full.several().get(self.device).map(|device| &*device.name)
     }
 
-    fn runs(&self, latency: Nanos) -> impl Iterator<Item = (&'a ComparedRun, &'a Measured)> + use<'a> {
+    /// The id of a plot that is called `what`: each of several devices has its own.
+    pub(super) fn id(&self, what: &str) -> String {
+        self.name().map_or(what.to_owned(), |name| format!("{name}-{what}"))
+    }
+
+    /// The title of a plot of `what` with results `late`.
+    fn title(&self, what: &str, late: Nanos) -> String {
+        let of = self.name().map_or(String::new(), |name| format!(" on {name}"));
+        format!("{what}{of}, {}", in_words(late))
+    }
+
+    fn runs(&self, latency: Nanos) -> impl Iterator<Item = (&'a ComparedRun, &'a ForceTrace)> + use<'a> {
+        let device = self.device;
         let at = self.comparison.runs.iter().filter(move |run| run.latency == latency);
-        at.filter_map(|run| Some((run, run.measured()?)))
+        at.filter_map(move |run| Some((run, &run.measured()?.devices.get(device)?.trace)))
     }
 
     /// The values of the ticks over time: each belongs to the end of its tick.
@@ -70,7 +93,7 @@ impl<'a> Plots<'a> {
 
     /// The resyncs to look at with results `latency` late, two that follow each other in the middle of the contact.
     fn resyncs(&self, latency: Nanos) -> [f64; 2] {
-        let magnitudes = magnitudes(&self.comparison.full);
+        let magnitudes = magnitudes(self.full);
         let touching: Vec<usize> =
             magnitudes.enumerate().filter(|(_, force)| *force > TOUCHING * self.peak).map(|(tick, _)| tick).collect();
         let middle = touching.get(touching.len() / 2).copied().unwrap_or(0) as f64;
@@ -88,10 +111,14 @@ impl<'a> Plots<'a> {
     }
 
     fn force_lines(&self, latency: Nanos) -> Vec<Line<'a>> {
-        let line = |class: String, name, run: &Measured| Line { class, name, points: self.over_time(magnitudes(run)) };
-        let runs = self.runs(latency).map(|(run, measured)| line(self.class(&run.model), &run.model, measured));
+        let line = |name: &'a str, trace: &ForceTrace| Line {
+            class: class(&self.models, name),
+            name,
+            points: self.over_time(magnitudes(trace)),
+        };
+        let runs = self.runs(latency).map(|(run, trace)| line(&run.model, trace));
         // Last, to be seen above the others.
-        runs.chain([line(self.class("full"), "full", &self.comparison.full)]).collect()
+        runs.chain([line("full", self.full)]).collect()
     }
 
     /// The forces over the whole run, and two resyncs of it.
@@ -112,9 +139,9 @@ impl<'a> Plots<'a> {
             lines: lines.clone(),
             ..Chart::new(title, [WIDE, 270.0], Axis::linear("t (s)", range), y)
         };
-        let mut whole = chart(format!("Force, {}", in_words(latency)), self.whole(), y_whole);
+        let mut whole = chart(self.title("Force", latency), self.whole(), y_whole);
         whole.band = Some(zoom);
-        let mut near = chart(format!("Two resyncs, {}", in_words(latency)), zoom, y_near);
+        let mut near = chart(self.title("Two resyncs", latency), zoom, y_near);
         let mark = |x| Mark { at: x, label: "resync".to_owned() };
         near.marks = self.resyncs(latency).into_iter().filter(|x| (zoom[0]..zoom[1]).contains(x)).map(mark).collect();
         [whole, near].map(|chart| chart.to_svg())
@@ -124,58 +151,58 @@ impl<'a> Plots<'a> {
     pub(super) fn errors(&self, latency: Nanos) -> String {
         let lines: Vec<Line<'a>> = self
             .runs(latency)
-            .map(|(run, measured)| Line {
-                class: self.class(&run.model),
+            .map(|(run, trace)| Line {
+                class: class(&self.models, &run.model),
                 name: &run.model,
-                points: self.over_time(self.comparison.errors(measured)),
+                points: self.over_time(trace.errors(self.full)),
             })
             .collect();
         let values = lines.iter().flat_map(|line| &line.points).map(|(_, error)| *error);
         let largest = values.filter(|error| error.is_finite()).fold(1.0, f64::max).min(LARGEST_ERROR);
         let y = Axis::log("error (% of peak)", [SMALLEST_ERROR, largest * 1.2]);
-        let title = format!("Error, {}", in_words(latency));
-        let chart = Chart::new(title, [WIDE, 250.0], Axis::linear("t (s)", self.whole()), y);
+        let chart = Chart::new(self.title("Error", latency), [WIDE, 250.0], Axis::linear("t (s)", self.whole()), y);
         Chart { band: Some(self.zoom(latency)), lines, ..chart }.to_svg()
-    }
-
-    /// Cost of a haptic tick against the error: every model and latency is a point, `full` lies on the bottom.
-    pub(super) fn speed_against_error(&self) -> String {
-        let us = |run: &Measured| run.cost.tick_p50.0.max(1) as f64 * 1e-3;
-        let period_us = self.comparison.haptic_period.0 as f64 * 1e-3;
-        let measured: Vec<(&ComparedRun, &Measured)> =
-            self.comparison.runs.iter().filter_map(|run| Some((run, run.measured()?))).collect();
-        let costs = || measured.iter().map(|(_, run)| us(run)).chain([us(&self.comparison.full), period_us]);
-        let errors = || measured.iter().map(|(_, run)| run.error.rms).filter(|rms| *rms > 0.0 && rms.is_finite());
-        let least_error = errors().fold(1.0, f64::min);
-        let range = [costs().fold(f64::MAX, f64::min) / ROOM, costs().fold(0.0, f64::max) * ROOM];
-        let y = Axis::log(
-            "rms error (% of peak)",
-            [least_error / ROOM, errors().fold(1.0, f64::max).min(LARGEST_ERROR) * ROOM],
-        );
-        let point = |model: &str, late: Nanos, run: &Measured| Point {
-            class: self.class(model),
-            label: match (model, late) {
-                ("full", _) => "full, error 0".to_owned(),
-                (model, Nanos::ZERO) => model.to_owned(),
-                (model, late) => format!("{model} {} ms", milliseconds(late)),
-            },
-            at: (us(run), run.error.rms),
-            sign: Sign::Disc,
-            is_hollow: late != Nanos::ZERO,
-        };
-        let runs = measured.iter().map(|(run, measured)| point(&run.model, run.latency, measured));
-        let x = Axis::log("CPU per haptic tick, p50 (us)", range);
-        Chart {
-            marks: vec![Mark { at: period_us, label: "haptic period".to_owned() }],
-            points: [point("full", Nanos::ZERO, &self.comparison.full)].into_iter().chain(runs).collect(),
-            ..Chart::new("Speed against error", [WIDE, 400.0], x, y)
-        }
-        .to_svg()
     }
 }
 
-fn magnitudes(run: &Measured) -> impl Iterator<Item = f64> {
-    run.trace.forces_n.iter().copied().map(magnitude)
+/// Cost of a haptic tick against the error: every model and latency is a point, `full` lies on the bottom.
+pub(super) fn speed_against_error(comparison: &Comparison) -> String {
+    let models = models(comparison);
+    let us = |run: &Measured| run.cost.tick_p50.0.max(1) as f64 * 1e-3;
+    let period_us = comparison.haptic_period.0 as f64 * 1e-3;
+    let measured: Vec<(&ComparedRun, &Measured)> =
+        comparison.runs.iter().filter_map(|run| Some((run, run.measured()?))).collect();
+    let costs = || measured.iter().map(|(_, run)| us(run)).chain([us(&comparison.full), period_us]);
+    let errors = || measured.iter().map(|(_, run)| run.error.rms).filter(|rms| *rms > 0.0 && rms.is_finite());
+    let least_error = errors().fold(1.0, f64::min);
+    let range = [costs().fold(f64::MAX, f64::min) / ROOM, costs().fold(0.0, f64::max) * ROOM];
+    let y = Axis::log(
+        "rms error (% of peak)",
+        [least_error / ROOM, errors().fold(1.0, f64::max).min(LARGEST_ERROR) * ROOM],
+    );
+    let point = |model: &str, late: Nanos, run: &Measured| Point {
+        class: class(&models, model),
+        label: match (model, late) {
+            ("full", _) => "full, error 0".to_owned(),
+            (model, Nanos::ZERO) => model.to_owned(),
+            (model, late) => format!("{model} {} ms", milliseconds(late)),
+        },
+        at: (us(run), run.error.rms),
+        sign: Sign::Disc,
+        is_hollow: late != Nanos::ZERO,
+    };
+    let runs = measured.iter().map(|(run, measured)| point(&run.model, run.latency, measured));
+    let x = Axis::log("CPU per haptic tick, p50 (us)", range);
+    Chart {
+        marks: vec![Mark { at: period_us, label: "haptic period".to_owned() }],
+        points: [point("full", Nanos::ZERO, &comparison.full)].into_iter().chain(runs).collect(),
+        ..Chart::new("Speed against error", [WIDE, 400.0], x, y)
+    }
+    .to_svg()
+}
+
+fn magnitudes(trace: &ForceTrace) -> impl Iterator<Item = f64> {
+    trace.forces_n.iter().copied().map(magnitude)
 }
 
 /// A latency as a plot's title says it.

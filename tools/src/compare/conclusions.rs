@@ -18,7 +18,7 @@ impl Comparison {
     /// `full` has no error, so another model can only win by cost: per haptic tick, which decides whether a rate can be kept,
     /// or in total, haptic and global group together.
     pub fn conclusions(&self) -> Vec<String> {
-        if self.full.trace.peak_n() == 0.0 {
+        if self.full.peak_n() == 0.0 {
             return vec!["`full` gives no force on this scene: there is nothing to compare".to_owned()];
         }
         let mut lines = vec![fit(self)];
@@ -132,14 +132,15 @@ fn two_digits(count: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::figures::{ForceDeviation, ForceTrace, ModelCost, RunOutcome};
+    use super::super::figures::{ForceDeviation, ForceTrace, MeasuredDevice, ModelCost, RunOutcome};
     use super::*;
 
     fn measured(rms: f64, tick_us: u64, total: f64) -> Measured {
         let tick = Nanos(tick_us * 1000);
         let cost = ModelCost { tick_p50: tick, tick_p99: tick, haptic_load: total, ..ModelCost::default() };
         let trace = ForceTrace { forces_n: vec![[0.0, 0.0, 1.0]], ..ForceTrace::default() };
-        Measured { error: ForceDeviation { rms, ..ForceDeviation::default() }, cost, trace, ..Measured::default() }
+        let error = ForceDeviation { rms, ..ForceDeviation::default() };
+        Measured::new(cost, 0, vec![MeasuredDevice { error, trace, ..MeasuredDevice::default() }])
     }
 
     fn comparison(full_us: u64, runs: &[(&str, u64, Measured)]) -> Comparison {
@@ -198,7 +199,7 @@ mod tests {
     #[test]
     fn a_scene_without_force_and_degraded_results_are_said() {
         let mut without = comparison(100, &[]);
-        without.full.trace.forces_n = vec![[0.0; 3]];
+        without.full.devices[0].trace.forces_n = vec![[0.0; 3]];
         assert!(without.conclusions().concat().contains("nothing to compare"));
         let run = Measured { degraded: 3, ..measured(1.0, 2, 0.2) };
         assert!(

@@ -46,6 +46,12 @@ impl ForceTrace {
         self.energy_j.iter().fold(0.0, |largest, energy| energy.abs().max(largest))
     }
 
+    /// How far each tick's force is from that of `full`, in percent of the largest force of `full`.
+    pub fn errors(&self, full: &Self) -> impl Iterator<Item = f64> {
+        let scale = 100.0 / full.peak_n();
+        self.differences_n(full).map(move |error| scale * error)
+    }
+
     /// How far each tick's force is from that of `full` (N).
     pub fn differences_n(&self, full: &Self) -> impl Iterator<Item = f64> {
         self.forces_n.iter().zip(&full.forces_n).map(|(force, exact)| magnitude(minus(*force, *exact)))
@@ -72,6 +78,18 @@ pub struct ForceDeviation {
 }
 
 impl ForceDeviation {
+    /// Of each figure the larger one; the other where one is not there.
+    fn worst(a: Self, b: Self) -> Self {
+        Self {
+            rms: a.rms.max(b.rms),
+            max: a.max.max(b.max),
+            jump: a.jump.max(b.jump),
+            resync_before_p99: a.resync_before_p99.max(b.resync_before_p99),
+            resync_after_p99: a.resync_after_p99.max(b.resync_after_p99),
+            energy: a.energy.max(b.energy),
+        }
+    }
+
     /// The error of `run` against `full`; both have the same ticks.
     pub fn between(run: &ForceTrace, full: &ForceTrace) -> Self {
         let percent_of = |whole: f64| if whole > 0.0 { 100.0 / whole } else { f64::NAN };
@@ -138,19 +156,53 @@ impl ModelCost {
     }
 }
 
-/// The measurement of a run that came to its end.
+/// One device in a run that came to its end.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Measured {
-    /// Distance of the run's forces from those of `full`.
+pub struct MeasuredDevice {
+    /// Its name; empty for the only one.
+    pub name: String,
+    /// Distance of the forces on its tool from those of `full`, in percent of what `full` has on this tool.
     pub error: ForceDeviation,
-    /// CPU time that the run took.
-    pub cost: ModelCost,
-    /// Haptic and global releases that reported a degraded result, such as a force that was not finite.
-    pub degraded: u64,
     /// The models that made the force, its own or those that it fell back to, with the share of ticks that each did (0 to 1).
     pub served: Vec<(ServedBy, f64)>,
     /// Forces and energies of the run.
     pub trace: ForceTrace,
+}
+
+/// The measurement of a run that came to its end.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// CPU time that the run took.
+    pub cost: ModelCost,
+    /// Haptic and global releases that reported a degraded result, such as a force that was not finite.
+    pub degraded: u64,
+    /// The devices in the order of the scene.
+    pub devices: Vec<MeasuredDevice>,
+    /// The error of the only device; of several, figure by figure, that of the one that is farthest off.
+    pub error: ForceDeviation,
+}
+
+impl Measured {
+    /// A run with these devices.
+    pub(super) fn new(cost: ModelCost, degraded: u64, devices: Vec<MeasuredDevice>) -> Self {
+        let error = devices.iter().map(|device| device.error).reduce(ForceDeviation::worst).unwrap_or_default();
+        Self { cost, degraded, devices, error }
+    }
+
+    /// The devices, if there are several.
+    pub(super) fn several(&self) -> &[MeasuredDevice] {
+        if self.devices.len() > 1 { &self.devices } else { &[] }
+    }
+
+    /// The largest force on a tool (N).
+    pub fn peak_n(&self) -> f64 {
+        self.devices.iter().map(|device| device.trace.peak_n()).fold(0.0, f64::max)
+    }
+
+    /// The number of resyncs of all devices.
+    pub fn resyncs(&self) -> usize {
+        self.devices.iter().map(|device| device.trace.resyncs.len()).sum()
+    }
 }
 
 /// How the run of one model went.
@@ -250,12 +302,6 @@ impl Comparison {
             RunOutcome::Measured(_) | RunOutcome::Refused(_) => None,
         })
     }
-
-    /// The error of a run tick by tick, in percent of the largest force of `full`.
-    pub fn errors<'a>(&'a self, run: &'a Measured) -> impl Iterator<Item = f64> + 'a {
-        let scale = 100.0 / self.full.trace.peak_n();
-        run.trace.differences_n(&self.full.trace).map(move |error| scale * error)
-    }
 }
 
 fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -305,6 +351,18 @@ mod tests {
     fn without_a_force_of_full_there_is_no_percentage() {
         let error = ForceDeviation::between(&trace(&[1.0], &[1.0]), &trace(&[0.0], &[0.0]));
         assert!(error.rms.is_nan() && error.max.is_nan() && error.jump.is_nan() && error.energy.is_nan());
+    }
+
+    #[test]
+    fn of_several_devices_the_worst_counts_figure_by_figure_and_one_without_a_force_does_not() {
+        let device = |rms, max| MeasuredDevice {
+            error: ForceDeviation { rms, max, ..ForceDeviation::default() },
+            ..MeasuredDevice::default()
+        };
+        let of = |devices: &[MeasuredDevice]| Measured::new(ModelCost::default(), 0, devices.to_vec()).error;
+        let error = of(&[device(1.0, 9.0), device(f64::NAN, f64::NAN), device(2.0, 3.0)]);
+        assert_eq!((error.rms, error.max), (2.0, 9.0));
+        assert!(of(&[device(f64::NAN, 1.0)]).rms.is_nan());
     }
 
     #[test]

@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-use super::charts::{Plots, colour, models};
-use super::figures::{Comparison, Measured};
-use super::milliseconds;
-use super::table::{COLUMNS, cell, clock, facts};
+use super::charts::{Plots, colour, models, speed_against_error};
+use super::figures::Comparison;
+use super::table::{COLUMNS, cell, clock, facts, rows};
 use crate::drawing::html::{escaped, page, sentence};
 
 /// The comparison as an HTML page that needs nothing else: no network, no script.
@@ -39,21 +38,18 @@ fn table(body: &mut String, comparison: &Comparison) {
         let _ = write!(body, "<th title=\"{}\">{}</th>", escaped(column.meaning), column.head.join("<br>"));
     }
     body.push_str("</tr></thead>\n<tbody>\n");
-    let mut row = |model: &str, late: &str, measured: Option<&Measured>, why: &str| {
-        let _ = write!(body, "<tr><td>{}</td><td>{late}</td>", escaped(model));
-        match measured {
-            Some(run) => COLUMNS.iter().for_each(|column| {
-                let _ = write!(body, "<td>{}</td>", cell(column, run));
+    for row in rows(comparison) {
+        let indent = if row.is_of_device() { "&emsp;" } else { "" };
+        let _ = write!(body, "<tr><td>{indent}{}</td><td>{}</td>", escaped(row.name), row.late);
+        match &row.figures {
+            Ok(figures) => COLUMNS.iter().for_each(|column| {
+                let _ = write!(body, "<td>{}</td>", cell(column, figures));
             }),
-            None => {
+            Err(why) => {
                 let _ = write!(body, "<td class=\"why\" colspan=\"{}\">{}</td>", COLUMNS.len(), escaped(why));
             }
         }
         body.push_str("</tr>\n");
-    };
-    row("full", "", Some(&comparison.full), "");
-    for run in comparison.runs.iter().chain(&comparison.finer) {
-        row(&run.model, &milliseconds(run.latency), run.measured(), run.missing().unwrap_or_default());
     }
     body.push_str("</tbody>\n</table></div>\n<details><summary>What the columns mean</summary>\n<dl>\n");
     for column in &COLUMNS {
@@ -66,7 +62,6 @@ fn table(body: &mut String, comparison: &Comparison) {
 /// The plots; returns the style by which their keys hide and show the models.
 fn plots(body: &mut String, comparison: &Comparison) -> String {
     let mut style = String::new();
-    let plots = Plots::new(comparison);
     let _ = writeln!(body, "<h2 id=\"plots\">Plots</h2>\n<div class=\"keys\">");
     for (number, model) in models(comparison).into_iter().enumerate() {
         let _ = writeln!(
@@ -84,20 +79,23 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
     };
     figure(
         "speed",
-        &plots.speed_against_error(),
+        &speed_against_error(comparison),
         "Left is cheaper, down is nearer to `full`. Filled: results of the global model are there at once; hollow: late.",
     );
-    for (number, latency) in comparison.latencies().into_iter().enumerate() {
-        let [whole, near] = plots.forces(latency);
-        let errors = plots.errors(latency);
-        let around = "The same around two resyncs in the middle of the contact. Dashed: a result of the global model becomes \
-                      visible.";
-        for (what, svg, caption) in [
-            ("force", whole, "Magnitude of the force on the tool. The shaded part is shown below."),
-            ("resync", near, around),
-            ("error", errors, "Distance from the force of `full`; what is below the lowest line is drawn on it."),
-        ] {
-            figure(&format!("{what}-{number}"), &svg, caption);
+    for device in 0..comparison.full.devices.len() {
+        let plots = Plots::new(comparison, device);
+        for (number, latency) in comparison.latencies().into_iter().enumerate() {
+            let [whole, near] = plots.forces(latency);
+            let errors = plots.errors(latency);
+            let around = "The same around two resyncs in the middle of the contact. Dashed: a result of the global model \
+                          becomes visible.";
+            for (what, svg, caption) in [
+                ("force", whole, "Magnitude of the force on the tool. The shaded part is shown below."),
+                ("resync", near, around),
+                ("error", errors, "Distance from the force of `full`; what is below the lowest line is drawn on it."),
+            ] {
+                figure(&plots.id(&format!("{what}-{number}")), &svg, caption);
+            }
         }
     }
     style

@@ -13,21 +13,25 @@
 //! | `models[]` | `full` first; `model`, `latency_ms`, `ok`, `why_not`, `error_percent`, `cost`, `resyncs`, `degraded` |
 //! | `models[].error_percent` | `rms`, `max`, `jump`, `resync_before_p99`, `resync_after_p99`, `energy` |
 //! | `models[].cost` | `tick_p50_ns`, `tick_p99_ns`, `tick_max_ns`, `haptic_s_per_s`, `global_s_per_s`, `total_s_per_s`, `builds`, `build_p50_ns`, `build_p99_ns` |
+//! | `devices[]` | of each of several devices `name`, `peak_n`, `largest_energy_j`; those of the document are then the largest |
+//! | `models[].devices[]` | of each of several devices `name`, `error_percent`, `resyncs`; the model's `error_percent` is then, figure by figure, that of the worst |
 //! | `finer[]` | as `models[]`: `full` with smaller steps, and with smaller elements where a surface was filled |
 //! | `conclusions[]` | sentences, not for programs |
 
 use serde_json::{Value, json};
 
 use super::conclusions::full_fits;
-use super::figures::{ComparedRun, Comparison, Measured};
+use super::figures::{ComparedRun, Comparison, ForceDeviation, Measured, MeasuredDevice};
 
 /// The comparison as one JSON document.
 pub fn to_json(comparison: &Comparison) -> String {
     let full = model("full", 0, Some(&comparison.full), None);
     let row = |run: &ComparedRun| model(&run.model, run.latency.0, run.measured(), run.missing());
     let models = comparison.runs.iter().map(row);
+    let energies = comparison.full.devices.iter().map(|device| device.trace.largest_energy_j());
+    let largest_energy_j = energies.fold(0.0, f64::max);
     let models: Vec<Value> = [full].into_iter().chain(models).collect();
-    json!({
+    let mut document = json!({
         "schema_version": 1,
         "scene": comparison.scene,
         "nodes": comparison.nodes,
@@ -38,31 +42,52 @@ pub fn to_json(comparison: &Comparison) -> String {
         "palpate_version": comparison.palpate_version,
         "instruction_set": comparison.instruction_set,
         "clock_ns": comparison.clock.0,
-        "peak_n": comparison.full.trace.peak_n(),
-        "largest_energy_j": comparison.full.trace.largest_energy_j(),
+        "peak_n": comparison.full.peak_n(),
+        "largest_energy_j": largest_energy_j,
         "full_fits_tick": full_fits(comparison),
         "models": models,
         "finer": comparison.finer.iter().map(row).collect::<Vec<_>>(),
         "conclusions": comparison.conclusions(),
+    });
+    add_devices(
+        &mut document,
+        &comparison.full,
+        |device| json!({ "peak_n": device.trace.peak_n(), "largest_energy_j": device.trace.largest_energy_j() }),
+    );
+    document.to_string()
+}
+
+/// Adds what there is to say of each device, with its name, where there are several.
+fn add_devices(to: &mut Value, run: &Measured, of: impl Fn(&MeasuredDevice) -> Value) {
+    let named = |device: &MeasuredDevice| {
+        let mut value = of(device);
+        value["name"] = json!(device.name);
+        value
+    };
+    if !run.several().is_empty() {
+        to["devices"] = run.several().iter().map(named).collect();
+    }
+}
+
+fn error_percent(error: &ForceDeviation, resyncs: usize) -> Value {
+    json!({
+        "rms": error.rms,
+        "max": error.max,
+        "jump": error.jump,
+        "resync_before_p99": (resyncs > 0).then_some(error.resync_before_p99),
+        "resync_after_p99": (resyncs > 0).then_some(error.resync_after_p99),
+        "energy": error.energy,
     })
-    .to_string()
 }
 
 fn model(name: &str, latency_ns: u64, run: Option<&Measured>, why_not: Option<&str>) -> Value {
-    let resyncs = run.map_or(0, |run| run.trace.resyncs.len());
-    json!({
+    let resyncs = run.map_or(0, Measured::resyncs);
+    let mut row = json!({
         "model": name,
         "latency_ms": latency_ns as f64 / 1e6,
         "ok": run.is_some(),
         "why_not": why_not,
-        "error_percent": run.map(|run| json!({
-            "rms": run.error.rms,
-            "max": run.error.max,
-            "jump": run.error.jump,
-            "resync_before_p99": (resyncs > 0).then_some(run.error.resync_before_p99),
-            "resync_after_p99": (resyncs > 0).then_some(run.error.resync_after_p99),
-            "energy": run.error.energy,
-        })),
+        "error_percent": run.map(|run| error_percent(&run.error, resyncs)),
         "cost": run.map(|run| json!({
             "tick_p50_ns": run.cost.tick_p50.0,
             "tick_p99_ns": run.cost.tick_p99.0,
@@ -76,7 +101,14 @@ fn model(name: &str, latency_ns: u64, run: Option<&Measured>, why_not: Option<&s
         })),
         "resyncs": resyncs,
         "degraded": run.map(|run| run.degraded),
-    })
+    });
+    if let Some(run) = run {
+        add_devices(&mut row, run, |device| {
+            let resyncs = device.trace.resyncs.len();
+            json!({ "error_percent": error_percent(&device.error, resyncs), "resyncs": resyncs })
+        });
+    }
+    row
 }
 
 #[cfg(test)]

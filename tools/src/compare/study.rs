@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use palpate::log::DeviceReport;
 use palpate::model::body::Block;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Histogram;
@@ -10,7 +11,9 @@ use palpate::scene::{BodySpec, Scene};
 use palpate::session::{Session, SessionBuilder, Summary};
 use palpate::{Error, ErrorKind};
 
-use super::figures::{ComparedRun, Comparison, ForceDeviation, ForceTrace, Measured, ModelCost, RunOutcome};
+use super::figures::{
+    ComparedRun, Comparison, ForceDeviation, ForceTrace, Measured, MeasuredDevice, ModelCost, RunOutcome,
+};
 use super::finer::finer;
 
 /// How much of a run passes between two calls of the progress callback.
@@ -71,10 +74,6 @@ impl Comparison {
         options: &CompareOptions,
         mut progress: impl FnMut(CompareProgress),
     ) -> Result<Self, Error> {
-        if scene.devices.len() > 1 {
-            let message = "is given several times, and what is compared is the force of one against `full`: leave one";
-            return Err(Error::scene("device", message));
-        }
         let global = rate("global.rate_hz", scene.global.rate_hz)?;
         let latencies = match options.latencies.is_empty() {
             true => vec![Nanos::ZERO, CompareOptions::one_period(global)],
@@ -99,7 +98,7 @@ impl Comparison {
         let session = build(scene, reference, options.duration_s)?;
         let at_work = |elapsed, until| report(0, reference.0.name(), reference.1, elapsed, until);
         let mut comparison = full(session, about(scene, global)?, at_work)?;
-        let full = &comparison.full.trace;
+        let full = &comparison.full;
         type Build<'a> = Box<dyn FnOnce() -> Result<Session, Error> + 'a>;
         let mut compare = |run, model: &'static str, latency, session: Build<'_>| {
             report(run, model, latency, Nanos::ZERO, None);
@@ -133,7 +132,7 @@ impl Measured {
 }
 
 /// How a run went, with its distance from `full`.
-fn outcome(ran: Result<(Nanos, Summary), Error>, full: &ForceTrace) -> RunOutcome {
+fn outcome(ran: Result<(Nanos, Summary), Error>, full: &Measured) -> RunOutcome {
     match ran {
         Err(refusal) => RunOutcome::Refused(refusal.to_string()),
         Ok((_, summary)) => match &summary.runtime.fault {
@@ -197,12 +196,19 @@ fn rate(field: &str, hz: f64) -> Result<Rate, Error> {
 }
 
 /// What a run says, against `full` if it is not `full` itself.
-fn measured(summary: &Summary, full: Option<&ForceTrace>) -> Measured {
-    let trace = ForceTrace::of(&summary.records);
-    let error = ForceDeviation::between(&trace, full.unwrap_or(&trace));
+fn measured(summary: &Summary, full: Option<&Measured>) -> Measured {
+    let device = |(number, report): (u16, &DeviceReport)| {
+        let trace = ForceTrace::of_device(&summary.records, number);
+        let full = full.and_then(|full| full.devices.get(usize::from(number))).map(|device| &device.trace);
+        MeasuredDevice {
+            name: report.name.clone(),
+            error: ForceDeviation::between(&trace, full.unwrap_or(&trace)),
+            served: report.force.shares().collect(),
+            trace,
+        }
+    };
     let degraded = summary.runtime.groups.iter().map(|group| group.degraded).sum();
-    let served = summary.report.devices.first().map_or(Vec::new(), |device| device.force.shares().collect());
-    Measured { error, cost: cost(summary), degraded, served, trace }
+    Measured::new(cost(summary), degraded, (0..).zip(&summary.report.devices).map(device).collect())
 }
 
 fn cost(summary: &Summary) -> ModelCost {

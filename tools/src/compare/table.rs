@@ -1,6 +1,6 @@
 //! The table of a comparison: its columns, and the text for a terminal of 100 columns.
 
-use super::figures::{Comparison, Measured};
+use super::figures::{Comparison, ForceDeviation, Measured, MeasuredDevice, ModelCost};
 use super::{figure, milliseconds};
 use crate::units::{duration, force};
 
@@ -9,7 +9,60 @@ pub(super) struct Column {
     pub(super) head: [&'static str; 3],
     pub(super) width: usize,
     pub(super) meaning: &'static str,
-    pub(super) value: fn(&Measured) -> Option<f64>,
+    pub(super) value: fn(&Figures<'_>) -> Option<f64>,
+}
+
+/// A row of the table: `full`, another run, or one of several devices in the run above it.
+pub(super) struct Row<'a> {
+    pub(super) name: &'a str,
+    /// The latency (ms); empty for `full` and for a device.
+    pub(super) late: String,
+    /// The figures, or the reason for which there are none.
+    pub(super) figures: Result<Figures<'a>, &'a str>,
+}
+
+/// What the columns of a row are taken from.
+pub(super) struct Figures<'a> {
+    error: &'a ForceDeviation,
+    is_resynced: bool,
+    /// A device has none of its own.
+    cost: Option<&'a ModelCost>,
+}
+
+impl<'a> Figures<'a> {
+    fn of(run: &'a Measured) -> Self {
+        Self { error: &run.error, is_resynced: run.resyncs() > 0, cost: Some(&run.cost) }
+    }
+
+    fn of_device(device: &'a MeasuredDevice) -> Self {
+        Self { error: &device.error, is_resynced: !device.trace.resyncs.is_empty(), cost: None }
+    }
+}
+
+impl Row<'_> {
+    /// True for one of several devices.
+    pub(super) fn is_of_device(&self) -> bool {
+        self.figures.as_ref().is_ok_and(|figures| figures.cost.is_none())
+    }
+}
+
+/// The rows in their order.
+pub(super) fn rows<'a>(comparison: &'a Comparison) -> impl Iterator<Item = Row<'a>> {
+    let full = ("full", String::new(), Ok(&comparison.full));
+    let others = comparison.runs.iter().chain(&comparison.finer).map(|run| {
+        let measured = run.measured().ok_or(run.missing().unwrap_or_default());
+        (&*run.model, milliseconds(run.latency), measured)
+    });
+    [full].into_iter().chain(others).flat_map(|(name, late, measured)| {
+        let whole = Row { name, late, figures: measured.map(Figures::of) };
+        let devices = measured.map_or(&[][..], Measured::several).iter();
+        let of_device = |device: &'a MeasuredDevice| Row {
+            name: &device.name,
+            late: String::new(),
+            figures: Ok(Figures::of_device(device)),
+        };
+        [whole].into_iter().chain(devices.map(of_device))
+    })
 }
 
 /// Columns of the terminal.
@@ -25,90 +78,84 @@ pub(super) const COLUMNS: [Column; 11] = [
         head: ["error", "rms", "%"],
         width: 7,
         meaning: "root mean square of the force's error over all ticks, in % of the largest force of full",
-        value: |run| Some(run.error.rms),
+        value: |of| Some(of.error.rms),
     },
     Column {
         head: ["error", "max", "%"],
         width: 7,
         meaning: "largest error of the force in one tick, in % of the largest force of full",
-        value: |run| Some(run.error.max),
+        value: |of| Some(of.error.max),
     },
     Column {
         head: ["jump", "worst", "%"],
         width: 7,
         meaning: "largest change of the force from one tick to the next, in % of the largest force of full",
-        value: |run| Some(run.error.jump),
+        value: |of| Some(of.error.jump),
     },
     Column {
         head: ["resync", "before", "p99 %"],
         width: 8,
         meaning: "jump of the force at a resync before blending, p99, in % of the largest force of full",
-        value: |run| is_resynced(run).then_some(run.error.resync_before_p99),
+        value: |of| of.is_resynced.then_some(of.error.resync_before_p99),
     },
     Column {
         head: ["resync", "after", "p99 %"],
         width: 8,
         meaning: "largest one-tick change that blending leaves of a resync's jump, p99, in % of the largest force of full",
-        value: |run| is_resynced(run).then_some(run.error.resync_after_p99),
+        value: |of| of.is_resynced.then_some(of.error.resync_after_p99),
     },
     Column {
         head: ["energy", "error", "%"],
         width: 7,
         meaning: "energy given to the body at the end of the run against full, in % of the largest energy of full",
-        value: |run| Some(run.error.energy),
+        value: |of| Some(of.error.energy),
     },
     Column {
         head: ["haptic", "p50", "us"],
         width: 7,
         meaning: "CPU time of a haptic tick, device and local model, p50",
-        value: |run| Some(run.cost.tick_p50.0 as f64 * 1e-3),
+        value: |of| Some(of.cost?.tick_p50.0 as f64 * 1e-3),
     },
     Column {
         head: ["tick", "p99", "us"],
         width: 6,
         meaning: "CPU time of a haptic tick, p99",
-        value: |run| Some(run.cost.tick_p99.0 as f64 * 1e-3),
+        value: |of| Some(of.cost?.tick_p99.0 as f64 * 1e-3),
     },
     Column {
         head: ["global", "load", "ms/s"],
         width: 7,
         meaning: "CPU time of the global group per second of simulated time",
-        value: |run| (run.cost.global_load > 0.0).then_some(1e3 * run.cost.global_load),
+        value: |of| of.cost.map(|cost| 1e3 * cost.global_load).filter(|load| *load > 0.0),
     },
     Column {
         head: ["total", "load", "ms/s"],
         width: 7,
         meaning: "CPU time of the haptic and the global group together, per second of simulated time",
-        value: |run| Some(1e3 * run.cost.total_load()),
+        value: |of| Some(1e3 * of.cost?.total_load()),
     },
     Column {
         head: ["build", "p50", "us"],
         width: 7,
         meaning: "CPU time of building a local model, once per resync, p50",
-        value: |run| (run.cost.builds > 0).then_some(run.cost.build_p50.0 as f64 * 1e-3),
+        value: |of| of.cost.filter(|cost| cost.builds > 0).map(|cost| cost.build_p50.0 as f64 * 1e-3),
     },
 ];
-
-fn is_resynced(run: &Measured) -> bool {
-    !run.trace.resyncs.is_empty()
-}
 
 /// The comparison as text, every line ended by a newline.
 pub fn to_text(comparison: &Comparison) -> String {
     let mut lines = vec![facts(comparison), String::new()];
     for line in 0..3 {
         let (model, latency) = [("", ""), ("model", "late"), ("", "ms")][line];
-        lines.push(row(model, latency, COLUMNS.iter().map(|column| column.head[line].to_owned())));
+        lines.push(self::line(model, latency, COLUMNS.iter().map(|column| column.head[line].to_owned())));
     }
-    let full = &comparison.full;
-    lines.push(row("full", "", COLUMNS.iter().map(|column| cell(column, full))));
-    for run in comparison.runs.iter().chain(&comparison.finer) {
-        let latency = milliseconds(run.latency);
-        lines.push(match run.measured() {
-            Some(measured) => row(&run.model, &latency, COLUMNS.iter().map(|column| cell(column, measured))),
-            None => row(&run.model, &latency, ["  ".to_owned() + run.missing().unwrap_or_default()].into_iter()),
-        });
-    }
+    lines.extend(rows(comparison).map(|row| {
+        let name = if row.is_of_device() { format!("  {}", row.name) } else { row.name.to_owned() };
+        match &row.figures {
+            Ok(figures) => line(&name, &row.late, COLUMNS.iter().map(|column| cell(column, figures))),
+            Err(why) => line(&name, &row.late, [format!("  {why}")].into_iter()),
+        }
+    }));
     lines.push(String::new());
     lines.extend(comparison.conclusions());
     lines.push(String::new());
@@ -149,8 +196,17 @@ pub(super) fn facts(comparison: &Comparison) -> String {
         comparison.duration.as_secs_f64(),
         hz(comparison.haptic_period),
         hz(comparison.global_period),
-        force(comparison.full.trace.peak_n())
+        peaks(&comparison.full)
     )
+}
+
+/// The largest force, of each device if there are several.
+fn peaks(full: &Measured) -> String {
+    let of_device = |device: &MeasuredDevice| format!("{} on {}", force(device.trace.peak_n()), device.name);
+    match full.several() {
+        [] => force(full.peak_n()),
+        several => several.iter().map(of_device).collect::<Vec<_>>().join(", "),
+    }
 }
 
 /// What the measurement adds to itself.
@@ -159,11 +215,11 @@ pub(super) fn clock(comparison: &Comparison) -> String {
 }
 
 /// The figure of a column, `-` where there is none.
-pub(super) fn cell(column: &Column, run: &Measured) -> String {
-    (column.value)(run).map_or("-".to_owned(), figure)
+pub(super) fn cell(column: &Column, figures: &Figures<'_>) -> String {
+    (column.value)(figures).map_or("-".to_owned(), figure)
 }
 
-fn row(model: &str, latency: &str, cells: impl Iterator<Item = String>) -> String {
+fn line(model: &str, latency: &str, cells: impl Iterator<Item = String>) -> String {
     // What is too long for its column, a reason, is the only one.
     let cells = cells.zip(&COLUMNS).map(|(cell, column)| format!("{cell:>width$}", width = column.width));
     format!("{model:<MODEL_WIDTH$}{latency:>LATENCY_WIDTH$}{}", cells.collect::<String>())

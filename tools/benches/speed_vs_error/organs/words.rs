@@ -65,7 +65,7 @@ fn about(study: &Study) -> String {
         finest.size_mm,
         finest.parts,
         finest.nodes,
-        figure(finest.measured.trace.peak_n()),
+        figure(finest.measured.peak_n()),
         figure(ms_per_s(&finest.measured)),
     )
 }
@@ -75,7 +75,7 @@ fn bodies(study: &Study) -> String {
     let row = |kind: &str, run: &Run| {
         let Distance { rms, max } = study.whole(&run.measured);
         let sizes = [run.size_mm.to_string(), run.nodes.to_string(), run.parts.to_string()];
-        let figures = [run.measured.trace.peak_n(), rms, max, ms_per_s(&run.measured)].map(figure);
+        let figures = [run.measured.peak_n(), rms, max, ms_per_s(&run.measured)].map(figure);
         [kind.to_owned()].into_iter().chain(sizes).chain(figures).collect::<Vec<_>>()
     };
     let tetrahedra = study.tetrahedra.iter().chain([&study.finest]).map(|run| row("tetrahedra", run));
