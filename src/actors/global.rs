@@ -135,11 +135,17 @@ impl ToolSide {
         }
     }
 
-    /// The patch that the next model is made for, if there are bases: the best window that has one, or the best of all.
+    /// The patch that the next model is made for, if there are bases: the best window that has one, or the best of all; the widest
+    /// while nobody knows where the tool is going.
     fn choose_patch(&mut self, at: (&Simulation, usize), bases: &Bases) {
         let has_basis = |patch: &[u32]| bases.get(patch).is_some();
         if !self.windows.choose(at, &self.triangles, has_basis, &mut self.patch) {
             self.windows.choose(at, &self.triangles, |_| true, &mut self.patch);
+        }
+        if self.history.is_new()
+            && let Some(widest) = self.windows.widest(self.triangles[0], &self.patch).filter(|patch| has_basis(patch))
+        {
+            widest.clone_into(&mut self.patch);
         }
     }
 }

@@ -102,6 +102,14 @@ impl ToolHistory {
         Self { positions, orientation: pose.orientation, known: 0, tick, lead }
     }
 
+    /// True as long as nobody knows where the tool is going.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn is_new(&self) -> bool {
+        self.known == 0
+    }
+
     /// Forgets the way so far: the tool has rested at `pose`.
     ///
     /// # Real-time

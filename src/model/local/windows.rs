@@ -120,6 +120,23 @@ impl Windows {
         usable(nodes)
     }
 
+    /// The patch of the largest windows that holds most of `patch`, whose middle is nearest to `triangle`: for a tool of which
+    /// nobody knows yet where it goes.
+    ///
+    /// # Real-time
+    /// For the global actor: looks at all windows.
+    pub fn widest(&self, triangle: u32, patch: &[u32]) -> Option<&[u32]> {
+        let at = self.triangles[triangle as usize];
+        let layer = self.windows.last()?.layer;
+        let rank = |window: &Window| {
+            let missing = patch.iter().filter(|node| window.patch.binary_search(node).is_err()).count();
+            (missing, (window.middle - at).norm_squared())
+        };
+        let ranked = self.windows[layer..].iter().map(|window| (rank(window), window));
+        let best = ranked.min_by(|((a, near), _), ((b, far), _)| a.cmp(b).then(near.total_cmp(far)));
+        best.map(|(_, window)| &window.patch[..])
+    }
+
     fn best(&self, triangles: &[u32], pressed: &[u32], usable: impl Fn(&[u32]) -> bool) -> Option<&Window> {
         let holds = |patch: &[u32]| pressed.iter().all(|node| patch.binary_search(node).is_ok());
         let mut best: Option<(&Window, f64)> = None;
@@ -210,6 +227,7 @@ mod tests {
         assert_eq!(resting.len(), SIZE.iter().product::<usize>());
         let fast = chosen(&[at(0.021), at(0.031), at(0.041), at(0.061)]);
         assert!(fast.len() > resting.len());
+        assert!(windows.widest(at(0.041), &resting).unwrap().len() > fast.len());
         // From edge to edge is more than any window holds: it holds the first half.
         let [edge, middle] = [at(0.001), at(0.031)];
         let too_far = chosen(&[edge, middle, at(0.061), at(0.079)]);

@@ -64,7 +64,7 @@ impl BasisSide {
     }
 }
 
-/// The basis of the window that each tool is over.
+/// The bases of the window that each tool is over, and of the widest there.
 fn first_bases(prepared: &Prepared, resting: &RestingBody, store: &BasisStore, tools: &[Pose]) -> Result<Bases, Error> {
     let simulation = &prepared.simulation;
     let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
@@ -75,11 +75,14 @@ fn first_bases(prepared: &Prepared, resting: &RestingBody, store: &BasisStore, t
         let windows = Windows::new(simulation, index, prepared.plan.template.patch);
         let mut patch = Vec::new();
         windows.choose((simulation, index), &triangles, |_| true, &mut patch);
-        // What cannot be reduced is told by the actor, when it is wanted.
-        if bases.get(&patch).is_none()
-            && let Ok(Some(basis)) = store.get(resting, &patch)
-        {
-            bases.insert(Arc::new(basis));
+        let widest = windows.widest(triangles[0], &patch).filter(|_| !simulation.contact(index).glued);
+        for patch in std::iter::once(&patch[..]).chain(widest) {
+            // What cannot be reduced is told by the actor, when it is wanted.
+            if bases.get(patch).is_none()
+                && let Ok(Some(basis)) = store.get(resting, patch)
+            {
+                bases.insert(Arc::new(basis));
+            }
         }
     }
     Ok(bases)
