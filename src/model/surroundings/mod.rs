@@ -11,7 +11,11 @@ mod products;
 mod reduced;
 mod reduction;
 mod resting;
+#[cfg(test)]
+mod stability;
 mod stored;
+#[cfg(test)]
+mod uneven;
 
 pub use accuracy::{Estimate, Size};
 pub use basis::{Bases, Basis};

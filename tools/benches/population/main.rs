@@ -3,7 +3,8 @@
 //!
 //! `cargo bench --bench population`; with `-- --quick` a short form that prints and writes nothing; with `-- --seen` the two
 //! thirds of the cases that may be looked at while working, case by case, written nowhere; `--cases N` how many, `--from N` the first
-//! seed, or `--only A,B` which; `--patch A,B,C`, `--basis N` and `--basis-latency MS` in place of the defaults.
+//! seed, or `--only A,B` which; `--patch A,B,C`, `--basis N`, `--basis-latency MS` and `--budget PERCENT` in place of the defaults;
+//! `--models A,B` in place of `predictive` and `patch`.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -18,6 +19,7 @@ mod words;
 use std::process::ExitCode;
 
 use palpate::Error;
+use palpate::model::local::Kind;
 
 use cases::is_unseen;
 use runs::{Settings, run_all};
@@ -53,7 +55,14 @@ fn main() -> ExitCode {
     let Some(arguments) = common::arguments() else { return ExitCode::SUCCESS };
     let value = |flag: &str| std::env::args().skip_while(|argument| argument != flag).nth(1);
     let number = |flag: &str| value(flag).and_then(|value| value.parse::<usize>().ok());
+    let kinds = |list: String| -> Vec<Kind> {
+        list.split(',')
+            .map(|name| Kind::ALL.into_iter().find(|kind| kind.name() == name).expect("--models takes names"))
+            .collect()
+    };
     let settings = Settings {
+        models: value("--models").map_or_else(|| vec![Kind::Predictive, Kind::Patch], kinds),
+        budget: value("--budget").and_then(|value| value.parse().ok()),
         patch: value("--patch").map(|sizes| {
             let mut sizes = sizes.split(',').map(|size| size.parse().expect("--patch takes A,B,C"));
             std::array::from_fn(|_| sizes.next().expect("--patch takes A,B,C"))

@@ -4,19 +4,22 @@ use std::fmt;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use palpate::Error;
 use palpate::log::ServedBy;
 use palpate::model::local::Kind;
 use palpate::runtime::Nanos;
-use palpate::scene::Scene;
+use palpate::scene::{ModelChoice, Scene};
+use palpate::{Error, Session};
 use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 
 use super::cases::{Case, Class};
 use super::paths::Motion;
 
 /// What is tried in place of the defaults.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Settings {
+    /// The models to run, besides the one that `auto` chooses.
+    pub models: Vec<Kind>,
+    pub budget: Option<f64>,
     pub patch: Option<[usize; 3]>,
     pub basis: Option<usize>,
     pub latency_ms: Option<f64>,
@@ -31,6 +34,7 @@ impl Settings {
             }
         }
         scene.local.basis = self.basis.or(scene.local.basis);
+        scene.local.error_pct = self.budget.or(scene.local.error_pct);
         scene.global.basis_latency_ms = self.latency_ms.unwrap_or(scene.global.basis_latency_ms);
     }
 }
@@ -78,6 +82,8 @@ pub struct CaseResult {
     name: String,
     /// Of `full` (N).
     pub peak_n: f64,
+    /// What `auto` chooses, and whether it says that the error may be larger than what was asked for.
+    pub auto: (Kind, bool),
     /// Models by name, in time and late; `None` with the reason for what did not run to its end.
     pub runs: Vec<(Kind, [Result<Run, String>; 2])>,
     seconds: f64,
@@ -113,7 +119,8 @@ impl fmt::Display for CaseResult {
                 }
             }
         }
-        write!(f, " ({:.1} s)", self.seconds)
+        let (auto, warns) = self.auto;
+        write!(f, " | auto {}{} ({:.1} s)", auto.name(), if warns { ", unsure" } else { "" }, self.seconds)
     }
 }
 
@@ -148,7 +155,14 @@ fn run(seed: u64, settings: &Settings) -> Result<CaseResult, Error> {
     let begun = Instant::now();
     let mut case = Case::new(seed)?;
     settings.apply(&mut case.scene);
-    let options = CompareOptions { models: vec![Kind::Predictive], ..CompareOptions::default() };
+    let session = Session::from_scene(case.scene.clone().with_model(ModelChoice::Auto)).virtual_time().build()?;
+    let choice = session.choice().expect("auto chooses");
+    let auto = (choice.model, choice.reason.warning.is_some());
+    let mut models = settings.models.clone();
+    if auto.0 != Kind::Full && !models.contains(&auto.0) {
+        models.push(auto.0);
+    }
+    let options = CompareOptions { models, ..CompareOptions::default() };
     let comparison = Comparison::measure(&case.scene, &options, |_| ())
         .map_err(|error| Error::new(error.kind(), format!("case {case}: {error}")))?;
     let full = &comparison.full;
@@ -165,6 +179,7 @@ fn run(seed: u64, settings: &Settings) -> Result<CaseResult, Error> {
         motion: case.motion,
         name: case.to_string(),
         peak_n: full.peak_n(),
+        auto,
         runs: options.models.iter().map(|&kind| of(kind)).collect(),
         seconds: begun.elapsed().as_secs_f64(),
     })

@@ -16,6 +16,9 @@ pub struct Document {
     pub pictures: Vec<(String, String)>,
 }
 
+/// The error that `auto` is asked for where a scene says nothing (%).
+const ASKED_PCT: f64 = 1.0;
+
 const HEAD: &str = "\
 # How far off on scenes that nobody tuned
 
@@ -24,11 +27,14 @@ Random but ordinary scenes, each made from its seed: cubes, bricks, slabs, pilla
 0.47), friction 0 to 1.5, points and spheres, haptic rates of 0.5 to 4 kHz, a global model at 20 to 50 Hz. A hand kneads at 1 to 5 Hz, taps,
 draws spirals, scribbles, drags and stops at once, or strokes to and fro at 0.2 to 0.5 m/s, always with tremor.
 
-Each scene runs for 1.2 s in virtual time with `full` and with `predictive` as it is by default, with results of the global model that
-are there at once (*in time*) or one period late. *rms* is the error of the force in % of the largest force of `full`; *jump* the largest
+Each scene runs for 1.2 s in virtual time with `full`, and with `predictive` and `patch` as they are by default, with results of the
+global model that are there at once (*in time*) or one period late. *rms* is the error of the force in % of the largest force of `full`; *jump* the largest
 change of the force in one tick beyond that of `full`, in the same; *peak* the largest force over that of `full`. *Tick* is the
 CPU time of a haptic tick, the median over scenes of p50 and p99 (which has catching up in it), *periods* what the global model works, in
 periods of simulation with `full`. Bases of reduced surroundings are there at once in these runs.
+
+The second tables say what `auto` chooses in virtual time, where an evaluation of the body's forces has a nominal cost, how
+far that model is off one period late, and how often a model was more than the usual `error_pct` of 1 % off without a word of it.
 
 A third of the scenes, those whose seed leaves 2 when divided by 3, is *unseen*: nothing was chosen by what they say.
 ";
@@ -52,19 +58,46 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.get(place.round() as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// The runs of `predictive` in time, or late, that came to their end.
-fn runs<'a>(results: &[&'a CaseResult], late: bool) -> Vec<&'a Run> {
-    let of = |result: &&'a CaseResult| result.of(Kind::Predictive)?[usize::from(late)].as_ref().ok();
+/// The runs of a model in time, or late, that came to their end.
+fn runs<'a>(results: &[&'a CaseResult], kind: Kind, late: bool) -> Vec<&'a Run> {
+    let of = |result: &&'a CaseResult| result.of(kind)?[usize::from(late)].as_ref().ok();
     results.iter().filter_map(of).collect()
 }
 
-/// Of `predictive`, in time and late: for all, by class and by motion.
+/// What `auto` chooses, with what its models are off by one period late.
+fn chosen(results: &[&CaseResult]) -> String {
+    let row = |kind: Kind| {
+        let those: Vec<&CaseResult> = results.iter().copied().filter(|result| result.auto.0 == kind).collect();
+        let error = |result: &CaseResult| match kind {
+            Kind::Full => 0.0,
+            _ => result.of(kind).and_then(|runs| runs[1].as_ref().ok()).map_or(f64::INFINITY, |run| run.rms),
+        };
+        let errors: Vec<f64> = those.iter().map(|result| error(result)).collect();
+        let is_broken = |result: &&&CaseResult| !result.auto.1 && error(result) > ASKED_PCT;
+        (!those.is_empty()).then(|| {
+            vec![
+                kind.name().to_owned(),
+                those.len().to_string(),
+                figure(quantile(errors.clone(), 0.5)),
+                figure(quantile(errors.clone(), 0.9)),
+                figure(quantile(errors, 1.0)),
+                those.iter().filter(|result| result.auto.1).count().to_string(),
+                those.iter().filter(is_broken).count().to_string(),
+            ]
+        })
+    };
+    let rows: Vec<Vec<String>> = Kind::ALL.into_iter().filter_map(row).collect();
+    let head = ["`auto` chooses", "scenes", "rms % p50", "p90", "worst", "says it is unsure", "breaks its word"];
+    format!("{}\n", table(&head, 1, &rows))
+}
+
+/// Of all models in time and late, of `predictive` by class and by motion too; then of `auto`.
 pub fn distributions(results: &[&CaseResult]) -> String {
     let mut rows = Vec::new();
-    let mut add = |name: &str, of: &dyn Fn(&CaseResult) -> bool| {
+    let mut add = |name: &str, kind: Kind, of: &dyn Fn(&CaseResult) -> bool| {
         let those: Vec<&CaseResult> = results.iter().copied().filter(|result| of(result)).collect();
         for (late, word) in [(false, "in time"), (true, "late")] {
-            let runs = runs(&those, late);
+            let runs = runs(&those, kind, late);
             if runs.is_empty() {
                 continue;
             }
@@ -87,12 +120,14 @@ pub fn distributions(results: &[&CaseResult]) -> String {
             ]);
         }
     };
-    add("all", &|_| true);
+    for kind in Kind::ALL {
+        add(&format!("all, `{}`", kind.name()), kind, &|_| true);
+    }
     for class in Class::ALL {
-        add(class.name(), &|result| result.class == class);
+        add(class.name(), Kind::Predictive, &|result| result.class == class);
     }
     for motion in Motion::ALL {
-        add(motion.name(), &|result| result.motion == motion);
+        add(motion.name(), Kind::Predictive, &|result| result.motion == motion);
     }
     let head = [
         "scenes",
@@ -108,14 +143,14 @@ pub fn distributions(results: &[&CaseResult]) -> String {
         "p99",
         "periods",
     ];
-    table(&head, 2, &rows)
+    format!("{}\n{}", table(&head, 2, &rows), chosen(results))
 }
 
 /// The share of scenes above an error, by class, one period late.
 fn errors(results: &[CaseResult]) -> Picture {
     let of_class = |(number, class): (usize, Class)| {
         let of: Vec<&CaseResult> = results.iter().filter(|result| result.class == class).collect();
-        let mut errors: Vec<f64> = runs(&of, true).into_iter().map(|run| run.rms).collect();
+        let mut errors: Vec<f64> = runs(&of, Kind::Predictive, true).into_iter().map(|run| run.rms).collect();
         errors.sort_by(f64::total_cmp);
         let count = errors.len();
         let label = |place: usize| if place + 1 == count { class.name().to_owned() } else { String::new() };
@@ -148,7 +183,10 @@ fn costs(results: &[CaseResult]) -> Picture {
         is_joined: false,
         sign: Sign::Disc,
         is_hollow: late,
-        points: runs(&all, late).into_iter().map(|run| (run.tick_us[0], run.rms, String::new())).collect(),
+        points: runs(&all, Kind::Predictive, late)
+            .into_iter()
+            .map(|run| (run.tick_us[0], run.rms, String::new()))
+            .collect(),
     };
     Picture {
         title: "predictive: error against cost; discs in time, circles one period late".to_owned(),
