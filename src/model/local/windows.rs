@@ -12,6 +12,9 @@ const HEIGHT: f64 = 0.7;
 /// Triangles under the tool that a window is to hold: there, ahead, behind and where it was. Those that a shape touches follow.
 const WAYS: usize = 3 * LOOKS + 1;
 
+/// Windows whose normals have this cosine between them look the same way.
+const ALIKE: f64 = 0.5;
+
 /// Windows of one size. Lengths in mean edges of the surface.
 struct Layer {
     /// The distance of the middles of neighbours.
@@ -43,6 +46,8 @@ pub struct Windows {
 struct Window {
     /// At rest (m).
     middle: Vec3,
+    /// The outward unit normal there.
+    normal: Vec3,
     /// Node ids in increasing order.
     patch: Vec<u32>,
     /// Of the first window of its size.
@@ -72,20 +77,24 @@ impl Windows {
             };
             let margin = (0.5 * spacing + way) * edge + shape.half_axis().norm();
             for (triangle, middle) in (0..).zip(&triangles) {
-                if windows[first..].iter().any(|window| (window.middle - middle).norm() < spacing * edge) {
+                let [a, b, c] = corners[triangle as usize];
+                let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+                // One around the corner does not reach as far here.
+                let is_beside = |window: &Window| {
+                    (window.middle - middle).norm() < spacing * edge && window.normal.dot(&normal) > ALIKE
+                };
+                if windows[first..].iter().any(is_beside) {
                     continue;
                 }
                 around.clear();
                 around.push(triangle);
-                let [a, b, c] = corners[triangle as usize];
-                let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
                 let pose = Pose::from(middle + normal * (HEIGHT * shape.radius()));
                 if touch.has_shape() {
                     touch.footprint((body.surface(), rest), &pose, margin, &mut around);
                 }
                 let mut patch = Vec::new();
                 simulation.patch(tool, &around, size, &mut patch);
-                windows.push(Window { middle: *middle, patch, layer: first });
+                windows.push(Window { middle: *middle, normal, patch, layer: first });
             }
         }
         Self { size, triangles, windows }
