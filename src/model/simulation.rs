@@ -210,7 +210,7 @@ impl Simulation {
     }
 
     /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the state at the
-    /// start of every substep and at the end, and goes back to the present.
+    /// start of every substep and at the end, and goes back to the present. It ends early with a tick in which `watch` says no.
     ///
     /// # Real-time
     /// For the global actor: costs as much as the ticks; `present` keeps the state meanwhile and may grow.
@@ -219,14 +219,20 @@ impl Simulation {
         ticks: u32,
         motion: impl Fn(usize, u32) -> ToolMotion,
         present: &mut State,
-        mut watch: impl FnMut(&State),
+        mut watch: impl FnMut(&State) -> bool,
     ) {
         present.clone_from(&self.state);
         let (touches, means) = (self.touches.clone(), self.means.clone());
+        let mut goes_on = true;
         for tick in 0..ticks {
-            self.advance(|tool| motion(tool, tick), &mut watch);
+            self.advance(|tool| motion(tool, tick), &mut |state| goes_on = goes_on && watch(state));
+            if !goes_on {
+                break;
+            }
         }
-        watch(&self.state);
+        if goes_on {
+            watch(&self.state);
+        }
         std::mem::swap(&mut self.state, present);
         (self.touches, self.means) = (touches, means);
     }

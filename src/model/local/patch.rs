@@ -347,6 +347,13 @@ impl Window {
         local.resize(self.nodes.len(), 0.0);
     }
 
+    /// The diagonal of the box around the patch whose nodes are at `rest` (m).
+    pub(super) fn extent(&self, rest: &[Vec3]) -> f64 {
+        let places = || self.nodes[..self.movable].iter().map(|&node| rest[node as usize]);
+        let corner = |of: fn(&Vec3, &Vec3) -> Vec3| places().reduce(|a, b| of(&a, &b)).unwrap_or_default();
+        (corner(Vec3::sup) - corner(Vec3::inf)).norm()
+    }
+
     /// Copies the window's share of a global array.
     pub(super) fn gather(&self, global: &[Vec3], local: &mut Vec<Vec3>) {
         local.clear();

@@ -37,17 +37,17 @@ pub(crate) fn extended(reason: Option<ModelReason>, why: String, missed: Option<
     }
 }
 
-/// What is to be expected of a model one global period late: force error rms in % of the peak, the worst of the scenes `hand`,
-/// `wave`, `drag_friction` and `drag_slip` (`palpate compare scenes/NAME.toml`).
+/// What is to be expected of a model one global period late: force error rms in % of the peak, which 19 of 20 of the scenes seen in
+/// docs/population.md were within.
 fn expected_error_pct(kind: Kind) -> f64 {
     match kind {
-        Kind::Hold => 33.0,
-        Kind::Patch => 38.0,
-        Kind::LinearBoundary => 25.0,
-        Kind::ScaledBoundary => 59.0,
-        Kind::Condensed => 36.0,
-        Kind::Predicted => 5.0,
-        Kind::Predictive => 0.5,
+        Kind::Hold => 60.0,
+        Kind::Patch => 78.0,
+        Kind::LinearBoundary => 82.0,
+        Kind::ScaledBoundary => 74.0,
+        Kind::Condensed => 42.0,
+        Kind::Predicted => 28.0,
+        Kind::Predictive => 7.5,
         Kind::Full => 0.0,
     }
 }
@@ -87,7 +87,11 @@ fn choose(situation: &Situation) -> Choice {
     let others: Vec<Kind> = Kind::ALL.into_iter().filter(is_other).collect();
     let full = situation.full_in_words("would take");
     if let Some(&model) = others.iter().filter(|kind| fits(kind)).find(|kind| expected_error_pct(**kind) <= error) {
-        let why = format!("{full}; {} meets {error} % (expected {} %)", model.name(), expected_error_pct(model));
+        let why = format!(
+            "{full}; {} meets {error} % (19 of 20 random scenes: {} %)",
+            model.name(),
+            expected_error_pct(model)
+        );
         return Choice { model, reason: ModelReason { why, warning: None } };
     }
     let by_error = |a: &&Kind, b: &&Kind| expected_error_pct(**a).total_cmp(&expected_error_pct(**b));
@@ -107,7 +111,9 @@ fn choose(situation: &Situation) -> Choice {
             _ => format!("{full}; {name} is the best that fits this body"),
         };
         let expected = expected_error_pct(model);
-        let warning = Some(format!("error_pct = {error} is not met, {name} is expected to be {expected} % off"));
+        let warning = Some(format!(
+            "error_pct = {error} is not sure, {name} may be {expected} % off (1 of 20 random scenes: more)"
+        ));
         return Choice { model, reason: ModelReason { why, warning } };
     }
     let by_load = |a: &Kind, b: &Kind| situation.load(*a).total_cmp(&situation.load(*b));
@@ -115,7 +121,7 @@ fn choose(situation: &Situation) -> Choice {
     let model = model.unwrap_or(Kind::Full);
     let expected = expected_error_pct(model);
     let why = format!("{full}, and {}; {} asks for least", situation.excess(model), model.name());
-    let warning = format!("no model fits this machine with a margin, and an error of {expected} % is expected");
+    let warning = format!("no model fits this machine with a margin, and an error of {expected} % is to be expected");
     Choice { model, reason: ModelReason { why, warning: Some(warning) } }
 }
 
@@ -175,13 +181,16 @@ mod tests {
 
     #[test]
     fn predictive_is_chosen_where_full_does_not_fit_and_the_global_period_holds_the_prediction() {
-        let why = ["would take 550 us of 1 ms (measured)", "predictive meets 1 %", "expected 0.5 %"];
-        assert_chosen(&beyond_full(), Kind::Predictive, &why, None);
+        let why = ["would take 550 us of 1 ms (measured)", "predictive meets 10 %", "19 of 20 random scenes: 7.5 %"];
+        assert_chosen(&Situation { error_pct: 10.0, ..beyond_full() }, Kind::Predictive, &why, None);
+        // Most scenes are within 1 %, but not 19 of 20.
+        let farther = Situation { ahead_ticks: 2, ..situation(350) };
+        assert_chosen(&farther, Kind::Predictive, &["the best that fits"], Some("predictive may be 7.5 % off"));
     }
 
     #[test]
     fn a_cheaper_model_is_chosen_where_so_much_error_is_allowed() {
-        for (error_pct, model) in [(26.0, Kind::LinearBoundary), (40.0, Kind::Hold), (4.0, Kind::Predictive)] {
+        for (error_pct, model) in [(45.0, Kind::Condensed), (65.0, Kind::Hold), (8.0, Kind::Predictive)] {
             let choice = choose(&Situation { error_pct, ..beyond_full() });
             assert!(choice.model == model && choice.reason.warning.is_none(), "{choice}");
         }
@@ -197,28 +206,20 @@ mod tests {
 
     #[test]
     fn what_misses_the_error_is_said_with_by_how_much_and_what_was_too_dear() {
-        let why = [
-            "would take 875 us of 1 ms",
-            "would need 65.9 ms of 33.3 ms for predictive",
-            "linear_boundary is the best",
-        ];
-        assert_chosen(&situation(350), Kind::LinearBoundary, &why, Some("linear_boundary is expected to be 25 % off"));
+        let why =
+            ["would take 875 us of 1 ms", "would need 65.9 ms of 33.3 ms for predictive", "condensed is the best"];
+        assert_chosen(&situation(350), Kind::Condensed, &why, Some("condensed may be 42 % off"));
         // A body that is not made of springs.
         let possible = vec![Kind::Hold, Kind::Patch, Kind::LinearBoundary, Kind::ScaledBoundary, Kind::Full];
         let own = Situation { possible, ..situation(350) };
-        assert_chosen(&own, Kind::LinearBoundary, &["the best that fits this body"], Some("error_pct = 1 is not met"));
+        assert_chosen(&own, Kind::Hold, &["the best that fits this body"], Some("error_pct = 1 is not sure"));
     }
 
     #[test]
     fn a_tick_of_a_patch_has_to_fit_too() {
         // At 20 kHz and 4 substeps a predictive patch takes 30 us of 50 us.
         let fast = Situation { haptic_period_s: 5e-5, ahead_ticks: 840, substeps: 4, error_pct: 10.0, ..situation(9) };
-        assert_chosen(
-            &fast,
-            Kind::LinearBoundary,
-            &["a tick of predictive would take 30 us of 50 us"],
-            Some("not met"),
-        );
+        assert_chosen(&fast, Kind::Condensed, &["a tick of predictive would take 30 us of 50 us"], Some("not sure"));
     }
 
     #[test]

@@ -12,6 +12,11 @@ use crate::contact::{Contact, ContactPoint, ToolMotion};
 use crate::surroundings::{Basis, ReducedMotion};
 use crate::{Vec3, Wrench};
 
+/// A ring that moves by more than this share of the patch's extent in one step is torn along.
+const TORN: f64 = 0.05;
+/// So long before it was seen to be torn along (ticks) it was on the way to that.
+const TORN_TICKS: usize = 2;
+
 /// The patch and what of the body depends on it stay non-linear. The ring, the patch's neighbours outside, moves as
 /// predicted for the expected path of the tool, and answers by the reduced surroundings to what the near part does
 /// differently from the prediction:
@@ -38,6 +43,8 @@ pub(super) struct Predictive {
     ring_positions: Vec<f64>,
     ring_velocities: Vec<f64>,
     ring_forces: Vec<f64>,
+    /// Inverse masses of the ring's nodes (1/kg).
+    ring_weights: Vec<f64>,
     /// The global model's present while it looks ahead.
     present: State,
 }
@@ -47,7 +54,7 @@ impl Predictive {
     /// [`rebuild`](LocalModel::rebuild).
     pub(super) fn new(size: [usize; 3]) -> Self {
         let (patch, near, path, surroundings, present) = Default::default();
-        let (ring_positions, ring_velocities, ring_forces) = Default::default();
+        let (ring_positions, ring_velocities, ring_forces, ring_weights) = Default::default();
         let (others, substep, basis) = Default::default();
         Self {
             size,
@@ -61,6 +68,7 @@ impl Predictive {
             ring_positions,
             ring_velocities,
             ring_forces,
+            ring_weights,
             present,
         }
     }
@@ -79,17 +87,34 @@ impl Predictive {
         self.substep = 0;
     }
 
-    /// Finds the ring's path: the whole body runs ahead.
+    /// Finds the ring's path: the whole body runs ahead. Its tool goes where no hand may ever go, as into elements until they give
+    /// way: a ring that is torn along ends the path.
     fn predict(&mut self, resync: &mut ResyncView<'_>) {
         let ring = self.ring();
-        let Self { patch: Patch { window, state, forces, stepping, .. }, near, path, present, .. } = self;
+        let Self { patch: Patch { window, state, forces, stepping, .. }, near, path, present, ring_weights, .. } = self;
         path.clear(window.ring, stepping.step(), (resync.horizon * stepping.substeps + 1) as usize);
         let motion = |tool: usize, n| resync.tools[tool].motion(n, stepping.tick);
+        let body = resync.global.body();
+        let (step, extent) = (stepping.step(), window.extent(body.rest()));
+        ring_weights.clear();
+        ring_weights.extend(window.nodes[ring.clone()].iter().map(|&node| body.inverse_masses()[node as usize]));
         resync.global.look_ahead(resync.horizon, motion, present, |global| {
             window.gather(&global.positions, &mut state.positions);
             window.gather(&global.velocities, &mut state.velocities);
             near.forces(state, forces);
-            path.push(state, forces, ring.clone());
+            let is_still_whole = |node: usize| {
+                let [way, pull] = [state.velocities[node], forces[node] * (ring_weights[node - ring.start] * step)]
+                    .map(|velocity| velocity.norm() * step);
+                // The rest of the body pulls at a node too, so that what is near may well pull.
+                way <= TORN * extent && pull <= extent
+            };
+            let is_sound = ring.clone().all(is_still_whole);
+            if is_sound {
+                path.push(state, forces, ring.clone());
+            } else {
+                path.drop_last(TORN_TICKS * stepping.substeps as usize);
+            }
+            is_sound
         });
         self.take_present(resync);
     }

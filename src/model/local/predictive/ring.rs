@@ -84,6 +84,12 @@ impl RingPath {
         }
     }
 
+    /// Takes the last `count` samples back, all but the first at most.
+    pub(super) fn drop_last(&mut self, count: usize) {
+        let size = 3 * self.numbers;
+        self.samples.truncate(self.samples.len().saturating_sub(count * size).max(size));
+    }
+
     /// The ring at the start of substep `n`, which may lie past the end.
     pub(super) fn at(&self, n: usize) -> RingSample<'_> {
         let last = (self.samples.len() / (3 * self.numbers).max(1)).saturating_sub(1);
@@ -134,5 +140,9 @@ mod tests {
         assert_eq!((at(1), at(2)), ((1.0, 1.0, 1.0), (2.0, 1.0, 2.0)));
         assert!((at(12).0 - 2.010).abs() < 1e-12 && at(12).1 == 1.0);
         assert!((at(100).0 - 2.015).abs() < 1e-12 && at(100).1 == 0.0 && at(100).2 == 2.0);
+        path.drop_last(1);
+        assert_eq!(path.at(2).forces[1], 1.0);
+        path.drop_last(9);
+        assert_eq!(path.at(2).forces[1], 0.0, "the first stays");
     }
 }
