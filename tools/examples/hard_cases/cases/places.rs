@@ -12,8 +12,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [8.0, 29.0, 14.0, 36.0]),
             run(LinearBoundary, 0.0, [6.5, 29.0, 14.0, 26.0]),
-            run(Predictive, 0.0, [0.14, 0.28, 14.0, 0.41]),
-            run(Predictive, 1.0, [0.22, 0.61, 14.0, 0.77]),
+            run(Predictive, 0.0, [0.11, 0.14, 14.0, 0.34]),
+            run(Predictive, 1.0, [0.15, 0.26, 14.0, 0.47]),
         ],
     )
     .ends_free(),
@@ -24,8 +24,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [9.1, 28.0, 17.0, 42.0]),
             run(LinearBoundary, 0.0, [6.3, 29.0, 17.0, 25.0]),
-            run(Predictive, 0.0, [0.12, 0.18, 17.0, 0.36]),
-            run(Predictive, 1.0, [0.18, 0.46, 17.0, 0.62]),
+            run(Predictive, 0.0, [0.13, 0.21, 17.0, 0.39]),
+            run(Predictive, 1.0, [0.2, 0.52, 17.0, 0.71]),
         ],
     )
     .ends_free(),
@@ -36,8 +36,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [3.0, 11.0, 121.0, 5.6]),
             run(LinearBoundary, 0.0, [2.7, 12.0, 121.0, 4.6]),
-            run(Predictive, 0.0, [0.12, 0.22, 121.0, 0.42]),
-            run(Predictive, 1.0, [0.22, 0.64, 121.0, 0.37]),
+            run(Predictive, 0.0, [0.13, 0.27, 130.0, 0.43]),
+            run(Predictive, 1.0, [0.16, 0.35, 130.0, 0.46]),
         ],
     )
     .ends_free(),
@@ -48,7 +48,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [3.0, 13.0, 121.0, 6.2]),
             run(LinearBoundary, 0.0, [1.4, 6.1, 121.0, 3.1]),
-            run(Predictive, 1.0, [0.13, 0.24, 121.0, 0.31]),
+            run(Predictive, 1.0, [0.14, 0.33, 130.0, 0.44]),
         ],
     )
     .ends_free(),
@@ -59,8 +59,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [9.4, 28.0, 14.0, 24.0]),
             run(LinearBoundary, 0.0, [7.8, 32.0, 14.0, 14.0]),
-            run(Predictive, 0.0, [0.14, 0.32, 15.0, 0.35]),
-            run(Predictive, 1.0, [0.25, 0.76, 15.0, 0.58]),
+            run(Predictive, 0.0, [0.12, 0.22, 15.0, 0.34]),
+            run(Predictive, 1.0, [0.18, 0.43, 15.0, 0.51]),
         ],
     )
     .ends_free(),
@@ -71,7 +71,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [14.0, 93.0, 37.0, 14.0]),
             run(LinearBoundary, 0.0, [7.6, 69.0, 42.0, 9.5]),
-            run(Predictive, 1.0, [0.22, 0.85, 57.0, 0.49]),
+            run(Predictive, 1.0, [0.22, 0.79, 56.0, 0.51]),
         ],
     ),
     case("rest", "hard/rest", "two minutes without a motion", &[run(Predictive, 1.0, [0.11, 0.21, 8.1, 0.36])]),
