@@ -11,6 +11,9 @@ const REMEMBERED: f64 = 0.25;
 /// The spring pushes at most so many times as hard as the surface ever did.
 const MOST: f64 = 1.2;
 
+/// What it held across the normal beyond friction becomes so much less with each tick.
+const EASING: f64 = 0.95;
+
 /// A tool over a surface of which nothing is known any more but how stiff it was.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Beyond {
@@ -30,6 +33,9 @@ struct Left {
     /// How high the tool was over it (m), and how hard the spring pushed (N).
     height: f64,
     pressed: f64,
+    /// What it held across the normal for what pressed. The dent that it was in has another normal than the surface at rest, so that
+    /// this may be more than friction allows.
+    across: f64,
     /// What was felt last, and where (m).
     felt: Wrench,
     at: Vec3,
@@ -58,7 +64,8 @@ impl Beyond {
     /// The tool leaves the patch at `at` (m), over a surface with the outward unit `normal`; it feels `felt`.
     pub(super) fn leave(&mut self, normal: Vec3, at: Vec3, felt: Wrench) {
         let pressed = felt.force.dot(&normal).max(0.0);
-        self.left = Some(Left { normal, height: at.dot(&normal), pressed, felt, at });
+        let across = if pressed > 0.0 { (felt.force - normal * pressed).norm() / pressed } else { 0.0 };
+        self.left = Some(Left { normal, height: at.dot(&normal), pressed, across, felt, at });
     }
 
     pub(super) fn has_left(&self) -> bool {
@@ -69,12 +76,13 @@ impl Beyond {
     pub(super) fn follow(&mut self, to: Vec3, friction: &Friction) -> Option<Wrench> {
         let stiffness = if self.squares > 0.0 { self.work / self.squares } else { 0.0 };
         let most = MOST * self.most;
-        let Left { normal, height, pressed, felt, at } = self.left.as_mut()?;
+        let Left { normal, height, pressed, across, felt, at } = self.left.as_mut()?;
         let before = felt.force.dot(normal);
         let along = (*pressed + stiffness * (*height - to.dot(normal))).clamp(0.0, most.max(*pressed));
         let way = to - *at;
+        *across *= EASING;
+        let limit = friction.kinetic.max(*across) * along;
         let across = felt.force - *normal * before - (way - *normal * way.dot(normal)) * (ALONG * stiffness);
-        let limit = friction.kinetic * along;
         let across = if across.norm() > limit { across * (limit / across.norm()) } else { across };
         let torque = if before > 0.0 { felt.torque * (along / before) } else { Vec3::zeros() };
         *felt = Wrench { force: *normal * along + across, torque };
@@ -100,6 +108,8 @@ mod tests {
         let mut left = beyond(Vec3::new(0.3, 0.0, 1.0));
         let stays = left.follow(Vec3::new(0.0, 0.0, -1e-3), &friction).unwrap();
         assert!((stays.force - Vec3::new(0.3, 0.0, 1.0)).norm() < 1e-12, "{stays:?}");
+        let steep = beyond(Vec3::new(0.9, 0.0, 1.0)).follow(Vec3::new(0.0, 0.0, -1e-3), &friction).unwrap();
+        assert!((steep.force.x - EASING * 0.9).abs() < 1e-12, "no jump: {steep:?}");
         let half = left.follow(Vec3::new(0.0, 0.0, -0.5e-3), &friction).unwrap();
         assert!((half.force - Vec3::new(0.25, 0.0, 0.5)).norm() < 1e-12, "in the cone: {half:?}");
         assert_eq!(left.follow(Vec3::new(0.0, 0.0, 1e-3), &friction), Some(Wrench::default()));

@@ -67,7 +67,7 @@ pub const CASES: &[Case] = &[
         "stalled drag",
         "hard/drag_long",
         "the global model stands still for 1 s",
-        &[run(LinearBoundary, 1.0, [115.0, 188.0, 19.0, 39.0]), run(Predictive, 1.0, [13.0, 42.0, 11.0, 13.0])],
+        &[run(LinearBoundary, 1.0, [44.0, 130.0, 19.0, 66.0]), run(Predictive, 1.0, [13.0, 42.0, 11.0, 13.0])],
     )
     .ends_free()
     .upset(Upset::Stall(0.4)),
