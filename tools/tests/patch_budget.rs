@@ -10,7 +10,7 @@ use std::process::Command;
 use palpate::devices::{Scripted, ToolPath};
 use palpate::log::{Environment, LogEntry, LogReader};
 use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::{ModelChoice, Scene};
+use palpate::scene::Scene;
 use palpate::session::{Session, SessionBuilder, Summary};
 
 use session_support::*;
@@ -127,27 +127,4 @@ fn a_run_with_a_budget_is_replayed_bit_for_bit_from_the_patch_in_its_log() {
     );
     let report = own().replay(&log).unwrap().run().unwrap();
     assert!(report.is_identical() && report.force.logged == summary.report.devices[0].force.ticks, "{report}");
-}
-
-/// Check that a budget below what any model keeps does not put `predictive` off: two devices leave no `full`, and the others
-/// are farther off.
-#[test]
-fn auto_sizes_the_patch_of_the_model_that_it_takes() {
-    let folder = tempfile::tempdir().unwrap();
-    let log = folder.path().join("run.mcap");
-    let both = |error_pct: f64| {
-        let session = Session::builder(block()).model(ModelChoice::Auto).error_pct(error_pct).virtual_time();
-        let session = session.named_device("left", Scripted::new(wiggling())).attach_node(top());
-        session.named_device("right", Scripted::new(pressing())).duration_s(0.1)
-    };
-    for (error_pct, size) in [(0.5, "4 x 4 x 2"), (0.2, "5 x 5 x 2")] {
-        let summary = run(both(error_pct).log(&log));
-        let environment = environment(&summary);
-        let reason = environment.model_reason.as_ref().unwrap();
-        assert_eq!(environment.model, "predictive", "{reason:?}");
-        assert!(reason.why.contains(&format!("takes patch {size}")), "{reason:?}");
-        assert_eq!(reason.warning.is_some(), error_pct < 0.4, "{reason:?}");
-        let report = both(error_pct).replay(&log).unwrap().run().unwrap();
-        assert!(report.is_identical(), "{report}");
-    }
 }
