@@ -7,7 +7,7 @@ mod session_support;
 use std::path::Path;
 use std::process::Command;
 
-use palpate::devices::{Scripted, ToolPath};
+use palpate::devices::ToolPath;
 use palpate::log::{Environment, LogEntry, LogReader};
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::scene::Scene;
