@@ -47,11 +47,7 @@ impl Rows {
             }
             of(row).iter().for_each(|&(node, _)| at_nodes[node as usize] = 0.0);
         }
-        calm(law, |law| {
-            let fastest = find_closing(body, rows, nodes, closing);
-            sweep(rows, (nearness, exact), shared, [closing, before], law, d);
-            has_run_away(rows, closing, fastest)
-        });
+        sweep_calmly(body, (rows, nodes), (nearness, exact), shared, [closing, before], law, d);
         for row in rows.iter() {
             for &(node, w) in of(row) {
                 body.velocities[node as usize] -= row.impulse * (w * body.inverse_masses[node as usize]);
@@ -77,24 +73,32 @@ impl Rows {
                 (row.mode, row.impulse) = (ContactMode::Lost, Vec3::zeros());
             }
         }
-        calm(law, |law| {
-            let fastest = find_closing(body, rows, nodes, closing);
-            sweep(rows, (nearness, exact), coupling, [closing, before], law, system.step());
-            has_run_away(rows, closing, fastest)
-        });
+        sweep_calmly(body, (rows, nodes), (nearness, exact), coupling, [closing, before], law, system.step());
         for row in rows.iter() {
             system.push_all(body.velocities, of(row), row.impulse);
         }
     }
 }
 
-/// Does `sweeps` with the friction of `law`, and with less while they run away.
-fn calm(law: &Law, mut sweeps: impl FnMut(&Law) -> bool) {
+/// Sweeps with the friction of `law`, and again with less while they run away.
+fn sweep_calmly<C: Copy + Mul<Vec3, Output = Vec3>>(
+    body: &Deformable<'_>,
+    (rows, nodes): (&mut [Row], &[(u32, f64)]),
+    (nearness, exact): (&mut Nearness, &mut Exact),
+    coupling: &[C],
+    [closing, before]: [&mut Vec<Vec3>; 2],
+    law: &Law,
+    d: f64,
+) {
     let mut law = *law;
-    let mut less = CALMER.iter();
-    while sweeps(&law)
-        && let Some(&most) = less.next()
-    {
+    let mut calmer = CALMER.iter();
+    loop {
+        let fastest = find_closing(body, rows, nodes, closing);
+        sweep(rows, (nearness, exact), coupling, [closing, before], &law, d);
+        if !has_run_away(rows, closing, fastest) {
+            return;
+        }
+        let Some(&most) = calmer.next() else { return };
         law.friction = law.friction.at_most(most);
     }
 }

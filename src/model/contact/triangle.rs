@@ -44,12 +44,12 @@ impl Projection {
 }
 
 /// sum w_i p_i.
-pub(super) fn interpolate(weights: &[f64; 3], corners: &[Vec3; 3]) -> Vec3 {
+pub(crate) fn interpolate(weights: &[f64; 3], corners: &[Vec3; 3]) -> Vec3 {
     corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
 }
 
 /// The outward unit normal at `weights` of triangle `t`; zero for a degenerate place.
-pub(super) fn contact_normal(kind: Normals, surface: &Surface, x: &[Vec3], t: u32, weights: &[f64; 3]) -> Vec3 {
+pub(crate) fn contact_normal(kind: Normals, surface: &Surface, x: &[Vec3], t: u32, weights: &[f64; 3]) -> Vec3 {
     let face = unit(area_vector(surface, x, t));
     match kind {
         Normals::Face => face,

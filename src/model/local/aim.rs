@@ -9,6 +9,7 @@ use crate::{Pose, Vec3};
 /// A window that is made ahead has room around a tool with a shape, in tool radii: where that goes a little aside or sooner, the
 /// same window serves.
 const ROOM: f64 = 0.3;
+
 /// Finds the surface triangles under the tool, now and where it is going.
 #[derive(Clone, Debug)]
 pub struct Aim {
@@ -37,8 +38,8 @@ impl Aim {
 
     /// Puts the triangles for a window of tool number `index` that is made `after` seconds from now in place of `triangles`: the
     /// one under the tool then, those that it comes over in the `lead` seconds that follow if it goes on or back, and all that its
-    /// shape may touch there. One that is made now begins with the triangle of the contact, one that is made ahead has room around the shape; a tool
-    /// that is glued goes nowhere else.
+    /// shape may touch there. One that is made now begins with the triangle of the contact, one that is made ahead has room around
+    /// the shape; a tool that is glued goes nowhere else.
     ///
     /// # Real-time
     /// For the global actor: bounded; `triangles` may grow.

@@ -6,7 +6,10 @@ use std::sync::Arc;
 use super::beyond::Beyond;
 use super::{PatchGeometry, ResyncView, Watched};
 use crate::body::{Body, State};
-use crate::contact::{Contact, ContactPoint, Deformable, Law, Rows, Skin, ToolMotion, Touch, step_all};
+use crate::contact::{
+    Contact, ContactPoint, Deformable, Law, Normals, Rows, Skin, ToolMotion, Touch, contact_normal, interpolate,
+    step_all,
+};
 use crate::mesh::Surface;
 use crate::simulation::Stepping;
 use crate::{Pose, Vec3, Wrench};
@@ -68,10 +71,10 @@ impl Patch {
     /// Where it touches the surface at rest (m), and the outward unit normal there.
     fn rest_contact(&self) -> Option<(Vec3, Vec3)> {
         let Contact { triangle, weights, .. } = self.touch.contact;
-        let corners = self.window.surface.triangles[triangle? as usize].map(|node| self.rest[node as usize]);
-        let [a, b, c] = corners;
-        let place = a * weights[0] + b * weights[1] + c * weights[2];
-        Some((place, (b - a).cross(&(c - a)).try_normalize(0.0)?))
+        let (surface, triangle) = (&self.window.surface, triangle?);
+        let corners = surface.triangles[triangle as usize].map(|node| self.rest[node as usize]);
+        let normal = contact_normal(Normals::Face, surface, &self.rest, triangle, &weights);
+        Some((interpolate(&weights, &corners), normal))
     }
 
     /// The tool felt `wrench` at `at` (m).

@@ -29,7 +29,7 @@ fn margin(body: &dyn Body, patch: &[u32], basis: &Basis, d: f64) -> f64 {
     let m = near.beside(&near.mass, &on_ring, &Matrix::identity(states, states), 1.0);
     let weight = |i: usize| 1.0 / m[(i, i)].sqrt();
     let of_step = DMatrix::from_fn(m.nrows(), m.nrows(), |i, j| {
-        weight(i) * weight(j) * (2.0 * d * 0.5 * (c[(i, j)] + c[(j, i)]) + d * d * k[(i, j)])
+        weight(i) * weight(j) * (d * (c[(i, j)] + c[(j, i)]) + d * d * k[(i, j)])
     });
     4.0 - of_step.symmetric_eigenvalues().max()
 }
