@@ -1,5 +1,7 @@
 //! The places at which tools may touch in one step, as rows of one system for the impulses there.
 
+use std::cmp::Ordering;
+
 use super::deformable::Deformable;
 use super::exact::Exact;
 use super::near::{Near, Search};
@@ -75,6 +77,17 @@ impl Rows {
     pub(super) fn clear(&mut self) {
         self.rows.clear();
         self.nodes.clear();
+    }
+
+    /// Puts rows in the order of their places. Sweeps that end before all is found find the same then in whatever order tools and
+    /// triangles are.
+    pub(super) fn sort(&mut self) {
+        let key = |row: &Row| [row.place, row.normal, row.target].map(<[f64; 3]>::from);
+        self.rows.sort_unstable_by(|one, other| {
+            let [one, other] = [key(one), key(other)];
+            let pairs = one.as_flattened().iter().zip(other.as_flattened());
+            pairs.map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+        });
     }
 
     /// The rows of a tool with the nodes of each.

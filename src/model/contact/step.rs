@@ -131,6 +131,7 @@ fn press_all(
             rows.add_point(body, (tool, touch), law, motion(tool), d);
         }
     }
+    rows.sort();
     solution(rows, body);
     body.drift(d);
     for (tool, touch) in touches.iter_mut().enumerate() {
