@@ -4,7 +4,9 @@ use crate::Vec3;
 
 /// False if whatever is in the box from `low` to `high` is surely farther than `distance` (m) from the axis.
 pub(super) fn may_be_near([from, to]: &[Vec3; 2], distance: f64, low: &Vec3, high: &Vec3) -> bool {
-    (0..3).all(|i| from[i].min(to[i]) <= high[i] + distance && from[i].max(to[i]) >= low[i] - distance)
+    // How far the box of the axis is from the other, along each edge.
+    let apart = (from.inf(to) - high).sup(&(low - from.sup(to))).sup(&Vec3::zeros());
+    apart.norm_squared() <= distance * distance
 }
 
 /// The place on a triangle that is nearest to a point.

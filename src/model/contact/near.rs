@@ -11,8 +11,12 @@ use crate::{Pose, Vec3};
 /// A centre that is farther than this below the surface, beside the tool's radius, has lost it (m).
 const MAX_DEPTH: f64 = 5e-3;
 
+/// Where a node stays in a step, a bit for each side of a box: that around the tool with all that it may touch, and that around the
+/// way of its axis.
+const AROUND: u16 = 0x3f;
+const AXIS: u16 = AROUND << 6;
 /// A node that a search has met.
-const MARKED: u8 = 1 << 7;
+const MARKED: u16 = 1 << 15;
 
 /// Where a tool comes near the surface.
 #[derive(Clone, Copy, Debug)]
@@ -31,8 +35,8 @@ pub(super) struct Near {
 #[derive(Clone, Debug)]
 pub(super) struct Search {
     pub(super) near: Vec<Near>,
-    /// On which sides of the box around a tool each node stays in the step, a bit for each, and `MARKED`.
-    sides: Vec<u8>,
+    /// On which sides of the boxes `AROUND` the tool and of its `AXIS` each node stays in the step, and `MARKED`.
+    sides: Vec<u16>,
     /// The corner at each marked node as the tool meets it at the end of the step (m).
     corners: Vec<Vec3>,
 }
@@ -59,22 +63,24 @@ impl Search {
         }
     }
 
-    /// Tells where nodes stay of the box around the way of a tool with all that it may touch: a triangle whose corners stay on one
-    /// side of it is not looked at again.
+    /// Tells where nodes stay of the boxes around the way of a tool: a triangle whose corners stay on one side of one is not
+    /// looked at again.
     fn find_sides(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) {
         let axes = [touch.shape.axis(&motion.from), touch.shape.axis(&motion.to)].into_iter().flatten();
         let (low, high) = axes
             .fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(low, high), end| {
                 (low.inf(&end), high.sup(&end))
             });
-        let around = Vec3::repeat(touch.shape.radius() + MAX_DEPTH + touch.skin.reach());
-        let (low, high) = (low - around, high + around);
+        let [around, beside] =
+            [touch.shape.radius() + MAX_DEPTH, 0.0].map(|far| Vec3::repeat(far + touch.skin.reach()));
+        let boxes = [(low - beside, high + beside), (low - around, high + around)];
         for ((sides, x), v) in self.sides.iter_mut().zip(&*body.positions).zip(&*body.velocities) {
             let end = x + v * d;
-            *sides = (0..3).fold(0, |sides, i| {
-                let below = u8::from(x[i].max(end[i]) < low[i]);
-                let above = u8::from(x[i].min(end[i]) > high[i]);
-                sides << 2 | below << 1 | above
+            let (least, most) = (x.inf(&end), x.sup(&end));
+            *sides = boxes.iter().fold(0, |sides, (low, high)| {
+                (0..3).fold(sides, |sides, i| {
+                    sides << 2 | u16::from(most[i] < low[i]) << 1 | u16::from(least[i] > high[i])
+                })
             });
         }
     }
@@ -87,7 +93,8 @@ impl Search {
         for end in 0..ends {
             let share = [0.0, 1.0, 0.5][end];
             let [from, to] = [from, to].map(|[a, b]| a + (b - a) * share);
-            let candidates = body.candidates.iter().copied().filter(|&triangle| meets(&self.sides, body, triangle));
+            let candidates =
+                body.candidates.iter().copied().filter(|&triangle| meets(&self.sides, AXIS, body, triangle));
             let Some(hit) = passing::first(body, candidates, skin, [from, to], d) else { continue };
             let corners = body.smoothed_corners(skin, hit.triangle, d);
             let place = interpolate(&hit.weights, &corners);
@@ -106,7 +113,7 @@ impl Search {
         // The nearest place in front of the surface, and the nearest behind it.
         let (mut front, mut behind) = (f64::INFINITY, None::<Near>);
         for &triangle in body.candidates {
-            if !meets(&self.sides, body, triangle) {
+            if !meets(&self.sides, AROUND, body, triangle) {
                 continue;
             }
             // Triangles share corners.
@@ -117,12 +124,15 @@ impl Search {
                 }
                 self.corners[node]
             });
+            let depths = body.corners(triangle).map(|node| skin.depth(node));
+            // It touches, or is the nearest of all.
+            let touching = radius + depths.into_iter().fold(0.0, f64::max);
+            let distance = touching.max(front.min(radius + MAX_DEPTH));
             let [a, b, c] = &corners;
-            if !closest::may_be_near(&axis, radius + MAX_DEPTH, &a.inf(b).inf(c), &a.sup(b).sup(c)) {
+            if !closest::may_be_near(&axis, distance, &a.inf(b).inf(c), &a.sup(b).sup(c)) {
                 continue;
             }
-            let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-            let depths = body.corners(triangle).map(|node| skin.depth(node));
+            let across = (b - a).cross(&(c - a));
             let shares = [closest::share_of_axis(&axis, &corners), 0.0, 1.0];
             for share in if is_long { &shares[..] } else { &shares[..1] } {
                 let centre = axis[0] + (axis[1] - axis[0]) * *share;
@@ -180,7 +190,7 @@ impl Search {
     }
 }
 
-/// False if the corners of a triangle are all on one side of the box.
-fn meets(sides: &[u8], body: &Deformable<'_>, triangle: u32) -> bool {
-    body.corners(triangle).iter().fold(!MARKED, |common, &node| common & sides[node]) == 0
+/// False if the corners of a triangle are all on one side of the box whose bits are `of`.
+fn meets(sides: &[u16], of: u16, body: &Deformable<'_>, triangle: u32) -> bool {
+    body.corners(triangle).iter().fold(of, |common, &node| common & sides[node]) == 0
 }
