@@ -1,5 +1,5 @@
 //! What a 1 kHz tick of `predictive` costs by the number of places at which a tool touches: spheres of growing radius on the 12^3
-//! body, two substeps, 50 states, a small circle. Each row is of 4,000 ticks after 400 that warm up.
+//! body, two substeps, windows of 6 x 6 x 3 nodes, 150 states, a small circle. Each row is of 4,000 ticks after 400 that warm up.
 //!
 //! `cargo bench -p palpate-model --bench contact_places`
 
@@ -16,7 +16,7 @@ use palpate_model::{Pose, Vec3};
 
 const TICKS: usize = 4_000;
 const WARM_UP: usize = 400;
-const STATES: usize = 50;
+const STATES: usize = 150;
 /// Radii and depths (mm).
 const TOOLS: [[f64; 2]; 8] =
     [[4.0, 1.0], [8.0, 3.0], [20.0, 3.0], [36.0, 3.0], [40.0, 4.0], [60.0, 5.0], [80.0, 5.0], [80.0, 7.0]];
@@ -47,7 +47,7 @@ fn pressed([radius, depth]: [f64; 2]) -> (Simulation, Vec3, Vec<u32>) {
 
 fn row([radius, depth]: [f64; 2]) {
     let (mut sim, tool, triangles) = pressed([radius * 1e-3, depth * 1e-3]);
-    let size = [4, 4, 2];
+    let size = [6, 6, 3];
     let mut patch = Vec::new();
     sim.patch(0, &triangles, size, &mut patch);
     let resting = RestingBody::new(sim.body()).expect("a body that can be taken apart");

@@ -2,6 +2,7 @@
 
 use super::far::Far;
 use super::products::Columns;
+use crate::body::kernel::Lane;
 use crate::linear_algebra::{Matrix, modes, product, product_t};
 
 /// What the velocities do to the states' accelerations.
@@ -51,9 +52,8 @@ impl Reduced {
     /// # Real-time
     /// Bounded, real-time safe.
     pub(crate) fn step(&self, motion: &mut ReducedMotion, forces: &[f64], d: f64) {
-        let ReducedMotion { eta, rate, acceleration } = motion;
-        acceleration.fill(0.0);
-        self.shapes.project(forces, acceleration);
+        let ReducedMotion { eta, rate, acceleration, sums } = motion;
+        self.shapes.project(forces, sums, acceleration);
         match &self.damping {
             Damping::Diagonal(damping) => {
                 for ((a, c), rate) in acceleration.iter_mut().zip(damping).zip(&*rate) {
@@ -87,6 +87,8 @@ pub(crate) struct ReducedMotion {
     eta: Vec<f64>,
     rate: Vec<f64>,
     acceleration: Vec<f64>,
+    /// Working memory.
+    sums: Vec<Lane>,
 }
 
 impl ReducedMotion {
@@ -99,5 +101,6 @@ impl ReducedMotion {
             vector.clear();
             vector.resize(states, 0.0);
         }
+        self.sums.resize(states, Lane::default());
     }
 }

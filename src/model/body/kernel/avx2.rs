@@ -5,7 +5,7 @@
 
 use std::arch::x86_64::*;
 
-use super::nodes::{Lane, Motion, Push};
+use super::nodes::{LANES, Lane, Motion, Push};
 use super::simd::{Numbers, Simd, Work};
 
 /// Proof that this machine has AVX2 and FMA.
@@ -75,6 +75,12 @@ impl Simd for Avx2 {
     fn load(self, from: &Lane) -> Pair {
         // SAFETY: the features were detected; the reference covers all that is read.
         unsafe { [_mm256_loadu_pd(from.as_ptr()), _mm256_loadu_pd(from.as_ptr().add(4))] }
+    }
+
+    #[inline(always)]
+    fn load_single(self, from: &[f32; LANES]) -> Pair {
+        // SAFETY: the features were detected; the reference covers all that is read.
+        unsafe { [0, 4].map(|first| _mm256_cvtps_pd(_mm_loadu_ps(from.as_ptr().add(first)))) }
     }
 
     #[inline(always)]

@@ -88,6 +88,12 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn load_single(self, from: &[f32; LANES]) -> __m512d {
+        // SAFETY: the features were detected; the reference covers all that is read.
+        unsafe { _mm512_cvtps_pd(_mm256_loadu_ps(from.as_ptr())) }
+    }
+
+    #[inline(always)]
     fn store(self, value: __m512d, to: &mut Lane) {
         // SAFETY: the features were detected; the reference covers all that is written.
         unsafe { _mm512_storeu_pd(to.as_mut_ptr(), value) }

@@ -36,6 +36,11 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn load_single(self, from: &[f32; LANES]) -> Lane {
+        from.map(f64::from)
+    }
+
+    #[inline(always)]
     fn store(self, value: Lane, to: &mut Lane) {
         *to = value;
     }

@@ -22,6 +22,8 @@ pub(crate) trait Simd: Copy {
 
     fn splat(self, value: f64) -> Self::V;
     fn load(self, from: &Lane) -> Self::V;
+    /// Eight singles, as the doubles that they are.
+    fn load_single(self, from: &[f32; LANES]) -> Self::V;
     fn store(self, value: Self::V, to: &mut Lane);
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;

@@ -158,9 +158,9 @@ impl Predictive {
 
 /// out = forces - expected, as far as `expected` reaches.
 fn deviations(out: &mut [f64], forces: &[Vec3], expected: &[f64]) {
-    let forces = forces.iter().flat_map(|force| force.iter());
+    let (out, expected) = (out.as_chunks_mut::<3>().0, expected.as_chunks::<3>().0);
     for ((out, force), expected) in out.iter_mut().zip(forces).zip(expected) {
-        *out = force - expected;
+        *out = [force.x - expected[0], force.y - expected[1], force.z - expected[2]];
     }
 }
 
