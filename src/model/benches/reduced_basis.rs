@@ -9,8 +9,8 @@ use palpate_model::body::{Block, Body};
 use palpate_model::mesh::Face;
 use palpate_model::surroundings::{Reduction, RestingBody, Size};
 
-const PATCH: [usize; 3] = [4, 4, 2];
-const STATES: usize = 50;
+const PATCH: [usize; 3] = [6, 6, 3];
+const STATES: usize = 150;
 const BUDGET: Size = Size::ErrorPct(0.5);
 const ROUNDS: usize = 5;
 

@@ -103,22 +103,20 @@ impl Far {
 
     /// -Phi^T K Phi and -Phi^T C Phi for the columns of `shapes`: what the states do to their own accelerations.
     pub(super) fn stiffness_and_damping(&self, shapes: &Matrix) -> (Matrix, Matrix) {
+        // Row by row: a coupling answers to all columns at once.
+        let rows = shapes.transpose();
         let of = |matrix: fn(&Coupling) -> &Mat3| {
-            let mut forces = Matrix::zeros(shapes.nrows(), shapes.ncols());
-            for (shape, mut force) in shapes.column_iter().zip(forces.column_iter_mut()) {
-                for ((row, column), coupling) in &self.couplings {
-                    let (block, row, column) = (matrix(coupling), 3 * *row as usize, 3 * *column as usize);
-                    let mut add = |to: usize, answer: Vec3| {
-                        let mut part = force.fixed_rows_mut::<3>(to);
-                        part -= answer;
-                    };
-                    add(row, block * shape.fixed_rows::<3>(column));
+            let mut answers = Matrix::zeros(rows.nrows(), rows.ncols());
+            for ((row, column), coupling) in &self.couplings {
+                let (block, row, column) = (matrix(coupling), 3 * *row as usize, 3 * *column as usize);
+                for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+                    answers.column_mut(row + i).axpy(-block[(i, j)], &rows.column(column + j), 1.0);
                     if row != column {
-                        add(column, block.tr_mul(&shape.fixed_rows::<3>(row)));
+                        answers.column_mut(column + j).axpy(-block[(i, j)], &rows.column(row + i), 1.0);
                     }
                 }
             }
-            let projected = product_t(shapes, &forces);
+            let projected = product_t(shapes, &answers.transpose());
             (&projected + projected.transpose()) * 0.5
         };
         let stiffness = of(|coupling| &coupling.stiffness);
