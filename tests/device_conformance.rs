@@ -4,7 +4,7 @@
 use palpate::devices::conformance::{Conformance, Verdict};
 use palpate::devices::{
     Axis, Calibration, Capabilities, Device, DeviceFault, DeviceState, FaultKind, FaultSpec, Faulty, ForceCommand,
-    Hand, HandSpec, PlantSpec, Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
+    Hand, HandSpec, PlantSpec, Pointer, PointerSpec, Replayed, ReplayedSample, SafetyStop, Scripted, ToolPath,
 };
 use palpate::model::Vec3;
 use palpate::runtime::Nanos;
@@ -50,6 +50,15 @@ fn a_simulated_hand_conforms_and_everything_about_it_can_be_seen() {
         let seen = report.checks.iter().filter(|check| check.verdict == Verdict::Passed).count();
         assert_eq!(seen, report.checks.len() - 1, "{report}");
     }
+}
+
+#[test]
+fn a_tool_behind_a_pointer_conforms_wherever_the_pointer_is() {
+    assert_passed(&Conformance::check(|| {
+        let (tool, mut pointer) = Pointer::new(PointerSpec::default(), [0.0; 3], Capabilities::TOUCH).unwrap();
+        assert!(pointer.point([0.02, 0.0, -0.01]));
+        tool
+    }));
 }
 
 #[test]

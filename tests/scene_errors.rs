@@ -101,7 +101,7 @@ const CASES: &[Case] = &[
     case("feedback = \"geometry\"", "feedback = \"patch\"", "scene.toml:22: local.feedback: ", &["\"trajectory\", \"contact_nodes\" or \"geometry\""]),
     case("kind = \"crossfade\"", "kind = \"fade\"", "scene.toml:23: local.blend.kind: ", &["\"none\", \"crossfade\" or \"offset\""]),
     case("patch = [4, 4, 2]", "step = \"euler\"", "scene.toml:21: local.step: ", &["\"auto\", \"explicit\" or \"implicit\""]),
-    case("kind = \"scripted\"", "kind = \"phantom\"", "scene.toml:25: device.kind: ", &["\"scripted\", \"hand\", \"replay\" or \"haply\""]),
+    case("kind = \"scripted\"", "kind = \"phantom\"", "scene.toml:25: device.kind: ", &["\"scripted\", \"hand\", \"replay\", \"pointer\" or \"haply\""]),
     case("kind = \"scripted\"", "kind = \"scripted\"\nplant = { mass_kg = 0.2 }", "scene.toml:26: device.plant: ", &["kind = \"hand\""]),
     case("kind = \"scripted\"", "kind = \"hand\"\nplant = { mass_kg = 0 }", "scene.toml:26: device.plant.mass_kg: ", &["is 0", "above 0"]),
     case("kind = \"scripted\"", "kind = \"hand\"\nplant = { axes = [\"w\"] }", "scene.toml:26: device.plant.axes[0]: ", &["\"x\", \"y\" or \"z\""]),

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`Scripted`] | follows a path, ignores the force |
 //! | [`Hand`] | a simulated device held by a simulated hand, which lets go |
+//! | [`Pointer`] | a tool on a spring behind a mouse, a finger or a pen |
 //!
 //! A scene can also name a log whose tool is replayed, and faults that any device is to have.
 //!
@@ -15,6 +16,7 @@ mod device;
 mod fault;
 mod faulty;
 mod hand;
+mod pointer;
 mod replayed;
 mod scripted;
 mod state;
@@ -25,6 +27,7 @@ pub use device::Device;
 pub use fault::{DeviceFault, SafetyStop};
 pub use faulty::{FaultKind, FaultSpec, Faulty};
 pub use hand::{Axis, Hand, HandSpec, PlantSpec};
+pub use pointer::{Pointer, PointerHandle, PointerSpec};
 pub use replayed::{Replayed, ReplayedSample};
 pub use scripted::Scripted;
 pub use state::{Calibration, DeviceState, ForceCommand};

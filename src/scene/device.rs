@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{HaplySpec, NodeSpec, ToolSpec};
-use crate::devices::{Capabilities, FaultSpec, HandSpec, PlantSpec, ToolPath};
+use crate::devices::{Capabilities, FaultSpec, HandSpec, PlantSpec, PointerSpec, ToolPath};
 use crate::error::Error;
 
 /// A device of a scene: what moves the tool, and what limits its force.
@@ -33,6 +33,9 @@ pub struct DeviceSpec {
     /// The simulated hand (`hand`).
     #[serde(skip_serializing_if = "is_default")]
     pub hand: HandSpec,
+    /// The tool behind a pointer (`pointer`).
+    #[serde(skip_serializing_if = "is_default")]
+    pub pointer: PointerSpec,
     /// Faults of the device, with their times.
     #[serde(rename = "fault", skip_serializing_if = "is_default")]
     pub faults: Vec<FaultSpec>,
@@ -60,6 +63,8 @@ pub enum DeviceKind {
     Hand,
     /// A tool that moves as in a log and ignores the force.
     Replay,
+    /// A tool on a spring behind a pointer, which a program moves: a mouse, a finger, a pen.
+    Pointer,
     /// An Inverse3 behind the Haply Inverse service; the crate `palpate-haply` opens it.
     Haply,
 }

@@ -231,6 +231,13 @@ impl SessionBuilder {
         self
     }
 
+    /// Runs until it is stopped, whatever duration the scene has.
+    #[must_use]
+    pub fn endless(mut self) -> Self {
+        self.parts.endless = true;
+        self
+    }
+
     /// Runs in simulated time, on one thread, as fast as the machine allows and bit-identically every time.
     #[must_use]
     pub fn virtual_time(mut self) -> Self {
@@ -267,6 +274,13 @@ impl SessionBuilder {
     #[must_use]
     pub fn log_scene(mut self) -> Self {
         self.parts.scene.log.scene = true;
+        self
+    }
+
+    /// Hands records to the program while the session runs, by [`Running::take_records`](super::Running::take_records).
+    #[must_use]
+    pub fn share_records(mut self) -> Self {
+        self.parts.options.shares_records = true;
         self
     }
 

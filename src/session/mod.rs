@@ -15,6 +15,7 @@
 mod builder;
 mod parts;
 mod prepare;
+mod records;
 mod replay;
 mod running;
 mod wire;
@@ -22,6 +23,7 @@ mod wire;
 pub use crate::actors::{LOG_FAILURE, SurfaceView, ToolView};
 pub use builder::SessionBuilder;
 pub use prepare::Choice;
+pub use records::SharedRecords;
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};
 pub use running::{Running, Summary, Viewer};
 

@@ -54,6 +54,7 @@ impl Parts {
                 in_real_time: true,
                 log: None,
                 keep_records: false,
+                shares_records: false,
                 measures_cost: false,
                 disturbed: Disturbed::default(),
             },
@@ -69,6 +70,7 @@ pub(super) struct Options {
     pub(super) in_real_time: bool,
     pub(super) log: Option<PathBuf>,
     pub(super) keep_records: bool,
+    pub(super) shares_records: bool,
     pub(super) measures_cost: bool,
     pub(super) disturbed: Disturbed,
 }

@@ -4,7 +4,9 @@ use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use super::records::SharedRecords;
 use crate::actors::{LoggerOutcome, SurfaceView, ToolView};
+use crate::devices::PointerHandle;
 use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
 use crate::model::mesh::Surface;
@@ -35,7 +37,7 @@ pub struct Running {
     runtime: RunningGraph,
     outcome: LoggerOutcome,
     memory: Option<Memory>,
-    viewer: Option<Viewer>,
+    outside: Outside,
     until: Option<Nanos>,
     builds: Option<HistogramReader>,
 }
@@ -45,11 +47,11 @@ impl Running {
         runtime: RunningGraph,
         outcome: LoggerOutcome,
         memory: Option<Memory>,
-        viewer: Viewer,
+        outside: Outside,
         until: Option<Nanos>,
         builds: Option<HistogramReader>,
     ) -> Self {
-        Self { runtime, outcome, memory, viewer: Some(viewer), until, builds }
+        Self { runtime, outcome, memory, outside, until, builds }
     }
 
     /// Waits for `span`, or until the run has ended; in virtual time, runs that much of it.
@@ -94,7 +96,18 @@ impl Running {
 
     /// Takes the viewer, which shows the newest surface, tool and force to a program that draws; there is one, for one thread.
     pub fn take_viewer(&mut self) -> Option<Viewer> {
-        self.viewer.take()
+        self.outside.viewer.take()
+    }
+
+    /// Takes what moves the tool of `device`, counted from 0, if that follows a pointer.
+    pub fn take_pointer(&mut self, device: usize) -> Option<PointerHandle> {
+        self.outside.pointers.get_mut(device)?.take()
+    }
+
+    /// Takes the end at which records come while the session runs, if they are
+    /// [shared](super::SessionBuilder::share_records).
+    pub fn take_records(&mut self) -> Option<SharedRecords> {
+        self.outside.records.take()
     }
 
     /// Ends the run and says how it went. A fault, a group that had to be given up or a log that could not be written is
@@ -106,6 +119,15 @@ impl Running {
         let builds = self.builds.map(|builds| builds.snapshot());
         Summary { report, runtime, log_error, records, builds }
     }
+}
+
+/// What a program outside the graph may take of a session that runs.
+#[derive(Debug)]
+pub(super) struct Outside {
+    pub(super) viewer: Option<Viewer>,
+    /// In the order of the devices.
+    pub(super) pointers: Vec<Option<PointerHandle>>,
+    pub(super) records: Option<SharedRecords>,
 }
 
 /// Records kept in memory.

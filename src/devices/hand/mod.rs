@@ -15,6 +15,7 @@ mod spec;
 mod transport;
 mod turning;
 
+pub(super) use plant::{Load, Motion};
 pub(crate) use spec::SpecFault;
 pub use spec::{Axis, HandSpec, PlantSpec};
 
@@ -22,7 +23,6 @@ use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPa
 use crate::error::Error;
 use crate::model::{Pose, Vec3};
 use crate::runtime::Nanos;
-use plant::{Load, Motion};
 use transport::Transport;
 use turning::{Turning, Twist};
 

@@ -2,22 +2,22 @@
 
 /// Place (m) and velocity (m/s) along one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Motion {
-    pub(super) place: f64,
-    pub(super) velocity: f64,
+pub(in crate::devices) struct Motion {
+    pub(in crate::devices) place: f64,
+    pub(in crate::devices) velocity: f64,
 }
 
 /// What acts on the mass during a step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Load {
-    pub(super) mass_kg: f64,
-    pub(super) damping_n_s_per_m: f64,
-    pub(super) stiffness_n_per_m: f64,
+pub(in crate::devices) struct Load {
+    pub(in crate::devices) mass_kg: f64,
+    pub(in crate::devices) damping_n_s_per_m: f64,
+    pub(in crate::devices) stiffness_n_per_m: f64,
     /// The spring's other end (m).
-    pub(super) intended_m: f64,
+    pub(in crate::devices) intended_m: f64,
     /// Everything else (N).
-    pub(super) force_n: f64,
-    pub(super) friction_n: f64,
+    pub(in crate::devices) force_n: f64,
+    pub(in crate::devices) friction_n: f64,
 }
 
 impl Motion {
@@ -26,7 +26,7 @@ impl Motion {
     ///
     /// Dry friction takes from the momentum what it can and stops the mass where that is more than there is: a mass that
     /// is pushed with less than `friction_n` stands still, to the last bit.
-    pub(super) fn after(self, dt: f64, load: &Load) -> Self {
+    pub(in crate::devices) fn after(self, dt: f64, load: &Load) -> Self {
         let per_mass = dt / load.mass_kg;
         let pull = load.force_n + load.stiffness_n_per_m * (load.intended_m - self.place);
         let driven = self.velocity + pull * per_mass;

@@ -3,7 +3,7 @@
 use super::super::device::{DeviceKind, DeviceProfile, DeviceSpec, field, numbered};
 use super::super::tool::ToolSpec;
 use super::check::{at_most_ms, lengths_within, not_negative, positive};
-use crate::devices::{HandSpec, PlantSpec};
+use crate::devices::{HandSpec, PlantSpec, PointerSpec};
 use crate::error::Error;
 use crate::model::contact::Equations;
 
@@ -72,6 +72,7 @@ fn device(device: &DeviceSpec) -> Result<(), Error> {
     let of_kind = [
         ("device.plant", device.plant != PlantSpec::default(), DeviceKind::Hand, "hand"),
         ("device.hand", device.hand != HandSpec::default(), DeviceKind::Hand, "hand"),
+        ("device.pointer", device.pointer != PointerSpec::default(), DeviceKind::Pointer, "pointer"),
         ("device.log", device.log.is_some(), DeviceKind::Replay, "replay"),
     ];
     if let Some((field, .., name)) = of_kind.iter().find(|(_, is_set, kind, _)| *is_set && device.kind != *kind) {
@@ -81,12 +82,17 @@ fn device(device: &DeviceSpec) -> Result<(), Error> {
         let message = "does nothing with kind = \"replay\", the tool moves as in the log: leave it out";
         return Err(Error::scene("device.path_csv", message));
     }
+    if device.kind == DeviceKind::Pointer && (device.path_csv.is_some() || device.path.is_some()) {
+        let message = "does nothing with kind = \"pointer\", whoever points says where the tool goes: leave it out";
+        return Err(Error::scene("device.path_csv", message));
+    }
     let none_of = |table: &str, fault: Option<(&str, String)>| match fault {
         None => Ok(()),
         Some((field, message)) => Err(Error::scene(&format!("device.{table}.{field}"), message)),
     };
     none_of("plant", device.plant.fault())?;
     none_of("hand", device.hand.fault())?;
+    none_of("pointer", device.pointer.fault())?;
     haply(device)?;
     let mut faults = device.faults.iter().enumerate();
     faults.try_for_each(|(index, spec)| none_of(&format!("fault[{index}]"), spec.fault()))

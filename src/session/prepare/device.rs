@@ -3,27 +3,36 @@
 use std::path::Path;
 
 use super::super::parts::OpenHaply;
-use crate::devices::{Device, DeviceState, Faulty, Hand, Replayed, ReplayedSample, Scripted, ToolPath};
+use crate::devices::{
+    Device, DeviceState, Faulty, Hand, Pointer, PointerHandle, Replayed, ReplayedSample, Scripted, ToolPath,
+};
 use crate::error::{Error, ErrorKind};
 use crate::files;
 use crate::log::{LogEntry, LogReader, LogRecord, ToolSample};
 use crate::model::Vec3;
+use crate::model::contact::ToolShape;
 use crate::runtime::Execution;
 use crate::scene::{DeviceKind, DeviceSpec};
 
 /// A glued tool that starts farther from its node would tear it there in the first tick (m).
 const LARGEST_START_GAP: f64 = 1e-3;
 
-/// The device of `spec` for ticks of `tick` (s); `glued_at` is where the node that the tool is glued to is at the start.
+/// A device, and what moves it if that is a pointer.
+pub(super) type Made = (Box<dyn Device>, Option<PointerHandle>);
+
+/// The device of `spec` for ticks of `tick` (s); `glued_at` is where the node that the tool is glued to is at the start,
+/// `body` where its nodes are.
 pub(super) fn device(
     spec: &DeviceSpec,
     tick: f64,
     glued_at: Option<Vec3>,
+    body: &[Vec3],
     execution: Execution,
     open_haply: Option<OpenHaply>,
-) -> Result<Box<dyn Device>, Error> {
+) -> Result<Made, Error> {
     let capabilities = spec.profile.capabilities();
-    match spec.kind {
+    let made: Result<Box<dyn Device>, Error> = match spec.kind {
+        DeviceKind::Pointer => return pointer(spec, glued_at, body),
         DeviceKind::Scripted => {
             let path = path(spec, glued_at)?;
             check_start("device.path_csv", path.at(0.0).into(), glued_at)?;
@@ -37,7 +46,30 @@ pub(super) fn device(
         }
         DeviceKind::Replay => replayed(spec, glued_at),
         DeviceKind::Haply => haply(spec, tick, execution, open_haply),
-    }
+    };
+    made.map(|device| (device, None))
+}
+
+/// Clear of a `body` that it starts above, in its largest extent.
+const CLEARANCE: f64 = 0.1;
+
+/// The tool behind a pointer, which starts at the node that it is glued to, or clear of the body, above its middle.
+fn pointer(spec: &DeviceSpec, glued_at: Option<Vec3>, body: &[Vec3]) -> Result<Made, Error> {
+    let home = glued_at.unwrap_or_else(|| {
+        let corner = |by: fn(&Vec3, &Vec3) -> Vec3| body.iter().copied().reduce(|a, b| by(&a, &b)).unwrap_or_default();
+        let (low, high) = (corner(Vec3::inf), corner(Vec3::sup));
+        let reach = match spec.tool.shape() {
+            ToolShape::Point => 0.0,
+            ToolShape::Sphere { radius } => radius,
+            ToolShape::Capsule { radius, half_axis } => radius + half_axis.norm(),
+        };
+        let middle = 0.5 * (low + high);
+        Vec3::new(middle.x, middle.y, high.z + reach + CLEARANCE * (high - low).amax())
+    });
+    let (tool, handle) = Pointer::new(spec.pointer.clone(), home.into(), spec.profile.capabilities())
+        .map_err(|error| error.at("device.pointer"))?;
+    check_start("device.pointer.start_m", handle.home().into(), glued_at)?;
+    Ok((Box::new(tool), Some(handle)))
 }
 
 /// `device` with the faults of `spec`.

@@ -5,7 +5,7 @@ use super::body::Start;
 use super::device;
 use super::limits::{self, check_capabilities, check_ramp};
 use crate::actors::Bounds;
-use crate::devices::Device;
+use crate::devices::{Device, PointerHandle};
 use crate::error::Error;
 use crate::model::body::Body;
 use crate::model::contact::{Contact, ToolShape};
@@ -22,6 +22,8 @@ pub(crate) struct Tool {
     /// Its name; empty for the only one.
     pub(crate) name: String,
     pub(crate) device: Box<dyn Device>,
+    /// What moves it, if it follows a pointer.
+    pub(crate) pointer: Option<PointerHandle>,
     /// How it touches the body at the start.
     pub(crate) contact: Contact,
     pub(crate) shape: ToolShape,
@@ -75,11 +77,11 @@ pub(super) fn tools(
     let (mut tools, mut all_resolved) = (Vec::new(), Vec::new());
     for (index, (spec, &node)) in scene.devices.iter().zip(&start.attached).enumerate() {
         let of_this = |error: Error| numbered(error, index, &scene.devices);
-        let device = match brought.next() {
-            Some((_, device)) => device,
+        let (device, pointer) = match brought.next() {
+            Some((_, device)) => (device, None),
             None => {
                 let glued_at = node.map(|node| state.positions[node as usize]);
-                device::device(spec, tick, glued_at, execution, open_haply).map_err(of_this)?
+                device::device(spec, tick, glued_at, &state.positions, execution, open_haply).map_err(of_this)?
             }
         };
         // What is executed again has met them already.
@@ -104,7 +106,7 @@ pub(super) fn tools(
             }
         };
         let name = spec.name.clone().filter(|_| scene.devices.len() > 1).unwrap_or_default();
-        tools.push(Tool { name, device, contact, shape: spec.tool.shape(), limits, bounds, coupling });
+        tools.push(Tool { name, device, pointer, contact, shape: spec.tool.shape(), limits, bounds, coupling });
         all_resolved.push(resolved);
     }
     // What differs between devices stays theirs.

@@ -144,6 +144,7 @@ fn capabilities(spec: &DeviceSpec) -> Capabilities {
     let of_profile = spec.profile.capabilities();
     match (spec.kind, &spec.haply) {
         (DeviceKind::Hand, _) => spec.plant.capabilities(of_profile),
+        (DeviceKind::Pointer, _) => spec.pointer.capabilities(of_profile),
         (DeviceKind::Haply, Some(haply)) => Capabilities::of_force(haply.max_force_n),
         _ => of_profile,
     }

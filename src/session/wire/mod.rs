@@ -10,7 +10,8 @@ mod models;
 mod sink;
 
 use super::prepare::{Prepared, Tool};
-use super::running::{Memory, Running, Viewer};
+use super::records::RecordSender;
+use super::running::{Memory, Outside, Running, Viewer};
 use crate::actors::{LoggerActor, LoggerOutcome, SceneWatch, SurfaceView, first_state};
 use crate::devices::DeviceState;
 use crate::error::{Error, ErrorKind};
@@ -45,7 +46,8 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     let places: Vec<Pose> = first.iter().map(DeviceState::pose).collect();
     let mut environment = environment::environment(&prepared, &first)?;
     let memory = prepared.options.keep_records.then(Memory::default);
-    let sinks = Sinks::new(memory.clone(), prepared.options.log.as_deref(), &environment)?;
+    let (sender, records) = prepared.options.shares_records.then(RecordSender::new).unzip();
+    let sinks = Sinks::new(memory.clone(), sender, prepared.options.log.as_deref(), &environment)?;
     let (mut graph, taker) = match rerun {
         Some(Rerun { recording, taker }) => (Runtime::reexecution(recording), Some(taker)),
         None => (Runtime::builder(prepared.options.execution), None),
@@ -72,6 +74,7 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     }
     let reducing = bases.as_ref().map(|bases| (prepared.basis_group(), bases.actor()));
     let logger_group = prepared.logger_group();
+    let pointers = prepared.tools.iter_mut().map(|tool| tool.pointer.take()).collect();
     let Prepared { simulation, tools, plan, local, global, until, .. } = prepared;
     let (models, maker) = models::models(&mut graph, &plan, simulation, &places, surfaces, bases, ticks);
     let haptic = haptic::actors(&mut graph, &plan, tools, ends, &first, models, ticks);
@@ -95,7 +98,8 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     if let Some(until) = until {
         graph.until(until);
     }
-    Ok(Running::new(graph.build()?.start()?, outcome, memory, viewer, until, builds))
+    let outside = Outside { viewer: Some(viewer), pointers, records };
+    Ok(Running::new(graph.build()?.start()?, outcome, memory, outside, until, builds))
 }
 
 /// The first state of a tool's device, or why there is none: a device that begins where it reaches no node of the body, at

@@ -6,18 +6,28 @@ use crate::actors::{LogFile, LogSink, Loss};
 use crate::error::Error;
 use crate::log::{Environment, GroupStats, LogRecord, SceneFrame, TextEvent};
 use crate::runtime::Nanos;
+use crate::session::records::RecordSender;
 use crate::session::running::Memory;
 
 /// All sinks that a session asked for, one after the other.
 pub(super) struct Sinks {
     memory: Option<Memory>,
+    sender: Option<RecordSender>,
     file: Option<LogFile>,
 }
 
 impl Sinks {
-    /// Keeps records in `memory` and writes them to a file at `path`, if there are any.
-    pub(super) fn new(memory: Option<Memory>, path: Option<&Path>, environment: &Environment) -> Result<Self, Error> {
-        Ok(Self { memory, file: path.map(|path| LogFile::create(path, environment)).transpose()? })
+    /// Keeps records in `memory`, hands them to the program by `sender` and writes them to a file at `path`, if there are any.
+    pub(super) fn new(
+        memory: Option<Memory>,
+        sender: Option<RecordSender>,
+        path: Option<&Path>,
+        environment: &Environment,
+    ) -> Result<Self, Error> {
+        if let Some(sender) = &sender {
+            sender.environment(environment);
+        }
+        Ok(Self { memory, sender, file: path.map(|path| LogFile::create(path, environment)).transpose()? })
     }
 
     /// Writes to the file, if there is one. A file that failed counts what it loses; memory goes on.
@@ -30,6 +40,9 @@ impl LogSink for Sinks {
     fn record(&mut self, record: &LogRecord) -> Result<(), Error> {
         if let Some(memory) = &self.memory {
             memory.push(*record);
+        }
+        if let Some(sender) = &self.sender {
+            sender.record(record);
         }
         self.on_file(|file| file.record(record))
     }
@@ -47,6 +60,9 @@ impl LogSink for Sinks {
     }
 
     fn environment(&mut self, environment: &Environment) {
+        if let Some(sender) = &self.sender {
+            sender.environment(environment);
+        }
         if let Some(file) = &mut self.file {
             file.environment(environment);
         }
