@@ -21,6 +21,7 @@ CRATES = {
     "palpate_model": ROOT / "src/model",
     "palpate_runtime": ROOT / "src/runtime",
     "palpate_haply": ROOT / "haply/src",
+    "palpate_view": ROOT / "view/src",
     "palpate_cli": ROOT / "tools/src",
 }
 ENGINE = ["palpate", "palpate_mesh", "palpate_model", "palpate_runtime"]

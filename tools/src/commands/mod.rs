@@ -12,6 +12,7 @@ pub mod reduce;
 pub mod replay;
 pub mod run;
 pub mod timing;
+pub mod view;
 
 mod files;
 mod log_info;
@@ -58,6 +59,8 @@ enum Command {
     Export(export::ExportArgs),
     /// Look into a log, check it, or save what is readable of a damaged one
     Log(log::LogArgs),
+    /// Show a scene in the browser and push it with the mouse
+    View(view::ViewArgs),
     /// Be a device's service without the device, to try a scene against it
     Mock(mock::MockArgs),
 }
@@ -89,6 +92,7 @@ pub fn main() -> ExitCode {
             Some(Command::Export(args)) => export::run(&args),
             Some(Command::Log(args)) => log::run(&args),
             Some(Command::Replay(args)) => replay::run(&args),
+            Some(Command::View(args)) => view::run(&args),
             Some(Command::Mock(args)) => mock::run(&args),
         },
         Err(error) if error.use_stderr() => Err(usage_error(&error)),

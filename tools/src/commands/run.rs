@@ -114,7 +114,7 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
 }
 
 /// A local model or `auto` by name, or which there are.
-fn choice(name: &str) -> Result<ModelChoice, String> {
+pub(super) fn choice(name: &str) -> Result<ModelChoice, String> {
     ModelChoice::from_name(name).ok_or_else(|| format!("the local models are {}", ModelChoice::NAMES.join(", ")))
 }
 

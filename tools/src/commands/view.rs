@@ -1,0 +1,108 @@
+//! `palpate view [SCENE|LOG]`: a page in the browser.
+
+use std::io::IsTerminal;
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use palpate::Error;
+use palpate::scene::{ModelChoice, Scene};
+use palpate_view::{Options, Pushed, Server};
+
+use super::{files, progress, run, shared};
+
+/// How often it is looked whether the user interrupted.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// The arguments of `palpate view`.
+#[derive(Debug, clap::Args)]
+pub struct ViewArgs {
+    /// The scene file (TOML); the demo scene if left out
+    pub scene: Option<PathBuf>,
+    /// Listen on this port; a free one if left out
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub port: u16,
+    /// Use this local model instead of the scene's own
+    #[arg(long, value_name = "NAME", value_parser = run::choice)]
+    pub model: Option<ModelChoice>,
+    /// Also write a log of all of it, with pictures; overwritten if it exists
+    #[arg(long, value_name = "LOG.mcap")]
+    pub out: Option<PathBuf>,
+    /// Leave the scene its own device: watch what it does in place of pushing
+    #[arg(long)]
+    pub watch: bool,
+    /// Let other machines in by this address of this one, such as 0.0.0.0; unencrypted
+    #[arg(long, value_name = "ADDRESS")]
+    pub listen: Option<IpAddr>,
+    /// Only print the address, open no browser
+    #[arg(long)]
+    pub no_browser: bool,
+}
+
+/// Shows a scene until it is interrupted.
+///
+/// # Errors
+/// Input errors of the scene, a port that is taken, or a failed run.
+pub fn run(args: &ViewArgs) -> Result<(), Error> {
+    let (mut scene, name) = match &args.scene {
+        Some(path) => (progress::load(path)?, shared::name_of(path)),
+        None => (Scene::demo(), "demo scene".to_owned()),
+    };
+    if let (Some(path), Some(out)) = (&args.scene, &args.out) {
+        files::keep_inputs(&files::inputs_of(path, &scene), out)?;
+    }
+    if let Some(model) = args.model {
+        scene = scene.with_model(model);
+    }
+    let pushed = if args.watch { Pushed::as_it_is(scene) } else { Pushed::new(scene) };
+    let pushed = pushed.open_haply_with(palpate_haply::open);
+    let pushed = args.out.iter().fold(pushed, |pushed, out| pushed.log(out));
+    let preparing = progress::preparing(&name);
+    let server = palpate_view::serve_scene(pushed, &options(args, &name)).map_err(|error| error.at(&name));
+    preparing.finish_and_clear();
+    show(server?, args, &name)
+}
+
+fn options(args: &ViewArgs, title: &str) -> Options {
+    let usual = Options::default();
+    Options { listen: args.listen.unwrap_or(usual.listen), port: args.port, title: title.to_owned() }
+}
+
+/// Tells where the page is, and waits until the user has seen enough.
+fn show(server: Server, args: &ViewArgs, name: &str) -> Result<(), Error> {
+    if args.listen.is_some_and(|address| !address.is_loopback()) {
+        shared::complain(
+            "warning: --listen lets other machines in, unencrypted: whoever has the whole address can push, and whoever reads \
+             the network can have the address",
+        );
+    }
+    let url = server.url();
+    shared::print(&format!("{name}: {url}\nCtrl-C ends it\n"))?;
+    if !args.no_browser {
+        open(&url);
+    }
+    let interrupt = shared::waits()?;
+    while !interrupt.came() && !server.wait_for(LOOK) {}
+    match server.stop() {
+        Some(summary) => shared::print(&summary.to_string()),
+        None => Ok(()),
+    }
+}
+
+/// Opens a browser where somebody sits in front of one. None is no error: the address is printed.
+fn open(url: &str) {
+    let has_display = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
+    let program = match std::env::consts::OS {
+        "macos" => "open",
+        "windows" => "explorer",
+        _ if has_display => "xdg-open",
+        _ => return,
+    };
+    if !std::io::stdout().is_terminal() {
+        return;
+    }
+    // The address, with its token, can be read in the list of processes by this user's own programs, as the terminal can.
+    let quiet = Command::new(program).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    drop(quiet);
+}

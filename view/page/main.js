@@ -1,0 +1,81 @@
+
+// The loop: one picture per frame of the screen, strips thirty and numbers ten times a second.
+function fit(canvas) {
+  const ratio = devicePixelRatio || 1;
+  const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [Math.max(1, width), Math.max(1, height)];
+}
+
+// Values at the arrows, and the axes in the corner.
+function drawLabels(canvas) {
+  fit(canvas);
+  const ratio = devicePixelRatio || 1;
+  const context = canvas.getContext("2d");
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  context.clearRect(0, 0, width, height);
+  const style = getComputedStyle(document.documentElement);
+  const [ink, paper] = ["--ink", "--paper"].map((name) => style.getPropertyValue(name));
+  context.font = "12px system-ui, 'DejaVu Sans', sans-serif";
+  const write = (text, x, y, tint) => {
+    context.lineWidth = 3;
+    context.strokeStyle = paper;
+    context.strokeText(text, x, y);
+    context.fillStyle = tint;
+    context.fillText(text, x, y);
+  };
+  context.textAlign = "left";
+  context.textBaseline = "middle";
+  const taken = [];
+  for (const tool of state.tools) {
+    for (const [force, name, tint] of [[tool.commanded, "commanded", "--one"], [tool.computed, "computed", "--two"]]) {
+      const at = norm(force) > 0.02 && onScreen(plus(tool.position, force, perNewton()), width, height);
+      if (!at) continue;
+      // Both arrows end at the same place as a rule: the second label goes below the first.
+      const place = [Math.max(4, Math.min(at[0] + 10, width - 130)), Math.max(12, Math.min(at[1], height - 40))];
+      while (taken.some(([x, y]) => Math.abs(x - place[0]) < 130 && Math.abs(y - place[1]) < 15)) place[1] += 15;
+      taken.push(place);
+      write(`${name} ${withUnit(norm(force), "N")}`, ...place, style.getPropertyValue(tint));
+    }
+  }
+  const { right, up } = axes();
+  const [x, y] = [38, 38];
+  ["x", "y", "z"].forEach((name, n) => {
+    const [dx, dy] = [24 * right[n], -24 * up[n]];
+    context.strokeStyle = ink;
+    context.lineWidth = 1.5;
+    context.beginPath();
+    context.moveTo(x, y);
+    context.lineTo(x + dx, y + dy);
+    context.stroke();
+    if (Math.hypot(dx, dy) > 5) write(name, x + 1.35 * dx - 3, y + 1.35 * dy, ink);
+  });
+}
+
+const clock = { strips: 0, numbers: 0, frames: 0 };
+function frame(now) {
+  const picture = element("picture");
+  fit(picture);
+  readGamepad(now);
+  play(now);
+  tellPointer();
+  paint(picture);
+  drawLabels(element("labels"));
+  clock.frames += 1;
+  picture.dataset.frames = clock.frames;
+  if (now - clock.strips > 33) { clock.strips = now; drawStrips(); showLegend(); }
+  if (now - clock.numbers > 100) { clock.numbers = now; readOut(); }
+  requestAnimationFrame(frame);
+}
+
+nameLines();
+if (startPainter(element("picture"))) {
+  startPointer(element("picture"));
+  startKeys(element("picture"));
+  startPanel();
+  startPlayer();
+  connect();
+  requestAnimationFrame(frame);
+} else {
+  say("This browser has no WebGL2, without which the body cannot be drawn.");
+}

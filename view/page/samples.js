@@ -1,0 +1,48 @@
+
+// The ticks of the last seconds, a ring for each device. A row has the time and these numbers.
+const COLUMNS = ["fx", "fy", "fz", "cx", "cy", "cz", "lateness", "execution", "age", "energy", "ledger", "pressure", "jump", "limits"];
+const ROW = COLUMNS.length + 1;
+const ROOM = 1 << 13;
+
+class Ring {
+  constructor() { this.clear(); }
+
+  clear() {
+    this.times = new Float64Array(ROOM);
+    this.columns = Object.fromEntries(COLUMNS.map((name) => [name, new Float32Array(ROOM)]));
+    this.count = 0; // ever pushed
+    this.deadline = 0;
+  }
+
+  push(first, deadline, rows) {
+    this.deadline = deadline;
+    for (let at = 0; at + ROW <= rows.length; at += ROW) {
+      const place = this.count % ROOM;
+      this.times[place] = first + rows[at] / 1000;
+      COLUMNS.forEach((name, n) => { this.columns[name][place] = rows[at + 1 + n]; });
+      this.count += 1;
+    }
+  }
+
+  // Places in the ring whose time lies within, in order.
+  *within(from, to) {
+    for (let n = Math.max(0, this.count - ROOM); n < this.count; n += 1) {
+      const place = n % ROOM;
+      if (this.times[place] >= from && this.times[place] <= to) yield place;
+    }
+  }
+
+  get newest() { return this.count > 0 ? (this.count - 1) % ROOM : -1; }
+
+  row(place) {
+    return Object.fromEntries([["time", this.times[place]], ...COLUMNS.map((name) => [name, this.columns[name][place]])]);
+  }
+
+  newestTime() { return this.count > 0 ? this.times[this.newest] : 0; }
+}
+
+const rings = new Map();
+function ring(device) {
+  if (!rings.has(device)) rings.set(device, new Ring());
+  return rings.get(device);
+}

@@ -1,0 +1,22 @@
+
+// What the page knows: one object, so that every part sees the same.
+const state = {
+  hello: null, // what is shown, as the server told it
+  role: "watch",
+  rest: null, // positions at the start (m), three numbers a node
+  restNormals: null,
+  positions: null, // the newest (m)
+  triangles: null, // corners, three a triangle
+  size: 0.1, // largest extent of the body (m)
+  centre: [0, 0, 0],
+  time: 0, // of the newest tools (s)
+  tools: [], // position, orientation, computed, commanded, pointer, mode
+  touches: [], // place, force, triangle, device
+  device: 0, // whose numbers and strips are shown, and which tool a drag moves
+  colourBy: "depth",
+  deepest: 0, // m
+  stats: null,
+  isNew: { topology: false, surface: false },
+};
+const element = (id) => document.getElementById(id);
+const MODES = ["free", "sticks", "slips", "lost: every node is held"];

@@ -1,0 +1,98 @@
+
+// The socket: what comes is read into the state, what the visitor does is sent. The token is in the part of the address that
+// browsers keep to themselves.
+const wire = { socket: null, wait: 500, bytes: 0, listeners: [] };
+const TOOL = 17;
+const CONTACT = 8;
+
+function connect() {
+  const token = location.hash.slice(1);
+  if (!token) return say("This address lacks its token: open the whole address that the command printed.");
+  const socket = new WebSocket(`ws://${location.host}/socket`);
+  socket.binaryType = "arraybuffer";
+  wire.socket = socket;
+  socket.onopen = () => { socket.send(JSON.stringify({ do: "enter", token })); wire.wait = 500; };
+  socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : see(data));
+  socket.onclose = ({ code, reason }) => {
+    status(reason ? `closed: ${reason}` : "not connected");
+    if (code === 1008) return;
+    setTimeout(connect, wire.wait);
+    wire.wait = Math.min(8000, 2 * wire.wait);
+  };
+  return undefined;
+}
+
+function send(message) {
+  if (wire.socket?.readyState === WebSocket.OPEN) wire.socket.send(JSON.stringify(message));
+}
+
+function status(text) { if (element("status").textContent !== text) element("status").textContent = text; }
+function say(text) { element("note").textContent = text; }
+
+function hear(message) {
+  if (message.kind === "hello") {
+    state.hello = message;
+    state.role = message.role;
+    state.device = Math.min(state.device, Math.max(0, message.tools.length - 1));
+    rings.forEach((ring) => ring.clear());
+    Object.assign(colouring.top, { depth: 0.002, pressure: 500 });
+    say(message.warning ?? "");
+    showHello();
+  } else if (message.kind === "role") {
+    state.role = message.role;
+    showHello();
+  } else if (message.kind === "note") {
+    say(message.text);
+  } else if (message.kind === "stats") {
+    state.stats = message;
+  }
+}
+
+function see(buffer) {
+  wire.bytes += buffer.byteLength;
+  const head = new DataView(buffer);
+  const u32 = (at) => head.getUint32(at, true);
+  const f64 = (at) => head.getFloat64(at, true);
+  const kind = u32(0);
+  if (kind === 1) {
+    const [nodes, triangles] = [u32(4), u32(8)];
+    state.rest = new Float32Array(buffer, 16, 3 * nodes);
+    state.positions = state.rest;
+    state.triangles = new Uint32Array(buffer, 16 + 12 * nodes, 3 * triangles);
+    state.restNormals = normalsOf(state.rest, state.triangles);
+    const isFirst = measureBody();
+    if (isFirst) look(0);
+    state.isNew.topology = true;
+  } else if (kind === 2) {
+    const tools = u32(4);
+    state.time = f64(8);
+    const numbers = new Float32Array(buffer, 24);
+    const vector = (at) => [numbers[at], numbers[at + 1], numbers[at + 2]];
+    state.tools = Array.from({ length: tools }, (_, n) => {
+      const at = TOOL * n;
+      return { position: vector(at), orientation: [...numbers.subarray(at + 3, at + 7)], computed: vector(at + 7), commanded: vector(at + 10), pointer: vector(at + 13), mode: numbers[at + 16] };
+    });
+    const first = TOOL * tools;
+    state.touches = Array.from({ length: (numbers.length - first) / CONTACT }, (_, n) => {
+      const at = first + CONTACT * n;
+      return { place: vector(at), force: vector(at + 3), triangle: numbers[at + 6], device: numbers[at + 7] };
+    });
+    state.isNew.colour ||= state.colourBy === "pressure";
+  } else if (kind === 3) {
+    ring(u32(4)).push(f64(8), f64(16), new Float32Array(buffer, 24));
+  } else if (kind === 4 && state.rest && u32(4) * 3 === state.rest.length) {
+    state.positions = new Float32Array(buffer, 16, state.rest.length);
+    state.isNew.surface = true;
+  }
+}
+
+// Extents of the body; true if it is another one than before.
+function measureBody() {
+  const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+  state.rest.forEach((c, n) => { low[n % 3] = Math.min(low[n % 3], c); high[n % 3] = Math.max(high[n % 3], c); });
+  const centre = [0, 1, 2].map((n) => (low[n] + high[n]) / 2);
+  const size = Math.max(...[0, 1, 2].map((n) => high[n] - low[n])) || 0.1;
+  const isOther = norm(minus(centre, state.centre)) > 0.01 * size || Math.abs(size - state.size) > 0.01 * size || painter.count === 0;
+  [state.centre, state.size] = [centre, size];
+  return isOther;
+}

@@ -1,0 +1,170 @@
+//! One browser: what it says is read, what waits for it is sent, and it may take its time within bounds.
+//!
+//! A read waits for a few milliseconds, then it is looked whether something is to be sent. A browser that stops reading stops
+//! its own thread alone, and that for moments: what could not be sent is tried again, and only the newest picture waits.
+
+use std::io;
+use std::net::TcpStream;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use tungstenite::protocol::{CloseFrame, Role, WebSocketConfig, frame::coding::CloseCode};
+use tungstenite::{Error, Message, Utf8Bytes, WebSocket};
+
+use crate::client::Outgoing;
+use crate::http::PATIENCE;
+use crate::hub::{Browser, Hub};
+use crate::wish::Wish;
+
+/// A message of the page has a hundred bytes.
+const MOST_BYTES: usize = 4 << 10;
+/// How long a read waits before it is looked whether something is to be sent.
+const LOOK: Duration = Duration::from_millis(4);
+/// How long a write waits for a browser that does not read.
+const PUSH: Duration = Duration::from_millis(20);
+/// A browser that has taken nothing for so long is gone, or may come again.
+const GONE: Duration = Duration::from_secs(90);
+
+/// Messages that a browser may send at once, and per second: a page sends one per picture of its screen.
+const BURST: f64 = 400.0;
+const PER_SECOND: f64 = 250.0;
+
+/// Messages that may still come: a bucket that fills with time.
+#[derive(Debug)]
+struct Allowance {
+    left: f64,
+    since: Instant,
+}
+
+impl Allowance {
+    fn new(now: Instant) -> Self {
+        Self { left: BURST, since: now }
+    }
+
+    /// Takes one message at `now`; false if there were too many.
+    fn take(&mut self, now: Instant) -> bool {
+        let passed = now.saturating_duration_since(self.since).as_secs_f64();
+        (self.left, self.since) = ((self.left + PER_SECOND * passed).min(BURST) - 1.0, now);
+        self.left >= 0.0
+    }
+}
+
+/// Serves a browser that asked for a socket, until it goes, says what it may not, or the server ends.
+pub(crate) fn serve(stream: TcpStream, rest: Vec<u8>, hub: &Hub) -> io::Result<()> {
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(LOOK))?;
+    stream.set_write_timeout(Some(PUSH))?;
+    let config = WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES));
+    let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
+    let Some(browser) = enter(&mut socket, hub) else { return Ok(()) };
+    let refusal = talk(&mut socket, &browser, hub);
+    hub.leave(&browser);
+    if let Some(words) = refusal {
+        close(&mut socket, words);
+    }
+    Ok(())
+}
+
+/// Waits for the token, and lets the browser in.
+fn enter(socket: &mut WebSocket<TcpStream>, hub: &Hub) -> Option<Arc<Browser>> {
+    let begin = Instant::now();
+    while begin.elapsed() < PATIENCE && !hub.is_over() {
+        match socket.read() {
+            Ok(Message::Text(text)) => match Wish::read(&text) {
+                Some(Wish::Enter { token }) if hub.token.is(&token) => {
+                    let browser = hub.enter();
+                    if browser.is_none() {
+                        close(socket, "too many browsers, close one");
+                    }
+                    return browser;
+                }
+                _ => break,
+            },
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            Err(error) if is_wait(&error) => {}
+            _ => return None,
+        }
+    }
+    close(socket, "the address lacks its token");
+    None
+}
+
+/// Reads and sends until the browser goes, or until it is sent away with these words.
+fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Option<&'static str> {
+    let mut allowance = Allowance::new(Instant::now());
+    let (mut is_sent, mut moved) = (true, Instant::now());
+    loop {
+        if hub.is_over() {
+            return Some("the server has ended");
+        }
+        match socket.read() {
+            Ok(_) if !allowance.take(Instant::now()) => return Some("too many messages"),
+            Ok(Message::Text(text)) => match Wish::read(&text) {
+                Some(wish) if !matches!(wish, Wish::Enter { .. }) => hub.wish(browser.number, wish),
+                _ => return Some("that is no message of the page"),
+            },
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            Ok(Message::Close(_)) => return None,
+            Ok(_) => return Some("that is no message of the page"),
+            Err(error) if is_wait(&error) => {}
+            Err(Error::Capacity(_)) => return Some("that message is too long"),
+            Err(_) => return None,
+        }
+        if !is_sent {
+            is_sent = match socket.flush() {
+                Ok(()) => true,
+                Err(error) if is_wait(&error) && moved.elapsed() < GONE => false,
+                Err(_) => return None,
+            };
+        }
+        // Nothing new is handed over before the last message has gone: so no more than one waits here.
+        while is_sent && let Some(message) = { browser.outbox().take() } {
+            let (length, message) = match message {
+                Outgoing::Text(text) => (text.len(), Message::Text(text.into())),
+                Outgoing::Bytes(bytes) => (bytes.len(), Message::Binary(bytes)),
+            };
+            is_sent = match socket.send(message) {
+                Ok(()) => true,
+                Err(error) if is_wait(&error) => false,
+                Err(_) => return None,
+            };
+            hub.count_sent(length);
+        }
+        if is_sent {
+            moved = Instant::now();
+        }
+    }
+}
+
+/// True if there was nothing to read, or no room to write, for the moment.
+fn is_wait(error: &Error) -> bool {
+    matches!(error, Error::Io(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut))
+}
+
+/// Says why, and goes, whether it is heard or not.
+fn close(socket: &mut WebSocket<TcpStream>, words: &'static str) {
+    let frame = CloseFrame { code: CloseCode::Policy, reason: Utf8Bytes::from_static(words) };
+    let _ = socket.close(Some(frame));
+    let _ = socket.flush();
+    let _ = socket.get_ref().shutdown(std::net::Shutdown::Write);
+    // What is still on the way is read, so that the words are not thrown away with the connection.
+    let begin = Instant::now();
+    while begin.elapsed() < PATIENCE / 6 && socket.read().is_ok_and(|message| !message.is_close()) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_may_send_one_message_per_picture_and_no_flood() {
+        let begin = Instant::now();
+        let mut allowance = Allowance::new(begin);
+        let of_a_page = (0_u64..2400).all(|n| allowance.take(begin + Duration::from_micros(8333 * n)));
+        assert!(of_a_page, "20 s at 120 Hz");
+        let mut flood = Allowance::new(begin);
+        let taken = (0..1000).take_while(|_| flood.take(begin)).count();
+        assert_eq!(taken, BURST as usize);
+        assert!(flood.take(begin + Duration::from_secs(10)), "it fills again");
+    }
+}

@@ -1,0 +1,220 @@
+//! What is shown: a session that a program started, or a scene of which one session after the other is made.
+
+use std::path::PathBuf;
+
+use palpate::log::Environment;
+use palpate::scene::{BodySpec, DeviceKind, DeviceSpec, FrictionSpec, ModelChoice, Scene};
+use palpate::session::{Running, Session};
+use palpate::{Device, Error, ErrorKind};
+use serde_json::{Value, json};
+
+use crate::wish::Change;
+
+/// What opens a device that the engine does not know.
+pub(crate) type OpenHaply = fn(&palpate::scene::HaplySpec, f64) -> Result<Box<dyn Device>, Error>;
+
+/// A scene that visitors push, and how its sessions are made.
+///
+/// ```
+/// use palpate::scene::{DeviceKind, Scene};
+/// use palpate_view::Pushed;
+///
+/// let pushed = Pushed::new(Scene::demo());
+/// assert_eq!(pushed.scene().devices[0].kind, DeviceKind::Pointer);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Pushed {
+    scene: Scene,
+    out: Option<PathBuf>,
+    open_haply: Option<OpenHaply>,
+    /// Sessions so far.
+    count: u32,
+}
+
+impl Pushed {
+    /// A scene whose first device is replaced by a pointer that begins where the device did; the other devices stay what they are.
+    pub fn new(mut scene: Scene) -> Self {
+        if let Some(first) = scene.devices.first_mut() {
+            point(first);
+        }
+        Self::as_it_is(scene)
+    }
+
+    /// A scene with its own devices, to be watched.
+    pub fn as_it_is(scene: Scene) -> Self {
+        Self { scene, out: None, open_haply: None, count: 0 }
+    }
+
+    /// Also writes a log of each session, with pictures: the first to `path`, each after it to a name with its number.
+    #[must_use]
+    pub fn log(mut self, path: impl Into<PathBuf>) -> Self {
+        self.out = Some(path.into());
+        self
+    }
+
+    /// Opens a device that the engine does not know by this, as
+    /// [`SessionBuilder::open_haply_with`](palpate::session::SessionBuilder::open_haply_with) does.
+    #[must_use]
+    pub fn open_haply_with(mut self, open: OpenHaply) -> Self {
+        self.open_haply = Some(open);
+        self
+    }
+
+    /// The scene as it will be run.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Starts a session with what a visitor changed. `before` is ended once the new one is sure to work.
+    pub(crate) fn start(&mut self, change: &Change, before: Option<Running>) -> (Option<Running>, Result<(), Error>) {
+        let session = match self.session(change) {
+            Ok(session) => session,
+            Err(error) => return (before, Err(error)),
+        };
+        // Two sessions at a time would be late by each other.
+        drop(before.map(Running::stop));
+        match session.start() {
+            Ok(running) => (Some(running), Ok(())),
+            Err(error) => (None, Err(error)),
+        }
+    }
+
+    fn session(&mut self, change: &Change) -> Result<Session, Error> {
+        let mut builder = Session::from_scene(changed(self.scene.clone(), change)?).endless().share_records();
+        if let Some(open) = self.open_haply {
+            builder = builder.open_haply_with(open);
+        }
+        if let Some(out) = &self.out {
+            builder = builder.log(numbered(out, self.count + 1)).log_scene();
+        }
+        let session = builder.build()?;
+        self.count += 1;
+        Ok(session)
+    }
+
+    /// What a visitor may change and what it is now, for the page.
+    pub(crate) fn about(&self, change: &Change) -> Value {
+        let friction = change.friction.unwrap_or(self.scene.contact.friction.coefficient());
+        let asked = change.model.as_deref().unwrap_or(self.scene.local.model.name());
+        let spring = self.scene.devices.first().filter(|device| device.kind == DeviceKind::Pointer);
+        json!({
+            "can_restart": true,
+            "models": ModelChoice::NAMES,
+            "asked_model": asked,
+            // The page's slider has no end for a tool that sticks whatever pulls at it.
+            "friction": friction.is_finite().then_some(friction),
+            "stiffness": change.stiffness.unwrap_or(1.0),
+            "spring_n_per_m": spring.map(|device| device.pointer.stiffness_n_per_m),
+            "session": self.count,
+        })
+    }
+}
+
+/// The name of the log of session `count`.
+fn numbered(path: &std::path::Path, count: u32) -> PathBuf {
+    if count < 2 {
+        return path.to_owned();
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let ending = path.extension().map_or(String::new(), |ending| format!(".{}", ending.to_string_lossy()));
+    path.with_file_name(format!("{stem}-{count}{ending}"))
+}
+
+/// Puts a pointer in the place of a device.
+fn point(device: &mut DeviceSpec) {
+    if device.kind == DeviceKind::Pointer {
+        return;
+    }
+    let begin = device.path.as_ref().map(|path| path.at(0.0));
+    let mut pointer = device.pointer.clone();
+    pointer.start_m = pointer.start_m.or(device.plant.start_m).or(begin);
+    *device = DeviceSpec {
+        name: device.name.take(),
+        kind: DeviceKind::Pointer,
+        attach_node: device.attach_node,
+        tool: device.tool,
+        profile: device.profile,
+        pointer,
+        ..DeviceSpec::default()
+    };
+}
+
+/// `scene` with what a visitor changed.
+fn changed(mut scene: Scene, change: &Change) -> Result<Scene, Error> {
+    if let Some(model) = &change.model {
+        let unknown = || Error::new(ErrorKind::Usage, format!("there is no local model {model:?}"));
+        scene = scene.with_model(ModelChoice::from_name(model).ok_or_else(unknown)?);
+        // What was chosen for another model need not suit this one.
+        (scene.local.patch, scene.local.basis) = (None, None);
+    }
+    if let Some(friction) = change.friction {
+        scene.contact.friction = FrictionSpec::Coefficient(friction);
+        // What breaks a tool loose is no less than what holds it back.
+        scene.contact.static_friction = scene.contact.static_friction.filter(|mu| *mu >= friction);
+    }
+    if let Some(factor) = change.stiffness.filter(|factor| *factor != 1.0) {
+        // A number of steps that was chosen for the scene's stiffness may be too small for this one.
+        scene.global.substeps_per_ms = None;
+        match &mut scene.body {
+            Some(BodySpec::MassSpring(body)) => {
+                body.material.stiffness_n_per_m *= factor;
+                body.regions
+                    .iter_mut()
+                    .filter_map(|region| region.stiffness_n_per_m.as_mut())
+                    .for_each(|k| *k *= factor);
+            }
+            Some(BodySpec::Tetrahedra(body)) => {
+                body.tissue.young_modulus_pa *= factor;
+                body.regions
+                    .iter_mut()
+                    .filter_map(|region| region.young_modulus_pa.as_mut())
+                    .for_each(|e| *e *= factor);
+            }
+            None => {}
+        }
+    }
+    Ok(scene)
+}
+
+/// What is known of a session that a program started.
+pub(crate) fn known(running: &mut Running) -> (Option<palpate::session::SharedRecords>, Environment) {
+    let mut records = running.take_records();
+    let environment = records.as_mut().and_then(|records| records.environment()).unwrap_or_default();
+    (records, environment)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_device_becomes_a_pointer_that_begins_where_it_did() {
+        let demo = Scene::demo();
+        let begin = demo.devices[0].path.as_ref().unwrap().at(0.0);
+        let pushed = Pushed::new(demo.clone());
+        let device = &pushed.scene().devices[0];
+        assert_eq!((device.kind, device.pointer.start_m), (DeviceKind::Pointer, Some(begin)));
+        assert_eq!(device.tool, demo.devices[0].tool);
+        assert!(pushed.scene().validate().is_ok());
+        assert_eq!(Pushed::as_it_is(demo.clone()).scene(), &demo);
+    }
+
+    #[test]
+    fn every_model_friction_and_stiffness_that_a_page_offers_makes_a_session() {
+        for name in ModelChoice::NAMES {
+            let change = Change { model: Some((*name).into()), ..Change::default() };
+            assert!(Pushed::new(Scene::demo()).session(&change).is_ok(), "{name}");
+        }
+        for (friction, stiffness) in [(0.0, 0.1), (2.0, 10.0)] {
+            let change = Change { model: None, friction: Some(friction), stiffness: Some(stiffness) };
+            let error = Pushed::new(Scene::demo()).session(&change).err();
+            assert!(error.is_none(), "{friction} {stiffness}: {error:?}");
+        }
+    }
+
+    #[test]
+    fn each_session_has_a_log_of_its_own() {
+        let names = [1, 2, 3].map(|count| numbered("a/run.mcap".as_ref(), count).display().to_string());
+        assert_eq!(names, ["a/run.mcap", "a/run-2.mcap", "a/run-3.mcap"]);
+    }
+}

@@ -1,0 +1,83 @@
+//! A visitor pushes, changes and takes the log along; a program serves a session of its own.
+
+mod visitor;
+
+use palpate::log::{LogEntry, LogReader, LogRecord};
+use palpate::prelude::*;
+use palpate_view::Options;
+use tungstenite::Message;
+use visitor::{ask, enter, find, say, server, tool};
+
+fn text(message: &Message) -> Option<serde_json::Value> {
+    let Message::Text(text) = message else { return None };
+    Some(serde_json::from_str(text).unwrap())
+}
+
+fn hello(message: &Message) -> Option<serde_json::Value> {
+    text(message).filter(|message| message["kind"] == "hello")
+}
+
+#[test]
+fn the_tool_goes_where_the_pointer_is_and_a_new_session_keeps_the_pointer() {
+    let (server, token) = server();
+    let mut visitor = enter(&server, &token);
+    let first = find(&mut visitor, hello).unwrap();
+    assert_eq!((first["mode"].as_str(), first["model"].as_str()), (Some("live"), Some("hold")));
+    say(&mut visitor, r#"{"do":"move","device":0,"to":[0.05,0.05,0.16]}"#);
+    let is_there = |position: [f32; 3]| (position[0] - 0.05).abs() < 1e-3 && (position[2] - 0.16).abs() < 1e-3;
+    assert!(find(&mut visitor, |message| tool(message).filter(|tool| is_there(tool.1))).is_some());
+    say(&mut visitor, r#"{"do":"restart","model":"patch","friction":0.2,"stiffness":2}"#);
+    let second = find(&mut visitor, hello).unwrap();
+    assert_eq!((second["model"].as_str(), second["friction"].as_f64()), (Some("patch"), Some(0.2)));
+    assert_eq!((second["stiffness"].as_f64(), second["session"].as_u64()), (Some(2.0), Some(2)));
+    assert!(find(&mut visitor, |message| tool(message).filter(|tool| tool.2 == [0.05, 0.05, 0.16])).is_some());
+    assert!(server.stop().is_some_and(|summary| summary.runtime.fault.is_none()));
+}
+
+#[test]
+fn the_log_of_what_was_felt_holds_what_was_shown() {
+    let (server, token) = server();
+    let mut visitor = enter(&server, &token);
+    // The samples that a strip is drawn from.
+    let shown = find(&mut visitor, |message| match message {
+        Message::Binary(bytes) if bytes[..4] == [3, 0, 0, 0] => Some(bytes.clone()),
+        _ => None,
+    });
+    let shown = shown.unwrap();
+    let first_s = f64::from_le_bytes(shown[8..16].try_into().unwrap());
+    let address = server.address();
+    let head = format!("GET /log HTTP/1.0\r\nHost: {address}\r\nAuthorization: Bearer {token}\r\n\r\n");
+    let mut stream = std::net::TcpStream::connect(address).unwrap();
+    std::io::Write::write_all(&mut stream, head.as_bytes()).unwrap();
+    let mut answer = Vec::new();
+    std::io::Read::read_to_end(&mut stream, &mut answer).unwrap();
+    let body = answer.windows(4).position(|end| end == b"\r\n\r\n").unwrap() + 4;
+    let mut reader = LogReader::new(&answer[body..], "log").unwrap();
+    let commands: Vec<_> = reader
+        .by_ref()
+        .filter_map(|entry| match entry {
+            LogEntry::Record(LogRecord::Command(sample)) => Some(sample),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(reader.damage(), None);
+    assert!(commands.iter().any(|sample| (sample.time.as_secs_f64() - first_s).abs() < 1e-9), "{first_s}");
+    assert!(reader.topics().get("/scene").is_some_and(|count| *count > 0), "with pictures: {:?}", reader.topics());
+}
+
+#[test]
+fn a_program_serves_its_own_session_in_three_lines() {
+    let body = Block::builder([6, 6, 6], [0.05; 3]).fix(palpate::model::mesh::Face::ZMin).build().unwrap();
+    let path = ToolPath::constant([0.02, 0.02, 0.07]).unwrap();
+    let running = Session::builder(body).path(path).share_records().build().unwrap().start().unwrap();
+    let server = palpate_view::serve(running, &Options::default()).unwrap();
+    let token = server.url().split_once('#').unwrap().1.to_owned();
+    let mut visitor = enter(&server, &token);
+    let hello = find(&mut visitor, hello).unwrap();
+    assert_eq!(hello["can_restart"], false);
+    assert_eq!(hello["tools"][0]["pointer"], false, "a path cannot be pushed");
+    assert_eq!(find(&mut visitor, tool).unwrap().1, [0.02, 0.02, 0.07]);
+    let page = ask(server.address(), &format!("GET / HTTP/1.1\r\nHost: {}", server.address()));
+    assert!(page.contains("default-src 'none'") && page.contains("<canvas"));
+    assert!(server.stop().unwrap().runtime.fault.is_none());
+}
