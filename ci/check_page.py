@@ -29,12 +29,12 @@ SLICE = 1400  # height of one screenshot
 class Browser:
     """Chromium, spoken to over two pipes: messages are JSON, ended by a zero byte."""
 
-    def __init__(self, program):
+    def __init__(self, program, flags=FLAGS):
         self.profile = tempfile.mkdtemp()
         (read_commands, self.commands), (self.answers, write_answers) = os.pipe(), os.pipe()
         # The browser reads from descriptor 3 and writes to 4.
         shell = f'exec "$@" 3<&{read_commands} 4>&{write_answers}'
-        command = ["bash", "-c", shell, "bash", program, *FLAGS, f"--user-data-dir={self.profile}", "about:blank"]
+        command = ["bash", "-c", shell, "bash", program, *flags, f"--user-data-dir={self.profile}", "about:blank"]
         self.process = subprocess.Popen(command, pass_fds=(read_commands, write_answers), stderr=subprocess.DEVNULL)
         os.close(read_commands)
         os.close(write_answers)

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Pages of `palpate timing --html` work in a browser: wide and narrow, light and dark, in print, without scripts; their numbers
-# are those of `--json`. Pages of `palpate reduce --html` fit the screen, and no words of their drawings lie on each other.
+# are those of `--json`. Pages of `palpate reduce --html` fit the screen, and no words of their drawings lie on each other. In the page
+# of `palpate view` the body gives way where it is pushed, and forces are those of the log; a log is scrubbed and played.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 build_programs
 palpate="$CARGO_TARGET_DIR/debug/palpate"
@@ -35,3 +36,5 @@ python3 ci/check_page.py "$folder"/{real_time,stopped,virtual,two_devices,cut}.h
 "$palpate" reduce --cells 5,5,5 --html "$folder/mesh.html" >/dev/null
 "$palpate" reduce scenes/drag_friction.toml --error-pct 0.5 --html "$folder/scene.html" >/dev/null
 python3 ci/check_drawings.py "$folder"/{paper,mesh,scene}.html
+
+python3 ci/check_view.py "$palpate" "$folder"

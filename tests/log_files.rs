@@ -295,6 +295,7 @@ fn one_of_everything() -> Vec<u8> {
         match &entry {
             LogEntry::Record(record) => writer.write(record).unwrap(),
             LogEntry::Text(event) => writer.write_text(event).unwrap(),
+            LogEntry::Scene(frame) => writer.write_scene(frame).unwrap(),
             LogEntry::Stats(stats) => writer.write_stats(stats).unwrap(),
             LogEntry::Environment(_) | LogEntry::Attachment { .. } => {}
         }

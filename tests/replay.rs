@@ -387,6 +387,7 @@ fn rewritten(log: &Path, entries: Vec<LogEntry>) -> PathBuf {
         match entry {
             LogEntry::Record(record) => writer.write(record).unwrap(),
             LogEntry::Text(event) => writer.write_text(event).unwrap(),
+            LogEntry::Scene(frame) => writer.write_scene(frame).unwrap(),
             LogEntry::Stats(stats) => writer.write_stats(stats).unwrap(),
             LogEntry::Environment(_) | LogEntry::Attachment { .. } => {}
         }

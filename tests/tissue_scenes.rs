@@ -410,6 +410,7 @@ fn a_log_that_names_a_file_reads_none() {
                 LogEntry::Record(record) => writer.write(&record).unwrap(),
                 LogEntry::Stats(stats) => writer.write_stats(&stats).unwrap(),
                 LogEntry::Text(text) => writer.write_text(&text).unwrap(),
+                LogEntry::Scene(frame) => writer.write_scene(&frame).unwrap(),
                 _ => {}
             }
         }

@@ -1,6 +1,6 @@
 //! What a reader finds in a log, in the order it was written, and the part of it that is asked for.
 
-use super::records::{Environment, LogRecord, TextEvent};
+use super::records::{Environment, LogRecord, SceneFrame, TextEvent};
 use super::stats::GroupStats;
 use crate::runtime::Nanos;
 
@@ -22,6 +22,9 @@ pub enum LogEntry {
     Stats(GroupStats),
     /// An event in words.
     Text(TextEvent),
+    /// A picture of the topic `/scene`, if [asked for](super::LogReader::with_scene): its surface. Tools and forces are in the
+    /// records.
+    Scene(SceneFrame),
 }
 
 /// A span of log time, counted from the start of the run. Two windows that meet share no record.
@@ -62,6 +65,7 @@ impl Window {
             LogEntry::Record(record) => self.contains(record.time()),
             LogEntry::Stats(stats) => self.contains(stats.time),
             LogEntry::Text(event) => self.contains(event.time),
+            LogEntry::Scene(frame) => self.contains(frame.time),
         }
     }
 }

@@ -137,6 +137,7 @@ pub fn time_of(entry: &LogEntry) -> Nanos {
         LogEntry::Record(record) => record.time(),
         LogEntry::Stats(stats) => stats.time,
         LogEntry::Text(event) => event.time,
+        LogEntry::Scene(frame) => frame.time,
     }
 }
 
@@ -184,6 +185,7 @@ pub fn log_of(entries: &[LogEntry], chunk: usize) -> Vec<u8> {
             LogEntry::Text(event) => writer.write_text(event).unwrap(),
             LogEntry::Stats(stats) => writer.write_stats(stats).unwrap(),
             LogEntry::Environment(environment) => writer.set_environment(environment),
+            LogEntry::Scene(frame) => writer.write_scene(frame).unwrap(),
             LogEntry::Attachment { .. } => {}
         }
         if i % chunk == chunk - 1 {

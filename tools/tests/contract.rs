@@ -302,6 +302,7 @@ fn a_virtual_log_is_in_time_order_from_front_to_back() {
             LogEntry::Record(record) => Some(record.time().0),
             LogEntry::Stats(stats) => Some(stats.time.0),
             LogEntry::Text(event) => Some(event.time.0),
+            LogEntry::Scene(frame) => Some(frame.time.0),
         })
         .collect();
     assert!(times.len() > 10_000 && times.is_sorted());

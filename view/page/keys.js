@@ -24,6 +24,8 @@ function startKeys(canvas) {
       c: nextColouring,
       p: () => element("save-png").click(),
       " ": () => element("play").click(),
+      ",": () => element("back").click(),
+      ".": () => element("step").click(),
     };
     const act = /^[0-6]$/.test(event.key) ? () => look(Number(event.key)) : keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!act) return;

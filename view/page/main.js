@@ -24,6 +24,9 @@ function drawLabels(canvas) {
     context.fillStyle = tint;
     context.fillText(text, x, y);
   };
+  // Where the tool and the deepest node are in the picture, for whoever tests the page.
+  const place = (at) => (at ? onScreen(at, width, height)?.map(Math.round).join() ?? "" : "");
+  Object.assign(element("picture").dataset, { tool: place(state.tools[state.device]?.position), deepest: place(state.deepestPlace), deepestMm: (1000 * state.deepest).toFixed(3) });
   context.textAlign = "left";
   context.textBaseline = "middle";
   const taken = [];
@@ -63,6 +66,8 @@ function frame(now) {
   drawLabels(element("labels"));
   clock.frames += 1;
   picture.dataset.frames = clock.frames;
+  // When the body was first seen (ms after the page was asked for).
+  if (painter.count > 0) picture.dataset.firstMs ??= Math.round(performance.now());
   if (now - clock.strips > 33) { clock.strips = now; drawStrips(); showLegend(); }
   if (now - clock.numbers > 100) { clock.numbers = now; readOut(); }
   requestAnimationFrame(frame);

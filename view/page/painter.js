@@ -112,7 +112,9 @@ function uploadSurface() {
   }
   normalsOf(state.positions, state.triangles, painter.normals);
   depths(painter.values);
-  state.deepest = painter.values.reduce((most, value) => Math.max(most, value), 0);
+  const deepest = painter.values.reduce((best, value, node) => (value > painter.values[best] ? node : best), 0);
+  state.deepest = Math.max(0, painter.values[deepest]);
+  state.deepestPlace = [...state.positions.subarray(3 * deepest, 3 * deepest + 3)];
   let values = painter.values;
   if (state.colourBy === "pressure") {
     pressures(painter.pressures, painter.normals, painter.areas);

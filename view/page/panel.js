@@ -15,6 +15,7 @@ function showHello() {
   ["model", "friction", "stiffness", "reset", "home"].forEach((id) => { element(id).disabled = !may || hello.mode === "log"; });
   element("reset").hidden = !hello.can_restart;
   element("home").hidden = hello.mode === "log";
+  showPlayer();
   element("save-log").hidden = !hello.has_samples || hello.mode === "log";
   if (hello.can_restart) {
     element("model").replaceChildren(...hello.models.map((name) => new Option(name, name)));

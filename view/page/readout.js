@@ -21,6 +21,15 @@ function readOut() {
     // Which tick it is, for whoever compares it with the log.
     Object.assign(commanded.dataset, { tick: row.time, x: row.cx, y: row.cy, z: row.cz });
   }
+  const isLog = state.hello?.mode === "log";
+  element("n-skipped").parentElement.hidden = isLog;
+  if (isLog) {
+    // Of the seconds that are shown: a log has no sums.
+    const places = [...own.within(state.time - SPAN_S, state.time)];
+    const p99 = (column) => places.map((n) => own.columns[column][n]).sort((a, b) => a - b)[Math.ceil(0.99 * places.length) - 1] * 1e-6;
+    put("n-lateness", withUnit(p99("lateness"), "s"));
+    put("n-execution", withUnit(p99("execution"), "s"));
+  }
   const haptic = state.stats?.groups?.[0];
   if (haptic) {
     put("n-lateness", withUnit(haptic.lateness_us.p99 * 1e-6, "s"));

@@ -15,6 +15,7 @@ const state = {
   device: 0, // whose numbers and strips are shown, and which tool a drag moves
   colourBy: "depth",
   deepest: 0, // m
+  deepestPlace: null,
   stats: null,
   isNew: { topology: false, surface: false },
 };

@@ -33,6 +33,7 @@ function hear(message) {
   if (message.kind === "hello") {
     state.hello = message;
     state.role = message.role;
+    hand.target = null;
     state.device = Math.min(state.device, Math.max(0, message.tools.length - 1));
     rings.forEach((ring) => ring.clear());
     Object.assign(colouring.top, { depth: 0.002, pressure: 500 });
@@ -40,11 +41,15 @@ function hear(message) {
     showHello();
   } else if (message.kind === "role") {
     state.role = message.role;
+    hand.target = null;
     showHello();
   } else if (message.kind === "note") {
     say(message.text);
+  } else if (message.kind === "clear") {
+    rings.forEach((ring) => ring.clear());
   } else if (message.kind === "stats") {
     state.stats = message;
+    if (message.ended) say("The session has ended. Reset starts another one, where that can be.");
   }
 }
 

@@ -60,6 +60,11 @@ impl Outbox {
     /// What is of a session that is over.
     pub(crate) fn forget(&mut self) {
         self.newest = Default::default();
+        self.forget_samples();
+    }
+
+    /// Samples of another time than the browser shows now.
+    pub(crate) fn forget_samples(&mut self) {
         self.samples.clear();
     }
 

@@ -164,6 +164,14 @@ impl Hub {
         locked(&self.state).browsers.iter().for_each(|browser| browser.outbox().say(text.clone()));
     }
 
+    /// Shows one browser what it asked for.
+    pub(crate) fn to_one(&self, number: u64, tell: impl FnOnce(&mut Outbox)) {
+        let browser = locked(&self.state).browsers.iter().find(|browser| browser.number == number).cloned();
+        if let Some(browser) = browser {
+            tell(&mut browser.outbox());
+        }
+    }
+
     pub(crate) fn count_sent(&self, bytes: usize) {
         locked(&self.state).sent_bytes += bytes as u64;
     }

@@ -24,6 +24,7 @@
 //! | `wish` | what a page may say |
 //! | `hub`, `client` | where the threads meet; what waits for one browser |
 //! | `stage`, `subject`, `live` | the session's thread; what it is made of; what is shown of it |
+//! | `playback` | a log in place of a session |
 //! | `frames`, `samples` | pictures and ticks in bytes |
 //! | `recent` | the newest minute, as a log |
 //! | `page` | html, style and script |
@@ -36,6 +37,7 @@ mod hub;
 mod live;
 mod options;
 mod page;
+mod playback;
 mod recent;
 mod samples;
 mod server;
@@ -44,6 +46,7 @@ mod stage;
 mod subject;
 mod wish;
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
@@ -56,6 +59,7 @@ pub use subject::Pushed;
 
 use guard::Token;
 use hub::Hub;
+use playback::Playback;
 use server::Door;
 use stage::Stage;
 use wish::Wish;
@@ -86,6 +90,25 @@ pub fn serve_scene(pushed: Pushed, options: &Options) -> Result<Server, Error> {
     let (door, hub, wishes) = prepare(options)?;
     let stage = Stage::of_scene(Arc::clone(&hub), wishes, pushed)?;
     Server::start(door, hub, move || stage.run())
+}
+
+/// Shows a log with pictures (topic `/scene`): a visitor plays it, steps through it, slower and faster.
+///
+/// # Errors
+/// Those of [`serve`]; [`ErrorKind::Io`](palpate::ErrorKind::Io) and [`ErrorKind::Log`](palpate::ErrorKind::Log) if the log cannot be
+/// read or has no pictures.
+///
+/// # Real-time
+/// Not for a tick: reads a file, starts threads.
+pub fn serve_log(log: &Path, options: &Options) -> Result<Server, Error> {
+    let playback = Playback::open(log)?;
+    let (door, hub, wishes) = prepare(options)?;
+    let shared = Arc::clone(&hub);
+    let show = move || {
+        playback.run(&shared, &wishes);
+        None
+    };
+    Server::start(door, hub, show)
 }
 
 /// What every server has before there is anything to show.

@@ -1,5 +1,6 @@
 //! A session that runs, as pictures and samples for browsers. On a thread of its own, 60 times a second.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -30,6 +31,8 @@ pub(crate) struct Live {
     records: Option<SharedRecords>,
     environment: Environment,
     topology: Topology,
+    /// Its triangles, for pictures of a log.
+    triangles: Arc<[[u32; 3]]>,
     /// The positions at the start (m), of the surface's nodes.
     first: Vec<[f64; 3]>,
     /// The newest positions (m).
@@ -49,8 +52,8 @@ impl Live {
         let topology = Topology::of(&viewer.as_ref().map(Viewer::triangles).unwrap_or_default());
         let first = viewer.as_mut().map_or(Vec::new(), |viewer| topology.points(&viewer.surface().positions).collect());
         let (rows, touches, told) = (Rows::default(), Vec::new(), Instant::now());
-        let (points, surface) = (first.clone(), None);
-        Self { running, viewer, records, environment, topology, first, points, surface, rows, touches, told }
+        let (points, surface, triangles) = (first.clone(), None, topology.triangles.as_slice().into());
+        Self { running, viewer, records, environment, topology, triangles, first, points, surface, rows, touches, told }
     }
 
     /// What is told of it to everybody; `about` is what the subject knows.
@@ -67,7 +70,7 @@ impl Live {
             pointers.iter().map(|pointer| pointer.as_ref().map_or([0.0; 3], |pointer| pointer.home())).collect();
         let corner = |side: usize, room: f64| -> [f64; 3] {
             std::array::from_fn(|axis| {
-                let beyond = homes.iter().map(|home| home[axis]);
+                let beyond = pointers.iter().flatten().map(|pointer| pointer.home()[axis]);
                 let reach = match side {
                     0 => beyond.fold(extents[axis][0], f64::min),
                     _ => beyond.fold(extents[axis][1], f64::max),
@@ -154,7 +157,7 @@ impl Live {
         let frame = SceneFrame {
             time,
             surface_time: time,
-            triangles: self.topology.triangles.as_slice().into(),
+            triangles: Arc::clone(&self.triangles),
             points: self.points.clone(),
             tool_size_m: POINT * (0..3).map(size).fold(0.0, f64::max),
             tools: (0..).zip(tools).map(|(number, tool)| self.scene_tool(number, tool)).collect(),

@@ -80,36 +80,43 @@ impl Rows {
 
     /// The rows that are whole, a message per device.
     pub(crate) fn take(&mut self) -> Vec<Bytes> {
-        let ready = self.newest.saturating_sub(JOINED);
-        self.until(ready)
-    }
-
-    /// All rows, when nothing follows any more.
-    #[cfg(test)]
-    pub(crate) fn finish(&mut self) -> Vec<Bytes> {
-        self.until(Nanos(u64::MAX))
-    }
-
-    fn until(&mut self, ready: Nanos) -> Vec<Bytes> {
         let mut by_device: BTreeMap<u16, Vec<(Nanos, Row)>> = BTreeMap::new();
+        let ready = self.newest.saturating_sub(JOINED);
+        self.until(ready, |device, time, row| by_device.entry(device).or_default().push((time, row)));
+        by_device.into_iter().map(|(device, rows)| block(device, self.deadline, &rows)).collect()
+    }
+
+    /// All rows by device and time, when nothing follows any more.
+    pub(crate) fn all(mut self) -> Vec<(u16, Nanos, Row)> {
+        let mut rows = Vec::new();
+        self.until(Nanos(u64::MAX), |device, time, row| rows.push((device, time, row)));
+        rows
+    }
+
+    /// The time that a tick of the haptic group has.
+    pub(crate) fn deadline(&self) -> Nanos {
+        self.deadline
+    }
+
+    fn until(&mut self, ready: Nanos, mut pass_on: impl FnMut(u16, Nanos, Row)) {
         for ((device, time), mut row) in self.waiting.extract_if(.., |(_, time), _| *time < ready) {
             [row.lateness_us, row.execution_us] = self.timings.get(&time).copied().unwrap_or_default();
-            by_device.entry(device).or_default().push((time, row));
+            pass_on(device, time, row);
         }
         self.timings = self.timings.split_off(&ready);
-        by_device.into_iter().map(|(device, rows)| self.bytes(device, &rows)).collect()
     }
+}
 
-    fn bytes(&self, device: u16, rows: &[(Nanos, Row)]) -> Bytes {
-        let first = rows.first().map_or(Nanos::ZERO, |row| row.0);
-        let mut to = Writer::new(3, 24 + 4 * Row::FLOATS * rows.len());
-        to.u32(device.into()).f64(first.as_secs_f64()).f64(self.deadline.as_secs_f64());
-        for (time, row) in rows {
-            to.f32(1e3 * time.saturating_sub(first).as_secs_f64() as f32);
-            row.numbers().into_iter().for_each(|number| to.f32(number as f32));
-        }
-        to.0.into()
+/// The message of `rows`, whose ticks have so much time.
+pub(crate) fn block(device: u16, deadline: Nanos, rows: &[(Nanos, Row)]) -> Bytes {
+    let first = rows.first().map_or(Nanos::ZERO, |row| row.0);
+    let mut to = Writer::new(3, 24 + 4 * Row::FLOATS * rows.len());
+    to.u32(device.into()).f64(first.as_secs_f64()).f64(deadline.as_secs_f64());
+    for (time, row) in rows {
+        to.f32(1e3 * time.saturating_sub(first).as_secs_f64() as f32);
+        row.numbers().into_iter().for_each(|number| to.f32(number as f32));
     }
+    to.0.into()
 }
 
 impl Row {
@@ -162,12 +169,13 @@ mod tests {
             let mut rows = Rows::default();
             order.iter().for_each(|&place| rows.push(&records[place]));
             assert!(rows.take().is_empty(), "more may come");
-            let messages = rows.finish();
-            assert_eq!((messages.len(), messages[0].len()), (1, 24 + 4 * Row::FLOATS));
-            let float = |n: usize| f32::from_le_bytes(messages[0][24 + 4 * n..][..4].try_into().unwrap());
+            let deadline = rows.deadline();
+            let rows: Vec<_> = rows.all().into_iter().map(|(_, time, row)| (time, row)).collect();
+            let message = block(0, deadline, &rows);
+            assert_eq!((rows.len(), message.len()), (1, 24 + 4 * Row::FLOATS));
+            let float = |n: usize| f32::from_le_bytes(message[24 + 4 * n..][..4].try_into().unwrap());
             assert_eq!([float(1), float(6), float(7), float(8), float(9)], [0.1, 1.0, 10.0, 50.0, 20.0]);
-            assert_eq!(f64::from_le_bytes(messages[0][16..24].try_into().unwrap()), 1e-3, "the deadline");
-            assert!(rows.finish().is_empty(), "a row is told once");
+            assert_eq!(f64::from_le_bytes(message[16..24].try_into().unwrap()), 1e-3, "the deadline");
         }
     }
 }

@@ -74,7 +74,12 @@ impl Server {
         let shared = Arc::clone(&hub);
         let accept = move || accept(&listener, &shared, address, &title);
         let accepting = std::thread::Builder::new().name("view-accept".into()).spawn(accept).map_err(failed)?;
-        let stage = std::thread::Builder::new().name("view".into()).spawn(stage).map_err(failed)?;
+        let ends = Ends(Arc::clone(&hub));
+        let run = move || {
+            let _ends = ends;
+            stage()
+        };
+        let stage = std::thread::Builder::new().name("view".into()).spawn(run).map_err(failed)?;
         Ok(Self { hub, address, stage: Some(stage), accepting: Some(accepting) })
     }
 
@@ -161,6 +166,15 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.end();
+    }
+}
+
+/// Ends the server with the session's thread, also when that panics: nobody waits for what does not come.
+struct Ends(Arc<Hub>);
+
+impl Drop for Ends {
+    fn drop(&mut self) {
+        self.0.end();
     }
 }
 

@@ -27,7 +27,7 @@ impl Stage {
     /// A stage for a session that runs already.
     pub(crate) fn of_running(hub: Arc<Hub>, wishes: Receiver<(u64, Wish)>, running: Running) -> Self {
         let mut stage = Self { hub, wishes, subject: None, change: Change::default(), live: None };
-        stage.put(running);
+        stage.put(running, &Change::default());
         stage
     }
 
@@ -37,16 +37,15 @@ impl Stage {
     /// If the scene cannot be run.
     pub(crate) fn of_scene(hub: Arc<Hub>, wishes: Receiver<(u64, Wish)>, mut subject: Pushed) -> Result<Self, Error> {
         let change = Change::default();
-        let (running, result) = subject.start(&change, None);
-        result?;
-        let mut stage = Self { hub, wishes, subject: Some(subject), change, live: None };
-        running.into_iter().for_each(|running| stage.put(running));
+        let running = subject.session(&change)?.start()?;
+        let mut stage = Self { hub, wishes, subject: Some(subject), change: change.clone(), live: None };
+        stage.put(running, &change);
         Ok(stage)
     }
 
-    fn put(&mut self, running: Running) {
+    fn put(&mut self, running: Running, change: &Change) {
         let about = match &self.subject {
-            Some(subject) => subject.about(&self.change),
+            Some(subject) => subject.about(change),
             None => json!({ "can_restart": false }),
         };
         let mut live = Live::new(running);
@@ -86,23 +85,36 @@ impl Stage {
         }
     }
 
-    /// Puts another session in the place of this one; one that cannot be is only told of.
+    /// Puts another session in the place of this one; a change that cannot be is only told of.
     fn restart(&mut self, change: Change) {
-        let Some(subject) = &mut self.subject else { return };
         let change = change.after(self.change.clone());
-        self.hub.say(&note("The body starts anew, as changed ..."));
-        let before = self.live.take().map(|live| live.running);
-        let (running, result) = subject.start(&change, before);
-        if result.is_ok() {
-            self.change = change;
+        self.hub.say(&note("The body starts anew ..."));
+        let result = self.replace(&change);
+        match result {
+            Ok(()) => self.change = change,
+            // What is shown goes on, or, if that has ended, starts anew as it was.
+            Err(error) => {
+                if self.live.is_none() {
+                    let _ = self.replace(&self.change.clone());
+                }
+                let rest = if self.live.is_some() {
+                    ""
+                } else {
+                    " There is no session now: reset, or start the command again."
+                };
+                self.hub.say(&note(&format!("That does not work: {error}.{rest}")));
+            }
         }
-        match running {
-            Some(running) => self.put(running),
-            None => self.hub.say(&note("There is no session: change something, or start the command again.")),
-        }
-        if let Err(error) = result {
-            self.hub.say(&note(&format!("That does not work, the body starts anew as it was: {error}")));
-        }
+    }
+
+    /// Ends the session and starts one with this `change`. The one that is shown is ended only for one that is sure to work.
+    fn replace(&mut self, change: &Change) -> Result<(), Error> {
+        let Some(subject) = &mut self.subject else { return Ok(()) };
+        let session = subject.session(change)?;
+        // Two sessions at a time would be late by each other.
+        drop(self.live.take().map(|live| live.running.stop()));
+        self.put(session.start()?, change);
+        Ok(())
     }
 }
 

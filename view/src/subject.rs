@@ -65,21 +65,11 @@ impl Pushed {
         &self.scene
     }
 
-    /// Starts a session with what a visitor changed. `before` is ended once the new one is sure to work.
-    pub(crate) fn start(&mut self, change: &Change, before: Option<Running>) -> (Option<Running>, Result<(), Error>) {
-        let session = match self.session(change) {
-            Ok(session) => session,
-            Err(error) => return (before, Err(error)),
-        };
-        // Two sessions at a time would be late by each other.
-        drop(before.map(Running::stop));
-        match session.start() {
-            Ok(running) => (Some(running), Ok(())),
-            Err(error) => (None, Err(error)),
-        }
-    }
-
-    fn session(&mut self, change: &Change) -> Result<Session, Error> {
+    /// A session with what a visitor changed, checked and not started.
+    ///
+    /// # Errors
+    /// If it cannot work.
+    pub(crate) fn session(&mut self, change: &Change) -> Result<Session, Error> {
         let mut builder = Session::from_scene(changed(self.scene.clone(), change)?).endless().share_records();
         if let Some(open) = self.open_haply {
             builder = builder.open_haply_with(open);

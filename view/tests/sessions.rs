@@ -4,7 +4,7 @@ mod visitor;
 
 use palpate::log::{LogEntry, LogReader, LogRecord};
 use palpate::prelude::*;
-use palpate_view::Options;
+use palpate_view::{Options, Pushed};
 use tungstenite::Message;
 use visitor::{ask, enter, find, say, server, tool};
 
@@ -32,6 +32,36 @@ fn the_tool_goes_where_the_pointer_is_and_a_new_session_keeps_the_pointer() {
     assert_eq!((second["stiffness"].as_f64(), second["session"].as_u64()), (Some(2.0), Some(2)));
     assert!(find(&mut visitor, |message| tool(message).filter(|tool| tool.2 == [0.05, 0.05, 0.16])).is_some());
     assert!(server.stop().is_some_and(|summary| summary.runtime.fault.is_none()));
+}
+
+#[test]
+fn a_session_that_cannot_start_is_told_of_and_the_body_starts_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    // The second session has no place for its log.
+    std::fs::create_dir(folder.path().join("felt-2.mcap")).unwrap();
+    let pushed = Pushed::new(Scene::demo()).log(folder.path().join("felt.mcap"));
+    let server = palpate_view::serve_scene(pushed, &Options::default()).unwrap();
+    let token = server.url().split_once('#').unwrap().1.to_owned();
+    let mut visitor = enter(&server, &token);
+    assert_eq!(find(&mut visitor, hello).unwrap()["session"], 1);
+    say(&mut visitor, r#"{"do":"restart","friction":0.1}"#);
+    // What was said before the new session is read first or after it.
+    let (mut again, mut told) = (None, None);
+    find(&mut visitor, |message| {
+        let message = text(message)?;
+        match message["kind"].as_str() {
+            Some("hello") => again = Some(message),
+            Some("note") => {
+                told = message["text"].as_str().map(str::to_owned).filter(|words| words.contains("not work"))
+            }
+            _ => {}
+        }
+        (again.is_some() && told.is_some()).then_some(())
+    });
+    let again = again.unwrap();
+    assert_eq!((&again["session"], &again["friction"]), (&3.into(), &0.5.into()), "{told:?}");
+    assert!(told.unwrap().contains("felt-2.mcap"));
+    assert!(find(&mut visitor, tool).is_some());
 }
 
 #[test]

@@ -148,7 +148,7 @@ impl Analysis {
     pub fn push_entry(&mut self, entry: &LogEntry) {
         match entry {
             LogEntry::Environment(environment) => self.set_environment(environment),
-            LogEntry::Attachment { .. } => {}
+            LogEntry::Attachment { .. } | LogEntry::Scene(_) => {}
             LogEntry::Record(record) => self.push(record),
             LogEntry::Stats(stats) => self.set_lost(stats.group, stats.lost_records),
             LogEntry::Text(event) => self.push_text(event),

@@ -41,6 +41,23 @@ impl SceneUpdate {
         }
         Self { deletions: Vec::new(), entities, time_ns: frame.time }
     }
+
+    /// The picture's surface, as it was written; `None` if it has none, or if a corner is none of its points.
+    pub(crate) fn surface(self) -> Option<SceneFrame> {
+        let entity = self.entities.into_iter().find(|entity| entity.id == "surface")?;
+        let mesh = entity.triangles.into_iter().next()?;
+        let corners = mesh.indices.0.as_chunks::<3>().0;
+        let points: Vec<[f64; 3]> = mesh.points.iter().map(|point| [point.x, point.y, point.z]).collect();
+        let is_whole = corners.iter().flatten().all(|&corner| (corner as usize) < points.len())
+            && points.iter().flatten().all(|c| c.is_finite());
+        is_whole.then(|| SceneFrame {
+            time: self.time_ns,
+            surface_time: self.time_ns,
+            triangles: corners.into(),
+            points,
+            ..SceneFrame::default()
+        })
+    }
 }
 
 fn entity(id: String, time: Nanos, epoch_ns: u64) -> SceneEntity {
@@ -267,5 +284,21 @@ mod tests {
         assert_eq!((contacts.spheres.len(), contacts.arrows.len()), (0, 0), "it replaces the one before");
         tool.shape = ToolShape::Point;
         assert_eq!(drawn(&tool), None);
+    }
+    #[test]
+    fn a_surface_reads_back_as_it_was_written_and_one_that_is_none_not_at_all() {
+        let frame = SceneFrame {
+            time: Nanos(7),
+            surface_time: Nanos(7),
+            triangles: vec![[0, 1, 2], [2, 1, 0]].into(),
+            points: vec![[0.1, 0.2, 0.3], [1e-300, -0.0, 5.0], [1.0, 2.0, 3.0]],
+            ..SceneFrame::default()
+        };
+        assert_eq!(SceneUpdate::of(&frame, 1 << 60).surface(), Some(frame.clone()));
+        let wrong = SceneFrame { triangles: vec![[0, 1, 3]].into(), ..frame.clone() };
+        assert_eq!(SceneUpdate::of(&wrong, 0).surface(), None, "a corner that there is not");
+        let endless = SceneFrame { points: vec![[f64::NAN; 3]; 3], ..frame };
+        assert_eq!(SceneUpdate::of(&endless, 0).surface(), None);
+        assert_eq!(SceneUpdate::default().surface(), None);
     }
 }

@@ -61,6 +61,8 @@ pub struct LogReader<R> {
     /// What other programs' channels together say of the run; `None` in a log of palpate's.
     foreign: Option<Environment>,
     foreign_base: Option<u64>,
+    /// Pictures are read too.
+    has_scene: bool,
 }
 
 struct Channel {
@@ -101,7 +103,16 @@ impl<R: Read> LogReader<R> {
             left: VecDeque::new(),
             foreign: Some(foreign_environment()),
             foreign_base: None,
+            has_scene: false,
         })
+    }
+
+    /// Also reads the pictures of the topic `/scene`, as [`LogEntry::Scene`]: they are most of a log that has them, and only who
+    /// draws needs them.
+    #[must_use]
+    pub fn with_scene(mut self) -> Self {
+        self.has_scene = true;
+        self
     }
 
     /// The damage of the log and its place, in one line; known only once the iterator has ended.
@@ -234,6 +245,10 @@ impl<R: Read> LogReader<R> {
             let records = contact.points().map(LogRecord::ContactPoint).chain([LogRecord::Contact(contact.sample())]);
             self.left.extend(records.map(LogEntry::Record));
             return Ok(self.left.pop_front());
+        }
+        if kind == TopicKind::Scene && self.has_scene {
+            let update = foxglove::SceneUpdate::decode(&data).map_err(|e| damaged(&e))?;
+            return Ok(update.surface().map(LogEntry::Scene));
         }
         LogEntry::decode(kind, &data).map_err(|e| damaged(&e))
     }

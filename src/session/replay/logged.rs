@@ -90,7 +90,7 @@ impl Gathered {
                 self.session = Some(String::from_utf8_lossy(&data).into_owned());
             }
             LogEntry::Attachment { name, data } if name == Environment::MESH => self.mesh = Some(data),
-            LogEntry::Attachment { .. } => {}
+            LogEntry::Attachment { .. } | LogEntry::Scene(_) => {}
             LogEntry::Stats(stats) => {
                 self.stats.insert(stats.group, stats);
             }

@@ -59,7 +59,7 @@ enum Command {
     Export(export::ExportArgs),
     /// Look into a log, check it, or save what is readable of a damaged one
     Log(log::LogArgs),
-    /// Show a scene in the browser and push it with the mouse
+    /// Show a scene in the browser and push it with the mouse, or play a log
     View(view::ViewArgs),
     /// Be a device's service without the device, to try a scene against it
     Mock(mock::MockArgs),

@@ -1,13 +1,14 @@
 //! `palpate view [SCENE|LOG]`: a page in the browser.
 
-use std::io::IsTerminal;
+use std::fs::File;
+use std::io::{IsTerminal, Read};
 use std::net::IpAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use palpate::Error;
 use palpate::scene::{ModelChoice, Scene};
+use palpate::{Error, ErrorKind};
 use palpate_view::{Options, Pushed, Server};
 
 use super::{files, progress, run, shared};
@@ -18,7 +19,8 @@ const LOOK: Duration = Duration::from_millis(100);
 /// The arguments of `palpate view`.
 #[derive(Debug, clap::Args)]
 pub struct ViewArgs {
-    /// The scene file (TOML); the demo scene if left out
+    /// The scene file (TOML), or a log with pictures (MCAP); the demo scene if left out
+    #[arg(value_name = "SCENE|LOG")]
     pub scene: Option<PathBuf>,
     /// Listen on this port; a free one if left out
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -40,11 +42,14 @@ pub struct ViewArgs {
     pub no_browser: bool,
 }
 
-/// Shows a scene until it is interrupted.
+/// Shows a scene or a log until it is interrupted.
 ///
 /// # Errors
 /// Input errors of the scene, a port that is taken, or a failed run.
 pub fn run(args: &ViewArgs) -> Result<(), Error> {
+    if let Some(log) = args.scene.as_deref().filter(|path| is_log(path)) {
+        return show_log(log, args);
+    }
     let (mut scene, name) = match &args.scene {
         Some(path) => (progress::load(path)?, shared::name_of(path)),
         None => (Scene::demo(), "demo scene".to_owned()),
@@ -60,6 +65,29 @@ pub fn run(args: &ViewArgs) -> Result<(), Error> {
     let pushed = args.out.iter().fold(pushed, |pushed, out| pushed.log(out));
     let preparing = progress::preparing(&name);
     let server = palpate_view::serve_scene(pushed, &options(args, &name)).map_err(|error| error.at(&name));
+    preparing.finish_and_clear();
+    show(server?, args, &name)
+}
+
+/// True if `path` is a log by its first bytes; what cannot be read is an error of the scene.
+fn is_log(path: &Path) -> bool {
+    let mut magic = [0; 5];
+    let file = File::open(path).ok().filter(|_| path.is_file());
+    file.is_some_and(|mut file| file.read_exact(&mut magic).is_ok()) && &magic == b"\x89MCAP"
+}
+
+fn show_log(log: &Path, args: &ViewArgs) -> Result<(), Error> {
+    for (is_given, option) in
+        [(args.model.is_some(), "--model"), (args.out.is_some(), "--out"), (args.watch, "--watch")]
+    {
+        if is_given {
+            let message = format!("{option} is for scenes, and {} is a log: leave it out", shared::name_of(log));
+            return Err(Error::new(ErrorKind::Usage, message));
+        }
+    }
+    let name = shared::name_of(log);
+    let preparing = progress::preparing(&name);
+    let server = palpate_view::serve_log(log, &options(args, &name));
     preparing.finish_and_clear();
     show(server?, args, &name)
 }
@@ -84,8 +112,13 @@ fn show(server: Server, args: &ViewArgs, name: &str) -> Result<(), Error> {
     }
     let interrupt = shared::waits()?;
     while !interrupt.came() && !server.wait_for(LOOK) {}
-    match server.stop() {
-        Some(summary) => shared::print(&summary.to_string()),
+    let Some(summary) = server.stop() else { return Ok(()) };
+    shared::print(&summary.to_string())?;
+    if let Some(fault) = summary.runtime.fault {
+        return Err(Error::new(ErrorKind::Fault, fault.to_string()).at(name));
+    }
+    match summary.log_error {
+        Some(error) => Err(Error::new(ErrorKind::Fault, format!("the log is incomplete: {error}"))),
         None => Ok(()),
     }
 }

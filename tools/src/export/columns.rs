@@ -118,7 +118,7 @@ pub(super) fn point_cells(entry: &LogEntry, row: &mut Vec<Cell>) {
 pub(super) fn cells(entry: &LogEntry, is_turned: bool, row: &mut Vec<Cell>) {
     row.clear();
     match entry {
-        LogEntry::Environment(_) | LogEntry::Attachment { .. } => {}
+        LogEntry::Environment(_) | LogEntry::Attachment { .. } | LogEntry::Scene(_) => {}
         LogEntry::Record(record) => {
             record_cells(record, row);
             if is_turned {

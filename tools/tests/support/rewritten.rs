@@ -24,6 +24,7 @@ pub fn rewrite_log(log: &Path, session: impl Fn(String) -> String, record: impl 
         match entry {
             LogEntry::Record(found) => writer.write(&record(found)).unwrap(),
             LogEntry::Text(event) => writer.write_text(&event).unwrap(),
+            LogEntry::Scene(frame) => writer.write_scene(&frame).unwrap(),
             LogEntry::Stats(stats) => writer.write_stats(&stats).unwrap(),
             LogEntry::Environment(_) | LogEntry::Attachment { .. } => {}
         }
