@@ -52,11 +52,11 @@ LAYOUT = """(() => {
 STATE = """(() => {
   const text = (id) => document.getElementById(id).textContent;
   const { tick, x, y, z } = document.getElementById("n-commanded").dataset;
-  const { tool, deepest, deepestMm, frames, firstMs } = document.getElementById("picture").dataset;
+  const { tool, deepest, deepestMm, frames, firstMs, distance } = document.getElementById("picture").dataset;
   const place = (text) => (text ? text.split(",").map(Number) : null);
   const box = document.getElementById("picture").getBoundingClientRect();
   return { status: text("status"), note: text("note"), time: parseFloat(text("n-time")), contact: text("n-contact"), commanded: text("n-commanded"),
-    tick: tick === undefined ? null : [tick, x, y, z].map(Number), tool: place(tool), deepest: place(deepest), deepest_mm: +deepestMm, frames: +frames, first: firstMs ?? null, left: box.left, top: box.top,
+    tick: tick === undefined ? null : [tick, x, y, z].map(Number), tool: place(tool), deepest: place(deepest), deepest_mm: +deepestMm, frames: +frames, first: firstMs ?? null, distance: +distance, left: box.left, top: box.top,
     scrub: document.getElementById("scrub").value, model: document.getElementById("model").value };
 })()"""
 
@@ -148,6 +148,32 @@ def push(check, browser):
     return pushed
 
 
+def touch(check, browser):
+    """A finger lifts the tool, two fingers move it in depth; keys bring it home."""
+    size(browser, 390, "light")
+    first = browser.run(STATE)
+    x, y = first["left"] + first["tool"][0], first["top"] + first["tool"][1]
+    point = lambda x, y, number=0: {"x": x, "y": y, "id": number}
+    send = lambda kind, *points: browser.send("Input.dispatchTouchEvent", type=kind, touchPoints=list(points))
+    send("touchStart", point(x, y))
+    for step in range(1, 9):
+        send("touchMove", point(x, y - 8 * step))
+        time.sleep(0.05)
+    lifted = wait(browser, lambda state: state["tool"][1] < first["tool"][1] - 40, "lifting by a finger")
+    check.that(lifted["deepest_mm"] < first["deepest_mm"], "the body is as deep when the tool has gone")
+    before = browser.run(STATE)["distance"]
+    send("touchStart", point(x, y - 64), point(x + 40, y - 64, 1))
+    for step in range(1, 6):
+        send("touchMove", point(x, y - 64), point(x + 40 + 10 * step, y - 64, 1))
+        time.sleep(0.05)
+    send("touchEnd")
+    check.that(wait(browser, lambda state: state["distance"] != before, "a pinch")["distance"] > before, "fingers that part do not push the tool away")
+    browser.run("document.getElementById('picture').focus()")
+    key(browser, "h")
+    wait(browser, lambda state: state["contact"] == "free" and state["deepest_mm"] < 0.5, "the way home")
+    size(browser, 1280, "light")
+
+
 def commanded(palpate, log):
     """`/force_commanded` of a log by its time in microseconds (N)."""
     table = subprocess.run([palpate, "export", log, "--topic", "/force_commanded", "--format", "csv"], capture_output=True, text=True, check=True).stdout
@@ -186,6 +212,7 @@ def check_live(check, browser, palpate, log, shots):
         browser.run("(() => { const c = document.getElementById('colour'); c.value = 'pressure'; c.dispatchEvent(new Event('change')); })()")
         time.sleep(0.6)
         shoot(browser, shots, "pressure-1280-light")
+        touch(check, browser)
         # Another session takes the place of this one.
         browser.run("(() => { const m = document.getElementById('model'); m.value = 'hold'; m.dispatchEvent(new Event('change')); })()")
         wait(browser, lambda state: "model hold" in state["status"], "another model")

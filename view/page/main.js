@@ -24,9 +24,9 @@ function drawLabels(canvas) {
     context.fillStyle = tint;
     context.fillText(text, x, y);
   };
-  // Where the tool and the deepest node are in the picture, for whoever tests the page.
+  // Where the tool and the deepest node are in the picture, and how far off the pointer is, for whoever tests the page.
   const place = (at) => (at ? onScreen(at, width, height)?.map(Math.round).join() ?? "" : "");
-  Object.assign(element("picture").dataset, { tool: place(state.tools[state.device]?.position), deepest: place(state.deepestPlace), deepestMm: (1000 * state.deepest).toFixed(3) });
+  Object.assign(element("picture").dataset, { tool: place(state.tools[state.device]?.position), deepest: place(state.deepestPlace), deepestMm: (1000 * state.deepest).toFixed(3), distance: norm(minus(wantedPlace() ?? [0, 0, 0], eye())).toFixed(5) });
   context.textAlign = "left";
   context.textBaseline = "middle";
   const taken = [];
