@@ -189,7 +189,7 @@ impl Live {
             .iter()
             .map(|group| {
                 let figures = |times: &palpate::runtime::Histogram| {
-                    json!({ "p50": us(times.percentile(50.0)), "p99": us(times.percentile(99.0)), "max": us(times.max()) })
+                    json!({ "p50": us(times.percentile(0.5)), "p99": us(times.percentile(0.99)), "max": us(times.max()) })
                 };
                 json!({
                     "name": group.name,

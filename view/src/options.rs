@@ -2,7 +2,7 @@
 
 use std::net::{IpAddr, Ipv4Addr};
 
-/// Where a server listens.
+/// The address, the port and the title of a server.
 ///
 /// ```
 /// use palpate_view::Options;

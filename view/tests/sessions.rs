@@ -34,6 +34,17 @@ fn the_tool_goes_where_the_pointer_is_and_a_new_session_keeps_the_pointer() {
     assert!(server.stop().is_some_and(|summary| summary.runtime.fault.is_none()));
 }
 
+// Check that percentiles are those of the report, and not the largest value under each name.
+#[test]
+fn the_figures_of_a_group_are_in_order() {
+    let (server, token) = server();
+    let mut visitor = enter(&server, &token);
+    let stats = find(&mut visitor, |message| text(message).filter(|message| message["kind"] == "stats")).unwrap();
+    let local = &stats["groups"][0];
+    let [p50, p99, max] = ["p50", "p99", "max"].map(|name| local["execution_us"][name].as_f64().unwrap());
+    assert!(0.0 < p50 && p50 <= p99 && p99 <= max && p50 < max, "{local}");
+}
+
 #[test]
 fn a_session_that_cannot_start_is_told_of_and_the_body_starts_as_it_was() {
     let folder = tempfile::tempdir().unwrap();
