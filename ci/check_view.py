@@ -169,6 +169,11 @@ def touch(check, browser):
     send("touchEnd")
     check.that(wait(browser, lambda state: state["distance"] != before, "a pinch")["distance"] > before, "fingers that part do not push the tool away")
     browser.run("document.getElementById('picture').focus()")
+    for name, nearer in (("PageUp", True), ("PageDown", False)):
+        before = browser.run(STATE)["distance"]
+        key(browser, name)
+        after = wait(browser, lambda state: state["distance"] != before, name)["distance"]
+        check.that((after < before) == nearer, f"{name} moves the tool from {before} m to {after} m from the viewer")
     key(browser, "h")
     wait(browser, lambda state: state["contact"] == "free" and state["deepest_mm"] < 0.5, "the way home")
     size(browser, 1280, "light")

@@ -27,7 +27,7 @@ function projection(aspect) {
 function look(number) {
   const { clientWidth, clientHeight } = element("picture");
   [camera.yaw, camera.pitch] = VIEWS[number];
-  camera.distance = 3.4 * state.size * Math.max(1, (1.1 * clientHeight) / Math.max(1, clientWidth));
+  camera.distance = 1.85 * state.diagonal * Math.max(1, (1.1 * clientHeight) / Math.max(1, clientWidth));
   camera.target = plus(state.centre, [0, 0, 1], 0.12 * state.size);
 }
 

@@ -1,6 +1,6 @@
 
 // The ticks of the last seconds, a ring for each device. A row has the time and these numbers.
-const COLUMNS = ["fx", "fy", "fz", "cx", "cy", "cz", "lateness", "execution", "age", "energy", "ledger", "pressure", "jump", "limits"];
+const COLUMNS = ["fx", "fy", "fz", "cx", "cy", "cz", "lateness", "execution", "age", "energy", "ledger", "pressure", "jump", "limits", "resync"];
 const ROW = COLUMNS.length + 1;
 const ROOM = 1 << 13;
 

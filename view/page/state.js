@@ -8,6 +8,7 @@ const state = {
   positions: null, // the newest (m)
   triangles: null, // corners, three a triangle
   size: 0.1, // largest extent of the body (m)
+  diagonal: 0.17, // of its extents (m)
   centre: [0, 0, 0],
   time: 0, // of the newest tools (s)
   tools: [], // position, orientation, computed, commanded, pointer, mode

@@ -12,7 +12,7 @@ const STRIPS = [
     { column: "execution", name: "execution", colour: "--one", dash: [] },
     { column: "lateness", name: "lateness", colour: "--two", dash: [2, 2] },
   ], level: { name: "deadline", of: (r) => r.deadline * 1e6 } },
-  { id: "age", unit: "ms", least: 10, zero: true, lines: [{ column: "age", name: "age", colour: "--one", dash: [] }], marks: { name: "resync", column: "jump" } },
+  { id: "age", unit: "ms", least: 10, zero: true, lines: [{ column: "age", name: "age", colour: "--one", dash: [] }], marks: { name: "resync", column: "resync" } },
   { id: "energy", unit: "mJ", least: 1, lines: [
     { column: "energy", name: "given by the tool", colour: "--one", dash: [] },
     { column: "ledger", name: "passivity ledger", colour: "--two", dash: [6, 3] },

@@ -98,6 +98,6 @@ function measureBody() {
   const centre = [0, 1, 2].map((n) => (low[n] + high[n]) / 2);
   const size = Math.max(...[0, 1, 2].map((n) => high[n] - low[n])) || 0.1;
   const isOther = norm(minus(centre, state.centre)) > 0.01 * size || Math.abs(size - state.size) > 0.01 * size || painter.count === 0;
-  [state.centre, state.size] = [centre, size];
+  [state.centre, state.size, state.diagonal] = [centre, size, norm(minus(high, low)) || 0.1];
   return isOther;
 }

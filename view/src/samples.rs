@@ -30,6 +30,8 @@ pub(crate) struct Row {
     pub(crate) pressure_kpa: f64,
     /// Difference of the new and the old model's force at a resync (mN); zero in other ticks.
     pub(crate) jump_mn: f64,
+    /// True in the tick of a resync.
+    pub(crate) is_resync: bool,
     /// Safety stages that acted: a bit each.
     pub(crate) limits: u16,
 }
@@ -63,7 +65,10 @@ impl Rows {
             LogRecord::Contact(sample) => {
                 self.row(sample.device, time).pressure_kpa = 1e-3 * f64::from(sample.mean_pressure_pa());
             }
-            LogRecord::Resync(resync) => self.row(resync.device, time).jump_mn = 1e3 * resync.jump_before_n,
+            LogRecord::Resync(resync) => {
+                let row = self.row(resync.device, time);
+                (row.jump_mn, row.is_resync) = (1e3 * resync.jump_before_n, true);
+            }
             LogRecord::Tick(timing) if timing.group == 0 => {
                 let us = |from: Nanos, to: Nanos| 1e-3 * to.saturating_sub(from).0 as f64;
                 self.deadline = timing.deadline.saturating_sub(timing.scheduled);
@@ -121,7 +126,7 @@ pub(crate) fn block(device: u16, deadline: Nanos, rows: &[(Nanos, Row)]) -> Byte
 
 impl Row {
     /// Milliseconds since the first row, and the numbers.
-    pub(crate) const FLOATS: usize = 15;
+    pub(crate) const FLOATS: usize = 16;
 
     fn numbers(&self) -> [f64; Self::FLOATS - 1] {
         let ([fx, fy, fz], [cx, cy, cz]) = (self.force_n, self.command_n);
@@ -141,6 +146,7 @@ impl Row {
             pressure_kpa,
             jump_mn,
             f64::from(limits),
+            f64::from(u8::from(self.is_resync)),
         ]
     }
 }
