@@ -201,8 +201,12 @@ fn stall(span: Duration) {
     let (before, ..) = find(&mut stalled, tool).unwrap();
     let mut visitor = enter(&server, &token);
     let reads_until = before + span.as_secs_f64();
-    let went_on = find(&mut visitor, |message| tool(message).map(|tool| tool.0).filter(|time| *time > reads_until));
-    assert!(went_on.is_some(), "nobody waits for it");
+    // Second by second: no picture is waited for longer than another.
+    for second in 1..=span.as_secs() {
+        let until = before + second as f64;
+        let went_on = find(&mut visitor, |message| tool(message).map(|tool| tool.0).filter(|time| *time > until));
+        assert!(went_on.is_some(), "nobody waits for it");
+    }
     // What the system's buffers hold is old; what follows is the newest.
     let newest = find(&mut stalled, |message| tool(message).map(|tool| tool.0).filter(|time| *time > reads_until));
     assert!(newest.is_some(), "it is shown the newest when it reads again");
