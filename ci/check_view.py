@@ -201,7 +201,7 @@ def start(browser, view):
 
 
 def check_live(check, browser, palpate, log, shots):
-    view = View(palpate, "--out", str(log))
+    view = View(palpate, "--model", "patch", "--out", str(log))
     try:
         start(browser, view)
         wait(browser, lambda state: state["first"], "the first picture")

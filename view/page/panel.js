@@ -3,7 +3,8 @@
 function showHello() {
   const { hello } = state;
   if (!hello) return;
-  const rates = `${hello.haptic_hz} Hz over ${Number(hello.global_hz).toFixed(0)} Hz`;
+  // `full` has no other rate.
+  const rates = `${hello.haptic_hz} Hz` + (hello.global_hz > 0 ? ` over ${Number(hello.global_hz).toFixed(0)} Hz` : "");
   const role = hello.mode === "log" ? "a log" : !hello.tools.some((tool) => tool.pointer) ? "the scene moves its tools" : state.role === "hand" ? "you hold the tool" : "somebody else holds the tool, you watch";
   status([`model ${hello.model}`, rates, role, hello.body ?? ""].filter(Boolean).join(" · "));
   const device = element("device");
