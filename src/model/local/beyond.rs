@@ -6,8 +6,6 @@ use crate::{Vec3, Wrench};
 /// The stiffness of a surface along itself over that towards it, about that of a round contact on an elastic half-space with a
 /// Poisson's ratio of 0.4 (Mindlin 1949).
 const ALONG: f64 = 0.75;
-/// What earlier patches knew of the stiffness counts so much less with each.
-const REMEMBERED: f64 = 0.25;
 /// The spring pushes at most so many times as hard as the surface ever did.
 const MOST: f64 = 1.2;
 
@@ -42,16 +40,6 @@ struct Left {
 }
 
 impl Beyond {
-    /// A new patch.
-    pub(super) fn restart(&mut self) {
-        *self = Self {
-            work: REMEMBERED * self.work,
-            squares: REMEMBERED * self.squares,
-            most: REMEMBERED * self.most,
-            left: None,
-        };
-    }
-
     /// The surface pushed with `force` (N) a tool that was `depth` (m) in the surface at rest.
     pub(super) fn learn(&mut self, force: f64, depth: f64) {
         if force > 0.0 && depth > 0.0 {

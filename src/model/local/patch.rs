@@ -62,7 +62,8 @@ impl Patch {
         (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
         window.gather(global.body().rest(), &mut self.rest);
         self.strayed = None;
-        self.beyond.restart();
+        // Not what this patch knew before: which one is built anew hangs on the threads, and a replay is to be the same.
+        self.beyond = Beyond::default();
         self.felt = global.wrench(resync.index);
         self.learn(global.wrench(resync.index), resync.tools[resync.index].position);
         self.watched.take(global.state());
