@@ -6,6 +6,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
 # Everything is compiled once: what would make a second time quicker only costs.
 export CARGO_INCREMENTAL=0
+# Lines for a debugger in ninety programs would be written and linked for nobody; a panic says its own.
+export CARGO_PROFILE_DEV_DEBUG=0
 # The checks import each other: nothing is left behind in ci/.
 export PYTHONDONTWRITEBYTECODE=1
 
