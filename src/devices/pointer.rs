@@ -7,7 +7,7 @@
 //! The wanted place goes to the haptic tick through an exchange, wait-free on both sides. It comes from outside, as a real device's
 //! position does: a log holds what the tool did, and a replay does not ask the pointer.
 
-use super::hand::{Load, Motion, SpecFault};
+use super::hand::{Load, Motion, SpecFault, shortened};
 use super::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand};
 use crate::error::Error;
 use crate::model::Vec3;
@@ -199,9 +199,7 @@ impl Pointer {
 
     /// The force on the tool now (N), no larger than the device's largest.
     fn exerting(&self) -> Vec3 {
-        let (force, most) = (self.command.at(self.now), self.capabilities.max_force_n);
-        let norm = force.norm();
-        if norm <= most { force } else { force * (most / norm) }
+        shortened(self.command.at(self.now), self.capabilities.max_force_n)
     }
 }
 

@@ -209,7 +209,7 @@ impl Device for Hand {
 }
 
 /// `vector`, no longer than `most`.
-fn shortened(vector: Vec3, most: f64) -> Vec3 {
+pub(super) fn shortened(vector: Vec3, most: f64) -> Vec3 {
     let norm = vector.norm();
     if norm <= most { vector } else { vector * (most / norm) }
 }
