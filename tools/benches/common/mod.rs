@@ -14,7 +14,7 @@ use palpate::model::body::InstructionSet;
 use palpate::model::local::Kind as LocalModelKind;
 use palpate::runtime::Nanos;
 use palpate::scene::Scene;
-use palpate_cli::compare::{CompareOptions, Comparison, Measured};
+use palpate_cli::compare::{CompareOptions, Comparison};
 use palpate_cli::drawing::Colour;
 pub use repository::in_repository;
 
@@ -113,18 +113,11 @@ pub fn table(head: &[&str], words: usize, rows: &[Vec<String>]) -> String {
     [line(&head), line(&rule)].into_iter().chain(rows.iter().map(|row| line(row))).collect()
 }
 
-/// The heads of [`cells`].
-pub const HEADS: [&str; 8] =
-    ["rms %", "max %", "jump %", "tick p50 us", "tick p99 us", "build p50 us", "global ms/s", "both ms/s"];
-
-/// Error and cost of a run.
-pub fn cells(run: &Measured) -> Vec<String> {
-    let (error, cost) = (&run.error, &run.cost);
-    let errors = [error.rms, error.max, error.jump].map(figure);
-    let costs = [us(cost.tick_p50), us(cost.tick_p99)].map(figure);
-    let build = if cost.builds > 0 { figure(us(cost.build_p50)) } else { "-".to_owned() };
-    let loads = [cost.global_load, cost.total_load()].map(|load| figure(1e3 * load));
-    errors.into_iter().chain(costs).chain([build]).chain(loads).collect()
+/// Rows in one: column by column what each of them has, separated by commas.
+pub fn joined(rows: &[Vec<String>]) -> Vec<String> {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let column = |place: usize| rows.iter().filter_map(|row| row.get(place).cloned()).collect::<Vec<_>>().join(", ");
+    (0..columns).map(column).collect()
 }
 
 /// Writes a file of the repository and says so.

@@ -25,11 +25,18 @@ const DOCUMENT: &str = "docs/speed_vs_error.md";
 const HEAD: &str = "\
 # Speed against error
 
-How far every local model is from `full`, and what it costs. [compare.md](compare.md) defines each figure: errors in % of the
-largest force of `full` on that scene, CPU time of one release of the haptic group (*tick*), of building one local model, and of
-the global group and both groups per second of simulated time (1000 ms/s is one core). Virtual time, so no result depends on the
-machine but the costs. The group that reduces surroundings for `predictive` is in none of these figures: it works once per
-place of the patch, and its results are there at once in these runs; [scale.md](scale.md) has what one of them costs.
+Which local model is near enough to the truth, and what does it cost? For a scene of your own, ask the command:
+
+```text
+cargo run --release -- compare scenes/drag_friction.toml --html compare.html
+```
+
+This page has the answers for three organs, for the reference scenes of the paper, for sizes of the patch and the basis, and for haptic rates.
+[compare.md](compare.md#the-columns) defines each figure. Errors are in % of the largest force of `full`, the whole body at the haptic rate, on
+that scene. Costs are CPU time: of one release of the haptic group (*tick*), of *building* one local model, and of *both* groups per second of
+simulated time, where 1000 ms/s is one core. All runs are in virtual time, so only the costs depend on the machine.
+The group that reduces surroundings for `predictive` works once per place of the patch and is in none of these figures:
+[scale.md](scale.md) has its cost.
 ";
 
 fn document(is_quick: bool) -> Result<(), Error> {

@@ -9,7 +9,7 @@ use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 use palpate_cli::drawing::{Picture, Series, Sign};
 
 use crate::Part;
-use crate::common::{HEADS, cells, colour, compared, figure, scene, table, us};
+use crate::common::{colour, compared, figure, scene, table, us};
 
 const SCENES: [&str; 2] = ["hand", "drag_friction"];
 const RATES: [f64; 5] = [250.0, 500.0, 1000.0, 2000.0, 4000.0];
@@ -22,8 +22,8 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
     let (names, rates, rounds) =
         if is_quick { (&SCENES[..1], &RATES[2..3], 1) } else { (&SCENES[..], &RATES[..], ROUNDS) };
     let mut text = "## Haptic rates\n\n\
-        Results one period of the global model (33.34 ms) late; the drag is run to its middle (1.2 s). The reference is `full` at the same rate, with at least 2 substeps \
-        per ms and one per tick, so that the physics at 4 kHz is stepped twice as often as at 1 kHz.\n"
+        Results are one period of the global model (33.34 ms) late, and the drag is run to its middle (1.2 s). The reference is `full` at the same rate, \
+        with at least 2 substeps per ms and one per tick.\n"
         .to_owned();
     let mut pictures = Vec::new();
     for name in names {
@@ -61,8 +61,10 @@ fn rows(measured: &[(f64, Comparison)]) -> String {
     let mut rows = Vec::new();
     for (rate, comparison) in measured {
         for (model, run) in runs(comparison) {
-            let first = [format!("{rate} Hz"), format!("`{model}`"), figure(share(comparison, run))];
-            rows.push(first.into_iter().chain(cells(run)).collect());
+            let (error, cost) = (&run.error, &run.cost);
+            let figures = [error.rms, error.max, us(cost.tick_p99), share(comparison, run), 1e3 * cost.total_load()];
+            let first = [format!("{rate} Hz"), format!("`{model}`")];
+            rows.push(first.into_iter().chain(figures.map(figure)).collect());
         }
         for run in &comparison.runs {
             if let Some(why) = run.missing() {
@@ -70,7 +72,7 @@ fn rows(measured: &[(f64, Comparison)]) -> String {
             }
         }
     }
-    let heads: Vec<&str> = ["rate", "model", "p99 in % of period"].into_iter().chain(HEADS).collect();
+    let heads = ["rate", "model", "rms %", "max %", "tick p99 us", "p99 in % of period", "both ms/s"];
     table(&heads, 2, &rows)
 }
 

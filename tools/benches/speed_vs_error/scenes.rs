@@ -9,7 +9,7 @@ use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 use palpate_cli::drawing::{Picture, Series, Sign};
 
 use crate::Part;
-use crate::common::{HEADS, cells, colour, compared, scene, table, us};
+use crate::common::{colour, compared, figure, joined, scene, table, us};
 
 const SCENES: [&str; 4] = ["hand", "wave", "drag_friction", "drag_slip"];
 const ROUNDS: usize = 1;
@@ -32,33 +32,47 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
     for line in overall(&comparisons) {
         let _ = writeln!(text, "- {line}");
     }
-    text.push_str("\nIn the pictures discs are results that are there at once, circles results one period late.\n");
+    text.push_str(
+        "\nEach cell has the figure with results that are there at once, then that with results one period (33.34 ms) late: discs and circles in the \
+         pictures. `palpate compare scenes/NAME.toml` draws conclusions for one scene.\n",
+    );
     let mut pictures = Vec::new();
     for comparison in &comparisons {
         let name = format!("speed_vs_error_{}", comparison.scene);
         let _ = write!(text, "\n### `{0}`\n\n![Speed against error on {0}](img/{name}.svg)\n\n", comparison.scene);
         text.push_str(&rows(comparison));
-        text.push('\n');
-        for line in comparison.conclusions() {
-            let _ = writeln!(text, "- {line}");
-        }
         pictures.push((name, picture(comparison).to_svg()));
     }
     Ok(Part { text, pictures })
 }
 
+/// The heads of [`cells`].
+const HEADS: [&str; 7] = ["rms %", "max %", "jump %", "tick p50 us", "tick p99 us", "build p50 us", "both ms/s"];
+
+/// Error and cost of a run.
+fn cells(run: &Measured) -> Vec<String> {
+    let (error, cost) = (&run.error, &run.cost);
+    let errors = [error.rms, error.max, error.jump].map(figure);
+    let costs = [us(cost.tick_p50), us(cost.tick_p99)].map(figure);
+    let build = if cost.builds > 0 { figure(us(cost.build_p50)) } else { "-".to_owned() };
+    errors.into_iter().chain(costs).chain([build, figure(1e3 * cost.total_load())]).collect()
+}
+
 fn rows(comparison: &Comparison) -> String {
-    let full = ["`full`".to_owned(), "-".to_owned()].into_iter().chain(cells(&comparison.full)).collect();
-    let runs = comparison.runs.iter().map(|run| {
-        let late = format!("{}", run.latency.0 as f64 / 1e6);
-        let figures = match run.measured() {
-            Some(measured) => cells(measured),
-            None => vec![run.missing().unwrap_or_default().to_owned()],
-        };
-        [format!("`{}`", run.model), late].into_iter().chain(figures).collect()
+    let full = ["`full`".to_owned()].into_iter().chain(cells(&comparison.full)).collect();
+    // The runs of one model follow each other.
+    let models = comparison.runs.chunk_by(|one, next| one.model == next.model).map(|runs| {
+        let figures: Vec<Vec<String>> = runs
+            .iter()
+            .map(|run| match run.measured() {
+                Some(measured) => cells(measured),
+                None => vec![run.missing().unwrap_or_default().to_owned()],
+            })
+            .collect();
+        [format!("`{}`", runs[0].model)].into_iter().chain(joined(&figures)).collect()
     });
-    let heads: Vec<&str> = ["model", "late ms"].into_iter().chain(HEADS).collect();
-    table(&heads, 1, &[full].into_iter().chain(runs).collect::<Vec<_>>())
+    let heads: Vec<&str> = ["model"].into_iter().chain(HEADS).collect();
+    table(&heads, 1, &[full].into_iter().chain(models).collect::<Vec<_>>())
 }
 
 fn picture(comparison: &Comparison) -> Picture {

@@ -8,7 +8,7 @@ use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 use palpate_cli::drawing::{Picture, Series, Sign};
 
 use crate::Part;
-use crate::common::{HEADS, cells, colour, compared, figure, scene, table, us};
+use crate::common::{colour, compared, figure, scene, table, us};
 
 const SCENES: [&str; 2] = ["hand", "drag_friction"];
 const ROUNDS: usize = 1;
@@ -51,8 +51,8 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
         variants.truncate(2);
     }
     let mut text = "## Sizes and substeps\n\n\
-        One setting at a time against the default: for `predictive` patch 6 x 6 x 3 and basis 150, for the others patch 4 x 4 x 2; 2 substeps per ms. Results of \
-        the global model are one period late; the drag is run to its middle (1.2 s); `full` has the same substeps as the model beside it.\n"
+        One setting at a time differs from the default: for `predictive` patch 6 x 6 x 3 and basis 150, for the others patch 4 x 4 x 2; 2 substeps per ms. Results of \
+        the global model are one period late, and the drag is run to its middle (1.2 s). The reference `full` has the same substeps.\n"
         .to_owned();
     let mut pictures = Vec::new();
     for name in names {
@@ -71,7 +71,6 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
         let file = format!("speed_vs_error_sizes_{name}");
         text.push_str(&format!("\n### Sizes on `{name}`\n\n![Sizes on {name}](img/{file}.svg)\n\n"));
         text.push_str(&rows(&measured));
-        text.push_str(&format!("\n{}\n", told(&measured)));
         pictures.push((file, picture(name, &measured).to_svg()));
     }
     Ok(Part { text, pictures })
@@ -82,42 +81,23 @@ fn rows(measured: &[(&str, Comparison)]) -> String {
     for (variant, comparison) in measured {
         for run in &comparison.runs {
             let figures = match run.measured() {
-                Some(measured) => cells(measured),
+                Some(Measured { error, cost, .. }) => {
+                    let costs = [cost.tick_p50, cost.tick_p99, cost.build_p50].map(|time| figure(us(time)));
+                    let errors = [error.rms, error.max].map(figure);
+                    errors.into_iter().chain(costs).chain([figure(1e3 * cost.total_load())]).collect()
+                }
                 None => vec![run.missing().unwrap_or_default().to_owned()],
             };
-            rows.push(
-                [format!("`{}`", run.model), (*variant).to_owned(), figure(us(comparison.full.cost.tick_p50))]
-                    .into_iter()
-                    .chain(figures)
-                    .collect(),
-            );
+            rows.push([format!("`{}`", run.model), (*variant).to_owned()].into_iter().chain(figures).collect());
         }
     }
     rows.sort_by_key(|row: &Vec<String>| row[0].clone());
-    let heads: Vec<&str> = ["model", "setting", "`full` p50 us"].into_iter().chain(HEADS).collect();
+    let heads = ["model", "setting", "rms %", "max %", "tick p50 us", "tick p99 us", "build p50 us", "both ms/s"];
     table(&heads, 2, &rows)
 }
 
 fn of<'a>(comparison: &'a Comparison, model: &str) -> Option<&'a Measured> {
     comparison.runs.iter().find(|run| run.model == model).and_then(|run| run.measured())
-}
-
-/// Which settings of `predictive` are nearer than the default, and for what.
-fn told(measured: &[(&str, Comparison)]) -> String {
-    let predictive: Vec<(&str, &Measured)> =
-        measured.iter().filter_map(|(name, comparison)| Some((*name, of(comparison, "predictive")?))).collect();
-    let Some(((_, default), others)) = predictive.split_first() else { return String::new() };
-    let mut lines = Vec::new();
-    for (name, run) in others {
-        let change = |of: fn(&Measured) -> f64| figure(of(run) / of(default));
-        lines.push(format!(
-            "{name} {} times the rms error for {} times the tick and {} times the global load",
-            change(|run| run.error.rms),
-            change(|run| us(run.cost.tick_p50)),
-            change(|run| run.cost.global_load),
-        ));
-    }
-    format!("`predictive` against its default: {}.", lines.join("; "))
 }
 
 fn picture(scene: &str, measured: &[(&str, Comparison)]) -> Picture {

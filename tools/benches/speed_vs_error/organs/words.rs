@@ -5,30 +5,27 @@ use std::fmt::Write;
 use palpate_cli::compare::Measured;
 use palpate_cli::drawing::{Colour, Picture, Series, Sign};
 
-use super::{Distance, Run, Study};
-use crate::common::{colour, figure, table};
+use super::{Distance, Local, Run, Study};
+use crate::common::{colour, figure, joined, table};
 
 pub const PICTURE: &str = "speed_vs_error_organs";
 const INTRODUCTION: &str = "\
-All that stands between the force that is felt and that of the elastic organ, together: mesh, material and local model. Three organs of
-`palpate-mesh` as tetrahedra with nodal pressure, and as lattices of springs of the same spacing; each with one way of a point tool over the
-real surface: press, a short drag at the same depth, lift, with friction 0.3, 0.8 s in all. Errors are distances from `full` on the finest
-mesh of tetrahedra, in % of its largest force. One basis size (100), window (4 x 4 x 2) and blend (10 ms) for all local models.
+How far is the force that is felt from that of the elastic organ, and is it the mesh, the material or the local model? Three organs of
+`palpate-mesh` are tetrahedra with nodal pressure, and lattices of springs of the same spacing. A point tool presses, drags a short way at
+the same depth and lifts, with friction 0.3, 0.8 s in all. Errors are distances from `full` on the finest mesh of tetrahedra, in % of its
+largest force. All local models have one basis size (100), window (4 x 4 x 2) and blend (10 ms).
 
-- **A point tool has no converged force on a continuum.** Its force falls with the size of the elements below it (the column of largest
-  forces), towards nothing. So the error of the mesh is that of this tool on this way, and the finest mesh is a reference and not the
-  truth: a still finer one would move all of it. What converges is the force of a tool with a size.
-- **A lattice of springs is no elastic tissue, however fine.** Against linear elasticity, stiffness matched, its tangential to normal
-  stiffness is 32 % off, the bulge of the surface around a punch 54 % too wide and the surface's field 45 % off: its Zener ratio is 2.33
-  and not 1, and Poisson's ratio is not for choosing. That it comes near to the finest force at some spacing is chance: a point's force
-  falls with the spacing here too, and crosses. The lattice's cubes have their centre inside the organ, so that its surface is off by up to half a
-  spacing; a spring's stiffness is E h / 4.5 (the mean over all directions is then Young's modulus), its damping eta h / 1.8, a node's
-  mass rho h^3, and nodes on the attached plane are held.
+- **A point tool has no converged force on a continuum.** Its force falls towards nothing with the size of the elements below it. So the
+  finest mesh is a reference and not the truth: a finer one would move all errors of the mesh. What converges is the force of a tool with a
+  size.
+- **A lattice of springs is no elastic tissue, however fine.** [tissue.md](tissue.md) says how far it is away. Where it comes near the finest
+  force, that is chance: its point force falls with the spacing too, and crosses. Its surface is off by up to half a spacing. A spring's
+  stiffness is E h / 4.5, its damping eta h / 1.8, a node's mass rho h^3, and nodes on the attached plane are held.
 ";
 const LEGEND: &str = "\
-Discs: tetrahedra, `full`. Squares: lattices, `full`. Diamonds: local models on the middle mesh, filled with results at once, hollow one
-period late. The finest has no distance from itself and lies on the lower edge. Right of the line one core is not enough. What has *diverged*
-in place of figures gave forces beyond all bounds, and is not in the picture.
+Discs are tetrahedra and squares lattices, both with `full`. Diamonds are local models on the middle mesh, hollow with results one period
+late. The finest mesh has no distance from itself and lies on the lower edge. Right of the line one core is not enough. A model that
+*diverged* gave forces beyond all bounds, and is not in the picture. Two figures in a cell are those with results at once and one period late.
 ";
 /// Forces this far away (% of the peak) are no tissue's: the model was unstable.
 const DIVERGED_PCT: f64 = 1e3;
@@ -87,23 +84,25 @@ fn bodies(study: &Study) -> String {
 /// What of the error on the middle mesh is whose.
 fn shares(study: &Study) -> String {
     let Some(middle) = study.tetrahedra.get(study.middle) else { return String::new() };
-    let row = |name: String, own: Distance, whole: &Measured| {
-        let whole_error = study.whole(whole).rms;
-        vec![name, error(own.rms), error(own.max), error(whole_error), figure(ms_per_s(whole))]
+    let figures = |own: Distance, whole: &Measured| {
+        vec![error(own.rms), error(own.max), error(study.whole(whole).rms), figure(ms_per_s(whole))]
     };
+    let row = |name: String, figures: Vec<String>| [name].into_iter().chain(figures).collect::<Vec<_>>();
     let full = &middle.measured;
-    let mesh =
-        row(format!("mesh: {} mm in place of {} mm", middle.size_mm, study.finest.size_mm), study.whole(full), full);
+    let mesh = format!("mesh: {} mm in place of {} mm", middle.size_mm, study.finest.size_mm);
+    let mesh = row(mesh, figures(study.whole(full), full));
     let steps = study.finer_steps.iter().map(|finer| {
         let own = study.distance(finer, full);
-        row("substeps: as chosen in place of twice as many".to_owned(), own, full)
+        row("substeps: as chosen in place of twice as many".to_owned(), figures(own, full))
     });
-    let locals = study.locals.iter().map(|local| {
-        let late = if local.is_late { ", one period late" } else { "" };
-        row(format!("local model: `{}`{late}", local.model), study.distance(&local.measured, full), &local.measured)
+    // The runs of one model follow each other.
+    let locals = study.locals.chunk_by(|one, next| one.model == next.model).map(|runs| {
+        let own = |run: &Local| figures(study.distance(&run.measured, full), &run.measured);
+        let figures: Vec<Vec<String>> = runs.iter().map(own).collect();
+        row(format!("`{}`", runs[0].model), joined(&figures))
     });
     let heads = ["part of the error", "its own rms %", "its own max %", "whole rms %", "CPU ms/s"];
-    let mut text = format!("What of the force's error is whose, elements of {} mm:\n\n", middle.size_mm);
+    let mut text = format!("Parts of the error with elements of {} mm:\n\n", middle.size_mm);
     text.push_str(&table(&heads, 1, &[mesh].into_iter().chain(steps).chain(locals).collect::<Vec<_>>()));
     for (model, why) in &study.missing {
         let _ = writeln!(text, "\n`{model}` has no figures: {why}.");
