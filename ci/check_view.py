@@ -10,6 +10,8 @@ import base64
 import contextlib
 import csv
 import io
+import os
+import pty
 import shutil
 import signal
 import subprocess
@@ -32,6 +34,19 @@ LAYOUT = """(() => {
     if (shown(element) && element.getBoundingClientRect().right > width + 1) faults.push(`too wide: ${element.tagName} ${element.id}`);
   for (const element of document.querySelectorAll("button, input, select, canvas[role], summary"))
     if (shown(element) && !(element.textContent.trim() || element.getAttribute("aria-label") || element.labels?.length)) faults.push(`no name: ${element.tagName} ${element.id}`);
+  // Text is read against what is behind it: 4.5 to 1 (WCAG 2.2, AA).
+  const numbers = (text) => text.match(/[\d.]+/g).map(Number);
+  const light = (colour) => numbers(colour).slice(0, 3).map((c) => c / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)).reduce((sum, c, n) => sum + c * [0.2126, 0.7152, 0.0722][n], 0);
+  const ground = (element) => { const own = getComputedStyle(element).backgroundColor; return own.startsWith("rgb(") ? own : element.parentElement ? ground(element.parentElement) : "rgb(255, 255, 255)"; };
+  for (const element of document.querySelectorAll("h1, p, span, b, dt, dd, label, output, button:enabled, select:enabled, summary, li, kbd"))
+    if (shown(element) && element.textContent.trim()) {
+      const [a, b] = [light(getComputedStyle(element).color), light(ground(element))];
+      const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+      if (ratio < 4.5) faults.push(`contrast of ${ratio.toFixed(1)}: ${element.tagName} ${element.id} ${element.textContent.trim().slice(0, 20)}`);
+    }
+  // Everything that can be done is reached by the Tab key.
+  for (const element of document.querySelectorAll("button:enabled, select:enabled, input:enabled, summary, #picture"))
+    if (shown(element) && element.tabIndex < 0) faults.push(`not reached by Tab: ${element.tagName} ${element.id}`);
   const parts = [...document.querySelectorAll("#stage, #strips figure, #side, header")].filter(shown).map((element) => [element.id || element.textContent.trim().slice(0, 20), element.getBoundingClientRect()]);
   parts.forEach(([name, a], n) => parts.slice(n + 1).forEach(([other, b]) => {
     if (Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1) faults.push(`${name} lies on ${other}`);
@@ -52,12 +67,12 @@ LAYOUT = """(() => {
 STATE = """(() => {
   const text = (id) => document.getElementById(id).textContent;
   const { tick, x, y, z } = document.getElementById("n-commanded").dataset;
-  const { tool, deepest, deepestMm, frames, firstMs, distance } = document.getElementById("picture").dataset;
+  const { tool, deepest, deepestMm, frames, surfaces, firstMs, distance } = document.getElementById("picture").dataset;
   const place = (text) => (text ? text.split(",").map(Number) : null);
   const box = document.getElementById("picture").getBoundingClientRect();
-  return { status: text("status"), note: text("note"), time: parseFloat(text("n-time")), contact: text("n-contact"), commanded: text("n-commanded"),
-    tick: tick === undefined ? null : [tick, x, y, z].map(Number), tool: place(tool), deepest: place(deepest), deepest_mm: +deepestMm, frames: +frames, first: firstMs ?? null, distance: +distance, left: box.left, top: box.top,
-    scrub: document.getElementById("scrub").value, model: document.getElementById("model").value };
+  return { status: text("status"), note: text("note"), time: parseFloat(text("n-time")), contact: text("n-contact"), commanded: text("n-commanded"), computed: text("n-computed"),
+    tick: tick === undefined ? null : [tick, x, y, z].map(Number), tool: place(tool), deepest: place(deepest), deepest_mm: +deepestMm, frames: +frames, surfaces: +surfaces, stress: parseFloat(text("n-stress")), legend: text("legend-ticks"), first: firstMs ?? null, distance: +distance, left: box.left, top: box.top,
+    scrub: document.getElementById("scrub").value, model: document.getElementById("model").value, friction: text("friction-value") };
 })()"""
 
 
@@ -89,9 +104,14 @@ def wait(browser, holds, what):
         time.sleep(0.05)
 
 
-def mouse(browser, kind, x, y):
+def mouse(browser, kind, x, y, **more):
     pressed = kind != "mouseReleased"
-    browser.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=int(pressed), clickCount=1)
+    browser.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=int(pressed), clickCount=1, **more)
+
+
+def choose(browser, name, value):
+    """Does what a visitor does with a slider or a list."""
+    browser.run(f"(() => {{ const e = document.getElementById('{name}'); e.value = '{value}'; for (const what of ['input', 'change']) e.dispatchEvent(new Event(what, {{ bubbles: true }})); }})()")
 
 
 def key(browser, name):
@@ -146,6 +166,112 @@ def push(check, browser):
     check.that(gap < 60, f"the tool is at {pushed['tool']} and the deepest node at {pushed['deepest']}")
     check.that(pushed["tool"][1] > first["tool"][1] + 5, "the tool did not go down")
     return pushed
+
+
+def newtons(text):
+    """What a number with its unit is (N)."""
+    value, unit = (text if " " in text else "0 N").split()
+    return float(value) * {"N": 1, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "kN": 1e3}[unit]
+
+
+def changes(check, browser, shots):
+    """Stiffness, friction and model change under the tool, and the body goes on."""
+    before = wait(browser, lambda state: newtons(state["computed"]) > 0.3, "a force")
+    most = browser.run("document.getElementById('stiffness').max")
+    choose(browser, "stiffness", most)
+    # The pointer's spring gives way: the force grows by less than the stiffness.
+    stiffer = wait(browser, lambda state: newtons(state["computed"]) > 1.08 * newtons(before["computed"]), "a stiffer body")
+    check.that(stiffer["time"] > before["time"], "the body started anew")
+    choose(browser, "stiffness", 0)
+    wait(browser, lambda state: newtons(state["computed"]) < 1.05 * newtons(before["computed"]), "the body as it was")
+    for model in ("full", "hold", "predictive", "patch"):
+        last = browser.run(STATE)
+        choose(browser, "model", model)
+        now = wait(browser, lambda state: f"model {model}" in state["status"] and state["time"] > last["time"] + 0.2, f"the model {model}")
+        check.that(now["contact"] != "free" and now["deepest_mm"] > 2, f"{model} began anew: {now}")
+    choose(browser, "friction", 0.1)
+    wait(browser, lambda state: state["friction"] == "0.10", "another friction")
+    shoot(browser, shots, "changes-1280-light")
+    choose(browser, "friction", 0.5)
+    choose(browser, "colour", "stress")
+    shown = wait(browser, lambda state: (state["stress"] or 0) > 0, "the stress")
+    check.that("Pa" in shown["legend"], f"the stress has no unit: {shown['legend']}")
+    time.sleep(0.4)
+    shoot(browser, shots, "stress-1280-light")
+    choose(browser, "colour", "pressure")
+    time.sleep(0.4)
+    shoot(browser, shots, "pressure-1280-light")
+    choose(browser, "colour", "depth")
+
+
+def smooth(check, browser):
+    """While the body moves, every frame shows another surface, although the global model makes some thirty a second."""
+    state = browser.run(STATE)
+    x, y = state["left"] + state["tool"][0], state["top"] + state["tool"][1]
+    mouse(browser, "mousePressed", x, y)
+    first = browser.run(STATE)
+    for step in range(40):
+        mouse(browser, "mouseMoved", x + step, y)
+        time.sleep(0.02)
+    last = browser.run(STATE)
+    mouse(browser, "mouseReleased", x + 39, y)
+    frames, surfaces = last["frames"] - first["frames"], last["surfaces"] - first["surfaces"]
+    check.that(surfaces > 0.75 * frames, f"{surfaces} surfaces in {frames} frames: the body does not move as the tool does")
+
+
+def pen(check, browser):
+    """A pen pushes as a mouse does."""
+    state = browser.run(STATE)
+    x, y = state["left"] + state["tool"][0], state["top"] + state["tool"][1]
+    mouse(browser, "mousePressed", x, y, pointerType="pen", force=0.5)
+    for step in range(1, 9):
+        mouse(browser, "mouseMoved", x - 3 * step, y, pointerType="pen", force=0.5)
+        time.sleep(0.03)
+    mouse(browser, "mouseReleased", x - 24, y, pointerType="pen")
+    wait(browser, lambda now: now["tool"][0] < state["tool"][0] - 12, "the way of a pen")
+
+
+GAMEPAD = """(() => {
+  window.rumbles = [];
+  const actuator = { playEffect: (kind, how) => { window.rumbles.push({ kind, ...how }); return Promise.resolve("complete"); } };
+  window.pad = { connected: true, axes: [0, 0, 0, 0], buttons: [], vibrationActuator: actuator };
+  Object.defineProperty(navigator, "getGamepads", { value: () => [null, window.pad], configurable: true });
+})()"""
+
+
+def gamepad(check, browser):
+    """The left stick moves the tool, the right one pushes it away, and it rumbles with the force."""
+    browser.run(GAMEPAD)
+    for axis, sign, what in ((0, 1, "right"), (0, -1, "left"), (3, 1, "nearer"), (3, -1, "farther")):
+        before = browser.run(STATE)
+        browser.run(f"window.pad.axes[{axis}] = {sign}")
+        moved = (lambda now: sign * (now["tool"][0] - before["tool"][0]) > 2) if axis == 0 else (lambda now: now["distance"] != before["distance"])
+        after = wait(browser, moved, f"a stick to the {what}")
+        browser.run(f"window.pad.axes[{axis}] = 0")
+        check.that(axis == 0 or (after["distance"] < before["distance"]) == (sign > 0), f"the right stick goes the wrong way: {what}")
+    rumbles = browser.run("window.rumbles")
+    check.that(any(rumble["kind"] == "dual-rumble" and 0 < rumble["strongMagnitude"] <= 1 for rumble in rumbles), f"no rumble under a force: {rumbles[:3]}")
+    browser.run("window.pad.connected = false")
+
+
+def check_opening(check, palpate, folder):
+    """On a terminal with a display the command opens a browser, with the whole address."""
+    told, program = folder / "opened", folder / "xdg-open"
+    program.write_text(f'#!/bin/sh\nprintf %s "$1" > "{told}.part" && mv "{told}.part" "{told}"\n')
+    program.chmod(0o755)
+    outer, inner = pty.openpty()
+    environment = {**os.environ, "DISPLAY": ":0", "PATH": f"{folder}:{os.environ['PATH']}"}
+    process = subprocess.Popen([palpate, "view"], stdout=inner, stderr=inner, stdin=inner, env=environment)
+    os.close(inner)
+    deadline = time.monotonic() + PATIENCE_S
+    while not told.exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    while process.poll() is None and time.monotonic() < deadline:
+        with contextlib.suppress(OSError):
+            os.read(outer, 4096)
+    address = told.read_text() if told.exists() else ""
+    check.that(address.startswith("http://127.0.0.1:") and len(address.partition("#")[2]) >= 16, f"the browser was opened with {address!r}")
 
 
 def touch(check, browser):
@@ -213,14 +339,16 @@ def check_live(check, browser, palpate, log, shots):
             seen.append(browser.run(STATE)["tick"])
             time.sleep(0.2)
         key(browser, "0")
+        changes(check, browser, shots)
+        smooth(check, browser)
+        pen(check, browser)
+        gamepad(check, browser)
         layouts(check, browser, shots, "live")
-        browser.run("(() => { const c = document.getElementById('colour'); c.value = 'pressure'; c.dispatchEvent(new Event('change')); })()")
-        time.sleep(0.6)
-        shoot(browser, shots, "pressure-1280-light")
         touch(check, browser)
         # Another session takes the place of this one.
-        browser.run("(() => { const m = document.getElementById('model'); m.value = 'hold'; m.dispatchEvent(new Event('change')); })()")
-        wait(browser, lambda state: "model hold" in state["status"], "another model")
+        before = browser.run(STATE)["time"]
+        browser.run("document.getElementById('reset').click()")
+        wait(browser, lambda state: state["time"] < before, "a reset")
         found = complaints(browser, view.url.split("#")[0])
     finally:
         view.stop()
@@ -271,6 +399,7 @@ def main():
             browser.send(f"{domain}.enable")
         check_live(check, browser, args.palpate, log, args.shots)
         check_log(check, browser, args.palpate, log, args.shots)
+        check_opening(check, args.palpate, args.folder)
     finally:
         with contextlib.suppress(RuntimeError):
             browser.close()

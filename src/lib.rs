@@ -87,7 +87,7 @@ pub mod prelude {
     pub use crate::model::mesh::Face;
     pub use crate::runtime::{Nanos, RateGroup};
     pub use crate::scene::Scene;
-    pub use crate::session::{Running, Session, SessionBuilder, Summary, Viewer};
+    pub use crate::session::{Controls, Running, Session, SessionBuilder, Summary, Viewer};
 }
 
 /// The README's program must compile.

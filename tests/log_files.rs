@@ -245,7 +245,7 @@ fn a_log_on_disk_is_read_through_its_path() {
     assert_eq!(reader.topic(), "/timing/haptic");
     assert_eq!(reader.next(), None);
     assert_eq!(reader.damage(), None);
-    assert_eq!(reader.topics().len(), 13);
+    assert_eq!(reader.topics().len(), 14);
 }
 
 #[test]

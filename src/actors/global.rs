@@ -3,16 +3,18 @@
 use super::basis::Wishes;
 use super::cause::Cause;
 use super::messages::{Checkpoint, SurfaceView, ToolTick, show};
+use super::model_maker::ModelMaker;
+use super::settings::Settings;
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::Pose;
 use crate::model::contact::ToolMotion;
-use crate::model::local::{Aim, LocalModel, PatchGeometry, ResyncView, ToolForecast, ToolHistory, Windows};
+use crate::model::local::{Aim, Kind, LocalModel, PatchGeometry, ResyncView, ToolForecast, ToolHistory, Windows};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{
-    Actor, ActorError, Nanos, Outcome, OutletWriter, QueueReader, Rate, Reader, Recorder, Stopwatch, TickContext,
-    Writer,
+    Actor, ActorError, Nanos, Outcome, OutletWriter, ParameterReader, QueueReader, Rate, Reader, Recorder, Stopwatch,
+    TickContext, Writer,
 };
 
 /// The ports of a [`GlobalActor`].
@@ -27,6 +29,8 @@ pub struct GlobalPorts {
 /// The ports of a [`GlobalActor`] that are there once, for however many tools.
 #[derive(Debug)]
 pub struct GlobalSharedPorts {
+    /// What is changed while it runs.
+    pub settings: ParameterReader<Settings>,
     /// To and from the basis actor, if the models use what it makes.
     pub surroundings: Option<SurroundingsPorts>,
     /// The newest surface: for a program that draws, for the log.
@@ -80,7 +84,9 @@ pub struct GlobalPlan {
     pub global: Rate,
     /// Haptic ticks that a local model may have to reach ahead.
     pub horizon: u32,
-    /// Patch nodes along the surface, along it, into depth.
+    /// Makes local models.
+    pub models: ModelMaker,
+    /// Of windows that may have a basis: patch nodes along the surface, along it, into depth.
     pub patch: [usize; 3],
     /// Bases that are there from the start.
     pub bases: Bases,
@@ -117,6 +123,8 @@ struct ToolSide {
     history: ToolHistory,
     /// Where local models may be made, if there are bases.
     windows: Windows,
+    /// The newest model that was published.
+    version: u64,
     /// Triangles that the window of its next model has to hold.
     triangles: Vec<u32>,
     /// The patch of its next model.
@@ -162,6 +170,8 @@ pub struct GlobalActor {
     ports: GlobalSharedPorts,
     plan: GlobalPlan,
     tools: Vec<ToolSide>,
+    /// Something else than the tools has changed since the last models.
+    is_changed: bool,
     /// Working memory: where each tool is and is expected.
     forecasts: Vec<ToolForecast>,
     /// Working memory: how each tool moves in a tick.
@@ -196,12 +206,25 @@ impl GlobalActor {
             from: tool.pose,
             is_between: false,
             history: ToolHistory::new(tool.pose, plan.haptic.period_s(), plan.lead_s()),
+            version: 0,
             triangles: Vec::new(),
             patch: Vec::new(),
         };
         let tools = tools.iter().zip(of_tools).enumerate().map(side).collect();
         let (forecasts, motions, triangles_ahead, patch_ahead) = Default::default();
-        Ok(Self { simulation, aim, ports: shared, plan, tools, forecasts, motions, triangles_ahead, patch_ahead })
+        let is_changed = true;
+        Ok(Self {
+            simulation,
+            aim,
+            ports: shared,
+            plan,
+            tools,
+            is_changed,
+            forecasts,
+            motions,
+            triangles_ahead,
+            patch_ahead,
+        })
     }
 
     /// The haptic tick of the state.
@@ -297,10 +320,18 @@ impl GlobalActor {
         for (index, (side, tool)) in self.tools.iter_mut().zip(&self.forecasts).enumerate() {
             self.aim.triangles((&self.simulation, index), tool, now, &mut side.triangles);
         }
-        self.publish_wishes(ctx);
+        let has_bases = self.has_bases();
+        if has_bases {
+            self.publish_wishes(ctx);
+        }
+        let (kind, is_changed) = (self.ports.settings.get().model, std::mem::take(&mut self.is_changed));
         let mut version = 0;
         for (index, side) in self.tools.iter_mut().enumerate() {
-            let has_bases = self.ports.surroundings.is_some();
+            // The whole body goes on by itself.
+            if kind == Kind::Full && !is_changed {
+                version = side.version;
+                continue;
+            }
             if has_bases {
                 side.choose_patch((&self.simulation, index), &self.plan.bases);
             }
@@ -315,10 +346,27 @@ impl GlobalActor {
                 bases: &self.plan.bases,
             };
             let model = side.ports.models.buffer();
+            self.plan.models.put(kind, resync.global.body_as_made(), model);
             Stopwatch::around(self.ports.build_cost.as_mut(), || model.rebuild(resync));
-            version = side.ports.models.publish(ctx);
+            side.version = side.ports.models.publish(ctx);
+            version = side.version;
         }
         version
+    }
+
+    /// True if local models take bases.
+    fn has_bases(&self) -> bool {
+        self.ports.surroundings.is_some() && self.ports.settings.get().model == Kind::Predictive
+    }
+
+    /// Takes what a program has changed since the last release.
+    fn take_settings(&mut self, ctx: &TickContext) {
+        if self.ports.settings.refresh(ctx) {
+            let Settings { friction, stiffness, .. } = self.ports.settings.get();
+            self.simulation.set_friction(friction);
+            self.simulation.approach_stiffness(stiffness);
+            self.is_changed = true;
+        }
     }
 
     /// Takes the bases that are there by now.
@@ -376,7 +424,7 @@ impl GlobalActor {
 
     fn publish_surface(&mut self, ctx: &TickContext) {
         let time = self.plan.haptic.release(self.now());
-        show(&mut self.ports.surfaces, ctx, time, &self.simulation.state().positions);
+        show(&mut self.ports.surfaces, ctx, time, &self.simulation);
     }
 }
 
@@ -393,6 +441,7 @@ impl Actor for GlobalActor {
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         let before = self.now();
+        self.take_settings(ctx);
         self.take_bases(ctx);
         let incomplete = self.follow_tools(ctx, ctx.scheduled);
         if self.now() == before {

@@ -11,11 +11,11 @@ use super::scene_watch::SceneWatch;
 use super::throttle::Throttle;
 use crate::error::{Error, ErrorKind};
 use crate::log::{Analysis, Environment, JoinedRecords, Level, LogRecord, RunReport, StatsCounter, TextEvent};
-use crate::runtime::Event;
 use crate::runtime::Nanos;
 use crate::runtime::{
     Actor, GrantHandle, GroupGrant, Outcome, OutletReader, Record, RecordDrain, RecordGap, SystemGrant, TickContext,
 };
+use crate::runtime::{Event, InputUse, PortUse};
 
 /// The target of the event that says that a log could not be written, for programs that report the summary's
 /// `log_error` instead.
@@ -214,8 +214,8 @@ impl LoggerActor {
                     self.keep(|sink| sink.stats(&stats));
                 }
             }
-            LogRecord::Port(used) => {
-                self.stats.get_mut(usize::from(used.group)).into_iter().for_each(StatsCounter::push_port_use);
+            LogRecord::Port(PortUse { group, .. }) | LogRecord::Input(InputUse { group, .. }) => {
+                self.stats.get_mut(usize::from(*group)).into_iter().for_each(StatsCounter::push_port_use);
             }
             _ => {}
         }

@@ -1,8 +1,9 @@
 //! What actors say to each other and to programs that watch.
 
 use crate::devices::DeviceState;
-use crate::model::body::State;
+use crate::model::body::{State, Stiffness};
 use crate::model::contact::{Contact, ContactMode};
+use crate::model::simulation::Simulation;
 use crate::model::{Pose, Turn, Vec3};
 use crate::runtime::{Nanos, OutletWriter, TickContext};
 
@@ -78,16 +79,19 @@ pub struct SurfaceView {
     pub time: Nanos,
     /// Position of every node (m); the triangles are those of the body's surface.
     pub positions: Vec<Vec3>,
+    /// How stiff the body is, in that which it was made with.
+    pub stiffness: Stiffness,
 }
 
-/// Shows the nodes at `positions` (m) at `time` to all who look.
+/// Shows the body at `time` to all who look.
 ///
 /// # Real-time
 /// Wait-free, real-time safe.
-pub fn show(surfaces: &mut [OutletWriter<SurfaceView>], ctx: &TickContext, time: Nanos, positions: &[Vec3]) {
+pub fn show(surfaces: &mut [OutletWriter<SurfaceView>], ctx: &TickContext, time: Nanos, body: &Simulation) {
+    let positions = &body.state().positions;
     for surface in surfaces {
         let view = surface.buffer();
-        view.time = time;
+        (view.time, view.stiffness) = (time, body.stiffness());
         view.positions.clear();
         view.positions.extend_from_slice(positions);
         surface.publish(ctx);

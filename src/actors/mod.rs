@@ -7,7 +7,8 @@
 //! every actor --records--> logger
 //! ```
 //!
-//! There is a device and a local actor for each tool, and one global actor for all. For `full` one actor with the whole body stands
+//! There is a device and a local actor for each tool, and one global actor for all. What a program changes while it runs, [`Settings`],
+//! goes to the global actor and comes to the local ones with the next model. For `full` one actor with the whole body stands
 //! in place of local and global ones:
 //!
 //! ```text
@@ -26,7 +27,9 @@ mod log_file;
 mod log_sink;
 mod logger;
 mod messages;
+mod model_maker;
 mod scene_watch;
+mod settings;
 mod throttle;
 mod ticks;
 mod tool;
@@ -40,7 +43,9 @@ pub(crate) use device::{DeviceActor, DevicePorts, GAP_S, first_state};
 pub(crate) use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
 pub(crate) use local::{LocalActor, LocalPorts};
 pub(crate) use messages::{Checkpoint, ComputedForce, DeviceSample, ToolTick};
+pub(crate) use model_maker::ModelMaker;
 pub(crate) use scene_watch::SceneWatch;
+pub(crate) use settings::Settings;
 pub(crate) use tool::{LocalTool, LocalToolPorts};
 pub(crate) use whole::WholeActor;
 

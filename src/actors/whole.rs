@@ -2,13 +2,14 @@
 
 use super::cause::Cause;
 use super::messages::{SurfaceView, show};
+use super::settings::Settings;
 use super::ticks::{self, ResyncTicks};
 use super::tool::{LocalTool, Serving};
 use crate::model::contact::ToolMotion;
 use crate::model::local::{Kind, Served};
 use crate::model::simulation::Simulation;
 use crate::model::{Vec3, Wrench};
-use crate::runtime::{Actor, GroupMode, Outcome, OutletWriter, Rate, TickContext};
+use crate::runtime::{Actor, GroupMode, Outcome, OutletWriter, ParameterReader, Rate, TickContext};
 
 /// Runs the detailed simulation at the haptic rate: one evaluation of its forces for all tools.
 ///
@@ -18,6 +19,8 @@ use crate::runtime::{Actor, GroupMode, Outcome, OutletWriter, Rate, TickContext}
 pub struct WholeActor {
     simulation: Simulation,
     tools: Vec<LocalTool>,
+    /// What is changed while it runs.
+    settings: ParameterReader<Settings>,
     /// The surface at the tick of each resync that there would be: for a program that draws, for the log.
     surfaces: Vec<OutletWriter<SurfaceView>>,
     haptic: Rate,
@@ -39,10 +42,11 @@ impl WholeActor {
         tools: Vec<LocalTool>,
         [haptic, global]: [Rate; 2],
         surfaces: Vec<OutletWriter<SurfaceView>>,
+        settings: ParameterReader<Settings>,
     ) -> Self {
         assert_eq!(tools.len(), simulation.tools(), "a place for each tool");
         let (resyncs, ways) = (ResyncTicks::new(haptic, global), Vec::with_capacity(tools.len()));
-        Self { simulation, tools, surfaces, haptic, resyncs, now: 0, ways, begun: false }
+        Self { simulation, tools, settings, surfaces, haptic, resyncs, now: 0, ways, begun: false }
     }
 
     /// Release 0: the first samples, no force.
@@ -72,7 +76,7 @@ impl WholeActor {
 
     fn show(&mut self, ctx: &TickContext) {
         if self.resyncs.has(self.now) {
-            show(&mut self.surfaces, ctx, self.haptic.release(self.now), &self.simulation.state().positions);
+            show(&mut self.surfaces, ctx, self.haptic.release(self.now), &self.simulation);
         }
     }
 
@@ -110,6 +114,11 @@ impl Actor for WholeActor {
         if !self.begun {
             self.begin(ctx);
             return Outcome::Continue;
+        }
+        if self.settings.refresh(ctx) {
+            let Settings { friction, stiffness, .. } = self.settings.get();
+            self.simulation.set_friction(friction);
+            self.simulation.approach_stiffness(stiffness);
         }
         ticks::due(ctx, self.now).for_each(|left| self.advance(ctx, left));
         match self.finish(ctx) {

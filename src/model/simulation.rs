@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::body::{Body, State};
+use crate::body::{Body, State, Stiffened, Stiffness};
 use crate::contact::{
-    Coarseness, Contact, ContactPoint, Deformable, Law, Rows, Skin, ToolMotion, ToolShape, Touch, step_all,
+    Coarseness, Contact, ContactPoint, Deformable, Friction, Law, Rows, Skin, ToolMotion, ToolShape, Touch, step_all,
 };
 use crate::error::ModelError;
 use crate::integrator::Spectrum;
@@ -57,7 +57,9 @@ impl Stepping {
 /// A body, its state and the contacts of the tools with it. Tools are numbered in the order of their devices.
 #[derive(Debug)]
 pub struct Simulation {
-    body: Box<dyn Body>,
+    body: Stiffened,
+    /// Where its stiffness goes, tick by tick.
+    stiffness: Stiffness,
     state: State,
     forces: Vec<Vec3>,
     touches: Vec<Touch>,
@@ -99,7 +101,9 @@ impl Simulation {
         let inverse_masses = body.inverse_masses().to_vec();
         let forces = vec![Vec3::zeros(); nodes];
         let (touches, rows, means) = Default::default();
-        let new = Self { body, state, forces, touches, rows, law, stepping, candidates, inverse_masses, means };
+        let (body, stiffness) = (Stiffened::new(body), Stiffness::default());
+        let new =
+            Self { body, stiffness, state, forces, touches, rows, law, stepping, candidates, inverse_masses, means };
         Ok(new.with_tool(contact))
     }
 
@@ -123,7 +127,8 @@ impl Simulation {
     /// Not real-time safe: allocates, and looks at every node of the surface.
     #[must_use]
     pub fn with_shape(mut self, tool: usize, shape: ToolShape) -> Self {
-        let skin = if shape == ToolShape::Point { Skin::default() } else { Skin::new(&*self.body, shape.radius()) };
+        let skin =
+            if shape == ToolShape::Point { Skin::default() } else { Skin::new(self.body.as_made(), shape.radius()) };
         self.touches[tool] = Touch::new(shape, Arc::new(skin), self.touches[tool].contact);
         self.rows.make_room(self.inverse_masses.len());
         self
@@ -137,7 +142,8 @@ impl Simulation {
         let mut rows = Rows::with_room(self.touches.len());
         rows.make_room(self.inverse_masses.len());
         Some(Self {
-            body: self.body.duplicate()?,
+            body: self.body.copy()?,
+            stiffness: self.stiffness,
             state: self.state.clone(),
             forces: self.forces.clone(),
             touches: self.touches.clone(),
@@ -182,11 +188,13 @@ impl Simulation {
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
     pub fn tick_all(&mut self, motions: &[ToolMotion]) {
+        let stiffness = self.body.stiffness().towards(self.stiffness, self.stepping.tick);
+        self.put_stiffness(stiffness);
         self.advance(|tool| motions[tool], &mut |_| ());
     }
 
     fn advance(&mut self, motion: impl Fn(usize) -> ToolMotion, watch: &mut impl FnMut(&State)) {
-        let Self { body, state, forces, touches, rows, law, candidates, inverse_masses, stepping, means } = self;
+        let Self { body, state, forces, touches, rows, law, candidates, inverse_masses, stepping, means, .. } = self;
         let (n, d) = (f64::from(stepping.substeps), stepping.step());
         means.fill(Wrench::default());
         touches.iter_mut().for_each(Touch::begin);
@@ -258,12 +266,50 @@ impl Simulation {
         nodes.into_iter().flat_map(|nodes| (0..3).map(move |i| (nodes[i], -force * weights[i]))).collect()
     }
 
-    /// The body that is simulated.
+    /// The body that is simulated, as stiff as it is now.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn body(&self) -> &dyn Body {
-        &*self.body
+        &self.body
+    }
+
+    /// The body with the stiffness that it was made with.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn body_as_made(&self) -> &dyn Body {
+        self.body.as_made()
+    }
+
+    /// How stiff the body is now.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn stiffness(&self) -> Stiffness {
+        self.body.stiffness()
+    }
+
+    /// Lets the body become as stiff as `target`, tick by tick, ten times within half a second: a deformed body that stiffens pushes.
+    /// Whoever asks for more than [`Stiffness::largest`] has a body that its steps do not bear.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn approach_stiffness(&mut self, target: Stiffness) {
+        self.stiffness = target;
+    }
+
+    fn put_stiffness(&mut self, stiffness: Stiffness) {
+        self.body.set_stiffness(stiffness);
+        self.touches.iter_mut().for_each(|touch| touch.stiffness = stiffness);
+    }
+
+    /// Changes the friction between tools and body from the next tick on.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn set_friction(&mut self, friction: Friction) {
+        self.law.friction = friction;
     }
 
     /// Positions and velocities of all nodes of the body.
@@ -349,7 +395,7 @@ impl Simulation {
     /// Not for a tick: looks at every triangle of the surface.
     pub fn coarseness(&self, tool: usize) -> Option<Coarseness> {
         let touch = &self.touches[tool];
-        touch.has_shape().then(|| touch.skin.coarseness(&*self.body))
+        touch.has_shape().then(|| touch.skin.coarseness(&self.body))
     }
 
     /// The shape of a tool.
@@ -367,7 +413,7 @@ impl Simulation {
     /// For the global actor, at each resync: bounded; `nodes` may grow.
     pub fn patch(&self, tool: usize, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
         self.body.patch(triangles, size, nodes);
-        self.touches[tool].complete(&*self.body, triangles, nodes);
+        self.touches[tool].complete(&self.body, triangles, nodes);
     }
 
     /// Puts the nodes that `tool` presses where it touches `triangles` in place of `nodes`, in increasing order: a patch without one
@@ -381,7 +427,7 @@ impl Simulation {
         nodes.extend(corners.filter(|&node| self.inverse_masses[node as usize] > 0.0));
         nodes.sort_unstable();
         nodes.dedup();
-        self.touches[tool].complete(&*self.body, triangles, nodes);
+        self.touches[tool].complete(&self.body, triangles, nodes);
     }
 
     /// Appends the triangles that `tool` touches, or may touch soon, at `pose`, or if its radius were larger by `margin` (m), each

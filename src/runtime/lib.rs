@@ -116,6 +116,7 @@ pub use ports::restartable::{ExchangePort, OutletPort, QueuePort, RecorderPort};
 pub use primitives::histogram::{Histogram, HistogramReader};
 pub use primitives::{exchange, ring};
 pub use rate_group::{OverrunPolicy, RateGroup, Release, Wait};
+pub use records::input::InputUse;
 pub use records::port_use::{PortUse, PortUseKind};
 pub use records::record::{Channel, Event, EventCode, Record};
 pub use records::recorder::{RecordDrain, RecordGap, Recorder};

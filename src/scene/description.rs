@@ -100,11 +100,13 @@ pub struct LogSpec {
 pub struct RunSpec {
     /// Simulated time (s).
     pub duration_s: f64,
+    /// True if the local model can be changed while it runs.
+    pub switchable: bool,
 }
 
 impl Default for RunSpec {
     fn default() -> Self {
-        Self { duration_s: 5.0 }
+        Self { duration_s: 5.0, switchable: false }
     }
 }
 

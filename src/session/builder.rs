@@ -277,6 +277,15 @@ impl SessionBuilder {
         self
     }
 
+    /// Lets the local model be changed while the session runs, by [`Controls::set_model`](super::Controls::set_model). `full` then runs
+    /// beside a global model, with the same forces, if there is one device; what a session can be switched to takes memory, and a
+    /// thread for reduced surroundings.
+    #[must_use]
+    pub fn switchable(mut self) -> Self {
+        self.parts.scene.run.switchable = true;
+        self
+    }
+
     /// Hands records to the program while the session runs, by [`Running::take_records`](super::Running::take_records).
     #[must_use]
     pub fn share_records(mut self) -> Self {

@@ -13,6 +13,7 @@
 //! ```
 
 mod builder;
+mod controls;
 mod parts;
 mod prepare;
 mod records;
@@ -22,6 +23,7 @@ mod wire;
 
 pub use crate::actors::{LOG_FAILURE, SurfaceView, ToolView};
 pub use builder::SessionBuilder;
+pub use controls::Controls;
 pub use prepare::Choice;
 pub use records::SharedRecords;
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};

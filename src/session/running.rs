@@ -4,11 +4,13 @@ use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use super::controls::Controls;
 use super::records::SharedRecords;
 use crate::actors::{LoggerOutcome, SurfaceView, ToolView};
 use crate::devices::PointerHandle;
 use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
+use crate::model::body::{Body, State, von_mises};
 use crate::model::mesh::Surface;
 use crate::runtime::{GroupLive, Nanos, OutletReader, RunningGraph, RuntimeReport, StopHandle};
 use crate::runtime::{Histogram, HistogramReader};
@@ -110,6 +112,11 @@ impl Running {
         self.outside.records.take()
     }
 
+    /// Takes what changes friction, stiffness and local model while the session runs; there is one, for one thread.
+    pub fn take_controls(&mut self) -> Option<Controls> {
+        self.outside.controls.take()
+    }
+
     /// Ends the run and says how it went. A fault, a group that had to be given up or a log that could not be written is
     /// part of the summary.
     pub fn stop(self) -> Summary {
@@ -128,6 +135,7 @@ pub(super) struct Outside {
     /// In the order of the devices.
     pub(super) pointers: Vec<Option<PointerHandle>>,
     pub(super) records: Option<SharedRecords>,
+    pub(super) controls: Option<Controls>,
 }
 
 /// Records kept in memory.
@@ -166,13 +174,44 @@ impl Memory {
 pub struct Viewer {
     triangles: Arc<[[u32; 3]]>,
     surface: OutletReader<SurfaceView>,
+    /// A copy of the body, as it was made, and where its nodes are: for what is computed of the surface that is shown.
+    body: Option<(Box<dyn Body>, State)>,
     /// In the order of the devices.
     tools: Vec<OutletReader<ToolView>>,
 }
 
 impl Viewer {
     pub(super) fn new(body: &Surface, surface: OutletReader<SurfaceView>, tools: Vec<OutletReader<ToolView>>) -> Self {
-        Self { triangles: body.triangles.as_slice().into(), surface, tools }
+        Self { triangles: body.triangles.as_slice().into(), surface, body: None, tools }
+    }
+
+    /// The same, which can tell the stress of `body`, if that can be copied and knows it.
+    pub(super) fn with_stress(mut self, body: &dyn Body) -> Self {
+        let state = State::at_rest(body.rest());
+        let first = body.surface().triangles.first().and_then(|corners| body.stress(&state, corners[0]));
+        self.body = first.and_then(|_| body.duplicate()).map(|body| (body, state));
+        self
+    }
+
+    /// True if it can tell the stress of the body: if the session [shares its records](super::SessionBuilder::share_records), and the body
+    /// is none of a program's own that does not know it.
+    pub fn knows_stress(&self) -> bool {
+        self.body.is_some()
+    }
+
+    /// Puts the equivalent stress of von Mises (Pa) at each of `nodes`, in the surface that was [taken](Self::surface) last, in place of
+    /// `stress`: of elements from Cauchy's, of springs from the virial, without what dampers carry. It stays empty if the body does not
+    /// know it.
+    ///
+    /// # Real-time
+    /// For this side: some microseconds for each node. The session's threads do nothing for it.
+    pub fn stress(&mut self, nodes: &[u32], stress: &mut Vec<f64>) {
+        stress.clear();
+        let Some((body, state)) = &mut self.body else { return };
+        let SurfaceView { positions, stiffness, .. } = self.surface.get();
+        state.positions.clone_from(positions);
+        let of = |&node: &u32| body.stress(state, node).map_or(0.0, |stress| stiffness.factor() * von_mises(&stress));
+        stress.extend(nodes.iter().map(of));
     }
 
     /// Node ids of the surface triangles, counter-clockwise seen from outside; they never change.

@@ -10,10 +10,12 @@ function scaleColour(share) {
 }
 
 // What the colour means: name, unit, and what one of the scale is in it. The scale grows with what is seen and never shrinks by itself.
-const colouring = { top: { depth: 0.002, pressure: 0.5 } };
+const COLOUR_TOPS = { depth: 0.002, pressure: 500, stress: 500 };
+const colouring = { top: { ...COLOUR_TOPS } };
 const COLOURINGS = {
   depth: { title: "pushed in, along the normal at the start", unit: "m" },
   pressure: { title: "contact pressure", unit: "Pa" },
+  stress: { title: "equivalent stress (von Mises)", unit: "Pa" },
 };
 
 function niceTop(value) {

@@ -41,6 +41,6 @@ function goHome() {
 
 function nextColouring() {
   const select = element("colour");
-  select.selectedIndex = (select.selectedIndex + 1) % select.options.length;
+  do select.selectedIndex = (select.selectedIndex + 1) % select.options.length; while (select.selectedOptions[0].disabled);
   select.dispatchEvent(new Event("change"));
 }

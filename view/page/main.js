@@ -30,12 +30,16 @@ function drawLabels(canvas) {
   context.textAlign = "left";
   context.textBaseline = "middle";
   const taken = [];
+  // The legend stays free.
+  const legend = element("legend");
+  const [legendLeft, legendEnd] = legend.hidden ? [width, 0] : [legend.offsetLeft, legend.offsetTop + legend.offsetHeight];
   for (const tool of state.tools) {
     for (const [force, name, tint] of [[tool.commanded, "commanded", "--one"], [tool.computed, "computed", "--two"]]) {
       const at = norm(force) > 0.02 && onScreen(plus(tool.position, force, perNewton()), width, height);
       if (!at) continue;
       // Both arrows end at the same place as a rule: the second label goes below the first.
-      const place = [Math.max(4, Math.min(at[0] + 10, width - 130)), Math.max(12, Math.min(at[1], height - 40))];
+      const right = at[1] < legendEnd + 45 ? legendLeft : width;
+      const place = [Math.max(4, Math.min(at[0] + 10, right - 132)), Math.max(12, Math.min(at[1], height - 40))];
       while (taken.some(([x, y]) => Math.abs(x - place[0]) < 130 && Math.abs(y - place[1]) < 15)) place[1] += 15;
       taken.push(place);
       write(`${name} ${withUnit(norm(force), "N")}`, ...place, style.getPropertyValue(tint));
@@ -62,10 +66,11 @@ function frame(now) {
   readGamepad(now);
   play(now);
   tellPointer();
+  showTime(now);
   paint(picture);
   drawLabels(element("labels"));
   clock.frames += 1;
-  picture.dataset.frames = clock.frames;
+  Object.assign(picture.dataset, { frames: clock.frames, surfaces: state.surfaces });
   // When the body was first seen (ms after the page was asked for).
   if (painter.count > 0) picture.dataset.firstMs ??= Math.round(performance.now());
   if (now - clock.strips > 33) { clock.strips = now; drawStrips(); showLegend(); }

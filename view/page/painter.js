@@ -119,6 +119,8 @@ function uploadSurface() {
   if (state.colourBy === "pressure") {
     pressures(painter.pressures, painter.normals, painter.areas);
     values = painter.pressures;
+  } else if (state.colourBy === "stress") {
+    values = state.stress ?? painter.pressures.fill(0);
   }
   if (COLOURINGS[state.colourBy]) {
     const most = values.reduce((most, value) => Math.max(most, value), 0);

@@ -3,35 +3,78 @@
 function showHello() {
   const { hello } = state;
   if (!hello) return;
-  // `full` has no other rate.
-  const rates = `${hello.haptic_hz} Hz` + (hello.global_hz > 0 ? ` over ${Number(hello.global_hz).toFixed(0)} Hz` : "");
-  const role = hello.mode === "log" ? "a log" : !hello.tools.some((tool) => tool.pointer) ? "the scene moves its tools" : state.role === "hand" ? "you hold the tool" : "somebody else holds the tool, you watch";
-  status([`model ${hello.model}`, rates, role, hello.body ?? ""].filter(Boolean).join(" · "));
+  showStatus();
   const device = element("device");
   device.replaceChildren(...hello.tools.map((tool, n) => new Option(tool.name ?? `tool ${n + 1}`, n)));
   device.value = state.device;
   document.querySelectorAll(".several").forEach((part) => { part.hidden = hello.tools.length < 2; });
-  element("changes").hidden = !hello.can_restart;
+  element("changes").hidden = !hello.settings;
+  const stress = element("colour").querySelector("[value=stress]");
+  stress.disabled = stress.hidden = !hello.has_stress;
+  if (!hello.has_stress && state.colourBy === "stress") colourBy("depth");
   const may = state.role === "hand";
-  ["model", "friction", "stiffness", "reset", "home"].forEach((id) => { element(id).disabled = !may || hello.mode === "log"; });
+  ["model", "friction", "static", "stribeck", "stiffness", "reset", "home"].forEach((id) => { element(id).disabled = !may || hello.mode === "log"; });
   element("reset").hidden = !hello.can_restart;
   element("home").hidden = hello.mode === "log";
   showPlayer();
   element("save-log").hidden = !hello.has_samples || hello.mode === "log";
-  if (hello.can_restart) {
-    element("model").replaceChildren(...hello.models.map((name) => new Option(name, name)));
-    element("model").value = hello.asked_model;
-    element("friction").disabled ||= hello.friction === null;
-    element("friction").value = hello.friction ?? 2;
-    element("stiffness").value = Math.log10(hello.stiffness);
-    showChanges();
+  if (hello.settings) {
+    // Where another session can begin, `auto` and models that need one are there too.
+    const models = hello.can_restart ? hello.models : hello.settings.models;
+    element("model").replaceChildren(...models.map((name) => new Option(name, name)));
+    const others = models.filter((name) => !hello.settings.models.includes(name));
+    const anew = others.length > 0 ? ` ${others.join(", ")} start${others.length > 1 ? "" : "s"} the body anew.` : "";
+    element("hint").textContent = `Changes come with the next resync; the body goes on.${anew}`;
+    showSettings();
   }
 }
 
-function showChanges() {
-  element("friction-value").textContent = state.hello.friction === null ? "sticks" : Number(element("friction").value).toFixed(2);
-  element("stiffness-value").textContent = `× ${(10 ** element("stiffness").value).toFixed(2)}`;
+function showStatus() {
+  const { hello } = state;
+  // `full` alone has no other rate.
+  const rates = `${hello.haptic_hz} Hz` + (hello.global_hz > 0 ? ` over ${Number(hello.global_hz).toFixed(0)} Hz` : "");
+  const role = hello.mode === "log" ? "a log" : !hello.tools.some((tool) => tool.pointer) ? "the scene moves its tools" : state.role === "hand" ? "you hold the tool" : "somebody else holds the tool, you watch";
+  status([`model ${hello.settings?.model ?? hello.model}`, rates, role, hello.body ?? ""].filter(Boolean).join(" · "));
 }
+
+// What can be changed, as it is now; what a visitor moves just now stays.
+function showSettings() {
+  const settings = state.hello?.settings;
+  if (!settings) return;
+  const put = (id, value) => { if (document.activeElement !== element(id) || !panel.moving.has(id)) element(id).value = value; };
+  showStatus();
+  put("model", settings.model);
+  put("friction", settings.friction ?? 2);
+  put("static", settings.static_friction ?? 2);
+  put("stribeck", settings.stribeck_m_s);
+  const [least, most] = settings.stiffness_limits.map(Math.log10);
+  Object.assign(element("stiffness"), { min: Math.max(-1, least), max: Math.min(1, most) });
+  put("stiffness", Math.log10(settings.stiffness));
+  element("friction").disabled ||= settings.friction === null;
+  showValues();
+}
+
+const panel = { moving: new Set() };
+
+function showValues() {
+  const settings = state.hello?.settings;
+  const coefficient = (id, value) => { element(`${id}-value`).textContent = value === null ? "sticks" : Number(element(id).value).toFixed(2); };
+  coefficient("friction", settings.friction);
+  coefficient("static", settings.static_friction);
+  element("stribeck-value").textContent = withUnit(Number(element("stribeck").value), "m/s", 2);
+  const stiffness = element("stiffness");
+  const isMost = Number(stiffness.value) >= Number(stiffness.max) - 1e-9 && Number(stiffness.max) < 1;
+  element("stiffness-value").textContent = `× ${(10 ** stiffness.value).toFixed(2)}${isMost ? ", the most its steps bear" : ""}`;
+}
+
+function colourBy(name) {
+  element("colour").value = name;
+  [state.colourBy, state.isNew.colour] = [name, true];
+  wishStress();
+}
+
+// Stress is computed while somebody looks at it.
+function wishStress() { send({ do: "stress", shown: state.colourBy === "stress" }); }
 
 function save(blob, name) {
   const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
@@ -62,15 +105,25 @@ function composed() {
 }
 
 function startPanel() {
-  const changed = (change) => send({ do: "restart", ...change });
   element("controls").addEventListener("submit", (event) => event.preventDefault());
   element("device").addEventListener("change", (event) => { state.device = Number(event.target.value); hand.target = null; });
-  element("colour").addEventListener("change", (event) => { state.colourBy = event.target.value; state.isNew.colour = true; });
-  element("model").addEventListener("change", (event) => changed({ model: event.target.value }));
-  element("friction").addEventListener("change", (event) => changed({ friction: Number(event.target.value) }));
-  element("stiffness").addEventListener("change", (event) => changed({ stiffness: Number((10 ** event.target.value).toFixed(4)) }));
-  ["friction", "stiffness"].forEach((id) => element(id).addEventListener("input", showChanges));
-  element("reset").addEventListener("click", () => changed({}));
+  element("colour").addEventListener("change", (event) => colourBy(event.target.value));
+  element("model").addEventListener("change", (event) => send({ do: "change", model: event.target.value }));
+  const sliders = {
+    friction: (value) => ({ friction: value }),
+    static: (value) => ({ static_friction: value }),
+    stribeck: (value) => ({ stribeck_m_s: value }),
+    // Not above the limit by rounding.
+    stiffness: (value) => ({ stiffness: Math.min(10 ** value, state.hello.settings.stiffness_limits[1]) }),
+  };
+  for (const [id, change] of Object.entries(sliders)) {
+    // While it is moved, ten times a second at most: it is felt at once.
+    let last = 0;
+    const tell = () => { last = performance.now(); send({ do: "change", ...change(Number(element(id).value)) }); };
+    element(id).addEventListener("input", () => { panel.moving.add(id); showValues(); if (performance.now() - last > 100) tell(); });
+    element(id).addEventListener("change", () => { panel.moving.delete(id); tell(); });
+  }
+  element("reset").addEventListener("click", () => send({ do: "restart" }));
   element("home").addEventListener("click", goHome);
   element("save-png").addEventListener("click", () => composed().toBlob((blob) => save(blob, "palpate.png")));
   element("save-log").addEventListener("click", async () => {

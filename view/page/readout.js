@@ -10,6 +10,8 @@ function readOut() {
   put("n-parts", `${tool.commanded.map((c) => c.toFixed(3)).join(", ")} N`);
   put("n-contact", MODES[tool.mode] ?? "–");
   put("n-depth", withUnit(state.deepest, "m"));
+  element("n-stress").parentElement.hidden = state.colourBy !== "stress";
+  if (state.stress) put("n-stress", withUnit(state.stress.reduce((most, value) => Math.max(most, value), 0), "Pa"));
   put("n-time", `${state.time.toFixed(2)} s`);
   const row = own.newest >= 0 ? own.row(rowPlace(own)) : null;
   const commanded = element("n-commanded");

@@ -5,13 +5,15 @@ const state = {
   role: "watch",
   rest: null, // positions at the start (m), three numbers a node
   restNormals: null,
-  positions: null, // the newest (m)
+  positions: null, // as they are drawn (m)
+  stress: null, // equivalent stress of each node (Pa), while it is shown
+  surfaces: 0, // different ones that were drawn so far
   triangles: null, // corners, three a triangle
   size: 0.1, // largest extent of the body (m)
   diagonal: 0.17, // of its extents (m)
   centre: [0, 0, 0],
   time: 0, // of the newest tools (s)
-  tools: [], // position, orientation, computed, commanded, pointer, mode
+  tools: [], // as they are drawn: position, orientation, computed, commanded, pointer, mode
   touches: [], // place, force, triangle, device
   device: 0, // whose numbers and strips are shown, and which tool a drag moves
   colourBy: "depth",

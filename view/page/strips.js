@@ -35,6 +35,22 @@ function nameLines() {
   }
 }
 
+// What was changed while it ran, and when: marks in the strip of the force, which shows the difference.
+const changes = [];
+function markChange(before, now) {
+  if (!before || !now) return;
+  const said = [];
+  if (before.model !== now.model) said.push(now.model);
+  if (before.friction !== now.friction || before.static_friction !== now.static_friction) said.push(`µ ${now.friction?.toFixed(2) ?? "sticks"}`);
+  if (before.stiffness !== now.stiffness) said.push(`k × ${now.stiffness.toFixed(2)}`);
+  if (said.length === 0) return;
+  // A slider that is moved is one change.
+  const last = changes.at(-1);
+  const isSame = last && said.length === 1 && last.what.slice(0, 2) === said[0].slice(0, 2) && state.time - last.time < 0.5;
+  if (isSame) Object.assign(last, { time: state.time, what: said[0] }); else changes.push({ time: state.time, what: said.join(", ") });
+  while (changes.length > 20) changes.shift();
+}
+
 function drawStrips() {
   const own = ring(state.device);
   const end = state.hello?.mode === "log" ? Math.max(SPAN_S, state.time) : Math.max(SPAN_S, own.newestTime());
@@ -117,6 +133,24 @@ function drawStrip(strip, own, places, end) {
     context.moveTo(box.left, y(level));
     context.lineTo(box.right, y(level));
     context.stroke();
+  }
+  if (strip.id === "force") {
+    context.setLineDash([1, 2]);
+    context.lineWidth = 1;
+    context.strokeStyle = context.fillStyle = colour("--ink");
+    context.textAlign = "left";
+    context.textBaseline = "top";
+    let free = -Infinity;
+    for (const change of changes.filter(({ time }) => time > end - SPAN_S && time <= end)) {
+      const at = Math.round(x(change.time)) + 0.5;
+      context.beginPath();
+      context.moveTo(at, box.top - 4);
+      context.lineTo(at, box.bottom);
+      context.stroke();
+      // Words that would lie on those before are left out.
+      const width = context.measureText(change.what).width;
+      if (at > free && at + 3 + width < box.right) { context.fillText(change.what, at + 3, box.top - 4); free = at + 8 + width; }
+    }
   }
   for (const line of strip.lines) {
     context.strokeStyle = colour(line.colour);

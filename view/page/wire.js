@@ -11,7 +11,7 @@ function connect() {
   const socket = new WebSocket(`ws://${location.host}/socket`);
   socket.binaryType = "arraybuffer";
   wire.socket = socket;
-  socket.onopen = () => { socket.send(JSON.stringify({ do: "enter", token })); wire.wait = 500; };
+  socket.onopen = () => { socket.send(JSON.stringify({ do: "enter", token })); wire.wait = 500; wishStress(); };
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : see(data));
   socket.onclose = ({ code, reason }) => {
     status(reason ? `closed: ${reason}` : "not connected");
@@ -36,9 +36,15 @@ function hear(message) {
     hand.target = null;
     state.device = Math.min(state.device, Math.max(0, message.tools.length - 1));
     rings.forEach((ring) => ring.clear());
-    Object.assign(colouring.top, { depth: 0.002, pressure: 500 });
+    forgetTimeline();
+    changes.length = 0;
+    Object.assign(colouring.top, COLOUR_TOPS);
     say(message.warning ?? "");
     showHello();
+  } else if (message.kind === "settings") {
+    markChange(state.hello?.settings, message.settings);
+    if (state.hello) state.hello.settings = message.settings;
+    showSettings();
   } else if (message.kind === "role") {
     state.role = message.role;
     hand.target = null;
@@ -63,6 +69,7 @@ function see(buffer) {
     const [nodes, triangles] = [u32(4), u32(8)];
     state.rest = new Float32Array(buffer, 16, 3 * nodes);
     state.positions = state.rest;
+    state.stress = null;
     state.triangles = new Uint32Array(buffer, 16 + 12 * nodes, 3 * triangles);
     state.restNormals = normalsOf(state.rest, state.triangles);
     const isFirst = measureBody();
@@ -70,24 +77,27 @@ function see(buffer) {
     state.isNew.topology = true;
   } else if (kind === 2) {
     const tools = u32(4);
-    state.time = f64(8);
+    const time = f64(8);
     const numbers = new Float32Array(buffer, 24);
     const vector = (at) => [numbers[at], numbers[at + 1], numbers[at + 2]];
-    state.tools = Array.from({ length: tools }, (_, n) => {
+    const shown = Array.from({ length: tools }, (_, n) => {
       const at = TOOL * n;
       return { position: vector(at), orientation: [...numbers.subarray(at + 3, at + 7)], computed: vector(at + 7), commanded: vector(at + 10), pointer: vector(at + 13), mode: numbers[at + 16] };
     });
     const first = TOOL * tools;
-    state.touches = Array.from({ length: (numbers.length - first) / CONTACT }, (_, n) => {
+    const touches = Array.from({ length: (numbers.length - first) / CONTACT }, (_, n) => {
       const at = first + CONTACT * n;
       return { place: vector(at), force: vector(at + 3), triangle: numbers[at + 6], device: numbers[at + 7] };
     });
+    addTools({ time, tools: shown, touches });
     state.isNew.colour ||= state.colourBy === "pressure";
   } else if (kind === 3) {
     ring(u32(4)).push(f64(8), f64(16), new Float32Array(buffer, 24));
   } else if (kind === 4 && state.rest && u32(4) * 3 === state.rest.length) {
-    state.positions = new Float32Array(buffer, 16, state.rest.length);
-    state.isNew.surface = true;
+    const positions = new Float32Array(buffer, 16, state.rest.length);
+    const at = 16 + 4 * state.rest.length;
+    const stress = buffer.byteLength > at ? new Float32Array(buffer, at, state.rest.length / 3) : null;
+    addSurface({ time: f64(8), positions, stress });
   }
 }
 

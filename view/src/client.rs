@@ -23,6 +23,8 @@ pub(crate) struct Outbox {
     /// Topology, surface and tools, in this order.
     newest: [Option<Bytes>; 3],
     samples: VecDeque<Bytes>,
+    /// True if the browser shows the stress of the body.
+    pub(crate) shows_stress: bool,
     /// Messages that were not sent because newer ones took their places.
     pub(crate) dropped: u64,
 }

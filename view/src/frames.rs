@@ -5,7 +5,7 @@
 //! | 1 | topology | nodes, triangles, 0; rest positions (3 f32 each), corners (3 u32 each) |
 //! | 2 | tools | tools; time, time of the surface (f64); [`TOOL_FLOATS`] f32 each; contacts, [`CONTACT_FLOATS`] f32 each |
 //! | 3 | samples | device; first time (f64), deadline (s, f64); rows, see [`Row`](crate::samples::Row) |
-//! | 4 | surface | nodes; time (f64); positions (3 f32 each) |
+//! | 4 | surface | nodes; time (f64); positions (3 f32 each); equivalent stress (Pa, f32 each) while somebody looks at it |
 
 use bytes::Bytes;
 use palpate::model::Vec3;
@@ -59,11 +59,12 @@ impl Topology {
     }
 }
 
-/// A surface at `time` (s).
-pub(crate) fn surface(time: f64, points: impl ExactSizeIterator<Item = [f64; 3]>) -> Bytes {
-    let mut to = Writer::new(4, 16 + 12 * points.len());
+/// A surface at `time` (s), with the stress at its nodes (Pa), if that is known.
+pub(crate) fn surface(time: f64, points: impl ExactSizeIterator<Item = [f64; 3]>, stress: &[f64]) -> Bytes {
+    let mut to = Writer::new(4, 16 + 12 * points.len() + 4 * stress.len());
     to.u32(points.len() as u32).f64(time);
     points.for_each(|point| to.vector(point));
+    stress.iter().for_each(|&pascal| to.f32(pascal as f32));
     to.0.into()
 }
 
@@ -128,8 +129,8 @@ mod tests {
         let topology = Topology::of(&[[7, 3, 9], [3, 9, 12]]);
         assert_eq!((topology.nodes.as_slice(), topology.triangles[1]), (&[3, 7, 9, 12][..], [0, 2, 3]));
         assert_eq!(topology.bytes([[0.0; 3]; 4].into_iter()).len(), 16 + 12 * 4 + 12 * 2);
-        let surface = surface(1.5, [[1.0, 2.0, 3.0]].into_iter());
-        assert_eq!(surface.len(), 16 + 12);
+        let surface = surface(1.5, [[1.0, 2.0, 3.0]].into_iter(), &[4e3]);
+        assert_eq!(surface.len(), 16 + 12 + 4);
         assert_eq!(f64::from_le_bytes(surface[8..16].try_into().unwrap()), 1.5);
         let shown = tools(0.25, &[ToolView::default()], &[[4.0, 5.0, 6.0]], &[Touch::default()]);
         assert_eq!(shown.len(), 24 + 4 * (TOOL_FLOATS + CONTACT_FLOATS));

@@ -109,7 +109,7 @@ impl Hub {
         match wish {
             Wish::Enter { .. } => {}
             // A second visitor watches: what it says was said before it knew, or by a page that is not ours.
-            Wish::Move { .. } | Wish::Restart(_) if !is_hand => {}
+            Wish::Move { .. } | Wish::Change(_) | Wish::Restart {} if !is_hand => {}
             Wish::Move { device, to } => {
                 let [low, high] = state.bounds;
                 let to = std::array::from_fn(|axis| to[axis].clamp(low[axis], high[axis]));
@@ -121,7 +121,11 @@ impl Hub {
                 }
             }
             // The session's thread may have gone, with the server.
-            Wish::Restart(_) | Wish::Seek { .. } => drop(self.wishes.send((browser, wish))),
+            Wish::Stress { shown } => {
+                let browser = state.browsers.iter().find(|other| other.number == browser);
+                browser.into_iter().for_each(|browser| browser.outbox().shows_stress = shown);
+            }
+            Wish::Change(_) | Wish::Restart {} | Wish::Seek { .. } => drop(self.wishes.send((browser, wish))),
         }
     }
 
@@ -140,6 +144,19 @@ impl Hub {
             browser.outbox().forget();
             greet(state, browser);
         }
+    }
+
+    /// What can be changed has become `settings`, for everybody and whoever comes.
+    pub(crate) fn set(&self, settings: Value) {
+        let state = &mut *locked(&self.state);
+        let text = json!({ "kind": "settings", "settings": settings }).to_string();
+        state.hello["settings"] = settings;
+        state.browsers.iter().for_each(|browser| browser.outbox().say(text.clone()));
+    }
+
+    /// True if a browser shows the stress of the body.
+    pub(crate) fn shows_stress(&self) -> bool {
+        locked(&self.state).browsers.iter().any(|browser| browser.outbox().shows_stress)
     }
 
     /// Where the pointers are (m), by device.

@@ -23,7 +23,7 @@
 //! | `guard`, `http`, `socket` | who may come in; one request; one browser |
 //! | `wish` | what a page may say |
 //! | `hub`, `client` | where the threads meet; what waits for one browser |
-//! | `stage`, `subject`, `live` | the session's thread; what it is made of; what is shown of it |
+//! | `stage`, `subject`, `live`, `tuning` | the session's thread; what it is made of; what is shown of it; what is changed of it |
 //! | `playback` | a log in place of a session |
 //! | `frames`, `samples` | pictures and ticks in bytes |
 //! | `recent` | the newest minute, as a log |
@@ -44,6 +44,7 @@ mod server;
 mod socket;
 mod stage;
 mod subject;
+mod tuning;
 mod wish;
 
 use std::path::Path;
@@ -79,7 +80,8 @@ pub fn serve(running: Running, options: &Options) -> Result<Server, Error> {
     Server::start(door, hub, move || stage.run())
 }
 
-/// Shows a scene: starts a session of it, and another in its place when a visitor changes the model, the friction or the stiffness.
+/// Shows a scene: starts a session of it, and another in its place when a visitor resets it. Friction, stiffness and local model change
+/// while it runs.
 ///
 /// # Errors
 /// Those of [`serve`], and if the scene cannot be run.

@@ -4,11 +4,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use palpate::Error;
 use palpate::log::{ContactSample, Environment, LogRecord, SceneFrame, SceneTool};
 use palpate::model::contact::ToolShape;
 use palpate::model::wxyz;
 use palpate::runtime::Nanos;
-use palpate::session::{Running, SharedRecords, ToolView, Viewer};
+use palpate::session::{Controls, Running, SharedRecords, ToolView, Viewer};
 use serde_json::{Value, json};
 
 use crate::client::Picture;
@@ -16,11 +17,15 @@ use crate::frames::{self, Topology, Touch};
 use crate::hub::{Begun, Hub, locked};
 use crate::samples::Rows;
 use crate::subject::known;
+use crate::tuning;
+use crate::wish::Change;
 
 /// Pictures per second.
 pub(crate) const PERIOD: Duration = Duration::from_micros(16_667);
 /// How far from the body a pointer may go, in its largest extent.
 const ROOM: f64 = 1.0;
+/// Stress is computed a tenth of the time at most, however large the body: pictures between have that of one before.
+const STRESS_SHARE: u32 = 10;
 /// A tool that is a point is drawn so wide, in the largest extent of the body.
 const POINT: f64 = 0.04;
 
@@ -29,6 +34,7 @@ pub(crate) struct Live {
     pub(crate) running: Running,
     viewer: Option<Viewer>,
     records: Option<SharedRecords>,
+    controls: Option<Controls>,
     environment: Environment,
     topology: Topology,
     /// Its triangles, for pictures of a log.
@@ -39,6 +45,9 @@ pub(crate) struct Live {
     points: Vec<[f64; 3]>,
     /// The time of the newest surface that was sent.
     surface: Option<Nanos>,
+    /// The newest stress (Pa) at the surface's nodes, and when it may be computed again.
+    stress: Vec<f64>,
+    next_stress: Instant,
     rows: Rows,
     touches: Vec<(Nanos, Touch)>,
     told: Instant,
@@ -53,7 +62,46 @@ impl Live {
         let first = viewer.as_mut().map_or(Vec::new(), |viewer| topology.points(&viewer.surface().positions).collect());
         let (rows, touches, told) = (Rows::default(), Vec::new(), Instant::now());
         let (points, surface, triangles) = (first.clone(), None, topology.triangles.as_slice().into());
-        Self { running, viewer, records, environment, topology, triangles, first, points, surface, rows, touches, told }
+        let (controls, stress, next_stress) = (running.take_controls(), Vec::new(), told);
+        Self {
+            running,
+            viewer,
+            records,
+            controls,
+            environment,
+            topology,
+            triangles,
+            first,
+            points,
+            surface,
+            stress,
+            next_stress,
+            rows,
+            touches,
+            told,
+        }
+    }
+
+    /// True if it can be changed like that while it runs.
+    pub(crate) fn reaches(&self, change: &Change) -> bool {
+        let can_be = |name: &str| {
+            let models = self.controls.as_ref().map_or(&[][..], Controls::models);
+            tuning::kind(name).is_some_and(|kind| models.contains(&kind))
+        };
+        change.model.as_deref().is_none_or(can_be)
+    }
+
+    /// Changes it while it runs.
+    ///
+    /// # Errors
+    /// Of the first thing that cannot be.
+    pub(crate) fn change(&mut self, change: &Change) -> Result<(), Error> {
+        self.controls.as_ref().map_or(Ok(()), |controls| tuning::apply(controls, change))
+    }
+
+    /// What can be changed, as it is now.
+    pub(crate) fn settings(&self) -> Value {
+        self.controls.as_ref().map_or(Value::Null, tuning::settings)
     }
 
     /// What is told of it to everybody; `about` is what the subject knows.
@@ -90,6 +138,8 @@ impl Live {
             "global_hz": self.environment.global_hz,
             "stages": self.environment.limit_stages,
             "has_samples": self.records.is_some(),
+            "has_stress": self.viewer.as_ref().is_some_and(Viewer::knows_stress),
+            "settings": self.settings(),
             "tools": (0..tools).map(|device| json!({
                 "name": self.environment.devices.get(device),
                 "shape": shape(self.environment.shape(device as u16)),
@@ -119,7 +169,15 @@ impl Live {
             self.surface = Some(time);
             self.points.clear();
             self.points.extend(self.topology.points(&surface.positions));
-            hub.show(Picture::Surface, &frames::surface(time.as_secs_f64(), self.points.iter().copied()));
+            if hub.shows_stress() && Instant::now() >= self.next_stress {
+                let begun = Instant::now();
+                viewer.stress(&self.topology.nodes, &mut self.stress);
+                self.next_stress = begun + STRESS_SHARE * begun.elapsed();
+            } else if !hub.shows_stress() {
+                self.stress.clear();
+            }
+            let points = self.points.iter().copied();
+            hub.show(Picture::Surface, &frames::surface(time.as_secs_f64(), points, &self.stress));
             self.remember(hub, time, &tools);
         }
         let touches: Vec<Touch> = self.touches.iter().map(|(_, touch)| *touch).collect();

@@ -93,7 +93,7 @@ impl Playback {
                     if frame.points.len() != playback.rest.len() {
                         continue;
                     }
-                    let surface = frames::surface(frame.time.as_secs_f64(), frame.points.iter().copied());
+                    let surface = frames::surface(frame.time.as_secs_f64(), frame.points.iter().copied(), &[]);
                     bytes += surface.len();
                     if bytes > MOST_BYTES {
                         let end = frame.time.as_secs_f64();

@@ -1,4 +1,4 @@
-//! The thread of the session: starts it, shows it, and puts another in its place when a visitor wants that.
+//! The thread of the session: starts it, shows it, changes it as a visitor wants, and puts another in its place where that is needed.
 
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -49,6 +49,8 @@ impl Stage {
             None => json!({ "can_restart": false }),
         };
         let mut live = Live::new(running);
+        // A session begins as its scene says. What was changed in the one before and cannot be here is left out.
+        let _ = live.change(&Change { model: None, ..change.clone() });
         live.begin(&self.hub, about);
         self.live = Some(live);
     }
@@ -57,14 +59,18 @@ impl Stage {
     pub(crate) fn run(mut self) -> Option<Summary> {
         let mut next = Instant::now();
         while !self.hub.is_over() {
-            // Of several that came meanwhile all count, in one new session.
-            let mut wanted: Option<Change> = None;
+            // Of several that came meanwhile all count: sliders send many.
+            let (mut wanted, mut restarts) = (None::<Change>, false);
             while let Ok((_, wish)) = self.wishes.try_recv() {
-                if let Wish::Restart(change) = wish {
-                    wanted = Some(change.after(wanted.unwrap_or_default()));
+                match wish {
+                    Wish::Change(change) => wanted = Some(change.after(wanted.unwrap_or_default())),
+                    Wish::Restart {} => restarts = true,
+                    _ => {}
                 }
             }
-            wanted.into_iter().for_each(|change| self.restart(change));
+            if restarts || wanted.is_some() {
+                self.change(wanted.unwrap_or_default(), restarts);
+            }
             if let Some(live) = &mut self.live {
                 live.publish(&self.hub);
             }
@@ -85,26 +91,34 @@ impl Stage {
         }
     }
 
-    /// Puts another session in the place of this one; a change that cannot be is only told of.
-    fn restart(&mut self, change: Change) {
-        let change = change.after(self.change.clone());
-        self.hub.say(&note("The body starts anew ..."));
-        let result = self.replace(&change);
+    /// Changes the session that runs, or puts another in its place if that is wanted or a model cannot be reached otherwise. What cannot
+    /// be is only told of.
+    fn change(&mut self, change: Change, restarts: bool) {
+        let is_reached = self.live.as_ref().is_some_and(|live| live.reaches(&change));
+        let (all, words) = (change.clone().after(self.change.clone()), "That does not work");
+        let result = if restarts || !is_reached {
+            self.restart(&all)
+        } else {
+            self.live.as_mut().map_or(Ok(()), |live| live.change(&change))
+        };
         match result {
-            Ok(()) => self.change = change,
-            // What is shown goes on, or, if that has ended, starts anew as it was.
-            Err(error) => {
-                if self.live.is_none() {
-                    let _ = self.replace(&self.change.clone());
-                }
-                let rest = if self.live.is_some() {
-                    ""
-                } else {
-                    " There is no session now: reset, or start the command again."
-                };
-                self.hub.say(&note(&format!("That does not work: {error}.{rest}")));
-            }
+            Ok(()) => self.change = all,
+            Err(error) => self.hub.say(&note(&format!("{words}: {error}."))),
         }
+        if let Some(live) = &self.live {
+            self.hub.set(live.settings());
+        }
+    }
+
+    /// Puts another session in the place of this one.
+    fn restart(&mut self, change: &Change) -> Result<(), Error> {
+        self.hub.say(&note("The body starts anew ..."));
+        let result = self.replace(change);
+        // What is shown goes on, or, if that has ended, starts anew as it was.
+        if result.is_err() && self.live.is_none() && self.replace(&self.change.clone()).is_err() {
+            self.hub.say(&note("There is no session now: reset, or start the command again."));
+        }
+        result
     }
 
     /// Ends the session and starts one with this `change`. The one that is shown is ended only for one that is sure to work.

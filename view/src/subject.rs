@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use palpate::log::Environment;
-use palpate::scene::{BodySpec, DeviceKind, DeviceSpec, FrictionSpec, ModelChoice, Scene};
+use palpate::scene::{DeviceKind, DeviceSpec, ModelChoice, Scene};
 use palpate::session::{Running, Session};
 use palpate::{Device, Error, ErrorKind};
 use serde_json::{Value, json};
@@ -71,6 +71,10 @@ impl Pushed {
     /// If it cannot work.
     pub(crate) fn session(&mut self, change: &Change) -> Result<Session, Error> {
         let mut builder = Session::from_scene(changed(self.scene.clone(), change)?).endless().share_records();
+        // With one core there is none for a global model beside `full`.
+        if std::thread::available_parallelism().is_ok_and(|cores| cores.get() > 1) {
+            builder = builder.switchable();
+        }
         if let Some(open) = self.open_haply {
             builder = builder.open_haply_with(open);
         }
@@ -84,16 +88,12 @@ impl Pushed {
 
     /// What a visitor may change and what it is now, for the page.
     pub(crate) fn about(&self, change: &Change) -> Value {
-        let friction = change.friction.unwrap_or(self.scene.contact.friction.coefficient());
         let asked = change.model.as_deref().unwrap_or(self.scene.local.model.name());
         let spring = self.scene.devices.first().filter(|device| device.kind == DeviceKind::Pointer);
         json!({
             "can_restart": true,
             "models": ModelChoice::NAMES,
             "asked_model": asked,
-            // The page's slider has no end for a tool that sticks whatever pulls at it.
-            "friction": friction.is_finite().then_some(friction),
-            "stiffness": change.stiffness.unwrap_or(1.0),
             "spring_n_per_m": spring.map(|device| device.pointer.stiffness_n_per_m),
             "session": self.count,
         })
@@ -129,39 +129,13 @@ fn point(device: &mut DeviceSpec) {
     };
 }
 
-/// `scene` with what a visitor changed.
+/// `scene` with the model that a visitor wants; friction and stiffness change while it runs.
 fn changed(mut scene: Scene, change: &Change) -> Result<Scene, Error> {
     if let Some(model) = &change.model {
         let unknown = || Error::new(ErrorKind::Usage, format!("there is no local model {model:?}"));
         scene = scene.with_model(ModelChoice::from_name(model).ok_or_else(unknown)?);
         // What was chosen for another model need not suit this one.
         (scene.local.patch, scene.local.basis) = (None, None);
-    }
-    if let Some(friction) = change.friction {
-        scene.contact.friction = FrictionSpec::Coefficient(friction);
-        // What breaks a tool loose is no less than what holds it back.
-        scene.contact.static_friction = scene.contact.static_friction.filter(|mu| *mu >= friction);
-    }
-    if let Some(factor) = change.stiffness.filter(|factor| *factor != 1.0) {
-        // A number of steps that was chosen for the scene's stiffness may be too small for this one.
-        scene.global.substeps_per_ms = None;
-        match &mut scene.body {
-            Some(BodySpec::MassSpring(body)) => {
-                body.material.stiffness_n_per_m *= factor;
-                body.regions
-                    .iter_mut()
-                    .filter_map(|region| region.stiffness_n_per_m.as_mut())
-                    .for_each(|k| *k *= factor);
-            }
-            Some(BodySpec::Tetrahedra(body)) => {
-                body.tissue.young_modulus_pa *= factor;
-                body.regions
-                    .iter_mut()
-                    .filter_map(|region| region.young_modulus_pa.as_mut())
-                    .for_each(|e| *e *= factor);
-            }
-            None => {}
-        }
     }
     Ok(scene)
 }
@@ -190,15 +164,10 @@ mod tests {
     }
 
     #[test]
-    fn every_model_friction_and_stiffness_that_a_page_offers_makes_a_session() {
+    fn every_model_that_a_page_offers_makes_a_session() {
         for name in ModelChoice::NAMES {
             let change = Change { model: Some((*name).into()), ..Change::default() };
             assert!(Pushed::new(Scene::demo()).session(&change).is_ok(), "{name}");
-        }
-        for (friction, stiffness) in [(0.0, 0.1), (2.0, 10.0)] {
-            let change = Change { model: None, friction: Some(friction), stiffness: Some(stiffness) };
-            let error = Pushed::new(Scene::demo()).session(&change).err();
-            assert!(error.is_none(), "{friction} {stiffness}: {error:?}");
         }
     }
 

@@ -7,6 +7,8 @@ use serde::Deserialize;
 const LARGEST: f64 = 1e3;
 /// Friction that tissue and tools have, with room.
 const MOST_FRICTION: f64 = 2.0;
+/// Over more no friction of a surface falls (m/s).
+const FASTEST_STRIBECK: f64 = 1.0;
 /// How much softer or stiffer the body may be made.
 const STIFFNESS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
 
@@ -18,8 +20,12 @@ pub(crate) enum Wish {
     Enter { token: String },
     /// The pointer of a device is at a place (m).
     Move { device: usize, to: [f64; 3] },
-    /// Another session takes the place of this one: changed, or as it was.
-    Restart(Change),
+    /// Friction, stiffness or model become another while the session runs.
+    Change(Change),
+    /// The body starts anew, with what was changed.
+    Restart {},
+    /// The browser is shown the stress of the body, or no more.
+    Stress { shown: bool },
     /// What a log shows at a time (s).
     Seek { time: f64 },
 }
@@ -30,8 +36,12 @@ pub(crate) enum Wish {
 pub(crate) struct Change {
     /// The name of the local model.
     pub(crate) model: Option<String>,
-    /// Coulomb coefficient.
+    /// Coulomb coefficient of sliding.
     pub(crate) friction: Option<f64>,
+    /// What breaks a sticking tool loose.
+    pub(crate) static_friction: Option<f64>,
+    /// The speed over which it falls from one to the other (m/s).
+    pub(crate) stribeck_m_s: Option<f64>,
     /// The stiffness of the whole body, in that of the scene.
     pub(crate) stiffness: Option<f64>,
 }
@@ -41,10 +51,10 @@ impl Wish {
     pub(crate) fn read(text: &str) -> Option<Self> {
         let wish: Self = serde_json::from_str(text).ok()?;
         let is_good = match &wish {
-            Self::Enter { .. } => true,
+            Self::Enter { .. } | Self::Restart {} | Self::Stress { .. } => true,
             Self::Move { to, .. } => to.iter().all(|c| c.is_finite() && c.abs() <= LARGEST),
             Self::Seek { time } => time.is_finite() && *time >= 0.0,
-            Self::Restart(change) => change.can_be(),
+            Self::Change(change) => change.can_be(),
         };
         is_good.then_some(wish)
     }
@@ -53,7 +63,8 @@ impl Wish {
 impl Change {
     fn can_be(&self) -> bool {
         self.model.as_deref().is_none_or(|name| ModelChoice::from_name(name).is_some())
-            && self.friction.is_none_or(|mu| (0.0..=MOST_FRICTION).contains(&mu))
+            && [self.friction, self.static_friction].iter().flatten().all(|mu| (0.0..=MOST_FRICTION).contains(mu))
+            && self.stribeck_m_s.is_none_or(|speed| (0.0..=FASTEST_STRIBECK).contains(&speed))
             && self.stiffness.is_none_or(|factor| STIFFNESS.contains(&factor))
     }
 
@@ -62,6 +73,8 @@ impl Change {
         Self {
             model: self.model.or(earlier.model),
             friction: self.friction.or(earlier.friction),
+            static_friction: self.static_friction.or(earlier.static_friction),
+            stribeck_m_s: self.stribeck_m_s.or(earlier.stribeck_m_s),
             stiffness: self.stiffness.or(earlier.stiffness),
         }
     }
@@ -76,9 +89,10 @@ mod tests {
         let to = [0.1, -0.02, 3e-3];
         assert_eq!(Wish::read(r#"{"do":"move","device":0,"to":[0.1,-0.02,3e-3]}"#), Some(Wish::Move { device: 0, to }));
         assert_eq!(Wish::read(r#"{"do":"seek","time":1.5}"#), Some(Wish::Seek { time: 1.5 }));
-        let change = Change { model: Some("hold".into()), friction: Some(0.3), stiffness: None };
-        assert_eq!(Wish::read(r#"{"do":"restart","model":"hold","friction":0.3}"#), Some(Wish::Restart(change)));
-        assert_eq!(Wish::read(r#"{"do":"restart"}"#), Some(Wish::Restart(Change::default())));
+        let change = Change { model: Some("hold".into()), friction: Some(0.3), ..Change::default() };
+        assert_eq!(Wish::read(r#"{"do":"change","model":"hold","friction":0.3}"#), Some(Wish::Change(change)));
+        assert_eq!(Wish::read(r#"{"do":"restart"}"#), Some(Wish::Restart {}));
+        assert_eq!(Wish::read(r#"{"do":"stress","shown":true}"#), Some(Wish::Stress { shown: true }));
     }
 
     #[test]
@@ -95,9 +109,13 @@ mod tests {
             r#"{"do":"move","device":0,"to":[null,0,0]}"#,
             r#"{"do":"move","device":-1,"to":[0,0,0]}"#,
             r#"{"do":"move","device":0,"to":[0,0,0],"file":"/etc/passwd"}"#,
-            r#"{"do":"restart","model":"../../x"}"#,
-            r#"{"do":"restart","friction":-1}"#,
-            r#"{"do":"restart","stiffness":1e9}"#,
+            r#"{"do":"change","model":"../../x"}"#,
+            r#"{"do":"change","friction":-1}"#,
+            r#"{"do":"change","static_friction":1e9}"#,
+            r#"{"do":"change","stribeck_m_s":-0.1}"#,
+            r#"{"do":"change","stiffness":1e9}"#,
+            r#"{"do":"change","scene":"x.toml"}"#,
+            r#"{"do":"stress","shown":"x"}"#,
             r#"{"do":"restart","scene":"x.toml"}"#,
             r#"{"do":"seek","time":-1}"#,
             r#"{"do":"open","path":"x"}"#,
@@ -108,8 +126,8 @@ mod tests {
 
     #[test]
     fn a_change_keeps_what_was_changed_before() {
-        let earlier = Change { model: Some("hold".into()), friction: Some(0.3), stiffness: None };
-        let both = Change { friction: Some(0.5), stiffness: Some(2.0), model: None }.after(earlier);
-        assert_eq!(both, Change { model: Some("hold".into()), friction: Some(0.5), stiffness: Some(2.0) });
+        let earlier = Change { model: Some("hold".into()), friction: Some(0.3), ..Change::default() };
+        let both = Change { friction: Some(0.5), stiffness: Some(2.0), ..Change::default() }.after(earlier.clone());
+        assert_eq!(both, Change { friction: Some(0.5), stiffness: Some(2.0), ..earlier });
     }
 }

@@ -231,7 +231,8 @@ fn a_second_visitor_watches_until_the_first_has_gone() {
     let mut second = enter(&server, &token);
     assert_eq!(find(&mut second, role).as_deref(), Some("watch"));
     say(&mut second, r#"{"do":"move","device":0,"to":[0.09,0.05,0.2]}"#);
-    say(&mut second, r#"{"do":"restart","friction":0.1}"#);
+    say(&mut second, r#"{"do":"change","friction":0.1}"#);
+    say(&mut second, r#"{"do":"restart"}"#);
     let (begin, _, pointer) = find(&mut second, tool).unwrap();
     let later = find(&mut second, |message| tool(message).filter(|tool| tool.0 > begin + 0.5)).unwrap();
     assert_eq!(later.2, pointer, "it moves nothing and starts nothing anew");

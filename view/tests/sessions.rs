@@ -26,12 +26,63 @@ fn the_tool_goes_where_the_pointer_is_and_a_new_session_keeps_the_pointer() {
     say(&mut visitor, r#"{"do":"move","device":0,"to":[0.05,0.05,0.16]}"#);
     let is_there = |position: [f32; 3]| (position[0] - 0.05).abs() < 1e-3 && (position[2] - 0.16).abs() < 1e-3;
     assert!(find(&mut visitor, |message| tool(message).filter(|tool| is_there(tool.1))).is_some());
-    say(&mut visitor, r#"{"do":"restart","model":"patch","friction":0.2,"stiffness":2}"#);
+    say(&mut visitor, r#"{"do":"change","friction":0.2}"#);
+    say(&mut visitor, r#"{"do":"restart"}"#);
     let second = find(&mut visitor, hello).unwrap();
-    assert_eq!((second["model"].as_str(), second["friction"].as_f64()), (Some("patch"), Some(0.2)));
-    assert_eq!((second["stiffness"].as_f64(), second["session"].as_u64()), (Some(2.0), Some(2)));
+    assert_eq!((second["session"].as_u64(), second["settings"]["friction"].as_f64()), (Some(2), Some(0.2)));
     assert!(find(&mut visitor, |message| tool(message).filter(|tool| tool.2 == [0.05, 0.05, 0.16])).is_some());
     assert!(server.stop().is_some_and(|summary| summary.runtime.fault.is_none()));
+}
+
+#[test]
+fn friction_stiffness_and_model_change_while_the_body_goes_on() {
+    let (server, token) = server();
+    let mut visitor = enter(&server, &token);
+    let first = find(&mut visitor, hello).unwrap();
+    let most = first["settings"]["stiffness_limits"][1].as_f64().unwrap();
+    assert!(most > 1.0, "{first}");
+    let mut last_s = 0.0;
+    for (wish, name, value) in [
+        (r#"{"do":"change","friction":0.25}"#.to_owned(), "friction", serde_json::json!(0.25)),
+        (format!(r#"{{"do":"change","stiffness":{most}}}"#), "stiffness", serde_json::json!(most)),
+        (r#"{"do":"change","model":"full"}"#.to_owned(), "model", serde_json::json!("full")),
+        (r#"{"do":"change","model":"patch"}"#.to_owned(), "model", serde_json::json!("patch")),
+    ] {
+        say(&mut visitor, &wish);
+        let mut is_set = false;
+        let time_s = find(&mut visitor, |message| {
+            assert_eq!(hello(message), None, "no other session begins");
+            is_set |= text(message).is_some_and(|said| said["kind"] == "settings" && said["settings"][name] == value);
+            tool(message).filter(|_| is_set).map(|(time_s, ..)| time_s)
+        });
+        assert!(time_s.unwrap() >= last_s, "the same run goes on");
+        last_s = time_s.unwrap();
+    }
+    // What the session's steps do not bear is refused with the limit, and nothing else is changed.
+    say(&mut visitor, r#"{"do":"change","stiffness":10}"#);
+    let told = find(&mut visitor, |message| text(message).filter(|said| said["kind"] == "note"));
+    assert!(told.unwrap()["text"].as_str().unwrap().contains(&format!("{most:.3}")), "the limit is named");
+    assert!(server.stop().is_some_and(|summary| summary.runtime.fault.is_none()));
+}
+
+#[test]
+fn stress_is_sent_while_somebody_looks_at_it() {
+    let (server, token) = server();
+    let mut visitor = enter(&server, &token);
+    assert_eq!(find(&mut visitor, hello).unwrap()["has_stress"], true);
+    let stress = |message: &Message| match message {
+        Message::Binary(bytes) if bytes[..4] == [4, 0, 0, 0] => {
+            let nodes = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
+            Some((bytes.len() - 16 - 12 * nodes) / (4 * nodes))
+        }
+        _ => None,
+    };
+    assert_eq!(find(&mut visitor, stress), Some(0));
+    for shown in [true, false] {
+        say(&mut visitor, &format!(r#"{{"do":"stress","shown":{shown}}}"#));
+        let numbers = usize::from(shown);
+        assert!(find(&mut visitor, |message| stress(message).filter(|found| *found == numbers)).is_some());
+    }
 }
 
 // Check that percentiles are those of the report, and not the largest value under each name.
@@ -55,7 +106,7 @@ fn a_session_that_cannot_start_is_told_of_and_the_body_starts_as_it_was() {
     let token = server.url().split_once('#').unwrap().1.to_owned();
     let mut visitor = enter(&server, &token);
     assert_eq!(find(&mut visitor, hello).unwrap()["session"], 1);
-    say(&mut visitor, r#"{"do":"restart","friction":0.1}"#);
+    say(&mut visitor, r#"{"do":"restart"}"#);
     // What was said before the new session is read first or after it.
     let (mut again, mut told) = (None, None);
     find(&mut visitor, |message| {
@@ -70,7 +121,7 @@ fn a_session_that_cannot_start_is_told_of_and_the_body_starts_as_it_was() {
         (again.is_some() && told.is_some()).then_some(())
     });
     let again = again.unwrap();
-    assert_eq!((&again["session"], &again["friction"]), (&3.into(), &0.5.into()), "{told:?}");
+    assert_eq!((&again["session"], &again["settings"]["friction"]), (&3.into(), &0.5.into()), "{told:?}");
     assert!(told.unwrap().contains("felt-2.mcap"));
     assert!(find(&mut visitor, tool).is_some());
 }

@@ -5,7 +5,7 @@ use crate::actors::messages::{ComputedForce, DeviceSample};
 use crate::actors::tool::LocalToolPorts;
 use crate::devices::DeviceState;
 use crate::log::{ForceSample, JoinedRecords, LogRecord};
-use crate::model::body::{Block, Body, State};
+use crate::model::body::{Block, Body, State, Stiffness};
 use crate::model::contact::{Contact, Law};
 use crate::model::mesh::Face;
 use crate::model::simulation::Stepping;
@@ -68,7 +68,9 @@ impl ByHand {
         };
         let (tools, ends) = (0..TOOLS as u16).map(&mut tool).unzip();
         let (surface, _) = graph.outlet(SurfaceView::default);
-        let actor = WholeActor::new(glued_simulation(), tools, [HAPTIC, Rate::hz(30)], vec![surface]);
+        let settings = Settings { friction: 0.0.into(), stiffness: Stiffness::default(), model: Kind::Full };
+        let settings = graph.parameter(settings).reader();
+        let actor = WholeActor::new(glued_simulation(), tools, [HAPTIC, Rate::hz(30)], vec![surface], settings);
         Self { actor, ends, drain, simulation: glued_simulation() }
     }
 

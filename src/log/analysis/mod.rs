@@ -134,6 +134,7 @@ impl Analysis {
             | LogRecord::ContactPoint(_)
             | LogRecord::Global(_)
             | LogRecord::Port(_)
+            | LogRecord::Input(_)
             | LogRecord::Probe(_) => {}
         }
     }

@@ -19,7 +19,7 @@ use super::percentiles::Percentiles;
 use super::records::{CommandSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy};
 use super::stats::GroupStats;
 use crate::model::contact::ContactMode;
-use crate::runtime::{self, GroupMode, Nanos, PortUse, PortUseKind, SlipCause, TickTiming};
+use crate::runtime::{self, GroupMode, InputUse, Nanos, PortUse, PortUseKind, SlipCause, TickTiming};
 
 /// The version of the schema that this build writes.
 pub(crate) const SCHEMA_VERSION: u32 = 3;
@@ -102,6 +102,19 @@ message! { "palpate.PortUse" => for PortUse {
     sequence = 7 (.sequence),
 } }
 
+// `/inputs`: a value that a release took from outside of the graph, as words.
+message! { "palpate.InputUse" => for InputUse {
+    time_ns = 1 (.time),
+    group = 2 (.group),
+    port = 3 (.port),
+    sequence = 4 (.sequence),
+    word_0 = 5 (.value[0]),
+    word_1 = 6 (.value[1]),
+    word_2 = 7 (.value[2]),
+    word_3 = 8 (.value[3]),
+    word_4 = 9 (.value[4]),
+} }
+
 // `/stats/GROUP`: how a group has kept time, once a second.
 message! { "palpate.Stats" => for GroupStats {
     time_ns = 1 (.time),
@@ -138,6 +151,7 @@ fn file() -> FileDescriptorProto {
             Resync::descriptor(),
             GlobalTick::descriptor(),
             PortUse::descriptor(),
+            InputUse::descriptor(),
             ProbeSample::descriptor(),
             GroupStats::descriptor(),
         ],

@@ -4,8 +4,8 @@ use super::foxglove::{Log, PoseInFrame, SceneUpdate};
 use super::{ActorTimes, Contact, LogMessage};
 use crate::log::records::{CommandSample, Environment, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync};
 use crate::log::stats::GroupStats;
-use crate::runtime::PortUse;
 use crate::runtime::TickTiming;
+use crate::runtime::{InputUse, PortUse};
 
 /// The kinds of messages that palpate logs, one for each kind of topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -21,6 +21,7 @@ pub enum TopicKind {
     Resync,
     Global,
     Ports,
+    Inputs,
     Probe,
     Scene,
     Log,
@@ -36,7 +37,7 @@ use TopicKind as Kind;
 const OF_DEVICE: [Kind; 6] = [Kind::Force, Kind::ForceCommanded, Kind::Tool, Kind::Contact, Kind::Resync, Kind::Probe];
 
 /// The topics that every log declares; `/scene` only those that have it.
-const SHARED: [Kind; 3] = [Kind::Global, Kind::Ports, Kind::Log];
+const SHARED: [Kind; 4] = [Kind::Global, Kind::Ports, Kind::Inputs, Kind::Log];
 
 impl Topic {
     /// The topics that the log of `environment` declares, whether or not anything is written there; `/actors` only where
@@ -67,6 +68,7 @@ impl Topic {
             LogRecord::Resync(r) => Self(Kind::Resync, r.device),
             LogRecord::Global(_) => Self(Kind::Global, 0),
             LogRecord::Port(_) => Self(Kind::Ports, 0),
+            LogRecord::Input(_) => Self(Kind::Inputs, 0),
             LogRecord::Probe(r) => Self(Kind::Probe, r.device),
         }
     }
@@ -76,7 +78,7 @@ impl Topic {
         let word = kind.word();
         match kind {
             Kind::Timing | Kind::Actors | Kind::Stats => format!("/{word}/{}", environment.group_name(number)),
-            Kind::Global | Kind::Ports | Kind::Scene | Kind::Log => format!("/{word}"),
+            Kind::Global | Kind::Ports | Kind::Inputs | Kind::Scene | Kind::Log => format!("/{word}"),
             _ => format!("{}/{word}", environment.device_prefix(number)),
         }
     }
@@ -96,6 +98,7 @@ impl TopicKind {
             Self::Resync => ("resync", Resync::NAME),
             Self::Global => ("global", GlobalTick::NAME),
             Self::Ports => ("ports", PortUse::NAME),
+            Self::Inputs => ("inputs", InputUse::NAME),
             Self::Probe => ("probe", ProbeSample::NAME),
             Self::Scene => ("scene", SceneUpdate::NAME),
             Self::Log => ("log", Log::NAME),

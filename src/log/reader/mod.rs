@@ -314,6 +314,7 @@ impl LogEntry {
             TopicKind::Resync => LogRecord::Resync(LogMessage::decode(data)?),
             TopicKind::Global => LogRecord::Global(LogMessage::decode(data)?),
             TopicKind::Ports => LogRecord::Port(LogMessage::decode(data)?),
+            TopicKind::Inputs => LogRecord::Input(LogMessage::decode(data)?),
             TopicKind::Probe => LogRecord::Probe(LogMessage::decode(data)?),
             TopicKind::Stats => return Ok(Some(Self::Stats(LogMessage::decode(data)?))),
             TopicKind::Scene => return Ok(None),

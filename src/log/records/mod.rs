@@ -20,7 +20,7 @@ pub use self::scene::{SceneFrame, SceneTool};
 
 use self::packing::Recorded;
 use crate::runtime::{ActorTimes, Channel, Event, Record, Recorder, TickTiming};
-use crate::runtime::{Nanos, PortUse};
+use crate::runtime::{InputUse, Nanos, PortUse};
 
 /// Everything that a log can hold per tick.
 ///
@@ -42,6 +42,7 @@ pub enum LogRecord {
     Actors(ActorTimes),
     Event(Event),
     Port(PortUse),
+    Input(InputUse),
     Force(ForceSample),
     Command(CommandSample),
     Tool(ToolSample),
@@ -60,6 +61,7 @@ macro_rules! each {
             LogRecord::Actors($r) => $of,
             LogRecord::Event($r) => $of,
             LogRecord::Port($r) => $of,
+            LogRecord::Input($r) => $of,
             LogRecord::Force($r) => $of,
             LogRecord::Command($r) => $of,
             LogRecord::Tool($r) => $of,
@@ -88,7 +90,7 @@ impl LogRecord {
             Self::Contact(r) => r.device,
             Self::Resync(r) => r.device,
             Self::Probe(r) => r.device,
-            Self::Tick(_) | Self::Actors(_) | Self::Event(_) | Self::Port(_) | Self::Global(_) => 0,
+            Self::Tick(_) | Self::Actors(_) | Self::Event(_) | Self::Port(_) | Self::Input(_) | Self::Global(_) => 0,
         }
     }
 
@@ -110,6 +112,7 @@ impl LogRecord {
             Channel::ACTORS => return Some(Self::Actors(ActorTimes::from_record(record)?)),
             Channel::EVENT => return Some(Self::Event(Event::from_record(record)?)),
             Channel::PORT => return Some(Self::Port(PortUse::from_record(record)?)),
+            Channel::INPUT => return Some(Self::Input(InputUse::from_record(record)?)),
             _ => {}
         }
         let (kind, device) = packing::kind_and_device(record.channel)?;
@@ -147,7 +150,7 @@ macro_rules! whole {
     )* };
 }
 
-whole! { TickTiming ActorTimes Event PortUse }
+whole! { TickTiming ActorTimes Event PortUse InputUse }
 
 #[cfg(test)]
 mod tests {
@@ -217,6 +220,7 @@ mod tests {
                 device: 4,
             }),
             LogRecord::Port(PortUse { time, port: 3, tick: 33, count: 1, ..PortUse::default() }),
+            LogRecord::Input(InputUse { time, group: 1, port: 7, sequence: 2, value: [1, 2, 3, 4, u64::MAX] }),
             LogRecord::Global(GlobalTick { time, version: 2, first_tick: 1, last_tick: 33 }),
             LogRecord::Probe(ProbeSample {
                 time,

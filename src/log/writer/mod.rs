@@ -147,6 +147,7 @@ impl<W: Write> McapWriter<W> {
             LogRecord::Resync(r) => self.push(topic, time, r),
             LogRecord::Global(r) => self.push(topic, time, r),
             LogRecord::Port(r) => self.push(topic, time, r),
+            LogRecord::Input(r) => self.push(topic, time, r),
             LogRecord::Probe(r) => self.push(topic, time, r),
         }
     }

@@ -54,7 +54,7 @@ fn row([radius, depth]: [f64; 2]) {
     let mut bases = Bases::default();
     let basis = Basis::compute(&resting, &patch, Size::States(STATES)).expect("held").expect("there are surroundings");
     bases.insert(Arc::new(basis));
-    let mut model = Template::new(Kind::Predictive, size, sim.body()).expect("it fits").empty().expect("a model");
+    let mut model = Template::new(Kind::Predictive, size, sim.body()).expect("it fits").empty();
     model.rebuild(ResyncView {
         global: &mut sim,
         tick: 500,

@@ -3,10 +3,11 @@
 use super::kernel::{InstructionSet, LatticeKernel, NOMINAL_SPRING_S};
 use super::lattice_springs::LatticeSprings;
 use super::region::{Material, Region, materials};
+use super::stress::virial;
 use super::{Body, Restriction, Spring, SpringNetwork, State, TangentBlock};
-use crate::Vec3;
 use crate::error::ModelError;
 use crate::mesh::{Face, Lattice, Surface};
+use crate::{Mat3, Vec3};
 
 /// A block of nodes and springs; made by [`Block::builder`].
 ///
@@ -261,6 +262,18 @@ impl Body for Block {
             2.5 * shear * stiffness / (1.0 - 0.25 * 0.25)
         };
         (0..self.rest.len() as u32).map(of_node).collect()
+    }
+
+    fn stress(&self, state: &State, node: u32) -> Option<Mat3> {
+        let at = self.lattice.coordinates(node);
+        let corner = |at: [usize; 3]| self.rest[self.lattice.id(at) as usize];
+        let step = corner([1, 1, 1]) - corner([0, 0, 0]);
+        // Half of a cell belongs to a node of a face, a quarter to one of an edge.
+        let ends = (0..3).filter(|&axis| at[axis] == 0 || at[axis] + 1 == self.lattice.nodes[axis]).count();
+        let volume = step.x * step.y * step.z * 0.5_f64.powi(ends as i32);
+        let x = state.positions[node as usize];
+        let springs = self.springs.neighbours(&self.lattice, node);
+        Some(virial(springs.map(|(other, spring)| (spring, state.positions[other as usize] - x)), volume))
     }
 
     fn nominal_evaluation(&self) -> f64 {

@@ -8,6 +8,8 @@ mod region;
 mod restriction;
 mod shape;
 mod spring;
+mod stiffness;
+mod stress;
 mod tetrahedra;
 
 pub use block::{Block, BlockBuilder};
@@ -17,6 +19,9 @@ pub use region::Region;
 pub use restriction::Restriction;
 pub use shape::Shape;
 pub use spring::{Spring, SpringTangent};
+pub(crate) use stiffness::Stiffened;
+pub use stiffness::Stiffness;
+pub use stress::von_mises;
 pub use tetrahedra::{Tetrahedra, TetrahedraBuilder, Tissue, TissueRegion, Where};
 
 use crate::mesh::Surface;
@@ -163,6 +168,15 @@ pub trait Body: Send + Sync + std::fmt::Debug {
     /// Not called in a tick: allocates.
     fn contact_moduli(&self) -> Vec<f64> {
         Vec::new()
+    }
+
+    /// The elastic stress (Pa) at `node`, the mean of what is around it: of elements Cauchy's, of springs the virial. `None`, the default,
+    /// if it is not known; what pressure there is need not be in it, see [`von_mises`].
+    ///
+    /// # Real-time
+    /// For programs that draw: bounded.
+    fn stress(&self, _state: &State, _node: u32) -> Option<Mat3> {
+        None
     }
 
     /// What one evaluation of all forces takes (s) on no machine in particular, for runs that must be the same on all of

@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 
 use super::kernel::{InstructionSet, NOMINAL_SPRING_S, NetworkKernel};
+use super::stress::{enclosed, virial};
 use super::{Body, Restriction, Spring, State, TangentBlock};
-use crate::Vec3;
 use crate::error::ModelError;
 use crate::mesh::{Lists, Surface};
+use crate::{Mat3, Vec3};
 
 /// Point masses joined by an arbitrary list of springs; made by [`SpringNetwork::builder`].
 ///
@@ -39,6 +40,8 @@ pub struct SpringNetwork {
     inverse_masses: Vec<f64>,
     surface: Surface,
     springs: Vec<(u32, u32, Spring)>,
+    /// Inside the surface at rest (m^3).
+    volume: f64,
     /// The springs at each node.
     at_node: Lists,
     kernel: NetworkKernel,
@@ -129,7 +132,9 @@ impl SpringNetworkBuilder {
             inverse_masses[node as usize] = 0.0;
         }
         let ends = self.springs.iter().zip(0..).flat_map(|(&(i, j, _), spring)| [(i, spring), (j, spring)]);
+        let volume = enclosed(&self.rest, &self.triangles);
         Ok(SpringNetwork {
+            volume,
             surface: Surface::new(nodes, self.triangles)?,
             kernel: NetworkKernel::new(nodes, &self.springs),
             rest: self.rest,
@@ -220,11 +225,18 @@ impl SpringNetwork {
             rest: nodes.iter().map(|&node| rest[node as usize]).collect(),
             inverse_masses: nodes.iter().map(|&node| inverse_masses[node as usize]).collect(),
             surface: Surface::default(),
+            volume: 0.0,
             at_node: Lists::new(nodes.len(), ends),
             kernel: NetworkKernel::new(nodes.len(), &near),
             springs: near,
         };
         Restriction { nodes, body: Box::new(body) }
+    }
+
+    /// The share of a node in the volume that the surface encloses at rest (m^3): by the number of its springs.
+    fn volume_of(&self, node: u32) -> Option<f64> {
+        let share = self.at_node.of(node).len() as f64 / (2.0 * self.springs.len() as f64);
+        Some(self.volume * share).filter(|volume| *volume > 0.0)
     }
 
     /// The springs at `node` and their other ends, with the differences of position and velocity to there.
@@ -275,6 +287,11 @@ impl Body for SpringNetwork {
     fn restriction(&self, nodes: &[u32]) -> Option<Restriction> {
         let springs = |node| self.at_node.of(node).iter().map(|&spring| self.springs[spring as usize]);
         Some(Self::restricted(&self.rest, &self.inverse_masses, nodes, springs))
+    }
+
+    fn stress(&self, state: &State, node: u32) -> Option<Mat3> {
+        let volume = self.volume_of(node)?;
+        Some(virial(self.around(state, node).map(|(_, spring, along, _)| (spring, along)), volume))
     }
 
     fn nominal_evaluation(&self) -> f64 {

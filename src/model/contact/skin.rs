@@ -15,7 +15,7 @@
 //! well.
 
 use crate::Vec3;
-use crate::body::Body;
+use crate::body::{Body, Stiffness};
 use crate::mesh::Surface;
 
 /// c, in mean edges at the node.
@@ -273,6 +273,11 @@ pub(super) struct Grain {
 }
 
 impl Grain {
+    /// That of the body as stiff as it is now.
+    pub(super) fn stiffened(self, stiffness: Stiffness) -> Self {
+        Self { modulus: self.modulus * stiffness.factor(), ..self }
+    }
+
     /// What a sphere of `radius` (m) sinks in beside the elements while `steady` (N) has pressed on the mean of the last
     /// milliseconds.
     pub(super) fn sinking(&self, radius: f64, steady: f64) -> Sinking {

@@ -7,7 +7,7 @@ use super::row::Row;
 use super::skin::Skin;
 use super::triangle::interpolate;
 use super::{Contact, ContactMode, ContactPoint, ToolShape};
-use crate::body::Body;
+use crate::body::{Body, Stiffness};
 use crate::mesh::Surface;
 use crate::{Pose, Vec3, Wrench};
 
@@ -31,6 +31,8 @@ pub(crate) struct Touch {
     pub(crate) contact: Contact,
     /// On the tool: the impulses over the full step.
     pub(crate) wrench: Wrench,
+    /// How stiff the body is that it touches.
+    pub(crate) stiffness: Stiffness,
     /// The force that has pressed on the mean of the last milliseconds (N).
     pub(super) steady: f64,
     /// Where a tool with a shape touched in this tick; forces are summed over its steps.
@@ -92,6 +94,7 @@ impl Touch {
         id: impl Fn(u32) -> Option<u32>,
     ) {
         (self.contact, self.wrench, self.steady) = (contact(&other.contact), Wrench::default(), other.steady);
+        self.stiffness = other.stiffness;
         self.points.clone_from(&other.points);
         self.pressed.clear();
         // Whether a place stuck is told by its triangle: corners have other numbers here.

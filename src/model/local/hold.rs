@@ -33,6 +33,10 @@ impl LocalModel for Hold {
         self.built_at
     }
 
+    fn kind(&self) -> Kind {
+        Kind::Hold
+    }
+
     fn serves_as(&self) -> Kind {
         Kind::Hold
     }

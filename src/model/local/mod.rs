@@ -11,6 +11,7 @@ mod patch;
 mod predictive;
 mod succession;
 mod template;
+mod whole;
 mod windows;
 
 use crate::body::State;
@@ -71,6 +72,12 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// Wait-free, real-time safe.
     fn built_at(&self) -> u64;
 
+    /// The kind of model that it is.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    fn kind(&self) -> Kind;
+
     /// The kind of model that made the force of the last tick: its own, or the one that it falls back to.
     ///
     /// # Real-time
@@ -83,6 +90,14 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// Wait-free, real-time safe.
     fn catches_up(&self) -> bool {
         true
+    }
+
+    /// Ticks that it is advanced per haptic tick until it has caught up, more than one; another model serves meanwhile.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    fn catch_up_ticks(&self) -> u64 {
+        8
     }
 
     /// The tool's contact in this model; its triangle is a global id.

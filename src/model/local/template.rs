@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::hold::Hold;
 use super::linear::{Boundary, Layers, LinearPatch, LinearSpec, Yielding};
 use super::predictive::Predictive;
+use super::whole::Whole;
 use super::{Feedback, Kind, LocalModel};
 use crate::body::Body;
 use crate::error::ModelError;
@@ -30,7 +31,7 @@ use crate::surroundings::{Condensation, RestingBody};
 /// let mut global = Simulation::new(Box::new(block), state, contact, Law::default(), stepping)?;
 ///
 /// // At every resync the local model is built from the global one; then it runs on by itself.
-/// let mut model = template.empty().expect("all but `full` have one");
+/// let mut model = template.empty();
 /// let tools = &[ToolForecast::at_rest(Vec3::new(0.03, 0.03, 0.05))];
 /// let (triangles, bases) = (&[triangle], &Bases::default());
 /// model.rebuild(ResyncView { global: &mut global, tick: 0, triangles, patch: None, tools, index: 0, horizon: 33, bases });
@@ -50,6 +51,8 @@ pub struct Template {
     pub resting: Option<Arc<RestingBody>>,
     feedback: Feedback,
     is_implicit: bool,
+    /// Of the global model, in haptic ticks.
+    period: u32,
     /// For the linear models.
     boundary: Boundary,
 }
@@ -71,15 +74,16 @@ impl Template {
                 ModelError::of("local.model", message)
             })
         };
+        let period = 33;
         let boundary = match kind {
-            Kind::LinearBoundary => Boundary::Drifting { ticks: 33 },
+            Kind::LinearBoundary => Boundary::Drifting { ticks: period },
             Kind::ScaledBoundary => Boundary::Layered(Layers::new(body)),
             Kind::Condensed => Boundary::Yielding(Yielding::new(Condensation::new(resting()?.into())?)),
             _ => Boundary::Still,
         };
         let resting =
             if matches!(kind, Kind::Predicted | Kind::Predictive) { Some(Arc::new(resting()?)) } else { None };
-        Ok(Self { kind, patch, resting, feedback: Feedback::of(kind), is_implicit: false, boundary })
+        Ok(Self { kind, patch, resting, feedback: Feedback::of(kind), is_implicit: false, period, boundary })
     }
 
     /// Lets the models tell the global one `feedback`.
@@ -108,6 +112,7 @@ impl Template {
     /// Wait-free, real-time safe.
     #[must_use]
     pub fn with_period(mut self, ticks: u32) -> Self {
+        self.period = ticks;
         if let Boundary::Drifting { ticks: moving } = &mut self.boundary {
             *moving = ticks;
         }
@@ -122,18 +127,30 @@ impl Template {
         self.kind.is_linear() && self.feedback != Feedback::Trajectory
     }
 
-    /// An empty model, to be rebuilt in place; `None` for [`Kind::Full`], which is the [`Simulation`](crate::simulation::Simulation) itself with
-    /// all tools.
+    /// A recipe for models of another `kind` with a `patch` of its own for the same body, as it was made.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn empty(&self) -> Option<Box<dyn LocalModel>> {
+    pub fn of_kind(&self, kind: Kind, patch: [usize; 3], body: &dyn Body) -> Result<Self, ModelError> {
+        let made = Self::new(kind, patch, body)?.with_period(self.period);
+        Ok(if self.is_implicit { made.with_implicit_steps() } else { made })
+    }
+
+    /// An empty model, to be rebuilt in place. That of [`Kind::Full`] is for one tool; where nothing but `full` is wanted it is the
+    /// [`Simulation`](crate::simulation::Simulation) itself with all tools.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn empty(&self) -> Box<dyn LocalModel> {
         let spec = LinearSpec { size: self.patch, feedback: self.feedback, is_implicit: self.is_implicit };
-        Some(match self.kind {
-            Kind::Full => return None,
-            Kind::Predicted | Kind::Predictive => Box::new(Predictive::new(self.patch)),
+        match self.kind {
+            Kind::Full => Box::new(Whole::default()),
+            Kind::Predicted | Kind::Predictive => Box::new(Predictive::new(self.patch, self.kind == Kind::Predictive)),
             kind if kind.is_linear() => Box::new(LinearPatch::new(spec, self.boundary.clone())),
             _ => Box::new(Hold::default()),
-        })
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::far::Far;
 use super::products::Columns;
+use crate::body::Stiffness;
 use crate::body::kernel::Lane;
 use crate::linear_algebra::{Matrix, modes, product, product_t};
 
@@ -52,22 +53,23 @@ impl Reduced {
     /// # Real-time
     /// Bounded, real-time safe.
     pub(crate) fn step(&self, motion: &mut ReducedMotion, forces: &[f64], d: f64) {
-        let ReducedMotion { eta, rate, acceleration, sums } = motion;
+        let ReducedMotion { eta, rate, acceleration, sums, stiffness } = motion;
+        let (s, root) = (stiffness.factor(), stiffness.root());
         self.shapes.project(forces, sums, acceleration);
         match &self.damping {
             Damping::Diagonal(damping) => {
                 for ((a, c), rate) in acceleration.iter_mut().zip(damping).zip(&*rate) {
-                    *a += c * rate;
+                    *a += root * (c * rate);
                 }
             }
             Damping::Full(damping) => {
                 for (a, row) in acceleration.iter_mut().zip(damping.chunks_exact(self.states)) {
-                    *a += row.iter().zip(&*rate).map(|(c, rate)| c * rate).sum::<f64>();
+                    *a += root * row.iter().zip(&*rate).map(|(c, rate)| c * rate).sum::<f64>();
                 }
             }
         }
         for (((eta, rate), a), k) in eta.iter_mut().zip(rate).zip(acceleration).zip(&self.stiffness) {
-            *rate += d * (*a + k * *eta);
+            *rate += d * (*a + s * (k * *eta));
             *eta += d * *rate;
         }
     }
@@ -89,14 +91,17 @@ pub(crate) struct ReducedMotion {
     acceleration: Vec<f64>,
     /// Working memory.
     sums: Vec<Lane>,
+    /// Of the body, in that of the basis.
+    stiffness: Stiffness,
 }
 
 impl ReducedMotion {
-    /// At rest.
+    /// At rest, in a body that is so stiff: its shapes are the same, its stiffness is s K and its damping sqrt(s) C.
     ///
     /// # Real-time
     /// Not called in a tick: may allocate.
-    pub(crate) fn rest(&mut self, states: usize) {
+    pub(crate) fn rest(&mut self, states: usize, stiffness: Stiffness) {
+        self.stiffness = stiffness;
         for vector in [&mut self.eta, &mut self.rate, &mut self.acceleration] {
             vector.clear();
             vector.resize(states, 0.0);

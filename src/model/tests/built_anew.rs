@@ -53,11 +53,11 @@ fn a_model_that_is_built_anew_is_as_a_new_one() {
     for kind in [Kind::Hold, Kind::Patch, Kind::LinearBoundary, Kind::ScaledBoundary, Kind::Predictive] {
         let (mut simulation, tool) = pressed();
         let template = Template::new(kind, [3, 3, 2], simulation.body()).unwrap();
-        let mut new = template.empty().unwrap();
+        let mut new = template.empty();
         build(&mut *new, &mut simulation, tool);
         let expected = drag(&mut *new, tool, Vec3::new(4e-4, 0.0, 0.0));
 
-        let mut used = template.empty().unwrap();
+        let mut used = template.empty();
         build(&mut *used, &mut simulation, tool);
         drag(&mut *used, tool, Vec3::new(-2e-4, 3e-4, -5e-5));
         build(&mut *used, &mut simulation, tool);

@@ -90,7 +90,7 @@ fn a_patch_on_a_held_face_reports_the_lost_contact_too() {
     let bottom = (0..sim.body().surface().triangles.len() as u32)
         .find(|&t| sim.body().surface().triangles[t as usize].iter().all(|&n| in_the_middle(n)))
         .unwrap();
-    let mut patch = Template::new(Kind::Patch, [4, 4, 2], sim.body()).unwrap().empty().unwrap();
+    let mut patch = Template::new(Kind::Patch, [4, 4, 2], sim.body()).unwrap().empty();
     patch.rebuild(ResyncView {
         global: &mut sim,
         tick: 0,

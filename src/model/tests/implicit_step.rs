@@ -34,7 +34,7 @@ fn patch(factor: f64, zeta: f64, friction: f64, is_implicit: bool, ticks: u32) -
         (centre - Vec3::new(0.035, 0.035, 0.07)).norm() < 0.006
     };
     let triangle = (0..sim.body().surface().triangles.len() as u32).find(top).unwrap();
-    let mut model = template.empty().unwrap();
+    let mut model = template.empty();
     model.rebuild(ResyncView {
         global: &mut sim,
         tick: 0,

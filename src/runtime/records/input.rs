@@ -3,16 +3,22 @@
 use crate::records::record::{Channel, Record};
 use crate::time::Nanos;
 
-/// A value from outside and the release that took it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct InputUse {
+/// A value from outside and the release that took it: of a [`Parameter`](crate::Parameter) or of [`Commands`](crate::Commands).
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct InputUse {
     /// The scheduled time of the release.
-    pub(crate) time: Nanos,
-    pub(crate) group: u16,
-    pub(crate) port: u32,
+    pub time: Nanos,
+    /// The rate group of the release.
+    pub group: u16,
+    /// The number of the port, in the order in which the builder made them.
+    pub port: u32,
     /// Counts the values of the port from 0, so that a missing one is noticed.
-    pub(crate) sequence: u64,
-    pub(crate) value: [u64; 5],
+    pub sequence: u64,
+    /// The value as words, see [`InputValue`](crate::InputValue).
+    pub value: [u64; 5],
 }
 
 impl From<InputUse> for Record {
@@ -25,7 +31,7 @@ impl From<InputUse> for Record {
 
 impl InputUse {
     /// Reads the value back; `None` if the record is about something else.
-    pub(crate) fn from_record(record: &Record) -> Option<Self> {
+    pub fn from_record(record: &Record) -> Option<Self> {
         let [sequence, a, b, c, d, e] = record.words;
         let (time, group, port, value) = (record.stamp, record.code, record.index, [a, b, c, d, e]);
         (record.channel == Channel::INPUT).then_some(Self { time, group, port, sequence, value })

@@ -77,9 +77,7 @@ impl Recording {
         for record in records {
             TickTiming::from_record(record).iter().for_each(|timing| recording.push_timing(timing));
             PortUse::from_record(record).iter().for_each(|used| recording.push_use(used));
-            if let Some(input) = InputUse::from_record(record) {
-                recording.inputs.entry(input.port).or_default().push(input);
-            }
+            InputUse::from_record(record).iter().for_each(|input| recording.push_input(input));
         }
         recording
     }
@@ -92,6 +90,11 @@ impl Recording {
     /// Adds the use of a port. Those of a kind and port come in the order in which they were made.
     pub fn push_use(&mut self, used: &PortUse) {
         self.uses.entry((used.port, used.kind)).or_default().push(*used);
+    }
+
+    /// Adds a value from outside. Those of a port come in the order in which they were taken.
+    pub fn push_input(&mut self, input: &InputUse) {
+        self.inputs.entry(input.port).or_default().push(*input);
     }
 
     /// Leaves out everything that was due at `time` or later. A release of the rest that needs something of it cannot
@@ -115,9 +118,10 @@ impl Recording {
         self.releases.get(&group).map_or(0, |releases| releases.len() as u64)
     }
 
-    /// The number of uses of ports by group `group`.
+    /// The number of uses of ports by group `group`, values from outside included.
     pub fn port_uses(&self, group: u16) -> u64 {
-        self.uses.values().flatten().filter(|used| used.group == group).count() as u64
+        let uses = self.uses.values().flatten().filter(|used| used.group == group).count();
+        (uses + self.inputs.values().flatten().filter(|input| input.group == group).count()) as u64
     }
 
     /// The scheduled time of the last release, zero without one.

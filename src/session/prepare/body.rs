@@ -24,6 +24,8 @@ pub(super) struct Start {
     pub(super) substeps: u32,
     /// How many of them the stability limit asks for.
     pub(super) stable_substeps: u32,
+    /// That limit (s).
+    pub(super) stable_step: f64,
 }
 
 impl Start {
@@ -57,13 +59,13 @@ impl Start {
         let held = scene.initial.as_ref().map(|initial| nodes.held(initial)).transpose()?;
         check_nodes(&*body, &attached, &probes)?;
         let tick = haptic.period_s();
-        let (substeps, stable_substeps) = substeps(&mut *body, scene.global.substeps_per_ms, tick)?;
+        let (substeps, stable_substeps, stable_step) = substeps(&mut *body, scene.global.substeps_per_ms, tick)?;
         let state = match held {
             // The equilibrium that the run begins from.
             Some(held) => static_equilibrium(&mut *body, &held)?,
             None => State::at_rest(body.rest()),
         };
-        Ok(Self { body, state, attached, probes, tick, substeps, stable_substeps })
+        Ok(Self { body, state, attached, probes, tick, substeps, stable_substeps, stable_step })
     }
 }
 
@@ -116,8 +118,8 @@ fn check_nodes(body: &dyn Body, attached: &[Option<u32>], probes: &[u32]) -> Res
     Ok(())
 }
 
-/// Substeps per haptic tick: as asked, unless that is unstable, or from the stability limit; and what that asks for.
-fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<(u32, u32), Error> {
+/// Substeps per haptic tick: as asked, unless that is unstable, or from the stability limit; what that asks for; and the limit itself (s).
+fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<(u32, u32, f64), Error> {
     let spectrum = Spectrum::estimate(body);
     let stable = spectrum.stable_step();
     if stable.is_nan() || stable <= 0.0 {
@@ -132,7 +134,7 @@ fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<(u32,
             );
             return Err(Error::scene("body", message));
         }
-        return Ok((substeps, substeps));
+        return Ok((substeps, substeps, stable));
     };
     let substeps = (f64::from(per_ms) * tick * 1e3 - 1e-9).ceil().max(1.0);
     if tick / substeps >= stable {
@@ -142,5 +144,5 @@ fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<(u32,
         );
         return Err(Error::scene("global.substeps_per_ms", message));
     }
-    Ok((substeps as u32, spectrum.substeps(tick)))
+    Ok((substeps as u32, spectrum.substeps(tick), stable))
 }

@@ -9,6 +9,7 @@ mod device;
 mod groups;
 mod limits;
 mod patch;
+mod plan;
 mod situation;
 mod timing;
 mod tools;
@@ -16,23 +17,23 @@ mod tools;
 pub use choice::Choice;
 pub(super) use choice::extended;
 pub(super) use groups::BASIS;
+pub(super) use plan::ModelPlan;
 pub(super) use timing::Timing;
 pub(super) use tools::Tool;
 
-use std::path::PathBuf;
-
 use super::parts::{Options, Parts};
+use crate::actors::Settings;
 use crate::error::Error;
+use crate::model::body::Stiffness;
 use crate::model::contact::Equations;
-use crate::model::local::Blend;
-use crate::model::local::{Feedback, Kind, Template};
+use crate::model::local::{Blend, Feedback, Kind, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
-use crate::model::surroundings::Size;
 use crate::runtime::{Execution, Nanos, Plan, RateGroup};
 use crate::scene::{BodySpec, NodeSpec, ProbeSpec, Scene, StepKind, Volume};
 use body::Start;
 use patch::PatchChoice;
+use situation::Situation;
 
 /// Everything that a session's actors are made of.
 #[derive(Debug)]
@@ -54,29 +55,15 @@ pub(super) struct Prepared {
     pub(super) options: Options,
 }
 
-/// How local models are made, followed by one another and watched.
-#[derive(Debug)]
-pub(super) struct ModelPlan {
-    pub(super) template: Template,
-    pub(super) timing: Timing,
-    pub(super) blend: Blend,
-    /// A basis takes its time here: they are made one by one.
-    pub(super) in_real_time: bool,
-    /// Logged nodes.
-    pub(super) probes: Vec<u32>,
-    /// Where reduced surroundings are kept from run to run.
-    pub(super) basis_folder: Option<PathBuf>,
-}
-
 impl Prepared {
-    /// True if the local models use reduced surroundings.
+    /// True if the local models use reduced surroundings, or may.
     pub(super) fn reduces(&self) -> bool {
-        self.plan.template.kind == Kind::Predictive && self.scene.local.basis_size() != Size::States(0)
+        self.plan.resting.is_some()
     }
 
     /// True if there is a global model beside the local ones.
     pub(super) fn is_multi_rate(&self) -> bool {
-        self.plan.template.kind != Kind::Full
+        self.plan.is_multi_rate()
     }
 
     /// The rate groups, in graph order.
@@ -124,6 +111,11 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     // The safety section with what it left to the device.
     (tools, as_run.safety) = tools::tools(devices, making)?;
     let template = template(kind, &scene, &start, timing)?;
+    let kinds = {
+        let Start { body, state, .. } = &mut start;
+        plan::kinds(&scene, kind, || Situation::of(&scene, &mut **body, state, timing, execution))
+    };
+    let resting = plan::resting(&scene, &template, &kinds, &start);
 
     let local = groups::local_group(local, rates[0], &tools, &scene.devices, execution);
     let evaluation = || measured.unwrap_or_else(|| budget::force_evaluation(&mut *start.body, &start.state));
@@ -134,7 +126,20 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let blend = Blend::new(scene.local.blend.kind, blend_ticks);
     let (probes, in_real_time) = (std::mem::take(&mut start.probes), options.in_real_time);
     let basis_folder = scene.local.basis_folder.take();
-    let plan = ModelPlan { template, timing, blend, in_real_time, probes, basis_folder };
+    let law = scene.contact.law();
+    let plan = ModelPlan {
+        template,
+        kinds,
+        resting,
+        timing,
+        blend,
+        in_real_time,
+        probes,
+        basis_folder,
+        settings: Settings { friction: law.friction, stiffness: Stiffness::default(), model: kind },
+        stiffest: Stiffness::largest(start.stable_step, start.tick, start.substeps),
+        equations: law.equations,
+    };
     let until = (!endless).then(|| Nanos::from_secs_f64(scene.run.duration_s));
     let simulation = simulation(start, &scene, &tools)?;
     let prepared =

@@ -27,9 +27,12 @@ fn place(record: &LogRecord) -> Option<usize> {
         LogRecord::Resync(_) => Some(3),
         LogRecord::Global(_) => Some(4),
         LogRecord::Probe(_) => Some(5),
-        LogRecord::Tick(_) | LogRecord::Actors(_) | LogRecord::Event(_) | LogRecord::Port(_) | LogRecord::Tool(_) => {
-            None
-        }
+        LogRecord::Tick(_)
+        | LogRecord::Actors(_)
+        | LogRecord::Event(_)
+        | LogRecord::Port(_)
+        | LogRecord::Input(_)
+        | LogRecord::Tool(_) => None,
     }
 }
 

@@ -67,7 +67,12 @@ fn fields(record: &LogRecord) -> Vec<(&'static str, u64)> {
             add("global_m", &r.global_m.map(f64::to_bits));
         }
         // Inputs and measurements: nothing is computed that they could be compared with.
-        LogRecord::Tick(_) | LogRecord::Actors(_) | LogRecord::Event(_) | LogRecord::Port(_) | LogRecord::Tool(_) => {}
+        LogRecord::Tick(_)
+        | LogRecord::Actors(_)
+        | LogRecord::Event(_)
+        | LogRecord::Port(_)
+        | LogRecord::Input(_)
+        | LogRecord::Tool(_) => {}
     }
     all
 }

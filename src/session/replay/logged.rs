@@ -106,6 +106,7 @@ impl Gathered {
                 self.timings.entry(timing.group).or_default().push(*timing);
             }
             LogRecord::Port(used) => self.recording.push_use(used),
+            LogRecord::Input(input) => self.recording.push_input(input),
             LogRecord::Tool(sample) => {
                 let device = usize::from(sample.device).min(MAX_DEVICES);
                 self.samples.resize_with(self.samples.len().max(device + 1), Vec::new);

@@ -6,7 +6,7 @@ use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::log::ModelReason;
 use crate::model::Pose;
-use crate::model::local::{Aim, ToolForecast, Windows};
+use crate::model::local::{Aim, Kind, ToolForecast, Windows};
 use crate::model::surroundings::{Bases, RestingBody, Size};
 use crate::runtime::{Actor, ExchangePort, RuntimeBuilder};
 use crate::session::prepare::{Prepared, extended};
@@ -28,7 +28,7 @@ impl BasisSide {
     /// # Errors
     /// If the surface cannot be searched.
     pub(super) fn new(graph: &mut RuntimeBuilder, prepared: &Prepared, tools: &[Pose]) -> Result<Option<Self>, Error> {
-        let Some(resting) = prepared.plan.template.resting.clone().filter(|_| prepared.reduces()) else {
+        let Some(resting) = prepared.plan.resting.clone() else {
             return Ok(None);
         };
         let folder = prepared.plan.basis_folder.clone();
@@ -37,7 +37,11 @@ impl BasisSide {
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
-            known: first_bases(prepared, &resting, &store, tools)?,
+            known: if prepared.plan.template.kind == Kind::Predictive {
+                first_bases(prepared, &resting, &store, tools)?
+            } else {
+                Bases::default()
+            },
             store,
             resting,
             pace,

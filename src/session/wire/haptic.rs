@@ -90,8 +90,8 @@ pub(super) fn actors(
     let rates = [plan.timing.haptic, plan.timing.global];
     match models {
         // It takes the samples of all devices.
-        Models::Whole(simulation, surfaces) => {
-            devices.push(Box::new(WholeActor::new(simulation, simulated, rates, surfaces)));
+        Models::Whole(simulation, surfaces, settings) => {
+            devices.push(Box::new(WholeActor::new(simulation, simulated, rates, surfaces, settings)));
             devices
         }
         Models::Local(models) => {

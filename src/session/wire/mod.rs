@@ -9,7 +9,8 @@ mod haptic;
 mod models;
 mod sink;
 
-use super::prepare::{Prepared, Tool};
+use super::controls::Controls;
+use super::prepare::{ModelPlan, Prepared, Tool};
 use super::records::RecordSender;
 use super::running::{Memory, Outside, Running, Viewer};
 use crate::actors::{LoggerActor, LoggerOutcome, SceneWatch, SurfaceView, first_state};
@@ -61,22 +62,28 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
 
     // Before the ports, so that they record what a replay needs. The order of the ports below numbers them in the log.
     let drain = graph.drain();
-    let ticks = (SECONDS_BUFFERED * prepared.plan.timing.haptic.as_hz()) as usize;
-    let ticks = ticks.clamp(MIN_TICKS_BUFFERED, MAX_TICKS_BUFFERED);
+    let ticks = ticks_buffered(&prepared.plan);
     let (surfaces, scene) = surfaces(&mut graph, &prepared);
     let mut ends: Vec<ToolEnds> = prepared.tools.iter().map(|_| ToolEnds::new(&mut graph)).collect();
     let views = ends.iter_mut().filter_map(ToolEnds::take_view).collect();
     let disbelieved = ends.iter_mut().filter_map(ToolEnds::take_disbelieved).collect();
     let viewer = Viewer::new(prepared.simulation.body().surface(), surfaces[0].reader(), views);
+    let viewer = match &records {
+        // Whoever watches that closely may want to see it.
+        Some(_) => viewer.with_stress(prepared.simulation.body_as_made()),
+        None => viewer,
+    };
     let bases = BasisSide::new(&mut graph, &prepared, &places)?;
     if let Some(bases) = &bases {
         environment.model_reason = bases.reason(environment.model_reason.take());
     }
     let reducing = bases.as_ref().map(|bases| (prepared.basis_group(), bases.actor()));
+    let settings = graph.parameter(prepared.plan.settings);
+    let controls = Controls::new(settings.clone(), &prepared.plan);
     let logger_group = prepared.logger_group();
     let pointers = prepared.tools.iter_mut().map(|tool| tool.pointer.take()).collect();
     let Prepared { simulation, tools, plan, local, global, until, .. } = prepared;
-    let (models, maker) = models::models(&mut graph, &plan, simulation, &places, surfaces, bases, ticks);
+    let (models, maker) = models::models(&mut graph, &plan, simulation, &places, surfaces, bases, settings);
     let haptic = haptic::actors(&mut graph, &plan, tools, ends, &first, models, ticks);
 
     let outcome = LoggerOutcome::default();
@@ -98,8 +105,14 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     if let Some(until) = until {
         graph.until(until);
     }
-    let outside = Outside { viewer: Some(viewer), pointers, records };
+    let outside = Outside { viewer: Some(viewer), pointers, records, controls: Some(controls) };
     Ok(Running::new(graph.build()?.start()?, outcome, memory, outside, until, builds))
+}
+
+/// Haptic ticks whose records and samples may wait.
+fn ticks_buffered(plan: &ModelPlan) -> usize {
+    let ticks = (SECONDS_BUFFERED * plan.timing.haptic.as_hz()) as usize;
+    ticks.clamp(MIN_TICKS_BUFFERED, MAX_TICKS_BUFFERED)
 }
 
 /// The first state of a tool's device, or why there is none: a device that begins where it reaches no node of the body, at

@@ -2,18 +2,18 @@
 
 use super::basis::BasisSide;
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
-use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, SurfaceView};
+use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, ModelMaker, Settings, SurfaceView};
 use crate::model::Pose;
-use crate::model::local::{Hold, Kind, PatchGeometry, Succession};
+use crate::model::local::{PatchGeometry, Succession};
 use crate::model::simulation::Simulation;
-use crate::runtime::{ExchangePort, OutletPort, OutletWriter, RuntimeBuilder};
+use crate::runtime::{ExchangePort, OutletPort, OutletWriter, Parameter, ParameterReader, RuntimeBuilder};
 use crate::session::prepare::ModelPlan;
 
 /// What computes the forces at the haptic rate.
 #[expect(clippy::large_enum_variant, reason = "there is one per session, and it goes into an actor")]
 pub(super) enum Models {
-    /// The whole body with all tools, and where its surface is shown.
-    Whole(Simulation, Vec<OutletWriter<SurfaceView>>),
+    /// The whole body with all tools, where its surface is shown, and what is changed while it runs.
+    Whole(Simulation, Vec<OutletWriter<SurfaceView>>, ParameterReader<Settings>),
     /// The models of each tool, and where the next ones come from.
     Local(Vec<(Succession, LocalPorts)>),
 }
@@ -26,22 +26,22 @@ pub(super) fn models(
     places: &[Pose],
     surfaces: Vec<OutletPort<SurfaceView>>,
     bases: Option<BasisSide>,
-    ticks: usize,
+    settings: Parameter<Settings>,
 ) -> (Models, Option<GlobalMaker>) {
-    if plan.template.kind == Kind::Full {
-        return (Models::Whole(simulation, surfaces.iter().map(OutletPort::writer).collect()), None);
+    if !plan.is_multi_rate() {
+        let surfaces = surfaces.iter().map(OutletPort::writer).collect();
+        return (Models::Whole(simulation, surfaces, settings.reader()), None);
     }
     let (surroundings, known) = match bases {
         Some(BasisSide { wishes, bases, known, .. }) => (Some((wishes, bases)), known),
         None => Default::default(),
     };
-    let (template, probes) = (plan.template.clone(), plan.probes.clone());
-    let model = move || {
-        let mut model = template.empty().unwrap_or_else(|| Box::new(Hold::default()));
-        model.watch(&probes);
-        model
-    };
-    let feeds_back = plan.template.feeds_back();
+    let maker = ModelMaker::new(plan.template.clone(), plan.kinds.clone(), plan.probes.clone());
+    let first = maker.clone();
+    let model = move || first.first();
+    // A model that comes later may feed back, if the first one does not.
+    let feeds_back = plan.template.feeds_back() || plan.kinds.len() > 1;
+    let ticks = super::ticks_buffered(plan);
     // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
     let nodes = simulation.state().positions.len();
     let link = |_| ToolLink {
@@ -51,6 +51,7 @@ pub(super) fn models(
     };
     let side = GlobalSide {
         tools: places.iter().map(link).collect(),
+        settings,
         surroundings,
         surfaces,
         checkpoint: graph.outlet_port(Checkpoint::default),
@@ -69,7 +70,8 @@ pub(super) fn models(
         haptic: plan.timing.haptic,
         global: plan.timing.global,
         horizon: plan.timing.horizon,
-        patch: plan.template.patch,
+        models: maker,
+        patch: plan.window(),
         bases: known,
     };
     (models, Some(GlobalMaker::new(simulation, places, plan, side)))

@@ -151,7 +151,7 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
     let horizon = (PERIODS_AHEAD * rate / GLOBAL_HZ).ceil() as u32 + 1;
     let mut of = |kind: Kind, patch: &[u32], bases: &Bases| -> Result<(Nanos, Tick), Error> {
         let template = Template::new(kind, PATCH, sim.body())?;
-        let mut model = template.empty().ok_or_else(no_contact)?;
+        let mut model = template.empty();
         let mut least = Nanos(u64::MAX);
         // The first build makes memory.
         for _ in 0..=ROUNDS {

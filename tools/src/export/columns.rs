@@ -78,6 +78,7 @@ pub(super) fn columns(kind: TopicKind, is_turned: bool) -> &'static [Column] {
         TopicKind::Resync => table! { F64: t_s, U32: version, F64: age_s jump_before_n jump_after_n energy_j },
         TopicKind::Global => table! { F64: t_s, U32: version, U64: first_tick last_tick },
         TopicKind::Ports => table! { F64: t_s, U32: group port, Text: kind, U64: tick count sequence },
+        TopicKind::Inputs => table! { F64: t_s, U32: group port, U64: sequence word_0 word_1 word_2 word_3 word_4 },
         TopicKind::Probe => table! {
             F64: t_s, U32: node, F64: local_x_m local_y_m local_z_m global_x_m global_y_m global_z_m
         },
@@ -160,6 +161,10 @@ fn record_cells(record: &LogRecord, row: &mut Vec<Cell>) {
         LogRecord::Port(r) => {
             row.extend([t_s, U32(r.group.into()), U32(r.port), Word(r.kind.name())]);
             row.extend([r.tick, r.count, r.sequence].map(U64));
+        }
+        LogRecord::Input(r) => {
+            row.extend([t_s, U32(r.group.into()), U32(r.port), U64(r.sequence)]);
+            row.extend(r.value.map(U64));
         }
         LogRecord::Probe(r) => {
             row.extend([t_s, U32(r.node)]);

@@ -78,6 +78,14 @@ impl Element {
         -(moved.edges * (metric * self.shear_modulus + rate)) - moved.areas * (pressure / 6.0)
     }
 
+    /// mu/J (F F^T - 1), Cauchy's stress but for a pressure (Pa); `None` where there is no volume left.
+    pub(super) fn shear_stress(&self, moved: &Moved) -> Option<Mat3> {
+        let gradient = moved.edges * self.inverse;
+        let ratio = gradient.determinant();
+        let left = gradient * gradient.transpose() - Mat3::identity();
+        (ratio > 0.0).then(|| left * (self.shear_modulus / ratio))
+    }
+
     /// The tangent of the forces under `dilation`, which stays as it is if it `is_averaged` and else is the element's own;
     /// `clamp` leaves out what is not positive semidefinite, and how viscous forces answer to positions.
     pub(super) fn tangent(&self, moved: &Moved, dilation: f64, is_averaged: bool, clamp: bool) -> EdgeTangent {

@@ -16,9 +16,9 @@ pub use tissue::{Tissue, TissueRegion};
 
 use super::kernel::{InstructionSet, NOMINAL_ELEMENT_S, TetrahedraKernel};
 use super::{Body, Restriction, State, TangentBlock};
-use crate::Vec3;
 use crate::error::ModelError;
 use crate::mesh::{LeftOut, Surface, TetrahedralMesh};
+use crate::{Mat3, Vec3};
 use solid::Solid;
 
 /// A body of linear tetrahedra, made by [`Tetrahedra::builder`]: a continuum of stable neo-Hookean tissue with Young's modulus,
@@ -159,6 +159,10 @@ impl Body for Tetrahedra {
             }
         }
         sums.into_iter().map(|(sum, count)| if count > 0.0 { sum / count } else { 0.0 }).collect()
+    }
+
+    fn stress(&self, state: &State, node: u32) -> Option<Mat3> {
+        self.solid.shear_stress(state, node)
     }
 
     fn nominal_evaluation(&self) -> f64 {

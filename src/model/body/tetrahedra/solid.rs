@@ -60,6 +60,18 @@ impl Solid {
         }
     }
 
+    /// What of Cauchy's stress shears at `node` (Pa): the mean over its elements, by their volumes at rest. An element that is turned
+    /// inside out has none.
+    pub(super) fn shear_stress(&self, state: &State, node: u32) -> Option<Mat3> {
+        let mut sum = (Mat3::zeros(), 0.0);
+        for element in self.at(node) {
+            if let Some(stress) = element.shear_stress(&element.moved(state)) {
+                sum = (sum.0 + stress * element.volume, sum.1 + element.volume);
+            }
+        }
+        (sum.1 > 0.0).then(|| sum.0 / sum.1)
+    }
+
     /// The tangent in the rows of `nodes`, each block once.
     pub(super) fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
         let elements = self.touching(nodes);

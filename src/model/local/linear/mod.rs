@@ -106,7 +106,7 @@ impl LocalModel for LinearPatch {
             let share = |row, column| 1.0 - weakened * (1.0 - boundary.share(body, row, column));
             tangent.rebuild(body, resync.global.state(), nodes, &|node| window.movable(node), &share);
             if let Some(stiffness) = &compliance {
-                tangent.add_stiffness(stiffness, weakened);
+                tangent.add_stiffness(stiffness, weakened * resync.global.stiffness().factor());
             }
             if weakened == 0.0 || tangent.is_stable() {
                 break;
@@ -147,6 +147,10 @@ impl LocalModel for LinearPatch {
 
     fn built_at(&self) -> u64 {
         self.patch.built_at
+    }
+
+    fn kind(&self) -> Kind {
+        self.boundary.kind()
     }
 
     fn serves_as(&self) -> Kind {

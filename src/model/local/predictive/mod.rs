@@ -29,6 +29,8 @@ const TORN_TICKS: usize = 2;
 #[derive(Debug)]
 pub(super) struct Predictive {
     size: [usize; 3],
+    /// True for one that takes a basis where there is one: `predicted` has none.
+    reduces: bool,
     /// Its window nodes are the patch, the ring, then what stands still; the ring is moved by its path.
     patch: Patch,
     near: NearBody,
@@ -52,12 +54,13 @@ pub(super) struct Predictive {
 impl Predictive {
     /// An empty model with a patch of `size` = nodes along the surface, along it, into depth. Memory comes with the first
     /// [`rebuild`](LocalModel::rebuild).
-    pub(super) fn new(size: [usize; 3]) -> Self {
+    pub(super) fn new(size: [usize; 3], reduces: bool) -> Self {
         let (patch, near, path, surroundings, present) = Default::default();
         let (ring_positions, ring_velocities, ring_forces, ring_weights) = Default::default();
         let (others, substep, basis) = Default::default();
         Self {
             size,
+            reduces,
             patch,
             near,
             others,
@@ -167,6 +170,7 @@ fn deviations(out: &mut [f64], forces: &[Vec3], expected: &[f64]) {
 impl LocalModel for Predictive {
     fn rebuild(&mut self, mut resync: ResyncView<'_>) {
         let (body, triangles, size) = (resync.global.body(), resync.triangles, self.size);
+        self.near.expect(resync.global.stiffness());
         let patch = |nodes: &mut Vec<u32>| match resync.patch {
             Some(patch) => nodes.extend_from_slice(patch),
             None => resync.global.patch(resync.index, triangles, size, nodes),
@@ -175,7 +179,8 @@ impl LocalModel for Predictive {
         self.patch.window.rebuild(body, triangles, skin, patch, |nodes| self.near.rebuild(body, nodes));
         let window = &self.patch.window;
         self.patch.forces.resize(window.nodes.len(), Vec3::zeros());
-        self.basis = resync.bases.get(&window.nodes[..window.movable]).cloned();
+        let known = self.reduces.then(|| resync.bases.get(&window.nodes[..window.movable])).flatten();
+        self.basis = known.cloned();
         for numbers in [&mut self.ring_positions, &mut self.ring_velocities, &mut self.ring_forces] {
             numbers.resize(3 * window.ring, 0.0);
         }
@@ -184,7 +189,8 @@ impl LocalModel for Predictive {
         self.others.extend(beside.filter_map(|(node, force)| Some((window.movable(node)?, force))));
         self.take_present(&resync);
         self.predict(&mut resync);
-        self.surroundings.rest(self.basis.as_ref().map_or(0, |basis| basis.answers.states()));
+        let states = self.basis.as_ref().map_or(0, |basis| basis.answers.states());
+        self.surroundings.rest(states, resync.global.stiffness());
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Wrench {
@@ -199,6 +205,10 @@ impl LocalModel for Predictive {
 
     fn built_at(&self) -> u64 {
         self.patch.built_at
+    }
+
+    fn kind(&self) -> Kind {
+        if self.reduces { Kind::Predictive } else { Kind::Predicted }
     }
 
     fn serves_as(&self) -> Kind {

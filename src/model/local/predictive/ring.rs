@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::Vec3;
-use crate::body::{Body, Restriction, State};
+use crate::body::{Body, Restriction, State, Stiffness};
 
 /// Past its end the prediction coasts with its last velocity for this long (s), then stands still.
 const COASTING: f64 = 15e-3;
@@ -14,12 +14,21 @@ pub(super) struct NearBody {
     restriction: Option<Restriction>,
     /// Ids of the patch's nodes, that it was made for.
     patch: Vec<u32>,
+    /// How stiff the body was then.
+    stiffness: Stiffness,
     /// Working memory, of the restriction's nodes.
     state: State,
     forces: Vec<Vec3>,
 }
 
 impl NearBody {
+    /// The body is so stiff from now on.
+    pub(super) fn expect(&mut self, stiffness: Stiffness) {
+        if self.stiffness != stiffness {
+            (self.restriction, self.stiffness) = (None, stiffness);
+        }
+    }
+
     /// That of `patch` in `body`; returns its other nodes: the ring, and held ones.
     pub(super) fn rebuild(&mut self, body: &dyn Body, patch: &[u32]) -> [&[u32]; 2] {
         if self.restriction.is_none() || self.patch != patch {

@@ -8,8 +8,6 @@ use crate::{Pose, Vec3, Wrench};
 
 pub use blend::{Blend, BlendKind, Jump};
 
-/// Ticks that a late model is advanced per haptic tick until it has caught up; the old model serves meanwhile.
-const CATCH_UP_TICKS: u64 = 8;
 /// Tool positions that are remembered for catching up; an older model is not used.
 const HISTORY: usize = 1024;
 
@@ -124,7 +122,7 @@ impl Succession {
     fn catch_up(&mut self) {
         let Some((version, mut reached)) = self.arrival else { return };
         if self.arriving.catches_up() {
-            let until = self.now.min(reached + CATCH_UP_TICKS);
+            let until = self.now.min(reached + self.arriving.catch_up_ticks());
             while reached < until {
                 self.arriving.tick(ToolMotion { from: self.at(reached), to: self.at(reached + 1) });
                 reached += 1;
@@ -200,6 +198,9 @@ mod tests {
         }
         fn built_at(&self) -> u64 {
             self.built_at
+        }
+        fn kind(&self) -> Kind {
+            Kind::Patch
         }
         fn serves_as(&self) -> Kind {
             Kind::Patch

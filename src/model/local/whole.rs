@@ -1,0 +1,78 @@
+//! `full` beside a global model: the whole body goes on by itself at the haptic rate.
+
+use super::{Kind, LocalModel, ResyncView};
+use crate::contact::{Contact, ContactPoint, ToolMotion};
+use crate::simulation::Simulation;
+use crate::{Vec3, Wrench};
+
+/// The whole body with its tool, as it was in the global model when it was built, and by itself from there on.
+///
+/// It follows the tool as the global model does, a tick at a time, so it needs no resync and is never old; it is built anew only where
+/// something else than the tool changes. With several tools it would not know the way of the others.
+#[derive(Debug, Default)]
+pub(super) struct Whole {
+    /// `None` before it is built, and for a body that cannot be copied.
+    simulation: Option<Simulation>,
+    /// The tick of its state.
+    now: u64,
+    /// Nodes that are watched.
+    watched: Vec<u32>,
+}
+
+/// A tick of it is a long one.
+const CATCH_UP_TICKS: u64 = 3;
+
+impl LocalModel for Whole {
+    fn rebuild(&mut self, resync: ResyncView<'_>) {
+        (self.simulation, self.now) = (resync.global.duplicate(), resync.tick);
+    }
+
+    fn tick(&mut self, tool: ToolMotion) -> Wrench {
+        let none = Wrench::from(Vec3::repeat(f64::NAN));
+        self.now += 1;
+        let Some(simulation) = &mut self.simulation else { return none };
+        let wrench = simulation.tick(tool);
+        // A state that is not finite touches nothing: its zero force would look like a free tool.
+        if simulation.state().is_finite() { wrench } else { none }
+    }
+
+    fn built_at(&self) -> u64 {
+        self.now
+    }
+
+    fn kind(&self) -> Kind {
+        Kind::Full
+    }
+
+    fn serves_as(&self) -> Kind {
+        Kind::Full
+    }
+
+    fn catch_up_ticks(&self) -> u64 {
+        CATCH_UP_TICKS
+    }
+
+    fn contact(&self) -> Contact {
+        self.simulation.as_ref().map_or(Contact::default(), |simulation| *simulation.contact(0))
+    }
+
+    fn contact_points(&self) -> &[ContactPoint] {
+        self.simulation.as_ref().map_or(&[], |simulation| simulation.contact_points(0))
+    }
+
+    fn contact_area(&self) -> f64 {
+        self.simulation.as_ref().map_or(0.0, |simulation| simulation.contact_area(0))
+    }
+
+    fn position(&self, node: u32) -> Option<Vec3> {
+        self.simulation.as_ref()?.state().positions.get(node as usize).copied()
+    }
+
+    fn global_position(&self, probe: usize) -> Option<Vec3> {
+        self.position(*self.watched.get(probe)?)
+    }
+
+    fn watch(&mut self, nodes: &[u32]) {
+        self.watched = nodes.to_vec();
+    }
+}

@@ -1,0 +1,86 @@
+//! How local models are made, followed by one another and watched, and what may be changed of them while a session runs.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::body::Start;
+use super::situation::Situation;
+use super::timing::Timing;
+use crate::actors::Settings;
+use crate::model::body::Stiffness;
+use crate::model::contact::Equations;
+use crate::model::local::{Blend, Kind, Template};
+use crate::model::surroundings::{RestingBody, Size};
+use crate::scene::Scene;
+
+/// How local models are made, followed by one another and watched.
+#[derive(Debug)]
+pub(crate) struct ModelPlan {
+    pub(crate) template: Template,
+    /// The kinds that the local models may be, with the patch of each; the first is that of the start.
+    pub(crate) kinds: Vec<(Kind, [usize; 3])>,
+    /// The body around its rest state, if one of them takes reduced surroundings.
+    pub(crate) resting: Option<Arc<RestingBody>>,
+    pub(crate) timing: Timing,
+    pub(crate) blend: Blend,
+    /// A basis takes its time here: they are made one by one.
+    pub(crate) in_real_time: bool,
+    /// Logged nodes.
+    pub(crate) probes: Vec<u32>,
+    /// Where reduced surroundings are kept from run to run.
+    pub(crate) basis_folder: Option<PathBuf>,
+    /// What may be changed while it runs, as it is at the start.
+    pub(crate) settings: Settings,
+    /// The stiffest body that the explicit steps bear.
+    pub(crate) stiffest: Stiffness,
+    pub(crate) equations: Equations,
+}
+
+impl ModelPlan {
+    /// True if there is a global model beside the local ones: always, but for `full` that stays what it is.
+    pub(crate) fn is_multi_rate(&self) -> bool {
+        self.template.kind != Kind::Full || self.kinds.len() > 1
+    }
+
+    /// Of the windows that may have a basis: patch nodes along the surface, along it, into depth.
+    pub(crate) fn window(&self) -> [usize; 3] {
+        let of = |(kind, patch): &(Kind, [usize; 3])| (*kind == Kind::Predictive).then_some(*patch);
+        self.kinds.iter().find_map(of).unwrap_or(self.template.patch)
+    }
+}
+
+/// The kinds that the local models of `scene`, which names its own, may be: that one, and in a switchable session the others that body
+/// and rates allow.
+pub(super) fn kinds(scene: &Scene, first: Kind, situation: impl FnOnce() -> Situation) -> Vec<(Kind, [usize; 3])> {
+    let mut kinds = vec![(first, scene.patch_size())];
+    // Several tools with `full` share one body, which no local model does.
+    let several = scene.devices.len() > 1;
+    if !scene.run.switchable || (several && first == Kind::Full) {
+        return kinds;
+    }
+    let situation = situation();
+    // What was chosen for the first need not suit another.
+    let mut usual = scene.clone();
+    usual.local.patch = None;
+    for kind in situation.possible.iter().copied().filter(|kind| *kind != first) {
+        let fits = kind != Kind::Full || (!several && situation.tight_share().is_some());
+        if fits {
+            kinds.push((kind, usual.clone().with_model(kind).patch_size()));
+        }
+    }
+    kinds
+}
+
+/// The body around its rest state, if one of `kinds` takes reduced surroundings.
+pub(super) fn resting(
+    scene: &Scene,
+    template: &Template,
+    kinds: &[(Kind, [usize; 3])],
+    start: &Start,
+) -> Option<Arc<RestingBody>> {
+    let reduces = kinds.iter().any(|(kind, _)| *kind == Kind::Predictive);
+    if !reduces || scene.local.basis_size() == Size::States(0) {
+        return None;
+    }
+    template.resting.clone().or_else(|| RestingBody::new(&*start.body).map(Arc::new))
+}

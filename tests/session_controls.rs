@@ -1,0 +1,197 @@
+//! Friction, stiffness and local model change while a session runs: the force follows, nothing jumps that no blend allows, and the log
+//! repeats it to the last bit.
+
+use std::time::Duration;
+
+use palpate::log::{ForceSample, LogRecord, ServedBy};
+use palpate::model::local::Kind;
+use palpate::prelude::*;
+
+/// What is done at a time (ms).
+type Act<'a> = (u64, &'a dyn Fn(&Controls));
+
+const EVERY: [Kind; 8] = Kind::ALL;
+
+/// A block of 6^3 nodes that is pressed 4 mm deep from 0.2 s on, and dragged from 0.6 s to 1.6 s if it is to be.
+fn pressed(model: Kind, drags: bool) -> SessionBuilder {
+    let body = Block::builder([6; 3], [0.05; 3]).stiffness(30.0).damping_ratio(0.3).node_mass(0.5e-3).fix(Face::ZMin);
+    let end = if drags { 0.032 } else { 0.022 };
+    let places =
+        [[0.022, 0.023, 0.052], [0.022, 0.023, 0.046], [0.022, 0.023, 0.046], [end, 0.023, 0.046], [end, 0.023, 0.046]];
+    let path = ToolPath::new(vec![0.0, 0.2, 0.6, 1.6, 10.0], places.to_vec()).unwrap();
+    Session::builder(body.build().unwrap()).path(path).friction(0.4).crossfade_ms(10.0).model(model)
+}
+
+/// Runs for so many seconds, and does what is wanted at its times (ms).
+fn run(session: SessionBuilder, ms: u64, wanted: &[Act<'_>]) -> Vec<ForceSample> {
+    let session = session.virtual_time().keep_records().duration_s(1e-3 * ms as f64);
+    let mut running = session.build().unwrap().start().unwrap();
+    let controls = running.take_controls().unwrap();
+    let mut now = 0;
+    for (at, act) in wanted {
+        running.wait_for(Duration::from_millis(at - now));
+        now = *at;
+        act(&controls);
+    }
+    running.wait();
+    let summary = running.stop();
+    assert_eq!(summary.runtime.fault, None);
+    let forces = summary.records.iter().filter_map(|record| match record {
+        LogRecord::Force(force) => Some(*force),
+        _ => None,
+    });
+    forces.collect()
+}
+
+fn size(force: &ForceSample) -> f64 {
+    force.force_n.iter().map(|c| c * c).sum::<f64>().sqrt()
+}
+
+/// Of the last 50 ms (N).
+fn settled(forces: &[ForceSample]) -> f64 {
+    let last = &forces[forces.len() - 50..];
+    last.iter().map(size).sum::<f64>() / 50.0
+}
+
+#[test]
+fn full_beside_a_global_model_is_full_to_the_last_bit() {
+    let alone = run(pressed(Kind::Full, true), 900, &[]);
+    let beside = run(pressed(Kind::Full, true).switchable(), 900, &[]);
+    assert!(alone.iter().map(size).fold(0.0, f64::max) > 0.1);
+    assert_eq!(alone.len(), beside.len());
+    for (a, b) in alone.iter().zip(&beside) {
+        assert_eq!((a.time, a.force_n.map(f64::to_bits)), (b.time, b.force_n.map(f64::to_bits)));
+        assert_eq!((b.served_by, b.model_age_s), (ServedBy::Full, 0.0));
+    }
+}
+
+#[test]
+fn every_model_takes_over_from_every_other_while_the_tool_touches() {
+    for from in [Kind::Hold, Kind::Full, Kind::Predictive] {
+        let acts: Vec<_> =
+            EVERY.iter().map(|&kind| move |controls: &Controls| controls.set_model(kind).unwrap()).collect();
+        let wanted: Vec<Act<'_>> =
+            (0..).zip(&acts).map(|(n, act)| (400 + 150 * n, act as &dyn Fn(&Controls))).collect();
+        let forces = run(pressed(from, false).switchable(), 400 + 150 * EVERY.len() as u64, &wanted);
+        for (n, kind) in (0..).zip(EVERY) {
+            // A period until it is built, one until it serves, and the blend.
+            let served = &forces[(400 + 150 * n + 100) as usize];
+            let expected = match kind {
+                Kind::Full => ServedBy::Full,
+                Kind::Hold => ServedBy::Hold,
+                Kind::Patch => ServedBy::Patch,
+                Kind::LinearBoundary => ServedBy::LinearBoundary,
+                Kind::ScaledBoundary => ServedBy::ScaledBoundary,
+                Kind::Condensed => ServedBy::Condensed,
+                Kind::Predicted => ServedBy::Predicted,
+                Kind::Predictive => ServedBy::Predictive,
+            };
+            assert_eq!(served.served_by, expected, "from {from:?}");
+        }
+        // The tool rests: what changes is what the models make of it, led over by the blend of 10 ms.
+        let resting = &forces[400..];
+        let most = resting.windows(2).map(|pair| (size(&pair[1]) - size(&pair[0])).abs()).fold(0.0, f64::max);
+        assert!(most < 0.12 * settled(&forces), "a step of {most} N beside {} N", settled(&forces));
+    }
+}
+
+#[test]
+fn a_body_that_is_twice_as_stiff_presses_back_twice_as_hard() {
+    for model in [Kind::Full, Kind::Hold, Kind::Patch, Kind::Condensed, Kind::Predictive] {
+        let as_made = run(pressed(model, false), 1500, &[]);
+        let stiffer = run(pressed(model, false), 1500, &[(400, &|controls| controls.set_stiffness(2.0).unwrap())]);
+        let (once, twice) = (settled(&as_made), settled(&stiffer));
+        assert!((twice / once - 2.0).abs() < 0.03, "{model:?}: {once} N, {twice} N");
+        // It goes there over tenths of a second: a step would push the hand.
+        let step = |forces: &[ForceSample]| {
+            forces[400..].windows(2).map(|pair| (size(&pair[1]) - size(&pair[0])).abs()).fold(0.0, f64::max)
+        };
+        assert!(step(&stiffer) < 0.15 * once, "{model:?}: a step of {} N", step(&stiffer));
+    }
+}
+
+#[test]
+fn a_body_made_stiffer_while_it_runs_moves_as_one_that_was_made_so() {
+    // From before the contact on, so that both meet the tool as they are.
+    let made = |factor: f64| {
+        let body = Block::builder([6; 3], [0.05; 3]).stiffness(30.0 * factor).damping_ratio(0.3).node_mass(0.5e-3);
+        let places = [[0.022, 0.023, 0.06], [0.022, 0.023, 0.06], [0.022, 0.023, 0.045]];
+        let path = ToolPath::new(vec![0.0, 0.5, 0.9], places.to_vec()).unwrap();
+        Session::builder(body.fix(Face::ZMin).build().unwrap())
+            .path(path)
+            .friction(0.4)
+            .model(Kind::Full)
+            .substeps_per_ms(2)
+    };
+    let live = run(made(1.0), 1000, &[(5, &|controls| controls.set_stiffness(1.7).unwrap())]);
+    let fixed = run(made(1.7), 1000, &[]);
+    let peak = fixed.iter().map(size).fold(0.0, f64::max);
+    assert!(peak > 0.1);
+    for (a, b) in live.iter().zip(&fixed) {
+        assert!((size(a) - size(b)).abs() < 1e-6 * peak, "{} {} at {}", size(a), size(b), a.time);
+    }
+}
+
+#[test]
+fn friction_that_is_changed_is_what_holds_a_dragged_tool() {
+    for model in [Kind::Full, Kind::Patch, Kind::Predictive] {
+        let ratio = |wanted: &[Act<'_>]| {
+            let forces = run(pressed(model, true), 1500, wanted);
+            let last = &forces[1400..];
+            let tangential: f64 = last.iter().map(|force| force.force_n[0].hypot(force.force_n[1])).sum();
+            tangential / last.iter().map(|force| force.force_n[2].abs()).sum::<f64>()
+        };
+        let (before, after) = (ratio(&[]), ratio(&[(700, &|controls| controls.set_friction(0.1.into()).unwrap())]));
+        // The surface leans under the tool, so that the ratio is not the coefficient itself.
+        assert!(after < before - 0.15, "{model:?}: {before} {after}");
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused_and_changes_nothing() {
+    let mut running = pressed(Kind::Patch, false).virtual_time().build().unwrap().start().unwrap();
+    let controls = running.take_controls().unwrap();
+    let most = *controls.stiffness_limits().end();
+    assert!(most > 1.0 && most < 10.0, "{most}");
+    for factor in [0.0, -1.0, f64::NAN, f64::INFINITY, 1.001 * most] {
+        let error = controls.set_stiffness(factor).unwrap_err().to_string();
+        assert!(error.contains(&format!("{most:.3}")), "{error}");
+    }
+    assert!(controls.set_friction((-0.1).into()).is_err() && controls.set_friction(f64::NAN.into()).is_err());
+    let error = controls.set_model(Kind::Full).unwrap_err().to_string();
+    assert!(error.contains("full cannot be set while this session runs, patch can"), "{error}");
+    assert_eq!((controls.stiffness(), controls.friction().kinetic, controls.model()), (1.0, 0.4, Kind::Patch));
+    controls.set_stiffness(most).unwrap();
+    running.wait_for(Duration::from_millis(1500));
+    assert_eq!(running.stop().runtime.fault, None, "the stiffest body that its steps bear is stable");
+}
+
+#[test]
+fn a_log_with_changes_is_repeated_to_the_last_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, in_real_time) in [("virtual.mcap", false), ("real.mcap", true)] {
+        let log = folder.path().join(name);
+        let session = pressed(Kind::Full, true).switchable();
+        let recorded = session.log(&log).duration_s(1.4);
+        let recorded = if in_real_time { recorded } else { recorded.virtual_time() };
+        let mut running = recorded.build().unwrap().start().unwrap();
+        let controls = running.take_controls().unwrap();
+        let acts: [&dyn Fn(); 6] = [
+            &|| controls.set_model(Kind::Patch).unwrap(),
+            &|| controls.set_friction(0.2.into()).unwrap(),
+            &|| controls.set_model(Kind::Predictive).unwrap(),
+            &|| controls.set_stiffness(1.8).unwrap(),
+            &|| controls.set_model(Kind::Full).unwrap(),
+            &|| controls.set_stiffness(0.6).unwrap(),
+        ];
+        for act in acts {
+            running.wait_for(Duration::from_millis(170));
+            act();
+        }
+        running.wait();
+        let summary = running.stop();
+        assert!(summary.runtime.fault.is_none() && summary.log_error.is_none());
+        let report = pressed(Kind::Full, true).switchable().duration_s(1.4).replay(&log).unwrap().run().unwrap();
+        assert!(report.is_identical(), "{name}: {report:?}");
+    }
+}
