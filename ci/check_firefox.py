@@ -3,7 +3,7 @@
 Usage: check_firefox.py PALPATE [--shot FILE] [--firefox PROGRAM]
 
 Drives the browser by Marionette, its own protocol: JSON with its length in front, over a socket. Needs nothing but Python's standard
-library and Firefox; WebGL is drawn by Mesa's software renderer.
+library, Firefox and Xvfb; WebGL is drawn by Mesa's software renderer.
 """
 
 import argparse
@@ -11,6 +11,7 @@ import base64
 import json
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -24,7 +25,6 @@ from check_view import STATE, View
 PATIENCE_S = 60
 PREFERENCES = {
     "webgl.force-enabled": True,
-    "webgl.out-of-process": False,
     "browser.shell.checkDefaultBrowser": False,
     "datareporting.policy.dataSubmissionEnabled": False,
     "toolkit.telemetry.enabled": False,
@@ -35,7 +35,7 @@ PREFERENCES = {
 
 
 class Firefox:
-    """Firefox without a window, spoken to by Marionette."""
+    """Firefox on a display of its own, spoken to by Marionette: without one it has no WebGL."""
 
     def __init__(self, program):
         self.profile = Path(tempfile.mkdtemp())
@@ -46,8 +46,8 @@ class Firefox:
         lines = [f"user_pref({json.dumps(name)}, {json.dumps(value)});" for name, value in preferences.items()]
         (self.profile / "user.js").write_text("\n".join(lines))
         environment = {**os.environ, "HOME": str(self.profile), "LIBGL_ALWAYS_SOFTWARE": "1"}
-        command = [program, "--headless", "--no-remote", "--marionette", "--profile", str(self.profile)]
-        self.process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        command = ["xvfb-run", "-a", program, "--no-remote", "--marionette", "-remote-allow-system-access", "--profile", str(self.profile)]
+        self.process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
         self.socket = self.connected(port)
         self.rest, self.number = b"", 0
         self.message()
@@ -95,7 +95,8 @@ class Firefox:
         return said
 
     def close(self):
-        self.process.terminate()
+        # The display too, which xvfb-run has started.
+        os.killpg(self.process.pid, signal.SIGTERM)
         self.process.wait(PATIENCE_S)
         shutil.rmtree(self.profile, ignore_errors=True)
 
@@ -107,7 +108,7 @@ def wait(browser, holds, what):
         if holds(state):
             return state
         if time.monotonic() > deadline:
-            raise RuntimeError(f"{what} did not happen: {state}")
+            raise RuntimeError(f"{what} did not happen: {state}; {browser.complaints()}")
         time.sleep(0.05)
 
 
