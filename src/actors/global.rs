@@ -1,67 +1,18 @@
 //! The global actor: advances the whole body along the tool's path and publishes the next local model.
 
-use super::basis::Wishes;
 use super::cause::Cause;
-use super::messages::{Checkpoint, SurfaceView, ToolTick, show};
+use super::global_ports::{GlobalPorts, GlobalSharedPorts, ToolPorts};
+use super::messages::{ToolTick, show};
 use super::model_maker::ModelMaker;
 use super::settings::Settings;
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::Pose;
 use crate::model::contact::ToolMotion;
-use crate::model::local::{Aim, Kind, LocalModel, PatchGeometry, ResyncView, ToolForecast, ToolHistory, Windows};
+use crate::model::local::{Aim, Kind, ResyncView, ToolForecast, ToolHistory, Windows};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
-use crate::runtime::{
-    Actor, ActorError, Nanos, Outcome, OutletWriter, ParameterReader, QueueReader, Rate, Reader, Recorder, Stopwatch,
-    TickContext, Writer,
-};
-
-/// The ports of a [`GlobalActor`].
-#[derive(Debug)]
-pub struct GlobalPorts {
-    /// Of each tool, in the order of the devices.
-    pub tools: Vec<ToolPorts>,
-    /// The others.
-    pub shared: GlobalSharedPorts,
-}
-
-/// The ports of a [`GlobalActor`] that are there once, for however many tools.
-#[derive(Debug)]
-pub struct GlobalSharedPorts {
-    /// What is changed while it runs.
-    pub settings: ParameterReader<Settings>,
-    /// To and from the basis actor, if the models use what it makes.
-    pub surroundings: Option<SurroundingsPorts>,
-    /// The newest surface: for a program that draws, for the log.
-    pub surfaces: Vec<OutletWriter<SurfaceView>>,
-    /// The newest good state, for a restart.
-    pub checkpoint: OutletWriter<Checkpoint>,
-    /// Records.
-    pub recorder: Recorder,
-    /// What building the next local model costs, if that is measured.
-    pub build_cost: Option<Stopwatch>,
-}
-
-/// The global half of what a [`LocalActor`](super::LocalActor) and the global one say to each other.
-#[derive(Debug)]
-pub struct ToolPorts {
-    /// The tool at every haptic tick.
-    pub ticks: QueueReader<ToolTick>,
-    /// The patch's geometry at the tick of the resync, if it is fed back.
-    pub geometry: Option<Reader<PatchGeometry>>,
-    /// The next local model.
-    pub models: Writer<Box<dyn LocalModel>>,
-}
-
-/// The global half of the ports of a [`BasisActor`](super::BasisActor).
-#[derive(Debug)]
-pub struct SurroundingsPorts {
-    /// What is wanted.
-    pub wishes: Writer<Wishes>,
-    /// What is there.
-    pub bases: Reader<Bases>,
-}
+use crate::runtime::{Actor, ActorError, Nanos, Outcome, Rate, Stopwatch, TickContext};
 
 /// Times at which a tool is looked for ahead: by then a basis may be ready (s).
 const PREFETCH_S: [f64; 3] = [0.15, 0.3, 0.6];

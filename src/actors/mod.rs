@@ -7,7 +7,7 @@
 //! every actor --records--> logger
 //! ```
 //!
-//! There is a device and a local actor for each tool, and one global actor for all. What a program changes while it runs, [`Settings`],
+//! There is a device and a local actor for each tool, and one global actor for all. What a program changes while it runs, `Settings`,
 //! goes to the global actor and comes to the local ones with the next model. For `full` one actor with the whole body stands
 //! in place of local and global ones:
 //!
@@ -22,6 +22,7 @@ mod believed;
 mod cause;
 mod device;
 mod global;
+mod global_ports;
 mod local;
 mod log_file;
 mod log_sink;
@@ -40,7 +41,8 @@ pub(crate) use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub(crate) use basis_store::BasisStore;
 pub(crate) use believed::{Bounds, Disbelieved};
 pub(crate) use device::{DeviceActor, DevicePorts, GAP_S, first_state};
-pub(crate) use global::{GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
+pub(crate) use global::{GlobalActor, GlobalPlan};
+pub(crate) use global_ports::{GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
 pub(crate) use local::{LocalActor, LocalPorts};
 pub(crate) use messages::{Checkpoint, ComputedForce, DeviceSample, ToolTick};
 pub(crate) use model_maker::ModelMaker;

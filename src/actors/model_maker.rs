@@ -16,11 +16,17 @@ pub struct ModelMaker {
 
 impl ModelMaker {
     /// Of models as `first` says, and of the kinds in `patches`; they watch the nodes `probes`.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn new(first: Template, patches: Vec<(Kind, [usize; 3])>, probes: Vec<u32>) -> Self {
         Self { templates: vec![first], patches, probes }
     }
 
     /// An empty model as at the start.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn first(&self) -> Box<dyn LocalModel> {
         self.watching(&self.templates[0])
     }

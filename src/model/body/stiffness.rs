@@ -23,23 +23,35 @@ impl Stiffness {
     const RATE: f64 = 4.6;
 
     /// So many times as stiff, if that is a positive number.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn times(factor: f64) -> Option<Self> {
         (factor > 0.0 && factor.is_finite()).then_some(Self(factor))
     }
 
     /// s: every elastic force is so many times as large.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn factor(self) -> f64 {
         self.0
     }
 
     /// sqrt(s): every damping force is so many times as large, as b = ratio * sqrt(2 m k) (the paper's definition) keeps its ratio.
     /// Everything in the body is that much faster, and its largest stable step that much shorter.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn root(self) -> f64 {
         self.0.sqrt()
     }
 
     /// The stiffest body that `substeps` explicit steps in `tick` (s) bear if its largest stable one is `stable_step` (s) as it was
     /// made: with the margin that steps are chosen by, and no less than as it was made.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn largest(stable_step: f64, tick: f64, substeps: u32) -> Self {
         let root = f64::from(substeps) * stable_step / (crate::integrator::MARGIN * tick);
         Self((root * root).max(1.0))

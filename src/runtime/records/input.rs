@@ -31,6 +31,9 @@ impl From<InputUse> for Record {
 
 impl InputUse {
     /// Reads the value back; `None` if the record is about something else.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn from_record(record: &Record) -> Option<Self> {
         let [sequence, a, b, c, d, e] = record.words;
         let (time, group, port, value) = (record.stamp, record.code, record.index, [a, b, c, d, e]);
