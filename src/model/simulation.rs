@@ -1,5 +1,7 @@
 //! A whole body with its contacts, advanced tick by tick: the global model, and `full` at the haptic rate.
 
+mod ahead;
+
 use std::sync::Arc;
 
 use crate::body::{Body, State, Stiffened, Stiffness};
@@ -9,6 +11,7 @@ use crate::contact::{
 use crate::error::ModelError;
 use crate::integrator::Spectrum;
 use crate::{Pose, Vec3, Wrench};
+use ahead::Ahead;
 
 /// How time is divided: ticks of the haptic rate, each of several explicit substeps.
 ///
@@ -71,6 +74,7 @@ pub struct Simulation {
     inverse_masses: Vec<f64>,
     /// On each tool: mean force and torque of the last tick, or of the resting contact before the first.
     means: Vec<Wrench>,
+    ahead: Box<Ahead>,
 }
 
 impl Simulation {
@@ -100,10 +104,22 @@ impl Simulation {
         let candidates = (0..body.surface().triangles.len() as u32).collect();
         let inverse_masses = body.inverse_masses().to_vec();
         let forces = vec![Vec3::zeros(); nodes];
-        let (touches, rows, means) = Default::default();
+        let (touches, rows, means, ahead) = Default::default();
         let (body, stiffness) = (Stiffened::new(body), Stiffness::default());
-        let new =
-            Self { body, stiffness, state, forces, touches, rows, law, stepping, candidates, inverse_masses, means };
+        let new = Self {
+            body,
+            stiffness,
+            state,
+            forces,
+            touches,
+            rows,
+            law,
+            stepping,
+            candidates,
+            inverse_masses,
+            means,
+            ahead,
+        };
         Ok(new.with_tool(contact))
     }
 
@@ -153,6 +169,7 @@ impl Simulation {
             candidates: self.candidates.clone(),
             inverse_masses: self.inverse_masses.clone(),
             means: self.means.clone(),
+            ahead: Box::new(self.ahead.anew()),
         })
     }
 
@@ -215,34 +232,6 @@ impl Simulation {
         }
         means.iter_mut().for_each(|sum| *sum = *sum / n);
         touches.iter_mut().for_each(|touch| touch.end(stepping.substeps, |triangle| triangle));
-    }
-
-    /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the state at the
-    /// start of every substep and at the end, and goes back to the present. It ends early with a tick in which `watch` says no.
-    ///
-    /// # Real-time
-    /// For the global actor: costs as much as the ticks; `present` keeps the state meanwhile and may grow.
-    pub(crate) fn look_ahead(
-        &mut self,
-        ticks: u32,
-        motion: impl Fn(usize, u32) -> ToolMotion,
-        present: &mut State,
-        mut watch: impl FnMut(&State) -> bool,
-    ) {
-        present.clone_from(&self.state);
-        let (touches, means) = (self.touches.clone(), self.means.clone());
-        let mut goes_on = true;
-        for tick in 0..ticks {
-            self.advance(|tool| motion(tool, tick), &mut |state| goes_on = goes_on && watch(state));
-            if !goes_on {
-                break;
-            }
-        }
-        if goes_on {
-            watch(&self.state);
-        }
-        std::mem::swap(&mut self.state, present);
-        (self.touches, self.means) = (touches, means);
     }
 
     /// The nodes that all tools but `tool` press, each with the force on it (N).

@@ -1,10 +1,11 @@
 //! The block of point masses joined by springs to all 26 neighbours: the paper's body.
 
+use super::cutout::part_of;
 use super::kernel::{InstructionSet, LatticeKernel, NOMINAL_SPRING_S};
 use super::lattice_springs::LatticeSprings;
 use super::region::{Material, Region, materials};
 use super::stress::virial;
-use super::{Body, Restriction, Spring, SpringNetwork, State, TangentBlock};
+use super::{Body, Cutout, Restriction, Spring, SpringNetwork, State, TangentBlock};
 use crate::error::ModelError;
 use crate::mesh::{Face, Lattice, Surface};
 use crate::{Mat3, Vec3};
@@ -243,6 +244,34 @@ impl Body for Block {
             self.springs.neighbours(&self.lattice, node).map(ends)
         };
         Some(SpringNetwork::restricted(&self.rest, &self.inverse_masses, nodes, springs))
+    }
+
+    fn cutout(&self, nodes: &[u32]) -> Option<Cutout> {
+        let at = || nodes.iter().map(|&node| self.lattice.coordinates(node));
+        let low = at().reduce(|a, b| std::array::from_fn(|axis| a[axis].min(b[axis])))?;
+        let high = at().reduce(|a, b| std::array::from_fn(|axis| a[axis].max(b[axis])))?;
+        // The rim has all ends of their springs; those between its own nodes are there too and move nothing.
+        let low = low.map(|c| c.saturating_sub(1));
+        let lattice =
+            Lattice { nodes: std::array::from_fn(|axis| (high[axis] + 2).min(self.lattice.nodes[axis]) - low[axis]) };
+        let whole = |id: u32| {
+            let at = lattice.coordinates(id);
+            self.lattice.id(std::array::from_fn(|axis| low[axis] + at[axis]))
+        };
+        let ids: Vec<u32> = (0..lattice.len() as u32).map(whole).collect();
+        let springs = self.springs.part(&lattice, &ids);
+        let inverse_mass =
+            |&id: &u32| if nodes.binary_search(&id).is_ok() { self.inverse_masses[id as usize] } else { 0.0 };
+        let (surface, triangles) = part_of(&self.surface, &ids);
+        let body = Self {
+            lattice,
+            rest: ids.iter().map(|&id| self.rest[id as usize]).collect(),
+            inverse_masses: ids.iter().map(inverse_mass).collect(),
+            surface,
+            kernel: self.kernel.of_part(&springs),
+            springs,
+        };
+        Some(Cutout { nodes: ids, triangles, body: Box::new(body) })
     }
 
     fn contact_moduli(&self) -> Vec<f64> {

@@ -50,14 +50,39 @@ pub(super) struct LatticeSprings {
 impl LatticeSprings {
     /// Springs of the `materials` of their nodes, half of each; `spacing` between nodes (m).
     pub(super) fn new(lattice: &Lattice, spacing: [f64; 3], materials: &[Material]) -> Self {
+        let rest_lengths = Lattice::FORWARD.map(|offset| {
+            let along: [f64; 3] = std::array::from_fn(|axis| offset[axis] as f64 * spacing[axis]);
+            along.iter().map(|c| c * c).sum::<f64>().sqrt()
+        });
+        let first = materials[0];
+        if materials.iter().all(|material| *material == first) {
+            let uniform = Elasticity::Uniform { stiffness: first.stiffness, damping: first.damping() };
+            return Self::with(lattice, rest_lengths, |_| uniform);
+        }
+        let of = |node: usize, direction: usize| {
+            let (at, a) = (lattice.coordinates(node as u32), materials[node]);
+            let b =
+                lattice.neighbour(at, Lattice::FORWARD[direction]).map_or(a, |to| materials[lattice.id(to) as usize]);
+            (in_series(a.stiffness, b.stiffness), in_series(a.damping(), b.damping()))
+        };
+        Self::with(lattice, rest_lengths, |exist| Elasticity::varied(exist, of))
+    }
+
+    /// Those of a part: the `lattice` whose nodes have the ids `whole` in that of these springs.
+    pub(super) fn part(&self, lattice: &Lattice, whole: &[u32]) -> Self {
+        let of = |node: usize, direction: usize| self.elasticity.of(whole[node], direction);
+        Self::with(lattice, self.offsets.map(|offset| offset.rest_length), |exist| match &self.elasticity {
+            &Elasticity::Uniform { stiffness, damping } => Elasticity::Uniform { stiffness, damping },
+            Elasticity::Varied { .. } => Elasticity::varied(exist, of),
+        })
+    }
+
+    fn with(lattice: &Lattice, rest_lengths: [f64; 13], elasticity: impl FnOnce(&[[u8; 13]]) -> Elasticity) -> Self {
         let nodes = lattice.len();
         let [nx, ny, _] = lattice.nodes.map(|n| n as isize);
-        let offsets = Lattice::FORWARD.map(|offset| {
-            let along: [f64; 3] = std::array::from_fn(|axis| offset[axis] as f64 * spacing[axis]);
-            Offset {
-                delta: (offset[0] + nx * (offset[1] + ny * offset[2])) as usize,
-                rest_length: along.iter().map(|c| c * c).sum::<f64>().sqrt(),
-            }
+        let offsets = std::array::from_fn(|direction| {
+            let [x, y, z] = Lattice::FORWARD[direction];
+            Offset { delta: (x + nx * (y + ny * z)) as usize, rest_length: rest_lengths[direction] }
         });
         let mut exist = vec![[0; 13]; nodes.div_ceil(LANES)];
         for p in 0..nodes {
@@ -66,8 +91,7 @@ impl LatticeSprings {
                 *bits |= u8::from(lattice.neighbour(at, offset).is_some()) << (p % LANES);
             }
         }
-        let elasticity = Elasticity::new(lattice, materials, &exist);
-        Self { nodes, elasticity, offsets, exist }
+        Self { nodes, elasticity: elasticity(&exist), offsets, exist }
     }
 
     /// How far the nodes of a spring are apart at most, in the numbering.
@@ -96,15 +120,13 @@ impl LatticeSprings {
 }
 
 impl Elasticity {
-    fn new(lattice: &Lattice, materials: &[Material], exist: &[[u8; 13]]) -> Self {
-        let uniform = Self::Uniform { stiffness: materials[0].stiffness, damping: materials[0].damping() };
-        if materials.windows(2).all(|pair| pair[0] == pair[1]) {
-            return uniform;
-        }
+    /// Stiffness and damping that differ: `of` gives those of the spring from a node in a forward direction, or where there is
+    /// none those of something near.
+    fn varied(exist: &[[u8; 13]], of: impl Fn(usize, usize) -> (f64, f64)) -> Self {
         let (mut sets, mut set_of) = (Vec::new(), Vec::with_capacity(exist.len()));
         let mut known: HashMap<Vec<u64>, u32> = HashMap::new();
         for (eight, exist) in exist.iter().enumerate() {
-            let set = Coefficients::new(lattice, materials, eight * LANES, exist);
+            let set = Coefficients::new(eight * LANES, exist, &of);
             let bits = set.stiffness.iter().chain(&set.damping).flatten().map(|value| value.to_bits()).collect();
             set_of.push(*known.entry(bits).or_insert_with(|| {
                 sets.push(set);
@@ -129,17 +151,14 @@ impl Elasticity {
 
 impl Coefficients {
     /// Those of the springs that begin at the eight nodes from `first` on.
-    fn new(lattice: &Lattice, materials: &[Material], first: usize, exist: &[u8; 13]) -> Self {
+    fn new(first: usize, exist: &[u8; 13], of: impl Fn(usize, usize) -> (f64, f64)) -> Self {
         let mut new = Self { stiffness: [[0.0; LANES]; 13], damping: [[0.0; LANES]; 13] };
-        for (direction, &offset) in Lattice::FORWARD.iter().enumerate() {
+        for (direction, bits) in exist.iter().enumerate() {
             // A lane without a spring has what the lane before has: fewer sets differ. Whatever it is, it is masked.
-            let mut last = (materials[first].stiffness, materials[first].damping());
+            let mut last = of(first, direction);
             for lane in 0..LANES {
-                if exist[direction] >> lane & 1 == 1 {
-                    let here = (first + lane) as u32;
-                    let to = lattice.neighbour(lattice.coordinates(here), offset).map_or(here, |to| lattice.id(to));
-                    let [a, b] = [here, to].map(|node| materials[node as usize]);
-                    last = (in_series(a.stiffness, b.stiffness), in_series(a.damping(), b.damping()));
+                if bits >> lane & 1 == 1 {
+                    last = of(first + lane, direction);
                 }
                 (new.stiffness[direction][lane], new.damping[direction][lane]) = last;
             }

@@ -1,8 +1,10 @@
 //! Deformable bodies: what a simulation needs to know of one, the block of springs, and networks of any springs.
 
 mod block;
+mod cutout;
 pub(crate) mod kernel;
 mod lattice_springs;
+mod neighbourhood;
 mod network;
 mod region;
 mod restriction;
@@ -13,7 +15,9 @@ mod stress;
 mod tetrahedra;
 
 pub use block::{Block, BlockBuilder};
+pub use cutout::Cutout;
 pub use kernel::InstructionSet;
+pub(crate) use neighbourhood::neighbourhood;
 pub use network::{SpringNetwork, SpringNetworkBuilder};
 pub use region::Region;
 pub use restriction::Restriction;
@@ -159,6 +163,16 @@ pub trait Body: Send + Sync + std::fmt::Debug {
     /// For the global actor, when the window of a local model moves: bounded by the nodes, may allocate.
     fn restriction(&self, _nodes: &[u32]) -> Option<Restriction> {
         None
+    }
+
+    /// `nodes` (ids in increasing order) as a body of their own, between others that are held; the default is made of the
+    /// [`restriction`](Self::restriction), `None` if there is none. Models that look ahead need no more of a large body than what is
+    /// around the tool.
+    ///
+    /// # Real-time
+    /// For the global actor, when the window of a local model moves: bounded by the nodes, may allocate.
+    fn cutout(&self, nodes: &[u32]) -> Option<Cutout> {
+        Cutout::of(self, nodes)
     }
 
     /// Contact modulus E / (1 - nu^2) of the material at each node (Pa), one per node; empty, the default, if it is not known. A

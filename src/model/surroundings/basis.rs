@@ -28,6 +28,11 @@ impl Basis {
         &self.patch
     }
 
+    /// The same for another `patch` (ids in increasing order) whose surroundings look the same.
+    pub(super) fn moved_to(&self, patch: &[u32]) -> Self {
+        Self { patch: patch.to_vec(), ..self.clone() }
+    }
+
     /// The number of states in which the ring answers.
     ///
     /// # Real-time

@@ -23,6 +23,10 @@ const LARGE: usize = 20_000;
 #[derive(Debug)]
 pub struct Reduction {
     patch: Vec<u32>,
+    /// What of a large body is around the patch; all else is in its numbering then.
+    around: Option<RestingBody>,
+    /// What that looks like.
+    likeness: Option<u64>,
     ring: Vec<u32>,
     size: Size,
     far: Far,
@@ -33,6 +37,8 @@ pub struct Reduction {
 
 #[derive(Debug)]
 enum Stage {
+    /// A window that looks the same has had its basis made.
+    Known(Basis),
     Factorise,
     /// So many moments are there; `last` is the right-hand side of the next.
     Moments {
@@ -59,19 +65,28 @@ impl Reduction {
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(body: &RestingBody, patch: &[u32], size: impl Into<Size>) -> Option<Self> {
+    pub fn new(whole: &RestingBody, patch: &[u32], size: impl Into<Size>) -> Option<Self> {
         let size = size.into();
-        let restriction = body.restriction(patch)?;
+        let (around, local) = whole.around(patch).unzip();
+        let (body, local) = (around.as_ref().unwrap_or(whole), local.as_deref().unwrap_or(patch));
+        let restriction = body.restriction(local)?;
         let ring: Vec<u32> = restriction.ring(patch.len()).to_vec();
         let can_move = !ring.is_empty() && size != Size::States(0);
-        can_move.then(|| Self {
+        if !can_move {
+            return None;
+        }
+        let likeness = around.as_ref().map(|around| around.likeness(local, size));
+        let known = likeness.and_then(|likeness| whole.alike(likeness));
+        Some(Self {
             patch: patch.to_vec(),
             ring,
             size,
             errors: None,
-            far: Far::new(body, patch, &restriction),
+            far: Far::new(body, local, &restriction),
+            stage: known.map_or(Stage::Factorise, |basis| Stage::Known(basis.moved_to(patch))),
             restriction,
-            stage: Stage::Factorise,
+            likeness,
+            around,
         })
     }
 
@@ -99,7 +114,7 @@ impl Reduction {
     /// # Real-time
     /// Not real-time safe: allocates, and takes a second for a large body.
     pub fn advance(&mut self, body: &RestingBody) -> Result<Option<Basis>, ModelError> {
-        let (far, ring) = (&self.far, &self.ring);
+        let (far, ring, whole, body) = (&self.far, &self.ring, body, self.around.as_ref().unwrap_or(body));
         match std::mem::replace(&mut self.stage, Stage::Done) {
             Stage::Factorise => {
                 let factor = Box::new(far.factorised(body, EXPANSION).ok_or_else(indefinite)?);
@@ -121,7 +136,12 @@ impl Reduction {
                     Stage::Compare { wide, contacts }
                 };
             }
-            Stage::Project { wide } => return self.project(&wide).map(Some),
+            Stage::Project { wide } => {
+                let basis = self.project(&wide)?;
+                self.likeness.inspect(|&likeness| whole.keep_alike(likeness, &basis));
+                return Ok(Some(basis));
+            }
+            Stage::Known(basis) => return Ok(Some(basis)),
             Stage::Done => {}
         }
         Ok(None)
@@ -234,6 +254,34 @@ mod tests {
     use super::*;
     use crate::body::{Block, Body};
     use crate::mesh::Face;
+
+    #[test]
+    fn of_a_large_body_only_what_is_around_a_window_is_reduced_and_windows_that_look_the_same_share_a_basis() {
+        let block = Block::builder([26, 26, 16], [0.225, 0.225, 0.135]).fix(Face::ZMin).build().unwrap();
+        let resting = RestingBody::new(&block).unwrap();
+        let nearest = crate::mesh::NearestTriangle::new(block.surface(), block.rest()).unwrap();
+        let patch = |x: f64| {
+            let mut patch = Vec::new();
+            block.patch(&[nearest.find(&crate::Vec3::new(x, 0.113, 0.135))], [4, 4, 2], &mut patch);
+            patch
+        };
+        let [middle, beside, edge] = [0.113, 0.122, 0.005].map(patch);
+        assert!(middle != beside);
+        let first = Basis::compute(&resting, &middle, 20).unwrap().unwrap();
+        let is_known = |patch: &[u32]| {
+            let reduction = Reduction::new(&resting, patch, 20).unwrap();
+            assert!(reduction.far.nodes.len() < 3000, "{}", reduction.far.nodes.len());
+            matches!(reduction.stage, Stage::Known(_))
+        };
+        assert!(is_known(&beside) && !is_known(&edge));
+        let shared = Basis::compute(&resting, &beside, 20).unwrap().unwrap();
+        assert_eq!((shared.patch(), &shared.answers), (&beside[..], &first.answers));
+        // Check that it is what would have been made.
+        let alone = Basis::compute(&RestingBody::new(&block).unwrap(), &beside, 20).unwrap().unwrap();
+        let off = |(a, b): (&f64, &f64)| (a - b).abs() / b.abs();
+        let worst = alone.answers.stiffness.iter().zip(&shared.answers.stiffness).map(off).fold(0.0, f64::max);
+        assert!(worst < 1e-6, "{worst}");
+    }
 
     // Check a small body whose patch is all that can move but a corner: what is left hangs on the patch alone.
     #[test]

@@ -1,8 +1,11 @@
 //! A body linear around its rest state: what reductions and condensations are made from.
 
 use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::body::{Body, Restriction, State};
+use super::accuracy::Size;
+use super::basis::Basis;
+use crate::body::{Body, Cutout, Restriction, State, neighbourhood};
 use crate::{Mat3, Vec3};
 
 /// What is left of two couplings that cancel counts as nothing below this share of them.
@@ -68,9 +71,15 @@ pub(super) fn couplings(body: &dyn Body) -> Vec<((u32, u32), Coupling)> {
 #[derive(Debug)]
 pub struct RestingBody {
     body: Box<dyn Body>,
-    couplings: Vec<((u32, u32), Coupling)>,
-    digest: u64,
+    /// Once somebody asks for them: of a large body mostly nobody does.
+    couplings: OnceLock<Vec<((u32, u32), Coupling)>>,
+    digest: OnceLock<u64>,
+    /// Bases of windows around which a large body looks the same in many places.
+    alike: Mutex<HashMap<u64, Arc<Basis>>>,
 }
+
+/// Nodes around a patch that its surroundings are limited to: beyond them a larger body is held.
+const NEIGHBOURS: usize = 2048;
 
 impl RestingBody {
     /// Of `body`; `None` if it has no duplicate or no restriction.
@@ -78,10 +87,20 @@ impl RestingBody {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn new(body: &dyn Body) -> Option<Self> {
-        let body = Self::is_of(body).then(|| body.duplicate()).flatten()?;
-        let couplings = couplings(&*body);
-        let digest = digest_of(body.rest(), body.inverse_masses(), &couplings);
-        Some(Self { body, couplings, digest })
+        Self::is_of(body).then(|| body.duplicate()).flatten().map(Self::alone)
+    }
+
+    fn alone(body: Box<dyn Body>) -> Self {
+        Self { body, couplings: OnceLock::new(), digest: OnceLock::new(), alike: Mutex::default() }
+    }
+
+    /// What of a large body is around `patch` (ids in increasing order), between nodes that are held, and the patch in its
+    /// numbering. `None` if that is all of it.
+    pub(super) fn around(&self, patch: &[u32]) -> Option<(Self, Vec<u32>)> {
+        let Cutout { nodes, body, .. } = self.body.cutout(&neighbourhood(&*self.body, patch, NEIGHBOURS)?)?;
+        let place: HashMap<u32, u32> = nodes.iter().copied().zip(0..).collect();
+        let patch: Vec<u32> = patch.iter().filter_map(|node| place.get(node).copied()).collect();
+        Some((Self::alone(body), patch))
     }
 
     /// True if `body` has what is needed: a duplicate, and a restriction.
@@ -93,12 +112,45 @@ impl RestingBody {
         movable.is_some_and(|node| body.restriction(&[node as u32]).is_some()) && body.duplicate().is_some()
     }
 
-    /// A number that differs for bodies of other nodes, masses, stiffness or damping at rest.
+    /// A number that differs for bodies of other nodes, masses, stiffness or damping.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn digest(&self) -> u64 {
-        self.digest
+        *self.digest.get_or_init(|| digest_of(&*self.body))
+    }
+
+    /// The basis that was made for surroundings of this [`likeness`](Self::likeness).
+    pub(super) fn alike(&self, likeness: u64) -> Option<Arc<Basis>> {
+        self.alike.lock().unwrap_or_else(PoisonError::into_inner).get(&likeness).cloned()
+    }
+
+    /// Keeps `basis` for other windows of this [`likeness`](Self::likeness).
+    pub(super) fn keep_alike(&self, likeness: u64, basis: &Basis) {
+        let basis = Arc::new(basis.clone());
+        self.alike.lock().unwrap_or_else(PoisonError::into_inner).insert(likeness, basis);
+    }
+
+    /// A number that is the same for a basis of `size` of `patch` (ids in increasing order) in bodies that are the same but for
+    /// where they are and for rounding.
+    pub(super) fn likeness(&self, patch: &[u32], size: Size) -> u64 {
+        let (rest, couplings) = (self.rest(), self.couplings());
+        let origin = rest[patch.first().map_or(0, |&node| node as usize)];
+        let extent = rest.iter().fold(0.0, |most: f64, x| most.max((x - origin).amax()));
+        let stiffest = couplings.iter().fold(0.0, |most: f64, (_, coupling)| most.max(coupling.stiffness.amax()));
+        let mut words: Vec<u64> = patch.iter().map(|&node| node.into()).collect();
+        let places = rest.iter().flat_map(|x| (0..3).map(|i| alike((x[i] - origin[i]) / extent)));
+        words.extend(places.chain(self.inverse_masses().iter().map(|&w| single(w))));
+        words.extend([single(extent), single(stiffest)]);
+        words.extend(match size {
+            Size::States(states) => [0, states as u64],
+            Size::ErrorPct(budget) => [1, budget.to_bits()],
+        });
+        for ((row, column), Coupling { stiffness, damping }) in couplings {
+            words.push(u64::from(*row) << 32 | u64::from(*column));
+            words.extend(stiffness.iter().chain(damping).map(|x| alike(x / stiffest)));
+        }
+        digest(&words.into_iter().flat_map(u64::to_le_bytes).collect::<Vec<u8>>())
     }
 
     /// Rest positions (m).
@@ -113,7 +165,7 @@ impl RestingBody {
 
     /// Stiffness and damping of all pairs of nodes that can move, the higher one first.
     pub(super) fn couplings(&self) -> &[((u32, u32), Coupling)] {
-        &self.couplings
+        self.couplings.get_or_init(|| couplings(&*self.body))
     }
 
     /// What of the body depends on `nodes`; `None` if the body has no restriction to them.
@@ -131,20 +183,38 @@ impl RestingBody {
         });
         let near: HashMap<(u32, u32), Coupling> = near.collect();
         let is_far = |node: &u32| nodes.binary_search(node).is_err();
-        let far = self.couplings.iter().filter(|((row, column), _)| is_far(row) && is_far(column));
+        let far = self.couplings().iter().filter(|((row, column), _)| is_far(row) && is_far(column));
         let rest = far.map(|(pair, coupling)| (*pair, near.get(pair).map_or(*coupling, |near| coupling.less(near))));
         rest.filter(|(_, coupling)| !coupling.is_zero()).collect()
     }
 }
 
-fn digest_of(rest: &[Vec3], inverse_masses: &[f64], couplings: &[((u32, u32), Coupling)]) -> u64 {
-    let coordinates = rest.iter().flat_map(|x| x.iter()).chain(inverse_masses).map(|x| x.to_bits());
-    let couplings = couplings.iter().flat_map(|((row, column), Coupling { stiffness, damping })| {
-        let numbers = stiffness.iter().chain(damping).map(|x| x.to_bits());
-        std::iter::once(u64::from(*row) << 32 | u64::from(*column)).chain(numbers)
-    });
-    let bytes: Vec<u8> = coordinates.chain(couplings).flat_map(u64::to_le_bytes).collect();
-    digest(&bytes)
+/// `share` in steps of 1e-7; no step ends at a number that is round.
+fn alike(share: f64) -> u64 {
+    (share * (1e7 / std::f64::consts::SQRT_2)).round() as i64 as u64
+}
+
+/// To seven digits.
+fn single(value: f64) -> u64 {
+    u64::from(((value * (1.0 + 1e-9)) as f32).to_bits())
+}
+
+/// Of the nodes, and of their forces when all of them are a little aside and move.
+fn digest_of(body: &dyn Body) -> u64 {
+    let (rest, nodes) = (body.rest(), (0..body.rest().len() as u32).collect::<Vec<_>>());
+    let extent = rest.iter().fold(0.0, |most: f64, x| most.max(x.amax()));
+    let aside = |n: usize, x: &Vec3| {
+        x + Vec3::new((1.9 * n as f64).sin(), (2.3 * n as f64).cos(), (2.9 * n as f64).sin()) * (1e-3 * extent)
+    };
+    let moves = |n: usize| Vec3::new((1.3 * n as f64).cos(), (1.7 * n as f64).sin(), (3.1 * n as f64).cos());
+    let state = State {
+        positions: rest.iter().enumerate().map(|(n, x)| aside(n, x)).collect(),
+        velocities: (0..rest.len()).map(moves).collect(),
+    };
+    let mut forces = vec![Vec3::zeros(); rest.len()];
+    body.node_forces(&state, &nodes, &mut forces);
+    let numbers = rest.iter().chain(&forces).flat_map(|x| x.iter()).chain(body.inverse_masses());
+    digest(&numbers.flat_map(|x| x.to_bits().to_le_bytes()).collect::<Vec<u8>>())
 }
 
 /// FNV-1a over whole words: fast enough for megabytes, and any changed bit changes it.

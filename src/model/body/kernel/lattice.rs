@@ -34,6 +34,13 @@ impl LatticeKernel {
         self.set = set;
     }
 
+    /// For the `springs` of a part of the lattice, on the same cores.
+    pub(crate) fn of_part(&self, springs: &LatticeSprings) -> Self {
+        let mut new = Self { parts: Vec::new(), set: self.set, cores: self.cores.clone() };
+        new.divide(springs, self.parts.len());
+        new
+    }
+
     #[cfg(feature = "parallel")]
     pub(crate) fn set_cores(&mut self, springs: &LatticeSprings, cores: usize) -> Result<(), ModelError> {
         self.cores = Cores::new(cores)?;

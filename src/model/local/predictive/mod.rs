@@ -7,7 +7,6 @@ use std::sync::Arc;
 use self::ring::{NearBody, RingPath};
 use super::patch::Patch;
 use super::{Kind, LocalModel, ResyncView};
-use crate::body::State;
 use crate::contact::{Contact, ContactPoint, ToolMotion};
 use crate::surroundings::{Basis, ReducedMotion};
 use crate::{Vec3, Wrench};
@@ -47,15 +46,13 @@ pub(super) struct Predictive {
     ring_forces: Vec<f64>,
     /// Inverse masses of the ring's nodes (1/kg).
     ring_weights: Vec<f64>,
-    /// The global model's present while it looks ahead.
-    present: State,
 }
 
 impl Predictive {
     /// An empty model with a patch of `size` = nodes along the surface, along it, into depth. Memory comes with the first
     /// [`rebuild`](LocalModel::rebuild).
     pub(super) fn new(size: [usize; 3], reduces: bool) -> Self {
-        let (patch, near, path, surroundings, present) = Default::default();
+        let (patch, near, path, surroundings) = Default::default();
         let (ring_positions, ring_velocities, ring_forces, ring_weights) = Default::default();
         let (others, substep, basis) = Default::default();
         Self {
@@ -72,7 +69,6 @@ impl Predictive {
             ring_velocities,
             ring_forces,
             ring_weights,
-            present,
         }
     }
 
@@ -90,20 +86,23 @@ impl Predictive {
         self.substep = 0;
     }
 
-    /// Finds the ring's path: the whole body runs ahead. Its tool goes where no hand may ever go, as into elements until they give
+    /// Finds the ring's path: the body runs ahead, or what of it is around the patch. Its tool goes where no hand may ever go, as into elements until they give
     /// way: a ring that is torn along ends the path.
     fn predict(&mut self, resync: &mut ResyncView<'_>) {
         let ring = self.ring();
-        let Self { patch: Patch { window, state, forces, stepping, .. }, near, path, present, ring_weights, .. } = self;
+        let Self { patch: Patch { window, state, forces, stepping, .. }, near, path, ring_weights, .. } = self;
         path.clear(window.ring, stepping.step(), (resync.horizon * stepping.substeps + 1) as usize);
         let motion = |tool: usize, n| resync.tools[tool].motion(n, stepping.tick);
         let body = resync.global.body();
         let (step, extent) = (stepping.step(), window.extent(body.rest()));
         ring_weights.clear();
         ring_weights.extend(window.nodes[ring.clone()].iter().map(|&node| body.inverse_masses()[node as usize]));
-        resync.global.look_ahead(resync.horizon, motion, present, |global| {
-            window.gather(&global.positions, &mut state.positions);
-            window.gather(&global.velocities, &mut state.velocities);
+        let reached = &window.nodes[..near.len()];
+        resync.global.look_ahead(&window.nodes[..window.movable], resync.horizon, motion, |ahead| {
+            let places = state.positions.iter_mut().zip(&mut state.velocities);
+            for ((x, v), &node) in places.zip(reached) {
+                (*x, *v) = ahead.node(node).unwrap_or((*x, *v));
+            }
             near.forces(state, forces);
             let is_still_whole = |node: usize| {
                 let [way, pull] = [state.velocities[node], forces[node] * (ring_weights[node - ring.start] * step)]

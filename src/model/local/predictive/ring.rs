@@ -40,6 +40,11 @@ impl NearBody {
         self.restriction.as_ref().map_or([&[], &[]], |near| [near.ring(patch.len()), near.held(patch.len())])
     }
 
+    /// The number of its nodes: patch, ring and held ones, the first of the window.
+    pub(super) fn len(&self) -> usize {
+        self.forces.len()
+    }
+
     /// Writes the force that it puts on each node of the window (N); patch, ring and held nodes come first there as here.
     pub(super) fn forces(&mut self, window: &State, forces: &mut [Vec3]) {
         let count = self.forces.len();

@@ -1,0 +1,328 @@
+//! Running ahead of the present: with the part of the body around a patch, or with all of a body that is not larger.
+
+use std::sync::Arc;
+
+use super::Simulation;
+use crate::Vec3;
+use crate::body::{Cutout, State, Stiffened, neighbourhood};
+use crate::contact::{Contact, Rows, Skin, ToolMotion, Touch};
+
+/// The velocity of what is left out dies away in about this time (s), and what changes it in about that: longer than for a tool, as
+/// it comes through the body.
+const DECAY: f64 = 100e-3;
+const CHANGE_DECAY: f64 = 60e-3;
+
+/// What runs ahead, and where the present is meanwhile.
+#[derive(Debug)]
+pub(super) struct Ahead {
+    /// Nodes around a patch that run ahead. Of a larger body the rest goes on as it does at present: what a tool does meanwhile
+    /// hardly comes so far.
+    most: usize,
+    /// The patch that the part was made for.
+    patch: Vec<u32>,
+    /// `None` if the neighbourhood of the patch is the whole body.
+    part: Option<Part>,
+    present: State,
+}
+
+impl Default for Ahead {
+    fn default() -> Self {
+        let (patch, part, present) = Default::default();
+        Self { most: Simulation::AHEAD, patch, part, present }
+    }
+}
+
+impl Ahead {
+    /// As large, before it was made.
+    pub(super) fn anew(&self) -> Self {
+        Self { most: self.most, ..Self::default() }
+    }
+}
+
+/// The state of what runs ahead.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Glimpse<'a> {
+    state: &'a State,
+    /// The place of each node of the body, [`Part::NONE`] for those that are left out; `None` if all are there.
+    places: Option<&'a [u32]>,
+}
+
+impl Glimpse<'_> {
+    /// Position (m) and velocity (m/s) of `node`, if it is there.
+    pub(crate) fn node(&self, node: u32) -> Option<(Vec3, Vec3)> {
+        let place = match self.places {
+            None => node,
+            Some(places) => *places.get(node as usize).filter(|&&place| place != Part::NONE)?,
+        };
+        Some((self.state.positions[place as usize], self.state.velocities[place as usize]))
+    }
+}
+
+/// A simulation of the nodes around a patch.
+#[derive(Debug)]
+struct Part {
+    simulation: Simulation,
+    /// The id of each of its nodes in the whole body, and the other way round.
+    nodes: Vec<u32>,
+    places: Vec<u32>,
+    /// The id of each of its triangles, in increasing order.
+    triangles: Vec<u32>,
+    /// Its nodes that can move in the whole body and follow nothing here.
+    rim: Vec<u32>,
+    /// Velocity and acceleration of each of these at the present (m/s, m/s^2).
+    drifts: Vec<[Vec3; 2]>,
+}
+
+impl Part {
+    const NONE: u32 = u32::MAX;
+
+    fn new(whole: &Simulation, patch: &[u32], most: usize) -> Option<Self> {
+        let around = neighbourhood(whole.body.as_made(), patch, most)?;
+        let Cutout { nodes, triangles, body } = whole.body.as_made().cutout(&around)?;
+        let mut places = vec![Self::NONE; whole.inverse_masses.len()];
+        nodes.iter().zip(0..).for_each(|(&node, place)| places[node as usize] = place);
+        let gives_way = |&place: &u32| whole.inverse_masses[nodes[place as usize] as usize] > 0.0;
+        let inverse_masses = body.inverse_masses().to_vec();
+        let is_held = |&place: &u32| inverse_masses[place as usize] == 0.0;
+        let rim = (0..nodes.len() as u32).filter(gives_way).filter(is_held).collect();
+        let place = |node: u32| Some(places[node as usize]).filter(|&place| place != Self::NONE);
+        // Where a smoothed corner is not all there, nothing is met.
+        let candidates = (0..).zip(&body.surface().triangles).filter(|(_, corners)| {
+            let made_of = |touch: &Touch| {
+                corners.iter().all(|&corner| {
+                    let shares = touch.skin.corner(nodes[corner as usize]);
+                    shares.iter().all(|&(node, _)| place(node).is_some())
+                })
+            };
+            whole.touches.iter().all(made_of)
+        });
+        let candidates = candidates.map(|(triangle, _)| triangle).collect();
+        let touch = |touch: &Touch| {
+            let mut skin = Skin::default();
+            touch.skin.localise(&nodes, place, &mut skin);
+            Touch::new(touch.shape, Arc::new(skin), Contact::default())
+        };
+        let mut rows = Rows::with_room(whole.touches.len());
+        rows.make_room(nodes.len());
+        let simulation = Simulation {
+            state: State::at_rest(body.rest()),
+            forces: vec![Vec3::zeros(); nodes.len()],
+            touches: whole.touches.iter().map(touch).collect(),
+            rows,
+            law: whole.law,
+            stepping: whole.stepping,
+            candidates,
+            means: whole.means.clone(),
+            ahead: Box::default(),
+            inverse_masses,
+            stiffness: whole.body.stiffness(),
+            body: Stiffened::new(body),
+        };
+        Some(Self { simulation, nodes, places, triangles, rim, drifts: Vec::new() })
+    }
+
+    /// Takes the state of `whole`.
+    fn begin(&mut self, whole: &Simulation) {
+        let Self { simulation, nodes, triangles, rim, drifts, .. } = self;
+        // What may change while a session runs.
+        simulation.law = whole.law;
+        simulation.put_stiffness(whole.body.stiffness());
+        drifts.clear();
+        drifts.extend(rim.iter().map(|&place| {
+            let node = nodes[place as usize] as usize;
+            [whole.state.velocities[node], whole.forces[node] * whole.inverse_masses[node]]
+        }));
+        for (place, &node) in nodes.iter().enumerate() {
+            simulation.state.positions[place] = whole.state.positions[node as usize];
+            simulation.state.velocities[place] = whole.state.velocities[node as usize];
+        }
+        let local = |triangle: u32| triangles.binary_search(&triangle).ok().map(|place| place as u32);
+        let localised = |contact: &Contact| match contact.triangle.map(local) {
+            Some(None) => Contact { glued: contact.glued, ..Contact::default() },
+            triangle => Contact { triangle: triangle.flatten(), ..*contact },
+        };
+        for (touch, of_whole) in simulation.touches.iter_mut().zip(&whole.touches) {
+            touch.restart(of_whole, localised, local);
+        }
+        simulation.means.copy_from_slice(&whole.means);
+    }
+
+    /// The rest of the body as it is expected to go on in the `tick`-th tick.
+    fn drift(&mut self, tick: u32) {
+        let State { velocities, .. } = &mut self.simulation.state;
+        let t = (f64::from(tick) + 0.5) * self.simulation.stepping.tick;
+        let [of_velocity, of_change] = [(-t / DECAY).exp(), t * (-t / CHANGE_DECAY).exp()];
+        for (&node, [velocity, acceleration]) in self.rim.iter().zip(&self.drifts) {
+            velocities[node as usize] = velocity * of_velocity + acceleration * of_change;
+        }
+    }
+}
+
+impl Simulation {
+    /// Nodes around a patch that run ahead, if nothing else is said.
+    pub const AHEAD: usize = 4096;
+
+    /// Lets at most about so many nodes around a patch run ahead: what a prediction costs, and how far from the tool the body may
+    /// do something unexpected.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    #[must_use]
+    pub fn looking_ahead_with(mut self, nodes: usize) -> Self {
+        *self.ahead = Ahead { most: nodes, ..Ahead::default() };
+        self
+    }
+
+    /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the state at the
+    /// start of every substep and at the end, and goes back to the present. It ends early with a tick in which `watch` says no. Of a
+    /// large body only the neighbourhood of `patch` runs ahead (ids in increasing order).
+    ///
+    /// # Real-time
+    /// For the global actor: costs as much as the ticks, of a large body those of a small one; allocates where the patch moves.
+    pub(crate) fn look_ahead(
+        &mut self,
+        patch: &[u32],
+        ticks: u32,
+        motion: impl Fn(usize, u32) -> ToolMotion,
+        mut watch: impl FnMut(Glimpse<'_>) -> bool,
+    ) {
+        let mut ahead = std::mem::take(&mut self.ahead);
+        if ahead.patch != patch {
+            patch.clone_into(&mut ahead.patch);
+            ahead.part = Part::new(self, patch, ahead.most);
+        }
+        if let Some(part) = &mut ahead.part {
+            part.begin(self);
+            for tick in 0..ticks {
+                part.drift(tick);
+                let Part { simulation, places, .. } = part;
+                let shown = |state: &State| watch(Glimpse { state, places: Some(places) });
+                if !simulation.advance_while(|tool| motion(tool, tick), shown) {
+                    self.ahead = ahead;
+                    return;
+                }
+            }
+            watch(Glimpse { state: &part.simulation.state, places: Some(&part.places) });
+        } else {
+            ahead.present.clone_from(&self.state);
+            let (touches, means) = (self.touches.clone(), self.means.clone());
+            let mut shown = |state: &State| watch(Glimpse { state, places: None });
+            let is_through = (0..ticks).all(|tick| self.advance_while(|tool| motion(tool, tick), &mut shown));
+            if is_through {
+                shown(&self.state);
+            }
+            std::mem::swap(&mut self.state, &mut ahead.present);
+            (self.touches, self.means) = (touches, means);
+        }
+        self.ahead = ahead;
+    }
+
+    /// A tick that is shown to `watch`; false if that says no.
+    fn advance_while(&mut self, motion: impl Fn(usize) -> ToolMotion, mut watch: impl FnMut(&State) -> bool) -> bool {
+        let mut goes_on = true;
+        self.advance(motion, &mut |state| goes_on = goes_on && watch(state));
+        goes_on
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::{Block, Body, Region, Shape, State};
+    use crate::contact::Law;
+    use crate::mesh::Face;
+    use crate::simulation::Stepping;
+
+    /// A block of so many nodes along each edge, 9 mm apart, with a stiff nodule; and a patch in the middle of its top.
+    fn simulation(nodes: usize) -> (Simulation, Vec<u32>) {
+        let size = 9e-3 * (nodes - 1) as f64;
+        let middle = [0.5 * size, 0.5 * size, size - 0.03];
+        let nodule = Region::new(Shape::Sphere { centre: middle, radius: 0.02 }).stiffness(90.0);
+        let block = Block::builder([nodes; 3], [size; 3]).region(nodule).fix(Face::ZMin).build().unwrap();
+        let nearest = crate::mesh::NearestTriangle::new(block.surface(), block.rest()).unwrap();
+        let mut patch = Vec::new();
+        block.patch(&[nearest.find(&Vec3::new(0.5 * size, 0.5 * size, size))], [6, 6, 3], &mut patch);
+        let (state, stepping) = (State::at_rest(block.rest()), Stepping { tick: 1e-3, substeps: 4 });
+        (Simulation::new(Box::new(block), state, Contact::default(), Law::default(), stepping).unwrap(), patch)
+    }
+
+    /// The tool presses into the middle of the top.
+    fn motion(simulation: &Simulation, tick: u32) -> ToolMotion {
+        let top = simulation.body().rest().iter().fold(Vec3::zeros(), |top, x| top.sup(x));
+        let at = |tick: u32| Vec3::new(0.51 * top.x, 0.49 * top.y, top.z + 1e-3 - 1e-4 * f64::from(tick));
+        ToolMotion { from: at(tick).into(), to: at(tick + 1).into() }
+    }
+
+    /// Positions of `patch` in each substep ahead.
+    fn seen(simulation: &mut Simulation, patch: &[u32], from: u32) -> Vec<Vec3> {
+        let motions: Vec<ToolMotion> = (0..60).map(|tick| motion(simulation, from + tick)).collect();
+        let mut seen = Vec::new();
+        simulation.look_ahead(
+            patch,
+            60,
+            |_, tick| motions[tick as usize],
+            |ahead| {
+                seen.extend(patch.iter().map(|&node| ahead.node(node).unwrap().0));
+                true
+            },
+        );
+        seen
+    }
+
+    #[test]
+    fn what_is_around_a_patch_runs_ahead_as_the_whole_body_does_and_the_present_stays() {
+        let (mut simulation, patch) = simulation(26);
+        for tick in 0..60 {
+            let motion = motion(&simulation, tick);
+            simulation.tick(motion);
+        }
+        let (present, contact) = (simulation.state().clone(), *simulation.contact(0));
+        let part = seen(&mut simulation, &patch, 60);
+        assert!(simulation.ahead.part.as_ref().unwrap().nodes.len() < 6000);
+        assert_eq!((simulation.state(), simulation.contact(0)), (&present, &contact));
+        // Of the whole body, as it really goes on.
+        let mut whole = Vec::new();
+        for tick in 60..120 {
+            let motion = motion(&simulation, tick);
+            simulation.advance(|_| motion, &mut |state| {
+                whole.extend(patch.iter().map(|&node| state.positions[node as usize]))
+            });
+        }
+        let moved = |from: &[Vec3], to: &[Vec3]| from.iter().zip(to).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let (first, last) = (&whole[..patch.len()], &whole[whole.len() - patch.len()..]);
+        assert!(moved(first, last) > 4e-3, "{}", moved(first, last));
+        let wrong = moved(&part[..whole.len()], &whole);
+        assert!(wrong < 0.02 * moved(first, last), "{wrong} of {}", moved(first, last));
+    }
+
+    #[test]
+    fn a_part_that_is_not_disturbed_from_outside_is_the_whole_body_bit_for_bit() {
+        // At rest in all but what is near: a wave that sets out comes to the rim later.
+        let (mut simulation, patch) = simulation(26);
+        let near = patch[patch.len() / 2] as usize;
+        simulation.state_mut().velocities[near].z = -0.05;
+        let seen_ticks = 1;
+        let mut part = Vec::new();
+        let rest = motion(&simulation, 0).from;
+        let still = ToolMotion { from: rest, to: rest };
+        simulation.look_ahead(
+            &patch,
+            seen_ticks,
+            |_, _| still,
+            |ahead| {
+                part.extend(patch.iter().map(|&node| ahead.node(node).unwrap().0));
+                true
+            },
+        );
+        simulation.advance(|_| still, &mut |_| ());
+        let whole = patch.iter().map(|&node| simulation.state().positions[node as usize]);
+        assert!(part[part.len() - patch.len()..].iter().copied().eq(whole));
+    }
+
+    #[test]
+    fn a_body_that_is_not_larger_runs_ahead_whole() {
+        let (mut simulation, patch) = simulation(12);
+        seen(&mut simulation, &patch, 0);
+        assert!(simulation.ahead.part.is_none() && !simulation.ahead.present.positions.is_empty());
+    }
+}
