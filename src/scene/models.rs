@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::model::local::{BlendKind, Feedback, Kind};
+use crate::model::simulation::Simulation;
 use crate::model::surroundings::Size;
 
 /// The global model of a scene: the slow, detailed simulation.
@@ -13,6 +14,11 @@ pub struct GlobalSpec {
     pub rate_hz: f64,
     /// Explicit steps per millisecond; chosen from the stability limit if absent.
     pub substeps_per_ms: Option<u32>,
+    /// Cores that compute the forces of the whole body, also where it is simulated at the haptic rate (`full`); more than one takes the
+    /// feature `parallel`.
+    pub cores: usize,
+    /// Nodes around a window that run ahead for its prediction; of a larger body the rest goes on as it does.
+    pub ahead_nodes: usize,
     /// Time after its release at which a result becomes visible, in virtual time (ms).
     pub compute_latency_ms: f64,
     /// Time after its release at which reduced surroundings of a patch become visible, in virtual time (ms).
@@ -21,7 +27,14 @@ pub struct GlobalSpec {
 
 impl Default for GlobalSpec {
     fn default() -> Self {
-        Self { rate_hz: 30.0, substeps_per_ms: None, compute_latency_ms: 0.0, basis_latency_ms: 0.0 }
+        Self {
+            rate_hz: 30.0,
+            substeps_per_ms: None,
+            cores: 1,
+            ahead_nodes: Simulation::AHEAD,
+            compute_latency_ms: 0.0,
+            basis_latency_ms: 0.0,
+        }
     }
 }
 

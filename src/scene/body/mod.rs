@@ -40,6 +40,24 @@ impl BodySpec {
         })
     }
 
+    /// The same with its forces computed on so many cores.
+    ///
+    /// # Errors
+    /// Those of [`build`](Self::build); if there are more cores than one and the feature `parallel` is not there, or the system
+    /// refuses a thread.
+    pub fn build_on(&self, cores: usize) -> Result<Box<dyn Body>, Error> {
+        if cores == 1 {
+            return self.build();
+        }
+        #[cfg(feature = "parallel")]
+        return Ok(match self {
+            Self::MassSpring(spec) => Box::new(spec.build()?.on_cores(cores)?),
+            Self::Tetrahedra(spec) => Box::new(spec.build()?.on_cores(cores)?),
+        });
+        #[cfg(not(feature = "parallel"))]
+        Err(Error::scene("global.cores", format!("is {cores}: this program was built without the feature parallel")))
+    }
+
     /// The kind of the body.
     pub fn kind(&self) -> BodyKind {
         match self {

@@ -34,6 +34,8 @@ const MAX_LENGTH_M: f64 = 1e3;
 const MIN_TRIANGLE_M2: f64 = 1e-14;
 /// Steps of 0.1 us: whatever needs more is no deformable body.
 const MAX_SUBSTEPS_PER_MS: u32 = 10_000;
+/// More than any machine of one memory.
+const MAX_CORES: usize = 1024;
 /// A dense tangent of 38 MB, far above what a haptic tick can multiply with.
 const MAX_PATCH_NODES: usize = 512;
 /// The corners of an element.
@@ -213,6 +215,12 @@ fn global(global: &GlobalSpec) -> Result<(), Error> {
             "is {substeps}, must be 1 to {MAX_SUBSTEPS_PER_MS}; leave it out to have it chosen from the stability limit"
         );
         return Err(Error::scene("global.substeps_per_ms", message));
+    }
+    if !(1..=MAX_CORES).contains(&global.cores) {
+        return Err(Error::scene("global.cores", format!("is {}, must be 1 to {MAX_CORES}", global.cores)));
+    }
+    if global.ahead_nodes == 0 {
+        return Err(Error::scene("global.ahead_nodes", "is 0, must be at least 1"));
     }
     let latencies = [
         ("global.compute_latency_ms", global.compute_latency_ms),

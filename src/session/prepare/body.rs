@@ -42,7 +42,7 @@ impl Start {
     ) -> Result<Self, Error> {
         let mut body = match (own, &scene.body) {
             (Some(own), _) => own,
-            (None, Some(spec)) => spec.build()?,
+            (None, Some(spec)) => spec.build_on(scene.global.cores)?,
             (None, None) => return Err(Error::scene("body", "is missing")),
         };
         check_body(&*body)?;

@@ -138,6 +138,7 @@ mod tests {
             haptic_period_s: 1e-3,
             global_period_s: 1.0 / 30.0,
             ahead_ticks: 42,
+            ahead_share: 1.0,
             cores: 2,
             error_pct: 1.0,
             states: 50,
@@ -186,6 +187,15 @@ mod tests {
         // Most scenes are within 1 %, but not 19 of 20.
         let farther = Situation { ahead_ticks: 2, ..situation(350) };
         assert_chosen(&farther, Kind::Predictive, &["the best that fits"], Some("predictive may be 7.5 % off"));
+    }
+
+    #[test]
+    fn of_a_large_body_a_part_runs_ahead_and_predictive_fits_where_full_does_not() {
+        // 0.85 of a core to follow the tool, and 1.26 times that to run all of the body ahead.
+        let whole = Situation { error_pct: 10.0, ..situation(340) };
+        assert_ne!(choose(&whole).model, Kind::Predictive);
+        let part = Situation { ahead_share: 0.1, ..whole };
+        assert_chosen(&part, Kind::Predictive, &["would take 850 us of 1 ms", "predictive meets 10 %"], None);
     }
 
     #[test]

@@ -205,7 +205,8 @@ fn simulation(start: Start, scene: &Scene, tools: &[Tool]) -> Result<Simulation,
     let Start { body, state, tick, substeps, .. } = start;
     let mut contacts = tools.iter().map(|tool| tool.contact);
     let first = contacts.next().unwrap_or_default();
-    let first = Simulation::new(body, state, first, scene.contact.law(), Stepping { tick, substeps })?;
+    let first = Simulation::new(body, state, first, scene.contact.law(), Stepping { tick, substeps })?
+        .looking_ahead_with(scene.global.ahead_nodes);
     let all = contacts.fold(first, Simulation::with_tool);
     Ok((0..).zip(tools).fold(all, |all, (index, tool)| all.with_shape(index, tool.shape)))
 }

@@ -10,6 +10,8 @@ use crate::scene::Scene;
 
 /// Contact, integration, device and records of a tick of the whole body, as a factor on its force evaluations.
 const OVERHEAD: f64 = 1.25;
+/// What runs ahead of a large body has a rim beside its own nodes.
+const AHEAD_RIM: f64 = 1.4;
 /// The part of a haptic period that the typical tick may take: the slowest of a hundred takes twice as long (`palpate compare`
 /// on the reference scenes: 74 and 168 us for `full`).
 const HAPTIC_SHARE: f64 = 0.5;
@@ -35,6 +37,8 @@ pub(super) struct Situation {
     pub(super) global_period_s: f64,
     /// Haptic ticks that `predictive` and `predicted` look ahead.
     pub(super) ahead_ticks: u32,
+    /// The part of the body that does.
+    pub(super) ahead_share: f64,
     pub(super) cores: usize,
     pub(super) error_pct: f64,
     /// States of the reduced surroundings; the most there may be where an error budget decides.
@@ -96,6 +100,7 @@ impl Situation {
             haptic_period_s,
             global_period_s,
             ahead_ticks: horizon,
+            ahead_share: (AHEAD_RIM * scene.global.ahead_nodes as f64 / state.positions.len() as f64).min(1.0),
             cores,
             error_pct: scene.local.chosen_within_pct(),
             states: match scene.local.basis_size() {
@@ -134,7 +139,7 @@ impl Situation {
     /// What the global model does in one of its periods (s): it follows the tool, and looks ahead.
     fn global_work_s(&self, kind: Kind) -> f64 {
         let follow = self.global_period_s / self.haptic_period_s * self.full_tick_s();
-        let run_ahead = f64::from(self.ahead_ticks) * self.full_tick_s();
+        let run_ahead = self.ahead_share * f64::from(self.ahead_ticks) * self.full_tick_s();
         let ahead = match kind {
             Kind::Full => return 0.0,
             Kind::Predicted | Kind::Predictive => run_ahead,
