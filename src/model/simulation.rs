@@ -1,79 +1,26 @@
 //! A whole body with its contacts, advanced tick by tick: the global model, and `full` at the haptic rate.
 
 mod ahead;
+mod moving;
+mod stepping;
 
 use std::sync::Arc;
 
 use crate::body::{Body, State, Stiffened, Stiffness};
-use crate::contact::{
-    Coarseness, Contact, ContactPoint, Deformable, Friction, Law, Rows, Skin, ToolMotion, ToolShape, Touch, step_all,
-};
+use crate::contact::{Coarseness, Contact, ContactPoint, Friction, Law, Rows, Skin, ToolMotion, ToolShape, Touch};
 use crate::error::ModelError;
-use crate::integrator::Spectrum;
 use crate::{Pose, Vec3, Wrench};
-use ahead::Ahead;
+use ahead::{Ahead, Glimpse};
+use moving::Moving;
 
-/// How time is divided: ticks of the haptic rate, each of several explicit substeps.
-///
-/// # Real-time
-/// A plain value: its methods are wait-free and real-time safe.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stepping {
-    /// Haptic period (s).
-    pub tick: f64,
-    /// Explicit substeps per tick, at least one.
-    pub substeps: u32,
-}
-
-impl Default for Stepping {
-    /// One substep per millisecond.
-    fn default() -> Self {
-        Self { tick: 1e-3, substeps: 1 }
-    }
-}
-
-impl Stepping {
-    /// Substeps per tick of `tick` (s) from the body's stability limit.
-    ///
-    /// # Real-time
-    /// Not real-time safe: allocates, and evaluates the body's forces hundreds of times.
-    pub fn stable_substeps(body: &mut dyn Body, tick: f64) -> u32 {
-        Spectrum::estimate(body).substeps(tick)
-    }
-
-    /// The substep d (s).
-    pub fn step(&self) -> f64 {
-        self.tick / f64::from(self.substeps)
-    }
-
-    /// Runs one tick: calls `substep` for each part of the tool's motion and returns the mean of what it gives.
-    pub(crate) fn tick(&self, tool: ToolMotion, mut substep: impl FnMut(ToolMotion, f64) -> Wrench) -> Wrench {
-        let n = f64::from(self.substeps);
-        let sum = (0..self.substeps).fold(Wrench::default(), |sum, u| {
-            let u = f64::from(u);
-            sum + substep(tool.part(u / n, (u + 1.0) / n), self.step())
-        });
-        sum / n
-    }
-}
+pub use stepping::Stepping;
 
 /// A body, its state and the contacts of the tools with it. Tools are numbered in the order of their devices.
 #[derive(Debug)]
 pub struct Simulation {
-    body: Stiffened,
+    moving: Moving,
     /// Where its stiffness goes, tick by tick.
     stiffness: Stiffness,
-    state: State,
-    forces: Vec<Vec3>,
-    touches: Vec<Touch>,
-    rows: Rows,
-    law: Law,
-    stepping: Stepping,
-    /// All surface triangles: a tool may touch anywhere.
-    candidates: Vec<u32>,
-    inverse_masses: Vec<f64>,
-    /// On each tool: mean force and torque of the last tick, or of the resting contact before the first.
-    means: Vec<Wrench>,
     ahead: Box<Ahead>,
 }
 
@@ -104,22 +51,10 @@ impl Simulation {
         let candidates = (0..body.surface().triangles.len() as u32).collect();
         let inverse_masses = body.inverse_masses().to_vec();
         let forces = vec![Vec3::zeros(); nodes];
-        let (touches, rows, means, ahead) = Default::default();
-        let (body, stiffness) = (Stiffened::new(body), Stiffness::default());
-        let new = Self {
-            body,
-            stiffness,
-            state,
-            forces,
-            touches,
-            rows,
-            law,
-            stepping,
-            candidates,
-            inverse_masses,
-            means,
-            ahead,
-        };
+        let (touches, rows, means) = Default::default();
+        let body = Stiffened::new(body);
+        let moving = Moving { body, state, forces, touches, rows, law, stepping, candidates, inverse_masses, means };
+        let new = Self { moving, stiffness: Stiffness::default(), ahead: Box::default() };
         Ok(new.with_tool(contact))
     }
 
@@ -129,11 +64,11 @@ impl Simulation {
     /// Not real-time safe: allocates.
     #[must_use]
     pub fn with_tool(mut self, contact: Contact) -> Self {
-        self.touches.push(Touch::new(ToolShape::Point, Arc::default(), contact));
+        self.moving.touches.push(Touch::new(ToolShape::Point, Arc::default(), contact));
         let force = self.resting_force(&contact);
-        self.means.push(force.into());
-        self.rows = Rows::with_room(self.touches.len());
-        self.rows.make_room(self.inverse_masses.len());
+        self.moving.means.push(force.into());
+        self.moving.rows = Rows::with_room(self.moving.touches.len());
+        self.moving.rows.make_room(self.moving.inverse_masses.len());
         self
     }
 
@@ -143,10 +78,13 @@ impl Simulation {
     /// Not real-time safe: allocates, and looks at every node of the surface.
     #[must_use]
     pub fn with_shape(mut self, tool: usize, shape: ToolShape) -> Self {
-        let skin =
-            if shape == ToolShape::Point { Skin::default() } else { Skin::new(self.body.as_made(), shape.radius()) };
-        self.touches[tool] = Touch::new(shape, Arc::new(skin), self.touches[tool].contact);
-        self.rows.make_room(self.inverse_masses.len());
+        let skin = if shape == ToolShape::Point {
+            Skin::default()
+        } else {
+            Skin::new(self.moving.body.as_made(), shape.radius())
+        };
+        self.moving.touches[tool] = Touch::new(shape, Arc::new(skin), self.moving.touches[tool].contact);
+        self.moving.rows.make_room(self.moving.inverse_masses.len());
         self
     }
 
@@ -155,33 +93,32 @@ impl Simulation {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn duplicate(&self) -> Option<Self> {
-        let mut rows = Rows::with_room(self.touches.len());
-        rows.make_room(self.inverse_masses.len());
-        Some(Self {
-            body: self.body.copy()?,
-            stiffness: self.stiffness,
-            state: self.state.clone(),
-            forces: self.forces.clone(),
-            touches: self.touches.clone(),
+        let mut rows = Rows::with_room(self.moving.touches.len());
+        rows.make_room(self.moving.inverse_masses.len());
+        let moving = Moving {
+            body: self.moving.body.copy()?,
+            state: self.moving.state.clone(),
+            forces: self.moving.forces.clone(),
+            touches: self.moving.touches.clone(),
             rows,
-            law: self.law,
-            stepping: self.stepping,
-            candidates: self.candidates.clone(),
-            inverse_masses: self.inverse_masses.clone(),
-            means: self.means.clone(),
-            ahead: Box::new(self.ahead.anew()),
-        })
+            law: self.moving.law,
+            stepping: self.moving.stepping,
+            candidates: self.moving.candidates.clone(),
+            inverse_masses: self.moving.inverse_masses.clone(),
+            means: self.moving.means.clone(),
+        };
+        Some(Self { moving, stiffness: self.stiffness, ahead: Box::new(self.ahead.anew()) })
     }
 
     /// The force that holds the contact point still in the present state (N): what a tool feels before the first tick.
     fn resting_force(&mut self, contact: &Contact) -> Vec3 {
         let Some(triangle) = contact.triangle else { return Vec3::zeros() };
-        self.body.forces(&self.state, &mut self.forces);
-        let nodes = self.body.surface().triangles[triangle as usize];
+        self.moving.body.forces(&self.moving.state, &mut self.moving.forces);
+        let nodes = self.moving.body.surface().triangles[triangle as usize];
         let (mut acceleration, mut compliance) = (Vec3::zeros(), 0.0);
         for (&node, w) in nodes.iter().zip(&contact.weights) {
-            let mobility = w * self.inverse_masses[node as usize];
-            acceleration += self.forces[node as usize] * mobility;
+            let mobility = w * self.moving.inverse_masses[node as usize];
+            acceleration += self.moving.forces[node as usize] * mobility;
             compliance += w * mobility;
         }
         if compliance > 0.0 { acceleration / compliance } else { Vec3::zeros() }
@@ -194,7 +131,7 @@ impl Simulation {
     /// Bounded and real-time safe if the body's forces are.
     pub fn tick(&mut self, tool: ToolMotion) -> Wrench {
         self.tick_all(&[tool]);
-        self.means[0]
+        self.moving.means[0]
     }
 
     /// Advances one haptic tick while each tool moves along its own of `motions`, one for each tool.
@@ -205,33 +142,39 @@ impl Simulation {
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
     pub fn tick_all(&mut self, motions: &[ToolMotion]) {
-        let stiffness = self.body.stiffness().towards(self.stiffness, self.stepping.tick);
-        self.put_stiffness(stiffness);
-        self.advance(|tool| motions[tool], &mut |_| ());
+        let stiffness = self.moving.body.stiffness().towards(self.stiffness, self.moving.stepping.tick);
+        self.moving.put_stiffness(stiffness);
+        self.moving.advance(|tool| motions[tool], &mut |_| ());
     }
 
-    fn advance(&mut self, motion: impl Fn(usize) -> ToolMotion, watch: &mut impl FnMut(&State)) {
-        let Self { body, state, forces, touches, rows, law, candidates, inverse_masses, stepping, means, .. } = self;
-        let (n, d) = (f64::from(stepping.substeps), stepping.step());
-        means.fill(Wrench::default());
-        touches.iter_mut().for_each(Touch::begin);
-        for u in 0..stepping.substeps {
-            let u = f64::from(u);
-            watch(state);
-            body.forces(state, forces);
-            let mut deformable = Deformable {
-                positions: &mut state.positions,
-                velocities: &mut state.velocities,
-                inverse_masses,
-                surface: body.surface(),
-                candidates,
-            };
-            let part = |tool| motion(tool).part(u / n, (u + 1.0) / n);
-            step_all(&mut deformable, forces, touches, rows, law, part, d);
-            means.iter_mut().zip(&*touches).for_each(|(sum, touch)| *sum += touch.wrench);
-        }
-        means.iter_mut().for_each(|sum| *sum = *sum / n);
-        touches.iter_mut().for_each(|touch| touch.end(stepping.substeps, |triangle| triangle));
+    /// Nodes around a patch that run ahead, if nothing else is said.
+    pub const AHEAD: usize = Ahead::NODES;
+
+    /// Lets at most about so many nodes around a patch run ahead: what a prediction costs, and how far from the tool the body may
+    /// do something unexpected.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    #[must_use]
+    pub fn looking_ahead_with(mut self, nodes: usize) -> Self {
+        *self.ahead = Ahead::with(nodes);
+        self
+    }
+
+    /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the state at the
+    /// start of every substep and at the end, and goes back to the present. It ends early with a tick in which `watch` says no. Of a
+    /// large body only the neighbourhood of `patch` runs ahead (ids in increasing order).
+    ///
+    /// # Real-time
+    /// For the global actor: costs as much as the ticks, of a large body those of a small one; allocates where the patch moves.
+    pub(crate) fn look_ahead(
+        &mut self,
+        patch: &[u32],
+        ticks: u32,
+        motion: impl Fn(usize, u32) -> ToolMotion,
+        watch: impl FnMut(Glimpse<'_>) -> bool,
+    ) {
+        self.ahead.run(&mut self.moving, patch, ticks, motion, watch);
     }
 
     /// The nodes that all tools but `tool` press, each with the force on it (N).
@@ -239,19 +182,19 @@ impl Simulation {
     /// # Real-time
     /// Bounded, real-time safe.
     pub(crate) fn exerted_beside(&self, tool: usize) -> impl Iterator<Item = (u32, Vec3)> {
-        (0..self.touches.len()).filter(move |&other| other != tool).flat_map(|other| self.exerted(other))
+        (0..self.moving.touches.len()).filter(move |&other| other != tool).flat_map(|other| self.exerted(other))
     }
 
     /// The nodes that `tool` touches with the force on each (N): of a point its mean over the last tick, of a tool with a shape
     /// that of the last step.
     fn exerted(&self, tool: usize) -> Vec<(u32, Vec3)> {
-        let touch = &self.touches[tool];
+        let touch = &self.moving.touches[tool];
         if touch.has_shape() {
             return touch.pressed().to_vec();
         }
         let Contact { triangle, weights, .. } = touch.contact;
-        let force = self.means[tool].force;
-        let nodes = triangle.map(|triangle| self.body.surface().triangles[triangle as usize]);
+        let force = self.moving.means[tool].force;
+        let nodes = triangle.map(|triangle| self.moving.body.surface().triangles[triangle as usize]);
         nodes.into_iter().flat_map(|nodes| (0..3).map(move |i| (nodes[i], -force * weights[i]))).collect()
     }
 
@@ -260,7 +203,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn body(&self) -> &dyn Body {
-        &self.body
+        &self.moving.body
     }
 
     /// The body with the stiffness that it was made with.
@@ -268,7 +211,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn body_as_made(&self) -> &dyn Body {
-        self.body.as_made()
+        self.moving.body.as_made()
     }
 
     /// How stiff the body is now.
@@ -276,7 +219,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn stiffness(&self) -> Stiffness {
-        self.body.stiffness()
+        self.moving.body.stiffness()
     }
 
     /// Lets the body become as stiff as `target`, tick by tick, ten times within half a second: a deformed body that stiffens pushes.
@@ -288,17 +231,12 @@ impl Simulation {
         self.stiffness = target;
     }
 
-    fn put_stiffness(&mut self, stiffness: Stiffness) {
-        self.body.set_stiffness(stiffness);
-        self.touches.iter_mut().for_each(|touch| touch.stiffness = stiffness);
-    }
-
     /// Changes the friction between tools and body from the next tick on.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn set_friction(&mut self, friction: Friction) {
-        self.law.friction = friction;
+        self.moving.law.friction = friction;
     }
 
     /// Positions and velocities of all nodes of the body.
@@ -306,7 +244,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn state(&self) -> &State {
-        &self.state
+        &self.moving.state
     }
 
     /// Positions and velocities of all nodes, to put in what a local model found.
@@ -314,7 +252,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn state_mut(&mut self) -> &mut State {
-        &mut self.state
+        &mut self.moving.state
     }
 
     /// Number of tools that touch the body or may touch it.
@@ -322,7 +260,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn tools(&self) -> usize {
-        self.touches.len()
+        self.moving.touches.len()
     }
 
     /// The contact of a tool; its triangle is the body's.
@@ -330,12 +268,12 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn contact(&self, tool: usize) -> &Contact {
-        &self.touches[tool].contact
+        &self.moving.touches[tool].contact
     }
 
     /// The contact of a tool, to put in what a local model found.
     pub(crate) fn contact_mut(&mut self, tool: usize) -> &mut Contact {
-        &mut self.touches[tool].contact
+        &mut self.moving.touches[tool].contact
     }
 
     /// Puts `tool` in `contact` with the mean `force` of a last tick on it (N): to go on from what another one has saved.
@@ -343,7 +281,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn restore_tool(&mut self, tool: usize, contact: Contact, force: Vec3) {
-        (self.touches[tool].contact, self.means[tool]) = (contact, force.into());
+        (self.moving.touches[tool].contact, self.moving.means[tool]) = (contact, force.into());
     }
 
     /// The law by which contacts are resolved.
@@ -351,7 +289,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn law(&self) -> &Law {
-        &self.law
+        &self.moving.law
     }
 
     /// The haptic tick and its substeps.
@@ -359,7 +297,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn stepping(&self) -> Stepping {
-        self.stepping
+        self.moving.stepping
     }
 
     /// Mean force of the last tick on a tool (N).
@@ -367,7 +305,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn force(&self, tool: usize) -> Vec3 {
-        self.means[tool].force
+        self.moving.means[tool].force
     }
 
     /// Mean force and torque of the last tick on a tool.
@@ -375,7 +313,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn wrench(&self, tool: usize) -> Wrench {
-        self.means[tool]
+        self.moving.means[tool]
     }
 
     /// How coarse the surface is against a tool with a shape; `None` for a point, and for a tool that is glued.
@@ -383,8 +321,8 @@ impl Simulation {
     /// # Real-time
     /// Not for a tick: looks at every triangle of the surface.
     pub fn coarseness(&self, tool: usize) -> Option<Coarseness> {
-        let touch = &self.touches[tool];
-        touch.has_shape().then(|| touch.skin.coarseness(&self.body))
+        let touch = &self.moving.touches[tool];
+        touch.has_shape().then(|| touch.skin.coarseness(&self.moving.body))
     }
 
     /// The shape of a tool.
@@ -392,7 +330,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn shape(&self, tool: usize) -> ToolShape {
-        self.touches[tool].shape
+        self.moving.touches[tool].shape
     }
 
     /// Puts the nodes of a patch for `tool` around surface triangles in place of `nodes`, in increasing order: those of
@@ -401,8 +339,8 @@ impl Simulation {
     /// # Real-time
     /// For the global actor, at each resync: bounded; `nodes` may grow.
     pub fn patch(&self, tool: usize, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.body.patch(triangles, size, nodes);
-        self.touches[tool].complete(&self.body, triangles, nodes);
+        self.moving.body.patch(triangles, size, nodes);
+        self.moving.touches[tool].complete(&self.moving.body, triangles, nodes);
     }
 
     /// Puts the nodes that `tool` presses where it touches `triangles` in place of `nodes`, in increasing order: a patch without one
@@ -412,11 +350,11 @@ impl Simulation {
     /// For the global actor, at each resync: bounded; `nodes` may grow.
     pub fn pressed_at(&self, tool: usize, triangles: &[u32], nodes: &mut Vec<u32>) {
         nodes.clear();
-        let corners = triangles.iter().flat_map(|&triangle| self.body.surface().triangles[triangle as usize]);
-        nodes.extend(corners.filter(|&node| self.inverse_masses[node as usize] > 0.0));
+        let corners = triangles.iter().flat_map(|&triangle| self.moving.body.surface().triangles[triangle as usize]);
+        nodes.extend(corners.filter(|&node| self.moving.inverse_masses[node as usize] > 0.0));
         nodes.sort_unstable();
         nodes.dedup();
-        self.touches[tool].complete(&self.body, triangles, nodes);
+        self.moving.touches[tool].complete(&self.moving.body, triangles, nodes);
     }
 
     /// Appends the triangles that `tool` touches, or may touch soon, at `pose`, or if its radius were larger by `margin` (m), each
@@ -425,15 +363,15 @@ impl Simulation {
     /// # Real-time
     /// For the global actor: looks at every triangle; `triangles` may grow.
     pub fn footprint(&self, tool: usize, pose: &Pose, margin: f64, triangles: &mut Vec<u32>) {
-        if self.touches[tool].has_shape() {
-            let surface = (self.body.surface(), &self.state.positions[..]);
-            self.touches[tool].footprint(surface, pose, margin, triangles);
+        if self.moving.touches[tool].has_shape() {
+            let surface = (self.moving.body.surface(), &self.moving.state.positions[..]);
+            self.moving.touches[tool].footprint(surface, pose, margin, triangles);
         }
     }
 
     /// What is known of a tool.
     pub(crate) fn touch(&self, tool: usize) -> &Touch {
-        &self.touches[tool]
+        &self.moving.touches[tool]
     }
 
     /// The places where a tool with a shape touched in the last tick; none for a point, whose one place
@@ -442,7 +380,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn contact_points(&self, tool: usize) -> &[ContactPoint] {
-        self.touches[tool].points()
+        self.moving.touches[tool].points()
     }
 
     /// The area that a tool with a shape touches (m^2), as fine as the triangles tell.
@@ -450,6 +388,6 @@ impl Simulation {
     /// # Real-time
     /// Bounded, real-time safe.
     pub fn contact_area(&self, tool: usize) -> f64 {
-        self.touches[tool].area(self.body.surface(), &self.state.positions)
+        self.moving.touches[tool].area(self.moving.body.surface(), &self.moving.state.positions)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Simulation;
+use super::moving::Moving;
 use crate::Vec3;
 use crate::body::{Cutout, State, Stiffened, neighbourhood};
 use crate::contact::{Contact, Rows, Skin, ToolMotion, Touch};
@@ -28,14 +28,61 @@ pub(super) struct Ahead {
 impl Default for Ahead {
     fn default() -> Self {
         let (patch, part, present) = Default::default();
-        Self { most: Simulation::AHEAD, patch, part, present }
+        Self { most: Self::NODES, patch, part, present }
     }
 }
 
 impl Ahead {
+    /// Nodes around a patch that run ahead, if nothing else is said.
+    pub(super) const NODES: usize = 4096;
+
+    /// At most about so many.
+    pub(super) fn with(nodes: usize) -> Self {
+        Self { most: nodes, ..Self::default() }
+    }
+
     /// As large, before it was made.
     pub(super) fn anew(&self) -> Self {
-        Self { most: self.most, ..Self::default() }
+        Self::with(self.most)
+    }
+
+    /// Runs on from the present of `whole` for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the
+    /// state at the start of every substep and at the end, and leaves `whole` as it was. It ends early with a tick in which `watch` says
+    /// no. Of a large body only the neighbourhood of `patch` runs ahead (ids in increasing order).
+    pub(super) fn run(
+        &mut self,
+        whole: &mut Moving,
+        patch: &[u32],
+        ticks: u32,
+        motion: impl Fn(usize, u32) -> ToolMotion,
+        mut watch: impl FnMut(Glimpse<'_>) -> bool,
+    ) {
+        if self.patch != patch {
+            patch.clone_into(&mut self.patch);
+            self.part = Part::new(whole, patch, self.most);
+        }
+        if let Some(part) = &mut self.part {
+            part.begin(whole);
+            for tick in 0..ticks {
+                part.drift(tick);
+                let Part { moving, places, .. } = part;
+                let shown = |state: &State| watch(Glimpse { state, places: Some(places) });
+                if !advance_while(moving, |tool| motion(tool, tick), shown) {
+                    return;
+                }
+            }
+            watch(Glimpse { state: &part.moving.state, places: Some(&part.places) });
+        } else {
+            self.present.clone_from(&whole.state);
+            let (touches, means) = (whole.touches.clone(), whole.means.clone());
+            let mut shown = |state: &State| watch(Glimpse { state, places: None });
+            let is_through = (0..ticks).all(|tick| advance_while(whole, |tool| motion(tool, tick), &mut shown));
+            if is_through {
+                shown(&whole.state);
+            }
+            std::mem::swap(&mut whole.state, &mut self.present);
+            (whole.touches, whole.means) = (touches, means);
+        }
     }
 }
 
@@ -58,10 +105,10 @@ impl Glimpse<'_> {
     }
 }
 
-/// A simulation of the nodes around a patch.
+/// The nodes around a patch, as a body of its own.
 #[derive(Debug)]
 struct Part {
-    simulation: Simulation,
+    moving: Moving,
     /// The id of each of its nodes in the whole body, and the other way round.
     nodes: Vec<u32>,
     places: Vec<u32>,
@@ -76,7 +123,7 @@ struct Part {
 impl Part {
     const NONE: u32 = u32::MAX;
 
-    fn new(whole: &Simulation, patch: &[u32], most: usize) -> Option<Self> {
+    fn new(whole: &Moving, patch: &[u32], most: usize) -> Option<Self> {
         let around = neighbourhood(whole.body.as_made(), patch, most)?;
         let Cutout { nodes, triangles, body } = whole.body.as_made().cutout(&around)?;
         let mut places = vec![Self::NONE; whole.inverse_masses.len()];
@@ -104,7 +151,7 @@ impl Part {
         };
         let mut rows = Rows::with_room(whole.touches.len());
         rows.make_room(nodes.len());
-        let simulation = Simulation {
+        let moving = Moving {
             state: State::at_rest(body.rest()),
             forces: vec![Vec3::zeros(); nodes.len()],
             touches: whole.touches.iter().map(touch).collect(),
@@ -113,44 +160,42 @@ impl Part {
             stepping: whole.stepping,
             candidates,
             means: whole.means.clone(),
-            ahead: Box::default(),
             inverse_masses,
-            stiffness: whole.body.stiffness(),
             body: Stiffened::new(body),
         };
-        Some(Self { simulation, nodes, places, triangles, rim, drifts: Vec::new() })
+        Some(Self { moving, nodes, places, triangles, rim, drifts: Vec::new() })
     }
 
     /// Takes the state of `whole`.
-    fn begin(&mut self, whole: &Simulation) {
-        let Self { simulation, nodes, triangles, rim, drifts, .. } = self;
+    fn begin(&mut self, whole: &Moving) {
+        let Self { moving, nodes, triangles, rim, drifts, .. } = self;
         // What may change while a session runs.
-        simulation.law = whole.law;
-        simulation.put_stiffness(whole.body.stiffness());
+        moving.law = whole.law;
+        moving.put_stiffness(whole.body.stiffness());
         drifts.clear();
         drifts.extend(rim.iter().map(|&place| {
             let node = nodes[place as usize] as usize;
             [whole.state.velocities[node], whole.forces[node] * whole.inverse_masses[node]]
         }));
         for (place, &node) in nodes.iter().enumerate() {
-            simulation.state.positions[place] = whole.state.positions[node as usize];
-            simulation.state.velocities[place] = whole.state.velocities[node as usize];
+            moving.state.positions[place] = whole.state.positions[node as usize];
+            moving.state.velocities[place] = whole.state.velocities[node as usize];
         }
         let local = |triangle: u32| triangles.binary_search(&triangle).ok().map(|place| place as u32);
         let localised = |contact: &Contact| match contact.triangle.map(local) {
             Some(None) => Contact { glued: contact.glued, ..Contact::default() },
             triangle => Contact { triangle: triangle.flatten(), ..*contact },
         };
-        for (touch, of_whole) in simulation.touches.iter_mut().zip(&whole.touches) {
+        for (touch, of_whole) in moving.touches.iter_mut().zip(&whole.touches) {
             touch.restart(of_whole, localised, local);
         }
-        simulation.means.copy_from_slice(&whole.means);
+        moving.means.copy_from_slice(&whole.means);
     }
 
     /// The rest of the body as it is expected to go on in the `tick`-th tick.
     fn drift(&mut self, tick: u32) {
-        let State { velocities, .. } = &mut self.simulation.state;
-        let t = (f64::from(tick) + 0.5) * self.simulation.stepping.tick;
+        let State { velocities, .. } = &mut self.moving.state;
+        let t = (f64::from(tick) + 0.5) * self.moving.stepping.tick;
         let [of_velocity, of_change] = [(-t / DECAY).exp(), t * (-t / CHANGE_DECAY).exp()];
         for (&node, [velocity, acceleration]) in self.rim.iter().zip(&self.drifts) {
             velocities[node as usize] = velocity * of_velocity + acceleration * of_change;
@@ -158,71 +203,15 @@ impl Part {
     }
 }
 
-impl Simulation {
-    /// Nodes around a patch that run ahead, if nothing else is said.
-    pub const AHEAD: usize = 4096;
-
-    /// Lets at most about so many nodes around a patch run ahead: what a prediction costs, and how far from the tool the body may
-    /// do something unexpected.
-    ///
-    /// # Real-time
-    /// Not real-time safe: allocates.
-    #[must_use]
-    pub fn looking_ahead_with(mut self, nodes: usize) -> Self {
-        *self.ahead = Ahead { most: nodes, ..Ahead::default() };
-        self
-    }
-
-    /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the state at the
-    /// start of every substep and at the end, and goes back to the present. It ends early with a tick in which `watch` says no. Of a
-    /// large body only the neighbourhood of `patch` runs ahead (ids in increasing order).
-    ///
-    /// # Real-time
-    /// For the global actor: costs as much as the ticks, of a large body those of a small one; allocates where the patch moves.
-    pub(crate) fn look_ahead(
-        &mut self,
-        patch: &[u32],
-        ticks: u32,
-        motion: impl Fn(usize, u32) -> ToolMotion,
-        mut watch: impl FnMut(Glimpse<'_>) -> bool,
-    ) {
-        let mut ahead = std::mem::take(&mut self.ahead);
-        if ahead.patch != patch {
-            patch.clone_into(&mut ahead.patch);
-            ahead.part = Part::new(self, patch, ahead.most);
-        }
-        if let Some(part) = &mut ahead.part {
-            part.begin(self);
-            for tick in 0..ticks {
-                part.drift(tick);
-                let Part { simulation, places, .. } = part;
-                let shown = |state: &State| watch(Glimpse { state, places: Some(places) });
-                if !simulation.advance_while(|tool| motion(tool, tick), shown) {
-                    self.ahead = ahead;
-                    return;
-                }
-            }
-            watch(Glimpse { state: &part.simulation.state, places: Some(&part.places) });
-        } else {
-            ahead.present.clone_from(&self.state);
-            let (touches, means) = (self.touches.clone(), self.means.clone());
-            let mut shown = |state: &State| watch(Glimpse { state, places: None });
-            let is_through = (0..ticks).all(|tick| self.advance_while(|tool| motion(tool, tick), &mut shown));
-            if is_through {
-                shown(&self.state);
-            }
-            std::mem::swap(&mut self.state, &mut ahead.present);
-            (self.touches, self.means) = (touches, means);
-        }
-        self.ahead = ahead;
-    }
-
-    /// A tick that is shown to `watch`; false if that says no.
-    fn advance_while(&mut self, motion: impl Fn(usize) -> ToolMotion, mut watch: impl FnMut(&State) -> bool) -> bool {
-        let mut goes_on = true;
-        self.advance(motion, &mut |state| goes_on = goes_on && watch(state));
-        goes_on
-    }
+/// A tick that is shown to `watch`; false if that says no.
+fn advance_while(
+    moving: &mut Moving,
+    motion: impl Fn(usize) -> ToolMotion,
+    mut watch: impl FnMut(&State) -> bool,
+) -> bool {
+    let mut goes_on = true;
+    moving.advance(motion, &mut |state| goes_on = goes_on && watch(state));
+    goes_on
 }
 
 #[cfg(test)]
@@ -231,7 +220,7 @@ mod tests {
     use crate::body::{Block, Body, Region, Shape, State};
     use crate::contact::Law;
     use crate::mesh::Face;
-    use crate::simulation::Stepping;
+    use crate::simulation::{Simulation, Stepping};
 
     /// A block of so many nodes along each edge, 9 mm apart, with a stiff nodule; and a patch in the middle of its top.
     fn simulation(nodes: usize) -> (Simulation, Vec<u32>) {
@@ -284,7 +273,7 @@ mod tests {
         let mut whole = Vec::new();
         for tick in 60..120 {
             let motion = motion(&simulation, tick);
-            simulation.advance(|_| motion, &mut |state| {
+            simulation.moving.advance(|_| motion, &mut |state| {
                 whole.extend(patch.iter().map(|&node| state.positions[node as usize]))
             });
         }
@@ -314,7 +303,7 @@ mod tests {
                 true
             },
         );
-        simulation.advance(|_| still, &mut |_| ());
+        simulation.moving.advance(|_| still, &mut |_| ());
         let whole = patch.iter().map(|&node| simulation.state().positions[node as usize]);
         assert!(part[part.len() - patch.len()..].iter().copied().eq(whole));
     }

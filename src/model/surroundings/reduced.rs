@@ -1,10 +1,8 @@
 //! A linear model in few states, in modal form, that answers to forces on a ring of nodes.
 
-use super::far::Far;
 use super::products::Columns;
 use crate::body::Stiffness;
 use crate::body::kernel::Lane;
-use crate::linear_algebra::{Matrix, modes, product, product_t};
 
 /// What the velocities do to the states' accelerations.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,23 +25,6 @@ pub(crate) struct Reduced {
 }
 
 impl Reduced {
-    /// The surroundings `far` in the span of the columns of `shapes`. `None` if there is no motion in that span, nothing that holds it or a number is not finite.
-    pub(super) fn new(far: &Far, ring: &[u32], shapes: &Matrix) -> Option<Self> {
-        if !far.is_held_together() {
-            return None;
-        }
-        let (stiffness, damping) = far.stiffness_and_damping(shapes);
-        let (modes, values) = modes(&far.mass(shapes), &stiffness).filter(|(_, values)| !values.is_empty())?;
-        let states = values.len();
-        let shapes = product(shapes, &modes);
-        let damping = match far.proportional_damping() {
-            Some(share) => Damping::Diagonal(values.iter().map(|value| share * value).collect()),
-            None => Damping::Full(product_t(&modes, &product(&damping, &modes)).data.into()),
-        };
-        let on_ring = Columns::new(&shapes.select_rows(&far.unknowns_of(ring)));
-        Some(Self { states, shapes: on_ring, stiffness: values, damping })
-    }
-
     pub(crate) fn states(&self) -> usize {
         self.states
     }

@@ -4,11 +4,14 @@ use super::accuracy::{Estimate, Size, states_within};
 use super::basis::Basis;
 use super::estimate::Contacts;
 use super::far::Far;
-use super::reduced::Reduced;
+use super::products::Columns;
+use super::reduced::{Damping, Reduced};
 use super::resting::RestingBody;
 use crate::body::Restriction;
 use crate::error::ModelError;
-use crate::linear_algebra::{Matrix, SparseFactor, leading_combinations, leading_left_singular_vectors};
+use crate::linear_algebra::{
+    Matrix, SparseFactor, leading_combinations, leading_left_singular_vectors, modes, product, product_t,
+};
 
 /// The real frequency that the answers are expanded at (rad/s): between rest and the fastest that a hand does.
 const EXPANSION: f64 = 2.0 * std::f64::consts::PI * 30.0;
@@ -178,9 +181,26 @@ impl Reduction {
         let linear = errors.as_ref().and_then(|errors| errors.get(states.checked_sub(1)?));
         let estimate = linear.map(|error| Estimate { linear_pct: 100.0 * error });
         let columns = wide.columns(0, states.min(wide.ncols())).into_owned();
-        let answers = Reduced::new(far, ring, &columns).ok_or_else(indefinite)?;
+        let answers = reduced(far, ring, &columns).ok_or_else(indefinite)?;
         Ok(Basis { patch: self.patch.clone(), answers, estimate })
     }
+}
+
+/// The surroundings `far` in the span of the columns of `shapes`. `None` if there is no motion in that span, nothing that holds it or a number is not finite.
+fn reduced(far: &Far, ring: &[u32], shapes: &Matrix) -> Option<Reduced> {
+    if !far.is_held_together() {
+        return None;
+    }
+    let (stiffness, damping) = far.stiffness_and_damping(shapes);
+    let (modes, values) = modes(&far.mass(shapes), &stiffness).filter(|(_, values)| !values.is_empty())?;
+    let states = values.len();
+    let shapes = product(shapes, &modes);
+    let damping = match far.proportional_damping() {
+        Some(share) => Damping::Diagonal(values.iter().map(|value| share * value).collect()),
+        None => Damping::Full(product_t(&modes, &product(&damping, &modes)).data.into()),
+    };
+    let on_ring = Columns::new(&shapes.select_rows(&far.unknowns_of(ring)));
+    Some(Reduced { states, shapes: on_ring, stiffness: values, damping })
 }
 
 fn indefinite() -> ModelError {

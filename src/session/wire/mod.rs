@@ -3,6 +3,7 @@
 //! [`start`] is the whole way. Ports are made in a fixed order, which numbers them in the log.
 
 mod basis;
+mod buffers;
 mod environment;
 mod global;
 mod haptic;
@@ -10,7 +11,7 @@ mod models;
 mod sink;
 
 use super::controls::Controls;
-use super::prepare::{ModelPlan, Prepared, Tool};
+use super::prepare::{Prepared, Tool};
 use super::records::RecordSender;
 use super::running::{Memory, Outside, Running, Viewer};
 use crate::actors::{LoggerActor, LoggerOutcome, SceneWatch, SurfaceView, first_state};
@@ -19,15 +20,9 @@ use crate::error::{Error, ErrorKind};
 use crate::model::{Pose, Vec3};
 use crate::runtime::{Actor, OutletPort, RecordDrain, Recording, Runtime, RuntimeBuilder, Stopwatch};
 use basis::BasisSide;
+use buffers::ticks_buffered;
 use haptic::ToolEnds;
 use sink::Sinks;
-
-/// A logger or a global model that is stuck for this long loses nothing.
-const SECONDS_BUFFERED: f64 = 4.0;
-/// However slow the haptic rate is: release 0 makes several records before the first drain.
-const MIN_TICKS_BUFFERED: usize = 64;
-/// However fast it is: a second of 1 MHz, 64 MiB a ring.
-const MAX_TICKS_BUFFERED: usize = 1 << 20;
 
 /// A recording that is executed again in place of a run of its own.
 pub(super) struct Rerun {
@@ -107,12 +102,6 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     }
     let outside = Outside { viewer: Some(viewer), pointers, records, controls: Some(controls) };
     Ok(Running::new(graph.build()?.start()?, outcome, memory, outside, until, builds))
-}
-
-/// Haptic ticks whose records and samples may wait.
-fn ticks_buffered(plan: &ModelPlan) -> usize {
-    let ticks = (SECONDS_BUFFERED * plan.timing.haptic.as_hz()) as usize;
-    ticks.clamp(MIN_TICKS_BUFFERED, MAX_TICKS_BUFFERED)
 }
 
 /// The first state of a tool's device, or why there is none: a device that begins where it reaches no node of the body, at

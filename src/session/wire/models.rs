@@ -1,6 +1,7 @@
 //! What computes the forces: the whole body, or local models that a global one sends.
 
 use super::basis::BasisSide;
+use super::buffers::ticks_buffered;
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
 use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, ModelMaker, Settings, SurfaceView};
 use crate::model::Pose;
@@ -41,7 +42,7 @@ pub(super) fn models(
     let model = move || first.first();
     // A model that comes later may feed back, if the first one does not.
     let feeds_back = plan.template.feeds_back() || plan.kinds.len() > 1;
-    let ticks = super::ticks_buffered(plan);
+    let ticks = ticks_buffered(plan);
     // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
     let nodes = simulation.state().positions.len();
     let link = |_| ToolLink {

@@ -1,0 +1,50 @@
+//! How the time of a simulation is divided.
+
+use crate::Wrench;
+use crate::body::Body;
+use crate::contact::ToolMotion;
+use crate::integrator::Spectrum;
+
+/// How time is divided: ticks of the haptic rate, each of several explicit substeps.
+///
+/// # Real-time
+/// A plain value: its methods are wait-free and real-time safe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stepping {
+    /// Haptic period (s).
+    pub tick: f64,
+    /// Explicit substeps per tick, at least one.
+    pub substeps: u32,
+}
+
+impl Default for Stepping {
+    /// One substep per millisecond.
+    fn default() -> Self {
+        Self { tick: 1e-3, substeps: 1 }
+    }
+}
+
+impl Stepping {
+    /// Substeps per tick of `tick` (s) from the body's stability limit.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates, and evaluates the body's forces hundreds of times.
+    pub fn stable_substeps(body: &mut dyn Body, tick: f64) -> u32 {
+        Spectrum::estimate(body).substeps(tick)
+    }
+
+    /// The substep d (s).
+    pub fn step(&self) -> f64 {
+        self.tick / f64::from(self.substeps)
+    }
+
+    /// Runs one tick: calls `substep` for each part of the tool's motion and returns the mean of what it gives.
+    pub(crate) fn tick(&self, tool: ToolMotion, mut substep: impl FnMut(ToolMotion, f64) -> Wrench) -> Wrench {
+        let n = f64::from(self.substeps);
+        let sum = (0..self.substeps).fold(Wrench::default(), |sum, u| {
+            let u = f64::from(u);
+            sum + substep(tool.part(u / n, (u + 1.0) / n), self.step())
+        });
+        sum / n
+    }
+}
