@@ -41,8 +41,11 @@ impl Work for Accelerate<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { velocities, forces, inverse_masses, d } = self;
-        let (eights, velocities) = velocities.as_chunks_mut::<LANES>();
-        let ((of_eights, forces), (weights, inverse_masses)) = (forces.as_chunks(), inverse_masses.as_chunks());
+        // A patch has masses of the nodes that it moves alone: what is left of eights begins at the same node in all three.
+        let nodes = velocities.len().min(forces.len()).min(inverse_masses.len());
+        let (eights, velocities) = velocities[..nodes].as_chunks_mut::<LANES>();
+        let (of_eights, forces) = forces[..nodes].as_chunks();
+        let (weights, inverse_masses) = inverse_masses[..nodes].as_chunks();
         for ((velocity, force), weight) in eights.iter_mut().zip(of_eights).zip(weights) {
             let weight = s.mul(s.splat(d), s.load(weight));
             let (mut moving, force) = (s.load_vectors(velocity), s.load_vectors(force));
@@ -67,8 +70,9 @@ impl Work for Advance<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { positions, velocities, d } = self;
-        let ((eights, positions), (of_eights, velocities)) =
-            (positions.as_chunks_mut::<LANES>(), velocities.as_chunks());
+        let nodes = positions.len().min(velocities.len());
+        let (eights, positions) = positions[..nodes].as_chunks_mut::<LANES>();
+        let (of_eights, velocities) = velocities[..nodes].as_chunks();
         for (position, velocity) in eights.iter_mut().zip(of_eights) {
             let (mut places, velocity) = (s.load_vectors(position), s.load_vectors(velocity));
             for axis in 0..3 {
@@ -243,6 +247,16 @@ mod tests {
         accelerate(&mut velocities, &forces, &inverse_masses, 1e-3);
         advance(&mut positions, &velocities, 1e-3);
         assert_eq!((velocities, positions), alone);
+    }
+
+    #[test]
+    fn of_slices_of_unlike_lengths_the_nodes_that_all_have_go_on() {
+        let mut velocities = vec![Vec3::zeros(); 45];
+        accelerate(&mut velocities, &[Vec3::x(); 30], &[1.0; 19], 1.0);
+        assert!(velocities.iter().enumerate().all(|(n, v)| v.x == if n < 19 { 1.0 } else { 0.0 }), "{velocities:?}");
+        let mut positions = vec![Vec3::zeros(); 45];
+        advance(&mut positions, &[Vec3::x(); 19], 1.0);
+        assert!(positions.iter().enumerate().all(|(n, x)| x.x == if n < 19 { 1.0 } else { 0.0 }), "{positions:?}");
     }
 
     #[test]
