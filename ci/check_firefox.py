@@ -20,9 +20,8 @@ import time
 from pathlib import Path
 
 from check_page import Check
-from check_view import STATE, View
+from check_view import PATIENCE_S, STATE, View, wait
 
-PATIENCE_S = 60
 PREFERENCES = {
     "webgl.force-enabled": True,
     "browser.shell.checkDefaultBrowser": False,
@@ -101,17 +100,6 @@ class Firefox:
         shutil.rmtree(self.profile, ignore_errors=True)
 
 
-def wait(browser, holds, what):
-    deadline = time.monotonic() + PATIENCE_S
-    while True:
-        state = browser.run(STATE)
-        if holds(state):
-            return state
-        if time.monotonic() > deadline:
-            raise RuntimeError(f"{what} did not happen: {state}; {browser.complaints()}")
-        time.sleep(0.05)
-
-
 def drag(browser, x, y, steps):
     """Presses at a place and moves on through `steps`, pixels each."""
     moves = [{"type": "pointerMove", "x": round(x + dx), "y": round(y + dy), "duration": 50} for dx, dy in steps]
@@ -153,6 +141,8 @@ def main():
         browser = Firefox(args.firefox)
         try:
             check_page(check, browser, view.url, args.shot)
+        except RuntimeError as fault:
+            raise RuntimeError(f"{fault}; {browser.complaints()}") from fault
         finally:
             browser.close()
     finally:

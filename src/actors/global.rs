@@ -4,7 +4,6 @@ use super::cause::Cause;
 use super::global_ports::{GlobalPorts, GlobalSharedPorts, ToolPorts};
 use super::messages::{ToolTick, show};
 use super::model_maker::ModelMaker;
-use super::settings::Settings;
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::Pose;
@@ -313,9 +312,7 @@ impl GlobalActor {
     /// Takes what a program has changed since the last release.
     fn take_settings(&mut self, ctx: &TickContext) {
         if self.ports.settings.refresh(ctx) {
-            let Settings { friction, stiffness, .. } = self.ports.settings.get();
-            self.simulation.set_friction(friction);
-            self.simulation.approach_stiffness(stiffness);
+            self.ports.settings.get().put_to(&mut self.simulation);
             self.is_changed = true;
         }
     }

@@ -3,6 +3,7 @@
 use crate::model::body::Stiffness;
 use crate::model::contact::Friction;
 use crate::model::local::Kind;
+use crate::model::simulation::Simulation;
 use crate::runtime::InputValue;
 
 /// What is wanted from the next release of the global model on; of the whole body from the next tick on. The log has it as it was
@@ -18,6 +19,17 @@ pub struct Settings {
     pub stiffness: Stiffness,
     /// The kind of the local models.
     pub model: Kind,
+}
+
+impl Settings {
+    /// Puts friction and stiffness to `body`; the kind of the local models is for whoever makes them.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn put_to(self, body: &mut Simulation) {
+        body.set_friction(self.friction);
+        body.approach_stiffness(self.stiffness);
+    }
 }
 
 impl InputValue for Settings {

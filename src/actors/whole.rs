@@ -116,9 +116,7 @@ impl Actor for WholeActor {
             return Outcome::Continue;
         }
         if self.settings.refresh(ctx) {
-            let Settings { friction, stiffness, .. } = self.settings.get();
-            self.simulation.set_friction(friction);
-            self.simulation.approach_stiffness(stiffness);
+            self.settings.get().put_to(&mut self.simulation);
         }
         ticks::due(ctx, self.now).for_each(|left| self.advance(ctx, left));
         match self.finish(ctx) {

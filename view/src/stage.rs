@@ -95,7 +95,7 @@ impl Stage {
     /// be is only told of.
     fn change(&mut self, change: Change, restarts: bool) {
         let is_reached = self.live.as_ref().is_some_and(|live| live.reaches(&change));
-        let (all, words) = (change.clone().after(self.change.clone()), "That does not work");
+        let all = change.clone().after(self.change.clone());
         let result = if restarts || !is_reached {
             self.restart(&all)
         } else {
@@ -103,7 +103,7 @@ impl Stage {
         };
         match result {
             Ok(()) => self.change = all,
-            Err(error) => self.hub.say(&note(&format!("{words}: {error}."))),
+            Err(error) => self.hub.say(&note(&format!("That does not work: {error}."))),
         }
         if let Some(live) = &self.live {
             self.hub.set(live.settings());

@@ -3,8 +3,8 @@
 use super::Body;
 use crate::Vec3;
 
-/// The nodes of `body` that can move and are nearest to `patch` at rest, at most about `count`, in increasing order: those in a box that reaches
-/// equally far beyond the patch on all sides. `None` if those are all that can move.
+/// The nodes of `body` that can move and are nearest to `patch` at rest, at most about `count`, in increasing order: those in a box that
+/// reaches equally far beyond the patch on all sides. `None` if those are all that can move.
 ///
 /// # Real-time
 /// Not real-time safe: allocates, and looks at every node.

@@ -186,7 +186,8 @@ impl Reduction {
     }
 }
 
-/// The surroundings `far` in the span of the columns of `shapes`. `None` if there is no motion in that span, nothing that holds it or a number is not finite.
+/// The surroundings `far` in the span of the columns of `shapes`. `None` if there is no motion in that span, nothing that holds it or
+/// a number is not finite.
 fn reduced(far: &Far, ring: &[u32], shapes: &Matrix) -> Option<Reduced> {
     if !far.is_held_together() {
         return None;

@@ -115,7 +115,7 @@ impl RestingBody {
     /// A number that differs for bodies of other nodes, masses, stiffness or damping.
     ///
     /// # Real-time
-    /// Wait-free, real-time safe.
+    /// Not real-time safe: the first call allocates, and evaluates the body's forces.
     pub fn digest(&self) -> u64 {
         *self.digest.get_or_init(|| digest_of(&*self.body))
     }

@@ -118,7 +118,7 @@ fn every_topic_has_a_table_whose_rows_match_its_header() {
     let mut reader = LogReader::new(bytes.as_slice(), "memory").unwrap();
     reader.by_ref().for_each(drop);
     let topics = reader.topics();
-    assert_eq!(topics.len(), 13);
+    assert_eq!(topics.len(), 14);
     for (&topic, &messages) in &topics {
         let table = table(&bytes, topic);
         let columns = table.lines().next().unwrap().split(',').count();

@@ -86,8 +86,8 @@ impl Predictive {
         self.substep = 0;
     }
 
-    /// Finds the ring's path: the body runs ahead, or what of it is around the patch. Its tool goes where no hand may ever go, as into elements until they give
-    /// way: a ring that is torn along ends the path.
+    /// Finds the ring's path: the body runs ahead, or what of it is around the patch. Its tool goes where no hand may ever go, as into
+    /// elements until they give way: a ring that is torn along ends the path.
     fn predict(&mut self, resync: &mut ResyncView<'_>) {
         let ring = self.ring();
         let Self { patch: Patch { window, state, forces, stepping, .. }, near, path, ring_weights, .. } = self;
