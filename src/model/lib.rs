@@ -5,6 +5,7 @@
 //! lists. One step of any model, whole body or patch, is [`contact::step`].
 
 pub mod body;
+pub mod bytes;
 pub mod contact;
 pub mod equilibrium;
 mod error;

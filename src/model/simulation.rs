@@ -3,6 +3,7 @@
 mod ahead;
 mod moving;
 mod stepping;
+mod told;
 
 use std::sync::Arc;
 
@@ -13,6 +14,8 @@ use crate::{Pose, Vec3, Wrench};
 use ahead::{Ahead, Glimpse};
 use moving::Moving;
 
+pub(crate) use told::Told;
+
 pub use stepping::Stepping;
 
 /// A body, its state and the contacts of the tools with it. Tools are numbered in the order of their devices.
@@ -22,6 +25,8 @@ pub struct Simulation {
     /// Where its stiffness goes, tick by tick.
     stiffness: Stiffness,
     ahead: Box<Ahead>,
+    /// What the simulation on another computer, of which this is the image, has told.
+    told: Option<Told>,
 }
 
 impl Simulation {
@@ -54,7 +59,7 @@ impl Simulation {
         let (touches, rows, means) = Default::default();
         let body = Stiffened::new(body);
         let moving = Moving { body, state, forces, touches, rows, law, stepping, candidates, inverse_masses, means };
-        let new = Self { moving, stiffness: Stiffness::default(), ahead: Box::default() };
+        let new = Self { moving, stiffness: Stiffness::default(), ahead: Box::default(), told: None };
         Ok(new.with_tool(contact))
     }
 
@@ -107,7 +112,7 @@ impl Simulation {
             inverse_masses: self.moving.inverse_masses.clone(),
             means: self.moving.means.clone(),
         };
-        Some(Self { moving, stiffness: self.stiffness, ahead: Box::new(self.ahead.anew()) })
+        Some(Self { moving, stiffness: self.stiffness, ahead: Box::new(self.ahead.anew()), told: self.told.clone() })
     }
 
     /// The force that holds the contact point still in the present state (N): what a tool feels before the first tick.
@@ -182,7 +187,33 @@ impl Simulation {
     /// # Real-time
     /// Bounded, real-time safe.
     pub(crate) fn exerted_beside(&self, tool: usize) -> impl Iterator<Item = (u32, Vec3)> {
-        (0..self.moving.touches.len()).filter(move |&other| other != tool).flat_map(|other| self.exerted(other))
+        let told = self.told.as_ref().map(|told| told.beside.iter().copied());
+        let own = if told.is_some() { 0..0 } else { 0..self.moving.touches.len() };
+        let own = own.filter(move |&other| other != tool).flat_map(|other| self.exerted(other));
+        told.into_iter().flatten().chain(own)
+    }
+
+    /// What the simulation that this is an image of has told; `None` for one of its own.
+    pub(crate) fn told(&self) -> Option<&Told> {
+        self.told.as_ref()
+    }
+
+    /// Makes this the image of another one, which is so stiff, has `told` of the surroundings of `tool`, felt `wrench` there and touched
+    /// as `touch` is told to.
+    pub(crate) fn be_told(
+        &mut self,
+        stiffness: Stiffness,
+        tool: usize,
+        wrench: Wrench,
+        touch: impl FnOnce(&mut Touch, u32),
+    ) -> &mut Told {
+        if self.stiffness() != stiffness {
+            self.stiffness = stiffness;
+            self.moving.put_stiffness(stiffness);
+        }
+        self.moving.means[tool] = wrench;
+        touch(&mut self.moving.touches[tool], self.moving.stepping.substeps);
+        self.told.get_or_insert_default()
     }
 
     /// The nodes that `tool` touches with the force on each (N): of a point its mean over the last tick, of a tool with a shape

@@ -44,7 +44,7 @@ pub use skin::Coarseness;
 pub(crate) use skin::Skin;
 pub use step::step;
 pub(crate) use step::{step_all, step_implicit};
-pub(crate) use touch::Touch;
+pub(crate) use touch::{Felt, Touch};
 pub(crate) use triangle::{contact_normal, interpolate};
 
 /// The state of a contact.

@@ -44,15 +44,22 @@ pub(crate) struct Touch {
 }
 
 /// One place at which a tool touches.
-#[derive(Clone, Copy, Debug)]
-struct Felt {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Felt {
     /// The corners that it is between, in increasing order.
     feature: [u32; 3],
-    weights: [f64; 3],
-    point: ContactPoint,
+    pub(crate) weights: [f64; 3],
+    pub(crate) point: ContactPoint,
     /// It pressed in the last step, with this impulse on the tool (N s).
-    is_pressing: bool,
-    impulse: Vec3,
+    pub(crate) is_pressing: bool,
+    pub(crate) impulse: Vec3,
+}
+
+impl Felt {
+    /// A place that pressed if `pressed`, to [go on from](Touch::go_on_from): corners have other numbers there.
+    pub(crate) fn told(point: ContactPoint, weights: [f64; 3], pressed: bool, impulse: Vec3) -> Self {
+        Self { feature: [u32::MAX; 3], weights, point, is_pressing: pressed, impulse }
+    }
 }
 
 impl Touch {
@@ -103,6 +110,24 @@ impl Touch {
             let point = ContactPoint { triangle: id(felt.point.triangle)?, ..felt.point };
             Some(Felt { feature: [u32::MAX; 3], point, ..*felt })
         }));
+    }
+
+    /// Where it touched in the last tick; forces are summed over the steps.
+    pub(crate) fn felt(&self) -> &[Felt] {
+        &self.felt
+    }
+
+    /// The force that has pressed on the mean of the last milliseconds (N).
+    pub(crate) fn steady(&self) -> f64 {
+        self.steady
+    }
+
+    /// Goes on from what was felt on another computer in a tick of `steps` steps.
+    pub(crate) fn go_on_from(&mut self, contact: Contact, steady: f64, felt: &[Felt], steps: u32) {
+        (self.contact, self.steady) = (contact, steady);
+        self.felt.clear();
+        self.felt.extend_from_slice(&felt[..felt.len().min(MOST_POINTS)]);
+        self.end(steps, |triangle| triangle);
     }
 
     /// Appends the triangles of a surface with nodes at `positions` (m) that the tool touches, or may touch soon, at `pose`, or if

@@ -7,6 +7,7 @@ mod forecast;
 mod hold;
 mod kind;
 mod linear;
+mod parcel;
 mod patch;
 mod predictive;
 mod succession;
@@ -25,6 +26,7 @@ pub use feedback::{Feedback, PatchGeometry};
 pub use forecast::{ToolForecast, ToolHistory};
 pub use hold::Hold;
 pub use kind::Kind;
+pub use parcel::{Image, Parcel};
 pub use succession::{Blend, BlendKind, Jump, Resynced, Served, Succession};
 pub use template::Template;
 pub use windows::Windows;
@@ -143,6 +145,14 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// # Real-time
     /// Not called in a tick: may allocate.
     fn watch(&mut self, _nodes: &[u32]) {}
+
+    /// What the model is built from on another computer, if it is [one for that](Template::departing).
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    fn parcel(&self) -> Option<&Parcel> {
+        None
+    }
 
     /// Writes what the model tells the global one, but for the tick; false if that is nothing.
     ///

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::hold::Hold;
 use super::linear::{Boundary, Layers, LinearPatch, LinearSpec, Yielding};
+use super::parcel::{Departing, Model};
 use super::predictive::Predictive;
 use super::whole::Whole;
 use super::{Feedback, Kind, LocalModel};
@@ -125,6 +126,24 @@ impl Template {
     /// Wait-free, real-time safe.
     pub fn feeds_back(&self) -> bool {
         self.kind.is_linear() && self.feedback != Feedback::Trajectory
+    }
+
+    /// An empty model for the side of the global one, if the local one is built on another computer: it serves nobody, and has a
+    /// [parcel](LocalModel::parcel) of what [`empty`](Self::empty) is built from there.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn departing(&self) -> Box<dyn LocalModel> {
+        let spec = LinearSpec { size: self.patch, feedback: self.feedback, is_implicit: self.is_implicit };
+        let model = match self.kind {
+            Kind::Predicted | Kind::Predictive => {
+                Model::Predictive(Box::new(Predictive::new(self.patch, self.kind == Kind::Predictive)))
+            }
+            // What answers to the patch is not looked at here.
+            kind if kind.is_linear() => Model::Linear(Box::new(LinearPatch::new(spec, Boundary::Still))),
+            _ => Model::Hold,
+        };
+        Box::new(Departing::new(self.kind, model))
     }
 
     /// A recipe for models of another `kind` with a `patch` of its own for the same body, as it was made.

@@ -41,6 +41,11 @@ impl Columns {
         }
     }
 
+    /// Rows and columns.
+    pub(super) fn shape(&self) -> (usize, usize) {
+        (self.rows, self.columns)
+    }
+
     /// The columns without the padding.
     pub(super) fn to_matrix(&self) -> Matrix {
         let tile = |row: usize, column: usize| &self.tiles[row / TILE * self.columns + column].0;

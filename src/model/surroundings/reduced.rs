@@ -29,6 +29,15 @@ impl Reduced {
         self.states
     }
 
+    /// True if it answers to a ring of so many numbers, and all its parts are of one size.
+    pub(crate) fn is_of(&self, ring: usize) -> bool {
+        let damping = match &self.damping {
+            Damping::Diagonal(damping) => damping.len() == self.states,
+            Damping::Full(damping) => damping.len() == self.states * self.states,
+        };
+        damping && self.stiffness.len() == self.states && self.shapes.shape() == (ring, self.states)
+    }
+
     /// One step of `d` seconds under `forces` on the ring (N, three numbers for each node).
     ///
     /// # Real-time

@@ -5,7 +5,7 @@ mod stable;
 
 use self::stable::stable_stepping;
 use super::feedback::{Feedback, PatchGeometry};
-use super::patch::Patch;
+use super::patch::{Patch, Window};
 use super::{Kind, LocalModel, ResyncView};
 use crate::contact::{Contact, ContactPoint, Equations, ToolMotion, step_implicit};
 use crate::linear::{Drift, ImplicitStep, PatchTangent};
@@ -47,6 +47,11 @@ impl LinearPatch {
     pub(super) fn new(spec: LinearSpec, boundary: Boundary) -> Self {
         let (patch, tangent, system) = Default::default();
         Self { boundary, spec, patch, tangent, system, is_implicit: false, ticks: 0 }
+    }
+
+    /// The part of the body that it holds.
+    pub(super) fn window(&self) -> &Window {
+        &self.patch.window
     }
 
     /// The surroundings `t` seconds into the present tick.

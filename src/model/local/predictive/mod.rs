@@ -5,7 +5,7 @@ mod ring;
 use std::sync::Arc;
 
 use self::ring::{NearBody, RingPath};
-use super::patch::Patch;
+use super::patch::{Patch, Window};
 use super::{Kind, LocalModel, ResyncView};
 use crate::contact::{Contact, ContactPoint, ToolMotion};
 use crate::surroundings::{Basis, ReducedMotion};
@@ -72,6 +72,16 @@ impl Predictive {
         }
     }
 
+    /// The part of the body that it holds.
+    pub(super) fn window(&self) -> &Window {
+        &self.patch.window
+    }
+
+    /// Numbers of one quantity of the ring, and its path.
+    pub(super) fn path(&self) -> (usize, &[f64]) {
+        (3 * self.patch.window.ring, self.path.samples())
+    }
+
     fn ring(&self) -> std::ops::Range<usize> {
         let window = &self.patch.window;
         window.movable..window.movable + window.ring
@@ -92,6 +102,14 @@ impl Predictive {
         let ring = self.ring();
         let Self { patch: Patch { window, state, forces, stepping, .. }, near, path, ring_weights, .. } = self;
         path.clear(window.ring, stepping.step(), (resync.horizon * stepping.substeps + 1) as usize);
+        if let Some(told) = resync.global.told() {
+            if !path.take(&told.path) {
+                // Another path than this body's: the ring stands still, from the next model on it moves again.
+                near.forces(state, forces);
+                path.push(state, forces, ring);
+            }
+            return;
+        }
         let motion = |tool: usize, n| resync.tools[tool].motion(n, stepping.tick);
         let body = resync.global.body();
         let (step, extent) = (stepping.step(), window.extent(body.rest()));

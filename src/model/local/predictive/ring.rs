@@ -98,6 +98,20 @@ impl RingPath {
         }
     }
 
+    /// Takes samples as [`samples`](Self::samples) gives them; false if they are not of these nodes, or none.
+    pub(super) fn take(&mut self, samples: &[f64]) -> bool {
+        let fits = self.numbers > 0 && !samples.is_empty() && samples.len().is_multiple_of(3 * self.numbers);
+        if fits {
+            self.samples.extend_from_slice(samples);
+        }
+        fits
+    }
+
+    /// Positions (m), velocities (m/s) and forces (N) at the start of each substep, one after the other.
+    pub(super) fn samples(&self) -> &[f64] {
+        &self.samples
+    }
+
     /// Takes the last `count` samples back, all but the first at most.
     pub(super) fn drop_last(&mut self, count: usize) {
         let size = 3 * self.numbers;

@@ -1,0 +1,139 @@
+//! The local model on the side of the global one: it serves nobody here, and takes down what the one over there is built from.
+
+use super::super::linear::LinearPatch;
+use super::super::predictive::Predictive;
+use super::super::{Kind, LocalModel, ResyncView};
+use super::Parcel;
+use crate::Wrench;
+use crate::body::Body;
+use crate::contact::{Contact, ToolMotion};
+
+/// What is built over there, and here as far as it takes to know what that looks at.
+#[derive(Debug)]
+pub(in crate::local) enum Model {
+    Hold,
+    Linear(Box<LinearPatch>),
+    Predictive(Box<Predictive>),
+}
+
+/// A model that is built elsewhere.
+#[derive(Debug)]
+pub(in crate::local) struct Departing {
+    /// Of the model over there.
+    kind: Kind,
+    model: Model,
+    parcel: Parcel,
+    /// Nodes whose global position is told.
+    watched: Vec<u32>,
+    /// The patch that the nodes around it were looked for, and these.
+    of: Vec<u32>,
+    around: Option<Vec<u32>>,
+}
+
+impl Departing {
+    pub(in crate::local) fn new(kind: Kind, model: Model) -> Self {
+        Self { kind, model, parcel: Parcel::default(), watched: Vec::new(), of: Vec::new(), around: None }
+    }
+
+    /// Builds the model as far as it is looked at here; which nodes it looks at.
+    fn nodes(&mut self, resync: ResyncView<'_>) -> Vec<u32> {
+        let surface = |resync: &ResyncView<'_>| {
+            let body = resync.global.body().surface();
+            let touched = resync.global.touch(resync.index).felt().iter().map(|felt| felt.point.triangle);
+            let corners = touched.flat_map(|triangle| body.triangles[triangle as usize]);
+            let around = corners.flat_map(|node| body.at_node(node).iter().copied());
+            around.flat_map(|triangle| body.triangles[triangle as usize]).collect()
+        };
+        let mut nodes: Vec<u32> = surface(&resync);
+        let ResyncView { global, tick, triangles, patch, tools, index, horizon, bases } = resync;
+        let view = ResyncView { global: &mut *global, tick, triangles, patch, tools, index, horizon, bases };
+        match &mut self.model {
+            Model::Hold => {}
+            Model::Linear(model) => {
+                model.rebuild(view);
+                let window = model.window();
+                let patch = &window.nodes[..window.movable];
+                if self.around.is_none() || self.of != patch {
+                    patch.clone_into(&mut self.of);
+                    self.around = Some(around(global.body(), patch));
+                }
+                nodes.extend(window.nodes.iter().chain(self.around.iter().flatten()));
+            }
+            Model::Predictive(model) => {
+                model.rebuild(view);
+                nodes.extend(&model.window().nodes);
+                let (ring, path) = model.path();
+                self.parcel.ring = ring;
+                self.parcel.path.clear();
+                self.parcel.path.extend_from_slice(path);
+            }
+        }
+        nodes.extend(&self.watched);
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+}
+
+/// The nodes that the forces on `patch` depend on: all, if the body does not say.
+fn around(body: &dyn Body, patch: &[u32]) -> Vec<u32> {
+    body.restriction(patch).map_or_else(|| (0..body.rest().len() as u32).collect(), |near| near.nodes)
+}
+
+impl LocalModel for Departing {
+    fn rebuild(&mut self, resync: ResyncView<'_>) {
+        let ResyncView { global, tick, triangles, patch, tools, index, horizon, bases } = resync;
+        let view = ResyncView { global: &mut *global, tick, triangles, patch, tools, index, horizon, bases };
+        self.parcel.nodes = self.nodes(view);
+        let Parcel { nodes, state, felt, beside, .. } = &mut self.parcel;
+        let (all, touch) = (global.state(), global.touch(index));
+        state.positions.clear();
+        state.positions.extend(nodes.iter().map(|&node| all.positions[node as usize]));
+        state.velocities.clear();
+        state.velocities.extend(nodes.iter().map(|&node| all.velocities[node as usize]));
+        touch.felt().clone_into(felt);
+        beside.clear();
+        beside.extend(global.exerted_beside(index));
+        let parcel = &mut self.parcel;
+        (parcel.tick, parcel.tool, parcel.place) = (tick, index as u16, tools[index].position);
+        (parcel.friction, parcel.stiffness) = (global.law().friction, global.stiffness());
+        triangles.clone_into(&mut parcel.triangles);
+        parcel.patch = patch.map(<[u32]>::to_vec);
+        (parcel.contact, parcel.steady, parcel.wrench) = (touch.contact, touch.steady(), global.wrench(index));
+        if parcel.bases.len() != bases.len() {
+            parcel.bases.clone_from(bases);
+        }
+    }
+
+    fn tick(&mut self, _: ToolMotion) -> Wrench {
+        Wrench::default()
+    }
+
+    fn built_at(&self) -> u64 {
+        self.parcel.tick
+    }
+
+    fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    fn serves_as(&self) -> Kind {
+        Kind::Hold
+    }
+
+    fn catches_up(&self) -> bool {
+        false
+    }
+
+    fn contact(&self) -> Contact {
+        self.parcel.contact
+    }
+
+    fn watch(&mut self, nodes: &[u32]) {
+        nodes.clone_into(&mut self.watched);
+    }
+
+    fn parcel(&self) -> Option<&Parcel> {
+        Some(&self.parcel)
+    }
+}

@@ -1,0 +1,98 @@
+//! The global model as far as it is known on another computer.
+
+use super::super::{LocalModel, ResyncView, ToolForecast};
+use super::{MOST_FELT, Parcel};
+use crate::Vec3;
+use crate::simulation::Simulation;
+use crate::surroundings::{Bases, Basis};
+
+/// Triangles that a window is made around, at most.
+const MOST_TRIANGLES: usize = 1 << 16;
+
+/// The image of a simulation on another computer: of the same body, in the state that the last [`Parcel`] of each window told.
+///
+/// Whatever comes is asked whether it fits the body before anything is done with it.
+#[derive(Debug)]
+pub struct Image {
+    simulation: Simulation,
+    /// Working memory.
+    tools: Vec<ToolForecast>,
+}
+
+impl Image {
+    /// Of a simulation of the body and the tools that `simulation` has.
+    pub fn new(simulation: Simulation) -> Self {
+        let tools = vec![ToolForecast::default(); simulation.tools()];
+        Self { simulation, tools }
+    }
+
+    /// Builds `model` as it would have been built where `parcel` comes from, with what there is of the `bases` here. False if the
+    /// parcel is one of another body: then nothing has been done.
+    ///
+    /// # Real-time
+    /// Not for a tick: costs what building a model costs but for looking ahead, and allocates.
+    pub fn rebuild(&mut self, parcel: &Parcel, bases: &Bases, model: &mut dyn LocalModel) -> bool {
+        let index = parcel.tool();
+        if index >= self.tools.len() || !self.fits(parcel) {
+            return false;
+        }
+        let state = self.simulation.state_mut();
+        let states = parcel.state.positions.iter().zip(&parcel.state.velocities);
+        for (&node, (x, v)) in parcel.nodes.iter().zip(states) {
+            (state.positions[node as usize], state.velocities[node as usize]) = (*x, *v);
+        }
+        self.simulation.set_friction(parcel.friction);
+        let told = self.simulation.be_told(parcel.stiffness, index, parcel.wrench, |touch, steps| {
+            touch.go_on_from(parcel.contact, parcel.steady, &parcel.felt, steps);
+        });
+        told.beside.clone_from(&parcel.beside);
+        told.path.clone_from(&parcel.path);
+        self.tools[index] = ToolForecast::at_rest(parcel.place);
+        model.rebuild(ResyncView {
+            global: &mut self.simulation,
+            tick: parcel.tick,
+            triangles: &parcel.triangles,
+            patch: parcel.patch(),
+            tools: &self.tools,
+            index,
+            horizon: 0,
+            bases,
+        });
+        true
+    }
+
+    /// True if `basis` can be one of this body.
+    pub fn has_room_for(&self, basis: &Basis) -> bool {
+        self.is_patch(basis.patch())
+            && self.ring_of(basis.patch()).is_some_and(|ring| basis.answers.is_of(3 * ring))
+    }
+
+    /// The nodes of the ring around a patch; `None` if the body cannot be taken apart.
+    fn ring_of(&self, patch: &[u32]) -> Option<usize> {
+        self.simulation.body().restriction(patch).map(|near| near.ring(patch.len()).len())
+    }
+
+    /// Some nodes that can move, in increasing order.
+    fn is_patch(&self, nodes: &[u32]) -> bool {
+        let masses = self.simulation.body().inverse_masses();
+        let can_move = |&node: &u32| masses.get(node as usize).is_some_and(|&w| w > 0.0);
+        nodes.iter().all(can_move) && nodes.windows(2).all(|pair| pair[0] < pair[1]) && !nodes.is_empty()
+    }
+
+    fn fits(&self, parcel: &Parcel) -> bool {
+        let body = self.simulation.body();
+        let (nodes, triangles) = (body.rest().len(), body.surface().triangles.len());
+        let is_node = |&node: &u32| (node as usize) < nodes;
+        let is_triangle = |&triangle: &u32| (triangle as usize) < triangles;
+        let is_told = |(node, _): &(u32, Vec3)| is_node(node);
+        let felt = parcel.felt.len() <= MOST_FELT && parcel.felt.iter().all(|felt| is_triangle(&felt.point.triangle));
+        let touched = parcel.contact.triangle.is_none_or(|triangle| is_triangle(&triangle));
+        let looked_at = parcel.nodes.iter().all(is_node) && parcel.beside.iter().all(is_told);
+        let around = (1..=MOST_TRIANGLES).contains(&parcel.triangles.len());
+        felt && touched
+            && looked_at
+            && around
+            && parcel.triangles.iter().all(is_triangle)
+            && parcel.patch().is_none_or(|patch| self.is_patch(patch))
+    }
+}

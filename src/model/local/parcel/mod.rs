@@ -1,0 +1,192 @@
+//! A local model on its way to another computer: not itself, but what it is built from.
+//!
+//! Both sides have the body. So nothing of it crosses: a [`Parcel`] names the nodes and triangles of a window and has their state, the
+//! contact, and the ring's predicted path, the one thing that takes the whole body to find. An [`Image`] of the simulation on the other
+//! side builds from it the very model that would have been built here.
+
+mod departing;
+mod image;
+mod path;
+
+use crate::body::{State, Stiffness};
+use crate::bytes::{BytesReader, BytesWriter};
+use crate::contact::{Contact, ContactMode, ContactPoint, Felt, Friction};
+use crate::surroundings::Bases;
+use crate::{Vec3, Wrench};
+
+pub(super) use departing::{Departing, Model};
+pub use image::Image;
+
+/// What a local model is built from, but for the body.
+///
+/// # Real-time
+/// Not for a tick: allocates.
+#[derive(Clone, Debug, Default)]
+pub struct Parcel {
+    /// The haptic tick of the state.
+    tick: u64,
+    /// The tool that the model is for.
+    tool: u16,
+    /// As in [`ResyncView`](super::ResyncView).
+    triangles: Vec<u32>,
+    /// The patch, if it is not the one around the triangles.
+    patch: Option<Vec<u32>>,
+    /// Friction and stiffness, which may change while a session runs.
+    friction: Friction,
+    stiffness: Stiffness,
+    /// Where the tool is (m).
+    place: Vec3,
+    /// The nodes that the model looks at, with their state.
+    nodes: Vec<u32>,
+    state: State,
+    contact: Contact,
+    steady: f64,
+    felt: Vec<Felt>,
+    wrench: Wrench,
+    /// Nodes that other tools press, with the force on each (N).
+    beside: Vec<(u32, Vec3)>,
+    /// Numbers of one quantity of the ring's path, three for each node, and the path.
+    ring: usize,
+    path: Vec<f64>,
+    /// The bases that there are. They go by themselves, once.
+    bases: Bases,
+}
+
+/// Bytes of the parts of lists at least.
+const NODE: usize = 4;
+const STATE: usize = NODE + 6 * 8;
+const PRESSED: usize = NODE + 3 * 8;
+const FELT: usize = NODE + 15 * 8 + 2;
+/// Places at which a tool touches.
+const MOST_FELT: usize = 1024;
+
+impl Parcel {
+    /// The haptic tick of the state that the model is built from.
+    pub fn tick(&self) -> u64 {
+        self.tick
+    }
+
+    /// The tool that the model is for.
+    pub fn tool(&self) -> usize {
+        self.tool.into()
+    }
+
+    /// The patch of the model, if it has one that a basis may belong to.
+    pub fn patch(&self) -> Option<&[u32]> {
+        self.patch.as_deref()
+    }
+
+    /// The bases that the global model knew; not part of the bytes.
+    pub fn bases(&self) -> &Bases {
+        &self.bases
+    }
+
+    /// Appends all of it but the bases.
+    pub fn write(&self, to: &mut BytesWriter<'_>) {
+        to.u64(self.tick);
+        to.u16(self.tool);
+        to.list(&self.triangles, |to, &triangle| to.u32(triangle));
+        to.u8(self.patch.is_some().into());
+        to.list(self.patch.as_deref().unwrap_or_default(), |to, &node| to.u32(node));
+        let Friction { kinetic, breakaway, stribeck } = self.friction;
+        [kinetic, breakaway, stribeck, self.stiffness.factor()].into_iter().for_each(|number| to.f64(number));
+        to.vector(&self.place);
+        let State { positions, velocities } = &self.state;
+        let nodes: Vec<_> = self.nodes.iter().zip(positions.iter().zip(velocities)).collect();
+        to.list(&nodes, |to, &(&node, (x, v))| {
+            to.u32(node);
+            to.vector(x);
+            to.vector(v);
+        });
+        write_contact(to, &self.contact);
+        to.f64(self.steady);
+        to.list(&self.felt, write_felt);
+        to.vector(&self.wrench.force);
+        to.vector(&self.wrench.torque);
+        to.list(&self.beside, |to, (node, force)| {
+            to.u32(*node);
+            to.vector(force);
+        });
+        path::write(to, self.ring, &self.path);
+    }
+
+    /// Takes what [`write`](Self::write) has appended; `None` if the bytes cannot be that, or hold a number that is not finite. Whether it
+    /// fits a body is what [`Image::rebuild`] asks.
+    pub fn read(from: &mut BytesReader<'_>) -> Option<Self> {
+        let mut parcel = Self { tick: from.u64()?, tool: from.u16()?, ..Self::default() };
+        from.list(NODE, &mut parcel.triangles, BytesReader::u32)?;
+        let has_patch = read_bool(from)?;
+        let mut patch = Vec::new();
+        from.list(NODE, &mut patch, BytesReader::u32)?;
+        parcel.patch = has_patch.then_some(patch);
+        let [kinetic, breakaway] = [read_coefficient(from)?, read_coefficient(from)?];
+        parcel.friction = Friction { kinetic, breakaway, stribeck: from.f64().filter(|&speed| speed >= 0.0)? };
+        parcel.stiffness = Stiffness::times(from.f64()?)?;
+        parcel.place = from.vector()?;
+        let mut states = Vec::new();
+        from.list(STATE, &mut states, |from| Some((from.u32()?, from.vector()?, from.vector()?)))?;
+        for (node, x, v) in states {
+            parcel.nodes.push(node);
+            parcel.state.positions.push(x);
+            parcel.state.velocities.push(v);
+        }
+        parcel.contact = read_contact(from)?;
+        parcel.steady = from.f64()?;
+        from.list(FELT, &mut parcel.felt, read_felt)?;
+        parcel.wrench = Wrench { force: from.vector()?, torque: from.vector()? };
+        from.list(PRESSED, &mut parcel.beside, |from| Some((from.u32()?, from.vector()?)))?;
+        parcel.ring = path::read(from, &mut parcel.path)?;
+        Some(parcel)
+    }
+}
+
+/// That of an unbounded friction is infinite.
+fn read_coefficient(from: &mut BytesReader<'_>) -> Option<f64> {
+    from.u64().map(f64::from_bits).filter(|&coefficient| coefficient >= 0.0)
+}
+
+fn write_contact(to: &mut BytesWriter<'_>, contact: &Contact) {
+    to.u32(contact.triangle.unwrap_or(u32::MAX));
+    contact.weights.iter().for_each(|&weight| to.f64(weight));
+    to.u8(contact.mode as u8);
+    to.u8(contact.glued.into());
+    to.vector(&contact.normal);
+}
+
+fn read_contact(from: &mut BytesReader<'_>) -> Option<Contact> {
+    Some(Contact {
+        triangle: Some(from.u32()?).filter(|&triangle| triangle != u32::MAX),
+        weights: read_weights(from)?,
+        mode: read_mode(from)?,
+        glued: read_bool(from)?,
+        normal: from.vector()?,
+    })
+}
+
+fn write_felt(to: &mut BytesWriter<'_>, felt: &Felt) {
+    let ContactPoint { triangle, place, normal, force, mode } = &felt.point;
+    to.u32(*triangle);
+    [place, normal, force, &felt.impulse].into_iter().for_each(|vector| to.vector(vector));
+    felt.weights.iter().for_each(|&weight| to.f64(weight));
+    to.u8(*mode as u8);
+    to.u8(felt.is_pressing.into());
+}
+
+fn read_felt(from: &mut BytesReader<'_>) -> Option<Felt> {
+    let (triangle, place, normal) = (from.u32()?, from.vector()?, from.vector()?);
+    let (force, impulse, weights, mode) = (from.vector()?, from.vector()?, read_weights(from)?, read_mode(from)?);
+    let point = ContactPoint { triangle, place, normal, force, mode };
+    Some(Felt::told(point, weights, read_bool(from)?, impulse))
+}
+
+fn read_weights(from: &mut BytesReader<'_>) -> Option<[f64; 3]> {
+    Some([from.f64()?, from.f64()?, from.f64()?])
+}
+
+fn read_mode(from: &mut BytesReader<'_>) -> Option<ContactMode> {
+    from.u8().map(|code| ContactMode::from_code(code.into()))
+}
+
+fn read_bool(from: &mut BytesReader<'_>) -> Option<bool> {
+    from.u8().filter(|&byte| byte < 2).map(|byte| byte == 1)
+}

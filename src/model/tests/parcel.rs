@@ -1,0 +1,174 @@
+//! A local model that is built on another computer: the same as here, and nothing that is sent there can break it.
+
+use palpate_model::Vec3;
+use palpate_model::body::{Block, Body, State};
+use palpate_model::bytes::{BytesReader, BytesWriter};
+use palpate_model::contact::{Contact, Law, ToolMotion, ToolShape};
+use palpate_model::local::{Image, Kind, LocalModel, Parcel, ResyncView, Template, ToolForecast};
+use palpate_model::mesh::Face;
+use palpate_model::simulation::{Simulation, Stepping};
+use palpate_model::surroundings::{Bases, Basis, RestingBody};
+use proptest::prelude::*;
+
+const PRESSES: u64 = 60;
+const HORIZON: u32 = 30;
+
+/// A block with a tool over it, and a second one beside that presses as well.
+fn at_rest(shape: ToolShape) -> Simulation {
+    let builder = Block::builder([8; 3], [0.07; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
+    let body = builder.fix(Face::ZMin).build().unwrap();
+    let state = State::at_rest(body.rest());
+    let law = Law { friction: 0.5.into(), ..Law::default() };
+    let stepping = Stepping { tick: 1e-3, substeps: 2 };
+    let simulation = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).unwrap();
+    simulation.with_tool(Contact::default()).with_shape(0, shape)
+}
+
+/// The same after both have pressed, and where they are.
+fn pressed(shape: ToolShape) -> (Simulation, [Vec3; 2]) {
+    let mut simulation = at_rest(shape);
+    let at = |tick: u64| {
+        let down = 0.0705 - 1e-4 * tick as f64;
+        [Vec3::new(0.033, 0.0362, down + shape.radius()), Vec3::new(0.052, 0.0362, down)]
+    };
+    for tick in 0..PRESSES {
+        let [from, to] = [at(tick), at(tick + 1)];
+        simulation.tick_all(&std::array::from_fn::<_, 2, _>(|tool| ToolMotion::straight(from[tool], to[tool])));
+    }
+    assert!((0..2).all(|tool| simulation.contact(tool).is_touching()));
+    (simulation, at(PRESSES))
+}
+
+/// The patch around the first tool, and its basis.
+fn patch_and_bases(simulation: &Simulation) -> (Vec<u32>, Bases) {
+    let triangle = simulation.contact(0).triangle.unwrap();
+    let mut patch = Vec::new();
+    simulation.patch(0, &[triangle], [4, 4, 2], &mut patch);
+    let resting = RestingBody::new(simulation.body()).unwrap();
+    let mut bases = Bases::default();
+    bases.insert(Basis::compute(&resting, &patch, 30).unwrap().unwrap().into());
+    (patch, bases)
+}
+
+fn build(model: &mut dyn LocalModel, (simulation, tools): (&mut Simulation, &[Vec3; 2]), patch: &[u32], bases: &Bases) {
+    let triangle = simulation.contact(0).triangle.unwrap();
+    model.rebuild(ResyncView {
+        global: simulation,
+        tick: PRESSES,
+        triangles: &[triangle],
+        patch: (!bases.is_empty()).then_some(patch),
+        tools: &tools.map(ToolForecast::at_rest),
+        index: 0,
+        horizon: HORIZON,
+        bases,
+    });
+}
+
+/// What is felt in each tick of a drag.
+fn drag(model: &mut dyn LocalModel, from: Vec3) -> Vec<Vec3> {
+    let at = |tick: u32| from + Vec3::new(2e-4, 1e-4, -5e-5) * f64::from(tick);
+    (0..40).map(|tick| model.tick(ToolMotion::straight(at(tick), at(tick + 1))).force).collect()
+}
+
+fn sent(parcel: &Parcel) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    parcel.write(&mut BytesWriter(&mut bytes));
+    bytes
+}
+
+#[test]
+fn a_model_that_is_built_over_there_is_the_one_that_would_be_built_here() {
+    for shape in [ToolShape::Point, ToolShape::Sphere { radius: 6e-3 }] {
+        let (mut simulation, tools) = pressed(shape);
+        let (patch, bases) = patch_and_bases(&simulation);
+        for kind in Kind::ALL.into_iter().filter(|&kind| kind != Kind::Full) {
+            let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
+            let bases = if kind == Kind::Predictive { bases.clone() } else { Bases::default() };
+            let [mut here, mut there] = [template.empty(), template.empty()];
+            build(&mut *here, (&mut simulation, &tools), &patch, &bases);
+            let mut departing = template.departing();
+            build(&mut *departing, (&mut simulation, &tools), &patch, &bases);
+
+            let bytes = sent(departing.parcel().unwrap());
+            let mut from = BytesReader(&bytes);
+            let parcel = Parcel::read(&mut from).unwrap();
+            assert!(from.0.is_empty() && parcel.tick() == PRESSES);
+            let mut image = Image::new(at_rest(shape));
+            assert!(image.rebuild(&parcel, &bases, &mut *there));
+            assert_eq!((there.serves_as(), there.built_at()), (kind, PRESSES));
+            assert_eq!(there.contact(), here.contact(), "{kind:?}");
+            assert_eq!(there.contact_points(), here.contact_points(), "{kind:?}");
+            assert_eq!(there.contact_area(), here.contact_area(), "{kind:?}");
+            let forces = [drag(&mut *here, tools[0]), drag(&mut *there, tools[0])];
+            let largest = forces[0].iter().map(Vec3::norm).fold(0.0, f64::max);
+            let apart = forces[0].iter().zip(&forces[1]).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            println!("{kind:?} {shape:?}: {} bytes, {:.1e} of {largest:.2} N apart", bytes.len(), apart);
+            // To the last bit, but for a path that is rounded.
+            let looks_ahead = matches!(kind, Kind::Predicted | Kind::Predictive);
+            assert!(apart <= if looks_ahead { 2e-5 * largest } else { 0.0 }, "{kind:?}: {apart} of {largest}");
+        }
+    }
+}
+
+#[test]
+fn a_parcel_of_another_body_is_refused_and_a_path_of_another_ring_is_not_gone() {
+    let (mut simulation, tools) = pressed(ToolShape::Point);
+    let (patch, bases) = patch_and_bases(&simulation);
+    let template = Template::new(Kind::Predictive, [4, 4, 2], simulation.body()).unwrap();
+    let mut departing = template.departing();
+    build(&mut *departing, (&mut simulation, &tools), &patch, &bases);
+    let parcel = departing.parcel().unwrap();
+    let small = Block::builder([4; 3], [0.03; 3]).fix(Face::ZMin).build().unwrap();
+    let state = State::at_rest(small.rest());
+    let stepping = Stepping { tick: 1e-3, substeps: 2 };
+    let other = Simulation::new(Box::new(small), state, Contact::default(), Law::default(), stepping).unwrap();
+    let mut image = Image::new(other);
+    let mut model = template.empty();
+    assert!(!image.rebuild(parcel, &bases, &mut *model));
+    assert!(!image.has_room_for(bases.iter().next().unwrap()));
+    assert!(Image::new(at_rest(ToolShape::Point)).has_room_for(bases.iter().next().unwrap()));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn bytes_of_anybody_are_refused_or_make_a_model_that_ticks(
+        cut in 0_usize..200_000,
+        flips in prop::collection::vec((0_usize..200_000, 1_u8..), 0..6),
+        garbage in prop::collection::vec(any::<u8>(), 0..300),
+        is_garbage in any::<bool>(),
+        kind in prop::sample::select(vec![Kind::Hold, Kind::Patch, Kind::Predictive]),
+    ) {
+        thread_local! {
+            static GOOD: Vec<(Kind, Vec<u8>)> = {
+                let (mut simulation, tools) = pressed(ToolShape::Sphere { radius: 6e-3 });
+                let (patch, bases) = patch_and_bases(&simulation);
+                [Kind::Hold, Kind::Patch, Kind::Predictive].map(|kind| {
+                    let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
+                    let mut departing = template.departing();
+                    let bases = if kind == Kind::Predictive { bases.clone() } else { Bases::default() };
+                    build(&mut *departing, (&mut simulation, &tools), &patch, &bases);
+                    (kind, sent(departing.parcel().unwrap()))
+                }).into()
+            };
+        }
+        let mut bytes = GOOD.with(|good| good.iter().find(|(of, _)| *of == kind).unwrap().1.clone());
+        if is_garbage {
+            bytes = garbage;
+        }
+        // Most of what can be wrong stands at the front.
+        for (at, flip) in flips {
+            let place = if at % 2 == 0 { at % bytes.len().clamp(1, 400) } else { at % bytes.len().max(1) };
+            bytes.get_mut(place).into_iter().for_each(|byte| *byte ^= flip);
+        }
+        bytes.truncate(bytes.len().saturating_sub(cut % 3 * cut));
+        let Some(parcel) = Parcel::read(&mut BytesReader(&bytes)) else { return Ok(()) };
+        let simulation = at_rest(ToolShape::Sphere { radius: 6e-3 });
+        let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
+        let mut model = template.empty();
+        if Image::new(simulation).rebuild(&parcel, &Bases::default(), &mut *model) {
+            drag(&mut *model, Vec3::new(0.033, 0.0362, 0.07));
+        }
+    }
+}
