@@ -17,6 +17,7 @@
 //! | [`runtime`] | actors, rate groups, ports, real and virtual time; without physics, usable on its own |
 //! | [`devices`] | what moves the tool: a path, a simulated hand, a log, or a program's own [`Device`] |
 //! | [`safety`] | what stands between a computed force and a device |
+//! | [`link`] | what crosses between two computers, and a link that is simulated |
 //! | [`log`], [`report`] | records, MCAP files, and what they say about a run |
 //!
 //! # Example
@@ -58,6 +59,7 @@ pub mod actors;
 pub mod devices;
 mod error;
 mod files;
+pub mod link;
 pub mod log;
 mod printable;
 pub mod random;

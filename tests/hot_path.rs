@@ -92,6 +92,15 @@ fn a_tick_with_the_whole_body_and_two_tools_makes_no_system_call_and_never_alloc
     assert_silent(Case::new(LocalModelKind::Full, Guard::SystemCalls).with_second());
 }
 
+/// The bridges are off the real-time thread, and the ports are what they are without them.
+#[test]
+fn a_tick_with_the_global_model_behind_a_link_makes_no_system_call_and_never_allocates() {
+    for model in [LocalModelKind::Hold, LocalModelKind::Patch, LocalModelKind::Predictive] {
+        assert_silent(Case::new(model, Guard::SystemCalls).linked());
+    }
+    assert_still(Case::new(LocalModelKind::Predictive, Guard::Counters).linked());
+}
+
 /// Of a sphere that touches in several places; one of the models is stepped implicitly.
 #[test]
 fn a_tick_of_a_tool_with_a_shape_makes_no_system_call_and_never_allocates() {

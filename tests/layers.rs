@@ -4,18 +4,19 @@
 use std::path::{Path, PathBuf};
 
 /// The engine's modules, each built on those before it alone.
-const ORDER: [(&str, &[&str]); 11] = [
+const ORDER: [(&str, &[&str]); 12] = [
     ("printable", &[]),
     ("error", &["printable"]),
     ("files", &["error"]),
     ("random", &[]),
     ("safety", &[]),
+    ("link", &["random"]),
     ("devices", &["error", "files", "random"]),
     ("scene", &["devices", "error", "files", "printable"]),
     ("log", &["error", "printable"]),
     ("report", &["error", "log"]),
-    ("actors", &["devices", "error", "files", "log", "report", "safety"]),
-    ("session", &["actors", "devices", "error", "files", "log", "report", "safety", "scene"]),
+    ("actors", &["devices", "error", "files", "link", "log", "report", "safety"]),
+    ("session", &["actors", "devices", "error", "files", "link", "log", "report", "safety", "scene"]),
 ];
 
 /// Words that belong to few files, or to few folders.

@@ -28,7 +28,8 @@ const USED_BY_TICKS: &str = "
 const SPEAK_FOR_ALL: &str = "
     Nanos Rate TickContext Record TickTiming Event PortUse PortUseKind SlipCause SlipCounts Histogram GraphError ModelError
     LogRecord ContactSample ContactPointSample ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact Friction ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice Region Shape ToolShape Pose Wrench
-    DeviceActor LocalActor LocalTool WholeActor GlobalActor LoggerActor LogSink
+    DeviceActor LocalActor LocalTool WholeActor GlobalActor LoggerActor LogSink HapticBridge GlobalBridge
+    BytesWriter BytesReader Parcel Image
     Scripted Replayed
     Block BlockBuilder SpringNetwork SpringNetworkBuilder Tetrahedra TetrahedraBuilder Tissue TissueRegion InstructionSet RateGroup RuntimeBuilder Runtime Plan GroupPlan Recording";
 

@@ -111,7 +111,7 @@ fn the_demo_file_reads_as_it_is_written() {
 fn the_demo_file_documents_every_key() {
     let everything = "[body]\n[body.block]\nnodes = [2, 2, 2]\nsize_m = [1, 1, 1]\n[body.material]\nnode_mass_kg = 1\n\
         stiffness_n_per_m = 1\ndamping_ratio = 1\n[[body.region]]\n\
-        shape = { layer = { axis = \"z\", from_m = 0, to_m = 1 } }\n[contact]\n[global]\n[local]\n[device]\n[device.plant]\n[device.hand]\n[device.pointer]\n[device.haply]\nmax_force_n = 1\n[[device.fault]]\nkind = \"late\"\nfrom_s = 1\nto_s = 2\n[safety]\n[log]\n[run]\n[initial]\n\
+        shape = { layer = { axis = \"z\", from_m = 0, to_m = 1 } }\n[contact]\n[global]\n[local]\n[device]\n[device.plant]\n[device.hand]\n[device.pointer]\n[device.haply]\nmax_force_n = 1\n[[device.fault]]\nkind = \"late\"\nfrom_s = 1\nto_s = 2\n[safety]\n[link]\n[log]\n[run]\n[initial]\n\
         pull = { node = [0, 0, 1], offset_m = [0, 0, 0] }\n[[probe]]\nnode = [0, 0, 0]\n";
     let demo = Scene::demo().source.unwrap();
     let words: Vec<&str> = demo.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).collect();
@@ -132,6 +132,7 @@ fn the_demo_file_documents_every_key() {
         "[device.haply]",
         "[[device.fault]]",
         "[safety]",
+        "[link]",
         "[log]",
         "[run]",
         "[initial]",

@@ -24,6 +24,8 @@ pub enum Cause {
     NoBasis,
     /// The global model was too late to follow the tool: it goes on from its newest surface and the newest tool.
     PathDropped,
+    /// Nothing comes from the other computer any more: the local model fades out.
+    LinkSilent,
 }
 
 impl Cause {
@@ -40,6 +42,7 @@ impl Cause {
             Self::NoBasis => 304,
             Self::PathDropped => 306,
             Self::DeviceImpossible => 305,
+            Self::LinkSilent => 307,
         }
     }
 
@@ -54,6 +57,7 @@ impl Cause {
             302 => "the global model's state is not finite, it publishes nothing any more",
             304 => "the surroundings of a patch could not be reduced",
             306 => "the global model was too late to follow the tool, it goes on from the newest surface and tool",
+            307 => "nothing comes from the global model's computer",
             305 => "the device reported a place where it cannot be, the last one is used",
             303 => "tool samples were lost between local and global model",
             _ => return None,
@@ -75,6 +79,7 @@ mod tests {
             Cause::SamplesLost,
             Cause::NoBasis,
             Cause::PathDropped,
+            Cause::LinkSilent,
         ];
         let causes: Vec<Cause> = DeviceFault::ALL.map(Cause::Device).into_iter().chain(others).collect();
         for (index, cause) in causes.iter().enumerate() {

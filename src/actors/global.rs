@@ -1,5 +1,7 @@
 //! The global actor: advances the whole body along the tool's path and publishes the next local model.
 
+use std::collections::VecDeque;
+
 use super::cause::Cause;
 use super::global_ports::{GlobalPorts, GlobalSharedPorts, ToolPorts};
 use super::messages::{ToolTick, show};
@@ -40,6 +42,8 @@ pub struct GlobalPlan {
     pub patch: [usize; 3],
     /// Bases that are there from the start.
     pub bases: Bases,
+    /// The tool's samples come over a link: what has come is followed, whatever the time.
+    pub linked: bool,
 }
 
 impl GlobalPlan {
@@ -64,6 +68,8 @@ impl GlobalPlan {
 #[derive(Debug)]
 struct ToolSide {
     ports: ToolPorts,
+    /// Samples that have come and are not taken yet.
+    waiting: VecDeque<ToolTick>,
     /// The tool at the last tick taken: the state's own time.
     tool: ToolTick,
     /// Where it comes from.
@@ -152,6 +158,7 @@ impl GlobalActor {
         let side = |(index, (&tool, ports)): (usize, (&ToolTick, ToolPorts))| ToolSide {
             windows: if has_bases { Windows::new(&simulation, index, plan.patch) } else { Windows::default() },
             ports,
+            waiting: VecDeque::new(),
             tool,
             from: tool.pose,
             is_between: false,
@@ -187,20 +194,33 @@ impl GlobalActor {
     /// The work is bounded: of more than two periods the state is not followed. It goes on as it is, the tools go
     /// straight to where they were half a period ago, and from there along their samples: a period's work.
     fn follow_tools(&mut self, ctx: &TickContext, until: Nanos) -> Option<Cause> {
-        let newest = self.plan.haptic.last_release(until);
+        self.take_arrivals(ctx);
+        let newest = if self.plan.linked { self.newest_arrival() } else { self.plan.haptic.last_release(until) };
         let mut cause = None;
         if newest.saturating_sub(self.now()) > self.plan.most_ticks() {
             let before = self.begin_way();
-            while self.take_samples(ctx, newest - self.plan.way_ticks()) {}
+            while self.take_samples(newest - self.plan.way_ticks()) {}
             cause = self.go(before);
         }
         loop {
             let before = self.begin_way();
-            if !self.take_samples(ctx, newest) {
+            if !self.take_samples(newest) {
                 return cause;
             }
             cause = cause.or(self.go(before));
         }
+    }
+
+    fn take_arrivals(&mut self, ctx: &TickContext) {
+        for side in &mut self.tools {
+            side.waiting.extend(std::iter::from_fn(|| side.ports.ticks.pop(ctx)));
+        }
+    }
+
+    /// The last tick that there is a sample of for every tool.
+    fn newest_arrival(&self) -> u64 {
+        let newest = |side: &ToolSide| side.waiting.back().map_or(side.tool.tick, |sample| sample.tick);
+        self.tools.iter().map(newest).min().unwrap_or_default()
     }
 
     /// The way of each tool begins where it is; the tick at which that is.
@@ -214,16 +234,16 @@ impl GlobalActor {
     /// Puts every tool to the earliest tick that waits, if it is not after `newest`; returns whether there was one.
     ///
     /// The samples of all tools come in step. Where one lacks a sample that another has, it is interpolated.
-    fn take_samples(&mut self, ctx: &TickContext, newest: u64) -> bool {
-        let Some(next) = self.next_tick(ctx).filter(|&next| next <= newest) else { return false };
+    fn take_samples(&mut self, newest: u64) -> bool {
+        let Some(next) = self.next_tick().filter(|&next| next <= newest) else { return false };
         for side in &mut self.tools {
-            let sample = side.ports.ticks.peek(ctx).unwrap_or(side.tool);
+            let sample = side.waiting.front().copied().unwrap_or(side.tool);
             side.is_between = sample.tick > next;
             side.tool = if side.is_between {
                 let share = next.saturating_sub(side.tool.tick) as f64 / (sample.tick - side.tool.tick) as f64;
                 ToolTick { tick: next, pose: side.tool.pose.towards(&sample.pose, share) }
             } else {
-                side.ports.ticks.pop(ctx);
+                side.waiting.pop_front();
                 sample
             };
         }
@@ -255,9 +275,9 @@ impl GlobalActor {
     }
 
     /// The earliest tick that waits, once there is one of every tool.
-    fn next_tick(&mut self, ctx: &TickContext) -> Option<u64> {
-        let waiting = |side: &mut ToolSide| side.ports.ticks.peek(ctx).map(|sample| sample.tick);
-        self.tools.iter_mut().map(waiting).reduce(|a, b| Some(a?.min(b?)))?
+    fn next_tick(&self) -> Option<u64> {
+        let waiting = |side: &ToolSide| side.waiting.front().map(|sample| sample.tick);
+        self.tools.iter().map(waiting).reduce(|a, b| Some(a?.min(b?)))?
     }
 
     /// Builds the next local model of each tool around its contact, or around the surface nearest to it, and where it is

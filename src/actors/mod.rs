@@ -8,7 +8,8 @@
 //! ```
 //!
 //! There is a device and a local actor for each tool, and one global actor for all. What a program changes while it runs, `Settings`,
-//! goes to the global actor and comes to the local ones with the next model. For `full` one actor with the whole body stands
+//! goes to the global actor and comes to the local ones with the next model. Where there is a link, two bridges stand between the local
+//! actors and the global one. For `full` one actor with the whole body stands
 //! in place of local and global ones:
 //!
 //! ```text
@@ -19,6 +20,7 @@
 mod basis;
 mod basis_store;
 mod believed;
+mod bridge;
 mod cause;
 mod device;
 mod global;
@@ -40,6 +42,7 @@ mod whole;
 pub(crate) use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub(crate) use basis_store::BasisStore;
 pub(crate) use believed::{Bounds, Disbelieved};
+pub(crate) use bridge::{GlobalBridge, GlobalEnd, HapticBridge, HapticEnd};
 pub(crate) use device::{DeviceActor, DevicePorts, GAP_S, first_state};
 pub(crate) use global::{GlobalActor, GlobalPlan};
 pub(crate) use global_ports::{GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};

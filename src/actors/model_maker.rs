@@ -31,8 +31,16 @@ impl ModelMaker {
         self.watching(&self.templates[0])
     }
 
+    /// An empty model as at the start, for the side of the global one where the local one is built elsewhere.
+    pub fn departing(&self) -> Box<dyn LocalModel> {
+        self.watch(self.templates[0].departing())
+    }
+
     fn watching(&self, template: &Template) -> Box<dyn LocalModel> {
-        let mut model = template.empty();
+        self.watch(template.empty())
+    }
+
+    fn watch(&self, mut model: Box<dyn LocalModel>) -> Box<dyn LocalModel> {
         model.watch(&self.probes);
         model
     }

@@ -31,8 +31,8 @@ pub use self::percentiles::{Distribution, Magnitudes, Percentiles};
 pub use self::reader::{LogReader, TopicKind};
 pub use self::records::{
     CommandSample, ContactPointSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, JoinedRecords,
-    Level, LogRecord, LoggedExecution, ModelReason, ProbeSample, Resync, SceneFrame, SceneTool, ServedBy, TextEvent,
-    ToolSample,
+    Level, LinkSample, LogRecord, LoggedExecution, ModelReason, ProbeSample, Resync, SceneFrame, SceneTool, ServedBy,
+    TextEvent, ToolSample,
 };
 pub(crate) use self::records::{MAX_DEVICES, WaitingPoints};
 pub(crate) use self::stats::StatsCounter;

@@ -5,6 +5,9 @@
 use crate::Vec3;
 
 /// Appends numbers to bytes.
+///
+/// # Real-time
+/// Not for a tick: allocates.
 #[derive(Debug)]
 pub struct BytesWriter<'a>(pub &'a mut Vec<u8>);
 
@@ -61,6 +64,9 @@ impl BytesWriter<'_> {
 }
 
 /// Takes numbers from bytes; `None` where there are none left.
+///
+/// # Real-time
+/// Not for a tick: lists allocate.
 #[derive(Clone, Copy, Debug)]
 pub struct BytesReader<'a>(pub &'a [u8]);
 

@@ -2,7 +2,7 @@
 
 use super::device::{DeviceSpec, one_or_many};
 use super::patch::fitting_patch;
-use super::{BodySpec, ContactSpec, GlobalSpec, LocalSpec, ModelChoice, NodeSpec, SafetySpec, StepKind};
+use super::{BodySpec, ContactSpec, GlobalSpec, LinkSpec, LocalSpec, ModelChoice, NodeSpec, SafetySpec, StepKind};
 use crate::model::Vec3;
 use crate::model::body::Body;
 use crate::model::local::Kind;
@@ -34,6 +34,9 @@ pub struct Scene {
     /// The local model: the fast, small simulation around each tool.
     #[serde(default)]
     pub local: LocalSpec,
+    /// The link between the two, if they are on two computers or as if they were; without, on one.
+    #[serde(default)]
+    pub link: Option<LinkSpec>,
     /// The devices, which move a tool and feel its force: one, or several with names.
     #[serde(rename = "device", with = "one_or_many", default = "one_device")]
     pub devices: Vec<DeviceSpec>,
@@ -123,6 +126,7 @@ impl Scene {
             contact: ContactSpec::default(),
             global: GlobalSpec::default(),
             local: LocalSpec::default(),
+            link: None,
             devices: one_device(),
             safety: SafetySpec::default(),
             initial: None,

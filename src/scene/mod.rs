@@ -17,6 +17,7 @@ mod description;
 mod device;
 mod file;
 mod haply;
+mod link;
 mod models;
 mod node;
 mod nodes;
@@ -34,6 +35,7 @@ pub use description::{InitialSpec, LogSpec, ProbeSpec, PullSpec, RunSpec, Scene}
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};
 pub(crate) use device::{field as device_field, numbered};
 pub use haply::HaplySpec;
+pub use link::LinkSpec;
 pub use models::{BlendSpec, GlobalSpec, LocalSpec, ModelChoice, StepKind};
 pub use node::NodeSpec;
 pub(crate) use nodes::Nodes;

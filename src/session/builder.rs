@@ -7,7 +7,7 @@ use crate::model::contact::ToolShape;
 use crate::model::local::BlendKind;
 use crate::model::local::Feedback;
 use crate::runtime::{Disturbance, Execution, RateGroup};
-use crate::scene::{BlendSpec, FrictionSpec, ModelChoice, SafetyStage, Scene, StepKind};
+use crate::scene::{BlendSpec, FrictionSpec, LinkSpec, ModelChoice, SafetyStage, Scene, StepKind};
 
 /// Collects the parts of a session; fills a [`Scene`] as a scene file does, and passes the same validation.
 ///
@@ -81,6 +81,13 @@ impl SessionBuilder {
         let shapes = &mut self.parts.shapes;
         shapes.resize(shapes.len().max(device + 1), None);
         shapes[device] = Some(shape);
+        self
+    }
+
+    /// Puts a simulated link between the haptic side and the global model, as if they were on two computers.
+    #[must_use]
+    pub fn link(mut self, link: LinkSpec) -> Self {
+        self.parts.scene.link = Some(link);
         self
     }
 

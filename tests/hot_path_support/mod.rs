@@ -20,7 +20,7 @@ use palpate::model::mesh::Face;
 use palpate::runtime::Nanos;
 use palpate::runtime::RateGroup;
 use palpate::runtime::exchange::exchange;
-use palpate::scene::StepKind;
+use palpate::scene::{LinkSpec, StepKind};
 use palpate::session::Session;
 
 pub use device::GUARDED;
@@ -61,6 +61,8 @@ pub struct Case {
     pub has_shape: bool,
     /// Another tool presses beside it.
     pub has_second: bool,
+    /// The global model is behind a link.
+    pub is_linked: bool,
 }
 
 const VARIABLE: &str = "PALPATE_HOT_PATH_CHILD";
@@ -97,7 +99,8 @@ pub enum Ended {
 
 impl Case {
     pub fn new(model: LocalModelKind, guard: Guard) -> Self {
-        Self { model, guard, offence: Offence::None, privileged: true, has_shape: false, has_second: false }
+        let (privileged, has_shape, has_second, is_linked) = (true, false, false, false);
+        Self { model, guard, offence: Offence::None, privileged, has_shape, has_second, is_linked }
     }
 
     pub fn with(self, offence: Offence) -> Self {
@@ -114,6 +117,10 @@ impl Case {
 
     pub fn with_second(self) -> Self {
         Self { has_second: true, ..self }
+    }
+
+    pub fn linked(self) -> Self {
+        Self { is_linked: true, ..self }
     }
 
     /// Runs it in a process of its own; `None`, with the reason printed, where the kernel refuses the filter.
@@ -168,6 +175,7 @@ impl Case {
             usize::from(self.privileged).to_string(),
             usize::from(self.has_shape).to_string(),
             usize::from(self.has_second).to_string(),
+            usize::from(self.is_linked).to_string(),
         ]
         .join(" ")
     }
@@ -175,7 +183,7 @@ impl Case {
     fn of_environment() -> Option<Self> {
         let text = std::env::var(VARIABLE).ok()?;
         let places: Vec<usize> = text.split(' ').map(|word| word.parse().expect("numbers")).collect();
-        let [model, guard, offence, privileged, has_shape, has_second] = places[..] else {
+        let [model, guard, offence, privileged, has_shape, has_second, is_linked] = places[..] else {
             panic!("{text:?} is no case")
         };
         Some(Self {
@@ -185,6 +193,7 @@ impl Case {
             privileged: privileged == 1,
             has_shape: has_shape == 1,
             has_second: has_second == 1,
+            is_linked: is_linked == 1,
         })
     }
 }
@@ -235,6 +244,9 @@ pub fn child() {
         .local_step(if case.model == LocalModelKind::ScaledBoundary { StepKind::Implicit } else { StepKind::Auto })
         .crossfade_ms(10.0)
         .log(std::env::var_os(LOG).expect("set by the parent"));
+    if case.is_linked {
+        session = session.link(LinkSpec { delay_ms: 5.0, jitter_ms: 2.0, loss: 0.01, ..LinkSpec::default() });
+    }
     if !case.privileged {
         session = session.local(RateGroup::hz(1000).best_effort());
     }

@@ -135,7 +135,8 @@ impl Analysis {
             | LogRecord::Global(_)
             | LogRecord::Port(_)
             | LogRecord::Input(_)
-            | LogRecord::Probe(_) => {}
+            | LogRecord::Probe(_)
+            | LogRecord::Link(_) => {}
         }
     }
 

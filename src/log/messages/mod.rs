@@ -16,7 +16,7 @@ use self::contact::ContactPoint;
 pub(crate) use self::wire::LogMessage;
 use self::wire::{Uint64s, WireEnum, message, messages, wire_enum};
 use super::percentiles::Percentiles;
-use super::records::{CommandSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy};
+use super::records::{CommandSample, ForceSample, GlobalTick, LinkSample, ProbeSample, Resync, ServedBy};
 use super::stats::GroupStats;
 use crate::model::contact::ContactMode;
 use crate::runtime::{self, GroupMode, InputUse, Nanos, PortUse, PortUseKind, SlipCause, TickTiming};
@@ -154,6 +154,7 @@ fn file() -> FileDescriptorProto {
             InputUse::descriptor(),
             ProbeSample::descriptor(),
             GroupStats::descriptor(),
+            LinkSample::descriptor(),
         ],
         enum_type: vec![
             SlipCause::enum_descriptor(false),

@@ -2,7 +2,9 @@
 
 use super::foxglove::{Log, PoseInFrame, SceneUpdate};
 use super::{ActorTimes, Contact, LogMessage};
-use crate::log::records::{CommandSample, Environment, ForceSample, GlobalTick, LogRecord, ProbeSample, Resync};
+use crate::log::records::{
+    CommandSample, Environment, ForceSample, GlobalTick, LinkSample, LogRecord, ProbeSample, Resync,
+};
 use crate::log::stats::GroupStats;
 use crate::runtime::TickTiming;
 use crate::runtime::{InputUse, PortUse};
@@ -25,6 +27,7 @@ pub enum TopicKind {
     Probe,
     Scene,
     Log,
+    Link,
 }
 
 /// One topic: its kind, and the number of the rate group or device that it is of, 0 if it is of none.
@@ -36,7 +39,10 @@ use TopicKind as Kind;
 /// The kinds that each device has a topic of, in the order in which a log declares them.
 const OF_DEVICE: [Kind; 6] = [Kind::Force, Kind::ForceCommanded, Kind::Tool, Kind::Contact, Kind::Resync, Kind::Probe];
 
-/// The topics that every log declares; `/scene` only those that have it.
+/// The group whose releases are those of a link.
+const LINK_GROUP: &str = "link";
+
+/// The topics that every log declares; `/scene` only those that have it, and `/link` where there is one.
 const SHARED: [Kind; 4] = [Kind::Global, Kind::Ports, Kind::Inputs, Kind::Log];
 
 impl Topic {
@@ -51,7 +57,9 @@ impl Topic {
         let actors = groups.filter(has_actors).map(|group| Self(Kind::Actors, group));
         let of_device = |device| OF_DEVICE.map(|kind| Self(kind, device));
         let devices = number(environment.devices.len().max(1)).flat_map(of_device);
-        timed.chain(actors).chain(devices).chain(SHARED.map(|kind| Self(kind, 0)))
+        let has_link = environment.groups.iter().any(|group| group.name == LINK_GROUP);
+        let link = has_link.then_some(Self(Kind::Link, 0));
+        timed.chain(actors).chain(devices).chain(SHARED.map(|kind| Self(kind, 0))).chain(link)
     }
 
     /// The topic where `record` belongs.
@@ -70,6 +78,7 @@ impl Topic {
             LogRecord::Port(_) => Self(Kind::Ports, 0),
             LogRecord::Input(_) => Self(Kind::Inputs, 0),
             LogRecord::Probe(r) => Self(Kind::Probe, r.device),
+            LogRecord::Link(_) => Self(Kind::Link, 0),
         }
     }
 
@@ -78,7 +87,7 @@ impl Topic {
         let word = kind.word();
         match kind {
             Kind::Timing | Kind::Actors | Kind::Stats => format!("/{word}/{}", environment.group_name(number)),
-            Kind::Global | Kind::Ports | Kind::Inputs | Kind::Scene | Kind::Log => format!("/{word}"),
+            Kind::Global | Kind::Ports | Kind::Inputs | Kind::Scene | Kind::Log | Kind::Link => format!("/{word}"),
             _ => format!("{}/{word}", environment.device_prefix(number)),
         }
     }
@@ -102,6 +111,7 @@ impl TopicKind {
             Self::Probe => ("probe", ProbeSample::NAME),
             Self::Scene => ("scene", SceneUpdate::NAME),
             Self::Log => ("log", Log::NAME),
+            Self::Link => ("link", LinkSample::NAME),
         }
     }
 
@@ -116,7 +126,7 @@ impl TopicKind {
 
     /// All kinds.
     fn all() -> impl Iterator<Item = Self> {
-        let others = [Self::Timing, Self::Actors, Self::Stats, Self::Scene];
+        let others = [Self::Timing, Self::Actors, Self::Stats, Self::Scene, Self::Link];
         others.into_iter().chain(OF_DEVICE).chain(SHARED)
     }
 
@@ -132,7 +142,7 @@ impl TopicKind {
     pub fn of_topic(name: &str) -> Option<Self> {
         let name = name.strip_prefix('/')?;
         match name.split_once('/') {
-            None => OF_DEVICE.into_iter().chain(SHARED).find(|kind| kind.word() == name),
+            None => OF_DEVICE.into_iter().chain(SHARED).chain([Self::Link]).find(|kind| kind.word() == name),
             Some((first, second)) => [Self::Timing, Self::Actors, Self::Stats]
                 .into_iter()
                 .find(|kind| kind.word() == first && !second.is_empty())

@@ -316,6 +316,7 @@ impl LogEntry {
             TopicKind::Ports => LogRecord::Port(LogMessage::decode(data)?),
             TopicKind::Inputs => LogRecord::Input(LogMessage::decode(data)?),
             TopicKind::Probe => LogRecord::Probe(LogMessage::decode(data)?),
+            TopicKind::Link => LogRecord::Link(LogMessage::decode(data)?),
             TopicKind::Stats => return Ok(Some(Self::Stats(LogMessage::decode(data)?))),
             TopicKind::Scene => return Ok(None),
             TopicKind::Log => {

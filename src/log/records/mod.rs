@@ -15,7 +15,9 @@ pub(super) use self::environment::{MAX_GROUPS, SCHEMA_VERSION_KEY};
 pub use self::event::{Level, TextEvent};
 pub use self::joined::JoinedRecords;
 pub(crate) use self::packing::MAX_DEVICES;
-pub use self::samples::{CommandSample, ForceSample, GlobalTick, ProbeSample, Resync, ServedBy, ToolSample};
+pub use self::samples::{
+    CommandSample, ForceSample, GlobalTick, LinkSample, ProbeSample, Resync, ServedBy, ToolSample,
+};
 pub use self::scene::{SceneFrame, SceneTool};
 
 use self::packing::Recorded;
@@ -51,6 +53,7 @@ pub enum LogRecord {
     Resync(Resync),
     Global(GlobalTick),
     Probe(ProbeSample),
+    Link(LinkSample),
 }
 
 /// Does the same with whichever record it is.
@@ -70,6 +73,7 @@ macro_rules! each {
             LogRecord::Resync($r) => $of,
             LogRecord::Global($r) => $of,
             LogRecord::Probe($r) => $of,
+            LogRecord::Link($r) => $of,
         }
     };
 }
@@ -90,7 +94,13 @@ impl LogRecord {
             Self::Contact(r) => r.device,
             Self::Resync(r) => r.device,
             Self::Probe(r) => r.device,
-            Self::Tick(_) | Self::Actors(_) | Self::Event(_) | Self::Port(_) | Self::Input(_) | Self::Global(_) => 0,
+            Self::Tick(_)
+            | Self::Actors(_)
+            | Self::Event(_)
+            | Self::Port(_)
+            | Self::Input(_)
+            | Self::Global(_)
+            | Self::Link(_) => 0,
         }
     }
 
@@ -130,6 +140,7 @@ impl LogRecord {
             Resync::KIND => Self::Resync(Resync::unpack(record, device)),
             GlobalTick::KIND => Self::Global(GlobalTick::unpack(record, device)),
             ProbeSample::KIND => Self::Probe(ProbeSample::unpack(record, device)),
+            LinkSample::KIND => Self::Link(LinkSample::unpack(record, device)),
             _ => return None,
         })
     }
@@ -228,6 +239,16 @@ mod tests {
                 local_m: [1.0, 2.0, 3.0],
                 global_m: [4.0, 5.0, 6.0],
                 device: 5,
+            }),
+            LogRecord::Link(LinkSample {
+                time,
+                epoch: 2,
+                round_trip: Nanos(28_000_000),
+                clock_ahead_s: -0.25,
+                clock_drift_ppm: 12.0,
+                sent: 1 << 40,
+                received: 3,
+                lost: 4,
             }),
         ];
         for record in records {

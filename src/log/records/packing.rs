@@ -8,11 +8,11 @@ use crate::runtime::Nanos;
 use crate::runtime::{Channel, Record};
 
 /// Channels of a device: each has its own of every kind.
-const CHANNELS: u16 = 16;
+const CHANNELS: u16 = 32;
 /// In the kind of a record: its sample is not whole without the part that comes before it.
-const HAS_PART: u16 = 8;
+const HAS_PART: u16 = 16;
 /// The kind of such a part; its code is the kind of the record that it belongs to.
-pub(super) const PART: u16 = 15;
+pub(super) const PART: u16 = 31;
 
 /// The most devices that a scene can have; channels beyond theirs are a program's own.
 pub(crate) const MAX_DEVICES: u16 = 8;

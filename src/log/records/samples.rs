@@ -182,3 +182,25 @@ record! {
         global_m: [f64; 3] = 4,
     } of device 5
 }
+
+record! {
+    /// The state of the link to the global model's computer, on the topic `/link`.
+    LinkSample is "palpate.Link" on 8 {
+        /// The scheduled time of the release that looked.
+        time = 1,
+        /// The number of the connection: a new one begins where the one before had fallen silent.
+        epoch: u32 = 2,
+        /// The quickest round trip of the last 1.6 s; zero before the first.
+        round_trip as round_trip_ns: Nanos = 3,
+        /// How far the clock there is ahead, beyond the start of the two runs (s).
+        clock_ahead_s: f64 = 4,
+        /// How much faster it goes (parts per million).
+        clock_drift_ppm: f64 = 5,
+        /// Messages that were sent from here.
+        sent: u64 = 6,
+        /// Messages of this connection that came.
+        received: u64 = 7,
+        /// Messages of this connection that have not come, of those that were sent before the newest one that did.
+        lost: u64 = 8,
+    }
+}

@@ -149,6 +149,7 @@ impl<W: Write> McapWriter<W> {
             LogRecord::Port(r) => self.push(topic, time, r),
             LogRecord::Input(r) => self.push(topic, time, r),
             LogRecord::Probe(r) => self.push(topic, time, r),
+            LogRecord::Link(r) => self.push(topic, time, r),
         }
     }
 

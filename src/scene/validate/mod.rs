@@ -4,6 +4,7 @@ mod check;
 mod counts;
 mod devices;
 mod friction;
+mod link;
 mod safety;
 mod tissue;
 
@@ -67,6 +68,7 @@ fn validate(scene: &Scene) -> Result<(), Error> {
     friction::validate(&scene.contact)?;
     global(&scene.global)?;
     local(&scene.local, &scene.global)?;
+    link::validate(scene)?;
     if scene.local.step == StepKind::Implicit && scene.contact.equations == Equations::Paper {
         let message =
             "\"implicit\" has the corrected contact equations only, leave it out or use equations = \"corrected\"";

@@ -8,6 +8,7 @@ mod choice;
 mod device;
 mod groups;
 mod limits;
+mod link;
 mod patch;
 mod plan;
 mod situation;
@@ -17,6 +18,7 @@ mod tools;
 pub use choice::Choice;
 pub(super) use choice::extended;
 pub(super) use groups::BASIS;
+pub(super) use link::LINK;
 pub(super) use plan::ModelPlan;
 pub(super) use timing::Timing;
 pub(super) use tools::Tool;
@@ -66,11 +68,23 @@ impl Prepared {
         self.plan.is_multi_rate()
     }
 
+    /// True if there is a link between the two.
+    pub(super) fn is_linked(&self) -> bool {
+        self.is_multi_rate() && self.plan.link.is_some()
+    }
+
+    /// The group of the bridges of a link.
+    pub(super) fn link_group(&self) -> RateGroup {
+        link::group(self.plan.timing.haptic)
+    }
+
     /// The rate groups, in graph order.
     pub(super) fn groups(&self) -> Vec<RateGroup> {
         let global = self.is_multi_rate().then(|| self.global.clone());
         let basis = self.reduces().then(|| self.basis_group());
-        [self.local.clone()].into_iter().chain(basis).chain(global).chain([self.logger_group()]).collect()
+        let link = self.is_linked().then(|| self.link_group());
+        let others = basis.into_iter().chain(global).chain(link);
+        [self.local.clone()].into_iter().chain(others).chain([self.logger_group()]).collect()
     }
 
     /// The group that reduces surroundings: it looks for wishes as often as the global model makes them.
@@ -98,6 +112,8 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let blend_ticks = (scene.local.blend.ms * 1e-3 / rates[0].period_s()).round().max(1.0) as u32;
     let work = Nanos::from_secs_f64(start.body.nominal_evaluation() * f64::from(start.substeps));
     let lateness = timing::lateness(&global, rates[0], work, options.in_real_time);
+    let lateness = link::lateness(scene.link.as_ref(), rates[0], lateness);
+    link::check(scene.link.as_ref(), &*start.body)?;
     let timing = Timing::new(rates, start.substeps, lateness, blend_ticks);
 
     let (kind, choice, measured) = choice::model(&mut scene, &mut start, timing, execution);
@@ -135,6 +151,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         blend,
         in_real_time,
         probes,
+        link: scene.link.as_ref().map(link::conditions),
         basis_folder,
         settings: Settings { friction: law.friction, stiffness: Stiffness::default(), model: kind },
         stiffest: Stiffness::largest(start.stable_step, start.tick, start.substeps),
@@ -195,7 +212,11 @@ fn template(kind: Kind, scene: &Scene, start: &Start, timing: Timing) -> Result<
     // The longer one where periods alternate, 33 and 34 ticks at 30 Hz.
     let ticks = (timing.haptic.as_hz() / timing.global.as_hz() - 1e-6).ceil().min(f64::from(u32::MAX)) as u32;
     let template = Template::new(kind, scene.patch_size(), &*start.body)?
-        .with_feedback(scene.local.feedback.unwrap_or(Feedback::of(kind)))
+        .with_feedback(scene.local.feedback.unwrap_or(match scene.link {
+            // A geometry that comes late belongs to another tick than the body's.
+            Some(_) => Feedback::Trajectory,
+            None => Feedback::of(kind),
+        }))
         .with_period(ticks);
     Ok(if is_implicit { template.with_implicit_steps() } else { template })
 }

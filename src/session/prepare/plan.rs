@@ -7,6 +7,7 @@ use super::body::Start;
 use super::situation::Situation;
 use super::timing::Timing;
 use crate::actors::Settings;
+use crate::link::Conditions;
 use crate::model::body::Stiffness;
 use crate::model::contact::Equations;
 use crate::model::local::{Blend, Kind, Template};
@@ -27,6 +28,8 @@ pub(crate) struct ModelPlan {
     pub(crate) in_real_time: bool,
     /// Logged nodes.
     pub(crate) probes: Vec<u32>,
+    /// What is between local and global model, if they are to be taken for two computers.
+    pub(crate) link: Option<Conditions>,
     /// Where reduced surroundings are kept from run to run.
     pub(crate) basis_folder: Option<PathBuf>,
     /// What may be changed while it runs, as it is at the start.
@@ -55,7 +58,8 @@ pub(super) fn kinds(scene: &Scene, first: Kind, situation: impl FnOnce() -> Situ
     let mut kinds = vec![(first, scene.patch_size())];
     // Several tools with `full` share one body, which no local model does.
     let several = scene.devices.len() > 1;
-    if !scene.run.switchable || (several && first == Kind::Full) {
+    // Over a link both sides make their models of one kind.
+    if !scene.run.switchable || scene.link.is_some() || (several && first == Kind::Full) {
         return kinds;
     }
     let situation = situation();

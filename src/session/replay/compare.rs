@@ -32,7 +32,8 @@ fn place(record: &LogRecord) -> Option<usize> {
         | LogRecord::Event(_)
         | LogRecord::Port(_)
         | LogRecord::Input(_)
-        | LogRecord::Tool(_) => None,
+        | LogRecord::Tool(_)
+        | LogRecord::Link(_) => None,
     }
 }
 

@@ -72,7 +72,8 @@ fn fields(record: &LogRecord) -> Vec<(&'static str, u64)> {
         | LogRecord::Event(_)
         | LogRecord::Port(_)
         | LogRecord::Input(_)
-        | LogRecord::Tool(_) => {}
+        | LogRecord::Tool(_)
+        | LogRecord::Link(_) => {}
     }
     all
 }

@@ -8,7 +8,7 @@ use crate::model::contact::ToolShape;
 use crate::runtime::{Execution, Rate};
 use crate::safety::Actions;
 use crate::scene::{BodySpec, TetrahedraSpec};
-use crate::session::prepare::{BASIS, Prepared, Tool};
+use crate::session::prepare::{BASIS, LINK, Prepared, Tool};
 
 /// The environment of a run whose devices gave these `first` states.
 pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<Environment, Error> {
@@ -97,7 +97,10 @@ fn groups(prepared: &Prepared) -> Vec<GroupInfo> {
     let basis = || GroupInfo { background: true, ..group(BASIS, timing.global) };
     let global = || GroupInfo { budget: prepared.global.declared_budget(), ..group("global", timing.global) };
     let logger = group("logger", prepared.logger_group().rate());
-    let optional = [prepared.reduces().then(basis), prepared.is_multi_rate().then(global)];
+    let bridges = || ["global bridge", "haptic bridge"].map(str::to_owned).into();
+    let link = || GroupInfo { background: true, actors: bridges(), ..group(LINK, timing.haptic) };
+    let optional =
+        [prepared.reduces().then(basis), prepared.is_multi_rate().then(global), prepared.is_linked().then(link)];
     [local].into_iter().chain(optional.into_iter().flatten()).chain([logger]).collect()
 }
 

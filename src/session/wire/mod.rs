@@ -7,6 +7,7 @@ mod buffers;
 mod environment;
 mod global;
 mod haptic;
+mod link;
 mod models;
 mod sink;
 
@@ -76,9 +77,10 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     let settings = graph.parameter(prepared.plan.settings);
     let controls = Controls::new(settings.clone(), &prepared.plan);
     let logger_group = prepared.logger_group();
+    let link_group = prepared.link_group();
     let pointers = prepared.tools.iter_mut().map(|tool| tool.pointer.take()).collect();
     let Prepared { simulation, tools, plan, local, global, until, .. } = prepared;
-    let (models, maker) = models::models(&mut graph, &plan, simulation, &places, surfaces, bases, settings);
+    let (models, maker, bridges) = models::models(&mut graph, &plan, simulation, &places, surfaces, bases, settings)?;
     let haptic = haptic::actors(&mut graph, &plan, tools, ends, &first, models, ticks);
 
     let outcome = LoggerOutcome::default();
@@ -95,6 +97,10 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     }
     if let Some(maker) = maker {
         maker.measured_by(build_cost).join(&mut graph, global)?;
+    }
+    if !bridges.is_empty() {
+        // Behind the global group: what that publishes at its start is over there before the run begins.
+        graph.group(link_group, bridges);
     }
     graph.group(logger_group, vec![logger]);
     if let Some(until) = until {

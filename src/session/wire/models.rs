@@ -3,11 +3,13 @@
 use super::basis::BasisSide;
 use super::buffers::ticks_buffered;
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
+use super::link::Linking;
 use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, ModelMaker, Settings, SurfaceView};
+use crate::error::Error;
 use crate::model::Pose;
 use crate::model::local::{PatchGeometry, Succession};
 use crate::model::simulation::Simulation;
-use crate::runtime::{ExchangePort, OutletPort, OutletWriter, Parameter, ParameterReader, RuntimeBuilder};
+use crate::runtime::{Actor, ExchangePort, OutletPort, OutletWriter, Parameter, ParameterReader, RuntimeBuilder};
 use crate::session::prepare::ModelPlan;
 
 /// What computes the forces at the haptic rate.
@@ -19,7 +21,11 @@ pub(super) enum Models {
     Local(Vec<(Succession, LocalPorts)>),
 }
 
-/// What computes the forces; and what makes the global actor, unless that is the whole body.
+/// What computes the forces; what makes the global actor, unless that is the whole body; and the bridges between the two, if there are
+/// any.
+///
+/// # Errors
+/// If there is a link and the body cannot be copied.
 pub(super) fn models(
     graph: &mut RuntimeBuilder,
     plan: &ModelPlan,
@@ -28,10 +34,10 @@ pub(super) fn models(
     surfaces: Vec<OutletPort<SurfaceView>>,
     bases: Option<BasisSide>,
     settings: Parameter<Settings>,
-) -> (Models, Option<GlobalMaker>) {
+) -> Result<(Models, Option<GlobalMaker>, Vec<Box<dyn Actor>>), Error> {
     if !plan.is_multi_rate() {
         let surfaces = surfaces.iter().map(OutletPort::writer).collect();
-        return (Models::Whole(simulation, surfaces, settings.reader()), None);
+        return Ok((Models::Whole(simulation, surfaces, settings.reader()), None, Vec::new()));
     }
     let (surroundings, known) = match bases {
         Some(BasisSide { wishes, bases, known, .. }) => (Some((wishes, bases)), known),
@@ -45,28 +51,35 @@ pub(super) fn models(
     let ticks = ticks_buffered(plan);
     // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
     let nodes = simulation.state().positions.len();
-    let link = |_| ToolLink {
-        ticks: graph.queue_port(ticks),
-        geometry: feeds_back.then(|| graph.exchange_port(move || PatchGeometry::with_room(nodes))),
-        models: graph.exchange_port(model.clone()),
+    let mut linking = plan.link.as_ref().map(|conditions| Linking::new(conditions, &simulation)).transpose()?;
+    let mut connected = |_| match &mut linking {
+        Some(linking) => linking.connect(graph, &maker, ticks),
+        None => {
+            let link = ToolLink {
+                ticks: graph.queue_port(ticks),
+                geometry: feeds_back.then(|| graph.exchange_port(move || PatchGeometry::with_room(nodes))),
+                models: graph.exchange_port(model.clone()),
+            };
+            let ports = LocalPorts {
+                models: link.models.reader(),
+                ticks: link.ticks.writer(),
+                geometry: link.geometry.as_ref().map(ExchangePort::writer),
+            };
+            (link, ports)
+        }
     };
+    let (tools, locals): (Vec<_>, Vec<_>) = places.iter().map(&mut connected).unzip();
     let side = GlobalSide {
-        tools: places.iter().map(link).collect(),
+        tools,
         settings,
         surroundings,
         surfaces,
         checkpoint: graph.outlet_port(Checkpoint::default),
         recorder: graph.recorder_port(ticks),
     };
-    let of_tool = |link: &ToolLink| {
-        let ports = LocalPorts {
-            models: link.models.reader(),
-            ticks: link.ticks.writer(),
-            geometry: link.geometry.as_ref().map(ExchangePort::writer),
-        };
-        (Succession::new([model(), model(), model()], plan.blend, Pose::default()), ports)
-    };
-    let models = Models::Local(side.tools.iter().map(of_tool).collect());
+    let of_tool = |ports| (Succession::new([model(), model(), model()], plan.blend, Pose::default()), ports);
+    let models = Models::Local(locals.into_iter().map(of_tool).collect());
+    let linked = linking.is_some();
     let plan = GlobalPlan {
         haptic: plan.timing.haptic,
         global: plan.timing.global,
@@ -74,6 +87,8 @@ pub(super) fn models(
         models: maker,
         patch: plan.window(),
         bases: known,
+        linked,
     };
-    (models, Some(GlobalMaker::new(simulation, places, plan, side)))
+    let bridges = linking.map(|linking| linking.bridges(graph)).unwrap_or_default();
+    Ok((models, Some(GlobalMaker::new(simulation, places, plan, side)), bridges))
 }

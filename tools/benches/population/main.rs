@@ -4,7 +4,8 @@
 //! `cargo bench --bench population`; with `-- --quick` a short form that prints and writes nothing; with `-- --seen` the two
 //! thirds of the cases that may be looked at while working, case by case, written nowhere; `--cases N` how many, `--from N` the first
 //! seed, or `--only A,B` which; `--patch A,B,C`, `--basis N`, `--basis-latency MS` and `--budget PERCENT` in place of the defaults;
-//! `--models A,B` in place of `predictive` and `patch`.
+//! `--models A,B` in place of `predictive` and `patch`; `--link MS,SHARE` with the global model behind a link of so much delay one way
+//! and such a share of lost packets.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -20,6 +21,7 @@ use std::process::ExitCode;
 
 use palpate::Error;
 use palpate::model::local::Kind;
+use palpate::scene::LinkSpec;
 
 use cases::is_unseen;
 use runs::{Settings, run_all};
@@ -69,6 +71,11 @@ fn main() -> ExitCode {
         }),
         basis: number("--basis"),
         latency_ms: value("--basis-latency").and_then(|value| value.parse().ok()),
+        link: value("--link").map(|conditions| {
+            let mut numbers = conditions.split(',').map(|number| number.parse().expect("--link takes MS,SHARE"));
+            let mut next = || numbers.next().expect("--link takes MS,SHARE");
+            LinkSpec { delay_ms: next(), loss: next(), seed: 1, ..LinkSpec::default() }
+        }),
     };
     let is_seen = std::env::args().any(|argument| argument == "--seen");
     let done = match is_seen {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use palpate::log::ServedBy;
 use palpate::model::local::Kind;
 use palpate::runtime::Nanos;
-use palpate::scene::{ModelChoice, Scene};
+use palpate::scene::{LinkSpec, ModelChoice, Scene};
 use palpate::{Error, Session};
 use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 
@@ -23,6 +23,8 @@ pub struct Settings {
     pub patch: Option<[usize; 3]>,
     pub basis: Option<usize>,
     pub latency_ms: Option<f64>,
+    /// What is between local and global model.
+    pub link: Option<LinkSpec>,
 }
 
 impl Settings {
@@ -35,6 +37,7 @@ impl Settings {
         }
         scene.local.basis = self.basis.or(scene.local.basis);
         scene.local.error_pct = self.budget.or(scene.local.error_pct);
+        scene.link.clone_from(&self.link);
         scene.global.basis_latency_ms = self.latency_ms.unwrap_or(scene.global.basis_latency_ms);
     }
 }

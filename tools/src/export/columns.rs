@@ -82,6 +82,9 @@ pub(super) fn columns(kind: TopicKind, is_turned: bool) -> &'static [Column] {
         TopicKind::Probe => table! {
             F64: t_s, U32: node, F64: local_x_m local_y_m local_z_m global_x_m global_y_m global_z_m
         },
+        TopicKind::Link => table! {
+            F64: t_s, U32: epoch, F64: round_trip_s clock_ahead_s clock_drift_ppm, U64: sent received lost
+        },
         // For viewers; refused before anything is asked of it.
         TopicKind::Scene => &[],
         TopicKind::Log => table! { F64: t_s, Text: level message },
@@ -156,6 +159,11 @@ fn record_cells(record: &LogRecord, row: &mut Vec<Cell>) {
         LogRecord::Resync(r) => {
             row.extend([t_s, U32(r.version), F64(r.age.as_secs_f64())]);
             row.extend([r.jump_before_n, r.jump_after_n, r.energy_j].map(F64));
+        }
+        LogRecord::Link(r) => {
+            row.extend([t_s, U32(r.epoch)]);
+            row.extend([r.round_trip.as_secs_f64(), r.clock_ahead_s, r.clock_drift_ppm].map(F64));
+            row.extend([r.sent, r.received, r.lost].map(U64));
         }
         LogRecord::Global(r) => row.extend([t_s, U32(r.version), U64(r.first_tick), U64(r.last_tick)]),
         LogRecord::Port(r) => {

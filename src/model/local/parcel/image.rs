@@ -12,6 +12,9 @@ const MOST_TRIANGLES: usize = 1 << 16;
 /// The image of a simulation on another computer: of the same body, in the state that the last [`Parcel`] of each window told.
 ///
 /// Whatever comes is asked whether it fits the body before anything is done with it.
+///
+/// # Real-time
+/// Not for a tick: allocates, and builds models.
 #[derive(Debug)]
 pub struct Image {
     simulation: Simulation,
@@ -63,8 +66,7 @@ impl Image {
 
     /// True if `basis` can be one of this body.
     pub fn has_room_for(&self, basis: &Basis) -> bool {
-        self.is_patch(basis.patch())
-            && self.ring_of(basis.patch()).is_some_and(|ring| basis.answers.is_of(3 * ring))
+        self.is_patch(basis.patch()) && self.ring_of(basis.patch()).is_some_and(|ring| basis.answers.is_of(3 * ring))
     }
 
     /// The nodes of the ring around a patch; `None` if the body cannot be taken apart.

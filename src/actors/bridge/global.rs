@@ -1,0 +1,141 @@
+//! The bridge beside the global actor: tool ticks in, local models and bases out.
+
+use std::collections::BTreeMap;
+
+use super::super::messages::ToolTick;
+use super::post::Post;
+use super::{MOST_MESSAGES, key_of};
+use crate::link::{Lane, Message, Transport};
+use crate::model::Pose;
+use crate::model::local::{LocalModel, Parcel};
+use crate::model::surroundings::Basis;
+use crate::runtime::{Actor, ActorError, Nanos, Outcome, QueueWriter, Reader, TickContext};
+
+/// A basis that is not there after so long is sent again.
+const SENT_AGAIN: Nanos = Nanos(3_000_000_000);
+/// Bases that are on their way at the same time: more would wait for one another, and the first ones are wanted first.
+const MOST_ON_THE_WAY: usize = 4;
+
+/// The ports of a [`GlobalBridge`] for one tool.
+#[derive(Debug)]
+pub struct GlobalEnd {
+    /// The tool at every haptic tick that came.
+    pub ticks: QueueWriter<ToolTick>,
+    /// The next local model: one that is [built elsewhere](crate::model::local::Template::departing).
+    pub models: Reader<Box<dyn LocalModel>>,
+}
+
+/// Carries local models to the haptic side, and the tool ticks that come from there to the global actor.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
+#[derive(Debug)]
+pub struct GlobalBridge {
+    post: Post,
+    tools: Vec<GlobalEnd>,
+    /// The newest tick of each tool.
+    newest: Vec<u64>,
+    bases: SentBases,
+}
+
+/// What the haptic side has.
+#[derive(Debug, Default)]
+struct SentBases {
+    /// When each was sent.
+    on_the_way: BTreeMap<u64, Nanos>,
+    held: Vec<u64>,
+}
+
+impl GlobalBridge {
+    /// A bridge for the tools of `ends`.
+    pub fn new(transport: Box<dyn Transport>, ends: Vec<GlobalEnd>) -> Self {
+        let newest = vec![0; ends.len()];
+        Self { post: Post::new(transport), tools: ends, newest, bases: SentBases::default() }
+    }
+
+    fn send_models(&mut self, ctx: &TickContext) {
+        let Self { post, tools, bases, .. } = self;
+        for end in tools {
+            if end.models.refresh(ctx)
+                && let Some(parcel) = end.models.get().parcel()
+            {
+                bases.send(post, parcel, ctx.scheduled);
+                let lane = Lane::Model { tool: parcel.tool() as u16 };
+                post.send_with(lane, ctx.scheduled, |header, bytes| Message::write_model(parcel, header, bytes));
+            }
+        }
+    }
+
+    fn receive(&mut self, ctx: &TickContext) {
+        for _ in 0..MOST_MESSAGES {
+            let epoch = self.post.epoch;
+            let Some((header, message)) = self.post.receive(ctx.scheduled, true) else { return };
+            if self.post.epoch != epoch {
+                // The haptic side has begun anew: what it has is not known.
+                self.bases = SentBases::default();
+            }
+            match message {
+                Message::Ticks { tool, ticks } => self.pass(ctx, tool.into(), ticks),
+                Message::Held(keys) => self.bases.held = keys,
+                Message::Ping => {
+                    let answer = Message::Pong { sent: header.sent, received: ctx.scheduled };
+                    self.post.send(Lane::Urgent, ctx.scheduled, &answer);
+                }
+                // Of the other direction.
+                Message::Model(_) | Message::Basis { .. } | Message::Pong { .. } => {}
+            }
+        }
+    }
+
+    /// Passes on what is new of `ticks`: most of them came before.
+    fn pass(&mut self, ctx: &TickContext, tool: usize, ticks: Vec<(u64, Pose)>) {
+        let (Some(end), Some(newest)) = (self.tools.get_mut(tool), self.newest.get_mut(tool)) else { return };
+        for (tick, pose) in ticks {
+            if tick > *newest {
+                *newest = tick;
+                // A full queue is counted; the global model sees the gap and interpolates over it.
+                end.ticks.push(ctx, ToolTick { tick, pose });
+            }
+        }
+    }
+}
+
+impl SentBases {
+    /// Sends what the haptic side lacks of the bases that `parcel` knows, the one that it needs itself first.
+    fn send(&mut self, post: &mut Post, parcel: &Parcel, now: Nanos) {
+        let Self { on_the_way, held } = self;
+        on_the_way.retain(|key, sent| !held.contains(key) && now.saturating_sub(*sent) < SENT_AGAIN);
+        let needed = parcel.patch().and_then(|patch| parcel.bases().get(patch)).map(|basis| &**basis);
+        let lacks = |basis: &&Basis| !held.contains(&key_of(basis.patch()));
+        for basis in needed.into_iter().chain(parcel.bases().iter()).filter(lacks) {
+            let key = key_of(basis.patch());
+            if on_the_way.len() >= MOST_ON_THE_WAY {
+                return;
+            }
+            if on_the_way.insert(key, now).is_none() {
+                post.send_with(Lane::Bulk, now, |header, bytes| Message::write_basis(key, basis, header, bytes));
+            }
+        }
+    }
+}
+
+impl Actor for GlobalBridge {
+    fn name(&self) -> &str {
+        "global bridge"
+    }
+
+    fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
+        self.send_models(ctx);
+        Ok(())
+    }
+
+    fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        self.send_models(ctx);
+        Outcome::Continue
+    }
+
+    fn commit(&mut self, ctx: &TickContext) -> Outcome {
+        self.receive(ctx);
+        Outcome::Continue
+    }
+}

@@ -1,0 +1,189 @@
+//! The bridge beside the local actors: tool ticks out, local models in.
+
+use std::collections::VecDeque;
+
+use super::super::cause::Cause;
+use super::super::messages::ToolTick;
+use super::post::Post;
+use super::{MOST_MESSAGES, SILENCE, key_of};
+use crate::link::{Clock, Lane, Message, Transport};
+use crate::log::LinkSample;
+use crate::model::local::{Image, LocalModel, Parcel};
+use crate::model::surroundings::{Bases, Basis};
+use crate::runtime::{Actor, ActorError, Nanos, Outcome, QueueReader, Recorder, TickContext, Writer};
+
+/// Ticks that a message has at least, if there are so many: those before the newest are repeated.
+const REPEATED: usize = 8;
+/// Ticks that are remembered: as many as one message holds.
+const REMEMBERED: usize = 64;
+/// Between two questions for the time.
+const ASKS_EVERY: Nanos = Nanos(50_000_000);
+
+/// The ports of a [`HapticBridge`] for one tool.
+#[derive(Debug)]
+pub struct HapticEnd {
+    /// The tool at every haptic tick.
+    pub ticks: QueueReader<ToolTick>,
+    /// The next local model.
+    pub models: Writer<Box<dyn LocalModel>>,
+}
+
+/// Carries tool ticks to the global side, and builds the local models that come from there.
+///
+/// # Real-time
+/// Not real-time safe: allocates, and builds models. Its group needs no priority.
+#[derive(Debug)]
+pub struct HapticBridge {
+    post: Post,
+    tools: Vec<Tool>,
+    image: Image,
+    bases: Bases,
+    /// Of the bases.
+    keys: Vec<u64>,
+    clock: Clock,
+    /// When something of this epoch came last; `None` before.
+    heard: Option<Nanos>,
+    asked: Option<Nanos>,
+    recorder: Recorder,
+}
+
+#[derive(Debug)]
+struct Tool {
+    end: HapticEnd,
+    /// Oldest first.
+    recent: VecDeque<ToolTick>,
+    /// The tick of the newest model of this epoch.
+    newest: Option<u64>,
+    /// The newest that has come in this release.
+    arrived: Option<Box<Parcel>>,
+}
+
+impl HapticBridge {
+    /// A bridge for the tools of `ends`, which builds models by the `image` of the body over there.
+    pub fn new(transport: Box<dyn Transport>, ends: Vec<HapticEnd>, image: Image, recorder: Recorder) -> Self {
+        let tool = |end| Tool { end, recent: VecDeque::new(), newest: None, arrived: None };
+        let (bases, keys, clock, heard, asked) = Default::default();
+        let (post, tools) = (Post::new(transport), ends.into_iter().map(tool).collect());
+        Self { post, tools, image, bases, keys, clock, heard, asked, recorder }
+    }
+
+    /// A connection that has fallen silent is over: what still comes of it is dropped.
+    fn begin_epoch_after_silence(&mut self, now: Nanos) -> bool {
+        let is_silent = self.heard.is_some_and(|heard| now.saturating_sub(heard) >= SILENCE);
+        if is_silent {
+            self.post.begin_epoch(self.post.epoch + 1);
+            self.heard = None;
+            self.tools.iter_mut().for_each(|tool| tool.newest = None);
+        }
+        self.heard.is_none()
+    }
+
+    fn send_ticks(&mut self, ctx: &TickContext) {
+        for (number, tool) in (0..).zip(&mut self.tools) {
+            let mut new = 0;
+            while let Some(tick) = tool.end.ticks.pop(ctx) {
+                if tool.recent.len() == REMEMBERED {
+                    tool.recent.pop_front();
+                }
+                tool.recent.push_back(tick);
+                new += 1;
+            }
+            if new > 0 {
+                let known = tool.recent.len();
+                let ticks = tool.recent.range(known - known.min(REPEATED.max(new))..);
+                let ticks = ticks.map(|tick| (tick.tick, tick.pose)).collect();
+                self.post.send(Lane::Urgent, ctx.scheduled, &Message::Ticks { tool: number, ticks });
+            }
+        }
+    }
+
+    fn ask(&mut self, now: Nanos) {
+        if self.asked.is_none_or(|asked| now.saturating_sub(asked) >= ASKS_EVERY) {
+            self.asked = Some(now);
+            self.post.send(Lane::Urgent, now, &Message::Ping);
+            self.post.send(Lane::Urgent, now, &Message::Held(self.keys.clone()));
+            self.record(now);
+        }
+    }
+
+    fn record(&mut self, time: Nanos) {
+        let [sent, received, lost] = self.post.counts();
+        self.recorder.push(LinkSample {
+            time,
+            epoch: u32::try_from(self.post.epoch).unwrap_or(u32::MAX),
+            round_trip: Nanos(self.clock.round_trip_ns().unwrap_or_default()),
+            clock_ahead_s: 1e-9 * self.clock.ahead_ns().unwrap_or_default(),
+            clock_drift_ppm: self.clock.drift_ppm(),
+            sent,
+            received,
+            lost,
+        });
+    }
+
+    /// Takes what has come; the newest models of all.
+    fn receive(&mut self, now: Nanos) {
+        for _ in 0..MOST_MESSAGES {
+            let Some((header, message)) = self.post.receive(now, false) else { return };
+            self.heard = Some(now);
+            match message {
+                Message::Model(parcel) => {
+                    let Some(tool) = self.tools.get_mut(parcel.tool()) else { continue };
+                    // One that was overtaken is outdated.
+                    if tool.newest.is_none_or(|newest| parcel.tick() > newest) {
+                        tool.newest = Some(parcel.tick());
+                        tool.arrived = Some(parcel);
+                    }
+                }
+                Message::Basis { key, basis } => self.keep(key, *basis),
+                Message::Pong { sent, received } => {
+                    self.clock.push([sent.0, received.0, header.sent.0, now.0]);
+                }
+                // Of the other direction.
+                Message::Ticks { .. } | Message::Held(_) | Message::Ping => {}
+            }
+        }
+    }
+
+    fn keep(&mut self, key: u64, basis: Basis) {
+        if key == key_of(basis.patch()) && !self.keys.contains(&key) && self.image.has_room_for(&basis) {
+            self.keys.push(key);
+            self.bases.insert(basis.into());
+        }
+    }
+
+    fn publish(&mut self, ctx: &TickContext) {
+        for tool in &mut self.tools {
+            if let Some(parcel) = tool.arrived.take()
+                && self.image.rebuild(&parcel, &self.bases, &mut **tool.end.models.buffer())
+            {
+                tool.end.models.publish(ctx);
+            }
+        }
+    }
+}
+
+impl Actor for HapticBridge {
+    fn name(&self) -> &str {
+        "haptic bridge"
+    }
+
+    fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
+        self.receive(ctx.scheduled);
+        self.publish(ctx);
+        self.post.begin();
+        Ok(())
+    }
+
+    fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        let is_silent = self.begin_epoch_after_silence(ctx.scheduled);
+        self.send_ticks(ctx);
+        self.ask(ctx.scheduled);
+        if is_silent { Outcome::Degraded(Cause::LinkSilent.code()) } else { Outcome::Continue }
+    }
+
+    fn commit(&mut self, ctx: &TickContext) -> Outcome {
+        self.receive(ctx.scheduled);
+        self.publish(ctx);
+        Outcome::Continue
+    }
+}

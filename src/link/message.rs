@@ -1,0 +1,315 @@
+//! What crosses, as bytes.
+//!
+//! ```text
+//! magic "plnk"   4    version   2    kind   2
+//! epoch          8    number    8    sent   8 (ns of the sender's clock)
+//! body
+//! ```
+//!
+//! Little-endian. A message is as long as it says and no longer; one byte more or less, another version, a kind that is not known or a
+//! number that is none, and all of it is refused.
+
+use std::fmt;
+
+use crate::model::bytes::{BytesReader, BytesWriter};
+use crate::model::local::Parcel;
+use crate::model::surroundings::Basis;
+use crate::model::{Pose, turn_of, wxyz};
+use crate::runtime::Nanos;
+
+const MAGIC: [u8; 4] = *b"plnk";
+/// The version of the format: of another one nothing is read.
+pub const VERSION: u16 = 1;
+/// No message is longer (bytes).
+pub const LARGEST: usize = 1 << 25;
+
+/// Ticks that one message repeats at most.
+const MOST_TICKS: usize = 64;
+/// Bases that one message names at most.
+const MOST_HELD: usize = 1024;
+/// Bytes of a tick.
+const TICK: usize = 8 * 8;
+/// How far from one the length of a turn may be.
+const UPRIGHT: f64 = 1e-6;
+
+/// What stands in front of every message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Header {
+    /// The connection that it belongs to, by number: what belongs to an older one is dropped.
+    pub epoch: u64,
+    /// Counts the messages of one side.
+    pub number: u64,
+    /// When it was sent, by the sender's clock.
+    pub sent: Nanos,
+}
+
+/// What one side tells the other.
+#[derive(Clone, Debug)]
+pub enum Message {
+    /// To the global side: a tool at its last haptic ticks, oldest first. Each message repeats some of those before, so that one that is
+    /// lost need not be sent again.
+    Ticks {
+        /// The tool.
+        tool: u16,
+        /// Number of the haptic tick, and where the tool is at its end.
+        ticks: Vec<(u64, Pose)>,
+    },
+    /// To the haptic side: what the next local model is built from.
+    Model(Box<Parcel>),
+    /// To the haptic side: reduced surroundings, once.
+    Basis {
+        /// What names it.
+        key: u64,
+        /// The surroundings.
+        basis: Box<Basis>,
+    },
+    /// To the global side: the bases that are there, by their keys.
+    Held(Vec<u64>),
+    /// To the global side: what time is it?
+    Ping,
+    /// To the haptic side: when the ping was sent, by the clock there, and when it came in, by the clock here.
+    Pong {
+        /// The time that was in the ping.
+        sent: Nanos,
+        /// When it came in.
+        received: Nanos,
+    },
+}
+
+const TICKS: u16 = 1;
+const MODEL: u16 = 2;
+const BASIS: u16 = 3;
+const HELD: u16 = 4;
+const PING: u16 = 5;
+const PONG: u16 = 6;
+
+/// Why a message is not believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// It is longer than any message.
+    TooLong(usize),
+    /// It does not begin as a message does.
+    NoMessage,
+    /// It is of another version.
+    Version(u16),
+    /// Nobody knows what it is.
+    Kind(u16),
+    /// It says something that cannot be.
+    Malformed,
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooLong(bytes) => write!(f, "a message of {bytes} bytes, {LARGEST} are the most"),
+            Self::NoMessage => f.write_str("no message of palpate's"),
+            Self::Version(version) => write!(f, "a message of version {version}, this is version {VERSION}"),
+            Self::Kind(kind) => write!(f, "a message of kind {kind}, which this version does not know"),
+            Self::Malformed => f.write_str("a message that is damaged"),
+        }
+    }
+}
+
+impl Message {
+    /// Writes the message in place of `bytes`.
+    pub fn write(&self, header: Header, bytes: &mut Vec<u8>) {
+        let to = &mut begin(header, self.kind(), bytes);
+        match self {
+            Self::Ticks { tool, ticks } => {
+                to.u16(*tool);
+                to.list(&ticks[ticks.len().saturating_sub(MOST_TICKS)..], |to, (tick, pose)| {
+                    to.u64(*tick);
+                    to.vector(&pose.position);
+                    wxyz(&pose.orientation).iter().for_each(|&part| to.f64(part));
+                });
+            }
+            Self::Model(parcel) => parcel.write(to),
+            Self::Basis { key, basis } => {
+                to.u64(*key);
+                to.0.extend_from_slice(&basis.to_bytes(*key));
+            }
+            Self::Held(keys) => to.list(&keys[..keys.len().min(MOST_HELD)], |to, &key| to.u64(key)),
+            Self::Ping => {}
+            Self::Pong { sent, received } => {
+                to.u64(sent.0);
+                to.u64(received.0);
+            }
+        }
+    }
+
+    /// Writes a model's message without a copy of the parcel.
+    pub fn write_model(parcel: &Parcel, header: Header, bytes: &mut Vec<u8>) {
+        parcel.write(&mut begin(header, MODEL, bytes));
+    }
+
+    /// Writes the message of a basis without a copy of it.
+    pub fn write_basis(key: u64, basis: &Basis, header: Header, bytes: &mut Vec<u8>) {
+        let to = &mut begin(header, BASIS, bytes);
+        to.u64(key);
+        to.0.extend_from_slice(&basis.to_bytes(key));
+    }
+
+    fn kind(&self) -> u16 {
+        match self {
+            Self::Ticks { .. } => TICKS,
+            Self::Model(_) => MODEL,
+            Self::Basis { .. } => BASIS,
+            Self::Held(_) => HELD,
+            Self::Ping => PING,
+            Self::Pong { .. } => PONG,
+        }
+    }
+
+    /// Reads a message of anybody's.
+    ///
+    /// # Errors
+    /// If it is none of this version, to the last byte.
+    pub fn read(bytes: &[u8]) -> Result<(Header, Self), Refused> {
+        if bytes.len() > LARGEST {
+            return Err(Refused::TooLong(bytes.len()));
+        }
+        let mut from = BytesReader(bytes.strip_prefix(&MAGIC).ok_or(Refused::NoMessage)?);
+        let version = from.u16().ok_or(Refused::Malformed)?;
+        if version != VERSION {
+            return Err(Refused::Version(version));
+        }
+        let kind = from.u16().ok_or(Refused::Malformed)?;
+        if !(TICKS..=PONG).contains(&kind) {
+            return Err(Refused::Kind(kind));
+        }
+        Self::read_body(kind, &mut from).filter(|_| from.0.is_empty()).ok_or(Refused::Malformed)
+    }
+
+    fn read_body(kind: u16, from: &mut BytesReader<'_>) -> Option<(Header, Self)> {
+        let header = Header { epoch: from.u64()?, number: from.u64()?, sent: Nanos(from.u64()?) };
+        let message = match kind {
+            TICKS => {
+                let (tool, mut ticks) = (from.u16()?, Vec::new());
+                from.list(TICK, &mut ticks, read_tick)?;
+                Self::Ticks { tool, ticks }
+            }
+            MODEL => Self::Model(Box::new(Parcel::read(from)?)),
+            BASIS => {
+                let key = from.u64()?;
+                let basis = Box::new(Basis::from_bytes(std::mem::take(&mut from.0), key)?);
+                Self::Basis { key, basis }
+            }
+            HELD => {
+                let mut keys = Vec::new();
+                from.list(8, &mut keys, BytesReader::u64)?;
+                Self::Held(keys)
+            }
+            PING => Self::Ping,
+            _ => Self::Pong { sent: Nanos(from.u64()?), received: Nanos(from.u64()?) },
+        };
+        Some((header, message))
+    }
+}
+
+fn begin(header: Header, kind: u16, bytes: &mut Vec<u8>) -> BytesWriter<'_> {
+    bytes.clear();
+    bytes.extend_from_slice(&MAGIC);
+    let mut to = BytesWriter(bytes);
+    to.u16(VERSION);
+    to.u16(kind);
+    to.u64(header.epoch);
+    to.u64(header.number);
+    to.u64(header.sent.0);
+    to
+}
+
+fn read_tick(from: &mut BytesReader<'_>) -> Option<(u64, Pose)> {
+    let (tick, position) = (from.u64()?, from.vector()?);
+    let orientation = turn_of([from.f64()?, from.f64()?, from.f64()?, from.f64()?]);
+    ((orientation.norm() - 1.0).abs() <= UPRIGHT).then_some((tick, Pose { position, orientation }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Vec3;
+
+    const HEADER: Header = Header { epoch: 3, number: 9, sent: Nanos(5) };
+
+    fn bytes_of(message: &Message) -> Vec<u8> {
+        let mut bytes = vec![7; 3];
+        message.write(HEADER, &mut bytes);
+        bytes
+    }
+
+    fn some() -> [Message; 5] {
+        let ticks = (1..9).map(|tick| (tick, Pose::at(Vec3::new(tick as f64, -0.0, 1e-300)))).collect();
+        [
+            Message::Ticks { tool: 1, ticks },
+            Message::Held(vec![1, u64::MAX]),
+            Message::Ping,
+            Message::Pong { sent: Nanos(1), received: Nanos(2) },
+            Message::Model(Box::default()),
+        ]
+    }
+
+    #[test]
+    fn messages_come_back_as_they_were_sent_and_not_with_a_byte_more_or_less() {
+        for message in some() {
+            let bytes = bytes_of(&message);
+            let (header, read) = Message::read(&bytes).unwrap();
+            assert_eq!((header, format!("{read:?}")), (HEADER, format!("{message:?}")));
+            for cut in 0..bytes.len() {
+                assert!(Message::read(&bytes[..cut]).is_err(), "{message:?} cut at {cut}");
+            }
+            let longer = [&bytes[..], &[0]].concat();
+            assert_eq!(Message::read(&longer).unwrap_err(), Refused::Malformed);
+        }
+    }
+
+    #[test]
+    fn another_version_another_kind_and_what_is_too_long_are_refused_by_name() {
+        let mut bytes = bytes_of(&Message::Ping);
+        assert_eq!(Message::read(&vec![0; LARGEST + 1]).unwrap_err(), Refused::TooLong(LARGEST + 1));
+        assert_eq!(Message::read(b"GET / HTTP/1.1").unwrap_err(), Refused::NoMessage);
+        bytes[6] = 99;
+        assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Kind(99));
+        bytes[4] = 2;
+        assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Version(2));
+        assert!(Refused::Version(2).to_string().contains("version 2, this is version 1"));
+    }
+
+    #[test]
+    fn numbers_that_are_none_and_turns_that_turn_nothing_are_refused() {
+        for wrong in [f64::NAN, f64::INFINITY] {
+            let ticks = vec![(1, Pose::at(Vec3::new(0.0, wrong, 0.0)))];
+            assert_eq!(Message::read(&bytes_of(&Message::Ticks { tool: 0, ticks })).unwrap_err(), Refused::Malformed);
+        }
+        let pose = Pose { position: Vec3::zeros(), orientation: turn_of([0.5, 0.0, 0.0, 0.0]) };
+        let ticks = vec![(1, pose)];
+        assert_eq!(Message::read(&bytes_of(&Message::Ticks { tool: 0, ticks })).unwrap_err(), Refused::Malformed);
+    }
+
+    #[test]
+    fn a_huge_count_asks_for_no_memory() {
+        let mut bytes = bytes_of(&Message::Held(Vec::new()));
+        let count = bytes.len() - 4;
+        bytes[count..].copy_from_slice(&u32::MAX.to_le_bytes());
+        assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Malformed);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn any_bytes_are_refused_or_read(
+            kind in 0_u16..8,
+            body in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..400),
+            flips in proptest::collection::vec((0_usize..4000, 1_u8..), 0..4),
+        ) {
+            let mut garbage = Vec::new();
+            begin(HEADER, kind, &mut garbage);
+            garbage.extend_from_slice(&body);
+            let _ = Message::read(&garbage);
+            for message in some() {
+                let mut bytes = bytes_of(&message);
+                let length = bytes.len();
+                flips.iter().for_each(|(at, flip)| bytes[at % length] ^= flip);
+                let _ = Message::read(&bytes);
+            }
+        }
+    }
+}

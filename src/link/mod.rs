@@ -1,0 +1,15 @@
+//! The way between two computers: device and local model on one, global model and bases on the other.
+//!
+//! [`Message`]s are what crosses, a [`Transport`] carries them. One transport is here, a [virtual link](VirtualLink) whose delay, loss
+//! and the like are those of a scene; others are of crates that know a network. What crosses is made and taken by two bridge actors, and
+//! neither the local nor the global actor can tell that the other is elsewhere.
+
+mod clock;
+mod message;
+mod transport;
+mod virtual_link;
+
+pub use clock::Clock;
+pub use message::{Header, LARGEST, Message, Refused, VERSION};
+pub use transport::{Lane, Transport};
+pub use virtual_link::{Conditions, VirtualEnd, VirtualLink};

@@ -1,0 +1,31 @@
+//! What carries messages to the other computer.
+
+use crate::runtime::Nanos;
+
+/// How urgent a message is: an urgent one never waits behind one that is less so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lane {
+    /// Few bytes, every millisecond: tool ticks, clock, control.
+    Urgent,
+    /// The newest local model of a tool: of those that wait to go, only the last is worth sending.
+    Model {
+        /// The tool that it is for.
+        tool: u16,
+    },
+    /// Large and needed once: bases.
+    Bulk,
+}
+
+/// Carries messages to another computer and back, at most once each, perhaps late, in another order or not at all.
+///
+/// Times are those of the session on this side; only a simulated transport looks at them.
+pub trait Transport: Send + std::fmt::Debug {
+    /// Hands over a message; never waits. What cannot go is dropped.
+    fn send(&mut self, lane: Lane, message: &[u8], now: Nanos);
+
+    /// Puts the next message that has come in place of `message`; false if there is none.
+    fn receive(&mut self, now: Nanos, message: &mut Vec<u8>) -> bool;
+
+    /// The session begins: what was handed over until now has been delivered before it.
+    fn begin(&mut self) {}
+}

@@ -1,0 +1,309 @@
+//! A link that is simulated: what a network would do to messages, the same in every run.
+//!
+//! A line that is as wide as it is said to be takes packets of [`PACKET`] bytes, of the most urgent message first. A message of one packet
+//! that is lost is lost. Of a longer one the packets that are lost are sent again, as a transport of whole messages does: each time that
+//! takes one more round trip. What is repeated takes no room on the line.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::{Lane, Transport};
+use crate::random::uniform;
+use crate::runtime::Nanos;
+
+/// What fits into a packet (bytes).
+const PACKET: usize = 1200;
+/// A packet is sent so many times more at most.
+const MOST_REPEATS: u32 = 8;
+/// A message that is held back comes so much later at least.
+const LEAST_BACK: Nanos = Nanos(1_000_000);
+/// Less urgent messages that wait for the line: of more, the oldest is dropped.
+const MOST_WAITING: usize = 256;
+
+/// What a link does to messages, either way.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Conditions {
+    /// One way, at least.
+    pub delay: Nanos,
+    /// Up to so much more, evenly.
+    pub jitter: Nanos,
+    /// Share of packets that are lost.
+    pub loss: f64,
+    /// Share of messages that come twice.
+    pub duplicate: f64,
+    /// Share of messages that are held back for one more delay, so that later ones overtake them.
+    pub reorder: f64,
+    /// Bits per second that the line takes; all at once if absent.
+    pub bits_per_s: Option<f64>,
+    /// Times in which nothing comes through: from, and until.
+    pub down: Vec<[Nanos; 2]>,
+    /// For the numbers that all chance is drawn from.
+    pub seed: u64,
+}
+
+/// A link between two sides, in one process.
+#[derive(Debug)]
+pub struct VirtualLink;
+
+impl VirtualLink {
+    /// Its two ends. Until the session [begins](Transport::begin) at one of them, everything arrives at once.
+    pub fn ends(conditions: Conditions) -> [VirtualEnd; 2] {
+        let ways = [0, 1].map(|way| Way::new(conditions.seed.wrapping_mul(2).wrapping_add(way)));
+        let line = Arc::new(Mutex::new(Line { conditions, ways, has_begun: false }));
+        [0, 1].map(|side| VirtualEnd { line: Arc::clone(&line), side })
+    }
+}
+
+/// One end of a [`VirtualLink`].
+#[derive(Debug)]
+pub struct VirtualEnd {
+    line: Arc<Mutex<Line>>,
+    side: usize,
+}
+
+impl VirtualEnd {
+    fn line(&self) -> MutexGuard<'_, Line> {
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Transport for VirtualEnd {
+    fn send(&mut self, lane: Lane, message: &[u8], now: Nanos) {
+        let side = self.side;
+        let Line { conditions, ways, has_begun } = &mut *self.line();
+        let way = &mut ways[side];
+        if *has_begun {
+            way.pump(conditions, now);
+            way.wait(lane, message, now);
+            way.pump(conditions, now);
+        } else {
+            way.arrive(now, message.to_vec());
+        }
+    }
+
+    fn receive(&mut self, now: Nanos, message: &mut Vec<u8>) -> bool {
+        let from = 1 - self.side;
+        let Line { conditions, ways, .. } = &mut *self.line();
+        let way = &mut ways[from];
+        way.pump(conditions, now);
+        let Some(first) = way.arriving.first_entry().filter(|first| first.key().0 <= now) else { return false };
+        *message = first.remove();
+        true
+    }
+
+    fn begin(&mut self) {
+        self.line().has_begun = true;
+    }
+}
+
+#[derive(Debug)]
+struct Line {
+    conditions: Conditions,
+    ways: [Way; 2],
+    has_begun: bool,
+}
+
+/// One of its two directions.
+#[derive(Debug)]
+struct Way {
+    seed: u64,
+    /// Numbers that have been drawn.
+    drawn: u64,
+    /// The most urgent first.
+    lanes: [VecDeque<Waiting>; 3],
+    /// When the line takes the next packet.
+    free_at: Nanos,
+    /// By time, and by number where times are equal.
+    arriving: BTreeMap<(Nanos, u64), Vec<u8>>,
+    arrived: u64,
+}
+
+#[derive(Debug)]
+struct Waiting {
+    lane: Lane,
+    message: Vec<u8>,
+    since: Nanos,
+    /// Bytes that have not gone yet.
+    left: usize,
+}
+
+impl Way {
+    fn new(seed: u64) -> Self {
+        let (lanes, arriving) = Default::default();
+        Self { seed, drawn: 0, lanes, free_at: Nanos::ZERO, arriving, arrived: 0 }
+    }
+
+    fn draw(&mut self) -> f64 {
+        self.drawn += 1;
+        uniform(self.seed, self.drawn)
+    }
+
+    fn wait(&mut self, lane: Lane, message: &[u8], now: Nanos) {
+        let place = match lane {
+            Lane::Urgent => 0,
+            Lane::Model { .. } => 1,
+            Lane::Bulk => 2,
+        };
+        let waiting = &mut self.lanes[place];
+        if let Lane::Model { .. } = lane {
+            // One that has begun to go goes on.
+            waiting.retain(|other| other.lane != lane || other.left < other.message.len());
+        }
+        if waiting.len() >= MOST_WAITING {
+            waiting.pop_front();
+        }
+        waiting.push_back(Waiting { lane, message: message.to_vec(), since: now, left: message.len() });
+    }
+
+    /// Lets go what has its turn until `now`.
+    fn pump(&mut self, conditions: &Conditions, now: Nanos) {
+        loop {
+            let first = self.lanes.iter().filter_map(|lane| lane.front()).map(|first| first.since).min();
+            let Some(at) = first.map(|first| first.max(self.free_at)).filter(|&at| at <= now) else { return };
+            let is_there = |lane: &&mut VecDeque<Waiting>| lane.front().is_some_and(|first| first.since <= at);
+            let Some(lane) = self.lanes.iter_mut().find(is_there) else { return };
+            let Some(first) = lane.front_mut() else { return };
+            let packet = first.left.min(PACKET);
+            first.left -= packet;
+            let takes = conditions.bits_per_s.map_or(0.0, |rate| packet as f64 * 8.0 / rate);
+            self.free_at = at + Nanos::from_secs_f64(takes);
+            if first.left == 0
+                && let Some(gone) = lane.pop_front()
+            {
+                self.carry(conditions, gone.message);
+            }
+        }
+    }
+
+    /// The last packet of `message` has gone.
+    fn carry(&mut self, conditions: &Conditions, message: Vec<u8>) {
+        let gone = self.free_at;
+        let is_down = conditions.down.iter().any(|&[from, until]| from <= gone && gone < until);
+        let packets = message.len().div_ceil(PACKET).max(1);
+        let lose = |way: &mut Self, packets: usize| (0..packets).filter(|_| way.draw() < conditions.loss).count();
+        let (mut lost, mut repeats) = (lose(self, packets), 0);
+        while packets > 1 && lost > 0 && repeats < MOST_REPEATS {
+            lost = lose(self, lost);
+            repeats += 1;
+        }
+        let copies = if self.draw() < conditions.duplicate { 2 } else { 1 };
+        let back = if self.draw() < conditions.reorder { conditions.delay.max(LEAST_BACK) } else { Nanos::ZERO };
+        let round_trip = conditions.delay.0.saturating_mul(2).saturating_add(conditions.jitter.0);
+        let repeated = Nanos(round_trip.saturating_mul(repeats.into()));
+        for _ in 0..copies {
+            let jitter = Nanos((conditions.jitter.0 as f64 * self.draw()) as u64);
+            if lost == 0 && !is_down {
+                self.arrive(gone + conditions.delay + jitter + back + repeated, message.clone());
+            }
+        }
+    }
+
+    fn arrive(&mut self, at: Nanos, message: Vec<u8>) {
+        self.arrived += 1;
+        self.arriving.insert((at, self.arrived), message);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    /// When which of a hundred messages of so many bytes come, one sent every millisecond: (number, ms).
+    fn arrivals(conditions: Conditions, bytes: usize) -> Vec<(u8, u64)> {
+        let [mut here, mut there] = VirtualLink::ends(conditions);
+        here.begin();
+        let (mut message, mut came) = (Vec::new(), Vec::new());
+        for ms in 0..2000 {
+            let now = Nanos(ms * MS);
+            if ms < 100 {
+                here.send(Lane::Urgent, &vec![ms as u8; bytes], now);
+            }
+            while there.receive(now, &mut message) {
+                came.push((message[0], ms));
+            }
+        }
+        assert!(!here.receive(Nanos(u64::MAX), &mut message), "nothing goes the other way");
+        came
+    }
+
+    #[test]
+    fn a_message_takes_the_delay_and_the_time_of_its_bytes() {
+        let delay = Nanos(14 * MS);
+        let came = arrivals(Conditions { delay, ..Conditions::default() }, 100);
+        assert_eq!(came, (0..100).map(|n| (n, u64::from(n) + 14)).collect::<Vec<_>>());
+        // 1000 bytes at 4 Mbit/s take 2 ms.
+        let narrow = arrivals(Conditions { delay, bits_per_s: Some(4e6), ..Conditions::default() }, 1000);
+        assert_eq!(narrow, (0..100).map(|n| (n, 2 * (u64::from(n) + 1) + 14)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn chance_is_as_large_as_was_said_and_the_same_every_time() {
+        let conditions =
+            |seed| Conditions { loss: 0.2, duplicate: 0.3, jitter: Nanos(9 * MS), seed, ..Conditions::default() };
+        let came = arrivals(conditions(1), 10);
+        assert_eq!(came, arrivals(conditions(1), 10));
+        assert_ne!(came, arrivals(conditions(2), 10));
+        let mut numbers: Vec<u8> = came.iter().map(|&(n, _)| n).collect();
+        numbers.sort_unstable();
+        let all = numbers.len();
+        numbers.dedup();
+        // Three standard deviations of a binomial count.
+        assert!(numbers.len().abs_diff(80) <= 12 && (all - numbers.len()).abs_diff(24) <= 14, "{came:?}");
+        assert!(came.iter().all(|&(n, ms)| (u64::from(n)..=u64::from(n) + 9).contains(&ms)));
+        assert!(came.windows(2).any(|pair| pair[0].0 > pair[1].0), "jitter overtakes");
+    }
+
+    #[test]
+    fn a_long_message_comes_late_where_a_short_one_is_lost() {
+        let conditions = Conditions { delay: Nanos(10 * MS), loss: 0.05, ..Conditions::default() };
+        let short = arrivals(conditions.clone(), 100);
+        let long = arrivals(conditions, 20 * PACKET);
+        assert!(short.len() < 100 && short.iter().all(|&(n, ms)| ms == u64::from(n) + 10));
+        assert_eq!(long.len(), 100);
+        assert!(long.iter().any(|&(n, ms)| ms == u64::from(n) + 30), "one round trip more: {long:?}");
+    }
+
+    #[test]
+    fn while_the_link_is_down_nothing_comes_through() {
+        let down = vec![[Nanos(20 * MS), Nanos(40 * MS)]];
+        let came = arrivals(Conditions { down, ..Conditions::default() }, 10);
+        assert_eq!(came.iter().map(|&(n, _)| n).collect::<Vec<_>>(), (0..20).chain(40..100).collect::<Vec<u8>>());
+    }
+
+    #[test]
+    fn an_urgent_message_passes_a_large_one_and_only_the_newest_model_waits() {
+        let [mut here, mut there] = VirtualLink::ends(Conditions { bits_per_s: Some(9.6e6), ..Conditions::default() });
+        here.begin();
+        let mut came = Vec::new();
+        for ms in 0..60 {
+            let now = Nanos(ms * MS);
+            if ms == 0 {
+                here.send(Lane::Bulk, &[9; 20 * PACKET], now);
+            }
+            if ms < 5 {
+                here.send(Lane::Model { tool: 0 }, &[ms as u8; 3 * PACKET], now);
+            }
+            if ms == 2 {
+                here.send(Lane::Urgent, &[7; 10], now);
+            }
+            let mut message = Vec::new();
+            while there.receive(now, &mut message) {
+                came.push((message[0], ms));
+            }
+        }
+        // A packet a millisecond: model 0 waits for the packet that went before it and is through when model 4 comes, 1 to 3 are
+        // outdated by then, and the large one is last.
+        assert_eq!(came.iter().map(|&(n, _)| n).collect::<Vec<_>>(), [7, 0, 4, 9], "{came:?}");
+    }
+
+    #[test]
+    fn before_the_session_begins_everything_arrives_at_once() {
+        let [mut here, mut there] =
+            VirtualLink::ends(Conditions { delay: Nanos(MS), loss: 1.0, ..Conditions::default() });
+        here.send(Lane::Bulk, &[1; 9000], Nanos::ZERO);
+        let mut message = Vec::new();
+        assert!(there.receive(Nanos::ZERO, &mut message) && message.len() == 9000);
+    }
+}
