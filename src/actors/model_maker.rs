@@ -32,6 +32,9 @@ impl ModelMaker {
     }
 
     /// An empty model as at the start, for the side of the global one where the local one is built elsewhere.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
     pub fn departing(&self) -> Box<dyn LocalModel> {
         self.watch(self.templates[0].departing())
     }

@@ -30,7 +30,7 @@ const SOFTEST: f64 = 0.01;
 /// let controls = running.take_controls().expect("there is one");
 /// running.wait_for(Duration::from_millis(200));
 /// controls.set_friction(0.2.into())?;
-/// controls.set_stiffness(2.0)?;
+/// controls.set_stiffness(1.5)?;
 /// controls.set_model(Kind::Full)?;
 /// running.wait_for(Duration::from_millis(200));
 /// assert!(controls.set_stiffness(1e6).is_err(), "its steps do not bear that");

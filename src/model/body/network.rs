@@ -132,10 +132,10 @@ impl SpringNetworkBuilder {
             inverse_masses[node as usize] = 0.0;
         }
         let ends = self.springs.iter().zip(0..).flat_map(|(&(i, j, _), spring)| [(i, spring), (j, spring)]);
-        let volume = enclosed(&self.rest, &self.triangles);
+        let surface = Surface::new(nodes, self.triangles)?;
         Ok(SpringNetwork {
-            volume,
-            surface: Surface::new(nodes, self.triangles)?,
+            volume: enclosed(&self.rest, &surface.triangles),
+            surface,
             kernel: NetworkKernel::new(nodes, &self.springs),
             rest: self.rest,
             inverse_masses,
