@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`Scripted`] | follows a path, ignores the force |
 //! | [`Hand`] | a simulated device held by a simulated hand, which lets go |
+//! | [`Hosted`] | a device that the program reads and writes itself, in a loop of its own |
 //! | [`Pointer`] | a tool on a spring behind a mouse, a finger or a pen |
 //!
 //! A scene can also name a log whose tool is replayed, and faults that any device is to have.
@@ -16,6 +17,7 @@ mod device;
 mod fault;
 mod faulty;
 mod hand;
+mod hosted;
 mod pointer;
 mod replayed;
 mod scripted;
@@ -27,6 +29,7 @@ pub use device::Device;
 pub use fault::{DeviceFault, SafetyStop};
 pub use faulty::{FaultKind, FaultSpec, Faulty};
 pub use hand::{Axis, Hand, HandSpec, PlantSpec};
+pub use hosted::{HostSide, Hosted};
 pub use pointer::{Pointer, PointerHandle, PointerSpec};
 pub use replayed::{Replayed, ReplayedSample};
 pub use scripted::Scripted;

@@ -374,10 +374,17 @@ impl RuntimeBuilder {
     /// An observer ends after all others: what fails in it is told when it ends, and there is nothing it could go on
     /// with.
     fn check_restartable(&self) -> Result<(), GraphError> {
-        let wrong = |(group, cast): &&(RateGroup, Cast)| group.observer && matches!(cast, Cast::Restartable(..));
-        self.groups.iter().find(wrong).map_or(Ok(()), |(group, _)| {
-            Err(GraphError::refused("an observer cannot be restartable; add it with `group`").in_group(&group.name))
-        })
+        for (group, cast) in &self.groups {
+            let wrong = match cast {
+                Cast::Restartable(..) if group.observer => "an observer cannot be restartable; add it with `group`",
+                Cast::Restartable(..) if group.is_hosted() => {
+                    "a hosted group cannot be restartable: it has no thread that could be replaced; add it with `group`"
+                }
+                _ => continue,
+            };
+            return Err(GraphError::refused(wrong).in_group(&group.name));
+        }
+        Ok(())
     }
 
     fn check_measurement(&self) -> Result<(), GraphError> {

@@ -9,7 +9,8 @@
 //!   [`parameter`](RuntimeBuilder::parameter) and [`commands`](RuntimeBuilder::commands) from threads outside.
 //! - Records: 64-byte [records](Record) leave a tick through wait-free [recorders](Recorder); a logger
 //!   [drains](RuntimeBuilder::drain) them. Every release leaves its [timing](TickTiming).
-//! - Release modes: the clock, or a [device](Release::DevicePaced) whose blocking read drives its group.
+//! - Release modes: the clock, a [device](Release::DevicePaced) whose blocking read drives its group, or a thread of the
+//!   [program's own](Release::Hosted) that has a loop already.
 //! - Slips: `released + skipped = elapsed periods` for every group, exactly, with a [cause](SlipCause) for each and a
 //!   [policy](OverrunPolicy) for what is late. Virtual time [injects](Disturbance) what threads only suffer.
 //! - Re-execution: a run on threads, [recorded](Recording), is repeated in virtual time bit for bit.
@@ -107,6 +108,7 @@ pub use builder::RuntimeBuilder;
 pub use error::{ActorError, GraphError, GraphErrorKind};
 pub use executor::Execution;
 pub use executor::disturbance::Disturbance;
+pub use executor::hosted::{HostRelease, HostedGroup};
 pub use graph::view::{GraphGroup, GraphPort, GraphView, PortEnd, PortKind};
 pub use ports::exchange_port::{Reader, Writer};
 pub use ports::inlet::{CommandReceiver, Commands, InputValue, Parameter, ParameterReader};

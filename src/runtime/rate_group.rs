@@ -54,6 +54,9 @@ pub enum Release {
         /// [`Event::WATCHDOG`](crate::Event::WATCHDOG).
         watchdog: Nanos,
     },
+    /// A thread of the program's own releases the group, by [`HostedGroup::release`](crate::HostedGroup::release); in virtual time
+    /// the clock does. The group has no thread, so neither policy nor core can be asked for.
+    Hosted,
 }
 
 /// The way in which a group's thread waits for its next release.
@@ -79,9 +82,9 @@ pub enum Wait {
 
 /// The rate, the timing contract and the thread of a group of actors.
 ///
-/// What releases it is its [`Release`] mode: the clock, or a device that has one of its own. The third way, virtual
-/// time, is a property of the executor: there every group is released by the virtual clock, a device-paced one as if
-/// its device delivered on time, unless a [disturbance](crate::Disturbance) delays it.
+/// What releases it is its [`Release`] mode: the clock, a device that has one of its own, or a thread of the program's. One more
+/// way, virtual time, is a property of the executor: there every group is released by the virtual clock, a device-paced one as
+/// if its device delivered on time, unless a [disturbance](crate::Disturbance) delays it.
 ///
 /// Values that cannot work are refused by [`RuntimeBuilder::build`](crate::RuntimeBuilder::build).
 ///
@@ -277,6 +280,13 @@ impl RateGroup {
         self.release(Release::DevicePaced { watchdog })
     }
 
+    /// Lets a thread of the program's own release the group: [`Release::Hosted`]. Under the policies
+    /// [`Skip`](OverrunPolicy::Skip), [`Degrade`](OverrunPolicy::Degrade) and [`Stop`](OverrunPolicy::Stop).
+    #[must_use]
+    pub fn hosted(self) -> Self {
+        self.release(Release::Hosted)
+    }
+
     /// Sets how the thread of the group waits for its next release.
     #[must_use]
     pub fn wait(mut self, wait: Wait) -> Self {
@@ -328,6 +338,11 @@ impl RateGroup {
         }
     }
 
+    /// True if a thread of the program's releases the group.
+    pub fn is_hosted(&self) -> bool {
+        self.release == Release::Hosted
+    }
+
     /// The cores that the group may run on; empty if it may run on any.
     pub(crate) fn cores(&self) -> Vec<usize> {
         self.cpu.map_or_else(|| self.cpus.clone(), |cpu| vec![cpu])
@@ -350,7 +365,7 @@ impl RateGroup {
     /// The watchdog of a device-paced group.
     pub(crate) fn watchdog(&self) -> Option<Nanos> {
         match self.release {
-            Release::Periodic => None,
+            Release::Periodic | Release::Hosted => None,
             Release::DevicePaced { watchdog } => Some(watchdog),
         }
     }

@@ -5,6 +5,7 @@ use crate::admission::plan::Plan;
 use crate::error::GraphError;
 use crate::executor::Execution;
 use crate::executor::disturbance::Disturb;
+use crate::executor::hosted::HostedGroup;
 use crate::executor::threaded::Threads;
 use crate::executor::virtual_time::VirtualRun;
 use crate::graph::view::GraphView;
@@ -109,9 +110,12 @@ impl Runtime {
         let specs: Vec<RateGroup> = groups.iter().map(|group| group.spec.clone()).collect();
         let teller = Teller::new(&live, &wiring.view(execution, &specs).warnings);
         let picture = Picture { execution, specs, wiring };
+        let mut hosted = Vec::new();
         let executor = match execution {
             Execution::Threaded => {
-                Executor::Threaded(Threads::start(groups, restarters, Arc::clone(&control), &grants)?)
+                let (threads, groups) = Threads::start(groups, restarters, Arc::clone(&control), &grants)?;
+                hosted = groups;
+                Executor::Threaded(threads)
             }
             Execution::Virtual => {
                 grants.set(SystemGrant::of_virtual_time(groups.iter().map(|group| &group.spec)));
@@ -127,10 +131,12 @@ impl Runtime {
         let telling = watch(&executor).inspect_err(|_| {
             if let Executor::Threaded(threads) = &mut lock(&executor).executor {
                 // Nobody else would: the groups have been released.
+                hosted.clear();
                 threads.join(&names, STOP_BOUND);
             }
         })?;
-        Ok(RunningGraph { executor, control, names, live, picture, registry, grants, telling: Mutex::new(telling) })
+        let (telling, hosted) = (Mutex::new(telling), Mutex::new(hosted));
+        Ok(RunningGraph { executor, control, names, live, picture, registry, grants, telling, hosted })
     }
 }
 
@@ -215,9 +221,19 @@ pub struct RunningGraph {
     grants: GrantHandle,
     /// Tells the program's subscriber, if threads run and there is one.
     telling: Mutex<Option<JoinHandle<()>>>,
+    /// The hosted groups that nobody has taken.
+    hosted: Mutex<Vec<HostedGroup>>,
 }
 
 impl RunningGraph {
+    /// Takes the [hosted](crate::Release::Hosted) group of this name, for the thread that releases it; `None` if it was taken, if
+    /// there is none, and in virtual time, where the clock releases it.
+    pub fn take_hosted(&mut self, name: &str) -> Option<HostedGroup> {
+        let mut hosted = lock(&self.hosted);
+        let place = hosted.iter().position(|group| group.name() == name)?;
+        Some(hosted.swap_remove(place))
+    }
+
     /// Lets the run go on for `span`, less if it ends before.
     ///
     /// Threads: sleeps and looks at the supervisor's mailbox. Virtual time: executes the releases of that span.
@@ -345,6 +361,8 @@ impl RunningGraph {
 
     /// Ends the run if it has not ended; returns the groups that had to be given up.
     fn end(&self) -> Vec<String> {
+        // Nobody releases these any more.
+        lock(&self.hosted).clear();
         let mut supervised = lock(&self.executor);
         let given_up = match &mut supervised.executor {
             Executor::Threaded(threads) => threads.join(&self.names, STOP_BOUND),

@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::log::{LogRecord, RunReport};
 use crate::model::body::{Body, State, von_mises};
 use crate::model::mesh::Surface;
-use crate::runtime::{GroupLive, Nanos, OutletReader, RunningGraph, RuntimeReport, StopHandle};
+use crate::runtime::{GroupLive, HostedGroup, Nanos, OutletReader, RunningGraph, RuntimeReport, StopHandle};
 use crate::runtime::{Histogram, HistogramReader};
 
 /// A session that runs. Dropping it commands zero force and joins its threads, within
@@ -94,6 +94,13 @@ impl Running {
     /// A handle that stops the run from another thread or from that of a signal handler.
     pub fn stop_handle(&self) -> StopHandle {
         self.runtime.stop_handle()
+    }
+
+    /// Takes the haptic group, if the session's local group is [hosted](crate::runtime::RateGroup::hosted): devices and local models
+    /// then tick where the program [releases](HostedGroup::release) it. `None` if it was taken, and in virtual time, where
+    /// [`wait_for`](Self::wait_for) releases it.
+    pub fn take_haptic_group(&mut self) -> Option<HostedGroup> {
+        self.runtime.take_hosted("local")
     }
 
     /// Takes the viewer, which shows the newest surface, tool and force to a program that draws; there is one, for one thread.

@@ -2,7 +2,7 @@
 
 use crate::error::GraphError;
 use crate::executor::Execution;
-use crate::rate_group::{OverrunPolicy, RateGroup};
+use crate::rate_group::{OverrunPolicy, RateGroup, Release};
 use std::collections::BTreeMap;
 
 /// Records carry the group's number in 16 bits; far fewer make sense.
@@ -111,20 +111,30 @@ fn check_policy(group: &RateGroup) -> Result<(), GraphError> {
             "degrading until 0 releases were in time is the policy Skip; use that or a larger number".to_owned(),
         );
     }
-    let Some(watchdog) = group.watchdog() else { return Ok(()) };
     let period = group.rate.period();
-    if watchdog < period {
-        return refuse(format!("watchdog {watchdog} must be at least the period {period}: a device may be that late"));
-    }
+    let paced_by = match group.release {
+        Release::Periodic => return Ok(()),
+        Release::DevicePaced { watchdog } if watchdog < period => {
+            return refuse(format!(
+                "watchdog {watchdog} must be at least the period {period}: a device may be that late"
+            ));
+        }
+        Release::DevicePaced { .. } => "a device that paces the group: it has one frame per release and sets the phase",
+        Release::Hosted if group.is_realtime() || !group.cores().is_empty() => {
+            return refuse(
+                "a hosted group has no thread of its own to give a policy or a core: set them on the program's"
+                    .to_owned(),
+            );
+        }
+        Release::Hosted => "a hosted group: the program's thread has one call per release and sets the phase",
+    };
     if group.observer {
-        return refuse("an observer ends after the others and cannot wait for a device; leave one out".to_owned());
+        return refuse("an observer ends after the others and cannot be paced from outside; leave one out".to_owned());
     }
     match group.overrun {
-        OverrunPolicy::CatchUp { .. } | OverrunPolicy::Rephase => refuse(format!(
-            "the policy {:?} contradicts a device that paces the group: it has one frame per release and sets the phase; \
-             use Skip, Degrade or Stop",
-            group.overrun
-        )),
+        OverrunPolicy::CatchUp { .. } | OverrunPolicy::Rephase => {
+            refuse(format!("the policy {:?} contradicts {paced_by}; use Skip, Degrade or Stop", group.overrun))
+        }
         _ => Ok(()),
     }
 }
@@ -336,6 +346,18 @@ mod tests {
         refused(&[paced().overrun(OverrunPolicy::CatchUp { max: 3 })], &["CatchUp { max: 3 }", "Skip"]);
         refused(&[paced().overrun(OverrunPolicy::Rephase)], &["Rephase", "phase"]);
         refused(&[named("b"), paced().observer()], &["rate group `a`", "observer"]);
+    }
+
+    #[test]
+    fn a_hosted_group_asks_for_no_thread_and_needs_a_policy_that_fits() {
+        let hosted = || named("a").hosted();
+        for policy in [OverrunPolicy::Skip, OverrunPolicy::Degrade { recover_after: 9 }, OverrunPolicy::Stop] {
+            assert!(admit(&[hosted().overrun(policy)]).is_ok());
+        }
+        refused(&[hosted().realtime(80)], &["rate group `a`", "no thread of its own"]);
+        refused(&[hosted().pin(1)], &["no thread of its own"]);
+        refused(&[hosted().overrun(OverrunPolicy::Rephase)], &["Rephase", "program's thread"]);
+        refused(&[named("b"), hosted().observer()], &["rate group `a`", "observer"]);
     }
 
     #[test]

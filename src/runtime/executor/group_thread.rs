@@ -1,8 +1,11 @@
 //! The thread of one rate group: it waits, releases, and goes on, winds down or ends after a fault.
 //!
+//! Of a [hosted](crate::Release::Hosted) group that thread is one of the program's, which comes for a release at a time.
+//!
 //! After warm-up the loop allocates nothing, takes no lock and makes no system call but its sleep.
 
 use crate::accounting::timeline::Wake;
+use crate::executor::beginning::{Beginning, since};
 use crate::executor::device_wait::DeviceWait;
 use crate::group::group_run::{AfterFault, GroupRun};
 use crate::group::lease::Lease;
@@ -12,21 +15,20 @@ use crate::supervision::restart::Restarter;
 use crate::supervision::stop::Control;
 use crate::supervision::supervisor::{Failure, Message, Restarted};
 use crate::system::grant::set_up_thread;
-use crate::system::os;
 use crate::system::wait::Waiter;
 use crate::time::Nanos;
 use crossbeam_channel::Sender;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How often an observer that has ended looks whether the others have.
+/// How often a thread looks that waits for time zero, or an observer that has ended whether the others have.
 const POLL: Duration = Duration::from_millis(2);
 
 /// What the thread of a group shares with the supervisor.
 pub(crate) struct Link {
-    /// Time zero of the run, of the monotonic clock.
-    pub(crate) base_ns: u64,
+    pub(crate) beginning: Arc<Beginning>,
     /// Counts the threads that the group has had, from 0.
     pub(crate) incarnation: usize,
     pub(crate) lease: Arc<Lease>,
@@ -52,9 +54,13 @@ impl GroupThread {
         if self.watched {
             self.group.lease = Some(Arc::clone(&self.link.lease));
         }
-        let base_ns = self.link.base_ns;
-        self.group.time_actors(move || since(base_ns));
-        let failed = self.release_all(&mut waiter);
+        let failed = match self.link.begun() {
+            Some(base_ns) => {
+                self.group.time_actors(move || since(base_ns));
+                self.release_all(base_ns, &mut waiter)
+            }
+            None => None,
+        };
         // Of a group that ends nobody can take the place any more; one that failed may still hang in its stop.
         let lease = &self.link.lease;
         let is_replaced = if failed.is_none() { !lease.begin_booking() } else { lease.is_revoked() };
@@ -66,20 +72,14 @@ impl GroupThread {
     }
 
     /// Runs release after release; the fault if the supervisor is to answer it.
-    fn release_all(&mut self, waiter: &mut Waiter) -> Option<RuntimeFault> {
-        let Self { group, link, .. } = self;
-        let Link { base_ns, lease, control, post, .. } = &*link;
-        let base_ns = *base_ns;
-        let observer = group.spec.observer;
+    fn release_all(&mut self, base_ns: u64, waiter: &mut Waiter) -> Option<RuntimeFault> {
         let now = || since(base_ns);
-        let mut pace = DeviceWait::new(group);
+        let mut pace = DeviceWait::new(&self.group);
         loop {
-            let Some(due) = group.ledger.next_due() else {
-                if group.spec.wind_down_at_end && group.begin_wind_down(now()) {
-                    continue;
-                }
-                return None;
-            };
+            let Self { group, link, .. } = self;
+            let Link { lease, control, .. } = &*link;
+            let observer = group.spec.observer;
+            let due = next_due(group, now)?;
             let winding_down = group.winding_down;
             let leave = || match observer {
                 true => control.observers_may_end(),
@@ -100,41 +100,49 @@ impl GroupThread {
                 Ok(None) => return None,
                 Err(fault) => Err(fault),
             };
-            let Err(fault) = result else { continue };
-            match group.after_fault(now(), self.restartable, control.stop_requested()) {
-                AfterFault::Restart => return Some(fault),
-                AfterFault::GoOn => post_fault(post, control, fault),
-                AfterFault::End if observer => {
-                    // It costs what it would have observed and nothing else.
-                    let _ = post.send(Message::Fault(fault));
-                    return None;
-                }
-                AfterFault::End => {
-                    post_fault(post, control, fault);
-                    return None;
-                }
+            if let Err(fault) = result
+                && let ControlFlow::Break(failed) = self.after(fault, now())
+            {
+                return failed;
             }
         }
     }
 
-    fn end(self, failed: Option<RuntimeFault>) {
+    /// What becomes of the group after a fault: it goes on, or it ends, with the fault if the supervisor is to answer that.
+    pub(crate) fn after(&mut self, fault: RuntimeFault, now: Nanos) -> ControlFlow<Option<RuntimeFault>> {
+        let Self { group, link: Link { control, post, .. }, .. } = self;
+        match group.after_fault(now, self.restartable, control.stop_requested()) {
+            AfterFault::Restart => return ControlFlow::Break(Some(fault)),
+            AfterFault::GoOn => {
+                post_fault(post, control, fault);
+                return ControlFlow::Continue(());
+            }
+            // It costs what it would have observed and nothing else.
+            AfterFault::End if group.spec.observer => drop(post.send(Message::Fault(fault))),
+            AfterFault::End => post_fault(post, control, fault),
+        }
+        ControlFlow::Break(None)
+    }
+
+    /// Stops the actors and tells the supervisor how it went.
+    pub(crate) fn end(self, failed: Option<RuntimeFault>) {
         let Self { mut group, link, .. } = self;
-        let Link { base_ns, incarnation, control, post, .. } = &link;
-        let (base_ns, incarnation) = (*base_ns, *incarnation);
+        let Link { beginning, incarnation, control, post, .. } = &link;
         let index = usize::from(group.index);
         let observer = group.spec.observer;
         if observer {
             while !control.observers_may_end() {
                 std::thread::sleep(POLL);
             }
-            if let Err(fault) = group.last_tick(since(base_ns)) {
+            if let Err(fault) = group.last_tick(beginning.elapsed()) {
                 post_fault(post, control, fault);
             }
         }
         let books = group.ledger;
-        let (report, fault) = group.finish(since(base_ns));
+        let (report, fault) = group.finish(beginning.elapsed());
         if let Some(fault) = failed {
-            let _ = post.send(Message::Failed(Box::new(Failure { group: index, incarnation, fault, report, books })));
+            let failure = Failure { group: index, incarnation: *incarnation, fault, report, books };
+            let _ = post.send(Message::Failed(Box::new(failure)));
             return;
         }
         if let Some(fault) = fault {
@@ -147,7 +155,28 @@ impl GroupThread {
     }
 }
 
+/// When the next release of `group` is due, one of its wind-down too; `None` if it has none.
+pub(crate) fn next_due(group: &mut GroupRun, now: impl Fn() -> Nanos) -> Option<Nanos> {
+    group.ledger.next_due().or_else(|| {
+        let winds_down = group.spec.wind_down_at_end && group.begin_wind_down(now());
+        winds_down.then(|| group.ledger.next_due()).flatten()
+    })
+}
+
 impl Link {
+    /// Waits for time zero, which a host may let wait for itself; `None` if the run is stopped before.
+    fn begun(&self) -> Option<u64> {
+        loop {
+            if let Some(base_ns) = self.beginning.get() {
+                return Some(base_ns);
+            }
+            if self.control.stop_requested() {
+                return None;
+            }
+            std::thread::sleep(POLL);
+        }
+    }
+
     /// Starts the thread that takes the place of one that failed: it makes the actors anew and goes on with the group.
     /// Nobody waits for it, however long that takes.
     ///
@@ -161,7 +190,7 @@ impl Link {
     }
 
     fn run_again(self, mut restarter: Restarter, failure: Box<Failure>) {
-        match restarter.again(&failure.fault, failure.books, since(self.base_ns)) {
+        match restarter.again(&failure.fault, failure.books, self.beginning.elapsed()) {
             Ok((group, books)) => {
                 // The actors were started without it, like those before them.
                 let granted = set_up_thread(&group.spec);
@@ -183,9 +212,4 @@ impl Link {
 fn post_fault(post: &Sender<Message>, control: &Control, fault: RuntimeFault) {
     let _ = post.send(Message::Fault(fault));
     control.request_stop();
-}
-
-/// The time since the start of the run.
-pub(crate) fn since(base_ns: u64) -> Nanos {
-    Nanos(os::monotonic().saturating_sub(base_ns))
 }

@@ -1,8 +1,10 @@
 //! The two executors: threads in real time, and virtual time on one thread.
 
+pub(crate) mod beginning;
 pub(crate) mod device_wait;
 pub(crate) mod disturbance;
 pub(crate) mod group_thread;
+pub(crate) mod hosted;
 pub(crate) mod schedule;
 pub(crate) mod threaded;
 pub(crate) mod virtual_time;

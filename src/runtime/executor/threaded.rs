@@ -3,7 +3,9 @@
 
 use crate::accounting::ledger::Ledger;
 use crate::error::GraphError;
-use crate::executor::group_thread::{GroupThread, Link, since};
+use crate::executor::beginning::Beginning;
+use crate::executor::group_thread::{GroupThread, Link};
+use crate::executor::hosted::HostedGroup;
 use crate::group::group_run::{GroupRun, start_actors};
 use crate::group::lease::Lease;
 use crate::group::panic_hook;
@@ -14,7 +16,7 @@ use crate::supervision::overdue::{Overdue, OverdueWatch};
 use crate::supervision::restart::Restarter;
 use crate::supervision::stop::{Control, STOP_BOUND};
 use crate::supervision::supervisor::{Failure, Message, Restarted, Supervisor};
-use crate::system::grant::{GrantHandle, SystemGrant, ThreadGrant, set_up_thread};
+use crate::system::grant::{GrantHandle, GroupGrant, SystemGrant, ThreadGrant, set_up_thread};
 use crate::system::os::{self, ThreadProbe};
 use crate::time::Nanos;
 use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
@@ -37,7 +39,8 @@ struct Seat {
     restart: Option<(Restarter, ExchangeReader<Ledger>)>,
     incarnation: usize,
     lease: Arc<Lease>,
-    probe: ThreadProbe,
+    /// `None` for a hosted group, whose thread is none of ours.
+    probe: Option<ThreadProbe>,
     watch: OverdueWatch,
 }
 
@@ -49,7 +52,7 @@ pub(crate) struct Threads {
     mail: Receiver<Message>,
     control: Arc<Control>,
     grants: GrantHandle,
-    base_ns: u64,
+    beginning: Arc<Beginning>,
     polled: Nanos,
     /// Set when somebody has waited long enough: nobody waits for the rest again.
     given_up: bool,
@@ -63,25 +66,29 @@ pub(crate) struct Threads {
 }
 
 impl Threads {
-    /// Sets the threads up, tells the grant, starts the actors on the calling thread and lets everything go.
+    /// Sets the threads up, tells the grant, starts the actors on the calling thread and lets everything go; with that the groups
+    /// that have no thread, whose first release is what the others then wait for.
     pub(crate) fn start(
         mut groups: Vec<GroupRun>,
         restarters: Vec<Option<(Restarter, ExchangeReader<Ledger>)>>,
         control: Arc<Control>,
         grants: &GrantHandle,
-    ) -> Result<Self, GraphError> {
+    ) -> Result<(Self, Vec<HostedGroup>), GraphError> {
         panic_hook::install();
         let mut grant = SystemGrant::of_machine();
         if groups.iter().any(|group| group.spec.is_realtime()) {
             grant.mlock = os::lock_memory().map_or_else(|reason| reason, |()| "locked".to_owned());
         }
         let (post, mail) = unbounded();
-        let mut handles = Vec::new();
-        let mut gates = Vec::new();
+        let mut places = Vec::new();
         for group in &groups {
+            if group.spec.is_hosted() {
+                grant.groups.push(GroupGrant::hosted(&group.spec));
+                places.push(None);
+                continue;
+            }
             let (thread, gate, granted) = spawn(&group.spec)?;
-            handles.push((thread, granted.probe));
-            gates.push(gate);
+            places.push(Some((thread, gate, granted.probe)));
             grant.timer_slack = worse(grant.timer_slack, granted.timer_slack);
             grant.groups.push(granted.group);
         }
@@ -93,33 +100,47 @@ impl Threads {
         }
         grants.set(grant);
         start_actors(&mut groups)?;
-        let base_ns = os::monotonic() + LEAD_NS;
-        let supervisor = Supervisor::new(groups.len());
-        let mut seats = Vec::new();
-        for (((group, gate), restart), (handle, probe)) in groups.into_iter().zip(gates).zip(restarters).zip(handles) {
-            let lease = Arc::new(Lease::default());
-            // A thread waits at its gate until it gets its group, so this cannot fail.
-            let (control, post) = (Arc::clone(&control), post.clone());
-            let link = Link { base_ns, incarnation: 0, lease: Arc::clone(&lease), control, post };
-            let restartable = restart.as_ref().is_some_and(|(restarter, _)| restarter.may_restart());
-            let _ = gate.send(GroupThread { group, restartable, watched: restart.is_some(), link });
-            let watch = OverdueWatch::default();
-            seats.push(Seat { handle: Some(handle), restart, incarnation: 0, lease, probe, watch });
+        let beginning = Arc::new(Beginning::new());
+        if places.iter().all(Option::is_some) {
+            beginning.set(os::monotonic() + LEAD_NS);
         }
-        Ok(Self {
+        let supervisor = Supervisor::new(groups.len());
+        let (mut seats, mut hosted) = (Vec::new(), Vec::new());
+        for ((group, place), restart) in groups.into_iter().zip(places).zip(restarters) {
+            let lease = Arc::new(Lease::default());
+            let (control, post) = (Arc::clone(&control), post.clone());
+            let link =
+                Link { beginning: Arc::clone(&beginning), incarnation: 0, lease: Arc::clone(&lease), control, post };
+            let restartable = restart.as_ref().is_some_and(|(restarter, _)| restarter.may_restart());
+            let thread = GroupThread { group, restartable, watched: restart.is_some(), link };
+            let (handle, probe) = match place {
+                Some((handle, gate, probe)) => {
+                    // A thread waits at its gate until it gets its group, so this cannot fail.
+                    let _ = gate.send(thread);
+                    (Some(handle), Some(probe))
+                }
+                None => {
+                    hosted.push(HostedGroup::new(thread));
+                    (None, None)
+                }
+            };
+            seats.push(Seat { handle, restart, incarnation: 0, lease, probe, watch: OverdueWatch::default() });
+        }
+        let threads = Self {
             seats,
             post,
             mail,
             control,
             grants: grants.clone(),
-            base_ns,
+            beginning,
             polled: Nanos::ZERO,
             given_up: false,
             closing: None,
             ended_at: None,
             _awake: awake.and_then(Result::ok),
             supervisor,
-        })
+        };
+        Ok((threads, hosted))
     }
 
     /// True if there is something to do besides counting what ends.
@@ -141,7 +162,7 @@ impl Threads {
         self.watch();
         let only_observers = self.control.observers_may_end();
         if only_observers && self.ended_at.is_none() {
-            self.ended_at = Some(since(self.base_ns));
+            self.ended_at = Some(self.beginning.elapsed());
         }
         if self.supervisor.all_ended() {
             return true;
@@ -176,7 +197,7 @@ impl Threads {
         seat.watch = OverdueWatch::default();
         let link = Link {
             incarnation: seat.incarnation,
-            base_ns: self.base_ns,
+            beginning: Arc::clone(&self.beginning),
             lease: Arc::clone(&seat.lease),
             control: Arc::clone(&self.control),
             post: self.post.clone(),
@@ -190,7 +211,7 @@ impl Threads {
     /// A replacement has made the actors and goes on.
     fn install(&mut self, begun: Restarted) {
         let seat = &mut self.seats[begun.group];
-        (seat.restart, seat.probe) = (Some((begun.restarter, begun.books)), begun.probe);
+        (seat.restart, seat.probe) = (Some((begun.restarter, begun.books)), Some(begun.probe));
         self.supervisor.restarts.push(begun.failure.fault);
         self.grants.replace(begun.group, begun.grant);
     }
@@ -204,7 +225,7 @@ impl Threads {
 
     /// Looks for releases that do not return.
     fn watch(&mut self) {
-        let now = since(self.base_ns);
+        let now = self.beginning.elapsed();
         let step = now.saturating_sub(self.polled).min(LONGEST_STEP);
         self.polled = now;
         for index in 0..self.seats.len() {
@@ -226,7 +247,8 @@ impl Threads {
         let Some(due) = books.next_due() else { return false };
         // Of the time since the last look, what it was overdue for; a device-paced group may wait for its device.
         let late = step.min(now.saturating_sub(due + restarter.spec.watchdog().unwrap_or_default()));
-        let (release, limit, probe) = (books.elapsed_periods(), restarter.policy.hung_after, seat.probe);
+        let Some(probe) = seat.probe else { return false };
+        let (release, limit) = (books.elapsed_periods(), restarter.policy.hung_after);
         match seat.watch.look(release, late, limit, probe.cpu(), || probe.is_ready()) {
             Overdue::Waited => false,
             Overdue::Starved => {
@@ -251,7 +273,7 @@ impl Threads {
         let books = *books.get();
         // Its thread may never end: nobody joins it, and it takes the core from nobody.
         seat.handle = None;
-        seat.probe.put_behind();
+        seat.probe.iter().for_each(ThreadProbe::put_behind);
         let at = books.next_due().unwrap_or(now);
         restarter.abandoned(at);
         let what = format!("did not return within {} and was left behind", restarter.policy.hung_after);
@@ -261,7 +283,7 @@ impl Threads {
     }
 
     pub(crate) fn elapsed(&self) -> Nanos {
-        self.ended_at.unwrap_or_else(|| since(self.base_ns))
+        self.ended_at.unwrap_or_else(|| self.beginning.elapsed())
     }
 
     /// Requests a stop and waits for all groups, `bound` for each step of the way: a group that does not end is given

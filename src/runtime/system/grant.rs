@@ -137,7 +137,7 @@ pub(crate) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
 /// What a threaded run of `groups` would be refused now, a sentence each: the same set-up on threads that end at once.
 pub(crate) fn refusals(groups: &[RateGroup]) -> Vec<String> {
     let mut refused = Vec::new();
-    for spec in groups {
+    for spec in groups.iter().filter(|group| !group.is_hosted()) {
         let own = spec.clone();
         let probe = spec.thread().spawn(move || set_up_thread(&own));
         let grant = match probe.map(std::thread::JoinHandle::join) {
@@ -159,6 +159,20 @@ pub(crate) fn refusals(groups: &[RateGroup]) -> Vec<String> {
         refused.extend(os::stay_awake().err().map(|reason| format!("idle states: {reason}")));
     }
     refused
+}
+
+impl GroupGrant {
+    /// The grant of a group that a thread of the program's releases: nothing is asked for.
+    pub(crate) fn hosted(spec: &RateGroup) -> Self {
+        let (asked, hosted) = (OTHER.to_owned(), "the program's thread".to_owned());
+        Self {
+            name: spec.name.clone(),
+            policy_asked: asked,
+            policy: hosted,
+            wait: "hosted".to_owned(),
+            ..Self::default()
+        }
+    }
 }
 
 impl SystemGrant {

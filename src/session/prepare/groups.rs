@@ -58,16 +58,17 @@ pub(super) fn local_group(
         // On a single core the haptic thread preempts the others; pinning would gain nothing.
         if last_core > 0 { group.pin(last_core) } else { group }
     });
+    // Policy and core of a program's own thread are its own affair.
+    let group = if group.is_hosted() { group } else { group.realtime_by_default(HAPTIC_PRIORITY) };
     let ramp_s = tools.iter().map(|tool| tool.limits.ramp_s).fold(0.0, f64::max);
-    let group = group
-        .realtime_by_default(HAPTIC_PRIORITY)
-        .name("local")
-        .wind_down(Nanos::from_secs_f64(ramp_s + RAMP_MARGIN_S));
+    let group = group.name("local").wind_down(Nanos::from_secs_f64(ramp_s + RAMP_MARGIN_S));
     // A device that exerts no force needs the time only to show in the log what would have been done.
     let exerts_force = tools.iter().any(|tool| tool.device.exerts_force());
     let group = if exerts_force { group.wind_down_at_end() } else { group };
     match (devices, execution) {
-        ([DeviceSpec { kind: DeviceKind::Haply, haply: Some(spec), .. }], Execution::Threaded) => {
+        ([DeviceSpec { kind: DeviceKind::Haply, haply: Some(spec), .. }], Execution::Threaded)
+            if !group.is_hosted() =>
+        {
             let watchdog = Nanos::from_secs_f64(spec.watchdog_ms * 1e-3).max(group.rate().period());
             group.device_paced(watchdog)
         }
@@ -102,7 +103,7 @@ pub(super) fn check_group(field: &str, group: &RateGroup) -> Result<(), Error> {
     } else if field == "local" && own().catches_up().as_secs_f64() > 0.5 * GAP_S {
         "catches up after stops that the force must come back from slowly (0.1 s): catch up at most 0.05 s, or use Skip"
     } else if field == "global" && own().release(Release::Periodic) != own() {
-        "is paced by a device, which only the local group has: leave it out"
+        "is paced by a device or hosted, which only the local group can be: leave it out"
     } else {
         return Ok(());
     };

@@ -1,0 +1,124 @@
+//! A group that a thread of the program's own releases, such as the haptic loop of an application that has one.
+
+use crate::accounting::timeline::Wake;
+use crate::executor::beginning::since;
+use crate::executor::group_thread::{GroupThread, next_due};
+use crate::system::os;
+use crate::time::Nanos;
+
+/// The outcome of a call of [`HostedGroup::release`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum HostRelease {
+    /// A release ran.
+    Ran,
+    /// No release: this period has had its own. Call again.
+    Early,
+    /// No release, and there will be none any more: drop the group.
+    Ended,
+}
+
+/// A [hosted](crate::Release::Hosted) group of a run on threads: its actors run in [`release`](Self::release), on the thread that
+/// calls it.
+///
+/// Time zero of the run is its first release: the threads of the other groups wait for it. From then on a release is run as it would
+/// be for a frame of a [device](crate::Release::DevicePaced): the next one of the nominal grid, from seven eighths of a period before
+/// it is due, or the one nearest in time, and the periods between are skipped with the cause
+/// [`StalledPeer`](crate::SlipCause::StalledPeer). A host that is silent is not waited for, and nobody releases the group in its
+/// place. After a stop was requested the group [winds down](crate::RateGroup::wind_down) by the releases that follow.
+///
+/// Dropping it stops its actors, on the thread that does so, and asks the run to stop; a run whose stop waits for it gives it up
+/// after [`STOP_BOUND`](crate::STOP_BOUND).
+///
+/// ```
+/// use palpate_runtime::{Execution, HostRelease, Outcome, RateGroup, Runtime, actor_fn};
+///
+/// let mut graph = Runtime::builder(Execution::Threaded);
+/// let group = RateGroup::hz(1000).name("haptic").hosted();
+/// graph.group(group, vec![actor_fn("idle", |_| Outcome::Continue)]);
+/// let mut running = graph.build()?.start()?;
+/// let mut haptic = running.take_hosted("haptic").expect("it is hosted");
+/// assert_eq!(haptic.release(), HostRelease::Ran);
+/// drop(haptic);
+/// assert_eq!(running.stop().groups[0].released, 1);
+/// # Ok::<(), palpate_runtime::GraphError>(())
+/// ```
+pub struct HostedGroup {
+    /// `None` only while it is dropped.
+    thread: Option<GroupThread>,
+    /// Its books and its actors' times count from here.
+    base_ns: Option<u64>,
+    ended: bool,
+}
+
+impl HostedGroup {
+    pub(crate) fn new(thread: GroupThread) -> Self {
+        Self { thread: Some(thread), base_ns: None, ended: false }
+    }
+
+    /// The name of the group.
+    pub fn name(&self) -> &str {
+        self.thread.as_ref().map_or("", |thread| &thread.group.spec.name)
+    }
+
+    /// Readies the calling thread for releases: touches the stack that a tick may need. Policy and core of the thread are the
+    /// program's.
+    ///
+    /// # Real-time
+    /// Not real-time safe: faults pages.
+    pub fn prepare_thread(&self) {
+        os::touch_stack();
+    }
+
+    /// Runs the release that the present time asks for, if any.
+    ///
+    /// # Real-time
+    /// Bounded and real-time safe if the actors are: reads the clock. A fault of an actor allocates its text. Where others wait for
+    /// time zero, the first call sets it.
+    pub fn release(&mut self) -> HostRelease {
+        let Some(thread) = self.thread.as_mut().filter(|_| !self.ended) else { return HostRelease::Ended };
+        let base_ns = match self.base_ns {
+            Some(base_ns) => base_ns,
+            None => {
+                let base_ns = thread.link.beginning.set(os::monotonic());
+                self.base_ns = Some(base_ns);
+                base_ns
+            }
+        };
+        let now = || since(base_ns);
+        let group = &mut thread.group;
+        let stops = !group.winding_down && thread.link.control.stop_requested();
+        if stops && !group.begin_wind_down(now()) || next_due(group, now).is_none() {
+            self.ended = true;
+            return HostRelease::Ended;
+        }
+        let at = now();
+        if at < group.ledger.next_frame_from() {
+            return HostRelease::Early;
+        }
+        if let Err(fault) = group.release(Wake::by_frame(at), |_| now(), |_| now())
+            && thread.after(fault, now()).is_break()
+        {
+            self.ended = true;
+        }
+        HostRelease::Ran
+    }
+
+    /// Time since time zero; none before the first release.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn elapsed(&self) -> Nanos {
+        self.base_ns.map_or(Nanos::ZERO, since)
+    }
+}
+
+impl Drop for HostedGroup {
+    fn drop(&mut self) {
+        if let Some(thread) = self.thread.take() {
+            thread.link.control.request_stop();
+            thread.end(None);
+        }
+    }
+}
+
+impl_debug!(HostedGroup, "name": |own| own.name().to_owned(), "ended": |own| own.ended);
