@@ -40,7 +40,9 @@ fn main() -> Result<(), Error> {
         let mut scene = scene(&name)?;
         if bases.is_some() {
             scene.local.basis_folder = bases.clone();
-            Session::from_scene(scene.clone().with_model(LocalModelKind::Predictive)).virtual_time().build()?.run()?;
+            let mut beforehand = scene.clone();
+            beforehand.global.basis_latency_ms = Some(0.0);
+            Session::from_scene(beforehand.with_model(LocalModelKind::Predictive)).virtual_time().build()?.run()?;
         }
         compare(&name, scene)?;
     }

@@ -67,7 +67,7 @@ const CASES: &[Case] = &[
     case("node_mass_kg", "mass_g", "scene.toml:8: body.material.mass_g: ", &["did you mean node_mass_kg?"]),
     case("[body]", "gravity = 9.81\n[body]", "scene.toml:1: gravity: ", &["unknown key", "body, contact, global"]),
     case("[safety]", "[safty]", "scene.toml:27: safty: ", &["did you mean safety?"]),
-    case("patch = [4, 4, 2]", "rim = 50", "scene.toml:21: local.rim: ", &["rate_hz, model, error_pct, patch, basis, basis_folder, feedback, step, blend, coupling"]),
+    case("patch = [4, 4, 2]", "rim = 50", "scene.toml:21: local.rim: ", &["rate_hz, model, error_pct, patch, basis, basis_folder, keep_bases, feedback, step, blend, coupling"]),
     case("patch = [4, 4, 2]", "basis = 5000", "scene.toml:21: local.basis: ", &["5000", "at most 500"]),
     case("ms = 10", "s = 10", "scene.toml:23: local.blend.s: ", &["unknown key", "did you mean ms?"]),
     case("node = [7, 5, 11]", "nodes = [7, 5, 11]", "scene.toml:36: probe[1].nodes: ", &["did you mean node?"]),

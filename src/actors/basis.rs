@@ -1,12 +1,13 @@
 //! The basis actor: reduces the surroundings of patches in the background, those that the tool needs first.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::basis_store::BasisStore;
 use super::cause::Cause;
 use crate::error::Error;
 use crate::model::surroundings::{Bases, Basis, Reduction, RestingBody};
-use crate::runtime::{Actor, Outcome, Reader, TickContext, Writer};
+use crate::runtime::{Actor, Nanos, Outcome, Reader, TickContext, Writer};
 
 /// Patches whose surroundings are wanted.
 #[derive(Clone, Debug, Default)]
@@ -24,7 +25,18 @@ pub struct BasisPorts {
     pub bases: Writer<Bases>,
 }
 
-/// Computes reduced surroundings.
+/// How long a basis takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// As long as it takes; a large body's is made in parts, as a stop does not wait for more.
+    Measured,
+    /// What it takes on no machine in particular.
+    Nominal,
+    /// So long, each.
+    Given(Nanos),
+}
+
+/// Computes reduced surroundings, one after the other.
 ///
 /// # Real-time
 /// Not real-time safe: a release may take a second. Its group needs a core that the haptic group does not use.
@@ -33,80 +45,118 @@ pub struct BasisActor {
     resting: Arc<RestingBody>,
     store: BasisStore,
     pace: Pace,
+    /// The time between two releases.
+    period: Nanos,
     bases: Bases,
     /// What a release has begun and the next ones go on with.
-    begun: Option<Reduction>,
+    begun: Option<Begun>,
+    /// What was made, with the time from which it is there.
+    made: VecDeque<(Nanos, Made)>,
     /// Patches whose surroundings cannot be reduced: they are not tried again.
     hopeless: Vec<Vec<u32>>,
     ports: BasisPorts,
 }
 
+/// The basis of a large body: each release does a part of it.
+#[derive(Debug)]
+enum Begun {
+    Making(Reduction),
+    /// One that was kept takes as many releases: what is on a disk decides nothing.
+    Kept(Basis, usize),
+}
+
+/// A patch and its basis, if there is one.
+type Made = (Vec<u32>, Result<Option<Basis>, Error>);
+
 impl BasisActor {
-    /// Of the body `resting`; bases come from `store`, and `bases` are there already.
+    /// Of the body `resting`, with a release in each `period`; bases come from `store`, and `bases` are there already.
     pub(crate) fn new(
         resting: Arc<RestingBody>,
         store: BasisStore,
         bases: Bases,
-        pace: Pace,
+        (pace, period): (Pace, Nanos),
         ports: BasisPorts,
     ) -> Self {
-        Self { resting, store, pace, bases, begun: None, hopeless: Vec::new(), ports }
+        let (begun, made, hopeless) = Default::default();
+        Self { resting, store, pace, period, bases, begun, made, hopeless, ports }
     }
 
-    /// Goes on with what was begun. For a large body it does one part only: a stop does not wait for more.
-    fn go_on(&mut self) -> Result<Option<Basis>, Error> {
-        while let Some(reduction) = &mut self.begun {
-            let advanced = reduction.advance(&self.resting);
-            if !matches!(advanced, Ok(None)) {
-                self.begun = None;
-                let basis = advanced?;
-                basis.iter().for_each(|basis| self.store.keep(&self.resting, basis));
-                return Ok(basis);
+    /// Makes the basis of `patch`, or begins it; with the time that this takes, if that is none of the machine's.
+    fn make(&mut self, patch: &[u32]) -> (Nanos, Option<Made>) {
+        let Some(reduction) = Reduction::new(&self.resting, patch, self.store.size()) else {
+            return (Nanos::ZERO, Some((patch.to_vec(), Ok(None))));
+        };
+        let cost = match self.pace {
+            Pace::Measured => Nanos::ZERO,
+            Pace::Nominal => Nanos::from_secs_f64(reduction.nominal()),
+            Pace::Given(cost) => cost,
+        };
+        let in_parts = reduction.is_large() && self.pace == Pace::Measured;
+        self.begun = Some(match self.store.kept(&self.resting, &reduction) {
+            Some(kept) => Begun::Kept(kept, reduction.parts()),
+            None => Begun::Making(reduction),
+        });
+        (cost, if in_parts { self.go_on() } else { std::iter::repeat_with(|| self.go_on()).flatten().next() })
+    }
+
+    /// Does the next part of what was begun; what was made, after the last.
+    fn go_on(&mut self) -> Option<Made> {
+        match self.begun.take()? {
+            Begun::Kept(basis, 1) => Some((basis.patch().to_vec(), Ok(Some(basis)))),
+            Begun::Kept(basis, parts) => {
+                self.begun = Some(Begun::Kept(basis, parts - 1));
+                None
             }
-            if reduction.is_large() && self.pace == Pace::OneByOne {
+            Begun::Making(mut reduction) => match self.store.advance(&self.resting, &mut reduction) {
+                Ok(None) => {
+                    self.begun = Some(Begun::Making(reduction));
+                    None
+                }
+                made => Some((reduction.patch().to_vec(), made)),
+            },
+        }
+    }
+
+    /// Makes what is wanted, as much of it as is begun before the next release; true if what is there already is wanted.
+    fn grant_wishes(&mut self, ctx: &TickContext) -> bool {
+        let next = ctx.scheduled + self.period;
+        let mut free = self.made.back().map_or(ctx.scheduled, |&(due, _)| due.max(ctx.scheduled));
+        if free >= next || !self.ports.wishes.refresh(ctx) {
+            return false;
+        }
+        let mut has_forgotten = false;
+        for patch in self.ports.wishes.get().patches.clone() {
+            let is_made = self.made.iter().any(|(_, (made, _))| *made == patch);
+            // A global model that was started again wants what is there already.
+            has_forgotten |= self.bases.get(&patch).is_some();
+            if is_made || self.bases.get(&patch).is_some() || self.hopeless.contains(&patch) {
+                continue;
+            }
+            let (cost, made) = self.make(&patch);
+            free = free + cost;
+            self.made.extend(made.map(|made| (free, made)));
+            if free >= next || self.pace == Pace::Measured {
                 break;
             }
         }
-        Ok(None)
+        has_forgotten
     }
 
-    /// The basis of `patch`, if it can be had in this release.
-    fn get(&mut self, patch: &[u32]) -> Result<Option<Basis>, Error> {
-        if let Some(basis) = self.store.read(&self.resting, patch) {
-            return Ok(Some(basis));
-        }
-        self.begun = Reduction::new(&self.resting, patch, self.store.size);
-        if self.begun.is_none() {
-            self.hopeless.push(patch.to_vec());
-        }
-        self.go_on()
-    }
-
-    /// Keeps what was made for `patch`; true if there is a basis more.
-    fn settle(&mut self, patch: Vec<u32>, made: Result<Option<Basis>, Error>, outcome: &mut Outcome) -> bool {
-        match made {
-            Ok(basis) => basis.map(|basis| self.bases.insert(Arc::new(basis))).is_some(),
-            Err(_) => {
-                self.hopeless.push(patch);
-                *outcome = Outcome::Degraded(Cause::NoBasis.code());
-                false
+    /// Takes over what is there by now; true if there is a basis more.
+    fn settle(&mut self, now: Nanos, outcome: &mut Outcome) -> bool {
+        let before = self.bases.len();
+        while let Some((_, (patch, made))) = self.made.pop_front_if(|(due, _)| *due <= now) {
+            match made {
+                Ok(Some(basis)) => self.bases.insert(Arc::new(basis)),
+                Ok(None) => self.hopeless.push(patch),
+                Err(_) => {
+                    self.hopeless.push(patch);
+                    *outcome = Outcome::Degraded(Cause::NoBasis.code());
+                }
             }
         }
+        self.bases.len() > before
     }
-
-    fn publish(&mut self, ctx: &TickContext) {
-        self.ports.bases.buffer().clone_from(&self.bases);
-        self.ports.bases.publish(ctx);
-    }
-}
-
-/// How many bases a release makes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
-    /// All that are wanted: in virtual time they take as long as they are said to.
-    All,
-    /// One, or a part of one for a large body: what is wanted changes meanwhile.
-    OneByOne,
 }
 
 impl Actor for BasisActor {
@@ -115,31 +165,24 @@ impl Actor for BasisActor {
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
-        let (mut outcome, mut has_news) = (Outcome::Continue, false);
-        if let Some(patch) = self.begun.as_ref().map(|reduction| reduction.patch().to_vec()) {
-            let made = self.go_on();
-            has_news = self.settle(patch, made, &mut outcome);
-        } else if self.ports.wishes.refresh(ctx) {
-            for patch in self.ports.wishes.get().patches.clone() {
-                if self.bases.get(&patch).is_some() {
-                    // A global model that was started again wants what is there already.
-                    has_news = true;
-                    continue;
-                }
-                if self.hopeless.contains(&patch) {
-                    continue;
-                }
-                let made = self.get(&patch);
-                let is_tried = made.is_ok();
-                has_news |= self.settle(patch, made, &mut outcome);
-                if is_tried && self.pace == Pace::OneByOne {
-                    break;
-                }
+        let mut outcome = Outcome::Continue;
+        let mut has_news = self.settle(ctx.scheduled, &mut outcome);
+        match self.begun {
+            Some(_) => {
+                let made = self.go_on();
+                self.made.extend(made.map(|made| (ctx.scheduled, made)));
             }
+            None => has_news |= self.grant_wishes(ctx),
         }
+        has_news |= self.settle(ctx.scheduled, &mut outcome);
         if has_news {
-            self.publish(ctx);
+            self.ports.bases.buffer().clone_from(&self.bases);
+            self.ports.bases.publish(ctx);
         }
         outcome
     }
 }
+
+#[cfg(test)]
+#[path = "tests/basis.rs"]
+mod tests;

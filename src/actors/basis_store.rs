@@ -1,111 +1,186 @@
 //! Where bases come from: a folder that keeps them from run to run, or the computation.
 
-use std::path::PathBuf;
+use std::fs::{self, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 use crate::error::Error;
 use crate::files;
-use crate::model::surroundings::{Basis, RestingBody, Size};
+use crate::model::body::InstructionSet;
+use crate::model::surroundings::{Basis, Reduction, RestingBody, Size};
 
 /// The largest file that may be a basis (bytes).
 const MOST_BYTES: u64 = 1 << 28;
+/// What a folder keeps in all (bytes), some 500 bases of the usual size: then the oldest go.
+const MOST_KEPT: u64 = 1 << 29;
+/// The extension of a basis, and of one in the making.
+const BASIS: &str = "basis";
+const PART: &str = "part";
+/// Whoever began to write a file so much earlier than others were written is gone.
+const ABANDONED: Duration = Duration::from_secs(3600);
+/// Names that are tried for a file in the making.
+const NAMES: u32 = 100;
 
 /// Makes the bases of one body, or reads those that it has made before.
 #[derive(Clone, Debug)]
 pub struct BasisStore {
     /// How large a basis is to be.
-    pub size: Size,
+    size: Size,
     /// Bases are kept in this folder, if there is one.
-    pub folder: Option<PathBuf>,
+    folder: Option<PathBuf>,
+    most_kept: u64,
+    /// It has said that something is wrong with the folder.
+    has_complained: bool,
 }
 
 impl BasisStore {
+    /// A store of bases of that `size`, kept in `folder` if there is one.
+    pub(crate) fn new(size: Size, folder: Option<PathBuf>) -> Self {
+        Self { size, folder, most_kept: MOST_KEPT, has_complained: false }
+    }
+
+    /// How large a basis is to be.
+    pub(crate) fn size(&self) -> Size {
+        self.size
+    }
+
     /// The basis of `patch` (node ids in increasing order); `None` if nothing around the patch can move. A file that is
     /// damaged or cannot be written is as good as none: the basis is computed.
     ///
     /// # Errors
     /// If nothing holds the surroundings together.
-    pub(crate) fn get(&self, resting: &RestingBody, patch: &[u32]) -> Result<Option<Basis>, Error> {
-        if let Some(basis) = self.read(resting, patch) {
-            return Ok(Some(basis));
+    pub(crate) fn get(&mut self, resting: &RestingBody, patch: &[u32]) -> Result<Option<Basis>, Error> {
+        let Some(mut reduction) = Reduction::new(resting, patch, self.size) else { return Ok(None) };
+        if let Some(kept) = self.kept(resting, &reduction) {
+            return Ok(Some(kept));
         }
-        let basis = Basis::compute(resting, patch, self.size)?;
-        if let Some(basis) = &basis {
-            self.keep(resting, basis);
+        loop {
+            if let Some(basis) = self.advance(resting, &mut reduction)? {
+                return Ok(Some(basis));
+            }
         }
+    }
+
+    /// The basis that `reduction` would make, if it was kept. One that is known already is not looked for: it would be that of its own
+    /// surroundings to the last bit, and not that of others like them, and what is on the disk is to change nothing.
+    pub(crate) fn kept(&mut self, resting: &RestingBody, reduction: &Reduction) -> Option<Basis> {
+        let basis = if reduction.is_known() { None } else { self.read(resting, reduction.patch()) };
+        basis.inspect(|basis| reduction.learn(resting, basis))
+    }
+
+    /// Does the next part of `reduction`; keeps the basis after the last, if there is a folder for it.
+    ///
+    /// # Errors
+    /// If nothing holds the surroundings together.
+    pub(crate) fn advance(&mut self, resting: &RestingBody, reduction: &mut Reduction) -> Result<Option<Basis>, Error> {
+        let is_known = reduction.is_known();
+        let basis = reduction.advance(resting)?;
+        basis.iter().filter(|_| !is_known).for_each(|basis| self.keep(resting, basis));
         Ok(basis)
     }
 
-    /// The basis of `patch`, if it was kept.
-    pub(crate) fn read(&self, resting: &RestingBody, patch: &[u32]) -> Option<Basis> {
+    fn read(&mut self, resting: &RestingBody, patch: &[u32]) -> Option<Basis> {
         let key = self.key(resting, patch);
-        let stored = Basis::from_bytes(&files::read(&self.file(key)?, MOST_BYTES).ok()?, key);
-        stored.filter(|basis| basis.patch() == patch)
+        let file = self.file(key)?;
+        if fs::symlink_metadata(&file).is_err_and(|error| error.kind() == io::ErrorKind::NotFound) {
+            return None;
+        }
+        let bytes = files::read(&file, MOST_BYTES);
+        let basis = bytes.ok().and_then(|bytes| Basis::from_bytes(&bytes, key)).filter(|basis| basis.patch() == patch);
+        if basis.is_none() {
+            self.complain("is damaged, or another version's: such bases are computed again", &file);
+        }
+        basis
     }
 
-    /// Keeps `basis`, if there is a folder for it.
-    pub(crate) fn keep(&self, resting: &RestingBody, basis: &Basis) {
+    /// The oldest make room.
+    fn keep(&mut self, resting: &RestingBody, basis: &Basis) {
         let key = self.key(resting, basis.patch());
         let (Some(folder), Some(file)) = (&self.folder, self.file(key)) else { return };
-        // Another run may read it meanwhile: it appears whole or not at all.
-        let part = folder.join(format!("{key:016x}.{}", std::process::id()));
-        let written = std::fs::create_dir_all(folder)
-            .and_then(|()| std::fs::write(&part, basis.to_bytes(key)))
-            .and_then(|()| std::fs::rename(&part, &file));
-        if let Err(error) = written {
-            // What there is of it would take the place that is missing.
-            let _ = std::fs::remove_file(&part);
-            tracing::warn!("the basis could not be kept in {}: {error}", folder.display());
+        let written = fs::create_dir_all(folder).and_then(|()| write_whole(&file, &basis.to_bytes(key)));
+        match written.and_then(|()| make_room(folder, self.most_kept)) {
+            Ok(()) => {}
+            Err(error) => self.complain(&format!("could not be kept: {error}"), &file),
+        }
+    }
+
+    /// Says once what is wrong with the folder: it may be the same with every basis.
+    fn complain(&mut self, what: &str, file: &Path) {
+        if !std::mem::replace(&mut self.has_complained, true) {
+            tracing::warn!("basis {} {what}", file.display());
         }
     }
 
     fn file(&self, key: u64) -> Option<PathBuf> {
-        self.folder.as_ref().map(|folder| folder.join(format!("{key:016x}.basis")))
+        self.folder.as_ref().map(|folder| folder.join(format!("{key:016x}")).with_extension(BASIS))
     }
 
-    /// Of body, patch and size.
+    /// Of body, patch and size, and of what the same numbers come from: another version, or instruction set, rounds otherwise, and a
+    /// run would not be repeated bit for bit.
     fn key(&self, resting: &RestingBody, patch: &[u32]) -> u64 {
         let mix = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31);
         let (kind, size) = match self.size {
             Size::States(states) => (0, states as u64),
             Size::ErrorPct(error_pct) => (1, error_pct.to_bits()),
         };
-        let of_size = mix(mix(resting.digest(), size), kind);
+        let by = [env!("CARGO_PKG_VERSION"), InstructionSet::detect().name()];
+        let made_by = by.into_iter().flat_map(str::bytes).map(u64::from).chain([u64::from(cfg!(debug_assertions))]);
+        let of_size = mix(mix(made_by.fold(resting.digest(), mix), size), kind);
         patch.iter().fold(of_size, |hash, &node| mix(hash, node.into()))
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::body::{Block, Body};
-    use crate::model::mesh::Face;
+/// Writes `file` so that it appears whole or not at all: other runs may read it, or write the same, meanwhile.
+fn write_whole(file: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut taken = io::Error::from(io::ErrorKind::AlreadyExists);
+    for number in 0..NAMES {
+        let part = file.with_extension(format!("{}-{number}.{PART}", std::process::id()));
+        let mut open = match OpenOptions::new().write(true).create_new(true).open(&part) {
+            Ok(open) => open,
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                taken = error;
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        let written = open.write_all(bytes).and_then(|()| fs::rename(&part, file));
+        if written.is_err() {
+            // What there is of it would take the place that is missing.
+            let _ = fs::remove_file(&part);
+        }
+        return written;
+    }
+    Err(taken)
+}
 
-    #[test]
-    fn what_was_computed_is_read_again_and_damage_is_computed_again() {
-        let block = Block::builder([5; 3], [0.05; 3]).fix(Face::ZMin).build().unwrap();
-        let resting = RestingBody::new(&block).unwrap();
-        let mut patch = Vec::new();
-        block.patch(&[block.surface().triangles.len() as u32 - 5], [2, 2, 1], &mut patch);
-        let folder = tempfile::tempdir().unwrap();
-        let store = BasisStore { size: Size::States(10), folder: Some(folder.path().join("bases")) };
-        let first = store.get(&resting, &patch).unwrap();
-        let files = || std::fs::read_dir(folder.path().join("bases")).unwrap().map(|file| file.unwrap().path());
-        assert_eq!(files().count(), 1);
-        assert_eq!(store.get(&resting, &patch).unwrap(), first);
-        for file in files() {
-            std::fs::write(file, b"no basis").unwrap();
-        }
-        assert_eq!(store.get(&resting, &patch).unwrap(), first);
-        // Check that what has no end is as good as damaged.
-        for file in files() {
-            std::fs::remove_file(&file).unwrap();
-            std::os::unix::fs::symlink("/dev/zero", &file).unwrap();
-        }
-        assert_eq!(store.get(&resting, &patch).unwrap(), first);
-        for (count, size) in [Size::States(11), Size::ErrorPct(1.0), Size::ErrorPct(2.0)].into_iter().enumerate() {
-            let other = BasisStore { size, ..store.clone() };
-            assert_ne!(other.get(&resting, &patch).unwrap(), first);
-            assert_eq!(files().count(), count + 2, "another size, another file");
+/// Removes the oldest bases of `folder` until the others are `most` bytes at most, and what writers left that are gone. Nothing else
+/// that may lie there is touched.
+fn make_room(folder: &Path, most: u64) -> io::Result<()> {
+    let mut kept = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        let (true, Ok(about)) = (matches!(extension, Some(BASIS | PART)), fs::symlink_metadata(&path)) else {
+            continue;
+        };
+        let written = about.modified().unwrap_or(SystemTime::UNIX_EPOCH);
+        kept.push((written, extension == Some(PART), about.len(), path));
+    }
+    let newest = kept.iter().map(|&(written, ..)| written).max().unwrap_or(SystemTime::UNIX_EPOCH);
+    kept.sort();
+    let mut total: u64 = kept.iter().map(|(_, _, bytes, _)| bytes).sum();
+    for (written, is_part, bytes, path) in kept {
+        let is_abandoned = is_part && newest.duration_since(written).is_ok_and(|age| age > ABANDONED);
+        if is_abandoned || total > most && !is_part {
+            // Another run may have done it.
+            let _ = fs::remove_file(&path);
+            total -= bytes;
         }
     }
+    Ok(())
 }
+
+#[cfg(test)]
+#[path = "tests/basis_store.rs"]
+mod tests;

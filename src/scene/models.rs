@@ -21,8 +21,9 @@ pub struct GlobalSpec {
     pub ahead_nodes: usize,
     /// Time after its release at which a result becomes visible, in virtual time (ms).
     pub compute_latency_ms: f64,
-    /// Time after its release at which reduced surroundings of a patch become visible, in virtual time (ms).
-    pub basis_latency_ms: f64,
+    /// Time that making the reduced surroundings of a patch takes, in virtual time (ms); if absent, what it takes on no machine in
+    /// particular.
+    pub basis_latency_ms: Option<f64>,
 }
 
 impl Default for GlobalSpec {
@@ -33,7 +34,7 @@ impl Default for GlobalSpec {
             cores: 1,
             ahead_nodes: Simulation::AHEAD,
             compute_latency_ms: 0.0,
-            basis_latency_ms: 0.0,
+            basis_latency_ms: None,
         }
     }
 }
@@ -55,8 +56,11 @@ pub struct LocalSpec {
     /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted. If absent, what
     /// `error_pct` needs, or 150 without that.
     pub basis: Option<usize>,
-    /// Folder in which bases are kept from run to run; relative to the current one.
+    /// Folder in which bases are kept from run to run; relative to the current one. If absent, it is the user's cache for a scene
+    /// that was read from a file and runs in real time, and none for others.
     pub basis_folder: Option<PathBuf>,
+    /// False for bases that are kept nowhere.
+    pub keep_bases: bool,
     /// The data that the global model takes over from the local one; if absent, those that the model is best with.
     pub feedback: Option<Feedback>,
     /// The way in which a linear patch is stepped.
@@ -76,6 +80,7 @@ impl Default for LocalSpec {
             patch: None,
             basis: None,
             basis_folder: None,
+            keep_bases: true,
             feedback: None,
             step: StepKind::default(),
             blend: BlendSpec::default(),

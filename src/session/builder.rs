@@ -156,6 +156,14 @@ impl SessionBuilder {
         self
     }
 
+    /// Keeps no reduced surroundings from run to run: by default those of a scene that was read from a file, and runs in real time, are
+    /// kept in the user's cache, and those of a scene that names a folder there.
+    #[must_use]
+    pub fn forget_bases(mut self) -> Self {
+        self.parts.scene.local.keep_bases = false;
+        self
+    }
+
     /// Chooses the data that the global model takes over from the local one.
     #[must_use]
     pub fn feedback(mut self, feedback: Feedback) -> Self {

@@ -187,7 +187,7 @@ fn an_error_budget_is_kept_with_as_many_states_as_it_needs() {
 #[test]
 fn late_bases_leave_the_first_windows_to_serve() {
     let mut scene = Case::new("drag_slip").scene.with_model(LocalModelKind::Predictive);
-    scene.global.basis_latency_ms = 900.0;
+    scene.global.basis_latency_ms = Some(900.0);
     scene.local.patch = Some([3, 3, 2]);
     scene.run.duration_s = 1.8;
     let (late, shares) = forces(scene);

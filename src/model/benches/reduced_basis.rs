@@ -1,29 +1,34 @@
-//! What the reduced surroundings of a patch cost: the whole, and each of its parts, on blocks held at the bottom with the
-//! patch in the middle of the top.
+//! What the reduced surroundings of a patch cost: the whole, each of its parts, and what the nominal time says, on blocks of springs and
+//! cubes of tetrahedra held at the bottom with the patch in the middle of the top.
 //!
 //! `taskset -c 0 cargo bench --bench reduced_basis [-- NODES_PER_EDGE ...]`
 
+mod cubes;
+
 use std::time::Instant;
 
+use palpate_model::Vec3;
 use palpate_model::body::{Block, Body};
 use palpate_model::mesh::Face;
 use palpate_model::surroundings::{Reduction, RestingBody, Size};
 
-const PATCH: [usize; 3] = [6, 6, 3];
+use cubes::cube;
+
+/// Of all cubes (m).
+const EDGE: f64 = 0.1;
 const STATES: usize = 150;
 const BUDGET: Size = Size::ErrorPct(0.5);
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 3;
 
-/// Ids of the patch in the middle of the top.
-fn patch(nodes: usize) -> Vec<u32> {
-    let from = [(nodes - PATCH[0]) / 2, (nodes - PATCH[1]) / 2, nodes - PATCH[2]];
+/// Ids of the patch in the middle of the top of a cube of that edge (m).
+fn patch(body: &dyn Body, edge: f64, size: [usize; 3]) -> Vec<u32> {
+    let middle = Vec3::new(0.5 * edge, 0.5 * edge, edge);
+    let far =
+        |triangle: &[u32; 3]| triangle.iter().map(|&node| (body.rest()[node as usize] - middle).norm()).sum::<f64>();
+    let triangles = body.surface().triangles.iter().enumerate();
+    let (nearest, _) = triangles.min_by(|a, b| far(a.1).total_cmp(&far(b.1))).expect("it has a surface");
     let mut ids = Vec::new();
-    for k in 0..PATCH[2] {
-        for j in 0..PATCH[1] {
-            ids.extend((0..PATCH[0]).map(|i| (from[0] + i + nodes * (from[1] + j + nodes * (from[2] + k))) as u32));
-        }
-    }
-    ids.sort_unstable();
+    body.patch(&[nearest as u32], size, &mut ids);
     ids
 }
 
@@ -56,31 +61,45 @@ fn parts(resting: &RestingBody, patch: &[u32], size: Size) -> Vec<f64> {
 
 fn main() {
     let asked: Vec<usize> = std::env::args().filter_map(|word| word.parse().ok()).collect();
-    let sizes = if asked.is_empty() { vec![12, 16, 24] } else { asked };
+    let sizes = if asked.is_empty() { vec![8, 12, 16, 24] } else { asked };
     println!("medians of {ROUNDS} rounds, ms of CPU time on one core; {STATES} states, and those that 0.5 % ask for\n");
-    println!("| nodes | all | prepare | factorise | moments | project | all, by the budget |");
-    println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: |");
+    println!(
+        "| nodes | ring | all | nominal | prepare | factorise | moments | project | all, by the budget | nominal |"
+    );
+    println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     for nodes in sizes {
-        let builder = Block::builder([nodes; 3], [0.1; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
-        let body = builder.fix(Face::ZMin).build().expect("a valid block");
-        let (resting, patch) = (RestingBody::new(&body).expect("springs"), patch(nodes));
-        let [by_states, by_budget] = [Size::States(STATES), BUDGET]
-            .map(|size| (0..ROUNDS).map(|_| parts(&resting, &patch, size)).collect::<Vec<Vec<f64>>>());
-        let median = |rounds: &[Vec<f64>], of: &dyn Fn(&[f64]) -> f64| {
-            let mut values: Vec<f64> = rounds.iter().map(|round| 1e3 * of(round)).collect();
-            values.sort_by(f64::total_cmp);
-            values[values.len() / 2]
-        };
-        let last = by_states[0].len() - 1;
-        println!(
-            "| {nodes}^3 | {:.0} | {:.1} | {:.1} | {:.1} | {:.1} | {:.0} |",
-            median(&by_states, &|round| round.iter().sum()),
-            median(&by_states, &|round| round[0]),
-            median(&by_states, &|round| round[1]),
-            median(&by_states, &|round| round[2..last].iter().sum()),
-            median(&by_states, &|round| round[last]),
-            median(&by_budget, &|round| round.iter().sum()),
-        );
-        assert!(body.rest().len() == nodes.pow(3));
+        let builder = Block::builder([nodes; 3], [EDGE; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
+        let block = builder.fix(Face::ZMin).build().expect("a valid block");
+        row(&format!("{nodes}^3 springs"), &block, [6, 6, 3]);
+        for (is_averaged, name) in [(false, "tetrahedra"), (true, "with nodal pressure")] {
+            row(&format!("{nodes}^3 {name}"), &cube(6 * (nodes - 1).pow(3), EDGE, is_averaged), [4, 4, 3]);
+        }
     }
+}
+
+/// Measures and prints `body` with a patch of that size.
+fn row(name: &str, body: &dyn Body, size: [usize; 3]) {
+    let (resting, patch) = (RestingBody::new(body).expect("springs or elements"), patch(body, EDGE, size));
+    let [(by_states, of_states), (by_budget, of_budget)] = [Size::States(STATES), BUDGET].map(|size| {
+        let reduction = Reduction::new(&resting, &patch, size).expect("the body moves");
+        let rounds = (0..ROUNDS).map(|_| parts(&resting, &patch, size)).collect::<Vec<Vec<f64>>>();
+        assert_eq!(rounds[0].len(), 1 + reduction.parts());
+        (rounds, 1e3 * reduction.nominal())
+    });
+    let ring = body.restriction(&patch).map_or(0, |near| near.nodes.len() - patch.len());
+    let median = |rounds: &[Vec<f64>], of: &dyn Fn(&[f64]) -> f64| {
+        let mut values: Vec<f64> = rounds.iter().map(|round| 1e3 * of(round)).collect();
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    let last = by_states[0].len() - 1;
+    println!(
+        "| {name} | {ring} | {:.0} | {of_states:.0} | {:.1} | {:.1} | {:.1} | {:.1} | {:.0} | {of_budget:.0} |",
+        median(&by_states, &|round| round.iter().sum()),
+        median(&by_states, &|round| round[0]),
+        median(&by_states, &|round| round[1]),
+        median(&by_states, &|round| round[2..last].iter().sum()),
+        median(&by_states, &|round| round[last]),
+        median(&by_budget, &|round| round.iter().sum()),
+    );
 }

@@ -51,6 +51,11 @@ impl Far {
         3 * self.nodes.len()
     }
 
+    /// Pairs of nodes that answer to each other, and nodes to themselves.
+    pub(super) fn pairs(&self) -> usize {
+        self.couplings.len()
+    }
+
     /// The unknowns of `nodes` (ids), three each.
     pub(super) fn unknowns_of(&self, nodes: &[u32]) -> Vec<usize> {
         let place = |&node: &u32| self.place[node as usize].expect("it is far and can move") as usize;

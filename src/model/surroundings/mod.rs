@@ -4,6 +4,7 @@
 mod accuracy;
 mod basis;
 mod condense;
+mod cost;
 mod estimate;
 mod far;
 mod near;

@@ -16,7 +16,7 @@ use crate::linear_algebra::{
 /// The real frequency that the answers are expanded at (rad/s): between rest and the fastest that a hand does.
 const EXPANSION: f64 = 2.0 * std::f64::consts::PI * 30.0;
 /// Moments: Z_0, Z_1 and Z_2.
-const MOMENTS: usize = 3;
+pub(super) const MOMENTS: usize = 3;
 /// Combinations of unit forces that are followed to higher moments.
 const LEADING: usize = 110;
 /// More unknowns than this take longer than a stop waits for.
@@ -31,8 +31,8 @@ pub struct Reduction {
     /// What that looks like.
     likeness: Option<u64>,
     ring: Vec<u32>,
-    size: Size,
-    far: Far,
+    pub(super) size: Size,
+    pub(super) far: Far,
     restriction: Restriction,
     stage: Stage,
     errors: Option<Vec<f64>>,
@@ -109,6 +109,23 @@ impl Reduction {
         self.far.unknowns() > LARGE
     }
 
+    /// True for surroundings like others whose basis was [made](Self::advance) or [learnt](Self::learn) before: theirs is that of these.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn is_known(&self) -> bool {
+        matches!(self.stage, Stage::Known(_))
+    }
+
+    /// Takes `basis`, which was made of the same by another run, for surroundings of `body` that are like these: as if it had been made
+    /// here.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates, takes a lock.
+    pub fn learn(&self, body: &RestingBody, basis: &Basis) {
+        self.likeness.inspect(|&likeness| body.keep_alike(likeness, basis));
+    }
+
     /// Does the next part; returns the basis after the last one.
     ///
     /// # Errors
@@ -141,7 +158,7 @@ impl Reduction {
             }
             Stage::Project { wide } => {
                 let basis = self.project(&wide)?;
-                self.likeness.inspect(|&likeness| whole.keep_alike(likeness, &basis));
+                self.learn(whole, &basis);
                 return Ok(Some(basis));
             }
             Stage::Known(basis) => return Ok(Some(basis)),

@@ -225,10 +225,10 @@ fn global(global: &GlobalSpec) -> Result<(), Error> {
         return Err(Error::scene("global.ahead_nodes", "is 0, must be at least 1"));
     }
     let latencies = [
-        ("global.compute_latency_ms", global.compute_latency_ms),
+        ("global.compute_latency_ms", Some(global.compute_latency_ms)),
         ("global.basis_latency_ms", global.basis_latency_ms),
     ];
-    for (field, latency_ms) in latencies {
+    for (field, latency_ms) in latencies.into_iter().filter_map(|(field, latency_ms)| Some((field, latency_ms?))) {
         not_negative(field, latency_ms)?;
         at_most_ms(field, latency_ms, MAX_LATENCY_MS)?;
     }

@@ -80,8 +80,8 @@ pub(super) fn local_group(
 const RAMP_MARGIN_S: f64 = 0.005;
 
 /// The group that reduces surroundings, for wishes that come at `rate`.
-pub(super) fn basis_group(rate: Rate, spec: &GlobalSpec) -> RateGroup {
-    RateGroup::new(rate).name(BASIS).latency(Nanos::from_secs_f64(spec.basis_latency_ms * 1e-3))
+pub(super) fn basis_group(rate: Rate) -> RateGroup {
+    RateGroup::new(rate).name(BASIS)
 }
 
 /// The group that takes records to the log, and pictures to one with `/scene`.

@@ -7,6 +7,7 @@ mod budget;
 mod choice;
 mod device;
 mod groups;
+mod kept;
 mod limits;
 mod link;
 mod patch;
@@ -89,7 +90,7 @@ impl Prepared {
 
     /// The group that reduces surroundings: it looks for wishes as often as the global model makes them.
     pub(super) fn basis_group(&self) -> RateGroup {
-        groups::basis_group(self.plan.timing.global, &self.scene.global)
+        groups::basis_group(self.plan.timing.global)
     }
 
     /// The group that takes records to the log.
@@ -141,7 +142,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     };
     let blend = Blend::new(scene.local.blend.kind, blend_ticks);
     let (probes, in_real_time) = (std::mem::take(&mut start.probes), options.in_real_time);
-    let basis_folder = scene.local.basis_folder.take();
+    let basis_folder = kept::folder(&scene, execution);
     let law = scene.contact.law();
     let plan = ModelPlan {
         template,
@@ -183,7 +184,7 @@ pub(super) fn as_run(scene: &Scene, named: Option<(&[Option<u32>], &[u32])>) -> 
     for device in &mut scene.devices {
         (device.path_csv, device.path, device.log) = (None, None, None);
     }
-    scene.local.basis_folder = None;
+    (scene.local.basis_folder, scene.local.keep_bases) = (None, true);
     if let Some(BodySpec::Tetrahedra(spec)) = &mut scene.body {
         // The mesh itself is in the log.
         (spec.mesh, spec.surface, spec.element_size_m, spec.surface_size_m) = (None, None, None, None);

@@ -8,7 +8,7 @@ use crate::log::ModelReason;
 use crate::model::Pose;
 use crate::model::local::{Aim, Kind, ToolForecast, Windows};
 use crate::model::surroundings::{Bases, RestingBody, Size};
-use crate::runtime::{Actor, ExchangePort, RuntimeBuilder};
+use crate::runtime::{Actor, ExchangePort, Nanos, RuntimeBuilder};
 use crate::session::prepare::{Prepared, extended};
 
 /// The basis actor's side of a session.
@@ -20,6 +20,8 @@ pub(super) struct BasisSide {
     resting: Arc<RestingBody>,
     store: BasisStore,
     pace: BasisPace,
+    /// Between two releases.
+    period: Nanos,
 }
 
 impl BasisSide {
@@ -32,25 +34,31 @@ impl BasisSide {
             return Ok(None);
         };
         let folder = prepared.plan.basis_folder.clone();
-        let store = BasisStore { size: prepared.scene.local.basis_size(), folder };
-        let pace = if prepared.plan.in_real_time { BasisPace::OneByOne } else { BasisPace::All };
+        let mut store = BasisStore::new(prepared.scene.local.basis_size(), folder);
+        let given = prepared.scene.global.basis_latency_ms.map(|ms| Nanos::from_secs_f64(ms * 1e-3));
+        let pace = match given {
+            _ if prepared.plan.in_real_time => BasisPace::Measured,
+            None => BasisPace::Nominal,
+            Some(cost) => BasisPace::Given(cost),
+        };
         Ok(Some(Self {
             wishes: graph.exchange_port(Wishes::default),
             bases: graph.exchange_port(Bases::default),
             known: if prepared.plan.template.kind == Kind::Predictive {
-                first_bases(prepared, &resting, &store, tools)?
+                first_bases(prepared, &resting, &mut store, tools)?
             } else {
                 Bases::default()
             },
             store,
             resting,
             pace,
+            period: prepared.plan.timing.global.period(),
         }))
     }
 
     /// The reason for the model, with what the first basis came to if its states were chosen by a budget.
     pub(super) fn reason(&self, of_model: Option<ModelReason>) -> Option<ModelReason> {
-        let Size::ErrorPct(budget) = self.store.size else { return of_model };
+        let Size::ErrorPct(budget) = self.store.size() else { return of_model };
         let Some(basis) = self.known.iter().max_by_key(|basis| basis.states()) else { return of_model };
         let (states, Some(estimate)) = (basis.states(), basis.estimate()) else { return of_model };
         let (linear, expected) = (estimate.linear_pct, estimate.expected_pct());
@@ -64,12 +72,18 @@ impl BasisSide {
 
     pub(super) fn actor(&self) -> Box<dyn Actor> {
         let ports = BasisPorts { wishes: self.wishes.reader(), bases: self.bases.writer() };
-        Box::new(BasisActor::new(Arc::clone(&self.resting), self.store.clone(), self.known.clone(), self.pace, ports))
+        let (resting, store, known) = (Arc::clone(&self.resting), self.store.clone(), self.known.clone());
+        Box::new(BasisActor::new(resting, store, known, (self.pace, self.period), ports))
     }
 }
 
 /// The bases of the window that each tool is over, and of the widest there.
-fn first_bases(prepared: &Prepared, resting: &RestingBody, store: &BasisStore, tools: &[Pose]) -> Result<Bases, Error> {
+fn first_bases(
+    prepared: &Prepared,
+    resting: &RestingBody,
+    store: &mut BasisStore,
+    tools: &[Pose],
+) -> Result<Bases, Error> {
     let simulation = &prepared.simulation;
     let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
     let (mut triangles, mut bases) = (Vec::new(), Bases::default());

@@ -38,7 +38,7 @@ impl Settings {
         scene.local.basis = self.basis.or(scene.local.basis);
         scene.local.error_pct = self.budget.or(scene.local.error_pct);
         scene.link.clone_from(&self.link);
-        scene.global.basis_latency_ms = self.latency_ms.unwrap_or(scene.global.basis_latency_ms);
+        scene.global.basis_latency_ms = self.latency_ms.or(scene.global.basis_latency_ms);
     }
 }
 

@@ -31,7 +31,7 @@ Each scene runs for 1.2 s in virtual time with `full`, and with `predictive` and
 global model that are there at once (*in time*) or one period late. *rms* is the error of the force in % of the largest force of `full`; *jump* the largest
 change of the force in one tick beyond that of `full`, in the same; *peak* the largest force over that of `full`. *Tick* is the
 CPU time of a haptic tick, the median over scenes of p50 and p99 (which has catching up in it), *periods* what the global model works, in
-periods of simulation with `full`. Bases of reduced surroundings are there at once in these runs.
+periods of simulation with `full`. A basis of reduced surroundings takes its nominal time in these runs, one after the other.
 
 The second tables say what `auto` chooses in virtual time, where an evaluation of the body's forces has a nominal cost, how
 far that model is off one period late, and how often a model was more than the usual `error_pct` of 1 % off without a word of it.

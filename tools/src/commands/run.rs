@@ -29,6 +29,9 @@ pub struct RunArgs {
     /// Also log the topic /scene for viewers: surface, tools and forces, 30 times a second
     #[arg(long)]
     pub log_scene: bool,
+    /// Keep no reduced surroundings from run to run, and take none that were kept
+    #[arg(long)]
+    pub no_cache: bool,
     /// Print the schedule and what this system would refuse, and run nothing
     #[arg(long)]
     pub plan: bool,
@@ -65,6 +68,9 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
     }
     if args.log_scene {
         builder = builder.log_scene();
+    }
+    if args.no_cache {
+        builder = builder.forget_bases();
     }
     if args.plan { plan(builder, &name) } else { execute(builder, &args.out, &name) }
 }
