@@ -8,6 +8,8 @@ export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
 export CARGO_INCREMENTAL=0
 # Lines for a debugger in ninety programs would be written and linked for nobody; a panic says its own.
 export CARGO_PROFILE_DEV_DEBUG=0
+# Bases that runs keep are no later run's.
+export XDG_CACHE_HOME="$CARGO_TARGET_DIR/cache"
 # The checks import each other: nothing is left behind in ci/.
 export PYTHONDONTWRITEBYTECODE=1
 

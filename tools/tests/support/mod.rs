@@ -72,6 +72,8 @@ fn palpate(folder: &Path, args: &[&str]) -> Called {
         .args(args)
         .current_dir(folder)
         .env("RUST_BACKTRACE", "1")
+        // Bases that are kept are not the user's own.
+        .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
         .stdin(Stdio::null())
         .output()
         .expect("the command starts");

@@ -22,7 +22,7 @@ pub const CASES: &[Case] = &[
         "late drag",
         "hard/drag_100",
         "results 1.5 and 2 periods late",
-        &[run(Predictive, 1.5, [0.38, 6.0, 15.0, 0.69]), run(Predictive, 2.0, [0.73, 9.6, 15.0, 1.2])],
+        &[run(Predictive, 1.5, [0.37, 6.0, 15.0, 0.62]), run(Predictive, 2.0, [0.67, 9.6, 15.0, 1.1])],
     )
     .ends_free(),
     case(
@@ -40,7 +40,7 @@ pub const CASES: &[Case] = &[
         "lost drag 0.1 m/s",
         "hard/drag_100",
         "every second resync is lost",
-        &[run(Predictive, 1.0, [0.61, 3.4, 15.0, 0.81])],
+        &[run(Predictive, 1.0, [1.6, 13.0, 15.0, 0.42])],
     )
     .ends_free()
     .upset(Upset::EverySecondLost),
@@ -48,7 +48,7 @@ pub const CASES: &[Case] = &[
         "lost drag 0.2 m/s",
         "hard/drag_200",
         "every second resync is lost",
-        &[run(Predictive, 1.0, [2.1, 17.0, 32.0, 0.73])],
+        &[run(Predictive, 1.0, [0.48, 3.0, 32.0, 0.72])],
     )
     .ends_free()
     .upset(Upset::EverySecondLost),
@@ -67,7 +67,7 @@ pub const CASES: &[Case] = &[
         "stalled drag",
         "hard/drag_long",
         "the global model stands still for 1 s",
-        &[run(LinearBoundary, 1.0, [44.0, 130.0, 19.0, 66.0]), run(Predictive, 1.0, [13.0, 42.0, 11.0, 13.0])],
+        &[run(LinearBoundary, 1.0, [44.0, 130.0, 19.0, 66.0]), run(Predictive, 1.0, [15.0, 47.0, 9.9, 5.2])],
     )
     .ends_free()
     .upset(Upset::Stall(0.4)),

@@ -12,8 +12,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [23.0, 113.0, 122.0, 42.0]),
             run(LinearBoundary, 0.0, [16.0, 108.0, 122.0, 41.0]),
-            run(Predictive, 0.0, [0.14, 0.32, 130.0, 0.33]),
-            run(Predictive, 1.0, [0.21, 0.58, 130.0, 0.34]),
+            run(Predictive, 0.0, [0.14, 0.32, 121.0, 0.33]),
+            run(Predictive, 1.0, [0.21, 0.58, 121.0, 0.34]),
         ],
     ),
     case(
@@ -23,8 +23,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [19.0, 113.0, 122.0, 42.0]),
             run(LinearBoundary, 0.0, [13.0, 108.0, 122.0, 41.0]),
-            run(Predictive, 0.0, [0.14, 0.42, 130.0, 0.38]),
-            run(Predictive, 1.0, [0.22, 0.82, 130.0, 0.4]),
+            run(Predictive, 0.0, [0.14, 0.42, 121.0, 0.38]),
+            run(Predictive, 1.0, [0.22, 0.82, 121.0, 0.4]),
         ],
     ),
     case(
@@ -34,8 +34,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [3.9, 38.0, 129.0, 8.5]),
             run(LinearBoundary, 0.0, [5.1, 38.0, 129.0, 8.5]),
-            run(Predictive, 0.0, [0.39, 4.4, 130.0, 0.3]),
-            run(Predictive, 1.0, [0.4, 4.5, 130.0, 0.3]),
+            run(Predictive, 0.0, [0.39, 4.4, 121.0, 0.3]),
+            run(Predictive, 1.0, [0.4, 4.5, 121.0, 0.3]),
         ],
     )
     .ends_free(),
@@ -47,7 +47,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [20.0, 76.0, 20.0, 89.0]),
             run(LinearBoundary, 0.0, [11.0, 45.0, 7.7, 39.0]),
             run(Predictive, 0.0, [0.71, 4.4, 7.5, 1.1]),
-            run(Predictive, 1.0, [2.3, 8.7, 7.5, 5.5]),
+            run(Predictive, 1.0, [2.3, 8.8, 7.5, 5.4]),
         ],
     )
     .ends_free(),
@@ -58,8 +58,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [13.0, 37.0, 11.0, 85.0]),
             run(LinearBoundary, 0.0, [13.0, 59.0, 9.9, 52.0]),
-            run(Predictive, 0.0, [0.12, 0.16, 11.0, 0.35]),
-            run(Predictive, 1.0, [0.25, 2.1, 13.0, 0.76]),
+            run(Predictive, 0.0, [0.16, 1.3, 11.0, 0.37]),
+            run(Predictive, 1.0, [0.21, 0.8, 11.0, 0.73]),
         ],
     )
     .ends_free(),
@@ -70,8 +70,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [19.0, 67.0, 15.0, 46.0]),
             run(LinearBoundary, 0.0, [14.0, 70.0, 15.0, 29.0]),
-            run(Predictive, 0.0, [0.12, 0.17, 15.0, 0.33]),
-            run(Predictive, 1.0, [0.19, 0.39, 15.0, 0.47]),
+            run(Predictive, 0.0, [0.15, 1.1, 15.0, 0.33]),
+            run(Predictive, 1.0, [0.59, 8.5, 15.0, 0.57]),
         ],
     )
     .ends_free(),
@@ -82,8 +82,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [21.0, 97.0, 21.0, 65.0]),
             run(LinearBoundary, 0.0, [19.0, 78.0, 20.0, 45.0]),
-            run(Predictive, 0.0, [0.13, 0.26, 32.0, 0.36]),
-            run(Predictive, 1.0, [0.25, 1.7, 32.0, 0.61]),
+            run(Predictive, 0.0, [0.13, 0.23, 32.0, 0.34]),
+            run(Predictive, 1.0, [0.24, 1.2, 32.0, 0.56]),
         ],
     )
     .ends_free(),
@@ -102,7 +102,7 @@ pub const CASES: &[Case] = &[
         "drag 0.6 m/s",
         "hard/drag_600",
         "friction 0.3, stops within 30 ms",
-        &[run(LinearBoundary, 0.0, [14.0, 70.0, 36.0, 54.0]), run(Predictive, 1.0, [3.6, 30.0, 49.0, 5.2])],
+        &[run(LinearBoundary, 0.0, [14.0, 70.0, 36.0, 54.0]), run(Predictive, 1.0, [3.6, 30.0, 49.0, 5.1])],
     )
     .ends_free(),
     case(
@@ -112,7 +112,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [17.0, 75.0, 75.0, 43.0]),
             run(LinearBoundary, 0.0, [14.0, 75.0, 50.0, 11.0]),
-            run(Predictive, 1.0, [4.4, 54.0, 53.0, 0.78]),
+            run(Predictive, 1.0, [4.3, 54.0, 53.0, 0.7]),
         ],
     ),
     case(

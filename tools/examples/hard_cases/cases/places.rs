@@ -36,8 +36,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [3.0, 11.0, 121.0, 5.6]),
             run(LinearBoundary, 0.0, [2.7, 12.0, 121.0, 4.6]),
-            run(Predictive, 0.0, [0.13, 0.27, 130.0, 0.43]),
-            run(Predictive, 1.0, [0.16, 0.35, 130.0, 0.46]),
+            run(Predictive, 0.0, [0.13, 0.27, 121.0, 0.39]),
+            run(Predictive, 1.0, [0.16, 0.35, 121.0, 0.41]),
         ],
     )
     .ends_free(),
@@ -48,7 +48,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [3.0, 13.0, 121.0, 6.2]),
             run(LinearBoundary, 0.0, [1.4, 6.1, 121.0, 3.1]),
-            run(Predictive, 1.0, [0.14, 0.33, 130.0, 0.44]),
+            run(Predictive, 1.0, [0.14, 0.33, 121.0, 0.44]),
         ],
     )
     .ends_free(),
@@ -59,8 +59,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [9.4, 28.0, 14.0, 24.0]),
             run(LinearBoundary, 0.0, [7.8, 32.0, 14.0, 14.0]),
-            run(Predictive, 0.0, [0.12, 0.22, 15.0, 0.34]),
-            run(Predictive, 1.0, [0.18, 0.43, 15.0, 0.51]),
+            run(Predictive, 0.0, [0.13, 0.28, 15.0, 0.34]),
+            run(Predictive, 1.0, [0.22, 0.69, 15.0, 0.49]),
         ],
     )
     .ends_free(),
