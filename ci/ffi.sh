@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# palpate for C and C++: the header is the one that cbindgen writes, and examples and tests build with gcc and clang without a warning
-# and run, once with the address and undefined-behaviour sanitizers.
+# palpate for C and C++: the header is the one that cbindgen writes, a tick allocates nothing and makes no system call, and examples and
+# tests build with gcc and clang without a warning and run, with the address and undefined-behaviour sanitizers too.
 #
 #     bash ci/ffi.sh           all of it
 #     bash ci/ffi.sh header    writes the header anew
@@ -31,6 +31,9 @@ echo 'int main(void) { return 0; }' >"$folder/probe.c"
 clang -fsanitize=address,undefined "$folder/probe.c" -o "$folder/probe" 2>/dev/null || install_packages "clang's sanitizers" libclang-rt-dev
 
 cargo build --locked -p palpate-ffi
+need_component clippy clippy
+cargo clippy --locked -p palpate-ffi --no-deps --all-targets -- -D warnings
+PALPATE_REQUIRE_SECCOMP=1 cargo test --locked -p palpate-ffi
 libraries="$CARGO_TARGET_DIR/debug"
 warnings=(-Wall -Wextra -Wpedantic -Werror)
 sanitize=(-g -fsanitize=address,undefined -fno-sanitize-recover=all)

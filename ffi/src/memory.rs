@@ -105,12 +105,12 @@ pub(crate) unsafe fn numbers<T: Copy>(pointer: *const T, count: usize, name: &'s
     Ok((0..count).map(|place| unsafe { pointer.add(place).read_unaligned() }).collect())
 }
 
-/// Copies `values` to `pointer`, where there is room for `room` of them.
+/// Puts `values` at `pointer`, where there is room for `room` of them.
 ///
 /// # Safety
 /// `pointer` is null or points at room for `room` values.
-pub(crate) unsafe fn copy_out<T: Copy>(
-    values: &[T],
+pub(crate) unsafe fn fill<T: Copy>(
+    values: impl ExactSizeIterator<Item = T>,
     pointer: *mut T,
     room: usize,
     name: &'static str,
@@ -118,12 +118,13 @@ pub(crate) unsafe fn copy_out<T: Copy>(
     if pointer.is_null() {
         return Err(Failure::new(PalpateCode::NullPointer, name));
     }
-    if room < values.len() {
-        return Err(Failure::argument(format!("{name}: room for {room}, and there are {}", values.len())));
+    let count = values.len();
+    if room < count {
+        return Err(Failure::argument(format!("{name}: room for {room}, and there are {count}")));
     }
-    for (place, value) in values.iter().enumerate() {
+    for (place, value) in values.take(count).enumerate() {
         // SAFETY: the caller's promise, and there is room.
-        unsafe { pointer.add(place).write_unaligned(*value) };
+        unsafe { pointer.add(place).write_unaligned(value) };
     }
     Ok(())
 }

@@ -204,7 +204,7 @@ static void arguments(void) {
     PalpateTool tool = {.size = sizeof tool};
     EXPECT(palpate_tool(session, 1, &tool), PALPATE_CODE_BAD_ARGUMENT, "no tool 1");
     double positions[3];
-    EXPECT(palpate_surface(session, positions, 1, NULL), PALPATE_CODE_BAD_ARGUMENT, "room for 3");
+    EXPECT(palpate_surface(session, positions, 1, NULL), PALPATE_CODE_BAD_ARGUMENT, "room for 1, and there are 125");
     size_t count = 0;
     PalpateContact contacts[1];
     EXPECT(palpate_contacts(session, contacts, 1, &count), PALPATE_CODE_BAD_ARGUMENT, "palpate_setup_share_contacts");

@@ -1,5 +1,6 @@
 // The C++ wrapper: ownership moves, what fails throws, a tick does not. Run by ci/ffi.sh, under sanitizers too.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -77,6 +78,54 @@ static void virtual_time_gives_the_same_forces_every_time() {
     const auto forces = press();
     EXPECT(forces.front() == 0.0 && forces.back() > 0.05);
     EXPECT(forces == press());
+}
+
+static void a_stop_that_is_asked_for_brings_the_force_to_rest_in_the_ticks_that_follow() {
+    auto setup = block();
+    setup.model("patch").virtual_time();
+    auto session = std::move(setup).start_hosted(device());
+    const auto loop = session.attach();
+    auto command = palpate::make<PalpateCommand>();
+    for (int tick = 0; tick <= 300; ++tick) {
+        loop.tick(at(0.024, 0.052 - 0.00003 * tick), command);
+    }
+    const double felt_n = command.force_n[2];
+    session.request_stop();
+    std::vector<double> forces;
+    while (loop.tick(at(0.024, 0.043), command) == PALPATE_CODE_OK && forces.size() < 1000) {
+        forces.push_back(command.force_n[2]);
+    }
+    EXPECT(felt_n > 0.05 && forces.size() > 10 && forces.size() < 1000);
+    EXPECT(std::is_sorted(forces.rbegin(), forces.rend()) && forces.front() <= felt_n && forces.back() == 0.0);
+    EXPECT(loop.tick(at(0.024, 0.043), command) == PALPATE_CODE_ENDED && command.force_n[2] == 0.0);
+    EXPECT(session.ended());
+    session.stop();
+}
+
+static void a_session_with_an_end_ends() {
+    auto setup = block();
+    setup.model("patch").virtual_time().duration(0.2);
+    auto session = std::move(setup).start_hosted(device());
+    const auto loop = session.attach();
+    auto command = palpate::make<PalpateCommand>();
+    int ticks = 0;
+    while (loop.tick(at(0.024, 0.052 - 0.00003 * ticks), command) == PALPATE_CODE_OK && ticks < 1000) {
+        ++ticks;
+    }
+    EXPECT(ticks >= 200 && ticks < 400);
+    session.stop();
+}
+
+static void one_thread_ticks_two_sessions() {
+    auto first = block().start_hosted(device());
+    auto second = block().start_hosted(device());
+    const auto one = first.attach(), other = second.attach();
+    auto command = palpate::make<PalpateCommand>();
+    EXPECT(one.tick(at(0.024, 0.052), command) == PALPATE_CODE_OK && other.tick(at(0.024, 0.052), command) == PALPATE_CODE_OK);
+    first.stop();
+    EXPECT(one.tick(at(0.024, 0.052), command) == PALPATE_CODE_BAD_HANDLE);
+    EXPECT(other.tick(at(0.024, 0.052), command) == PALPATE_CODE_OK);
+    second.stop();
 }
 
 static void two_devices_feel_two_forces() {
@@ -170,6 +219,9 @@ static void what_fails_throws_and_ownership_moves() {
 
 int main() {
     virtual_time_gives_the_same_forces_every_time();
+    a_stop_that_is_asked_for_brings_the_force_to_rest_in_the_ticks_that_follow();
+    a_session_with_an_end_ends();
+    one_thread_ticks_two_sessions();
     two_devices_feel_two_forces();
     tetrahedra_from_arrays();
     what_fails_throws_and_ownership_moves();

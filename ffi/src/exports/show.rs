@@ -2,7 +2,7 @@
 
 use crate::boundary::boundary;
 use crate::code::{Failure, PalpateCode};
-use crate::memory::{check_size, copy_out, put, write};
+use crate::memory::{check_size, fill, put, write};
 use crate::session::SESSIONS;
 use crate::types::{PalpateContact, PalpateSession, PalpateTool};
 
@@ -38,9 +38,9 @@ pub unsafe extern "C" fn palpate_surface_size(
 pub unsafe extern "C" fn palpate_triangles(session: PalpateSession, triangles: *mut u32, room: usize) -> PalpateCode {
     boundary(|| {
         SESSIONS.with(session.id, |live| {
-            let flat: Vec<u32> = live.viewer()?.triangles().iter().flatten().copied().collect();
+            let own = live.viewer()?.triangles();
             // SAFETY: the caller's promise.
-            unsafe { copy_out(&flat, triangles, room.saturating_mul(3), "triangles") }
+            unsafe { fill(own.iter().copied(), triangles.cast(), room, "triangles") }
         })
     })
 }
@@ -60,13 +60,13 @@ pub unsafe extern "C" fn palpate_surface(
     boundary(|| {
         SESSIONS.with(session.id, |live| {
             let surface = live.viewer()?.surface();
-            let flat: Vec<f64> = surface.positions.iter().flat_map(|at| [at.x, at.y, at.z]).collect();
+            let positions = surface.positions.iter().map(|&at| <[f64; 3]>::from(at));
             if !time_s.is_null() {
                 // SAFETY: the caller's promise.
                 unsafe { put(time_s, surface.time.as_secs_f64(), "time_s")? };
             }
             // SAFETY: the caller's promise.
-            unsafe { copy_out(&flat, positions_m, room.saturating_mul(3), "positions_m") }
+            unsafe { fill(positions, positions_m.cast(), room, "positions_m") }
         })
     })
 }
@@ -107,7 +107,7 @@ pub unsafe extern "C" fn palpate_contacts(
             // SAFETY: the caller's promise.
             unsafe {
                 put(count, newest.len(), "count")?;
-                copy_out(&newest, contacts, room, "contacts")
+                fill(newest.into_iter(), contacts, room, "contacts")
             }
         })
     })
