@@ -24,9 +24,10 @@ CRATES = {
     "palpate_haply": ROOT / "haply/src",
     "palpate_view": ROOT / "view/src",
     "palpate_cli": ROOT / "tools/src",
+    "palpate_python": ROOT / "python/src",
 }
-# Its names are those of C, in one header.
-FOREIGN = {"palpate_ffi"}
+# Their names are those of C, in one header, and of Python.
+FOREIGN = {"palpate_ffi", "palpate_python"}
 ENGINE = ["palpate", "palpate_mesh", "palpate_model", "palpate_runtime"]
 ASIDE = {"tests", "benches", "examples", "target"}
 # Chosen by a cfg, these files are one: a kernel names its instruction sets and they name it.

@@ -28,7 +28,7 @@ pub use self::analysis::{
 };
 pub use self::entry::{LogEntry, Window};
 pub use self::percentiles::{Distribution, Magnitudes, Percentiles};
-pub use self::reader::{LogReader, TopicKind};
+pub use self::reader::{LogReader, Topic, TopicKind};
 pub use self::records::{
     CommandSample, ContactPointSample, ContactSample, Environment, ForceSample, GlobalTick, GroupInfo, JoinedRecords,
     Level, LinkSample, LogRecord, LoggedExecution, ModelReason, ProbeSample, Resync, SceneFrame, SceneTool, ServedBy,

@@ -37,6 +37,13 @@ impl SessionBuilder {
         Self { parts: Parts::new(body, scene) }
     }
 
+    /// Puts a body of the program's own in the place of the scene's.
+    #[must_use]
+    pub fn body(mut self, body: impl Body + 'static) -> Self {
+        self.parts.body = Some(Box::new(body));
+        self
+    }
+
     /// Adds a device of the program's own; without one the tool follows the scene's path.
     ///
     /// Each of several devices has its own contact and local model, and needs a name: see

@@ -11,7 +11,8 @@
 //! | `log_file` | looks into a log file, checks it, and saves what is readable of a damaged one |
 //! | [`drawing`] | charts as SVG, pages as HTML |
 //!
-//! It is no library for programs: public is what the repository's own benches and pictures and the program `palpate-parquet` need.
+//! It is no library for programs: public is what the repository's own benches and pictures, the program `palpate-parquet` and the Python
+//! package need.
 
 mod commands;
 pub mod compare;
@@ -27,5 +28,5 @@ mod timing;
 mod units;
 
 pub use commands::{OutputFile, WindowArgs, main};
-pub use export::{Cell, ColumnType, TableWriter, export_rows, is_turned};
-pub use reduce::reduction_costs;
+pub use export::{Cell, ColumnType, TableWriter, columns, export_rows, is_turned};
+pub use reduce::{ReduceOptions, reduction_costs, reduction_json};

@@ -30,9 +30,17 @@ pub enum TopicKind {
     Link,
 }
 
-/// One topic: its kind, and the number of the rate group or device that it is of, 0 if it is of none.
+/// A topic of a log: its kind, and the number of the rate group or device that it is of, 0 if it is of none.
+///
+/// ```
+/// use palpate::log::{Environment, ForceSample, LogRecord, Topic, TopicKind};
+///
+/// let topic = Topic::of(&LogRecord::Force(ForceSample::default()));
+/// assert_eq!(topic, Topic(TopicKind::Force, 0));
+/// assert_eq!(topic.name(&Environment::default()), "/force");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Topic(pub(crate) TopicKind, pub(crate) u16);
+pub struct Topic(pub TopicKind, pub u16);
 
 use TopicKind as Kind;
 
@@ -48,7 +56,7 @@ const SHARED: [Kind; 4] = [Kind::Global, Kind::Ports, Kind::Inputs, Kind::Log];
 impl Topic {
     /// The topics that the log of `environment` declares, whether or not anything is written there; `/actors` only where
     /// there are several.
-    pub(crate) fn declared(environment: &Environment) -> impl Iterator<Item = Self> {
+    pub fn declared(environment: &Environment) -> impl Iterator<Item = Self> {
         let number = |count: usize| 0..u16::try_from(count).unwrap_or(u16::MAX);
         let has_actors =
             |group: &u16| environment.groups.get(usize::from(*group)).is_some_and(|g| !g.actors.is_empty());
@@ -63,7 +71,7 @@ impl Topic {
     }
 
     /// The topic where `record` belongs.
-    pub(crate) fn of(record: &LogRecord) -> Self {
+    pub fn of(record: &LogRecord) -> Self {
         match record {
             LogRecord::Tick(r) => Self(Kind::Timing, r.group),
             LogRecord::Actors(r) => Self(Kind::Actors, r.group),
@@ -82,7 +90,8 @@ impl Topic {
         }
     }
 
-    pub(crate) fn name(self, environment: &Environment) -> String {
+    /// The name of the topic in the log of `environment`, which has the names of groups and devices.
+    pub fn name(self, environment: &Environment) -> String {
         let Self(kind, number) = self;
         let word = kind.word();
         match kind {

@@ -15,7 +15,7 @@ pub use self::chunk::{ChunkHead, ChunkRecords};
 use self::foreign::ForeignChannel;
 pub use self::framing::{RecordStream, Section};
 use super::entry::LogEntry;
-pub use super::messages::topic::TopicKind;
+pub use super::messages::topic::{Topic, TopicKind};
 use super::messages::{self, LogMessage, foxglove};
 use super::records::{Environment, GroupInfo, LogRecord, LoggedExecution, MAX_GROUPS, SCHEMA_VERSION_KEY};
 use crate::error::Error;

@@ -49,7 +49,7 @@ impl Scene {
             let line = line_of(error.as_bytes(), error.utf8_error().valid_up_to());
             Error::new(ErrorKind::Scene, "is not UTF-8 text, save the file as UTF-8").at(format!("{name}:{line}"))
         })?;
-        Self::from_text(&text, &name, path.parent(), progress)
+        Self::from_text(&text, &name, path.parent(), true, progress)
     }
 
     /// The scene in `text`; `name` stands for the file in errors, and `device.path_csv`, `device.log`, `body.mesh` and
@@ -58,17 +58,45 @@ impl Scene {
     /// # Errors
     /// As [`load`](Self::load).
     pub fn from_toml(text: &str, name: &str, base: Option<&Path>) -> Result<Self, Error> {
-        Self::from_text(text, name, base, &mut |_| ())
+        Self::from_text(text, name, base, true, &mut |_| ())
     }
 
-    fn from_text(text: &str, name: &str, base: Option<&Path>, progress: &mut dyn FnMut(f64)) -> Result<Self, Error> {
+    /// The scene in `text` as [`from_toml`](Self::from_toml) reads it, for a program that completes it: there need be no body, and nothing that
+    /// moves the tool. A session that is built of it refuses what is still missing.
+    ///
+    /// ```
+    /// use palpate::devices::ToolPath;
+    /// use palpate::scene::Scene;
+    ///
+    /// # fn main() -> Result<(), palpate::Error> {
+    /// let mut scene = Scene::from_partial_toml("contact.friction = 0.3", "settings", None)?;
+    /// scene.devices[0].path = Some(ToolPath::constant([0.02, 0.02, 0.049])?);
+    /// let error = Scene::from_partial_toml("contact.friction = -1", "settings", None).unwrap_err();
+    /// assert!(error.place().ends_with("contact.friction"));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn from_partial_toml(text: &str, name: &str, base: Option<&Path>) -> Result<Self, Error> {
+        Self::from_text(text, name, base, false, &mut |_| ())
+    }
+
+    fn from_text(
+        text: &str,
+        name: &str,
+        base: Option<&Path>,
+        is_whole: bool,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Self, Error> {
         let found = |file: &Path| base.map_or_else(|| file.to_owned(), |base| base.join(file));
         let read_path = |path_csv: &Path| ToolPath::read_csv(&found(path_csv));
         let read_volume = |spec: &TetrahedraSpec, file: &Path| {
             let filled_with = spec.surface.is_some().then(|| spec.sizes());
             Volume::read(&found(file), spec.unit_m, filled_with, progress)
         };
-        let mut scene = Self::from_toml_with(text, name, read_path, read_volume)?;
+        let mut scene = Self::from_toml_with(text, name, is_whole, read_path, read_volume)?;
         // It is read when a session is built.
         for device in &mut scene.devices {
             device.log = device.log.take().map(|log| found(&log));
@@ -80,13 +108,15 @@ impl Scene {
     pub fn demo() -> Self {
         let path = |path_csv: &Path| ToolPath::from_csv(DEMO_PATH_CSV, &path_csv.display().to_string());
         let volume = |_: &TetrahedraSpec, _: &Path| Err(Error::scene("body.mesh", "is not part of the program"));
-        Self::from_toml_with(DEMO_TOML, "demo.toml", path, volume).expect("the built-in scene is valid")
+        Self::from_toml_with(DEMO_TOML, "demo.toml", true, path, volume).expect("the built-in scene is valid")
     }
 
-    /// The scene in `text`, with the tool's path fetched by `read_path` and the body's mesh by `read_volume`.
+    /// The scene in `text`, with the tool's path fetched by `read_path` and the body's mesh by `read_volume`; if it `is_whole`, with a body and
+    /// a tool.
     fn from_toml_with(
         text: &str,
         name: &str,
+        is_whole: bool,
         read_path: impl Fn(&Path) -> Result<ToolPath, Error>,
         read_volume: impl FnMut(&TetrahedraSpec, &Path) -> Result<Volume, Error>,
     ) -> Result<Self, Error> {
@@ -94,7 +124,7 @@ impl Scene {
         let (document, _) = DeTable::parse_recoverable(text);
         let root = document.get_ref();
         let on_line = |error: Error, offset: usize| error.at(format!("{name}:{}", line_of(text, offset)));
-        if scene.body.is_none() {
+        if is_whole && scene.body.is_none() {
             let message = "is missing, a scene needs the tables [body.block] and [body.material], or a [body] of kind = \"tetrahedra\"";
             return Err(on_line(Error::scene("body", message), 0));
         }
@@ -116,7 +146,7 @@ impl Scene {
             device.path = Some(read);
         }
         let tools = || {
-            let mut devices = scene.devices.iter().enumerate();
+            let mut devices = scene.devices.iter().enumerate().filter(|_| is_whole);
             devices.try_for_each(|(index, device)| tool(device).map_err(|error| numbered(error, index, &scene.devices)))
         };
         scene.validate().and_then(|()| tools()).map_err(|error| {

@@ -12,9 +12,8 @@ mod table;
 pub(crate) use figures::ComparedRun;
 pub use figures::{Comparison, ForceDeviation, ForceTrace, Measured};
 pub(crate) use html::to_html;
-pub(crate) use json::to_json;
-pub use study::CompareOptions;
-pub(crate) use study::CompareProgress;
+pub use json::to_json;
+pub use study::{CompareOptions, CompareProgress};
 pub(crate) use table::to_text;
 
 use palpate::runtime::Nanos;

@@ -52,7 +52,7 @@ macro_rules! table {
 }
 
 /// The columns of a topic of this kind; `is_turned` if a sample of it has a torque or is turned.
-pub(super) fn columns(kind: TopicKind, is_turned: bool) -> &'static [Column] {
+pub fn columns(kind: TopicKind, is_turned: bool) -> &'static [Column] {
     match kind {
         TopicKind::Force | TopicKind::ForceCommanded if is_turned => table! {
             F64: t_s fx_n fy_n fz_n tx_n_m ty_n_m tz_n_m
@@ -92,7 +92,7 @@ pub(super) fn columns(kind: TopicKind, is_turned: bool) -> &'static [Column] {
 }
 
 /// True if an entry fills the columns that tools without torque and turn do not have.
-pub(super) fn is_turned(entry: &LogEntry) -> bool {
+pub fn is_turned(entry: &LogEntry) -> bool {
     match entry {
         LogEntry::Record(LogRecord::Force(r)) => r.torque_n_m != [0.0; 3],
         LogEntry::Record(LogRecord::Command(r)) => r.torque_n_m != [0.0; 3],
@@ -102,12 +102,12 @@ pub(super) fn is_turned(entry: &LogEntry) -> bool {
 }
 
 /// The columns of the places of a topic with contacts.
-pub(super) const POINT_COLUMNS: &[Column] = table! {
+pub const POINT_COLUMNS: &[Column] = table! {
     F64: t_s, F32: x_m y_m z_m nx ny nz normal_n tangential_n, U32: triangle, Text: mode
 };
 
 /// Puts the cells of a place that touches into `row`; leaves it empty for all else.
-pub(super) fn point_cells(entry: &LogEntry, row: &mut Vec<Cell>) {
+pub fn point_cells(entry: &LogEntry, row: &mut Vec<Cell>) {
     row.clear();
     if let LogEntry::Record(LogRecord::ContactPoint(r)) = entry {
         let ContactPointSample { place_m, normal, triangle, .. } = *r;
@@ -119,7 +119,7 @@ pub(super) fn point_cells(entry: &LogEntry, row: &mut Vec<Cell>) {
 
 /// Puts the cells of one entry into `row`, one for each column of its kind (`is_turned` or not), row behind row if it has several; leaves it empty
 /// for what belongs in no table.
-pub(super) fn cells(entry: &LogEntry, is_turned: bool, row: &mut Vec<Cell>) {
+pub fn cells(entry: &LogEntry, is_turned: bool, row: &mut Vec<Cell>) {
     row.clear();
     match entry {
         LogEntry::Environment(_) | LogEntry::Attachment { .. } | LogEntry::Scene(_) => {}

@@ -1,6 +1,6 @@
 //! A log in the formats of other programs: one file per format, and each reads the log once, a chunk at a time.
 
-mod columns;
+pub mod columns;
 mod hgrm;
 mod table;
 mod trace;
