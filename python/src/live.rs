@@ -77,13 +77,14 @@ impl Live {
         }
     }
 
-    fn recording(&self) -> Result<Recording, palpate::Error> {
-        let Some(summary) = self.end() else { return Ok(Recording::default()) };
-        let Some(log) = &self.log else { return Ok(Recording::of_run(summary)) };
+    /// What is left of the session, for whoever ends it.
+    fn recording(&self) -> Result<Option<Recording>, palpate::Error> {
+        let Some(summary) = self.end() else { return Ok(None) };
+        let Some(log) = &self.log else { return Ok(Some(Recording::of_run(summary))) };
         let faults = Recording::faults_of(&summary);
         let mut recording = Recording::read(log)?;
         recording.faults = faults;
-        Ok(recording)
+        Ok(Some(recording))
     }
 }
 
@@ -231,8 +232,9 @@ impl Live {
     /// Ends the session, if it has not ended, and gives its Run. What went wrong is in `Run.faults`.
     fn stop(&self, py: Python<'_>) -> PyResult<Py<Run>> {
         let run = self.run.get_or_try_init(py, || {
-            let recording = py.detach(|| self.recording()).or_raise(py)?;
-            Py::new(py, Run::new(py, recording)?)
+            let left = py.detach(|| self.recording()).or_raise(py)?;
+            let nothing = "nothing is left of the session: its log could not be read, or another thread is ending it";
+            Py::new(py, Run::new(py, left.ok_or_else(|| usage(py, "stop", nothing))?)?)
         });
         run.map(|run| run.clone_ref(py))
     }

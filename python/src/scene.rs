@@ -26,6 +26,8 @@ pub(crate) struct Scene {
     pub(crate) base: Option<PathBuf>,
     /// The file, or what stands for it.
     pub(crate) name: String,
+    /// Part of the program: there is no file of its path.
+    pub(crate) is_built_in: bool,
 }
 
 #[pymethods]
@@ -36,7 +38,7 @@ impl Scene {
         if let Ok(dictionary) = source.cast::<PyDict>() {
             let table = table(dictionary, "")?;
             let scene = py.detach(|| partial(&table, base.as_deref())).or_raise(py)?;
-            return Ok(Self { scene, table, base, name: DICTIONARY.to_owned() });
+            return Ok(Self { scene, table, base, name: DICTIONARY.to_owned(), is_built_in: false });
         }
         if !source.is_instance_of::<PyString>() && !source.hasattr("__fspath__")? {
             let kind = source.get_type().name()?.to_string();
@@ -54,7 +56,7 @@ impl Scene {
         // It has been read as a scene before.
         let table = scene.source.as_deref().and_then(|text| text.parse().ok()).unwrap_or_default();
         let base = Some(path.parent().unwrap_or(Path::new("")).to_owned());
-        Ok(Self { scene, table, base, name: path.display().to_string() })
+        Ok(Self { scene, table, base, name: path.display().to_string(), is_built_in: false })
     }
 
     /// The scene that `palpate` alone runs: five seconds of pressing, dragging, circling and tapping.
@@ -62,7 +64,7 @@ impl Scene {
     fn demo() -> Self {
         let scene = EngineScene::demo();
         let table = scene.source.as_deref().and_then(|text| text.parse().ok()).unwrap_or_default();
-        Self { scene, table, base: None, name: "demo".to_owned() }
+        Self { scene, table, base: None, name: "demo".to_owned(), is_built_in: true }
     }
 
     /// The tables of the scene as a new dictionary, as they were given: what is left out has its default.

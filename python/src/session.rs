@@ -273,7 +273,7 @@ fn described(subject: &Bound<'_, PyAny>, changes: Table, path: Option<ToolPath>)
         Ok(scene) => scene.clone(),
         Err(_) => py.get_type::<Scene>().call1((subject,))?.cast_into::<Scene>()?,
     };
-    let Scene { scene, table, base, name } = scene.get();
+    let Scene { scene, table, base, name, is_built_in } = scene.get();
     if changes.is_empty() && path.is_none() {
         return Ok((scene.clone(), name.clone()));
     }
@@ -294,7 +294,7 @@ fn described(subject: &Bound<'_, PyAny>, changes: Table, path: Option<ToolPath>)
         // Its mesh has been read, and is not read again.
         table.remove("body");
     }
-    if name == "demo" {
+    if *is_built_in {
         // Its path is part of the program.
         table.get_mut("device").and_then(Value::as_table_mut).map(|device| device.remove("path_csv"));
     }
@@ -302,7 +302,7 @@ fn described(subject: &Bound<'_, PyAny>, changes: Table, path: Option<ToolPath>)
     if !is_block {
         changed.body.clone_from(&scene.body);
     }
-    if name == "demo" {
+    if *is_built_in {
         changed.devices[0].path.clone_from(&scene.devices[0].path);
     }
     if let Some(path) = path {

@@ -179,3 +179,15 @@ def test_nothing_of_python_is_let_on_a_real_time_thread(block, press, part):
     )
     with pytest.raises(palpate.UsageError, match="is written in Python"):
         session.start()
+
+
+def test_a_body_that_explodes_is_a_fault_with_what_came_before():
+    class Explodes(Net):
+        def forces(self, x, v):
+            return super().forces(x, v) * (np.nan if x[:, 2].min() < -0.003 else 1.0)
+
+    with pytest.raises(palpate.FaultError) as caught:
+        palpate.Session(Explodes(), path=DOWN, model="full").run()
+    run = caught.value.run
+    assert run.faults and str(caught.value).endswith(run.faults[0])
+    assert 50 < len(run) < 200 and run.force[:, 2].max() > 0.01

@@ -1,6 +1,8 @@
 """Scenes from files and dictionaries, and the studies of them."""
 
 import json
+import os
+import signal
 import threading
 import time
 
@@ -79,6 +81,12 @@ def test_other_threads_run_meanwhile(block, press):
     done.set()
     thread.join()
     assert sum(began < moment < ended for moment in counted) > 10
+
+
+def test_an_interrupt_ends_a_run(block):
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        palpate.Session(block, path=(0.03, 0.03, 0.08), model="full", duration_s=1e5).run()
 
 
 def test_a_comparison_has_the_figures_of_the_command(command, scenes, tmp_path):
