@@ -87,6 +87,22 @@ fn a_host_that_puts_nothing_is_a_device_without_a_new_state() {
     assert!(running.stop().runtime.groups[0].degraded > 100);
 }
 
+// Check that a pause gives no force, as the hand may have gone anywhere, and that the force comes back from there.
+#[test]
+fn after_a_pause_the_force_begins_at_nothing_and_comes_back() {
+    let (builder, mut host) = builder();
+    let mut running = builder.build().unwrap().start().unwrap();
+    let mut group = running.take_haptic_group().unwrap();
+    tick(&mut group, &mut host, Duration::from_millis(300));
+    let felt = host.command().force;
+    std::thread::sleep(Duration::from_millis(400));
+    let after = tick(&mut group, &mut host, Duration::from_millis(800));
+    assert!(felt.norm() > 0.1 && after[0].1.norm() < 1e-9, "{felt} and {}", after[0].1);
+    assert!(after.last().unwrap().1.norm() > 0.1, "{:?}", after.last());
+    drop(group);
+    assert!(running.stop().runtime.groups[0].skipped > 300);
+}
+
 #[test]
 fn virtual_time_takes_what_was_put_before_each_step_and_is_the_same_every_time() {
     let forces = || {

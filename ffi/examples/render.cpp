@@ -28,8 +28,8 @@ class Picture {
 public:
     static constexpr int side = 320;
 
-    /// Draws a triangle, the brighter the more it faces the light.
-    void triangle(const std::array<Vector, 3> &corners) {
+    /// Draws a triangle of this colour (red, green, blue), the brighter the more it faces the light.
+    void triangle(const std::array<Vector, 3> &corners, const Vector &colour) {
         const Vector normal = unit(cross(minus(corners[1], corners[0]), minus(corners[2], corners[0])));
         const double light = 0.25 + 0.75 * std::max(0.0, dot(normal, unit({-0.4, -0.6, 1.0})));
         std::array<Vector, 3> at;
@@ -47,7 +47,7 @@ public:
                 const Vector here = {x + 0.5, y + 0.5, 0.0};
                 const double a = edge(at[1], at[2], here) / area, b = edge(at[2], at[0], here) / area;
                 if (a >= 0.0 && b >= 0.0 && a + b <= 1.0) {
-                    put(x, y, a * at[0][2] + b * at[1][2] + (1.0 - a - b) * at[2][2], light);
+                    put(x, y, a * at[0][2] + b * at[1][2] + (1.0 - a - b) * at[2][2], light, colour);
                 }
             }
         }
@@ -56,17 +56,20 @@ public:
     void write(const std::string &path) const {
         std::ofstream file(path, std::ios::binary);
         file << "P6\n" << side << ' ' << side << "\n255\n";
-        for (const double value : light_) {
-            const auto level = [&](double colour) { return static_cast<char>(static_cast<int>(255.0 * value * colour)); };
-            file << level(0.95) << level(0.62) << level(0.55);
+        for (const Vector &colour : colours_) {
+            for (const double part : colour) {
+                file << static_cast<char>(static_cast<int>(255.0 * part));
+            }
         }
         if (!file) {
             throw std::runtime_error(path + " cannot be written");
         }
     }
 
-    /// How many pixels show the body.
-    long drawn() const { return std::count_if(light_.begin(), light_.end(), [](double value) { return value > 0.0; }); }
+    /// How many pixels show something.
+    long drawn() const {
+        return std::count_if(near_.begin(), near_.end(), [](double near) { return near > nothing; });
+    }
 
 private:
     /// Where a point is in the picture (pixels), and how near.
@@ -85,17 +88,35 @@ private:
     static int first(double value) { return std::clamp(static_cast<int>(std::floor(value)), 0, side - 1); }
     static int last(double value) { return std::clamp(static_cast<int>(std::ceil(value)), 0, side - 1); }
 
-    void put(int x, int y, double near, double light) {
+    void put(int x, int y, double near, double light, const Vector &colour) {
         const std::size_t place = static_cast<std::size_t>(y) * side + x;
         if (near > near_[place]) {
             near_[place] = near;
-            light_[place] = light;
+            colours_[place] = {light * colour[0], light * colour[1], light * colour[2]};
         }
     }
 
-    std::vector<double> near_ = std::vector<double>(side * side, -1e9);
-    std::vector<double> light_ = std::vector<double>(side * side, 0.0);
+    static constexpr double nothing = -1e9;
+    std::vector<double> near_ = std::vector<double>(side * side, nothing);
+    std::vector<Vector> colours_ = std::vector<Vector>(side * side, Vector{1.0, 1.0, 1.0});
 };
+
+/// Draws the tool: a sphere of 16 times 8 faces.
+static void draw_sphere(Picture &drawing, const double *centre, double radius_m) {
+    const auto at = [&](int around, int down) -> Vector {
+        const double turn = 3.14159265 * around / 8, fall = 3.14159265 * down / 8;
+        return {centre[0] + radius_m * std::sin(fall) * std::cos(turn), centre[1] + radius_m * std::sin(fall) * std::sin(turn),
+                centre[2] + radius_m * std::cos(fall)};
+    };
+    const Vector steel = {0.75, 0.8, 0.85};
+    for (int around = 0; around < 16; ++around) {
+        for (int down = 0; down < 8; ++down) {
+            const Vector a = at(around, down), b = at(around, down + 1), c = at(around + 1, down + 1), d = at(around + 1, down);
+            drawing.triangle({a, b, c}, steel);
+            drawing.triangle({a, c, d}, steel);
+        }
+    }
+}
 
 static Vector node(const palpate::Surface &surface, std::uint32_t number) {
     const double *at = &surface.positions_m[3 * number];
@@ -116,6 +137,7 @@ static void write_obj(const palpate::Surface &surface, const std::string &path) 
 }
 
 int main() try {
+    constexpr double radius_m = 0.012;  // As in the scene.
     auto setup = palpate::Setup::toml(R"(
         [body]
         kind = "mass_spring"
@@ -130,7 +152,7 @@ int main() try {
         [contact]
         friction = 0.5
         [local]
-        model = "patch"
+        model = "predictive"
         [device]
         kind = "pointer"
         tool = { shape = "sphere", radius_m = 0.012 }
@@ -142,17 +164,19 @@ int main() try {
     long least = Picture::side * Picture::side;
     for (int picture = 0; picture < 3; ++picture) {
         // The tool hangs on a spring behind this place, as behind a mouse: in the upper face, and along it.
-        session.point(0.035 + 0.015 * picture, 0.05, 0.095);
+        session.point(0.03 + 0.02 * picture, 0.05, 0.1);
         session.wait(0.4);
         session.surface(surface);
         Picture drawing;
         for (std::size_t at = 0; at < surface.triangles.size(); at += 3) {
             drawing.triangle({node(surface, surface.triangles[at]), node(surface, surface.triangles[at + 1]),
-                              node(surface, surface.triangles[at + 2])});
+                              node(surface, surface.triangles[at + 2])},
+                             {0.95, 0.62, 0.55});
         }
+        const PalpateTool tool = session.tool();
+        draw_sphere(drawing, tool.position_m, radius_m);
         drawing.write("press-" + std::to_string(picture) + ".ppm");
         least = std::min(least, drawing.drawn());
-        const PalpateTool tool = session.tool();
         const auto contacts = session.contacts();
         std::printf("%.3f s  tool at (%.4f, %.4f, %.4f) m  computed force %.3f N  touches in %zu places\n", tool.time_s,
                     tool.position_m[0], tool.position_m[1], tool.position_m[2], tool.computed_force_n[2], contacts.size());

@@ -116,6 +116,34 @@ static void a_session_with_an_end_ends() {
     session.stop();
 }
 
+static void a_scene_with_a_pointer_takes_the_device_of_the_host() {
+    auto setup = palpate::Setup::toml(R"(
+        [body]
+        kind = "mass_spring"
+        [body.block]
+        nodes = [6, 6, 6]
+        size_m = [0.05, 0.05, 0.05]
+        fixed = ["z_min"]
+        [body.material]
+        node_mass_kg = 0.0005
+        stiffness_n_per_m = 30.0
+        damping_ratio = 0.3
+        [device]
+        kind = "pointer"
+        tool = { shape = "sphere", radius_m = 0.008 }
+    )");
+    setup.model("patch").virtual_time();
+    auto session = std::move(setup).start_hosted(device());
+    const auto loop = session.attach();
+    auto command = palpate::make<PalpateCommand>();
+    for (int tick = 0; tick <= 300; ++tick) {
+        EXPECT(loop.tick(at(0.024, 0.06 - 0.00003 * tick), command) == PALPATE_CODE_OK);
+    }
+    EXPECT(command.force_n[2] > 0.05);
+    EXPECT(thrown([&] { session.point(0.0, 0.0, 0.0); }) == PALPATE_CODE_BAD_ARGUMENT);
+    session.stop();
+}
+
 static void one_thread_ticks_two_sessions() {
     auto first = block().start_hosted(device());
     auto second = block().start_hosted(device());
@@ -221,6 +249,7 @@ int main() {
     virtual_time_gives_the_same_forces_every_time();
     a_stop_that_is_asked_for_brings_the_force_to_rest_in_the_ticks_that_follow();
     a_session_with_an_end_ends();
+    a_scene_with_a_pointer_takes_the_device_of_the_host();
     one_thread_ticks_two_sessions();
     two_devices_feel_two_forces();
     tetrahedra_from_arrays();

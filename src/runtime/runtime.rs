@@ -228,6 +228,9 @@ pub struct RunningGraph {
 impl RunningGraph {
     /// Takes the [hosted](crate::Release::Hosted) group of this name, for the thread that releases it; `None` if it was taken, if
     /// there is none, and in virtual time, where the clock releases it.
+    ///
+    /// # Real-time
+    /// Not real-time safe: takes a lock.
     pub fn take_hosted(&mut self, name: &str) -> Option<HostedGroup> {
         let mut hosted = lock(&self.hosted);
         let place = hosted.iter().position(|group| group.name() == name)?;

@@ -1,4 +1,4 @@
-//! What C calls, and nothing else: pointers become values by [`memory`](crate::memory), what happens is in the other modules.
+//! What C calls, and nothing else: pointers become values by `memory`, what happens is in the other modules.
 
 pub mod library;
 pub mod run;

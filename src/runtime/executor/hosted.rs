@@ -56,6 +56,9 @@ impl HostedGroup {
     }
 
     /// The name of the group.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn name(&self) -> &str {
         self.thread.as_ref().map_or("", |thread| &thread.group.spec.name)
     }
