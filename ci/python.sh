@@ -10,7 +10,7 @@ export PATH="$venv/bin:$PATH"
 # Together, so that the command and the package are made of the same compiled crates.
 cargo build --locked -p palpate-cli -p palpate-python
 need_component clippy clippy
-cargo clippy --locked -p palpate-python --all-targets -- -D warnings
+cargo clippy --locked --no-deps -p palpate-python --all-targets -- -D warnings
 wheels=$(mktemp -d)
 trap 'rm -rf "$wheels"' EXIT
 maturin build --locked --profile dev --manifest-path python/Cargo.toml --out "$wheels"

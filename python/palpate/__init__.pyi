@@ -19,7 +19,7 @@ from .errors import LogError as LogError
 from .errors import RefusedError as RefusedError
 from .errors import SceneError as SceneError
 from .errors import UsageError as UsageError
-from .typing import Body, Device, Floats, Ids, Vector
+from .typing import Body, Device, Floats, Ids, Mesh, Vector
 
 __all__ = [
     "Block",
@@ -109,11 +109,11 @@ class Block:
 
 @final
 class Tetrahedra:
-    """Linear tetrahedra with tissue's own parameters: a volume mesh, or a closed surface that is filled."""
+    """Linear tetrahedra with tissue's own parameters: a volume mesh as a file or arrays, or a closed surface that is filled."""
 
     def __new__(
         cls,
-        mesh: _Path,
+        mesh: _Path | tuple[npt.ArrayLike, npt.ArrayLike] | Mesh,
         *,
         young_modulus_pa: float,
         poisson_ratio: float,
@@ -122,6 +122,7 @@ class Tetrahedra:
         nodal_pressure: bool = True,
         fixed: Sequence[str | Mapping[str, Any]] | None = None,
         regions: Sequence[Mapping[str, Any]] | None = None,
+        groups: Mapping[str, npt.ArrayLike] | None = None,
         element_size_m: float | None = None,
         surface_size_m: float | None = None,
         unit_m: float | None = None,

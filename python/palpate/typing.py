@@ -1,7 +1,7 @@
 """What the package takes, as types: devices and bodies that are written in Python, arrays, vectors."""
 
 from collections.abc import Sequence
-from typing import Protocol, Union
+from typing import Any, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,16 @@ Floats = npt.NDArray[np.float64]
 Ids = npt.NDArray[np.uint32]
 Vector = Union[Sequence[float], Floats]
 State = Union[Vector, "tuple[Vector, Vector]", "tuple[Vector, Vector, Vector]"]
+
+
+class Mesh(Protocol):
+    """A mesh of meshio or pyvista: points (n, 3) (m), and tetrahedra (k, 4) among the cells."""
+
+    @property
+    def points(self) -> npt.ArrayLike: ...
+
+    @property
+    def cells_dict(self) -> "dict[Any, Any]": ...
 
 
 class Device(Protocol):

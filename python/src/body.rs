@@ -2,14 +2,17 @@
 
 use std::path::PathBuf;
 
+use palpate::Error;
 use palpate::model::body::Body;
-use palpate::scene::BodySpec;
+use palpate::model::mesh::TetrahedralMesh;
+use palpate::scene::{BodySpec, Scene, Volume};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use toml::{Table, Value};
 
 use crate::arrays::{frozen, frozen_points};
-use crate::errors::OrRaise;
+use crate::errors::{OrRaise, usage};
+use crate::mesh_arrays;
 use crate::scene::partial;
 use crate::toml_value::{table, value};
 
@@ -28,6 +31,24 @@ impl Described {
         let scene = Table::from_iter([("body".to_owned(), Value::Table(table.clone()))]);
         let built = py.detach(|| {
             let spec = partial(&scene, None)?.body.expect("it was given");
+            let built = spec.build()?;
+            Ok(Self { spec, table, built })
+        });
+        built.or_raise(py)
+    }
+
+    /// Takes `mesh` for the body of tetrahedra that `body` says all else of.
+    fn of_mesh(py: Python<'_>, body: &Bound<'_, PyDict>, mesh: TetrahedralMesh) -> PyResult<Self> {
+        let table = table(body, "body")?;
+        let scene = Table::from_iter([("body".to_owned(), Value::Table(table.clone()))]);
+        let read = || scene.try_into::<Scene>().map_err(|error| Error::scene("body", error.message()));
+        let built = py.detach(|| {
+            let mut scene = read()?;
+            if let Some(spec) = scene.body.as_mut().and_then(BodySpec::tetrahedra_mut) {
+                spec.volume = Some(Volume::new(mesh)?);
+            }
+            scene.validate()?;
+            let spec = scene.body.expect("it was given");
             let built = spec.build()?;
             Ok(Self { spec, table, built })
         });
@@ -119,7 +140,8 @@ impl Block {
 /// Linear tetrahedra with tissue's own parameters.
 ///
 /// mesh: a volume mesh (.msh, .vtk, .vtu), or a closed surface (.stl, .obj), which is filled with elements of element_size_m and, at the
-/// surface, surface_size_m. young_modulus_pa: E (Pa). poisson_ratio: from 0 to below 0.5. density_kg_m3 (kg/m^3). viscosity_pa_s: shear
+/// surface, surface_size_m; or arrays: a tuple of points (n, 3) (m) and tetrahedra (k, 4), or a mesh of meshio or pyvista, with groups, numbers
+/// of nodes by a name for what they are. young_modulus_pa: E (Pa). poisson_ratio: from 0 to below 0.5. density_kg_m3 (kg/m^3). viscosity_pa_s: shear
 /// viscosity (Pa s). fixed: what is held, names of groups of the mesh or shapes such as {"sphere": {"centre_m": [0, 0, 0], "radius_m":
 /// 0.01}}. regions: dictionaries as [[body.region]] of a scene file has them. unit_m: metres per unit of length of the file.
 ///
@@ -133,11 +155,11 @@ pub(crate) struct Tetrahedra {
 impl Tetrahedra {
     #[new]
     #[pyo3(signature = (mesh, *, young_modulus_pa, poisson_ratio, density_kg_m3 = 1060.0, viscosity_pa_s = 0.0, nodal_pressure = true,
-                        fixed = None, regions = None, element_size_m = None, surface_size_m = None, unit_m = None))]
+                        fixed = None, regions = None, groups = None, element_size_m = None, surface_size_m = None, unit_m = None))]
     #[expect(clippy::too_many_arguments, reason = "they have names where they are given")]
     fn new(
         py: Python<'_>,
-        mesh: PathBuf,
+        mesh: &Bound<'_, PyAny>,
         young_modulus_pa: f64,
         poisson_ratio: f64,
         density_kg_m3: f64,
@@ -145,6 +167,7 @@ impl Tetrahedra {
         nodal_pressure: bool,
         fixed: Option<&Bound<'_, PyAny>>,
         regions: Option<&Bound<'_, PyAny>>,
+        groups: Option<&Bound<'_, PyDict>>,
         element_size_m: Option<f64>,
         surface_size_m: Option<f64>,
         unit_m: Option<f64>,
@@ -155,17 +178,31 @@ impl Tetrahedra {
         tissue.set_item("density_kg_m3", density_kg_m3)?;
         tissue.set_item("viscosity_pa_s", viscosity_pa_s)?;
         tissue.set_item("nodal_pressure", nodal_pressure)?;
-        let ending = mesh.extension().map(|ending| ending.to_ascii_lowercase());
-        let is_surface = ending.is_some_and(|ending| ending == "stl" || ending == "obj");
+        let arrays = mesh_arrays::given(mesh, groups)?;
         body.set_item("kind", "tetrahedra")?;
-        body.set_item(if is_surface { "surface" } else { "mesh" }, mesh)?;
+        if arrays.is_none() {
+            let file: PathBuf = mesh.extract()?;
+            let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
+            let is_surface = ending.is_some_and(|ending| ending == "stl" || ending == "obj");
+            body.set_item(if is_surface { "surface" } else { "mesh" }, file)?;
+        } else if element_size_m.is_some() || surface_size_m.is_some() || unit_m.is_some() {
+            return Err(usage(
+                py,
+                "element_size_m, surface_size_m, unit_m",
+                "are for files: leave them out, arrays are in metres",
+            ));
+        }
         put(&body, "element_size_m", element_size_m)?;
         put(&body, "surface_size_m", surface_size_m)?;
         put(&body, "unit_m", unit_m)?;
         put(&body, "fixed", fixed)?;
         body.set_item("tissue", tissue)?;
         put(&body, "region", regions)?;
-        Ok(Self { described: Described::new(py, &body)? })
+        let described = match arrays {
+            None => Described::new(py, &body)?,
+            Some(mesh) => Described::of_mesh(py, &body, mesh)?,
+        };
+        Ok(Self { described })
     }
 
     /// Rest positions of all nodes (m), shape (n, 3).

@@ -2,9 +2,9 @@
 //!
 //! | module | what it does |
 //! | --- | --- |
-//! | `body`, `tool`, `path` | what is touched, what touches it, and how that moves |
+//! | `body`, `mesh_arrays`, `tool`, `path` | what is touched, what touches it, and how that moves |
 //! | `scene` | scenes from files and dictionaries |
-//! | `session`, `live` | runs one in simulated time; lets one run on threads, and shows it |
+//! | `session`, `subject`, `live` | runs one in simulated time; what it is made of; lets one run on threads, and shows it |
 //! | `own_device`, `own_body` | devices and bodies that are written in Python |
 //! | `run`, `recording`, `table` | what a run leaves behind, whether it comes from memory or from a log |
 //! | `studies` | comparing local models, reducing a body |
@@ -14,6 +14,7 @@ mod arrays;
 mod body;
 mod errors;
 mod live;
+mod mesh_arrays;
 mod own_body;
 mod own_device;
 mod path;
@@ -22,6 +23,7 @@ mod run;
 mod scene;
 mod session;
 mod studies;
+mod subject;
 mod table;
 mod toml_value;
 mod tool;

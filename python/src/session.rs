@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use palpate::Session as EngineSession;
-use palpate::devices::ToolPath;
 use palpate::model::local::Kind;
 use palpate::scene::Scene as EngineScene;
 use palpate::session::{Running, SessionBuilder, Summary};
@@ -12,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use toml::{Table, Value};
 
-use crate::body::{Block, Described, Tetrahedra, keyword};
+use crate::body::keyword;
 use crate::errors::{OrRaise, exception, usage};
 use crate::live::Live;
 use crate::own_body::{OwnBody, has_tangent, is_body};
@@ -20,8 +19,8 @@ use crate::own_device::{Failure, NOT_REAL_TIME, OwnDevice};
 use crate::path::tool_path;
 use crate::recording::Recording;
 use crate::run::Run;
-use crate::scene::{Scene, partial};
-use crate::toml_value::{merge, table};
+use crate::subject::{described, of_body};
+use crate::toml_value::table;
 
 /// How much simulated time passes between two looks at Ctrl-C.
 const STEP: Duration = Duration::from_millis(10);
@@ -227,96 +226,6 @@ impl Session {
 fn logged(builder: SessionBuilder, log: Option<&Path>, log_scene: bool) -> SessionBuilder {
     let builder = log.into_iter().fold(builder, |builder, log| builder.log(log));
     if log_scene { builder.log_scene() } else { builder }
-}
-
-/// A scene of `changes` around a body: the one that is `described`, or a program's own.
-fn of_body(
-    py: Python<'_>,
-    described: Option<&Described>,
-    mut changes: Table,
-    path: Option<ToolPath>,
-) -> PyResult<EngineScene> {
-    let has_duration = changes.get("run").is_some_and(|run| run.get("duration_s").is_some());
-    if changes.remove("body").is_some() {
-        return Err(usage(py, "settings", "has a body, and so has the session: leave one out"));
-    }
-    let spec = described.map(|described| &described.spec);
-    if let Some(described) = described.filter(|described| described.spec.mass_spring().is_some()) {
-        changes.insert("body".to_owned(), Value::Table(described.table.clone()));
-    }
-    let mut scene = py.detach(|| partial(&changes, None)).or_raise(py)?;
-    // A mesh has been read, and is not read again.
-    scene.body = spec.cloned();
-    if let Some(path) = path {
-        if !has_duration && path.duration_s() > 0.0 {
-            scene.run.duration_s = path.duration_s();
-        }
-        put_path(py, &mut scene, path)?;
-    }
-    Ok(scene)
-}
-
-/// The scene that `subject` means with `changes` put over it, and its name.
-fn described(subject: &Bound<'_, PyAny>, changes: Table, path: Option<ToolPath>) -> PyResult<(EngineScene, String)> {
-    let py = subject.py();
-    let body = if let Ok(block) = subject.cast::<Block>() {
-        Some(("block", &block.get().described))
-    } else if let Ok(tetrahedra) = subject.cast::<Tetrahedra>() {
-        Some(("tetrahedra", &tetrahedra.get().described))
-    } else {
-        None
-    };
-    if let Some((name, described)) = body {
-        return Ok((of_body(py, Some(described), changes, path)?, name.to_owned()));
-    }
-    let scene = match subject.cast::<Scene>() {
-        Ok(scene) => scene.clone(),
-        Err(_) => py.get_type::<Scene>().call1((subject,))?.cast_into::<Scene>()?,
-    };
-    let Scene { scene, table, base, name, is_built_in } = scene.get();
-    if changes.is_empty() && path.is_none() {
-        return Ok((scene.clone(), name.clone()));
-    }
-    let mut table = table.clone();
-    if matches!(table.get("device"), Some(Value::Array(_))) && changes.contains_key("device") {
-        return Err(usage(
-            py,
-            "tool, attach_node",
-            "are for a scene with one device, and this has several: say it in the scene",
-        ));
-    }
-    let is_block = scene.body.as_ref().is_some_and(|body| body.mass_spring().is_some());
-    if !is_block && changes.contains_key("body") {
-        return Err(usage(py, "settings", "has a body, and so has the scene: make another Scene of its to_dict()"));
-    }
-    merge(&mut table, changes);
-    if !is_block {
-        // Its mesh has been read, and is not read again.
-        table.remove("body");
-    }
-    if *is_built_in {
-        // Its path is part of the program.
-        table.get_mut("device").and_then(Value::as_table_mut).map(|device| device.remove("path_csv"));
-    }
-    let mut changed = py.detach(|| partial(&table, base.as_deref())).or_raise(py)?;
-    if !is_block {
-        changed.body.clone_from(&scene.body);
-    }
-    if *is_built_in {
-        changed.devices[0].path.clone_from(&scene.devices[0].path);
-    }
-    if let Some(path) = path {
-        put_path(py, &mut changed, path)?;
-    }
-    Ok((changed, name.clone()))
-}
-
-/// Lets the first device follow `path`.
-fn put_path(py: Python<'_>, scene: &mut EngineScene, path: ToolPath) -> PyResult<()> {
-    let first = scene.devices.first_mut();
-    let first = first.ok_or_else(|| usage(py, "path", "is for a scene with a device, and this has none"))?;
-    (first.path, first.path_csv) = (Some(path), None);
-    Ok(())
 }
 
 fn put(tables: &mut Table, name: &str, key: &str, value: Value) {

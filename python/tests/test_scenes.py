@@ -53,6 +53,38 @@ def test_a_sphere_turns_and_touches_at_many_places(block):
     assert run.torque.shape == (200, 3) and len(run.contact_points) > 100
 
 
+def test_arrays_make_the_mesh_that_a_file_does(scenes):
+    tissue = dict(young_modulus_pa=5e3, poisson_ratio=0.45, fixed=["attached"])
+    file = palpate.Tetrahedra(scenes / "meshes/liver.msh", **tissue)
+    arrays = (file.nodes, file.tetrahedra)
+    ours = palpate.Tetrahedra(arrays, groups={"attached": file.groups["attached"]}, **tissue)
+    assert (ours.nodes == file.nodes).all() and (ours.held == file.held).all() and ours.held.any()
+    assert (np.sort(ours.tetrahedra, axis=None) == np.sort(file.tetrahedra, axis=None)).all()
+
+    class Mesh:
+        points, cells_dict = file.nodes, {"triangle": file.triangles, "tetra": file.tetrahedra}
+
+    assert (palpate.Tetrahedra(Mesh(), groups={"attached": [0, 1, 2]}, **tissue).tetrahedra == ours.tetrahedra).all()
+    path = np.array([(0.0, -0.03, -0.004, 0.042), (0.1, -0.03, -0.004, 0.036)])
+    assert np.abs(palpate.Session(ours, path=path, model="patch").run().force).max() > 0.0
+    for mesh, groups, words in [
+        ((file.nodes, file.tetrahedra + 1000), {}, "numbers of nodes below 884"),
+        ((file.nodes, file.tetrahedra.astype(float)), {}, "whole numbers"),
+        ((file.nodes, file.triangles), {}, "4 in a row"),
+        ((file.nodes[:, :2], file.tetrahedra), {}, "shape"),
+        (arrays, {"attached": [-1]}, "below 884"),
+        (7, {}, "a tuple"),
+        (scenes / "meshes/liver.msh", {}, "a file has its own"),
+    ]:
+        with pytest.raises(palpate.UsageError, match=words):
+            palpate.Tetrahedra(mesh, groups=groups, **tissue)
+    with pytest.raises(palpate.SceneError, match="body.fixed"):
+        palpate.Tetrahedra(arrays, **tissue)
+    with pytest.raises(palpate.SceneError) as caught:
+        palpate.Tetrahedra(arrays, groups={"attached": [0]}, **{**tissue, "poisson_ratio": 0.5})
+    assert caught.value.field == "body.tissue.poisson_ratio"
+
+
 def test_numpy_counts_as_python(press):
     block = palpate.Block(np.array([8, 8, 8]), np.full(3, 0.06), stiffness_n_per_m=np.float64(30.0))
     rows = palpate.Session(block, path=np.array(press), model="hold", patch=np.array([4, 4, 2])).run()
