@@ -59,6 +59,7 @@ pub struct BasisActor {
 
 /// The basis of a large body: each release does a part of it.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one at a time, in an actor")]
 enum Begun {
     Making(Reduction),
     /// One that was kept takes as many releases: what is on a disk decides nothing.

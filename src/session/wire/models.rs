@@ -23,6 +23,9 @@ pub(super) enum Models {
 
 /// What computes the forces; what makes the global actor, unless that is the whole body; and the bridges between the two, if there are
 /// any.
+pub(super) type Wired = (Models, Option<GlobalMaker>, Vec<Box<dyn Actor>>);
+
+/// Wires what computes the forces.
 ///
 /// # Errors
 /// If there is a link and the body cannot be copied.
@@ -34,7 +37,7 @@ pub(super) fn models(
     surfaces: Vec<OutletPort<SurfaceView>>,
     bases: Option<BasisSide>,
     settings: Parameter<Settings>,
-) -> Result<(Models, Option<GlobalMaker>, Vec<Box<dyn Actor>>), Error> {
+) -> Result<Wired, Error> {
     if !plan.is_multi_rate() {
         let surfaces = surfaces.iter().map(OutletPort::writer).collect();
         return Ok((Models::Whole(simulation, surfaces, settings.reader()), None, Vec::new()));
