@@ -18,7 +18,6 @@ use crate::runtime::Nanos;
 /// use palpate::prelude::*;
 ///
 /// /// Sways from side to side; nothing pushes it.
-/// #[derive(Debug)]
 /// struct Pendulum;
 ///
 /// impl Device for Pendulum {
@@ -49,7 +48,7 @@ use crate::runtime::Nanos;
 /// # Ok(())
 /// # }
 /// ```
-pub trait Device: Send + std::fmt::Debug {
+pub trait Device: Send {
     /// The name of the device in reports and logs.
     ///
     /// # Real-time
@@ -132,6 +131,12 @@ pub trait Device: Send + std::fmt::Debug {
     /// Not called in a tick.
     fn exerted_torque(&self) -> Option<Vec3> {
         None
+    }
+}
+
+impl std::fmt::Debug for dyn Device {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Device").field("name", &self.name()).finish_non_exhaustive()
     }
 }
 

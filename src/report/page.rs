@@ -28,21 +28,43 @@ impl Page {
 
     /// Adds text with a name in front, on as many lines as it needs.
     pub fn wrapped(&mut self, name: &str, text: &str) {
-        let (mut name, mut line) = (name, String::new());
-        for word in text.split(' ') {
-            if !line.is_empty() && NAME_WIDTH + line.len() + 1 + word.len() > WIDTH {
-                self.named(name, std::mem::replace(&mut line, "  ".to_owned()));
-                name = "";
-            } else if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
+        let mut name = name;
+        for line in wrap(text, WIDTH - NAME_WIDTH) {
+            self.named(name, line);
+            name = "";
         }
-        self.named(name, line);
+    }
+
+    /// Adds text without a name, on as many lines as it needs.
+    pub fn paragraph(&mut self, text: &str) {
+        wrap(text, WIDTH).for_each(|line| self.line(line));
     }
 
     /// Adds a line with a name in front.
     pub fn named(&mut self, name: &str, text: String) {
         self.line(format!("{name:<NAME_WIDTH$}{text}"));
     }
+}
+
+/// Lines of at most `width` columns, those after the first indented by two, that end between words.
+fn wrap(text: &str, width: usize) -> impl Iterator<Item = String> {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let last = lines.last_mut().expect("there is a line");
+        if !last.is_empty() && last.chars().count() + 1 + word.chars().count() > width {
+            lines.push(format!("  {word}"));
+            continue;
+        }
+        if !last.is_empty() {
+            last.push(' ');
+        }
+        last.push_str(word);
+    }
+    lines.into_iter()
+}
+
+/// How many of `count` entries are shown where there is room for `most`: all, if the line that says how many are hidden would hide
+/// one only.
+pub fn shown(count: usize, most: usize) -> usize {
+    if count == most + 1 { count } else { count.min(most) }
 }

@@ -4,7 +4,7 @@
 
 use std::fmt;
 
-use super::page::Page;
+use super::page::{Page, shown};
 use super::units::Quantity;
 use crate::log::{DeviceReport, GroupSummary, LoggedExecution, Percentiles, RunReport};
 use crate::runtime::SlipCounts;
@@ -31,7 +31,7 @@ impl Page {
     /// Adds what a report begins with: the verdict in a line.
     pub fn head(&mut self, report: &RunReport) {
         let (verdict, reason) = report.verdict();
-        self.line(format!("{}: {reason}", verdict.name()));
+        self.paragraph(&format!("{}: {reason}", verdict.name()));
     }
 
     /// Adds what the run was: execution, model and why, what is switched off, what the system granted.
@@ -59,12 +59,11 @@ impl Page {
             self.wrapped("SAFETY OFF", &environment.safety_off.join(", "));
         }
         environment.coupling.iter().for_each(|design| self.wrapped("coupling", design));
-        for (i, (what, granted)) in environment.granted.iter().take(GRANT_LINES).enumerate() {
+        let shown = shown(environment.granted.len(), GRANT_LINES);
+        for (i, (what, granted)) in environment.granted.iter().take(shown).enumerate() {
             self.wrapped(if i == 0 { "granted" } else { "" }, &format!("{what}: {granted}"));
         }
-        if let Some(hidden) = environment.granted.len().checked_sub(GRANT_LINES).filter(|&hidden| hidden > 0) {
-            self.named("", format!("and {hidden} more"));
-        }
+        self.hidden(environment.granted.len() - shown);
     }
 
     /// Adds the rate groups: periods, causes of slips and misses, percentiles.
@@ -91,6 +90,18 @@ impl Page {
             }
         }
         self.line(String::new());
+        if !report.is_virtual() {
+            self.times(report);
+        } else if report.groups.iter().any(is_timed) {
+            self.times(report);
+            self.line("virtual time: lateness, execution and period error are declared, not measured".to_owned());
+        } else {
+            self.line("virtual time: every release at its time, and takes none".to_owned());
+        }
+    }
+
+    /// Adds the percentiles of the rate groups' times.
+    fn times(&mut self, report: &RunReport) {
         self.line(format!(
             "{:<11}{:<13}{:>8}{:>9}{:>10}{:>10}{:>10}{:>9}",
             "", "", "samples", "p50", "p90", "p99", "p99.9", "max"
@@ -98,14 +109,9 @@ impl Page {
         for group in &report.groups {
             percentiles(self, short(&group.name), "lateness", group.lateness);
             // Other programs' logs may know the lateness alone.
-            let others =
-                [("execution", group.execution), ("period error", group.period_error), ("jitter", group.jitter)];
-            for (what, found) in others.into_iter().filter(|(_, found)| found.count > 0 || group.released == 0) {
+            for (what, found) in others(group).into_iter().filter(|(_, found)| found.count > 0 || group.released == 0) {
                 percentiles(self, "", what, found);
             }
-        }
-        if report.is_virtual() {
-            self.line("virtual time: lateness, execution and period error are declared, not measured".to_owned());
         }
     }
 
@@ -181,16 +187,21 @@ impl Page {
 
     /// Adds the first events, and what is wrong with the log.
     pub fn events(&mut self, report: &RunReport) {
-        for (i, event) in report.events.iter().take(EVENTS_SHOWN).enumerate() {
+        let count = report.event_count as usize;
+        let shown = shown(count, EVENTS_SHOWN).min(report.events.len());
+        for (i, event) in report.events.iter().take(shown).enumerate() {
             let name = if i == 0 { "events" } else { "" };
             self.named(name, format!("{:.3} s {}: {}", event.time.as_secs_f64(), event.level.name(), event.message));
         }
-        let hidden = report.event_count.saturating_sub(EVENTS_SHOWN as u64);
-        if hidden > 0 {
-            self.named("", format!("and {hidden} more"));
-        }
+        self.hidden(count - shown);
         if let Some(damage) = &report.damage {
             self.named("damage", damage.clone());
+        }
+    }
+
+    fn hidden(&mut self, count: usize) {
+        if count > 0 {
+            self.named("", format!("and {count} more"));
         }
     }
 }
@@ -199,6 +210,16 @@ fn percentiles(page: &mut Page, group: &str, what: &str, p: Percentiles<u64>) {
     let cell = |ns: u64| if p.count == 0 { "-".to_owned() } else { Quantity::Nanoseconds(ns).to_string() };
     let [p50, p90, p99, p999, max] = [p.p50, p.p90, p.p99, p.p999, p.max].map(cell);
     page.line(format!("{group:<11}{what:<13}{:>8}{p50:>9}{p90:>10}{p99:>10}{p999:>10}{max:>9}", p.count));
+}
+
+/// What is known of a group's times beside its lateness.
+fn others(group: &GroupSummary) -> [(&'static str, Percentiles<u64>); 3] {
+    [("execution", group.execution), ("period error", group.period_error), ("jitter", group.jitter)]
+}
+
+/// True if any of its times is not zero.
+fn is_timed(group: &GroupSummary) -> bool {
+    group.lateness.max > 0 || others(group).iter().any(|(_, found)| found.max > 0)
 }
 
 fn causes(counts: SlipCounts) -> String {
@@ -274,7 +295,7 @@ mod tests {
         analysis.push(&LogRecord::Resync(Resync::default()));
         let text = analysis.report().to_string();
         assert!(text.lines().count() <= 40, "{text}");
-        assert!(text.contains("declared, not measured"), "{text}");
+        assert!(text.contains("every release at its time"), "{text}");
     }
 
     #[test]

@@ -45,7 +45,7 @@ enum Cast {
 ///     graph.group(RateGroup::hz(1000).name(name).pin(0).budget(Nanos(700_000)), vec![]);
 /// }
 /// let refused = graph.build().unwrap_err().to_string();
-/// assert!(refused.starts_with("the budgets on core 0 need 140.0 % (`a` 700µs of 1ms + `b` 700µs of 1ms)"));
+/// assert!(refused.starts_with("the budgets on core 0 need 140.0 % (`a` 700 us of 1 ms + `b` 700 us of 1 ms)"));
 /// ```
 ///
 /// # Real-time

@@ -10,7 +10,9 @@ use std::time::Duration;
 ///
 /// let tick = Nanos::from_secs_f64(0.003);
 /// assert_eq!(tick + Nanos(500), Nanos(3_000_500));
+/// assert_eq!(tick - Nanos::from_millis(1), Nanos::from_millis(2));
 /// assert_eq!((tick.as_secs_f64(), Nanos(1).saturating_sub(tick)), (0.003, Nanos::ZERO));
+/// assert_eq!(Nanos(1_500).to_string(), "1.5 us");
 /// ```
 ///
 /// # Real-time
@@ -25,6 +27,11 @@ impl Nanos {
     /// Nanoseconds of a duration; saturates after 584 years.
     pub fn from_duration(duration: Duration) -> Self {
         Self(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX))
+    }
+
+    /// Nanoseconds of so many milliseconds; saturates after 584 years.
+    pub const fn from_millis(milliseconds: u64) -> Self {
+        Self(milliseconds.saturating_mul(1_000_000))
     }
 
     /// Nanoseconds of a time in seconds, rounded to the nearest; negative and NaN give zero.
@@ -56,9 +63,30 @@ impl std::ops::Add for Nanos {
     }
 }
 
+/// # Panics
+/// If the difference is negative, as [`Duration`] does; [`saturating_sub`](Nanos::saturating_sub) gives zero.
+impl std::ops::Sub for Nanos {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self(self.0.checked_sub(other.0).expect("a time minus a later one"))
+    }
+}
+
+/// Every digit, in the largest unit of which it is at least one: `135 us`, `33.333333 ms`.
 impl fmt::Display for Nanos {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:?}", self.to_duration())
+        let (unit, name) = match self.0 {
+            0..1_000 => (1, "ns"),
+            1_000..1_000_000 => (1_000, "us"),
+            1_000_000..1_000_000_000 => (1_000_000, "ms"),
+            _ => (1_000_000_000, "s"),
+        };
+        let (whole, part) = (self.0 / unit, self.0 % unit);
+        if part == 0 {
+            return write!(f, "{whole} {name}");
+        }
+        let digits = unit.ilog10() as usize;
+        write!(f, "{whole}.{} {name}", format!("{part:0digits$}").trim_end_matches('0'))
     }
 }
 

@@ -120,7 +120,7 @@ fn the_policy_decides_whether_a_thread_spins() {
     assert_eq!(told.periods, PERIODS);
     let local = line(&told, "local");
     if local.contains("SCHED_FIFO 80 on") {
-        assert!(local.ends_with("sleep, then spin, margin adapts (at most 135µs)"), "{local}");
+        assert!(local.ends_with("sleep, then spin, margin adapts (at most 135 us)"), "{local}");
     } else {
         assert!(local.contains(", sleep;") && local.contains("refused"), "{local}");
     }

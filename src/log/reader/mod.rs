@@ -79,7 +79,8 @@ impl LogReader<BufReader<File>> {
     /// # Errors
     /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read, [`ErrorKind::Log`](crate::ErrorKind::Log) if it is no
     /// MCAP file.
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
         Self::new(BufReader::with_capacity(READ_BUFFER_BYTES, file), &path.display().to_string())
     }

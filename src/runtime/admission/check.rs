@@ -267,21 +267,21 @@ mod tests {
 
     #[test]
     fn a_deadline_beyond_the_period_is_refused_with_both_values() {
-        refused(&[named("a").deadline(Nanos(1_500_000))], &["rate group `a`", "1.5ms", "1ms"]);
+        refused(&[named("a").deadline(Nanos(1_500_000))], &["rate group `a`", "1.5 ms", "1 ms"]);
         refused(&[named("a").deadline(Nanos(0))], &["above 0"]);
         assert!(admit(&[named("a").deadline(Nanos(1_000_000))]).is_ok());
     }
 
     #[test]
     fn a_budget_beyond_the_period_or_deadline_is_refused() {
-        refused(&[named("a").budget(Nanos(2_000_000))], &["budget 2ms", "1ms"]);
-        refused(&[named("a").deadline(Nanos(200_000)).budget(Nanos(300_000))], &["300µs", "200µs"]);
+        refused(&[named("a").budget(Nanos(2_000_000))], &["budget 2 ms", "1 ms"]);
+        refused(&[named("a").deadline(Nanos(200_000)).budget(Nanos(300_000))], &["300 us", "200 us"]);
     }
 
     #[test]
     fn a_latency_beyond_the_period_is_refused_on_threads_and_allowed_in_virtual_time() {
         let late = [named("a").latency(Nanos(1_000_001))];
-        refused(&late, &["rate group `a`", "1.000001ms", "1ms", "virtual time"]);
+        refused(&late, &["rate group `a`", "1.000001 ms", "1 ms", "virtual time"]);
         assert!(super::admit(&late, Execution::Virtual, cores(2)).is_ok());
         assert!(admit(&[named("a").latency(Nanos(1_000_000))]).is_ok());
     }
@@ -321,7 +321,7 @@ mod tests {
     #[test]
     fn budgets_that_overfill_all_cores_together_are_refused_on_threads_with_the_sum() {
         let groups = ["a", "b", "c"].map(|name| named(name).budget(Nanos(700_000)));
-        refused(&groups, &["210.0 %", "`a` 700µs of 1ms + `b`", "2 cores"]);
+        refused(&groups, &["210.0 %", "`a` 700 us of 1 ms + `b`", "2 cores"]);
         assert!(super::admit(&groups, Execution::Threaded, cores(3)).is_ok());
         assert!(super::admit(&groups, Execution::Virtual, cores(1)).is_ok());
         // Check that budgets which fill every core exactly fit
@@ -342,7 +342,7 @@ mod tests {
         for policy in [OverrunPolicy::Skip, OverrunPolicy::Degrade { recover_after: 9 }, OverrunPolicy::Stop] {
             assert!(admit(&[paced().overrun(policy)]).is_ok());
         }
-        refused(&[named("a").device_paced(Nanos(999_999))], &["watchdog 999.999µs", "period 1ms"]);
+        refused(&[named("a").device_paced(Nanos(999_999))], &["watchdog 999.999 us", "period 1 ms"]);
         refused(&[paced().overrun(OverrunPolicy::CatchUp { max: 3 })], &["CatchUp { max: 3 }", "Skip"]);
         refused(&[paced().overrun(OverrunPolicy::Rephase)], &["Rephase", "phase"]);
         refused(&[named("b"), paced().observer()], &["rate group `a`", "observer"]);

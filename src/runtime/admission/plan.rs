@@ -219,7 +219,8 @@ impl fmt::Display for Plan {
         let header = ["rate", "period", "offset", "deadline", "budget", "load"];
         write!(f, "\n{:width$}", "group")?;
         header.iter().try_for_each(|name| write!(f, " {name:>10}"))?;
-        writeln!(f, "  core  {:15}{:24}overrun", "policy", "wait")?;
+        let wait_width = self.groups.iter().map(|group| group.wait.chars().count()).max().unwrap_or(0).max(4);
+        writeln!(f, "  core  {:15}{:wait_width$}  overrun", "policy", "wait")?;
         for group in &self.groups {
             let policy = match (self.execution, group.priority) {
                 (Execution::Virtual, _) => "-".to_owned(),
@@ -240,7 +241,7 @@ impl fmt::Display for Plan {
                 write!(f, " {:>10}", time.map_or("-".to_owned(), short))?;
             }
             let load = group.utilisation().map_or("-".to_owned(), percent);
-            writeln!(f, " {load:>10}  {core:>4}  {policy:15}{:24}{}", group.wait, group.overrun)?;
+            writeln!(f, " {load:>10}  {core:>4}  {policy:15}{:wait_width$}  {}", group.wait, group.overrun)?;
         }
         writeln!(f)?;
         if self.total_load > 0.0 {

@@ -248,13 +248,13 @@ mod tests {
     #[test]
     fn what_was_granted_is_told_with_its_bound() {
         let told = |wait, period| Waiter::new(wait, true, Nanos(period)).to_string();
-        assert_eq!(told(Wait::Auto, MS), "sleep, then spin, margin adapts (at most 135µs)");
+        assert_eq!(told(Wait::Auto, MS), "sleep, then spin, margin adapts (at most 135 us)");
         // Check that a period of which 15 % are less than a wake-up takes gets that, and no sleep if it is shorter
-        assert_eq!(told(Wait::Auto, MS / 2), "sleep, then spin, margin adapts (at most 75µs)");
-        assert_eq!(told(Wait::Auto, MS / 5), "sleep, then spin, margin adapts (at most 50µs)");
-        assert_eq!(told(Wait::Auto, MS / 20), "sleep, then spin, margin adapts (at most 45µs)");
+        assert_eq!(told(Wait::Auto, MS / 2), "sleep, then spin, margin adapts (at most 75 us)");
+        assert_eq!(told(Wait::Auto, MS / 5), "sleep, then spin, margin adapts (at most 50 us)");
+        assert_eq!(told(Wait::Auto, MS / 20), "sleep, then spin, margin adapts (at most 45 us)");
         assert_eq!(told(Wait::Auto, MS / 50), "spin");
-        assert_eq!(told(Wait::SleepSpin { margin: Nanos(50 * US) }, MS), "sleep, then spin 50µs");
+        assert_eq!(told(Wait::SleepSpin { margin: Nanos(50 * US) }, MS), "sleep, then spin 50 us");
         assert_eq!(told(Wait::Spin, MS), "spin");
         assert_eq!(told(Wait::Sleep, MS), "sleep");
     }

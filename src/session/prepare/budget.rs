@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::body::{Body, State};
 use crate::model::local::Kind;
+use crate::report::Quantity;
 use crate::runtime::{Nanos, RateGroup};
 
 /// Evaluations at most, and the time after which no other is begun: the least of several is what the machine can do when
@@ -79,12 +80,12 @@ impl Cost {
             _ => ("body", "a period of the global model", ""),
         };
         let message = format!(
-            "{what} takes at least {budget:.3?} on this machine ({evaluations:.1} force evaluations of {:.3?}) and its period \
-             is {period:.3?}: use {other}fewer nodes (about {fits} of {} fit) or virtual time (--virtual)",
-            self.evaluation.to_duration(),
+            "{what} takes at least {} on this machine ({evaluations:.1} force evaluations of {}) and its period is {}: use \
+             {other}fewer nodes (about {fits} of {} fit) or virtual time (--virtual)",
+            Quantity::Nanoseconds(budget.0),
+            Quantity::Nanoseconds(self.evaluation.0),
+            Quantity::Nanoseconds(period.0),
             self.nodes,
-            budget = budget.to_duration(),
-            period = period.to_duration(),
         );
         Err(Error::scene(place, message))
     }
@@ -111,12 +112,12 @@ mod tests {
     fn what_cannot_fit_is_refused_with_the_sum_and_what_would_fit() {
         let error = cost(1000, Kind::Hold).budget(&RateGroup::hz(40)).unwrap_err().to_string();
         for words in
-            ["body: ", "50.000ms", "50.0 force evaluations of 1.000ms", "25.000ms", "about 500 of 1000", "--virtual"]
+            ["body: ", "50.0 ms", "50.0 force evaluations of 1.00 ms", "25.0 ms", "about 500 of 1000", "--virtual"]
         {
             assert!(error.contains(words), "{words:?} is not in {error}");
         }
         let error = cost(1000, Kind::Full).budget(&RateGroup::hz(1000)).unwrap_err().to_string();
-        for words in ["local.model: ", "2.000ms", "another local model", "about 500 of 1000"] {
+        for words in ["local.model: ", "2.00 ms", "another local model", "about 500 of 1000"] {
             assert!(error.contains(words), "{words:?} is not in {error}");
         }
     }

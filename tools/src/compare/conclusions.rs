@@ -45,7 +45,10 @@ fn fit(comparison: &Comparison) -> String {
     let (p99, period) = (comparison.full.cost.tick_p99, comparison.haptic_period);
     let nodes = comparison.nodes as f64 * period.0 as f64 / p99.0.max(1) as f64;
     let times = format!("CPU p99 {} of {}", duration(p99.0), duration(period.0));
-    let line = format!("cost grows with the nodes, so the line is near {} nodes", two_digits(nodes));
+    let line = format!(
+        "cost grows with the nodes, so its p99 fits up to some {} nodes (a run is refused only where its least time does not fit)",
+        two_digits(nodes)
+    );
     match full_fits(comparison) {
         true => format!("`full` fits the haptic tick here ({times}): no other model is needed on this scene; {line}"),
         false => format!("`full` does not fit the haptic tick here ({times}): another model is needed; {line}"),
@@ -57,22 +60,28 @@ pub(super) fn full_fits(comparison: &Comparison) -> bool {
     comparison.full.cost.tick_p99 <= comparison.haptic_period
 }
 
+/// A question to a run.
+type Asked<'a> = dyn Fn(&Measured) -> bool + 'a;
+
 /// Who is cheaper than `full` in which way, and who in none.
-fn against_full(comparison: &Comparison) -> [String; 3] {
+fn against_full(comparison: &Comparison) -> Vec<String> {
     let full = &comparison.full;
     let in_total = |run: &Measured| run.cost.total_load() < (1.0 - MARGIN) * full.cost.total_load();
     let per_tick = |run: &Measured| (run.cost.tick_p50.0 as f64) < (1.0 - MARGIN) * full.cost.tick_p50.0 as f64;
     let is_worse = |run: &Measured| run.error.rms > 0.0 && !in_total(run);
-    let those = |wins: &dyn Fn(&Measured) -> bool| list(comparison, wins);
     let (load, margin) = (figure(1e3 * full.cost.total_load()), 100.0 * MARGIN);
-    [
-        format!("cheaper than `full` in total ({load} ms/s) by more than {margin} %: {}", those(&in_total)),
-        format!("worse than `full` in error and not cheaper in total: {}", those(&is_worse)),
-        format!(
-            "worse in error and cheaper in nothing, not even a haptic tick: {}",
-            those(&|run| is_worse(run) && !per_tick(run))
-        ),
-    ]
+    let no_gain = |run: &Measured| is_worse(run) && !per_tick(run);
+    let sorted: [(String, &Asked<'_>); 3] = [
+        (format!("cheaper than `full` in total ({load} ms/s) by more than {margin} %"), &in_total),
+        ("worse than `full` in error and not cheaper in total".to_owned(), &is_worse),
+        ("of these, not cheaper in a haptic tick either".to_owned(), &no_gain),
+    ];
+    // That nothing is cheaper must be said; what nobody is besides need not be.
+    let said = sorted.into_iter().enumerate().filter_map(|(n, (what, is))| match list(comparison, is) {
+        names if names.is_empty() => (n == 0).then(|| format!("{what}: none")),
+        names => Some(format!("{what}: {}", names.join(", "))),
+    });
+    said.collect()
 }
 
 /// The cheapest per haptic tick within an error, for each latency.
@@ -104,7 +113,7 @@ fn own_error(comparison: &Comparison) -> Option<String> {
 }
 
 /// The models of which runs are `asked` for; with the latency where that is not so for all latencies of the model.
-fn list(comparison: &Comparison, asked: &dyn Fn(&Measured) -> bool) -> String {
+fn list(comparison: &Comparison, asked: &Asked<'_>) -> Vec<String> {
     let runs = || comparison.runs.iter().filter_map(|run| Some((run, run.measured()?)));
     let all = |model: &str| runs().filter(|(run, _)| run.model == model).all(|(_, measured)| asked(measured));
     let names = runs().filter(|(_, measured)| asked(measured)).map(|(run, _)| match all(&run.model) {
@@ -113,7 +122,7 @@ fn list(comparison: &Comparison, asked: &dyn Fn(&Measured) -> bool) -> String {
     });
     let mut names: Vec<String> = names.collect();
     names.dedup();
-    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+    names
 }
 
 /// A latency in a sentence.
@@ -162,9 +171,9 @@ mod tests {
     fn full_is_said_to_fit_or_not_with_the_size_at_which_that_changes() {
         let fits = Comparison::conclusions(&comparison(100, &[])).concat();
         assert!(fits.contains("fits the haptic tick here (CPU p99 100 us of 1.00 ms)"), "{fits}");
-        assert!(fits.contains("no other model is needed") && fits.contains("near 10000 nodes"), "{fits}");
+        assert!(fits.contains("no other model is needed") && fits.contains("up to some 10000 nodes"), "{fits}");
         let not = Comparison::conclusions(&comparison(4100, &[])).concat();
-        assert!(not.contains("does not fit the haptic tick") && not.contains("near 240 nodes"), "{not}");
+        assert!(not.contains("does not fit the haptic tick") && not.contains("up to some 240 nodes"), "{not}");
     }
 
     #[test]
@@ -181,7 +190,7 @@ mod tests {
         let ends = [
             "in total (100 ms/s) by more than 10 %: hold (33 ms late), patch (in time)",
             "not cheaper in total: hold (in time), patch (33 ms late)",
-            "not even a haptic tick: patch (33 ms late)",
+            "not cheaper in a haptic tick either: patch (33 ms late)",
             "within 1 % rms of `full`: in time hold (0.500 %, 2.00 us per tick); 33 ms late none",
             "within 5 % rms of `full`: in time hold (0.500 %, 2.00 us per tick); 33 ms late none",
         ];
@@ -189,7 +198,7 @@ mod tests {
             100,
             &[("hold", 0, measured(0.5, 99, 0.099)), ("hold", 33, measured(0.5, 99, 0.101))],
         ));
-        assert!(same[2].ends_with("total: hold") && same[3].ends_with("tick: hold"), "{same:?}");
+        assert!(same[2].ends_with("total: hold") && same[3].ends_with("either: hold"), "{same:?}");
         assert_eq!(lines.len(), 1 + ends.len());
         for (line, end) in lines[1..].iter().zip(ends) {
             assert!(line.ends_with(end), "{line:?} does not end with {end:?}");
