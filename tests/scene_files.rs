@@ -8,7 +8,7 @@ use palpate::model::contact::{Equations, Normals};
 use palpate::model::local::BlendKind;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::model::mesh::Face;
-use palpate::scene::{FrictionSpec, NodeSpec, Scene};
+use palpate::scene::{BuiltIn, FrictionSpec, NodeSpec, Scene};
 
 #[path = "../examples/scene_paths.rs"]
 #[allow(dead_code, reason = "its main function writes the files that are only compared here")]
@@ -84,7 +84,13 @@ fn a_device_that_this_program_does_not_open_is_refused_with_what_opens_it() {
 }
 
 #[test]
-fn the_built_in_demo_is_the_demo_file() {
+fn every_scene_of_the_folder_is_built_in() {
+    let names: Vec<_> = files_with(&folder(), "toml").iter().map(|file| file.file_stem().unwrap().to_owned()).collect();
+    assert!(names.iter().map(|name| name.to_str().unwrap()).eq(BuiltIn::all().map(BuiltIn::name)), "{names:?}");
+    for scene in BuiltIn::all() {
+        assert_eq!(scene.load(), load(scene.name()));
+        assert!((20..400).contains(&scene.about().len()), "{}", scene.about());
+    }
     assert_eq!(Scene::demo(), load("demo"));
 }
 

@@ -12,6 +12,7 @@
 //! ```
 
 mod body;
+mod built_in;
 mod contact;
 mod description;
 mod device;
@@ -30,6 +31,7 @@ pub use body::{
     BlockSpec, BodyKind, BodySpec, MassSpringSpec, MaterialSpec, RegionSpec, TetrahedraSpec, TissueRegionSpec,
     TissueSpec, Volume,
 };
+pub use built_in::BuiltIn;
 pub use contact::{ContactSpec, FrictionSpec};
 pub use description::{InitialSpec, LogSpec, ProbeSpec, PullSpec, RunSpec, Scene};
 pub use device::{DeviceKind, DeviceProfile, DeviceSpec};

@@ -79,7 +79,7 @@ fn a_killed_run_leaves_a_readable_log_that_lacks_at_most_a_second() {
         // Between two records or in one: a kill waits for neither.
         assert!(called.err.contains("cut off"), "{called:?}");
         // The start of the run by the environment, and the last record of the haptic group, since then.
-        let reader = LogReader::open(&folder.path("killed.mcap")).unwrap();
+        let reader = LogReader::open(folder.path("killed.mcap")).unwrap();
         let (mut start, mut last) = (0, palpate::runtime::Nanos::ZERO);
         for entry in reader {
             match entry {

@@ -59,9 +59,9 @@ fn a_body_that_takes_longer_than_its_period_is_refused_in_real_time_with_what_wa
     folder.spoil("nodes = [6, 6, 6]", "nodes = [12, 12, 12]");
     let scene = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
     folder.write("scene.toml", scene.replace("[3, 3, 5]", "[3, 3, 11]").replace("_m = 30.0", "_m = 3000000.0"));
-    let words = ["scene.toml: body: ", "force evaluations of", "33.333ms", "fewer nodes", "of 1728 fit"];
+    let words = ["scene.toml: body: ", "force evaluations of", "33.3 ms", "fewer nodes", "of 1728 fit"];
     assert_refused_in_real_time(&folder, &[], &words);
-    let words = ["scene.toml: local.model: ", "a haptic tick of `full`", "1.000ms", "another local model"];
+    let words = ["scene.toml: local.model: ", "a haptic tick of `full`", "1.00 ms", "another local model"];
     assert_refused_in_real_time(&folder, &["--model", "full"], &words);
 }
 
@@ -74,15 +74,15 @@ fn auto_says_in_plan_report_timing_and_json_which_model_it_took_and_why() {
     let plan = folder.succeed(&[&auto[..], &["--plan"]].concat());
     let line = format!("model full: {why}");
     assert!(words(&plan).contains(&line), "{plan}");
-    for report in [folder.succeed(&auto), folder.succeed(&["timing", "palpate-run.mcap"])] {
+    for report in [folder.succeed(&auto), folder.succeed(&["timing", "palpate-virtual.mcap"])] {
         assert!(words(&report).contains(&line), "{report}");
     }
-    let json = folder.succeed(&["timing", "palpate-run.mcap", "--json"]);
+    let json = folder.succeed(&["timing", "palpate-virtual.mcap", "--json"]);
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["environment"]["model_reason"], why);
     assert!(json["environment"]["model_warning"].is_null(), "{json}");
     // A model that is named has no reason to give.
     let named = folder.succeed(&["run", "scene.toml", "--virtual", "--plan"]);
     assert!(!named.contains("model"), "{named}");
-    folder.succeed(&["replay", "palpate-run.mcap"]);
+    folder.succeed(&["replay", "palpate-virtual.mcap"]);
 }

@@ -13,19 +13,15 @@ mod suggest;
 use super::body::Volume;
 use super::device::{field as device_field, numbered};
 use super::validate::{mesh, tool};
-use super::{BodySpec, Scene, TetrahedraSpec};
+use super::{BodySpec, BuiltIn, Scene, TetrahedraSpec};
 use crate::devices::ToolPath;
 use crate::error::{Error, ErrorKind};
 use crate::files;
 use fault::{Fault, plain_key};
 use locate::{exact_offset_of, line_of, offset_of, table_at};
 
-/// The scene that `palpate` alone runs, part of the program.
-const DEMO_TOML: &str = include_str!("../../../scenes/demo.toml");
 /// Largest scene file (bytes): a hundred times what a person writes.
 const LARGEST_FILE: usize = 1 << 20;
-
-const DEMO_PATH_CSV: &str = include_str!("../../../scenes/paths/demo.csv");
 
 impl Scene {
     /// Reads, completes and validates a scene file; the tool's path and the body's mesh are found relative to it. A closed
@@ -106,14 +102,12 @@ impl Scene {
 
     /// The built-in demo: five seconds of pressing, dragging, circling and tapping. Reads no file.
     pub fn demo() -> Self {
-        let path = |path_csv: &Path| ToolPath::from_csv(DEMO_PATH_CSV, &path_csv.display().to_string());
-        let volume = |_: &TetrahedraSpec, _: &Path| Err(Error::scene("body.mesh", "is not part of the program"));
-        Self::from_toml_with(DEMO_TOML, "demo.toml", true, path, volume).expect("the built-in scene is valid")
+        BuiltIn::named("demo").expect("it is built in").load()
     }
 
     /// The scene in `text`, with the tool's path fetched by `read_path` and the body's mesh by `read_volume`; if it `is_whole`, with a body and
     /// a tool.
-    fn from_toml_with(
+    pub(super) fn from_toml_with(
         text: &str,
         name: &str,
         is_whole: bool,

@@ -11,7 +11,7 @@ use crate::compare::{CompareOptions, CompareProgress, Comparison, to_html, to_js
 /// The arguments of `palpate compare`.
 #[derive(Debug, clap::Args)]
 pub struct CompareArgs {
-    /// The scene file (TOML)
+    /// A scene file (TOML), or the name of a built-in scene (`palpate list`)
     pub scene: PathBuf,
     /// Compare only these models with `full`, by name and separated by commas
     #[arg(long, value_name = "A,B", value_delimiter = ',', value_parser = run::model)]

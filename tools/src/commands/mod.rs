@@ -4,7 +4,9 @@
 //! the user interrupted.
 
 pub mod compare;
+pub mod doctor;
 pub mod export;
+pub mod list;
 pub mod log;
 pub mod mesh;
 pub mod mock;
@@ -20,11 +22,14 @@ mod progress;
 mod shared;
 
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 pub use files::OutputFile;
 pub use shared::WindowArgs;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+use palpate::model::body::InstructionSet;
 use palpate::session::LOG_FAILURE;
 use palpate::{Error, ErrorKind};
 use tracing_subscriber::filter::{LevelFilter, Targets};
@@ -35,7 +40,7 @@ use tracing_subscriber::util::SubscriberInitExt;
 ///
 /// Without a subcommand, runs the built-in demo scene in real time for 5 seconds and reports how it went.
 #[derive(Debug, Parser)]
-#[command(name = "palpate", version, args_conflicts_with_subcommands = true)]
+#[command(name = "palpate", version = VERSION.as_str(), args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
@@ -43,7 +48,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run a scene file, in real time or in virtual time
+    /// List the scenes that are built in
+    List,
+    /// Say whether this machine is ready for real time, and what to do
+    Doctor,
+    /// Run a scene, in real time or in virtual time
     Run(run::RunArgs),
     /// Say how well a recorded run kept its time, and what that did to the force
     Timing(timing::TimingArgs),
@@ -63,7 +72,18 @@ enum Command {
     View(view::ViewArgs),
     /// Be a device's service without the device, to try a scene against it
     Mock(mock::MockArgs),
+    /// Print what completes this command in a shell
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
 }
+
+/// Version, features, and the instructions that the numerics use on this machine.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let features = if cfg!(feature = "parallel") { "parallel" } else { "none" };
+    format!("{}\nfeatures: {features}\ninstructions: {}", env!("CARGO_PKG_VERSION"), InstructionSet::detect().name())
+});
 
 /// Parses the command line, runs it and says how it ended.
 pub fn main() -> ExitCode {
@@ -84,6 +104,8 @@ pub fn main() -> ExitCode {
     let result = match Cli::try_parse() {
         Ok(Cli { command }) => match command {
             None => run::demo(),
+            Some(Command::List) => list::run(),
+            Some(Command::Doctor) => doctor::run(),
             Some(Command::Run(args)) => run::run(&args),
             Some(Command::Compare(args)) => compare::run(&args),
             Some(Command::Reduce(args)) => reduce::run(&args),
@@ -94,6 +116,7 @@ pub fn main() -> ExitCode {
             Some(Command::Replay(args)) => replay::run(&args),
             Some(Command::View(args)) => view::run(&args),
             Some(Command::Mock(args)) => mock::run(&args),
+            Some(Command::Completions { shell }) => completions(shell),
         },
         Err(error) if error.use_stderr() => Err(usage_error(&error)),
         Err(help) => return print_help(&help),
@@ -109,6 +132,12 @@ pub fn main() -> ExitCode {
             if error.kind().is_input() { ExitCode::from(2) } else { ExitCode::from(1) }
         }
     }
+}
+
+fn completions(shell: Shell) -> Result<(), Error> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "palpate", &mut script);
+    shared::print(&String::from_utf8_lossy(&script))
 }
 
 fn print_help(help: &clap::Error) -> ExitCode {

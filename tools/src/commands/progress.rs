@@ -6,23 +6,30 @@ use std::path::Path;
 use std::time::Duration;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressBarIter, ProgressDrawTarget, ProgressStyle};
-use palpate::Error;
 use palpate::log::LogReader;
 use palpate::runtime::{GroupLive, Nanos};
-use palpate::scene::Scene;
+use palpate::scene::{BuiltIn, Scene};
 use palpate::session::Running;
+use palpate::{Error, ErrorKind};
 
 use super::shared::name_of;
 
 /// How much of the run passes between two drawings.
 const STEP: Duration = Duration::from_millis(50);
 
-/// Loads the scene at `path`; a bar shows how far the filling of a surface is.
+/// Loads the scene at `path`, or the built-in one of that name; a bar shows how far the filling of a surface is.
 ///
 /// # Errors
 /// Those of [`Scene::load`].
 pub fn load(path: &Path) -> Result<Scene, Error> {
     const ALL: f64 = 1000.0;
+    // A file comes first: whoever has one of that name means it.
+    if !path.exists() && path.extension().is_none() && path.components().count() == 1 {
+        let built_in = path.to_str().and_then(BuiltIn::named);
+        let missing =
+            || Error::new(ErrorKind::Usage, "no such file, and no scene is built in by that name: see `palpate list`");
+        return built_in.map(BuiltIn::load).ok_or_else(|| missing().at(name_of(path)));
+    }
     let mut filling = None;
     let scene = Scene::load_with(path, &mut |done| {
         let bar = filling.get_or_insert_with(|| {

@@ -17,7 +17,7 @@ use crate::reduce::{
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("subject").required(true).args(["scene", "paper", "cells"]))]
 pub struct ReduceArgs {
-    /// Check for this scene (TOML) how much of the force the patch of its local model captures
+    /// Check for this scene, a file (TOML) or the name of a built-in one (`palpate list`), how much of the force the patch of its local model captures
     pub scene: Option<PathBuf>,
     /// Compute a table or figure of the paper: table1, table2, fig4, fig5, fig8 or all; several by commas
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = studies)]

@@ -11,11 +11,13 @@ use super::{files, progress, shared};
 
 /// Where the log goes if nothing is said.
 const DEFAULT_LOG: &str = "palpate-run.mcap";
+/// Of a run in virtual time: it does not take the place of a real one, whose timing is still to be read.
+const VIRTUAL_LOG: &str = "palpate-virtual.mcap";
 
 /// The arguments of `palpate run`.
 #[derive(Debug, clap::Args)]
 pub struct RunArgs {
-    /// The scene file (TOML)
+    /// A scene file (TOML), or the name of a built-in scene (`palpate list`)
     pub scene: PathBuf,
     /// Run in simulated time, as fast as the machine allows and bit-identically every time
     #[arg(long = "virtual")]
@@ -35,9 +37,9 @@ pub struct RunArgs {
     /// Print the schedule and what this system would refuse, and run nothing
     #[arg(long)]
     pub plan: bool,
-    /// The log to write; overwritten if it exists
-    #[arg(long, value_name = "LOG.mcap", default_value = DEFAULT_LOG)]
-    pub out: PathBuf,
+    /// The log to write, overwritten if it exists; palpate-run.mcap if left out, palpate-virtual.mcap in virtual time
+    #[arg(long, value_name = "LOG.mcap")]
+    pub out: Option<PathBuf>,
 }
 
 /// Runs the built-in demo scene in real time.
@@ -54,7 +56,8 @@ pub fn demo() -> Result<(), Error> {
 /// Input errors of the scene, or a failed run.
 pub fn run(args: &RunArgs) -> Result<(), Error> {
     let mut scene = progress::load(&args.scene)?;
-    files::keep_inputs(&files::inputs_of(&args.scene, &scene), &args.out)?;
+    let out = args.out.as_deref().unwrap_or(Path::new(if args.virtual_time { VIRTUAL_LOG } else { DEFAULT_LOG }));
+    files::keep_inputs(&files::inputs_of(&args.scene, &scene), out)?;
     let name = shared::name_of(&args.scene);
     if let Some(model) = args.model {
         scene = scene.with_model(model);
@@ -72,7 +75,7 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
     if args.no_cache {
         builder = builder.forget_bases();
     }
-    if args.plan { plan(builder, &name) } else { execute(builder, &args.out, &name) }
+    if args.plan { plan(builder, &name) } else { execute(builder, out, &name) }
 }
 
 fn plan(builder: SessionBuilder, name: &str) -> Result<(), Error> {

@@ -19,7 +19,7 @@ const LOOK: Duration = Duration::from_millis(100);
 /// The arguments of `palpate view`.
 #[derive(Debug, clap::Args)]
 pub struct ViewArgs {
-    /// The scene file (TOML), or a log with pictures (MCAP); the demo scene if left out
+    /// A scene file (TOML) or the name of a built-in scene (`palpate list`), or a log with pictures (MCAP); the demo scene if left out
     #[arg(value_name = "SCENE|LOG")]
     pub scene: Option<PathBuf>,
     /// Listen on this port; a free one if left out

@@ -1,0 +1,116 @@
+//! Scenes that are part of the program, with the files that they name.
+
+use std::path::Path;
+
+use super::body::Volume;
+use super::{Scene, TetrahedraSpec};
+use crate::devices::ToolPath;
+use crate::error::{Error, ErrorKind};
+
+macro_rules! files {
+    ($($name:literal)*) => { [$(($name, include_str!(concat!("../../scenes/", $name)))),*] };
+}
+
+/// The scenes of the folder `scenes/`.
+const SCENES: [(&str, &str); 22] = files![
+    "cantilever.toml"
+    "demo.toml"
+    "device_faults.toml"
+    "drag_friction.toml"
+    "drag_slip.toml"
+    "drag_stick.toml"
+    "finger.toml"
+    "forceps.toml"
+    "hand.toml"
+    "hand_release.toml"
+    "haply.toml"
+    "layers.toml"
+    "liver.toml"
+    "liver_tumour.toml"
+    "nodule.toml"
+    "pull_release.toml"
+    "soft_deep.toml"
+    "stick_slip.toml"
+    "two_hands.toml"
+    "wave.toml"
+    "wave_probe.toml"
+    "z_width.toml"
+];
+
+/// What they name.
+const FILES: [(&str, &str); 19] = files![
+    "meshes/cantilever.msh"
+    "meshes/liver.msh"
+    "paths/bend.csv"
+    "paths/demo.csv"
+    "paths/drag.csv"
+    "paths/finger.csv"
+    "paths/forceps_left.csv"
+    "paths/forceps_right.csv"
+    "paths/hand.csv"
+    "paths/hand_release.csv"
+    "paths/hold_right.csv"
+    "paths/hover.csv"
+    "paths/liver.csv"
+    "paths/liver_slide.csv"
+    "paths/palpate.csv"
+    "paths/press.csv"
+    "paths/pull_release.csv"
+    "paths/slide.csv"
+    "paths/stick_slip.csv"
+];
+
+/// A scene that is part of the program.
+///
+/// ```
+/// use palpate::scene::BuiltIn;
+///
+/// let scene = BuiltIn::named("drag_friction").unwrap();
+/// assert!(scene.about().starts_with("The tool presses 8 mm into the top"));
+/// assert_eq!(scene.load().run.duration_s, 2.5);
+/// assert!(BuiltIn::all().count() > 20 && BuiltIn::named("nothing").is_none());
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuiltIn {
+    file: &'static str,
+    text: &'static str,
+}
+
+impl BuiltIn {
+    /// All of them, in the order of their names.
+    pub fn all() -> impl Iterator<Item = Self> {
+        SCENES.into_iter().map(|(file, text)| Self { file, text })
+    }
+
+    /// The one of that name, if there is one.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::all().find(|scene| scene.name() == name)
+    }
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        self.file.trim_end_matches(".toml")
+    }
+
+    /// What happens in it, in a sentence or two: the text's own first words.
+    pub fn about(self) -> String {
+        let comment = self.text.lines().map_while(|line| line.strip_prefix("# "));
+        comment.take_while(|line| !line.starts_with("Look for:")).collect::<Vec<_>>().join(" ")
+    }
+
+    /// The scene as a file of it would be loaded. Reads no file.
+    pub fn load(self) -> Scene {
+        let path = |name: &Path| ToolPath::from_csv(text_of(name)?, &name.display().to_string());
+        let volume = |spec: &TetrahedraSpec, name: &Path| {
+            Volume::of_file(text_of(name)?.into(), &name.display().to_string(), spec.unit_m)
+        };
+        Scene::from_toml_with(self.text, self.file, true, path, volume).expect("tests load every one of them")
+    }
+}
+
+/// The text of a file that scenes name.
+fn text_of(name: &Path) -> Result<&'static str, Error> {
+    let found = FILES.iter().find(|(file, _)| Path::new(file) == name);
+    let missing = || Error::new(ErrorKind::Io, "is not part of the program").at(name.display().to_string());
+    found.map(|(_, text)| *text).ok_or_else(missing)
+}
