@@ -146,6 +146,19 @@ def test_a_patch_of_a_body_is_near_the_whole():
     assert np.abs(patch.force - full.force).max() < 0.5 * peak and len(patch.resyncs) > 3
 
 
+@pytest.mark.parametrize("model", ["hold", "linear_boundary", "scaled_boundary"])
+def test_the_other_models_of_a_body_run(model):
+    run = palpate.Session(TautNet(), path=DOWN, model=model).run()
+    assert run.model == model and run.force[-1, 2] > 0.05
+
+
+@pytest.mark.parametrize("model", ["condensed", "predicted", "predictive"])
+def test_a_body_that_cannot_be_taken_apart_is_refused_where_it_must_be(model):
+    with pytest.raises(palpate.SceneError, match="restriction") as caught:
+        palpate.Session(TautNet(), path=DOWN, model=model).run()
+    assert caught.value.field == "local.model"
+
+
 def test_a_body_without_a_tangent_has_no_local_model():
     with pytest.raises(palpate.UsageError, match="model=\"full\"") as caught:
         palpate.Session(Net(), path=DOWN, model="patch")
