@@ -1,4 +1,4 @@
-"""The code of docs/python.md runs as it stands there, but for the page, which nobody leaves by Ctrl-C here."""
+"""The code of docs/python.md and of the README runs as it stands there, but for the page, which nobody leaves by Ctrl-C here."""
 
 import re
 
@@ -24,3 +24,9 @@ def test_the_page_s_code_runs(tmp_path, monkeypatch, block, press, capsys):
     assert capsys.readouterr().out.strip() == said
     exec(device, names)
     assert names["run"].force.shape == (1000, 3)
+
+
+def test_the_readme_s_code_runs(capsys):
+    (code,) = BLOCK.findall((ROOT / "python/README.md").read_text())
+    exec(code, {})
+    assert capsys.readouterr().out.startswith("(1000, 3) 3.")
