@@ -490,7 +490,7 @@ enum PalpateCode palpate_request_stop(struct PalpateSession session);
  * session ended by a fault; it is stopped then too.
  *
  * On the thread that ticks it, it ends at once; from another thread it waits for the ticks that bring the force to rest. A loop that
- * does not tick any more is given up after 10 s.
+ * does not tick any more is given up after 5 s, which is a fault.
  *
  * # Safety
  * `summary` is null or a struct that begins with its size.
