@@ -6,8 +6,7 @@ use std::path::Path;
 use palpate::Error;
 use palpate::log::{Analysis, Environment, LogEntry, LogReader, LogRecord, RunReport, Topic, TopicKind};
 use palpate::session::Summary;
-use palpate_cli::columns::{self, Column};
-use palpate_cli::{Cell, ColumnType};
+use palpate_cli::columns::{self, Cell, Column, ColumnType};
 
 /// What is added to a topic with contacts to name the table of the places that touch.
 const POINTS: &str = "/points";

@@ -32,7 +32,7 @@ const TICK: usize = 8 * 8;
 /// How far from one the length of a turn may be.
 const UPRIGHT: f64 = 1e-6;
 
-/// What stands in front of every message.
+/// The header of every message of a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Header {
     /// The connection that it belongs to, by number: what belongs to an older one is dropped.
@@ -43,7 +43,7 @@ pub struct Header {
     pub sent: Nanos,
 }
 
-/// What one side tells the other.
+/// A message of one side of a link to the other.
 #[derive(Clone, Debug)]
 pub enum Message {
     /// To the global side: a tool at its last haptic ticks, oldest first. Each message repeats some of those before, so that one that is

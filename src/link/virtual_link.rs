@@ -20,7 +20,7 @@ const LEAST_BACK: Nanos = Nanos(1_000_000);
 /// Less urgent messages that wait for the line: of more, the oldest is dropped.
 const MOST_WAITING: usize = 256;
 
-/// What a link does to messages, either way.
+/// The behaviour of a simulated link, in either direction: delay, loss, order, rate and outages.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conditions {
     /// One way, at least.

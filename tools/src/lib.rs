@@ -28,5 +28,5 @@ mod timing;
 mod units;
 
 pub use commands::{OutputFile, WindowArgs, main};
-pub use export::{Cell, ColumnType, TableWriter, columns, export_rows, is_turned};
+pub use export::{TableWriter, columns, export_rows, is_turned};
 pub use reduce::{ReduceOptions, reduction_costs, reduction_json};

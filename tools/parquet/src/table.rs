@@ -9,7 +9,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use palpate::{Error, ErrorKind};
-use palpate_cli::{Cell, ColumnType, TableWriter};
+use palpate_cli::TableWriter;
+use palpate_cli::columns::{Cell, ColumnType};
 use parquet::basic::{Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;

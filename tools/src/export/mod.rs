@@ -9,7 +9,6 @@ use std::fmt::{self, Display, Formatter};
 use std::io::Read;
 use std::path::Path;
 
-pub use columns::{Cell, ColumnType};
 pub(crate) use hgrm::{TickDuration, export_percentiles};
 pub use table::TableWriter;
 pub(crate) use table::export_table;

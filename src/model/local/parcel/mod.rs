@@ -17,7 +17,7 @@ use crate::{Vec3, Wrench};
 pub(super) use departing::{Departing, Model};
 pub use image::Image;
 
-/// What a local model is built from, but for the body.
+/// The ingredients of a local model, but for the body: they cross a link, and the model is built on the other side.
 ///
 /// # Real-time
 /// Not for a tick: allocates.
