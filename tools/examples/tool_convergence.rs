@@ -90,14 +90,15 @@ fn newtons(forces: &[f64]) -> String {
 }
 
 fn slides() {
-    println!("\n| slide over four cells of the lattice | mean (N) | from least to most (%) |");
-    println!("| --- | ---: | ---: |");
+    println!("\n| slide over four cells of the lattice | mean (N) | from least to most (%) | within a cell (%) |");
+    println!("| --- | ---: | ---: | ---: |");
     let cell = SIDE / 11.0;
     let path = [3.5, 7.5].map(|x| Vec3::new(x * cell, 0.0512, SIDE));
     for radius in RADII {
         let forces = slide(Box::new(lattice(12)), shape(radius), path, Vec3::z(), DEPTH, 4.0);
         let mean = forces.iter().sum::<f64>() / forces.len() as f64;
-        println!("| {} | {mean:.4} | {:.2} |", name(radius), spread(&forces));
+        let ripple = ripple(&forces, forces.len() / 4);
+        println!("| {} | {mean:.4} | {:.2} | {ripple:.2} |", name(radius), spread(&forces));
     }
 }
 

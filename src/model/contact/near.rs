@@ -8,6 +8,9 @@ use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
 use crate::{Pose, Vec3};
 
+/// Within so many radii of the surface the way from there to the axis is rounding: an axis that goes through a triangle is at none.
+const ON_SURFACE: f64 = 1e-3;
+
 /// A centre that is farther than this below the surface, beside the tool's radius, has lost it (m).
 const MAX_DEPTH: f64 = 5e-3;
 
@@ -140,8 +143,11 @@ impl Search {
                 let place = interpolate(&weights, &corners);
                 let away = centre - place;
                 let distance = away.norm();
+                let is_off = distance > ON_SURFACE * radius;
+                let normal = if is_off { away * away.dot(&across).signum() } else { across };
+                let Some(normal) = normal.try_normalize(0.0) else { continue };
                 let depth: f64 = weights.iter().zip(depths).map(|(w, depth)| w * depth).sum();
-                let near = |normal, distance: f64| Near {
+                let near = |distance: f64| Near {
                     triangle,
                     weights,
                     place,
@@ -152,13 +158,12 @@ impl Search {
                 if away.dot(&across) < 0.0 {
                     if behind.is_none_or(|known| -distance > known.gap + radius) {
                         // Out of the body on the shortest way.
-                        behind = Some(Near { gap: -distance - radius, ..near(away / -distance, 0.0) });
+                        behind = Some(Near { gap: -distance - radius, ..near(0.0) });
                     }
                     continue;
                 }
                 front = front.min(distance);
-                let Some(normal) = away.try_normalize(1e-12).or_else(|| across.try_normalize(0.0)) else { continue };
-                let near = near(normal, distance);
+                let near = near(distance);
                 if near.gap < 0.0 {
                     self.keep(near, radius);
                 }

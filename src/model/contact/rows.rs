@@ -199,7 +199,9 @@ impl Rows {
         let depth = (at(&motion.to) - near.place).dot(&near.normal) - touch.shape.radius() - near.gap;
         let before = (at(&motion.from) - position).dot(&near.normal) - touch.shape.radius() - depth;
         // What overlapped before is pushed out slowly; what would overlap by the motion is met at once.
-        let grain = touch.skin.grain(corners, &near.weights).map(|grain| grain.stiffened(touch.stiffness));
+        let nodes_at = corners.map(|node| body.positions[node as usize]);
+        let grain = touch.skin.grain(corners, &near.weights, &nodes_at);
+        let grain = grain.map(|grain| grain.stiffened(touch.stiffness));
         let sinking = grain.map(|grain| (grain.sinking(touch.shape.radius(), touch.steady), grain));
         let sinking = sinking.filter(|(sinking, _)| sinking.most() > NEXT_TO_NOTHING);
         let sunk = sinking.map_or(0.0, |(sinking, _)| sinking.most());

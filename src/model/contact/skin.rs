@@ -26,8 +26,8 @@ const CUT: f64 = 0.91;
 const EDGES: [f64; 2] = [0.25, 0.5];
 /// The least cosine between a node's normal and those of its triangles, at a sharp edge and on a smooth surface.
 const COSINES: [f64; 2] = [0.75, 0.95];
-/// Squared edges by the mean square of the weights' own spread within a triangle.
-const HAT: f64 = 6.0;
+/// How far an element by itself spreads a load on its node, squared, in squared edges.
+const ELEMENT: f64 = 0.04;
 /// The most that a tool sinks in beside the elements, in edges.
 const MOST_SUNK: f64 = 0.6;
 
@@ -59,7 +59,7 @@ impl Skin {
                 grains.push(Grain {
                     share: ramp(edge / radius, EDGES),
                     modulus,
-                    spread: (sigma * sigma + edge * edge / HAT).sqrt(),
+                    variance: sigma * sigma + ELEMENT * edge * edge,
                     most: MOST_SUNK * edge,
                 });
             }
@@ -103,15 +103,20 @@ impl Skin {
         }
     }
 
-    /// The grain of the body at `weights` of three nodes, if it is known.
-    pub(super) fn grain(&self, nodes: [u32; 3], weights: &[f64; 3]) -> Option<Grain> {
-        let mut mean = Grain { modulus: 0.0, spread: 0.0, most: 0.0, share: 0.0 };
+    /// The grain of the body at `weights` of three nodes, which are at `places` (m), if it is known.
+    pub(super) fn grain(&self, nodes: [u32; 3], weights: &[f64; 3], places: &[Vec3; 3]) -> Option<Grain> {
+        let mut mean = Grain { modulus: 0.0, variance: 0.0, most: 0.0, share: 0.0 };
         for (node, weight) in nodes.into_iter().zip(weights) {
             let grain = self.grains.get(node as usize)?;
             mean.modulus += grain.modulus * weight;
-            mean.spread += grain.spread * weight;
+            mean.variance += grain.variance * weight;
             mean.most += grain.most * weight;
             mean.share += grain.share * weight;
+        }
+        // What is shared by several corners is spread as far as they are apart: over the middle of a face the elements give way less
+        // than over a node.
+        for [i, j] in [[0, 1], [1, 2], [2, 0]] {
+            mean.variance += 0.5 * weights[i] * weights[j] * (places[i] - places[j]).norm_squared();
         }
         (mean.modulus > 0.0).then_some(mean)
     }
@@ -264,8 +269,8 @@ pub struct Coarseness {
 pub(super) struct Grain {
     /// E / (1 - nu^2) (Pa).
     modulus: f64,
-    /// sigma (m).
-    spread: f64,
+    /// sigma^2 (m^2), along any one direction.
+    variance: f64,
     /// The tool does not sink in deeper than this beside the elements (m).
     most: f64,
     /// How coarse the elements are against the tool, from 0 to 1: fine ones show all of it themselves.
@@ -281,7 +286,7 @@ impl Grain {
     /// What a sphere of `radius` (m) sinks in beside the elements while `steady` (N) has pressed on the mean of the last
     /// milliseconds.
     pub(super) fn sinking(&self, radius: f64, steady: f64) -> Sinking {
-        let shown = 1.0 / (2.0 * std::f64::consts::PI.sqrt() * self.spread * self.modulus);
+        let shown = 1.0 / (2.0 * (std::f64::consts::PI * self.variance).sqrt() * self.modulus);
         let hertz = (9.0 / (16.0 * radius * self.modulus * self.modulus)).cbrt();
         // Where both grow alike, for a contact of radius sqrt(pi) sigma, the elements lack most.
         let turn = (2.0 * hertz / (3.0 * shown)).powi(3);
@@ -292,7 +297,7 @@ impl Grain {
 
     /// How much of a load at that squared distance (m^2) counts as one here.
     pub(super) fn nearness(&self, squared: f64) -> f64 {
-        (1.0 - squared / (16.0 * self.spread * self.spread)).max(0.0).powi(2)
+        (1.0 - squared / (16.0 * self.variance)).max(0.0).powi(2)
     }
 }
 
@@ -311,8 +316,7 @@ pub(super) struct Sinking {
 impl Sinking {
     /// The depth (m) under `force` (N); it grows with the force.
     pub(super) fn at(&self, force: f64) -> f64 {
-        let force = force.clamp(0.0, self.turn);
-        (self.share * (self.hertz * (force * force).cbrt() - self.shown * force)).min(self.most)
+        self.lacking(force) * self.bend(force)
     }
 
     /// The largest depth (m).
@@ -322,14 +326,26 @@ impl Sinking {
 
     /// The depth around `force` (N), as linear in it.
     pub(super) fn tangent(&self, force: f64) -> Sunk {
-        let depth = self.at(force);
-        if force >= self.turn || depth >= self.most {
-            return Sunk { offset: depth, slope: 0.0 };
+        if force >= self.turn {
+            return Sunk { offset: self.most(), slope: 0.0 };
         }
         // At no force it would be infinitely steep.
         let force = force.max(1e-9 * self.turn);
-        let slope = self.share * (2.0 / 3.0 * self.hertz / force.cbrt() - self.shown);
+        let slope = self.share * (2.0 / 3.0 * self.hertz / force.cbrt() - self.shown) * self.bend(force).powi(9);
         Sunk { offset: self.at(force) - slope * force, slope }
+    }
+
+    /// What the elements lack (m) under `force` (N).
+    fn lacking(&self, force: f64) -> f64 {
+        let force = force.clamp(0.0, self.turn);
+        self.share * (self.hertz * (force * force).cbrt() - self.shown * force)
+    }
+
+    /// How much of that the tool sinks in: nearly all, but never as much as `most`. It comes near to that in a bend,
+    /// x / (1 + (x / most)^8)^(1/8): at a corner the surface, which the tool has left behind, would have to keep up with it from one
+    /// step to the next, and its inertia would be felt as a jump.
+    fn bend(&self, force: f64) -> f64 {
+        (1.0 + (self.lacking(force) / self.most).powi(8)).sqrt().sqrt().sqrt().recip()
     }
 }
 
@@ -371,7 +387,7 @@ mod tests {
 
     /// Of a sphere of 8 mm on elements of 9 mm and 16 kPa.
     fn sinking(steady: f64) -> Sinking {
-        Grain { modulus: 16e3, spread: 8e-3, most: 3e-3, share: 1.0 }.sinking(8e-3, steady)
+        Grain { modulus: 16e3, variance: 64e-6, most: 3e-3, share: 1.0 }.sinking(8e-3, steady)
     }
 
     #[test]
@@ -382,6 +398,17 @@ mod tests {
         assert!(depths[999] <= 3e-3);
         // Under a steady force far beyond the turn the elements show all of it.
         assert_eq!(sinking(1e3).most(), 0.0);
+    }
+
+    /// Check that how fast it sinks in changes little by little: under 1 % more force by at most a tenth of the steepest where the
+    /// most is near, and by nothing like that at once.
+    #[test]
+    fn a_tool_that_comes_near_to_the_most_does_not_stop_at_once() {
+        let sinking = sinking(0.0);
+        let slopes: Vec<f64> = (0..400).map(|n| sinking.tangent(0.05 * 1.01_f64.powi(n)).slope).collect();
+        let largest = slopes.windows(2).map(|pair| (pair[0] - pair[1]) / pair[0]).fold(0.0, f64::max);
+        assert!(slopes.windows(2).all(|pair| pair[1] <= pair[0]) && sinking.most() > 0.9 * 3e-3);
+        assert!(largest < 0.1, "{largest}");
     }
 
     #[test]

@@ -42,6 +42,24 @@ fn press_path(place: Vec3, outward: Vec3, radius: f64, above: f64, depth: f64) -
     (0..=200).map(|k| place + outward * height(k)).collect()
 }
 
+/// Check that tools smaller than the elements, pressed in far deeper than their radius, are always pushed back the way they came:
+/// they sink in beside the elements until their centre is in the surface, and the tilted capsule's axis goes through it.
+#[test]
+fn a_small_tool_that_is_pressed_deep_is_pushed_out_the_way_it_came() {
+    let tilted = ToolShape::Capsule { radius: 2e-3, half_axis: Vec3::new(0.012, 0.003, -0.004) };
+    for shape in [sphere(1e-3), sphere(2e-3), sphere(4e-3), tilted] {
+        let mut simulation = reference_block(shape, 0.0);
+        let path = press_path(Vec3::new(0.052, 0.049, 0.1), Vec3::z(), shape.radius(), 6e-3, 0.012);
+        let mut last = Vec3::zeros();
+        for (from, to) in path.iter().zip(&path[1..]) {
+            last = simulation.tick(ToolMotion::straight(*from, *to)).force;
+            let normals = simulation.contact_points(0).iter().map(|point| point.normal.z);
+            assert!(last.z >= 0.0 && normals.fold(1.0, f64::min) > 0.7, "{shape:?}: {last} at {to}");
+        }
+        assert!(last.z > 0.1 && last.xy().norm() < 0.3 * last.z, "{shape:?}: {last}");
+    }
+}
+
 /// Check that no speed passes through a sheet that is one element thick, held at two sides.
 #[test]
 fn a_fast_sphere_does_not_pass_through_a_sheet() {

@@ -34,7 +34,7 @@ fn a_sphere_feels_the_same_over_nodes_edges_and_faces_of_a_lattice() {
     };
     let (sphere, point) = (forces(SPHERE), forces(ToolShape::Point));
     println!("sphere {sphere:.4?}: {:.1} %, point {point:.4?}", spread(&sphere));
-    assert!(spread(&sphere) < 3.0, "{sphere:?}");
+    assert!(spread(&sphere) < 1.5, "{sphere:?}");
     assert!(point[3] > 1.8 * point[0], "{point:?}");
 }
 
@@ -52,17 +52,20 @@ fn a_sphere_feels_the_same_over_a_node_an_edge_and_a_face_of_an_organ() {
     };
     let (sphere, point) = (forces(SPHERE), forces(ToolShape::Point));
     println!("sphere {sphere:.4?}: {:.1} %, point {point:.4?}: {:.0} %", spread(&sphere), spread(&point));
-    // 3 % are wanted, 3.2 reached.
-    assert!(spread(&sphere) < 3.5, "{sphere:?}");
+    assert!(spread(&sphere) < 3.0, "{sphere:?}");
 }
 
-/// Check that a sphere that slides over four cells of a flat lattice feels little of them: 2 % are wanted, 5.4 reached, 33 % is what
-/// a point feels.
+/// Check that a sphere that slides over four cells of a flat lattice feels little of them, and that a point does.
 #[test]
 fn a_sphere_slides_over_a_flat_lattice_with_little_ripple() {
     let cell = SIDE / 11.0;
     let path = [3.5, 7.5].map(|x| Vec3::new(x * cell, 0.0512, SIDE));
-    let forces = slide(Box::new(lattice(12)), SPHERE, path, Vec3::z(), DEPTH, 2.0);
-    println!("{:.2} %, {:.4} N", spread(&forces), forces[0]);
-    assert!(spread(&forces) < 6.0);
+    let of = |shape: ToolShape| {
+        let forces = slide(Box::new(lattice(12)), shape, path, Vec3::z(), DEPTH, 2.0);
+        ripple(&forces, forces.len() / 4)
+    };
+    let (sphere, point) = (of(SPHERE), of(ToolShape::Point));
+    println!("{sphere:.2} %, point {point:.2} %");
+    assert!(sphere < 2.0, "{sphere}");
+    assert!(point > 20.0, "{point}");
 }

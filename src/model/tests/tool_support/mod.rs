@@ -98,6 +98,15 @@ pub fn spread(forces: &[f64]) -> f64 {
     200.0 * (high - low) / (high + low)
 }
 
+/// How far forces are apart, in percent of their mean, beside what changes from one cell to the next, as it does towards the rims of a
+/// finite body: each is compared with the mean over a cell of `ticks` around it.
+pub fn ripple(forces: &[f64], ticks: usize) -> f64 {
+    let mean = |forces: &[f64]| forces.iter().sum::<f64>() / forces.len() as f64;
+    let beside: Vec<f64> = forces.windows(ticks + 1).map(|window| window[ticks / 2] - mean(&window[..ticks])).collect();
+    let (low, high) = beside.iter().fold((f64::MAX, f64::MIN), |(low, high), &f| (low.min(f), high.max(f)));
+    100.0 * (high - low) / mean(forces)
+}
+
 /// A block of springs of 0.1 m with `nodes` per axis, its bottom held: the same material for any number, as that of 12 nodes
 /// with 30 N/m and 0.5 g.
 pub fn lattice(nodes: usize) -> Block {
