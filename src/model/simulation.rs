@@ -73,7 +73,7 @@ impl Simulation {
         let force = self.resting_force(&contact);
         self.moving.means.push(force.into());
         self.moving.rows = Rows::with_room(self.moving.touches.len());
-        self.moving.rows.make_room(self.moving.inverse_masses.len());
+        self.moving.rows.make_room(self.moving.inverse_masses.len(), self.moving.candidates.len());
         self
     }
 
@@ -89,7 +89,7 @@ impl Simulation {
             Skin::new(self.moving.body.as_made(), shape.radius())
         };
         self.moving.touches[tool] = Touch::new(shape, Arc::new(skin), self.moving.touches[tool].contact);
-        self.moving.rows.make_room(self.moving.inverse_masses.len());
+        self.moving.rows.make_room(self.moving.inverse_masses.len(), self.moving.candidates.len());
         self
     }
 
@@ -99,7 +99,7 @@ impl Simulation {
     /// Not real-time safe: allocates.
     pub fn duplicate(&self) -> Option<Self> {
         let mut rows = Rows::with_room(self.moving.touches.len());
-        rows.make_room(self.moving.inverse_masses.len());
+        rows.make_room(self.moving.inverse_masses.len(), self.moving.candidates.len());
         let moving = Moving {
             body: self.moving.body.copy()?,
             state: self.moving.state.clone(),

@@ -1,6 +1,5 @@
 //! What a contact step works on: nodes, their surface, and where on it the tool is.
 
-use super::closest;
 use super::skin::Skin;
 use super::triangle::{contact_normal, interpolate, walk};
 use super::{Contact, Law, ToolMotion, swept};
@@ -36,33 +35,19 @@ impl Deformable<'_> {
         self.surface.triangles[triangle as usize].map(|node| node as usize)
     }
 
-    /// The corners of a triangle as a tool with that `skin` meets them (m), `ahead` seconds from now if nothing presses.
-    pub(super) fn smoothed_corners(&self, skin: &Skin, triangle: u32, ahead: f64) -> [Vec3; 3] {
-        self.surface.triangles[triangle as usize].map(|node| self.smoothed_corner(skin, node, ahead))
-    }
-
-    /// The corner at `node` as a tool with that `skin` meets it (m), `ahead` seconds from now if nothing presses.
-    pub(super) fn smoothed_corner(&self, skin: &Skin, node: u32, ahead: f64) -> Vec3 {
-        let at = |node: usize| self.positions[node] + self.velocities[node] * ahead;
+    /// The corner at `node` as a tool with that `skin` meets it (m): now, and `ahead` seconds from now if nothing presses.
+    pub(super) fn smoothed_corner(&self, skin: &Skin, node: u32, ahead: f64) -> [Vec3; 2] {
+        let at = |node: u32| {
+            let (x, v) = (self.positions[node as usize], self.velocities[node as usize]);
+            [x, x + v * ahead]
+        };
         match skin.corner(node) {
-            [] => at(node as usize),
-            shares => shares.iter().fold(Vec3::zeros(), |sum, &(other, share)| sum + at(other as usize) * share),
+            [] => at(node),
+            shares => shares.iter().fold([Vec3::zeros(); 2], |[now, then], &(other, share)| {
+                let [x, end] = at(other);
+                [now + x * share, then + end * share]
+            }),
         }
-    }
-
-    /// False if a triangle, where it is or as smoothed, is surely farther than `distance` (m) from the segment `axis` while its
-    /// nodes move for `ahead` seconds.
-    pub(super) fn is_within(&self, skin: &Skin, triangle: u32, axis: &[Vec3; 2], distance: f64, ahead: f64) -> bool {
-        let corners = self.corners(triangle);
-        let start = corners.map(|node| self.positions[node]);
-        let motion = corners.map(|node| self.velocities[node] * ahead);
-        let [a, b, c] = start;
-        let [d, e, f] = std::array::from_fn(|i| start[i] + motion[i]);
-        let low = a.inf(&b).inf(&c).inf(&d).inf(&e).inf(&f);
-        let high = a.sup(&b).sup(&c).sup(&d).sup(&e).sup(&f);
-        // A smoothed corner is a mean of what is around it: not farther from its node than another triangle reaches.
-        let distance = if skin.is_none() { distance } else { distance + (high - low).max() };
-        closest::may_be_near(axis, distance, &low, &high)
     }
 
     /// The share of the step after which the contact acts: 0 for one that exists, the hit's for a new one.

@@ -33,6 +33,7 @@ mod step;
 mod swept;
 mod touch;
 mod triangle;
+mod vicinity;
 
 use crate::{Pose, Vec3};
 

@@ -6,20 +6,11 @@ use super::deformable::Deformable;
 use super::passing;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
+use super::vicinity::{MAX_DEPTH, Vicinity};
 use crate::{Pose, Vec3};
 
 /// Within so many radii of the surface the way from there to the axis is rounding: an axis that goes through a triangle is at none.
 const ON_SURFACE: f64 = 1e-3;
-
-/// A centre that is farther than this below the surface, beside the tool's radius, has lost it (m).
-const MAX_DEPTH: f64 = 5e-3;
-
-/// Where a node stays in a step, a bit for each side of a box: that around the tool with all that it may touch, and that around the
-/// way of its axis.
-const AROUND: u16 = 0x3f;
-const AXIS: u16 = AROUND << 6;
-/// A node that a search has met.
-const MARKED: u16 = 1 << 15;
 
 /// Where a tool comes near the surface.
 #[derive(Clone, Copy, Debug)]
@@ -34,100 +25,72 @@ pub(super) struct Near {
     pub(super) share: f64,
 }
 
-/// The places that were found, and what the search keeps of each node.
-#[derive(Clone, Debug)]
+/// The places that were found, and what the search keeps from step to step.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Search {
     pub(super) near: Vec<Near>,
-    /// On which sides of the boxes `AROUND` the tool and of its `AXIS` each node stays in the step, and `MARKED`.
-    sides: Vec<u16>,
-    /// The corner at each marked node as the tool meets it at the end of the step (m).
-    corners: Vec<Vec3>,
-}
-
-impl Default for Search {
-    fn default() -> Self {
-        Self { near: Vec::with_capacity(MOST_POINTS), sides: Vec::new(), corners: Vec::new() }
-    }
+    /// Of each tool.
+    vicinities: Vec<Vicinity>,
+    /// The corners of a vicinity as the tool meets them at the start of the step, and at its end if nothing presses (m).
+    corners: Vec<[Vec3; 2]>,
 }
 
 impl Search {
-    /// Makes room for a body of `nodes` nodes.
-    pub(super) fn make_room(&mut self, nodes: usize) {
-        self.sides.resize(nodes, 0);
-        self.corners.resize(nodes, Vec3::zeros());
+    /// For so many tools.
+    pub(super) fn new(tools: usize) -> Self {
+        let vicinities = vec![Vicinity::default(); tools];
+        Self { near: Vec::with_capacity(MOST_POINTS), vicinities, corners: Vec::new() }
     }
 
-    /// Finds the places that would overlap with the tool at the end of the step if nothing pressed.
-    pub(super) fn find(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) {
+    /// Makes room for a body of so many nodes and candidates, and forgets another one.
+    pub(super) fn make_room(&mut self, nodes: usize, candidates: usize) {
+        self.vicinities.iter_mut().for_each(|vicinity| vicinity.make_room(nodes, candidates));
+        self.corners.reserve(nodes);
+    }
+
+    /// Finds the places that would overlap with a tool at the end of the step if nothing pressed.
+    pub(super) fn find(&mut self, body: &Deformable<'_>, (tool, touch): (usize, &Touch), motion: ToolMotion, d: f64) {
         self.near.clear();
-        self.find_sides(body, touch, motion, d);
-        if !self.find_passed(body, touch, motion, d) {
-            self.find_near(body, touch, &motion.to, d);
+        let mut vicinity = std::mem::take(&mut self.vicinities[tool]);
+        vicinity.update(body, touch, motion, d);
+        self.corners.clear();
+        self.corners.extend(vicinity.nodes.iter().map(|&node| body.smoothed_corner(&touch.skin, node, d)));
+        if !self.find_passed(&vicinity, touch, motion) {
+            self.find_near(&vicinity, touch, &motion.to);
         }
-    }
-
-    /// Tells where nodes stay of the boxes around the way of a tool: a triangle whose corners stay on one side of one is not
-    /// looked at again.
-    fn find_sides(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) {
-        let axes = [touch.shape.axis(&motion.from), touch.shape.axis(&motion.to)].into_iter().flatten();
-        let (low, high) = axes
-            .fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(low, high), end| {
-                (low.inf(&end), high.sup(&end))
-            });
-        let [around, beside] =
-            [touch.shape.radius() + MAX_DEPTH, 0.0].map(|far| Vec3::repeat(far + touch.skin.reach()));
-        let boxes = [(low - beside, high + beside), (low - around, high + around)];
-        for ((sides, x), v) in self.sides.iter_mut().zip(&*body.positions).zip(&*body.velocities) {
-            let end = x + v * d;
-            let (least, most) = (x.inf(&end), x.sup(&end));
-            *sides = boxes.iter().fold(0, |sides, (low, high)| {
-                (0..3).fold(sides, |sides, i| {
-                    sides << 2 | u16::from(most[i] < low[i]) << 1 | u16::from(least[i] > high[i])
-                })
-            });
-        }
+        self.vicinities[tool] = vicinity;
     }
 
     /// A place of the surface that the axis passes within the step; whatever else is near at its end is the far side.
-    fn find_passed(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) -> bool {
-        let (shape, skin) = (&touch.shape, &*touch.skin);
+    fn find_passed(&mut self, vicinity: &Vicinity, touch: &Touch, motion: ToolMotion) -> bool {
+        let shape = &touch.shape;
         let [from, to] = [shape.axis(&motion.from), shape.axis(&motion.to)];
         let ends = if shape.half_axis() == Vec3::zeros() { 1 } else { 3 };
         for end in 0..ends {
             let share = [0.0, 1.0, 0.5][end];
             let [from, to] = [from, to].map(|[a, b]| a + (b - a) * share);
-            let candidates =
-                body.candidates.iter().copied().filter(|&triangle| meets(&self.sides, AXIS, body, triangle));
-            let Some(hit) = passing::first(body, candidates, skin, [from, to], d) else { continue };
-            let corners = body.smoothed_corners(skin, hit.triangle, d);
-            let place = interpolate(&hit.weights, &corners);
+            let candidates = vicinity.corners.iter().map(|nodes| nodes.map(|node| self.corners[node as usize]));
+            let Some((found, weights)) = passing::first(candidates, [from, to]) else { continue };
+            let corners = vicinity.corners[found].map(|node| self.corners[node as usize][1]);
+            let place = interpolate(&weights, &corners);
             let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
             let Some(normal) = across.try_normalize(0.0) else { continue };
             let gap = (to - place).dot(&normal) - shape.radius();
-            self.near.push(Near { triangle: hit.triangle, weights: hit.weights, place, normal, gap, share });
+            let triangle = vicinity.triangles[found];
+            self.near.push(Near { triangle, weights, place, normal, gap, share });
         }
         !self.near.is_empty()
     }
 
-    fn find_near(&mut self, body: &Deformable<'_>, touch: &Touch, pose: &Pose, d: f64) {
+    fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) {
         let (shape, skin) = (&touch.shape, &*touch.skin);
         let (radius, axis) = (shape.radius(), shape.axis(pose));
         let is_long = shape.half_axis() != Vec3::zeros();
         // The nearest place in front of the surface, and the nearest behind it.
         let (mut front, mut behind) = (f64::INFINITY, None::<Near>);
-        for &triangle in body.candidates {
-            if !meets(&self.sides, AROUND, body, triangle) {
-                continue;
-            }
-            // Triangles share corners.
-            let corners = body.corners(triangle).map(|node| {
-                if self.sides[node] & MARKED == 0 {
-                    self.sides[node] |= MARKED;
-                    self.corners[node] = body.smoothed_corner(skin, node as u32, d);
-                }
-                self.corners[node]
-            });
-            let depths = body.corners(triangle).map(|node| skin.depth(node));
+        for (&triangle, places) in vicinity.triangles.iter().zip(&vicinity.corners) {
+            let corners = places.map(|place| self.corners[place as usize][1]);
+            let depths = places.map(|place| skin.depth(vicinity.nodes[place as usize] as usize));
             // It touches, or is the nearest of all.
             let touching = radius + depths.into_iter().fold(0.0, f64::max);
             let distance = touching.max(front.min(radius + MAX_DEPTH));
@@ -193,9 +156,4 @@ impl Search {
             *shallowest = near;
         }
     }
-}
-
-/// False if the corners of a triangle are all on one side of the box whose bits are `of`.
-fn meets(sides: &[u16], of: u16, body: &Deformable<'_>, triangle: u32) -> bool {
-    body.corners(triangle).iter().fold(of, |common, &node| common & sides[node]) == 0
 }

@@ -1,30 +1,23 @@
 //! Detection for a tool with a shape that goes so fast that its centre comes in within one step.
 
-use super::deformable::Deformable;
-use super::skin::Skin;
-use super::swept::{Hit, passed_through};
+use super::swept::passed_through;
+use super::vicinity::is_near;
 use crate::Vec3;
 
-/// The earliest of the triangles `candidates`, as smoothed for a tool, through which a point of the tool's axis comes in on its straight way.
-pub(super) fn first(
-    body: &Deformable<'_>,
-    candidates: impl Iterator<Item = u32>,
-    skin: &Skin,
-    way: [Vec3; 2],
-    d: f64,
-) -> Option<Hit> {
-    let mut best: Option<Hit> = None;
-    for triangle in candidates {
-        if !body.is_within(skin, triangle, &way, 0.0, d) {
+/// The earliest of triangles, each with its corners at the start and at the end of a step, through which a point of the tool's axis
+/// comes in on its straight way: its number, and the weights of the place.
+pub(super) fn first(triangles: impl Iterator<Item = [[Vec3; 2]; 3]>, way: [Vec3; 2]) -> Option<(usize, [f64; 3])> {
+    let mut best: Option<(usize, [f64; 3], f64)> = None;
+    for (number, moving) in triangles.enumerate() {
+        if !is_near(&way, 0.0, &moving) {
             continue;
         }
-        let [start, end] = [0.0, d].map(|ahead| body.smoothed_corners(skin, triangle, ahead));
-        let corners = |share: f64| std::array::from_fn(|i| start[i] + (end[i] - start[i]) * share);
+        let corners = |share: f64| moving.map(|[start, end]| start + (end - start) * share);
         if let Some((weights, share)) = passed_through(corners, |share| way[0] + (way[1] - way[0]) * share)
-            && best.is_none_or(|best| share < best.share)
+            && best.is_none_or(|(.., earliest)| share < earliest)
         {
-            best = Some(Hit { triangle, weights, share });
+            best = Some((number, weights, share));
         }
     }
-    best
+    best.map(|(number, weights, _)| (number, weights))
 }

@@ -48,7 +48,7 @@ impl Rows {
         Self {
             rows: Vec::with_capacity(rows),
             nodes: Vec::with_capacity(40 * rows),
-            search: Search::default(),
+            search: Search::new(tools),
             nearness: Nearness::with_room(rows),
             exact: Exact::default(),
             shared: Vec::with_capacity(rows * rows),
@@ -67,11 +67,11 @@ impl Rows {
         self.coupling.reserve(places * places);
     }
 
-    /// Makes room for a body of `nodes` nodes.
-    pub(crate) fn make_room(&mut self, nodes: usize) {
+    /// Makes room for a body of so many nodes and candidates, and forgets what it knows of another one.
+    pub(crate) fn make_room(&mut self, nodes: usize, candidates: usize) {
         self.at_nodes.resize(nodes, 0.0);
         self.listed.resize(nodes, 0);
-        self.search.make_room(nodes);
+        self.search.make_room(nodes, candidates);
     }
 
     pub(super) fn clear(&mut self) {
@@ -159,7 +159,7 @@ impl Rows {
         motion: ToolMotion,
         d: f64,
     ) {
-        self.search.find(body, touch, motion, d);
+        self.search.find(body, (tool, touch), motion, d);
         for place in 0..self.search.near.len() {
             let near = self.search.near[place];
             self.add(body, (tool, touch), motion, d, near);

@@ -41,6 +41,8 @@ pub(crate) struct Skin {
     depths: Vec<f64>,
     /// Of each node; empty if the body's contact modulus is not known.
     grains: Vec<Grain>,
+    /// No smoothed corner moves farther than its nodes do by more than this factor.
+    stretch: f64,
     /// No smoothed corner is farther than this from its node (m), unless its triangles are stretched to more than twice their size.
     reach: f64,
 }
@@ -69,11 +71,13 @@ impl Skin {
             shares.append(&mut found);
             starts.push(shares.len() as u32);
         }
+        let sizes = starts.windows(2).map(|ends| &shares[ends[0] as usize..ends[1] as usize]);
+        let stretch = sizes.map(|corner| corner.iter().map(|(_, share)| share.abs()).sum()).fold(1.0, f64::max);
         if shares.len() == rest.len() {
             (starts, shares, depths) = Default::default();
         }
         let reach = if starts.is_empty() { 0.0 } else { 2.0 * longest };
-        Self { starts, shares, depths, grains, reach }
+        Self { starts, shares, depths, grains, stretch, reach }
     }
 
     /// How coarse the surface is for the tool.
@@ -121,6 +125,11 @@ impl Skin {
         (mean.modulus > 0.0).then_some(mean)
     }
 
+    /// How much farther than its nodes a smoothed corner may move, as a factor.
+    pub(super) fn stretch(&self) -> f64 {
+        self.stretch
+    }
+
     /// How far smoothed corners may be from their nodes (m).
     pub(super) fn reach(&self) -> f64 {
         self.reach
@@ -138,7 +147,7 @@ impl Skin {
         local.shares.clear();
         local.depths.clear();
         local.grains.clear();
-        local.reach = self.reach;
+        (local.stretch, local.reach) = (self.stretch, self.reach);
         if !self.grains.is_empty() {
             local.grains.extend(nodes.iter().map(|&node| self.grains[node as usize]));
         }

@@ -54,7 +54,7 @@ impl Patch {
             self.rows = Rows::with_room(1);
         }
         if touch.has_shape() {
-            self.rows.make_room(window.nodes.len());
+            self.rows.make_room(window.nodes.len(), window.candidates.len());
         }
         self.touch.restart(touch, |contact| window.localised(contact), |triangle| window.triangle(triangle));
         let skin = Arc::make_mut(&mut self.touch.skin);

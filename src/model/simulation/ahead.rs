@@ -143,14 +143,14 @@ impl Part {
             };
             whole.touches.iter().all(made_of)
         });
-        let candidates = candidates.map(|(triangle, _)| triangle).collect();
+        let candidates: Vec<u32> = candidates.map(|(triangle, _)| triangle).collect();
         let touch = |touch: &Touch| {
             let mut skin = Skin::default();
             touch.skin.localise(&nodes, place, &mut skin);
             Touch::new(touch.shape, Arc::new(skin), Contact::default())
         };
         let mut rows = Rows::with_room(whole.touches.len());
-        rows.make_room(nodes.len());
+        rows.make_room(nodes.len(), candidates.len());
         let moving = Moving {
             state: State::at_rest(body.rest()),
             forces: vec![Vec3::zeros(); nodes.len()],

@@ -215,7 +215,8 @@ mod tests {
                 let errors = pressed.iter().map(|pressed| dense_error(&body, &patch, &basis, pressed.node));
                 let worst = errors.fold(0.0, f64::max);
                 let estimate = 0.01 * estimates[states - 1].1.linear_pct;
-                assert!((estimate / worst - 1.0).abs() < 1e-4, "{states} states: {estimate} against {worst}");
+                // The estimate is that of the shapes before they are rounded to 16 bits, which changes forces by less than 0.005 %.
+                assert!((estimate - worst).abs() < 1e-4 * worst + 5e-5, "{states} states: {estimate} against {worst}");
             }
         }
     }

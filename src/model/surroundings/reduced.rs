@@ -1,8 +1,7 @@
 //! A linear model in few states, in modal form, that answers to forces on a ring of nodes.
 
-use super::products::Columns;
+use super::products::{Columns, Scratch};
 use crate::body::Stiffness;
-use crate::body::kernel::Lane;
 
 /// What the velocities do to the states' accelerations.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,9 +42,9 @@ impl Reduced {
     /// # Real-time
     /// Bounded, real-time safe.
     pub(crate) fn step(&self, motion: &mut ReducedMotion, forces: &[f64], d: f64) {
-        let ReducedMotion { eta, rate, acceleration, sums, stiffness } = motion;
+        let ReducedMotion { eta, rate, acceleration, displacements, velocities, scratch, stiffness } = motion;
         let (s, root) = (stiffness.factor(), stiffness.root());
-        self.shapes.project(forces, sums, acceleration);
+        self.shapes.project(forces, scratch, acceleration);
         match &self.damping {
             Damping::Diagonal(damping) => {
                 for ((a, c), rate) in acceleration.iter_mut().zip(damping).zip(&*rate) {
@@ -58,18 +57,13 @@ impl Reduced {
                 }
             }
         }
-        for (((eta, rate), a), k) in eta.iter_mut().zip(rate).zip(acceleration).zip(&self.stiffness) {
+        for (((eta, rate), a), k) in eta.iter_mut().zip(&mut *rate).zip(acceleration).zip(&self.stiffness) {
             *rate += d * (*a + s * (k * *eta));
             *eta += d * *rate;
         }
-    }
-
-    /// Adds the displacements (m) and velocities (m/s) of the ring, three numbers for each node.
-    ///
-    /// # Real-time
-    /// Bounded, real-time safe.
-    pub(crate) fn add_ring(&self, motion: &ReducedMotion, positions: &mut [f64], velocities: &mut [f64]) {
-        self.shapes.combine([&motion.eta, &motion.rate], [positions, velocities]);
+        // The ring's displacements are Phi eta: they grow as eta does, and are no second product.
+        self.shapes.combine(rate, scratch, velocities);
+        displacements.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += d * v);
     }
 }
 
@@ -79,23 +73,39 @@ pub(crate) struct ReducedMotion {
     eta: Vec<f64>,
     rate: Vec<f64>,
     acceleration: Vec<f64>,
-    /// Working memory.
-    sums: Vec<Lane>,
+    /// Of the ring (m, m/s), three numbers for each node.
+    displacements: Vec<f64>,
+    velocities: Vec<f64>,
+    scratch: Scratch,
     /// Of the body, in that of the basis.
     stiffness: Stiffness,
 }
 
 impl ReducedMotion {
-    /// At rest, in a body that is so stiff: its shapes are the same, its stiffness is s K and its damping sqrt(s) C.
+    /// Of `model` at rest, or of none, in a body that is so stiff: its shapes are the same, its stiffness is s K and its damping
+    /// sqrt(s) C.
     ///
     /// # Real-time
     /// Not called in a tick: may allocate.
-    pub(crate) fn rest(&mut self, states: usize, stiffness: Stiffness) {
+    pub(crate) fn rest(&mut self, model: Option<&Reduced>, stiffness: Stiffness) {
         self.stiffness = stiffness;
-        for vector in [&mut self.eta, &mut self.rate, &mut self.acceleration] {
+        let Self { eta, rate, acceleration, displacements, velocities, scratch, .. } = self;
+        let (rows, states) = model.map_or((0, 0), |model| model.shapes.shape());
+        for (vector, length) in
+            [(eta, states), (rate, states), (acceleration, states), (displacements, rows), (velocities, rows)]
+        {
             vector.clear();
-            vector.resize(states, 0.0);
+            vector.resize(length, 0.0);
         }
-        self.sums.resize(states, Lane::default());
+        *scratch = model.map(|model| model.shapes.scratch()).unwrap_or_default();
+    }
+
+    /// Adds the displacements (m) and velocities (m/s) of the ring, three numbers for each node.
+    ///
+    /// # Real-time
+    /// Bounded, real-time safe.
+    pub(crate) fn add_ring(&self, positions: &mut [f64], velocities: &mut [f64]) {
+        positions.iter_mut().zip(&self.displacements).for_each(|(x, more)| *x += more);
+        velocities.iter_mut().zip(&self.velocities).for_each(|(v, more)| *v += more);
     }
 }

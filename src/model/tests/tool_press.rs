@@ -4,9 +4,9 @@
 mod tissue_support;
 mod tool_support;
 
-use palpate_model::Vec3;
 use palpate_model::body::Body;
-use palpate_model::contact::ToolShape;
+use palpate_model::contact::{ToolMotion, ToolShape};
+use palpate_model::{Pose, Turn, Vec3};
 use tool_support::*;
 
 const SPHERE: ToolShape = ToolShape::Sphere { radius: 0.008 };
@@ -68,4 +68,30 @@ fn a_sphere_slides_over_a_flat_lattice_with_little_ripple() {
     println!("{sphere:.2} %, point {point:.2} %");
     assert!(sphere < 2.0, "{sphere}");
     assert!(point > 20.0, "{point}");
+}
+
+/// Check that a search that goes on from what it knows of a tool's vicinity finds what one does that begins anew in every tick, to
+/// the last bit: fast and slow, over rims, with a tool that turns.
+#[test]
+fn what_is_known_of_a_vicinity_changes_nothing() {
+    let capsule = ToolShape::Capsule { radius: 4e-3, half_axis: Vec3::new(8e-3, 0.0, 0.0) };
+    for (shape, speed) in [(SPHERE, 0.05), (SPHERE, 0.6), (capsule, 0.3)] {
+        let mut simulation = resting(Box::new(lattice(12)), shape);
+        let pose = |tick: u32| {
+            let t = 1e-3 * f64::from(tick);
+            let sunk = DEPTH * (t / 0.05).min(1.0);
+            let position = Vec3::new(0.05 + speed * t, 0.047 + 0.3 * speed * t, SIDE + shape.radius() + 1e-3 - sunk);
+            Pose { orientation: Turn::from_scaled_axis(Vec3::z() * (3.0 * t)), ..Pose::at(position) }
+        };
+        let mut touched = 0;
+        for tick in 0..250 {
+            let motion = ToolMotion { from: pose(tick), to: pose(tick + 1) };
+            let mut anew = simulation.duplicate().unwrap();
+            let wrench = simulation.tick(motion);
+            assert_eq!(anew.tick(motion), wrench, "{shape:?} tick {tick}");
+            assert_eq!(anew.contact_points(0), simulation.contact_points(0));
+            touched += usize::from(wrench.force != Vec3::zeros());
+        }
+        assert!(touched > 50, "{touched}");
+    }
 }

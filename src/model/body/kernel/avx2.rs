@@ -5,7 +5,7 @@
 
 use std::arch::x86_64::*;
 
-use super::nodes::{LANES, Lane, Motion, Push};
+use super::nodes::{LANES, Lane, Motion, Push, Singles};
 use super::simd::{Numbers, Simd, Work};
 
 /// Proof that this machine has AVX2 and FMA.
@@ -64,6 +64,7 @@ macro_rules! lanewise {
 impl Simd for Avx2 {
     type V = Pair;
     type M = Pair;
+    type W = [__m256; 2];
 
     #[inline(always)]
     fn splat(self, value: f64) -> Pair {
@@ -75,12 +76,6 @@ impl Simd for Avx2 {
     fn load(self, from: &Lane) -> Pair {
         // SAFETY: the features were detected; the reference covers all that is read.
         unsafe { [_mm256_loadu_pd(from.as_ptr()), _mm256_loadu_pd(from.as_ptr().add(4))] }
-    }
-
-    #[inline(always)]
-    fn load_single(self, from: &[f32; LANES]) -> Pair {
-        // SAFETY: the features were detected; the reference covers all that is read.
-        unsafe { [0, 4].map(|first| _mm256_cvtps_pd(_mm_loadu_ps(from.as_ptr().add(first)))) }
     }
 
     #[inline(always)]
@@ -130,6 +125,47 @@ impl Simd for Avx2 {
             [
                 _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(all, low), low)),
                 _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(all, high), high)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn splat_single(self, value: f32) -> [__m256; 2] {
+        // SAFETY: the features were detected.
+        unsafe { [_mm256_set1_ps(value); 2] }
+    }
+
+    #[inline(always)]
+    fn load_singles(self, from: &Singles) -> [__m256; 2] {
+        // SAFETY: the features were detected; the reference covers all that is read.
+        unsafe { [_mm256_loadu_ps(from.as_ptr()), _mm256_loadu_ps(from.as_ptr().add(LANES))] }
+    }
+
+    #[inline(always)]
+    fn store_singles(self, value: [__m256; 2], to: &mut Singles) {
+        // SAFETY: the features were detected; the reference covers all that is written.
+        unsafe {
+            _mm256_storeu_ps(to.as_mut_ptr(), value[0]);
+            _mm256_storeu_ps(to.as_mut_ptr().add(LANES), value[1]);
+        }
+    }
+
+    #[inline(always)]
+    fn mul_add_single(self, a: [__m256; 2], b: [__m256; 2], c: [__m256; 2]) -> [__m256; 2] {
+        // SAFETY: the features were detected.
+        unsafe { [_mm256_fmadd_ps(a[0], b[0], c[0]), _mm256_fmadd_ps(a[1], b[1], c[1])] }
+    }
+
+    #[inline(always)]
+    fn load_halves(self, from: &[u32; 2 * LANES]) -> [[__m256; 2]; 2] {
+        // SAFETY: the features were detected; the reference covers all that is read.
+        unsafe {
+            let low = _mm256_loadu_si256(from.as_ptr().cast());
+            let high = _mm256_loadu_si256(from.as_ptr().add(LANES).cast());
+            let lower = [_mm256_slli_epi32::<16>(low), _mm256_slli_epi32::<16>(high)];
+            [
+                [_mm256_castsi256_ps(lower[0]), _mm256_castsi256_ps(lower[1])],
+                [_mm256_castsi256_ps(low), _mm256_castsi256_ps(high)],
             ]
         }
     }

@@ -6,7 +6,7 @@
 use std::arch::x86_64::*;
 
 use super::super::super::Vec3;
-use super::nodes::{LANES, Lane, Motion, Push};
+use super::nodes::{LANES, Lane, Motion, Push, Singles};
 use super::simd::{Numbers, Simd, Work};
 
 /// Proof that this machine has AVX-512F and AVX-512DQ.
@@ -74,6 +74,7 @@ macro_rules! lanewise {
 impl Simd for Avx512 {
     type V = __m512d;
     type M = __mmask8;
+    type W = __m512;
 
     #[inline(always)]
     fn splat(self, value: f64) -> __m512d {
@@ -85,12 +86,6 @@ impl Simd for Avx512 {
     fn load(self, from: &Lane) -> __m512d {
         // SAFETY: the features were detected; the reference covers all that is read.
         unsafe { _mm512_loadu_pd(from.as_ptr()) }
-    }
-
-    #[inline(always)]
-    fn load_single(self, from: &[f32; LANES]) -> __m512d {
-        // SAFETY: the features were detected; the reference covers all that is read.
-        unsafe { _mm512_cvtps_pd(_mm256_loadu_ps(from.as_ptr())) }
     }
 
     #[inline(always)]
@@ -132,6 +127,39 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn mask(self, bits: u8) -> __mmask8 {
         bits
+    }
+
+    #[inline(always)]
+    fn splat_single(self, value: f32) -> __m512 {
+        // SAFETY: the features were detected.
+        unsafe { _mm512_set1_ps(value) }
+    }
+
+    #[inline(always)]
+    fn load_singles(self, from: &Singles) -> __m512 {
+        // SAFETY: the features were detected; the reference covers all that is read.
+        unsafe { _mm512_loadu_ps(from.as_ptr()) }
+    }
+
+    #[inline(always)]
+    fn store_singles(self, value: __m512, to: &mut Singles) {
+        // SAFETY: the features were detected; the reference covers all that is written.
+        unsafe { _mm512_storeu_ps(to.as_mut_ptr(), value) }
+    }
+
+    #[inline(always)]
+    fn mul_add_single(self, a: __m512, b: __m512, c: __m512) -> __m512 {
+        // SAFETY: the features were detected.
+        unsafe { _mm512_fmadd_ps(a, b, c) }
+    }
+
+    #[inline(always)]
+    fn load_halves(self, from: &[u32; 2 * LANES]) -> [__m512; 2] {
+        // SAFETY: the features were detected; the reference covers all that is read.
+        unsafe {
+            let words = _mm512_loadu_si512(from.as_ptr().cast());
+            [_mm512_castsi512_ps(_mm512_slli_epi32::<16>(words)), _mm512_castsi512_ps(words)]
+        }
     }
 
     #[inline(always)]

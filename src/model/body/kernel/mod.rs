@@ -27,7 +27,8 @@ pub(super) const NOMINAL_ELEMENT_S: f64 = 10e-9;
 
 pub(super) use lattice::LatticeKernel;
 pub(crate) use network::NetworkKernel;
-pub(crate) use nodes::{LANES, Lane};
+pub(super) use nodes::Lane;
+pub(crate) use nodes::{LANES, Singles};
 pub use simd::InstructionSet;
 pub(crate) use simd::{Simd, Work};
 pub(super) use tetrahedra::TetrahedraKernel;

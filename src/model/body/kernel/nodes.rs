@@ -6,6 +6,9 @@ pub(crate) const LANES: usize = 8;
 /// Eight doubles in memory.
 pub(crate) type Lane = [f64; LANES];
 
+/// Sixteen singles in memory: as much.
+pub(crate) type Singles = [f32; 2 * LANES];
+
 /// Position and velocity of one node: x, y, z, unused, and again. One cache line, one AVX-512 register.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]

@@ -1,6 +1,6 @@
 //! The portable instruction set: plain arithmetic on arrays, which the compiler vectorises as far as it can.
 
-use super::nodes::{LANES, Lane, Motion, Push};
+use super::nodes::{LANES, Lane, Motion, Push, Singles};
 use super::simd::{Numbers, Simd};
 
 /// Plain arithmetic: no fused multiply-add, which a processor may lack, but where it is asked for by name; exact root and
@@ -24,6 +24,7 @@ macro_rules! lanewise {
 impl Simd for Portable {
     type V = Lane;
     type M = [bool; LANES];
+    type W = Singles;
 
     #[inline(always)]
     fn splat(self, value: f64) -> Lane {
@@ -33,11 +34,6 @@ impl Simd for Portable {
     #[inline(always)]
     fn load(self, from: &Lane) -> Lane {
         *from
-    }
-
-    #[inline(always)]
-    fn load_single(self, from: &[f32; LANES]) -> Lane {
-        from.map(f64::from)
     }
 
     #[inline(always)]
@@ -65,6 +61,31 @@ impl Simd for Portable {
     #[inline(always)]
     fn mask(self, bits: u8) -> [bool; LANES] {
         std::array::from_fn(|lane| bits >> lane & 1 == 1)
+    }
+
+    #[inline(always)]
+    fn splat_single(self, value: f32) -> Singles {
+        [value; 2 * LANES]
+    }
+
+    #[inline(always)]
+    fn load_singles(self, from: &Singles) -> Singles {
+        *from
+    }
+
+    #[inline(always)]
+    fn store_singles(self, value: Singles, to: &mut Singles) {
+        *to = value;
+    }
+
+    #[inline(always)]
+    fn mul_add_single(self, a: Singles, b: Singles, c: Singles) -> Singles {
+        std::array::from_fn(|lane| a[lane] * b[lane] + c[lane])
+    }
+
+    #[inline(always)]
+    fn load_halves(self, from: &[u32; 2 * LANES]) -> [Singles; 2] {
+        [from.map(|word| f32::from_bits(word << 16)), from.map(f32::from_bits)]
     }
 
     #[inline(always)]

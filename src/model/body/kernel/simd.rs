@@ -1,7 +1,7 @@
 //! Eight doubles at once: what the force kernels ask of an instruction set, and the choice of one at run time.
 
 use super::super::super::Vec3;
-use super::nodes::{LANES, Lane, Motion, Push};
+use super::nodes::{LANES, Lane, Motion, Push, Singles};
 use super::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::{avx2::Avx2, avx512::Avx512};
@@ -19,11 +19,11 @@ pub(crate) trait Simd: Copy {
     type V: Copy;
     /// A yes or no for each of them.
     type M: Copy;
+    /// Sixteen singles in registers.
+    type W: Copy;
 
     fn splat(self, value: f64) -> Self::V;
     fn load(self, from: &Lane) -> Self::V;
-    /// Eight singles, as the doubles that they are.
-    fn load_single(self, from: &[f32; LANES]) -> Self::V;
     fn store(self, value: Self::V, to: &mut Lane);
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
@@ -48,6 +48,14 @@ pub(crate) trait Simd: Copy {
     fn keep(self, bits: Self::M, x: Self::V, limit: Self::V, value: Self::V) -> Self::V;
     /// The lowest bit belongs to the first lane.
     fn mask(self, bits: u8) -> Self::M;
+
+    fn splat_single(self, value: f32) -> Self::W;
+    fn load_singles(self, from: &Singles) -> Self::W;
+    fn store_singles(self, value: Self::W, to: &mut Singles);
+    /// a b + c of singles.
+    fn mul_add_single(self, a: Self::W, b: Self::W, c: Self::W) -> Self::W;
+    /// Sixteen words as the singles whose upper halves their lower halves are, and as the singles that they are.
+    fn load_halves(self, from: &[u32; 2 * LANES]) -> [Self::W; 2];
 
     /// Eight vectors as their coordinates.
     #[inline(always)]

@@ -159,18 +159,14 @@ impl Predictive {
     fn substep(&mut self, tool: ToolMotion, d: f64) -> Wrench {
         self.take_near_forces();
         let force = self.patch.step(tool, d);
-        let basis = self.basis.take();
-        if let Some(basis) = &basis {
+        if let Some(basis) = &self.basis {
             let expected = self.path.at(self.substep).forces;
             deviations(&mut self.ring_forces, &self.patch.forces[self.patch.window.movable..], expected);
             basis.answers.step(&mut self.surroundings, &self.ring_forces, d);
         }
         self.substep += 1;
         self.path.at(self.substep).write(&mut self.ring_positions, &mut self.ring_velocities);
-        if let Some(basis) = &basis {
-            basis.answers.add_ring(&self.surroundings, &mut self.ring_positions, &mut self.ring_velocities);
-        }
-        self.basis = basis;
+        self.surroundings.add_ring(&mut self.ring_positions, &mut self.ring_velocities);
         self.place_ring();
         force
     }
@@ -206,8 +202,7 @@ impl LocalModel for Predictive {
         self.others.extend(beside.filter_map(|(node, force)| Some((window.movable(node)?, force))));
         self.take_present(&resync);
         self.predict(&mut resync);
-        let states = self.basis.as_ref().map_or(0, |basis| basis.answers.states());
-        self.surroundings.rest(states, resync.global.stiffness());
+        self.surroundings.rest(self.basis.as_ref().map(|basis| &basis.answers), resync.global.stiffness());
     }
 
     fn tick(&mut self, tool: ToolMotion) -> Wrench {
