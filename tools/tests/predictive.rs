@@ -203,7 +203,7 @@ fn a_sphere_that_is_dragged() {
     assert!(late.rms <= 1.0 && late.jump <= own_jump + 1.5, "{late:?}");
 }
 
-/// The same over tissue: the many nodes under a sphere take 250 states, with 150 it is 1.3 % off.
+/// The same over tissue: the many nodes under a sphere take 250 states, with 150 it is 1 % off.
 #[test]
 fn a_sphere_over_tissue() {
     let case = Case::with_sphere("tests/reference/tissue/t1_drag.toml", 0.6);
