@@ -149,6 +149,6 @@ fn faults_of_the_log_leave_the_force_alone() {
 #[test]
 fn a_thread_left_behind_is_named_in_the_log() {
     let summary = run(Fault::GlobalNeverReturns).summary.unwrap();
-    assert!(words(&summary).contains("global: a release did not return within 2s, its thread was left behind"));
+    assert!(words(&summary).contains("global: a release did not return within 2 s, its thread was left behind"));
     assert!(summary.runtime.restarts[0].what.contains("left behind"));
 }
