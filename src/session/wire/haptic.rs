@@ -8,6 +8,7 @@ use crate::actors::{
 };
 use crate::devices::DeviceState;
 use crate::log::ContactSample;
+use crate::model::Pose;
 use crate::model::contact::ToolShape;
 use crate::runtime::{Actor, OutletReader, OutletWriter, Reader, RuntimeBuilder, Writer};
 use crate::safety::Pipeline;
@@ -36,10 +37,12 @@ pub(super) struct ToolEnds {
 }
 
 impl ToolEnds {
-    pub(super) fn new(graph: &mut RuntimeBuilder) -> Self {
+    /// Of a tool that begins at `place`, where it is seen before its first tick too.
+    pub(super) fn new(graph: &mut RuntimeBuilder, place: &Pose) -> Self {
+        let Pose { position, orientation } = *place;
         let (sample_writer, samples) = graph.exchange(DeviceSample::default);
         let (force_writer, forces) = graph.exchange(ComputedForce::default);
-        let (view_writer, view) = graph.outlet(ToolView::default);
+        let (view_writer, view) = graph.outlet(move || ToolView { position, orientation, ..ToolView::default() });
         let (disbelieved_writer, disbelieved) = graph.outlet(Disbelieved::default);
         let (view, disbelieved) = (Some(view), Some(disbelieved));
         Self { sample_writer, samples, force_writer, forces, view_writer, view, disbelieved_writer, disbelieved }

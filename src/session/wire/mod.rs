@@ -60,7 +60,7 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     let drain = graph.drain();
     let ticks = ticks_buffered(&prepared.plan);
     let (surfaces, scene) = surfaces(&mut graph, &prepared);
-    let mut ends: Vec<ToolEnds> = prepared.tools.iter().map(|_| ToolEnds::new(&mut graph)).collect();
+    let mut ends: Vec<ToolEnds> = places.iter().map(|place| ToolEnds::new(&mut graph, place)).collect();
     let views = ends.iter_mut().filter_map(ToolEnds::take_view).collect();
     let disbelieved = ends.iter_mut().filter_map(ToolEnds::take_disbelieved).collect();
     let viewer = Viewer::new(prepared.simulation.body().surface(), surfaces[0].reader(), views);
