@@ -84,7 +84,7 @@ class Capsule:
 
 @final
 class Block:
-    """A block of point masses, each joined by springs to its 26 neighbours. _Node id = i + nx (j + ny k)."""
+    """A block of point masses, each joined by springs to its 26 neighbours. Node id = i + nx (j + ny k)."""
 
     def __new__(
         cls,

@@ -8,7 +8,7 @@ Every error of palpate is an :class:`Error`. ``str(error)`` is one line; its par
 import re
 
 _LINE = re.compile(r"(?P<file>.+):(?P<line>\d+)")
-_FIELD = re.compile(r"(body|contact|global|local|device|safety|initial|probe|log|run)(\[\d+\])?(\.[A-Za-z_\[\]0-9]+)*")
+_FIELD = re.compile(r"(body|contact|global|local|link|device|safety|initial|probe|log|run)(\[\d+\])?(\.[A-Za-z_\[\]0-9]+)*")
 
 
 class Error(Exception):

@@ -159,6 +159,12 @@ def test_a_body_that_cannot_be_taken_apart_is_refused_where_it_must_be(model):
     assert caught.value.field == "local.model"
 
 
+def test_a_body_behind_a_link_is_refused_by_its_field():
+    with pytest.raises(palpate.SceneError) as caught:
+        palpate.Session(TautNet(), path=DOWN, model="hold", settings={"link": {"delay_ms": 1.0}}).run()
+    assert caught.value.field == "link" and caught.value.file is None
+
+
 def test_a_body_without_a_tangent_has_no_local_model():
     with pytest.raises(palpate.UsageError, match="model=\"full\"") as caught:
         palpate.Session(Net(), path=DOWN, model="patch")
