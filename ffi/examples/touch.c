@@ -1,9 +1,8 @@
 /* The least that a host with a haptic loop of its own does: a scene, a session, a tick per millisecond, a force.
  *
  * In virtual time, so that it runs anywhere and gives the same force every time; without that line, the ticks belong into the host's
- * thread at 1 kHz. Built by: cc touch.c -I ffi/include -L target/debug -lpalpate_ffi */
+ * thread at 1 kHz. Built by: cc ffi/examples/touch.c -I ffi/include -L target/debug -lpalpate_ffi */
 
-#include <math.h>
 #include <stdio.h>
 
 #include "palpate.h"
@@ -33,7 +32,7 @@ int main(void) {
     PalpateState state = {.size = sizeof state};
     PalpateCommand command = {.size = sizeof command};
     for (int tick = 0; tick <= 600; tick++) {
-        /* Down by 1.5 cm within 0.6 s, and back up at the end. */
+        /* Down by 1.5 cm within 0.4 s, and back up within 0.2 s. */
         double depth_m = tick < 400 ? 0.015 * tick / 400.0 : 0.015 * (600 - tick) / 200.0;
         state.position_m[0] = 0.048;
         state.position_m[1] = 0.052;

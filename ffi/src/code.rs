@@ -54,8 +54,8 @@ impl Failure {
         Self { code, text: Cow::Owned(text) }
     }
 
-    pub(crate) fn argument(text: String) -> Self {
-        Self::of(PalpateCode::BadArgument, text)
+    pub(crate) fn argument(text: impl Into<Cow<'static, str>>) -> Self {
+        Self { code: PalpateCode::BadArgument, text: text.into() }
     }
 }
 

@@ -89,6 +89,22 @@ pub(crate) unsafe fn put<T: Copy>(pointer: *mut T, value: T, name: &'static str)
     Ok(())
 }
 
+/// Puts what `make` gives at `pointer`, and nothing before that: so nothing is made that nobody gets.
+///
+/// # Safety
+/// That of [`put`].
+pub(crate) unsafe fn put_made<T: Copy + Default>(
+    pointer: *mut T,
+    name: &'static str,
+    make: impl FnOnce() -> Result<T, Failure>,
+) -> Result<(), Failure> {
+    // SAFETY: the caller's promise.
+    unsafe { put(pointer, T::default(), name)? };
+    let made = make()?;
+    // SAFETY: the caller's promise.
+    unsafe { put(pointer, made, name) }
+}
+
 /// The `count` numbers at `pointer`.
 ///
 /// # Safety

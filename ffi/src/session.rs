@@ -66,21 +66,19 @@ impl Live {
     }
 
     pub(crate) fn controls(&self) -> Result<&Controls, Failure> {
-        self.controls.as_ref().ok_or_else(|| Failure::argument("this session has no controls".to_owned()))
+        self.controls.as_ref().ok_or_else(|| Failure::argument("this session has no controls"))
     }
 
     pub(crate) fn viewer(&mut self) -> Result<&mut Viewer, Failure> {
-        self.viewer.as_mut().ok_or_else(|| Failure::argument("this session shows no surface".to_owned()))
+        self.viewer.as_mut().ok_or_else(|| Failure::argument("this session shows no surface"))
     }
-}
 
-impl Live {
     /// Where the tools touch in the newest tick that is known.
     pub(crate) fn newest_contacts(&mut self) -> Result<Vec<PalpateContact>, Failure> {
         let contacts = self.contacts.as_mut().ok_or_else(|| {
-            Failure::argument("contacts are not shared: call palpate_setup_share_contacts before the start".to_owned())
+            Failure::argument("contacts are not shared: call palpate_setup_share_contacts before the start")
         })?;
-        let viewer = self.viewer.as_mut().ok_or_else(|| Failure::argument("no surface".to_owned()))?;
+        let viewer = self.viewer.as_mut().ok_or_else(|| Failure::argument("no surface"))?;
         let triangles = viewer.triangles();
         Ok(contacts.newest(&triangles, &viewer.surface().positions))
     }

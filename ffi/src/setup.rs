@@ -144,5 +144,5 @@ impl Setup {
 }
 
 fn broken() -> Failure {
-    Failure::argument("a call that changed this setup panicked: free it and begin anew".to_owned())
+    Failure::argument("a call that changed this setup panicked: free it and begin anew")
 }

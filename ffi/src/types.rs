@@ -3,6 +3,7 @@
 use std::ffi::c_char;
 
 use palpate::devices::{Capabilities, DeviceState};
+use palpate::model::body::Tissue;
 use palpate::model::contact::ContactMode;
 use palpate::model::{Turn, turn_of, wxyz};
 use palpate::session::ToolView;
@@ -235,7 +236,6 @@ impl PalpateDevice {
     /// What it can do; what is impossible is refused when the session is started.
     pub(crate) fn capabilities(&self) -> Capabilities {
         let weak = Capabilities::default();
-        let known = |value: f64, default: f64| if value == 0.0 { default } else { value };
         Capabilities {
             max_force_n: known(self.max_force_n, weak.max_force_n),
             max_torque_n_m: (self.max_torque_n_m != 0.0).then_some(self.max_torque_n_m),
@@ -245,6 +245,23 @@ impl PalpateDevice {
             ..weak
         }
     }
+}
+
+impl PalpateTetrahedra {
+    pub(crate) fn tissue(&self) -> Tissue {
+        let liver = Tissue::LIVER;
+        Tissue {
+            young_modulus: known(self.young_modulus_pa, liver.young_modulus),
+            poisson_ratio: known(self.poisson_ratio, liver.poisson_ratio),
+            density: known(self.density_kg_per_m3, liver.density),
+            viscosity: known(self.viscosity_pa_s, liver.viscosity),
+        }
+    }
+}
+
+/// `value`, or `default` where the program left it 0.
+fn known(value: f64, default: f64) -> f64 {
+    if value == 0.0 { default } else { value }
 }
 
 impl PalpateTool {

@@ -3,10 +3,11 @@
 use numpy::PyReadonlyArray2;
 use palpate::model::mesh::{Group, TetrahedralMesh};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::PyDict;
 
 use crate::arrays::points;
 use crate::errors::usage;
+use crate::scene::is_path;
 
 /// What meshio and pyvista call tetrahedra in `cells_dict`.
 const TETRAHEDRA: [&str; 2] = ["tetra", "10"];
@@ -17,7 +18,7 @@ const TETRAHEDRA: [&str; 2] = ["tetra", "10"];
 /// `UsageError` if it is neither, or an index is none of a node.
 pub(crate) fn given(mesh: &Bound<'_, PyAny>, groups: Option<&Bound<'_, PyDict>>) -> PyResult<Option<TetrahedralMesh>> {
     let py = mesh.py();
-    if mesh.is_instance_of::<PyString>() || mesh.hasattr("__fspath__")? {
+    if is_path(mesh)? {
         return match groups {
             None => Ok(None),
             Some(_) => {

@@ -77,7 +77,7 @@ impl OwnBody {
         }
     }
 
-    /// The vectors that `method` gives, one for each of `count`.
+    /// Puts the vectors that `method` gives into `forces`, which says how many there must be.
     fn vectors(
         &self,
         py: Python<'_>,

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use palpate::devices::ToolPath;
 use pyo3::prelude::*;
-use pyo3::types::PyString;
 
 use crate::arrays::rows;
 use crate::errors::{OrRaise, usage};
+use crate::scene::is_path;
 
 const NEEDED: &str = "a file (t_s,x_m,y_m,z_m), one place (x, y, z), or rows of (t_s, x_m, y_m, z_m), with (qw, qx, qy, qz) behind \
                       them for a tool that turns";
@@ -18,7 +18,7 @@ const NEEDED: &str = "a file (t_s,x_m,y_m,z_m), one place (x, y, z), or rows of 
 /// `UsageError` if it is none, and what the engine says of its numbers or its file.
 pub(crate) fn tool_path(given: &Bound<'_, PyAny>) -> PyResult<ToolPath> {
     let py = given.py();
-    if given.is_instance_of::<PyString>() || given.hasattr("__fspath__")? {
+    if is_path(given)? {
         return ToolPath::read_csv(&given.extract::<PathBuf>()?).or_raise(py);
     }
     let (values, [count, columns]) = rows(given, "path", NEEDED)?;

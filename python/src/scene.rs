@@ -30,6 +30,21 @@ pub(crate) struct Scene {
     pub(crate) is_built_in: bool,
 }
 
+impl Scene {
+    /// The scene that `given` is, or that its path or dictionary means.
+    pub(crate) fn of<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, Self>> {
+        match given.cast::<Self>() {
+            Ok(scene) => Ok(scene.clone()),
+            Err(_) => Ok(given.py().get_type::<Self>().call1((given,))?.cast_into::<Self>()?),
+        }
+    }
+}
+
+/// True if `given` is the path of a file.
+pub(crate) fn is_path(given: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(given.is_instance_of::<PyString>() || given.hasattr("__fspath__")?)
+}
+
 #[pymethods]
 impl Scene {
     #[new]
@@ -40,7 +55,7 @@ impl Scene {
             let scene = py.detach(|| partial(&table, base.as_deref())).or_raise(py)?;
             return Ok(Self { scene, table, base, name: DICTIONARY.to_owned(), is_built_in: false });
         }
-        if !source.is_instance_of::<PyString>() && !source.hasattr("__fspath__")? {
+        if !is_path(source)? {
             let kind = source.get_type().name()?.to_string();
             return Err(usage(py, "source", &format!("is a {kind}, must be the path of a scene file or a dictionary")));
         }

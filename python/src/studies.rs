@@ -88,10 +88,7 @@ fn scene_of(subject: &Bound<'_, PyAny>) -> PyResult<(EngineScene, String)> {
     if let Ok(session) = subject.cast::<Session>() {
         return session.get().scene_to_study(subject.py());
     }
-    let scene = match subject.cast::<Scene>() {
-        Ok(scene) => scene.clone(),
-        Err(_) => subject.py().get_type::<Scene>().call1((subject,))?.cast_into::<Scene>()?,
-    };
+    let scene = Scene::of(subject)?;
     Ok((scene.get().scene.clone(), scene.get().name.clone()))
 }
 

@@ -54,10 +54,7 @@ pub(crate) fn described(
     if let Some((name, described)) = body {
         return Ok((of_body(py, Some(described), changes, path)?, name.to_owned()));
     }
-    let scene = match subject.cast::<Scene>() {
-        Ok(scene) => scene.clone(),
-        Err(_) => py.get_type::<Scene>().call1((subject,))?.cast_into::<Scene>()?,
-    };
+    let scene = Scene::of(subject)?;
     let Scene { scene, table, base, name, is_built_in } = scene.get();
     if changes.is_empty() && path.is_none() {
         return Ok((scene.clone(), name.clone()));

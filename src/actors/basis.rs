@@ -128,9 +128,10 @@ impl BasisActor {
         let mut has_forgotten = false;
         for patch in self.ports.wishes.get().patches.clone() {
             let is_made = self.made.iter().any(|(_, (made, _))| *made == patch);
+            let is_there = self.bases.get(&patch).is_some();
             // A global model that was started again wants what is there already.
-            has_forgotten |= self.bases.get(&patch).is_some();
-            if is_made || self.bases.get(&patch).is_some() || self.hopeless.contains(&patch) {
+            has_forgotten |= is_there;
+            if is_made || is_there || self.hopeless.contains(&patch) {
                 continue;
             }
             let (cost, made) = self.make(&patch);

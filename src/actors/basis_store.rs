@@ -133,15 +133,11 @@ impl BasisStore {
 
 /// Writes `file` so that it appears whole or not at all: other runs may read it, or write the same, meanwhile.
 fn write_whole(file: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut taken = io::Error::from(io::ErrorKind::AlreadyExists);
     for number in 0..NAMES {
         let part = file.with_extension(format!("{}-{number}.{PART}", std::process::id()));
         let mut open = match OpenOptions::new().write(true).create_new(true).open(&part) {
             Ok(open) => open,
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                taken = error;
-                continue;
-            }
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
             Err(error) => return Err(error),
         };
         let written = open.write_all(bytes).and_then(|()| fs::rename(&part, file));
@@ -151,7 +147,7 @@ fn write_whole(file: &Path, bytes: &[u8]) -> io::Result<()> {
         }
         return written;
     }
-    Err(taken)
+    Err(io::ErrorKind::AlreadyExists.into())
 }
 
 /// Removes the oldest bases of `folder` until the others are `most` bytes at most, and what writers left that are gone. Nothing else

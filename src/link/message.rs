@@ -23,8 +23,8 @@ pub const VERSION: u16 = 1;
 /// No message is longer (bytes).
 pub const LARGEST: usize = 1 << 25;
 
-/// Ticks that one message repeats at most.
-const MOST_TICKS: usize = 64;
+/// Ticks that one message has at most.
+pub const MOST_TICKS: usize = 64;
 /// Bases that one message names at most.
 const MOST_HELD: usize = 1024;
 /// Bytes of a tick.

@@ -10,6 +10,6 @@ mod transport;
 mod virtual_link;
 
 pub use clock::Clock;
-pub use message::{Header, LARGEST, Message, Refused, VERSION};
+pub use message::{Header, LARGEST, MOST_TICKS, Message, Refused, VERSION};
 pub use transport::{Lane, Transport};
 pub use virtual_link::{Conditions, VirtualEnd, VirtualLink};

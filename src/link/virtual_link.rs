@@ -75,7 +75,6 @@ impl Transport for VirtualEnd {
         if *has_begun {
             way.pump(conditions, now);
             way.wait(lane, message, now);
-            way.pump(conditions, now);
         } else {
             way.arrive(now, message.to_vec());
         }

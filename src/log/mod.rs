@@ -27,6 +27,7 @@ pub use self::analysis::{
     ResyncReport, RunReport, TickFigures, TickGauge, TouchReport, magnitude,
 };
 pub use self::entry::{LogEntry, Window};
+pub(crate) use self::messages::topic::LINK_GROUP;
 pub use self::percentiles::{Distribution, Magnitudes, Percentiles};
 pub use self::reader::{LogReader, Topic, TopicKind};
 pub use self::records::{

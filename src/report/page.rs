@@ -37,7 +37,7 @@ impl Page {
 
     /// Adds text without a name, on as many lines as it needs.
     pub fn paragraph(&mut self, text: &str) {
-        wrap(text, WIDTH).for_each(|line| self.line(line));
+        wrap(text, WIDTH).into_iter().for_each(|line| self.line(line));
     }
 
     /// Adds a line with a name in front.
@@ -47,7 +47,7 @@ impl Page {
 }
 
 /// Lines of at most `width` columns, those after the first indented by two, that end between words.
-fn wrap(text: &str, width: usize) -> impl Iterator<Item = String> {
+fn wrap(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
         let last = lines.last_mut().expect("there is a line");
@@ -60,7 +60,7 @@ fn wrap(text: &str, width: usize) -> impl Iterator<Item = String> {
         }
         last.push_str(word);
     }
-    lines.into_iter()
+    lines
 }
 
 /// How many of `count` entries are shown where there is room for `most`: all, if the line that says how many are hidden would hide

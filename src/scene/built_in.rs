@@ -8,11 +8,11 @@ use crate::devices::ToolPath;
 use crate::error::{Error, ErrorKind};
 
 macro_rules! files {
-    ($($name:literal)*) => { [$(($name, include_str!(concat!("../../scenes/", $name)))),*] };
+    ($($name:literal)*) => { &[$(($name, include_str!(concat!("../../scenes/", $name)))),*] };
 }
 
 /// The scenes of the folder `scenes/`.
-const SCENES: [(&str, &str); 22] = files![
+static SCENES: &[(&str, &str)] = files![
     "cantilever.toml"
     "demo.toml"
     "device_faults.toml"
@@ -38,7 +38,7 @@ const SCENES: [(&str, &str); 22] = files![
 ];
 
 /// What they name.
-const FILES: [(&str, &str); 19] = files![
+static FILES: &[(&str, &str)] = files![
     "meshes/cantilever.msh"
     "meshes/liver.msh"
     "paths/bend.csv"
@@ -79,7 +79,7 @@ pub struct BuiltIn {
 impl BuiltIn {
     /// All of them, in the order of their names.
     pub fn all() -> impl Iterator<Item = Self> {
-        SCENES.into_iter().map(|(file, text)| Self { file, text })
+        SCENES.iter().map(|&(file, text)| Self { file, text })
     }
 
     /// The one of that name, if there is one.

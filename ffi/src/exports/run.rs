@@ -9,7 +9,7 @@ use crate::boundary::boundary;
 use crate::code::{Failure, PalpateCode};
 use crate::handles;
 use crate::haptic_loop::{self, MOST_DEVICES};
-use crate::memory::{check_size, put, read, text, write};
+use crate::memory::{check_size, put, put_made, read, text, write};
 use crate::session::{self, Live, SESSIONS};
 use crate::setup::SETUPS;
 use crate::types::{PalpateDevice, PalpateSession, PalpateSetup, PalpateSummary};
@@ -21,14 +21,9 @@ use crate::types::{PalpateDevice, PalpateSession, PalpateSetup, PalpateSummary};
 /// `session` is null or can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_start(setup: PalpateSetup, session: *mut PalpateSession) -> PalpateCode {
-    boundary(|| {
-        // SAFETY: the caller's promise.
-        unsafe { put(session, PalpateSession { id: 0 }, "session")? };
-        let setup = taken(setup)?;
-        let id = SESSIONS.add(Live::new(setup.session()?.start()?, None));
-        // SAFETY: the caller's promise.
-        unsafe { put(session, PalpateSession { id }, "session") }
-    })
+    let start = || Ok(PalpateSession { id: SESSIONS.add(Live::new(taken(setup)?.session()?.start()?, None)) });
+    // SAFETY: the caller's promise.
+    boundary(|| unsafe { put_made(session, "session", start) })
 }
 
 /// Starts a session whose haptic loop the host owns, for its `count` devices: the thread of that loop calls palpate_attach once and
@@ -44,9 +39,7 @@ pub unsafe extern "C" fn palpate_start_hosted(
     count: usize,
     session: *mut PalpateSession,
 ) -> PalpateCode {
-    boundary(|| {
-        // SAFETY: the caller's promise.
-        unsafe { put(session, PalpateSession { id: 0 }, "session")? };
+    let start = || {
         if count == 0 || count > MOST_DEVICES {
             return Err(Failure::argument(format!("count is {count}, must be 1 to {MOST_DEVICES} devices")));
         }
@@ -60,17 +53,17 @@ pub unsafe extern "C" fn palpate_start_hosted(
             told.push((name, device));
         }
         let (made, hosts, haptic) = taken(setup)?.hosted(&told)?;
-        let id = SESSIONS.add(Live::new(made.start()?, Some((hosts, haptic))));
-        // SAFETY: the caller's promise.
-        unsafe { put(session, PalpateSession { id }, "session") }
-    })
+        Ok(PalpateSession { id: SESSIONS.add(Live::new(made.start()?, Some((hosts, haptic)))) })
+    };
+    // SAFETY: the caller's promise.
+    boundary(|| unsafe { put_made(session, "session", start) })
 }
 
 fn taken(setup: PalpateSetup) -> Result<crate::setup::Setup, Failure> {
     let setup = SETUPS.take(setup.id)?;
     std::sync::Arc::into_inner(setup)
         .map(|setup| setup.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner))
-        .ok_or_else(|| Failure::argument("another thread is changing this setup".to_owned()))
+        .ok_or_else(|| Failure::argument("another thread is changing this setup"))
 }
 
 /// Waits for so many seconds, or until the session has ended by itself; in virtual time, runs that much of it.
@@ -111,7 +104,7 @@ pub extern "C" fn palpate_point(session: PalpateSession, x: f64, y: f64, z: f64)
     boundary(|| {
         SESSIONS.with(session.id, |live| {
             let pointer = live.pointer.as_mut();
-            let pointer = pointer.ok_or_else(|| Failure::argument("the session's device is no pointer".to_owned()))?;
+            let pointer = pointer.ok_or_else(|| Failure::argument("the session's device is no pointer"))?;
             match pointer.point([x, y, z]) {
                 true => Ok(()),
                 false => Err(Failure::argument(format!("({x}, {y}, {z}) is no place"))),

@@ -4,28 +4,22 @@ use std::ffi::c_char;
 use std::path::Path;
 
 use palpate::devices::ToolPath;
-use palpate::model::body::Tissue;
 use palpate::model::contact::ToolShape;
 use palpate::scene::{ModelChoice, Scene};
 
 use crate::boundary::boundary;
 use crate::code::{Failure, PalpateCode};
-use crate::memory::{numbers, put, read, text};
+use crate::memory::{numbers, put_made, read, text};
 use crate::setup::{Mesh, SETUPS, Setup};
 use crate::types::{PalpateBlock, PalpateSetup, PalpateTetrahedra};
 
-/// Gives `made` a handle at `setup`.
+/// Puts the handle of what `make` gives at `setup`.
 ///
 /// # Safety
 /// `setup` is null or can be written.
 unsafe fn give(setup: *mut PalpateSetup, make: impl FnOnce() -> Result<Setup, Failure>) -> PalpateCode {
-    boundary(|| {
-        // SAFETY: the caller's promise. Before anything is made, so that nothing is lost.
-        unsafe { put(setup, PalpateSetup { id: 0 }, "setup")? };
-        let id = SETUPS.add(make()?);
-        // SAFETY: the caller's promise.
-        unsafe { put(setup, PalpateSetup { id }, "setup") }
-    })
+    // SAFETY: the caller's promise.
+    boundary(|| unsafe { put_made(setup, "setup", || Ok(PalpateSetup { id: SETUPS.add(make()?) })) })
 }
 
 /// Sets a session up from a scene file, with the paths in it relative to the file.
@@ -91,19 +85,11 @@ pub unsafe extern "C" fn palpate_setup_tetrahedra(
     unsafe {
         give(setup, || {
             let body = read(body)?;
-            let times = |count: usize, by: usize| count.saturating_mul(by);
-            let or = |value: f64, default: f64| if value == 0.0 { default } else { value };
-            let liver = Tissue::LIVER;
             Setup::of_tetrahedra(Mesh {
-                points: numbers(body.points_m, times(body.point_count, 3), "points_m")?,
-                elements: numbers(body.elements, times(body.element_count, 4), "elements")?,
+                points: numbers(body.points_m, body.point_count.saturating_mul(3), "points_m")?,
+                elements: numbers(body.elements, body.element_count.saturating_mul(4), "elements")?,
                 fixed: numbers(body.fixed_nodes, body.fixed_count, "fixed_nodes")?,
-                tissue: Tissue {
-                    young_modulus: or(body.young_modulus_pa, liver.young_modulus),
-                    poisson_ratio: or(body.poisson_ratio, liver.poisson_ratio),
-                    density: or(body.density_kg_per_m3, liver.density),
-                    viscosity: or(body.viscosity_pa_s, liver.viscosity),
-                },
+                tissue: body.tissue(),
             })
         })
     }

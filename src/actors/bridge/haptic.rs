@@ -6,7 +6,7 @@ use super::super::cause::Cause;
 use super::super::messages::ToolTick;
 use super::post::Post;
 use super::{MOST_MESSAGES, SILENCE, key_of};
-use crate::link::{Clock, Lane, Message, Transport};
+use crate::link::{Clock, Lane, MOST_TICKS, Message, Transport};
 use crate::log::LinkSample;
 use crate::model::local::{Image, LocalModel, Parcel};
 use crate::model::surroundings::{Bases, Basis};
@@ -14,8 +14,6 @@ use crate::runtime::{Actor, ActorError, Nanos, Outcome, QueueReader, Recorder, T
 
 /// Ticks that a message has at least, if there are so many: those before the newest are repeated.
 const REPEATED: usize = 8;
-/// Ticks that are remembered: as many as one message holds.
-const REMEMBERED: usize = 64;
 /// Between two questions for the time.
 const ASKS_EVERY: Nanos = Nanos(50_000_000);
 
@@ -38,8 +36,6 @@ pub struct HapticBridge {
     tools: Vec<Tool>,
     image: Image,
     bases: Bases,
-    /// Of the bases.
-    keys: Vec<u64>,
     clock: Clock,
     /// When something of this epoch came last; `None` before.
     heard: Option<Nanos>,
@@ -62,9 +58,9 @@ impl HapticBridge {
     /// A bridge for the tools of `ends`, which builds models by the `image` of the body over there.
     pub fn new(transport: Box<dyn Transport>, ends: Vec<HapticEnd>, image: Image, recorder: Recorder) -> Self {
         let tool = |end| Tool { end, recent: VecDeque::new(), newest: None, arrived: None };
-        let (bases, keys, clock, heard, asked) = Default::default();
+        let (bases, clock, heard, asked) = Default::default();
         let (post, tools) = (Post::new(transport), ends.into_iter().map(tool).collect());
-        Self { post, tools, image, bases, keys, clock, heard, asked, recorder }
+        Self { post, tools, image, bases, clock, heard, asked, recorder }
     }
 
     /// A connection that has fallen silent is over: what still comes of it is dropped.
@@ -82,7 +78,7 @@ impl HapticBridge {
         for (number, tool) in (0..).zip(&mut self.tools) {
             let mut new = 0;
             while let Some(tick) = tool.end.ticks.pop(ctx) {
-                if tool.recent.len() == REMEMBERED {
+                if tool.recent.len() == MOST_TICKS {
                     tool.recent.pop_front();
                 }
                 tool.recent.push_back(tick);
@@ -101,7 +97,8 @@ impl HapticBridge {
         if self.asked.is_none_or(|asked| now.saturating_sub(asked) >= ASKS_EVERY) {
             self.asked = Some(now);
             self.post.send(Lane::Urgent, now, &Message::Ping);
-            self.post.send(Lane::Urgent, now, &Message::Held(self.keys.clone()));
+            let held = self.bases.iter().map(|basis| key_of(basis.patch())).collect();
+            self.post.send(Lane::Urgent, now, &Message::Held(held));
             self.record(now);
         }
     }
@@ -145,8 +142,8 @@ impl HapticBridge {
     }
 
     fn keep(&mut self, key: u64, basis: Basis) {
-        if key == key_of(basis.patch()) && !self.keys.contains(&key) && self.image.has_room_for(&basis) {
-            self.keys.push(key);
+        let is_new = self.bases.get(basis.patch()).is_none();
+        if is_new && key == key_of(basis.patch()) && self.image.has_room_for(&basis) {
             self.bases.insert(basis.into());
         }
     }

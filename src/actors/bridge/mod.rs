@@ -7,7 +7,7 @@
 //!
 //! What they carry is made and taken here, off the real-time threads: the local actor has the same ports as without them and cannot tell
 //! the difference. Each connection is an *epoch*. Its number stands in every message; the haptic side begins a new one when it has heard
-//! nothing for [`SILENCE`], which is longer than a force lasts without a model, and the global side follows. What belongs to an older
+//! nothing for [`SILENCE`], which by default is longer than a force lasts without a model, and the global side follows. What belongs to an older
 //! epoch is dropped, on both sides.
 
 mod global;
@@ -19,7 +19,7 @@ use crate::runtime::Nanos;
 pub use global::{GlobalBridge, GlobalEnd};
 pub use haptic::{HapticBridge, HapticEnd};
 
-/// A haptic side that has heard nothing for so long takes the connection for gone: no force is left by then.
+/// A haptic side that has heard nothing for so long takes the connection for gone: by default no force is left by then.
 pub const SILENCE: Nanos = Nanos(500_000_000);
 
 /// Messages that a release takes at most: of a flood, the rest waits.

@@ -48,10 +48,10 @@ use TopicKind as Kind;
 const OF_DEVICE: [Kind; 6] = [Kind::Force, Kind::ForceCommanded, Kind::Tool, Kind::Contact, Kind::Resync, Kind::Probe];
 
 /// The group whose releases are those of a link.
-const LINK_GROUP: &str = "link";
+pub(crate) const LINK_GROUP: &str = "link";
 
-/// The topics that every log declares; `/scene` only those that have it, and `/link` where there is one.
-const SHARED: [Kind; 4] = [Kind::Global, Kind::Ports, Kind::Inputs, Kind::Log];
+/// The topics that every log declares, `/link` only where there is one; `/scene` only those that have it.
+const SHARED: [Kind; 5] = [Kind::Global, Kind::Ports, Kind::Inputs, Kind::Log, Kind::Link];
 
 impl Topic {
     /// The topics that the log of `environment` declares, whether or not anything is written there; `/actors` only where
@@ -66,8 +66,8 @@ impl Topic {
         let of_device = |device| OF_DEVICE.map(|kind| Self(kind, device));
         let devices = number(environment.devices.len().max(1)).flat_map(of_device);
         let has_link = environment.groups.iter().any(|group| group.name == LINK_GROUP);
-        let link = has_link.then_some(Self(Kind::Link, 0));
-        timed.chain(actors).chain(devices).chain(SHARED.map(|kind| Self(kind, 0))).chain(link)
+        let shared = SHARED.into_iter().filter(move |&kind| kind != Kind::Link || has_link);
+        timed.chain(actors).chain(devices).chain(shared.map(|kind| Self(kind, 0)))
     }
 
     /// The topic where `record` belongs.
@@ -135,7 +135,7 @@ impl TopicKind {
 
     /// All kinds.
     fn all() -> impl Iterator<Item = Self> {
-        let others = [Self::Timing, Self::Actors, Self::Stats, Self::Scene, Self::Link];
+        let others = [Self::Timing, Self::Actors, Self::Stats, Self::Scene];
         others.into_iter().chain(OF_DEVICE).chain(SHARED)
     }
 
@@ -151,7 +151,7 @@ impl TopicKind {
     pub fn of_topic(name: &str) -> Option<Self> {
         let name = name.strip_prefix('/')?;
         match name.split_once('/') {
-            None => OF_DEVICE.into_iter().chain(SHARED).chain([Self::Link]).find(|kind| kind.word() == name),
+            None => OF_DEVICE.into_iter().chain(SHARED).find(|kind| kind.word() == name),
             Some((first, second)) => [Self::Timing, Self::Actors, Self::Stats]
                 .into_iter()
                 .find(|kind| kind.word() == first && !second.is_empty())

@@ -45,14 +45,12 @@ pub enum HostRelease {
 pub struct HostedGroup {
     /// `None` only while it is dropped.
     thread: Option<GroupThread>,
-    /// Its books and its actors' times count from here.
-    base_ns: Option<u64>,
     ended: bool,
 }
 
 impl HostedGroup {
     pub(crate) fn new(thread: GroupThread) -> Self {
-        Self { thread: Some(thread), base_ns: None, ended: false }
+        Self { thread: Some(thread), ended: false }
     }
 
     /// The name of the group.
@@ -79,14 +77,8 @@ impl HostedGroup {
     /// time zero, the first call sets it.
     pub fn release(&mut self) -> HostRelease {
         let Some(thread) = self.thread.as_mut().filter(|_| !self.ended) else { return HostRelease::Ended };
-        let base_ns = match self.base_ns {
-            Some(base_ns) => base_ns,
-            None => {
-                let base_ns = thread.link.beginning.set(os::monotonic());
-                self.base_ns = Some(base_ns);
-                base_ns
-            }
-        };
+        let beginning = &thread.link.beginning;
+        let base_ns = beginning.get().unwrap_or_else(|| beginning.set(os::monotonic()));
         let now = || since(base_ns);
         let group = &mut thread.group;
         let stops = !group.winding_down && thread.link.control.stop_requested();
@@ -106,12 +98,12 @@ impl HostedGroup {
         HostRelease::Ran
     }
 
-    /// Time since time zero; none before the first release.
+    /// Time since time zero; none before.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn elapsed(&self) -> Nanos {
-        self.base_ns.map_or(Nanos::ZERO, since)
+        self.thread.as_ref().map_or(Nanos::ZERO, |thread| thread.link.beginning.elapsed())
     }
 }
 

@@ -7,9 +7,9 @@ use crate::runtime::{Nanos, Rate, RateGroup};
 use crate::scene::LinkSpec;
 
 /// The name of the group of the bridges.
-pub(crate) const LINK: &str = "link";
+pub(crate) use crate::log::LINK_GROUP as LINK;
 
-/// A local model that is older exerts no force: nobody looks farther ahead.
+/// By default a local model that is older exerts no force: nobody looks farther ahead.
 const OLDEST: Nanos = Nanos(300_000_000);
 
 /// What is done to messages.

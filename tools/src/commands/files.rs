@@ -15,7 +15,7 @@ const NAMES: u32 = 1000;
 const MOST_LINKS: u32 = 40;
 
 /// Everything that the scene at `path` reads: itself, the mesh or surface of its body, paths and logs of its devices, and the
-/// bases that were kept for it.
+/// bases in the folder that it names.
 pub fn inputs_of(path: &Path, scene: &Scene) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut inputs = vec![path.to_owned()];

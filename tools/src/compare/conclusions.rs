@@ -60,9 +60,6 @@ pub(super) fn full_fits(comparison: &Comparison) -> bool {
     comparison.full.cost.tick_p99 <= comparison.haptic_period
 }
 
-/// A question to a run.
-type Asked<'a> = dyn Fn(&Measured) -> bool + 'a;
-
 /// Who is cheaper than `full` in which way, and who in none.
 fn against_full(comparison: &Comparison) -> Vec<String> {
     let full = &comparison.full;
@@ -71,17 +68,18 @@ fn against_full(comparison: &Comparison) -> Vec<String> {
     let is_worse = |run: &Measured| run.error.rms > 0.0 && !in_total(run);
     let (load, margin) = (figure(1e3 * full.cost.total_load()), 100.0 * MARGIN);
     let no_gain = |run: &Measured| is_worse(run) && !per_tick(run);
-    let sorted: [(String, &Asked<'_>); 3] = [
-        (format!("cheaper than `full` in total ({load} ms/s) by more than {margin} %"), &in_total),
-        ("worse than `full` in error and not cheaper in total".to_owned(), &is_worse),
-        ("of these, not cheaper in a haptic tick either".to_owned(), &no_gain),
-    ];
+    let said = |what: &str, asked: &dyn Fn(&Measured) -> bool| {
+        let those = list(comparison, asked);
+        (!those.is_empty()).then(|| format!("{what}: {}", those.join(", ")))
+    };
     // That nothing is cheaper must be said; what nobody is besides need not be.
-    let said = sorted.into_iter().enumerate().filter_map(|(n, (what, is))| match list(comparison, is) {
-        names if names.is_empty() => (n == 0).then(|| format!("{what}: none")),
-        names => Some(format!("{what}: {}", names.join(", "))),
-    });
-    said.collect()
+    let cheaper = format!("cheaper than `full` in total ({load} ms/s) by more than {margin} %");
+    let cheaper = said(&cheaper, &in_total).unwrap_or_else(|| format!("{cheaper}: none"));
+    let worse = said("worse than `full` in error and not cheaper in total", &is_worse);
+    [Some(cheaper), worse, said("of these, not cheaper in a haptic tick either", &no_gain)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// The cheapest per haptic tick within an error, for each latency.
@@ -113,7 +111,7 @@ fn own_error(comparison: &Comparison) -> Option<String> {
 }
 
 /// The models of which runs are `asked` for; with the latency where that is not so for all latencies of the model.
-fn list(comparison: &Comparison, asked: &Asked<'_>) -> Vec<String> {
+fn list(comparison: &Comparison, asked: &dyn Fn(&Measured) -> bool) -> Vec<String> {
     let runs = || comparison.runs.iter().filter_map(|run| Some((run, run.measured()?)));
     let all = |model: &str| runs().filter(|(run, _)| run.model == model).all(|(_, measured)| asked(measured));
     let names = runs().filter(|(_, measured)| asked(measured)).map(|(run, _)| match all(&run.model) {

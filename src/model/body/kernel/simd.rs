@@ -1,4 +1,4 @@
-//! Eight doubles at once: what the force kernels ask of an instruction set, and the choice of one at run time.
+//! Eight doubles at once, or sixteen singles: what the force kernels ask of an instruction set, and the choice of one at run time.
 
 use super::super::super::Vec3;
 use super::nodes::{LANES, Lane, Motion, Push, Singles};
