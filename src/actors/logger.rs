@@ -21,9 +21,13 @@ use crate::runtime::{Event, InputUse, PortUse};
 /// `log_error` instead.
 pub const LOG_FAILURE: &str = "palpate::log_failure";
 
-/// Records younger than this wait for the next drain: a slow group stamps its records with the start of a release and
-/// hands them over at its end, and the log is to be in the order of time.
+/// Records younger than this wait for the next drain: a group stamps its records with the start of a release and hands
+/// them over at its end, and the log is to be in the order of time.
 const HELD_BACK: Nanos = Nanos(100_000_000);
+
+/// A release that takes longer is waited for, such as that of a basis, but no longer than this: a group that is stuck
+/// is not to keep the log of the others in memory, where it is lost if the process is killed.
+const LONGEST_HELD_BACK: Nanos = Nanos(1_000_000_000);
 
 /// The outcome of a run, filled in when the logger stops.
 #[derive(Clone, Debug, Default)]
@@ -165,15 +169,16 @@ impl LoggerActor {
         }
     }
 
-    /// Takes what was recorded and passes on, in the order of time, what is older than `horizon`.
-    fn take_records(&mut self, horizon: Nanos, now: Nanos) {
+    /// Takes what was recorded and passes on, in the order of time, what nothing older can follow any more; `all` of it after the last release.
+    fn take_records(&mut self, ctx: &TickContext, all: bool) {
         // More than none only after a panic: what was passed on then is not passed on twice.
         self.records.drain(..std::mem::take(&mut self.passed));
-        self.drain.drain(&mut self.records);
+        let at_work = self.drain.drain(&mut self.records);
+        let horizon = if all { Nanos(u64::MAX) } else { settled(ctx.scheduled, at_work) };
         // Stable: what a thread records at one time keeps its order.
         self.records.sort_by_key(|record| record.stamp);
         if let Some(RecordGap { records, from }) = self.drain.take_gap() {
-            self.tell(&Loss { records, from, to: now.max(from), why: "the logger came late" });
+            self.tell(&Loss { records, from, to: ctx.now.max(from), why: "the logger came late" });
         }
         let ready = self.records.partition_point(|record| record.stamp < horizon);
         self.note_lost();
@@ -289,7 +294,7 @@ impl Actor for LoggerActor {
             scene.take(ctx);
         }
         self.learn_grants();
-        self.take_records(ctx.scheduled.saturating_sub(HELD_BACK), ctx.now);
+        self.take_records(ctx, false);
         let log_time = self.log_time;
         if !self.sink_failed {
             self.keep(|sink| sink.flush(log_time, ctx.now));
@@ -299,7 +304,7 @@ impl Actor for LoggerActor {
 
     fn stop(&mut self, ctx: &TickContext) {
         self.learn_grants();
-        self.take_records(Nanos(u64::MAX), ctx.now);
+        self.take_records(ctx, true);
         for counter in std::mem::take(&mut self.stats) {
             let stats = counter.finish(self.log_time);
             self.keep(|sink| sink.stats(&stats));
@@ -312,6 +317,11 @@ impl Actor for LoggerActor {
         let mut outcome = self.outcome.0.lock().unwrap_or_else(PoisonError::into_inner);
         *outcome = (self.analysis.report(), self.failure.take());
     }
+}
+
+/// Before which nothing will be recorded any more, as far as anybody waits for it: `at_work` is when the oldest release was due that may.
+fn settled(now: Nanos, at_work: Nanos) -> Nanos {
+    now.saturating_sub(HELD_BACK).min(at_work.max(now.saturating_sub(LONGEST_HELD_BACK)))
 }
 
 /// An event in words; the causes that palpate's own actors give are named.
@@ -354,4 +364,19 @@ fn group_in_words(group: &GroupGrant) -> String {
     let cpu = group.cpu.map_or("any cpu".to_owned(), |cpu| format!("cpu {cpu}"));
     let refused = if group.refused.is_empty() { String::new() } else { format!("; {}", group.refused) };
     format!("{}{priority} on {cpu}, {}{refused}", group.policy, group.wait)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_log_waits_for_a_release_that_takes_long_but_not_for_one_that_is_stuck() {
+        let ms = |ms: u64| Nanos(ms * 1_000_000);
+        assert_eq!(settled(ms(5000), Nanos(u64::MAX)), ms(4900));
+        assert_eq!(settled(ms(5000), ms(4990)), ms(4900));
+        assert_eq!(settled(ms(5000), ms(4600)), ms(4600));
+        assert_eq!(settled(ms(5000), ms(10)), ms(4000));
+        assert_eq!(settled(ms(50), ms(10)), Nanos::ZERO);
+    }
 }

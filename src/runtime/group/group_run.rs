@@ -220,6 +220,7 @@ impl GroupRun {
         start: impl FnOnce(Nanos) -> Nanos,
         end: impl FnOnce(Nanos) -> Nanos,
     ) -> Result<(), RuntimeFault> {
+        self.recorder.iter_mut().for_each(|recorder| recorder.begin_release(scheduled));
         let now = start(scheduled);
         let dt_nominal = self.last.dt_nominal;
         let first = self.ledger.released == 0;
@@ -257,6 +258,7 @@ impl GroupRun {
                 recorder.push(ActorTimes { group: self.index, scheduled, actors, spent: timer.end(end) });
             }
         }
+        self.recorder.iter_mut().for_each(Recorder::end_release);
         if let Some(books) = &mut self.books {
             *books.buffer() = self.ledger;
             books.publish(scheduled);

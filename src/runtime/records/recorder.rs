@@ -1,7 +1,10 @@
 //! How records leave an actor: a ring per source, drained by a logger that merges them by time.
+//!
+//! A release stamps what it records with the time at which it was due, however long it takes. A group therefore says when one is at work,
+//! and a logger that wants the order of time waits for what such a release may still record.
 
 use crate::primitives::ring::{Consumer, Producer, Sums, ring};
-use crate::primitives::sync::{AtomicBool, Ordering, lock};
+use crate::primitives::sync::{AtomicBool, AtomicU64, CachePadded, Ordering, lock};
 use crate::records::record::Record;
 use crate::time::Nanos;
 use std::sync::{Arc, Mutex};
@@ -28,15 +31,21 @@ struct Rings {
 #[derive(Debug)]
 struct Source {
     ring: Consumer<Record>,
+    at_work: Arc<AtWork>,
     /// Lost records that are part of a gap.
     told: u64,
     /// The stamp of the last record taken.
     newest: Nanos,
 }
 
+/// When the release was due that is at work; [`IDLE`] if none is.
+type AtWork = CachePadded<AtomicU64>;
+
+const IDLE: u64 = u64::MAX;
+
 impl Source {
-    fn new(ring: Consumer<Record>) -> Self {
-        Self { ring, told: 0, newest: Nanos::ZERO }
+    fn new(ring: Consumer<Record>, at_work: Arc<AtWork>) -> Self {
+        Self { ring, at_work, told: 0, newest: Nanos::ZERO }
     }
 
     /// Takes what there is, and says what was lost.
@@ -96,11 +105,13 @@ impl Registry {
     /// nobody.
     pub(crate) fn replace(&self, old: Option<usize>, capacity: usize) -> NewRing {
         let (producer, consumer) = ring(capacity);
+        let at_work = Arc::new(CachePadded(AtomicU64::new(IDLE)));
+        let source = Source::new(consumer, Arc::clone(&at_work));
         let mut rings = lock(&self.rings);
         let index = old.unwrap_or(rings.all.len());
         let mut before = 0;
         if old.is_some() {
-            let mut replaced = std::mem::replace(&mut rings.all[index], Source::new(consumer));
+            let mut replaced = std::mem::replace(&mut rings.all[index], source);
             // At one moment: the recorder may be at work on a thread that was left behind.
             let Sums { pushed, lost, left } = replaced.ring.sums();
             let wanted = self.wanted();
@@ -110,9 +121,9 @@ impl Registry {
             rings.lost += lost;
             before = pushed + lost;
         } else {
-            rings.all.push(Source::new(consumer));
+            rings.all.push(source);
         }
-        NewRing { recorder: Recorder(producer), index, before }
+        NewRing { recorder: Recorder { ring: producer, at_work }, index, before }
     }
 
     pub(crate) fn drain(self: &Arc<Self>) -> RecordDrain {
@@ -148,7 +159,10 @@ impl Registry {
 /// assert_eq!(Event::from_record(&records[0]).map(|event| event.detail), Some(42));
 /// ```
 #[derive(Debug)]
-pub struct Recorder(Producer<Record>);
+pub struct Recorder {
+    ring: Producer<Record>,
+    at_work: Arc<AtWork>,
+}
 
 impl Recorder {
     /// Records something; a full ring drops and counts it.
@@ -157,7 +171,21 @@ impl Recorder {
     /// Wait-free, real-time safe.
     #[inline]
     pub fn push(&mut self, record: impl Into<Record>) {
-        self.0.push(record.into());
+        self.ring.push(record.into());
+    }
+
+    /// A release is at work that was due at `scheduled`: it may still record at that stamp or later.
+    #[inline]
+    pub(crate) fn begin_release(&mut self, scheduled: Nanos) {
+        // Relaxed: a drain that does not see it yet takes it for one that begins after the drain.
+        self.at_work.store(scheduled.0, Ordering::Relaxed);
+    }
+
+    /// It has recorded everything.
+    #[inline]
+    pub(crate) fn end_release(&mut self) {
+        // Release: with the acquire in `drain`, so that whoever sees this also finds the records in their rings.
+        self.at_work.store(IDLE, Ordering::Release);
     }
 }
 
@@ -167,19 +195,23 @@ pub struct RecordDrain(Arc<Registry>);
 
 impl RecordDrain {
     /// Appends what was recorded since the last call, in the order of the stamps; equal stamps keep the order in which
-    /// the recorders were made.
+    /// the recorders were made. Returns when the oldest release was due that is at work: it may still record at that
+    /// stamp or later, but no other that has begun. `Nanos(u64::MAX)` if none is at work.
     ///
     /// # Real-time
     /// Takes a lock and allocates: for loggers.
-    pub fn drain(&mut self, records: &mut Vec<Record>) {
+    pub fn drain(&mut self, records: &mut Vec<Record>) -> Nanos {
         let first = records.len();
         let rings = &mut *lock(&self.0.rings);
+        // Before the rings: what ends meanwhile has recorded more than is taken here.
+        let at_work = rings.all.iter().map(|source| source.at_work.load(Ordering::Acquire)).min();
         records.append(&mut rings.kept);
         for index in 0..rings.all.len() {
             let gap = rings.all[index].drain(records);
             rings.note(gap);
         }
         records[first..].sort_by_key(|record| record.stamp);
+        Nanos(at_work.unwrap_or(IDLE))
     }
 
     /// Records lost so far because a ring was full.
@@ -202,6 +234,7 @@ impl RecordDrain {
 #[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
+    use crate::ports::restartable::RecorderPort;
     use crate::records::record::Event;
 
     fn event(stamp: u64, code: u32) -> Event {
@@ -242,6 +275,24 @@ mod tests {
         a.push(event(5, 0));
         drain.drain(&mut records);
         assert_eq!((drain.take_gap(), drain.lost(), records.len()), (None, 2, 6));
+    }
+
+    #[test]
+    fn the_oldest_release_that_is_at_work_is_told() {
+        let registry = Registry::new();
+        let mut drain = registry.drain();
+        let port = RecorderPort::new(&registry, 4);
+        let (mut slow, mut quick) = (port.recorder(), registry.recorder(4));
+        let mut at_work = || drain.drain(&mut Vec::new());
+        assert_eq!(at_work(), Nanos(u64::MAX));
+        slow.begin_release(Nanos(5));
+        quick.begin_release(Nanos(7));
+        assert_eq!(at_work(), Nanos(5));
+        quick.end_release();
+        assert_eq!(at_work(), Nanos(5));
+        // Check that nobody waits for one that was left behind
+        let _next = port.recorder();
+        assert_eq!(at_work(), Nanos(u64::MAX));
     }
 
     #[test]
