@@ -8,7 +8,7 @@ use palpate::model::contact::{Equations, Normals};
 use palpate::model::local::BlendKind;
 use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::model::mesh::Face;
-use palpate::scene::{BuiltIn, FrictionSpec, NodeSpec, Scene};
+use palpate::scene::{BuiltIn, FrictionSpec, NodeSpec, Scene, ToolSpec};
 
 #[path = "../examples/scene_paths.rs"]
 #[allow(dead_code, reason = "its main function writes the files that are only compared here")]
@@ -69,6 +69,7 @@ fn every_scene_loads_and_says_what_it_shows() {
         let is_predictive = body.tetrahedra().is_some()
             || body.region_count() > 0
             || scene.devices.len() > 1
+            || scene.devices[0].tool != ToolSpec::Point
             || scene.contact.static_friction.is_some();
         let model = if is_predictive { LocalModelKind::Predictive } else { LocalModelKind::Patch };
         assert_eq!(scene.local.model, model.into(), "{}", file.display());
@@ -105,7 +106,7 @@ fn the_demo_file_reads_as_it_is_written() {
     assert_eq!(scene.contact.normals, Normals::Interpolated);
     assert_eq!(scene.contact.equations, Equations::Corrected);
     assert_eq!((scene.global.rate_hz, scene.global.substeps_per_ms), (30.0, Some(2)));
-    assert_eq!(scene.local.feedback, Some(Feedback::Geometry));
+    assert_eq!((scene.local.model, scene.local.feedback), (LocalModelKind::Predictive.into(), None));
     assert_eq!((scene.local.blend.kind, scene.local.blend.ms), (BlendKind::Crossfade, 10.0));
     assert_eq!(scene.safety.max_force_n, Some(3.3));
     assert_eq!(scene.probes.len(), 1);
@@ -235,7 +236,9 @@ fn a_glued_tool_starts_where_its_node_rests() {
 
 #[test]
 fn another_model_drops_only_a_feedback_that_it_cannot_give() {
-    let full = Scene::demo().with_model(LocalModelKind::Full);
+    let mut paper = Scene::demo().with_model(LocalModelKind::Patch);
+    paper.local.feedback = Some(Feedback::Geometry);
+    let full = paper.with_model(LocalModelKind::Full);
     assert_eq!((full.local.model, full.local.feedback), (LocalModelKind::Full.into(), None));
     assert!(full.validate().is_ok());
     let mut scene = Scene::demo();
