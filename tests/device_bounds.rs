@@ -61,7 +61,7 @@ fn a_device_that_tells_a_place_where_it_cannot_be_makes_no_force() {
         assert!(commands[312..324].iter().all(|row| row.force_n == [0.0; 3]), "the watchdog lets it go");
         assert!(norm(commands[590].force_n) > 0.3, "and takes it up");
         // The log says what was told, and what could have been.
-        let words: Vec<String> = LogReader::open(&log).unwrap().filter_map(told).collect();
+        let words: Vec<String> = LogReader::open(&log).unwrap().map(Result::unwrap).filter_map(told).collect();
         let told = words.iter().find(|words| words.contains("where it cannot be")).expect("an event");
         let [x, y, z]: [f64; 3] = lie.into();
         assert!(told.contains(&format!("it told [{x}, {y}, {z}] m")) && told.contains("at most"), "{told}");

@@ -41,7 +41,7 @@ impl Disk {
     fn read(&self) -> (Vec<LogEntry>, Option<String>) {
         let bytes = self.bytes.lock().unwrap().clone();
         let mut reader = LogReader::new(bytes.as_slice(), "disk").expect("the magic is there");
-        let entries = reader.by_ref().collect();
+        let entries = reader.readable().collect();
         (entries, reader.damage().map(str::to_owned))
     }
 }
@@ -230,7 +230,7 @@ fn a_disk_that_stalls_for_three_seconds_loses_nothing() {
     let bytes = disk.bytes.lock().unwrap().clone();
     // Check that it is whole: the index counts every message, and the data fits its checksum
     let mut reader = LogReader::new(bytes.as_slice(), "disk").unwrap();
-    let read = reader.by_ref().count() as u64;
+    let read = reader.readable().count() as u64;
     assert!(reader.damage().is_none() && reader.is_checksummed(), "{:?}", reader.damage());
     assert!(read > ran.ticks * PER_TICK, "{read} of {} ticks", ran.ticks);
 }

@@ -15,7 +15,7 @@ use proptest::prelude::*;
 
 fn read(bytes: &[u8]) -> (Vec<LogEntry>, Option<String>) {
     let mut reader = LogReader::new(bytes, "memory").unwrap();
-    let entries = reader.by_ref().collect();
+    let entries = reader.readable().collect();
     (entries, reader.damage().map(str::to_owned))
 }
 
@@ -239,11 +239,11 @@ fn a_log_on_disk_is_read_through_its_path() {
     writer.write(&record).unwrap();
     writer.finish().unwrap();
     let mut reader = LogReader::open(&path).unwrap();
-    assert!(matches!(reader.next(), Some(LogEntry::Environment(_))));
-    assert_eq!(reader.next(), Some(LogEntry::Record(record)));
+    assert!(matches!(reader.next(), Some(Ok(LogEntry::Environment(_)))));
+    assert_eq!(reader.next().unwrap().unwrap(), LogEntry::Record(record));
     assert!(matches!(record, LogRecord::Tick(_)));
     assert_eq!(reader.topic(), "/timing/haptic");
-    assert_eq!(reader.next(), None);
+    assert!(reader.next().is_none());
     assert_eq!(reader.damage(), None);
     assert_eq!(reader.topics().len(), 14);
 }
@@ -254,7 +254,7 @@ fn a_picture_is_counted_and_gives_no_entry() {
     writer.write_scene(&SceneFrame { time: Nanos(5), ..SceneFrame::default() }).unwrap();
     let bytes = writer.finish().unwrap();
     let mut reader = LogReader::new(bytes.as_slice(), "memory").unwrap();
-    assert_eq!((reader.by_ref().count(), reader.damage()), (1, None));
+    assert_eq!((reader.readable().count(), reader.damage()), (1, None));
     assert_eq!(reader.topics().get("/scene"), Some(&1));
 }
 
@@ -270,7 +270,7 @@ fn a_foreign_message_of_a_well_known_name_is_no_entry() {
     file.finish().unwrap();
     let bytes = file.into_inner().into_inner();
     let mut reader = LogReader::new(bytes.as_slice(), "memory").unwrap();
-    assert_eq!((reader.by_ref().count(), reader.damage()), (0, None));
+    assert_eq!((reader.readable().count(), reader.damage()), (0, None));
     assert_eq!(reader.topics().get("/rosout"), Some(&1));
 }
 
@@ -380,11 +380,29 @@ fn records_are_as_written_where_the_environment_is_lost() {
     assert!(got.len() > 400 && got.iter().all(|record| sent.contains(record)));
 }
 
+// Check that nobody who reads a log with `?` can take part of it for all of it.
+#[test]
+fn damage_is_one_error_after_what_can_be_read_and_then_the_end() {
+    let whole = one_of_everything();
+    let cut = &whole[..whole.len() / 2];
+    let (entries, damage) = read(cut);
+    let mut reader = LogReader::new(cut, "memory").unwrap();
+    let got: Vec<_> = reader.by_ref().take_while(Result::is_ok).map(Result::unwrap).collect();
+    assert_eq!(got, entries);
+    assert!(reader.next().is_none(), "the error was taken, and comes once");
+    let error = LogReader::new(cut, "memory").unwrap().collect::<Result<Vec<_>, _>>().unwrap_err();
+    assert_eq!((error.kind(), error.to_string()), (ErrorKind::Log, format!("memory: {}", damage.unwrap())));
+    assert_eq!(
+        LogReader::new(whole.as_slice(), "memory").unwrap().map(Result::unwrap).collect::<Vec<_>>(),
+        read(&whole).0
+    );
+}
+
 #[test]
 fn a_log_says_whether_it_has_a_checksum() {
     let checked = |bytes: &[u8]| {
         let mut reader = LogReader::new(bytes, "memory").unwrap();
-        reader.by_ref().for_each(drop);
+        reader.readable().for_each(drop);
         (reader.is_checksummed(), reader.damage().is_none())
     };
     let bytes = one_of_everything();

@@ -346,7 +346,7 @@ fn a_log_is_replayed_without_the_mesh_file() {
     let report = Session::replay(&log).unwrap_or_else(|error| panic!("{error}")).run().unwrap();
     assert!(report.is_identical(), "{report}");
     let mut attached = Vec::new();
-    for entry in LogReader::open(&log).unwrap() {
+    for entry in LogReader::open(&log).unwrap().map(Result::unwrap) {
         match entry {
             LogEntry::Attachment { name, data } => attached.push((name, data)),
             LogEntry::Environment(environment) => {
@@ -386,12 +386,11 @@ fn a_log_that_names_a_file_reads_none() {
     let scene = folder.scene(&pressed()).with_model(Kind::Patch);
     let log = folder.path("run.mcap");
     Session::from_scene(scene.clone()).virtual_time().log(&log).build().unwrap().run().unwrap();
-    let entries = LogReader::open(&log).unwrap();
-    let environment = entries.into_iter().find_map(|entry| match entry {
+    let environment = LogReader::open(&log).unwrap().map(Result::unwrap).find_map(|entry| match entry {
         LogEntry::Environment(environment) => Some(environment),
         _ => None,
     });
-    let session = LogReader::open(&log).unwrap().find_map(|entry| match entry {
+    let session = LogReader::open(&log).unwrap().map(Result::unwrap).find_map(|entry| match entry {
         LogEntry::Attachment { name, data } if name == Environment::SESSION => Some(data),
         _ => None,
     });
@@ -405,7 +404,7 @@ fn a_log_that_names_a_file_reads_none() {
         let named = Environment { session: Some(session.clone()), mesh, ..environment.clone().unwrap() };
         let other = folder.path("named.mcap");
         let mut writer = palpate::log::McapWriter::create(&other, &named).unwrap();
-        for entry in LogReader::open(&log).unwrap() {
+        for entry in LogReader::open(&log).unwrap().map(Result::unwrap) {
             match entry {
                 LogEntry::Record(record) => writer.write(&record).unwrap(),
                 LogEntry::Stats(stats) => writer.write_stats(&stats).unwrap(),

@@ -52,7 +52,7 @@ impl Recording {
     pub(crate) fn read(path: &Path) -> Result<Self, Error> {
         let mut reader = LogReader::open(path)?;
         let (mut recording, mut analysis) = (Self::default(), Analysis::default());
-        while let Some(entry) = reader.next() {
+        while let Some(Ok(entry)) = reader.next() {
             analysis.push_entry(&entry);
             if let LogEntry::Environment(environment) = &entry {
                 recording.declare(environment);

@@ -201,7 +201,7 @@ impl Case {
 impl Found {
     /// Counts what the log holds of the guarded ticks.
     fn read_log(&mut self, log: &Path, [from, to]: [Nanos; 2]) {
-        for entry in LogReader::open(log).expect("the log of the child") {
+        for entry in LogReader::open(log).expect("the log of the child").map(Result::unwrap) {
             let LogEntry::Record(record) = entry else { continue };
             if !(from..=to).contains(&record.time()) {
                 continue;

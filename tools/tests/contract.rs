@@ -235,6 +235,7 @@ fn exported_forces_have_one_row_per_tick_and_read_back_exactly() {
     let csv = |topic| folder.succeed(&["export", "palpate-virtual.mcap", "--topic", topic, "--format", "csv"]);
     let records: Vec<LogRecord> = LogReader::open(folder.path("palpate-virtual.mcap"))
         .unwrap()
+        .map(Result::unwrap)
         .filter_map(|entry| match entry {
             LogEntry::Record(record) => Some(record),
             _ => None,
@@ -322,6 +323,7 @@ fn a_virtual_log_is_in_time_order_from_front_to_back() {
     folder.succeed(&["run", "scene.toml", "--virtual", "--duration", "2.1"]);
     let times: Vec<u64> = LogReader::open(folder.path("palpate-virtual.mcap"))
         .unwrap()
+        .map(Result::unwrap)
         .filter_map(|entry| match entry {
             LogEntry::Environment(_) | LogEntry::Attachment { .. } => None,
             LogEntry::Record(record) => Some(record.time().0),

@@ -31,10 +31,10 @@ fn the_command_exits_with_0_and_one_warning() {
         assert_eq!((called.code, called.err.lines().count()), (Some(0), 1), "cut at {cut}: {called:?}");
         assert!(called.err.starts_with("warning: cut.mcap: "), "cut at {cut}: {called:?}");
         if is_export {
-            let readable = LogReader::new(&bytes[..cut], "cut.mcap").unwrap();
+            let mut reader = LogReader::new(&bytes[..cut], "cut.mcap").unwrap();
             let is_force = |entry: &LogEntry| matches!(entry, LogEntry::Record(LogRecord::Force(_)));
             assert!(whole.starts_with(&called.out), "cut at {cut}");
-            assert_eq!(called.out.lines().count(), 1 + readable.filter(is_force).count(), "cut at {cut}");
+            assert_eq!(called.out.lines().count(), 1 + reader.readable().filter(is_force).count(), "cut at {cut}");
         } else {
             assert!(called.out.contains("DAMAGED") || called.out.contains("damage"), "cut at {cut}: {called:?}");
         }
@@ -79,9 +79,9 @@ fn a_killed_run_leaves_a_readable_log_that_lacks_at_most_a_second() {
         // Between two records or in one: a kill waits for neither.
         assert!(called.err.contains("cut off"), "{called:?}");
         // The start of the run by the environment, and the last record of the haptic group, since then.
-        let reader = LogReader::open(folder.path("killed.mcap")).unwrap();
+        let mut reader = LogReader::open(folder.path("killed.mcap")).unwrap();
         let (mut start, mut last) = (0, palpate::runtime::Nanos::ZERO);
-        for entry in reader {
+        for entry in reader.readable() {
             match entry {
                 LogEntry::Environment(environment) => start = environment.epoch_ns(),
                 LogEntry::Record(record @ LogRecord::Force(_)) => last = record.time(),

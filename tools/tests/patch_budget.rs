@@ -35,7 +35,7 @@ fn environment(summary: &Summary) -> &Environment {
 
 /// The scene as it was run, by the log.
 fn as_run(log: &Path) -> Scene {
-    let text = LogReader::open(log).unwrap().find_map(|entry| match entry {
+    let text = LogReader::open(log).unwrap().map(Result::unwrap).find_map(|entry| match entry {
         LogEntry::Attachment { name, data } if name == Environment::SESSION => Some(String::from_utf8(data).unwrap()),
         _ => None,
     });

@@ -203,7 +203,7 @@ fn each_device_has_its_topics_and_its_part_of_the_report_and_replays() {
     assert!(devices[0].force.peak_n != devices[1].force.peak_n);
     let mut reader = LogReader::open(&log).unwrap();
     let tools: Vec<ToolSample> = reader
-        .by_ref()
+        .readable()
         .filter_map(|entry| match entry {
             LogEntry::Record(LogRecord::Tool(sample)) => Some(sample),
             _ => None,
@@ -275,7 +275,10 @@ fn two_hands_on_the_whole_body_run_and_replay() {
             assert!(device.force.peak_commanded_n > 0.1 && device.force.not_finite == 0, "{summary}");
         }
         let mut reader = LogReader::open(&log).unwrap();
-        assert_eq!(reader.by_ref().filter(|entry| matches!(entry, LogEntry::Record(LogRecord::Resync(_)))).count(), 0);
+        assert_eq!(
+            reader.readable().filter(|entry| matches!(entry, LogEntry::Record(LogRecord::Resync(_)))).count(),
+            0
+        );
         for topic in ["/left/force", "/right/force_commanded", "/left/contact", "/right/tool"] {
             assert!(reader.topics()[topic] >= 2500, "{topic}: {:?}", reader.topics());
         }

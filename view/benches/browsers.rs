@@ -106,7 +106,7 @@ fn pooled(pairs: &[[Vec<f64>; 2]], drawn: &[usize], place: usize, q: f64) -> f64
 fn ticks(log: &std::path::Path) -> Result<Vec<(u64, f64)>, Error> {
     let (mut start, mut ticks) = (0, Vec::new());
     for entry in LogReader::open(log)? {
-        match entry {
+        match entry? {
             LogEntry::Environment(environment) => {
                 if let LoggedExecution::Threaded { start_unix_ns } = environment.execution {
                     start = start_unix_ns;

@@ -81,7 +81,7 @@ impl Playback {
             warning: None,
         };
         let (mut rows, mut bytes) = (Rows::default(), 0);
-        for entry in reader.by_ref() {
+        for entry in reader.readable() {
             match entry {
                 LogEntry::Environment(environment) => playback.environment = environment,
                 LogEntry::Scene(frame) => {

@@ -89,7 +89,7 @@ mod tests {
         let log = recent.log().unwrap().unwrap();
         let mut reader = LogReader::new(log.as_slice(), "log").unwrap();
         let is_force = |entry: &LogEntry| matches!(entry, LogEntry::Record(LogRecord::Force(_)));
-        assert_eq!(reader.by_ref().filter(is_force).count(), 6001);
+        assert_eq!(reader.readable().filter(is_force).count(), 6001);
         assert_eq!(reader.damage(), None);
     }
 

@@ -146,7 +146,7 @@ fn the_log_of_what_was_felt_holds_what_was_shown() {
     let body = answer.windows(4).position(|end| end == b"\r\n\r\n").unwrap() + 4;
     let mut reader = LogReader::new(&answer[body..], "log").unwrap();
     let commands: Vec<_> = reader
-        .by_ref()
+        .readable()
         .filter_map(|entry| match entry {
             LogEntry::Record(LogRecord::Command(sample)) => Some(sample),
             _ => None,

@@ -18,16 +18,17 @@ use super::entry::LogEntry;
 pub use super::messages::topic::{Topic, TopicKind};
 use super::messages::{self, LogMessage, foxglove};
 use super::records::{Environment, GroupInfo, LogRecord, LoggedExecution, MAX_GROUPS, SCHEMA_VERSION_KEY};
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
 
 /// Logs before it have other messages on `/tool` and `/log`.
 const OLDEST_SCHEMA: u32 = 2;
 const READ_BUFFER_BYTES: usize = 1 << 18;
 
-/// The entries of a log, as an iterator.
+/// The entries of a log, as an iterator of results.
 ///
-/// A damaged or truncated log gives everything before the damage and then ends; [`damage`](Self::damage) says what
-/// and where. Memory is bounded by one chunk.
+/// A damaged or truncated log gives everything before the damage, then one error that says what is damaged and where, and then
+/// ends: `?` on each entry reads a whole log or none. [`readable`](Self::readable) is for programs that use what there is.
+/// Memory is bounded by one chunk.
 ///
 /// ```
 /// use palpate::log::{Environment, ForceSample, LogEntry, LogReader, LogRecord, McapWriter};
@@ -37,15 +38,18 @@ const READ_BUFFER_BYTES: usize = 1 << 18;
 /// writer.write(&LogRecord::Force(ForceSample { force_n: [0.0, 0.0, -1.5], ..ForceSample::default() }))?;
 /// let log = writer.finish()?;
 ///
-/// let mut reader = LogReader::new(log.as_slice(), "memory")?;
-/// let forces: Vec<f64> = reader
-///     .by_ref()
-///     .filter_map(|entry| match entry {
-///         LogEntry::Record(LogRecord::Force(sample)) => Some(sample.force_n[2]),
-///         _ => None,
-///     })
-///     .collect();
-/// assert_eq!((forces, reader.damage()), (vec![-1.5], None));
+/// let mut forces = Vec::new();
+/// for entry in LogReader::new(log.as_slice(), "memory")? {
+///     if let LogEntry::Record(LogRecord::Force(sample)) = entry? {
+///         forces.push(sample.force_n[2]);
+///     }
+/// }
+/// assert_eq!(forces, [-1.5]);
+///
+/// // Without its last byte it is still read, and said to be damaged.
+/// let mut cut = LogReader::new(&log[..log.len() - 1], "memory")?;
+/// assert_eq!(cut.readable().count(), 2);
+/// assert!(cut.damage().is_some());
 /// # Ok(())
 /// # }
 /// ```
@@ -63,6 +67,8 @@ pub struct LogReader<R> {
     foreign_base: Option<u64>,
     /// Pictures are read too.
     has_scene: bool,
+    /// The damage was given as an error.
+    is_told: bool,
 }
 
 struct Channel {
@@ -77,8 +83,7 @@ impl LogReader<BufReader<File>> {
     /// Opens the log at `path`.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read, [`ErrorKind::Log`](crate::ErrorKind::Log) if it is no
-    /// MCAP file.
+    /// [`ErrorKind::Io`] if it cannot be read, [`ErrorKind::Log`] if it is no MCAP file.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
@@ -90,8 +95,7 @@ impl<R: Read> LogReader<R> {
     /// Reads a log from `source`; `place` names it in errors. `source` should be buffered.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`](crate::ErrorKind::Io) if it cannot be read, [`ErrorKind::Log`](crate::ErrorKind::Log) if it is no
-    /// MCAP file.
+    /// [`ErrorKind::Io`] if it cannot be read, [`ErrorKind::Log`] if it is no MCAP file.
     pub fn new(source: R, place: &str) -> Result<Self, Error> {
         let records = RecordStream::new(source, place)?;
         Ok(Self {
@@ -105,6 +109,7 @@ impl<R: Read> LogReader<R> {
             foreign: Some(foreign_environment()),
             foreign_base: None,
             has_scene: false,
+            is_told: false,
         })
     }
 
@@ -114,6 +119,11 @@ impl<R: Read> LogReader<R> {
     pub fn with_scene(mut self) -> Self {
         self.has_scene = true;
         self
+    }
+
+    /// The entries up to the end of the log or to its damage, of which [`damage`](Self::damage) tells afterwards.
+    pub fn readable(&mut self) -> impl Iterator<Item = LogEntry> {
+        self.map_while(Result::ok)
     }
 
     /// The damage of the log and its place, in one line; known only once the iterator has ended.
@@ -256,20 +266,27 @@ impl<R: Read> LogReader<R> {
 }
 
 impl<R: Read> Iterator for LogReader<R> {
-    type Item = LogEntry;
+    type Item = Result<LogEntry, Error>;
 
-    fn next(&mut self) -> Option<LogEntry> {
+    /// The next entry.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Log`] where the log is damaged, once.
+    fn next(&mut self) -> Option<Self::Item> {
         if let Some(entry) = self.left.pop_front() {
-            return Some(entry);
+            return Some(Ok(entry));
         }
-        loop {
-            let opcode = self.records.read_next()?;
+        while let Some(opcode) = self.records.read_next() {
             match self.decode(opcode) {
-                Ok(Some(entry)) => return Some(entry),
+                Ok(Some(entry)) => return Some(Ok(entry)),
                 Ok(None) => {}
                 Err(e) => self.records.stop(format!("the log is damaged: {e}")),
             }
         }
+        if std::mem::replace(&mut self.is_told, true) {
+            return None;
+        }
+        self.records.damage().map(|damage| Err(Error::new(ErrorKind::Log, damage).at(&self.place)))
     }
 }
 

@@ -154,7 +154,7 @@ fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<Replayed
     let mut reader = LogReader::open(log)?;
     let reader_place = reader.place().to_owned();
     let (mut number, mut first, mut samples) = (0, None, Vec::new());
-    for entry in reader.by_ref() {
+    for entry in reader.readable() {
         match entry {
             LogEntry::Environment(environment) => {
                 let devices = &environment.devices;

@@ -62,7 +62,7 @@ impl Logged {
     pub(super) fn read(path: &Path) -> Result<Self, Error> {
         let mut reader = LogReader::open(path)?;
         let mut gathered = Gathered::default();
-        for entry in reader.by_ref() {
+        for entry in reader.readable() {
             gathered.push(entry);
         }
         let place = reader.place();

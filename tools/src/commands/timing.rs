@@ -77,7 +77,7 @@ fn read(log: &Path, args: &TimingArgs, groups: &[String]) -> Result<TimingReport
     }
     let mut analysis = TimingAnalysis::new(selection);
     let (bar, mut reader) = ReadBar::open("reading", log, false)?;
-    reader.by_ref().for_each(|entry| analysis.push_entry(&entry));
+    reader.readable().for_each(|entry| analysis.push_entry(&entry));
     bar.clear();
     let mut report = analysis.report();
     report.run.damage = reader.damage().map(str::to_owned);

@@ -85,7 +85,7 @@ pub fn export_percentiles<R: Read, W: Write>(
     let topic = format!("/timing/{group}");
     let mut gauge = Gauge::new(figure);
     let mut values = Distribution::default();
-    while let Some(entry) = reader.next() {
+    while let Some(Ok(entry)) = reader.next() {
         if reader.topic() == topic
             && let LogEntry::Record(LogRecord::Tick(timing)) = &entry
             && window.contains_entry(&entry)

@@ -120,10 +120,10 @@ pub fn is_turned(log: &Path, topic: &str) -> Result<bool, Error> {
     Ok(false)
 }
 
-/// The next entry of `topic` in `window`.
+/// The next entry of `topic` in `window`, before the end of the log or its damage.
 fn next_of<R: Read>(reader: &mut LogReader<R>, topic: &str, window: &Window) -> Option<LogEntry> {
     loop {
-        let entry = reader.next()?;
+        let entry = reader.next()?.ok()?;
         if reader.topic() == topic && window.contains_entry(&entry) {
             return Some(entry);
         }

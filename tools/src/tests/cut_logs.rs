@@ -26,7 +26,7 @@ fn exported(bytes: &[u8], topic: &str) -> (String, Option<String>) {
 fn analysed(bytes: &[u8]) -> (TimingAnalysis, Option<String>) {
     let mut reader = LogReader::new(bytes, "cut.mcap").expect("it begins with the magic");
     let mut analysis = TimingAnalysis::new(Selection::default());
-    reader.by_ref().for_each(|entry| analysis.push_entry(&entry));
+    reader.readable().for_each(|entry| analysis.push_entry(&entry));
     (analysis, reader.damage().map(str::to_owned))
 }
 

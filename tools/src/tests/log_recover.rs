@@ -33,7 +33,7 @@ fn long_log() -> Vec<u8> {
 
 fn read(bytes: &[u8]) -> (Vec<LogEntry>, Option<String>) {
     let mut reader = LogReader::new(bytes, "memory").unwrap();
-    let entries = reader.by_ref().collect();
+    let entries = reader.readable().collect();
     (entries, reader.damage().map(str::to_owned))
 }
 

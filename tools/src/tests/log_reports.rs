@@ -10,7 +10,7 @@ use super::log_sample::{entries, log_of, time_of};
 fn analyse(bytes: &[u8]) -> RunReport {
     let mut reader = LogReader::new(bytes, "memory").unwrap();
     let mut analysis = Analysis::default();
-    reader.by_ref().for_each(|entry| analysis.push_entry(&entry));
+    reader.readable().for_each(|entry| analysis.push_entry(&entry));
     RunReport { damage: reader.damage().map(str::to_owned), ..analysis.report() }
 }
 
@@ -43,7 +43,7 @@ fn percentiles_of_a_log_equal_those_of_the_sorted_records() {
 fn json_is_one_document_that_says_what_the_log_says() {
     let bytes = log_of(&entries(500), 1000);
     let mut analysis = TimingAnalysis::new(Selection::default());
-    LogReader::new(bytes.as_slice(), "memory").unwrap().for_each(|entry| analysis.push_entry(&entry));
+    LogReader::new(bytes.as_slice(), "memory").unwrap().for_each(|entry| analysis.push_entry(&entry.unwrap()));
     let value: serde_json::Value = serde_json::from_str(&timing_to_json(&analysis.report())).unwrap();
     assert_eq!(value["verdict"], "FAILED");
     assert_eq!(value["reason"], "global: an actor reported fault 18446744073709551615, in 0.500 s of real time");
@@ -116,7 +116,7 @@ fn every_topic_has_a_table_whose_rows_match_its_header() {
     let sent = entries(40);
     let bytes = log_of(&sent, 100);
     let mut reader = LogReader::new(bytes.as_slice(), "memory").unwrap();
-    reader.by_ref().for_each(drop);
+    reader.readable().for_each(drop);
     let topics = reader.topics();
     assert_eq!(topics.len(), 14);
     for (&topic, &messages) in &topics {

@@ -70,7 +70,7 @@ fn injected() -> Vec<Injected> {
 fn read(path: &Path) -> TimingReport {
     let mut reader = LogReader::open(path).unwrap();
     let mut analysis = TimingAnalysis::new(Selection::default());
-    reader.by_ref().for_each(|entry| analysis.push_entry(&entry));
+    reader.readable().for_each(|entry| analysis.push_entry(&entry));
     assert_eq!(reader.damage(), None);
     analysis.report()
 }

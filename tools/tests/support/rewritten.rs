@@ -6,7 +6,7 @@ use palpate::log::{Environment, LogEntry, LogReader, LogRecord, McapWriter};
 
 /// Writes the log anew with another text of what was run and other records.
 pub fn rewrite_log(log: &Path, session: impl Fn(String) -> String, record: impl Fn(LogRecord) -> LogRecord) {
-    let entries: Vec<_> = LogReader::open(log).unwrap().collect();
+    let entries: Vec<_> = LogReader::open(log).unwrap().map(Result::unwrap).collect();
     let mut environment = Environment::default();
     for entry in &entries {
         match entry {

@@ -27,7 +27,7 @@ use crate::drawing::html::JsonString;
 /// [`ErrorKind::Io`](palpate::ErrorKind::Io) if `out` cannot be written.
 pub fn export_trace<R: Read, W: Write>(reader: &mut LogReader<R>, window: &Window, out: &mut W) -> Result<(), Error> {
     let mut trace = Trace::new(out).map_err(output_error)?;
-    while let Some(entry) = reader.next() {
+    while let Some(Ok(entry)) = reader.next() {
         match &entry {
             LogEntry::Environment(environment) => trace.set_environment(environment),
             entry if window.contains_entry(entry) => trace.entry(entry, reader.topic()).map_err(output_error)?,
