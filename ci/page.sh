@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Pages of `palpate timing --html` work in a browser: wide and narrow, light and dark, in print, without scripts; their numbers
-# are those of `--json`. Pages of `palpate reduce --html` fit the screen, and no words of their drawings lie on each other. In the page
+# are those of `--json`. Pages of `palpate reduce --html` and `palpate compare --html` fit the screen, and no words of their drawings lie on each other. In the page
 # of `palpate view` the body gives way where it is pushed, and forces are those of the log; a log is scrubbed and played.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 build_programs
@@ -35,6 +35,7 @@ python3 ci/check_page.py "$folder"/{real_time,stopped,virtual,two_devices,cut}.h
 "$palpate" reduce --paper all --html "$folder/paper.html" >/dev/null
 "$palpate" reduce --cells 5,5,5 --html "$folder/mesh.html" >/dev/null
 "$palpate" reduce scenes/drag_friction.toml --error-pct 0.5 --html "$folder/scene.html" >/dev/null
-python3 ci/check_drawings.py "$folder"/{paper,mesh,scene}.html
+"$palpate" compare scenes/drag_friction.toml --models-only --duration 0.4 --html "$folder/compare.html" >/dev/null
+python3 ci/check_drawings.py "$folder"/{paper,mesh,scene,compare}.html
 
 python3 ci/check_view.py "$palpate" "$folder"

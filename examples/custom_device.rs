@@ -90,7 +90,6 @@ fn main() -> Result<(), Error> {
     let session = Session::builder(body)
         .device(Hand::new())
         .friction(0.5)
-        .crossfade_ms(10.0)
         .duration_s((PRINT_EVERY * PRINTS).as_secs_f64())
         .build()?;
     let mut running = session.start()?;

@@ -20,10 +20,8 @@ fn main() -> Result<(), Error> {
     let session = Session::builder(body)
         .path(path) // or .device(...): anything that implements `Device`
         .tool(ToolShape::Sphere { radius: 0.008 })
-        .global(RateGroup::hz(30))
         .local(RateGroup::hz(1000).pin(1).realtime(80))
         .friction(0.5)
-        .crossfade_ms(10.0)
         .log("minimal.mcap")
         .build()?; // refuses what cannot work, and says why
     let running = session.start()?; // threads are up

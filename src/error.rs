@@ -92,6 +92,13 @@ impl Error {
         self
     }
 
+    /// Says place and message as `words` says them.
+    #[must_use]
+    pub(crate) fn reworded(mut self, words: impl Fn(&str) -> String) -> Self {
+        (self.place, self.message) = (words(&self.place), words(&self.message));
+        self
+    }
+
     /// Calls the field `from` at the start of the error's place `to`.
     #[must_use]
     pub(crate) fn with_place_of(mut self, from: &str, to: &str) -> Self {

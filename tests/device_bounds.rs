@@ -143,7 +143,7 @@ fn a_path_in_millimetres_is_refused_with_its_place_and_the_reach() {
     let positions = path.positions_m().iter().map(|place| place.map(|c| 1e3 * c)).collect();
     let large = ToolPath::new(path.times_s().to_vec(), positions).unwrap();
     let error = refused(Session::builder(block()).path(large));
-    assert_eq!((error.kind(), error.place()), (ErrorKind::Scene, "device.path_csv"));
+    assert_eq!((error.kind(), error.place()), (ErrorKind::Scene, "path()"));
     assert!(error.to_string().contains("the device reaches 0.960 m: is the path in metres?"), "{error}");
 }
 

@@ -393,9 +393,9 @@ fn rewritten(log: &Path, entries: Vec<LogEntry>) -> PathBuf {
     path
 }
 
-/// A short virtual run of the demo, in contact at its end.
+/// A short virtual run of the demo, in contact at its end, with a model that has two rate groups and no third for its basis.
 fn short(folder: &tempfile::TempDir) -> PathBuf {
-    record(demo(0.5).virtual_time(), folder).1
+    record(demo(0.5).model(LocalModelKind::Patch).virtual_time(), folder).1
 }
 
 fn replayed(log: &Path) -> Result<ReplayReport, Error> {

@@ -448,3 +448,31 @@ fn an_implicit_step_has_no_paper_equations() {
     let message = refusal(&paper).to_string();
     assert!(message.starts_with("scene.toml:23: local.step: ") && message.contains("corrected"), "{message}");
 }
+
+// Check that who writes calls reads of calls.
+#[test]
+fn errors_of_a_builder_name_its_calls() {
+    use palpate::prelude::*;
+    let session = || Session::builder(Block::builder([5; 3], [0.1; 3]).fix(Face::ZMin).build().unwrap());
+    let path = || ToolPath::constant([0.05, 0.05, 0.09]).unwrap();
+    let errors = [
+        (session().path(path()).friction(-1.0), "friction(): is -1, must be"),
+        (session().path(path()).local(RateGroup::hz(20)), "local(): is 20, must be at least global(), 30"),
+        (session().path(path()).offset_ms(0.0), "offset_ms(): is 0"),
+        (session().path(path()).substeps_per_ms(0), "substeps_per_ms(): is 0"),
+        (session().path(path()).duration_s(-1.0), "duration_s(): is -1"),
+        (session(), "device: nothing moves the tool: give it a path(), an attach_node() or a device"),
+    ];
+    for (session, words) in errors {
+        let error = session.virtual_time().build().unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Scene);
+        assert!(error.to_string().starts_with(words), "{error}, not {words}");
+        assert!(
+            !["local.", "global.", "contact.", "run.", "device."].iter().any(|key| error.to_string().contains(key)),
+            "{error}"
+        );
+    }
+    // A scene of a file has keys.
+    let error = Session::from_scene(Scene::demo()).friction(-1.0).build().unwrap_err();
+    assert!(error.to_string().starts_with("contact.friction: "), "{error}");
+}

@@ -40,6 +40,16 @@ fn auto_is_the_default_of_programs_and_a_named_model_is_not_questioned() {
 }
 
 #[test]
+fn settings_that_the_chosen_model_does_not_use_are_said() {
+    let asked = session(block()).crossfade_ms(10.0).global(palpate::runtime::RateGroup::hz(30)).virtual_time();
+    let summary = asked.build().unwrap().run().unwrap().to_string();
+    let words = summary.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("without effect in full: crossfade_ms() and global()"), "{summary}");
+    let used = session(block()).model(LocalModelKind::Patch).crossfade_ms(10.0).virtual_time();
+    assert!(!used.build().unwrap().run().unwrap().to_string().contains("without effect"));
+}
+
+#[test]
 fn auto_is_the_default_of_scenes() {
     let text = "[body.block]\nnodes = [6, 6, 6]\nsize_m = [0.1, 0.1, 0.1]\n[body.material]\nnode_mass_kg = 0.0005\n\
                 stiffness_n_per_m = 30.0\ndamping_ratio = 0.3\n[device]\nattach_node = [3, 3, 5]\n";
@@ -105,7 +115,7 @@ fn a_replay_takes_the_model_of_the_log_and_does_not_choose_again() {
     let choice = built.choice().cloned().unwrap();
     built.run().unwrap();
     let (mut environment, mut scene) = (None, None);
-    for entry in LogReader::open(&log).unwrap() {
+    for entry in LogReader::open(&log).unwrap().map(Result::unwrap) {
         match entry {
             LogEntry::Environment(found) => environment = Some(found),
             LogEntry::Attachment { name, data } if name == Environment::SESSION => {

@@ -58,7 +58,7 @@ fn a_body_that_cannot_keep_its_rate_is_refused_when_the_session_is_built() {
     let refused = |model| session(slow(takes).0).model(model).build().unwrap_err();
     for (model, words) in [
         (LocalModelKind::Patch, ["body: ", "66.7 force evaluations", "33.3 ms", "of 216 fit"]),
-        (LocalModelKind::Full, ["local.model: ", "2.0 force evaluations", "1.00 ms", "another local model"]),
+        (LocalModelKind::Full, ["model(): ", "2.0 force evaluations", "1.00 ms", "another local model"]),
     ] {
         let error = refused(model);
         assert_eq!(error.kind(), ErrorKind::Scene);

@@ -90,7 +90,7 @@ fn what_is_off_is_in_environment_and_report_and_two_stages_cannot_be() {
             Ok(_) => assert!(stage.can_be_off()),
             Err(error) => {
                 assert!(!stage.can_be_off());
-                assert!(error.to_string().contains("safety.off: names"), "{error}");
+                assert!(error.to_string().contains("safety_off(): names"), "{error}");
             }
         }
     }

@@ -4,7 +4,7 @@ use std::fmt::{self, Write as _};
 
 /// Pixels per metre, and around the body.
 const SCALE: f64 = 4000.0;
-const MARGIN: f64 = 30.0;
+const MARGIN: f64 = 44.0;
 
 /// How stiff each point felt.
 pub struct Map {
@@ -94,9 +94,18 @@ impl Map {
             fx - 8.0,
             fy - 8.0
         ));
-        let (middle, below) = (whole / 2.0, whole - 10.0);
+        let (middle, bottom, left) = (whole / 2.0, MARGIN + size, MARGIN - 6.0);
+        for tick in [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| share * edge) {
+            let mm = format!("{:.0}", 1e3 * tick);
+            line(format!("<path d=\"M{:.1} {bottom:.1}v4M{MARGIN} {:.1}h-4\" stroke=\"#888\"/>", x(tick), y(tick)));
+            line(format!("<text x=\"{:.1}\" y=\"{:.1}\">{mm}</text>", x(tick), bottom + 15.0));
+            line(format!("<text x=\"{left:.1}\" y=\"{:.1}\" text-anchor=\"end\">{mm}</text>", y(tick) + 4.0));
+        }
+        line(format!("<text x=\"{middle:.1}\" y=\"{:.1}\">x (mm)</text>", bottom + 30.0));
+        line(format!("<text transform=\"translate(13 {middle:.1}) rotate(-90)\">y (mm)</text>"));
         line(format!(
-            "<text x=\"{middle:.1}\" y=\"{below:.1}\">apparent stiffness (N/m); dashed: the nodule, cross: where it was found</text>"
+            "<text x=\"{middle:.1}\" y=\"{:.1}\">apparent stiffness (N/m); dashed: the nodule, cross: where it was found</text>",
+            MARGIN - 16.0
         ));
         line("</svg>".to_owned());
         svg

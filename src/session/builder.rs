@@ -20,7 +20,6 @@ use crate::scene::{BlendSpec, FrictionSpec, LinkSpec, ModelChoice, SafetyStage, 
 ///     .path(ToolPath::constant([0.02, 0.02, 0.049])?)
 ///     .friction(0.5)
 ///     .local(RateGroup::hz(2000))
-///     .crossfade_ms(10.0)
 ///     .virtual_time()
 ///     .duration_s(0.05);
 /// assert_eq!(session.build()?.run()?.report.devices[0].force.ticks, 100);

@@ -20,6 +20,7 @@ mod records;
 mod replay;
 mod running;
 mod wire;
+mod words;
 
 pub use crate::actors::{LOG_FAILURE, SurfaceView, ToolView};
 pub use builder::SessionBuilder;
@@ -123,11 +124,17 @@ impl SessionBuilder {
     /// Checks everything and makes the session ready to start.
     ///
     /// # Errors
-    /// If something cannot work, naming the field and what would be right.
+    /// If something cannot work, naming the field of a scene, or the call of this builder if it began with
+    /// [`Session::builder`], and what would be right.
     pub fn build(self) -> Result<Session, Error> {
         if self.parts.options.measures_cost && self.parts.options.execution == Execution::Threaded {
             return Err(Error::new(ErrorKind::Runtime, "cost is measured in virtual time only: use virtual_time()"));
         }
-        Ok(Session { prepared: prepare(self.parts)? })
+        let of_program = self.parts.is_of_program.then(|| self.parts.scene.clone());
+        let prepared = prepare(self.parts).map_err(|error| match &of_program {
+            Some(scene) => words::of_builder(error, scene),
+            None => error,
+        })?;
+        Ok(Session { prepared })
     }
 }

@@ -17,6 +17,8 @@ pub(super) type OpenHaply = fn(&HaplySpec, f64) -> Result<Box<dyn Device>, Error
 #[derive(Debug)]
 pub(super) struct Parts {
     pub(super) scene: Scene,
+    /// The scene is no file's: a program says by calls what is in it.
+    pub(super) is_of_program: bool,
     /// The program's own body, in place of the scene's.
     pub(super) body: Option<Box<dyn Body>>,
     /// The program's own devices with their names, in place of the scene's first ones.
@@ -38,6 +40,7 @@ pub(super) struct Parts {
 impl Parts {
     pub(super) fn new(body: Option<Box<dyn Body>>, scene: Scene) -> Self {
         Self {
+            is_of_program: body.is_some(),
             endless: body.is_some(),
             scene,
             body,

@@ -101,8 +101,12 @@ fn the_page_has_every_plot_and_needs_nothing_else() {
     assert_eq!(plots.len(), 7);
     let curves = |plot: &str| plot.matches("class=\"line ").count();
     let models = expected_rows().len() / 2;
-    assert_eq!(plots[0].matches("<circle").count(), expected_rows().len());
-    assert_eq!([1, 2, 3].map(|at| curves(plots[at])), [models + 1, models + 1, models]);
+    // Each is drawn for a broad page and for a narrow one.
+    for width in [0, 1] {
+        let drawn = |at: usize| plots[at].split("<div class=\"narrow\">").nth(width).expect("two drawings");
+        assert_eq!(drawn(0).matches("<circle").count(), expected_rows().len());
+        assert_eq!([1, 2, 3].map(|at| curves(drawn(at))), [models + 1, models + 1, models]);
+    }
     for outside in ["http", "src=", "@import", "url(", "<script", "<link", "NaN"] {
         assert!(!page.contains(outside), "the page has {outside:?}");
     }

@@ -69,7 +69,8 @@ fn a_body_that_takes_longer_than_its_period_is_refused_in_real_time_with_what_wa
 fn auto_says_in_plan_report_timing_and_json_which_model_it_took_and_why() {
     let folder = Folder::new();
     let auto = ["run", "scene.toml", "--virtual", "--model", "auto"];
-    let why = "a full tick takes 9.7 us of 1 ms (nominal), and nothing beats full where it fits";
+    let why = "a full tick takes 9.7 us of 1 ms (nominal), and nothing beats full where it fits; without effect in full: \
+               local.blend and local.patch";
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>().join(" ");
     let plan = folder.succeed(&[&auto[..], &["--plan"]].concat());
     let line = format!("model full: {why}");

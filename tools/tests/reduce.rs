@@ -182,7 +182,7 @@ fn a_scene_has_its_verdict_first_and_the_exit_code_follows_it_on_request() {
     let is_local = locality["local"].as_bool().unwrap();
     let verdict = locality["verdict"].as_str().unwrap();
     let text = folder.succeed(&["reduce", "scene.toml", "--html", "page.html"]);
-    assert!(text.starts_with(if is_local { "Local. " } else { "Not local. " }), "{text}");
+    assert!(text.starts_with(if is_local { "Local at " } else { "Not local. " }), "{text}");
     let page = std::fs::read_to_string(folder.path("page.html")).unwrap();
     assert!(page.contains("Over the surface") && page.contains("between resyncs (10 to 1000 Hz)"));
     let called = folder.call(&["reduce", "scene.toml", "--error-pct", "5", "--fail-if-not-local"]);

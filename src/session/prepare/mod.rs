@@ -15,6 +15,7 @@ mod plan;
 mod situation;
 mod timing;
 mod tools;
+mod unused;
 
 pub use choice::Choice;
 pub(super) use choice::extended;
@@ -25,8 +26,10 @@ pub(super) use timing::Timing;
 pub(super) use tools::Tool;
 
 use super::parts::{Options, Parts};
+use super::words::in_calls;
 use crate::actors::Settings;
 use crate::error::Error;
+use crate::log::ModelReason;
 use crate::model::body::Stiffness;
 use crate::model::contact::Equations;
 use crate::model::local::{Blend, Feedback, Kind, Template};
@@ -50,6 +53,8 @@ pub(super) struct Prepared {
     pub(super) plan: ModelPlan,
     /// Why its model, if none was named.
     pub(super) choice: Option<Choice>,
+    /// Settings that a model has no use for which was named: one that was chosen says so itself.
+    pub(super) unused: Option<String>,
     /// The patch, if an error budget chose it.
     pub(super) sized_patch: Option<PatchChoice>,
     pub(super) local: RateGroup,
@@ -79,6 +84,19 @@ impl Prepared {
         link::group(self.plan.timing.haptic)
     }
 
+    /// Why model and patch are what they are, if that was left to the session, and which settings the model has no use for.
+    pub(super) fn model_reason(&self) -> Option<ModelReason> {
+        let of_model = self.choice.as_ref().map(|choice| choice.reason.clone());
+        let reason = match &self.sized_patch {
+            Some(patch) => Some(patch.reason(of_model)),
+            None => of_model,
+        };
+        match &self.unused {
+            Some(words) => Some(extended(reason, words.clone(), None)),
+            None => reason,
+        }
+    }
+
     /// The rate groups, in graph order.
     pub(super) fn groups(&self) -> Vec<RateGroup> {
         let global = self.is_multi_rate().then(|| self.global.clone());
@@ -105,10 +123,12 @@ impl Prepared {
 /// Whatever cannot work, naming the field and what would be right.
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let mut scene = described(&parts)?;
-    let Parts { body, devices, attached, probes, global, local, open_haply, endless, is_replay, options, .. } = parts;
+    let Parts { body, devices, attached, probes, global, local, open_haply, endless, .. } = parts;
+    let Parts { is_of_program, is_replay, options, .. } = parts;
     let execution = options.execution;
     let rates = timing::rates(&scene)?;
     let mut start = Start::new(body, &scene, &attached, probes, rates[0])?;
+    let has_global = global.is_some();
     let global = groups::global_group(global, &scene.global, rates[1], execution)?;
     let blend_ticks = (scene.local.blend.ms * 1e-3 / rates[0].period_s()).round().max(1.0) as u32;
     let work = Nanos::from_secs_f64(start.body.nominal_evaluation() * f64::from(start.substeps));
@@ -118,6 +138,13 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let timing = Timing::new(rates, start.substeps, lateness, blend_ticks);
 
     let (kind, choice, measured) = choice::model(&mut scene, &mut start, timing, execution);
+    let settings = unused::settings(&scene, kind, has_global).into_iter();
+    let named = |field: &str| if is_of_program { in_calls(field, scene.local.blend.kind) } else { field.to_owned() };
+    let mut unused = unused::in_words(&settings.map(named).collect::<Vec<_>>(), kind);
+    let choice = choice.map(|Choice { model, reason }| match unused.take() {
+        Some(words) => Choice { model, reason: extended(Some(reason), words, None) },
+        None => Choice { model, reason },
+    });
     let sized_patch = patch::choose(&scene, &*start.body, &start.attached);
     // Named in the log's scene, so that a replay does not choose again.
     scene.local.patch = Some(sized_patch.as_ref().map_or(scene.patch_size(), |choice| choice.size));
@@ -161,7 +188,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let until = (!endless).then(|| Nanos::from_secs_f64(scene.run.duration_s));
     let simulation = simulation(start, &scene, &tools)?;
     let prepared =
-        Prepared { scene: as_run, simulation, tools, plan, choice, sized_patch, local, global, until, options };
+        Prepared { scene: as_run, simulation, tools, plan, choice, unused, sized_patch, local, global, until, options };
     Plan::check(execution, &prepared.groups())?;
     Ok(prepared)
 }

@@ -2,7 +2,7 @@
 
 use crate::devices::DeviceState;
 use crate::error::Error;
-use crate::log::{Environment, GroupInfo, LoggedExecution, ModelReason, ToolSample};
+use crate::log::{Environment, GroupInfo, LoggedExecution, ToolSample};
 use crate::model::body::Block;
 use crate::model::contact::ToolShape;
 use crate::runtime::{Execution, Rate};
@@ -25,7 +25,7 @@ pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<
             Execution::Threaded => LoggedExecution::Threaded { start_unix_ns: unix_now_ns() },
         },
         model: prepared.plan.template.kind.name().to_owned(),
-        model_reason: model_reason(prepared),
+        model_reason: prepared.model_reason(),
         body: tetrahedra.map(|spec| body(prepared, spec)),
         tools: tools(prepared),
         haptic_hz: timing.haptic.as_hz(),
@@ -102,15 +102,6 @@ fn groups(prepared: &Prepared) -> Vec<GroupInfo> {
     let optional =
         [prepared.reduces().then(basis), prepared.is_multi_rate().then(global), prepared.is_linked().then(link)];
     [local].into_iter().chain(optional.into_iter().flatten()).chain([logger]).collect()
-}
-
-/// Why model and patch are what they are, if that was left to the session.
-fn model_reason(prepared: &Prepared) -> Option<ModelReason> {
-    let of_model = prepared.choice.as_ref().map(|choice| choice.reason.clone());
-    match &prepared.sized_patch {
-        Some(patch) => Some(patch.reason(of_model)),
-        None => of_model,
-    }
 }
 
 /// The haptic actors in the order of their ticks: two for each tool, or one for all after their devices.

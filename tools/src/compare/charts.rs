@@ -7,7 +7,8 @@ use super::figures::{ComparedRun, Comparison, ForceTrace, Measured};
 use super::milliseconds;
 use crate::drawing::svg::{Axis, Chart, Line, Mark, Point, Sign};
 
-const WIDE: f64 = 960.0;
+/// Widths of a chart on a page, and on a narrow one.
+pub(super) const WIDTHS: [f64; 2] = [960.0, 400.0];
 /// A force below this part of the peak is no contact to look at.
 const TOUCHING: f64 = 0.01;
 /// Errors below this are not told apart over time (% of the peak).
@@ -121,8 +122,8 @@ impl<'a> Plots<'a> {
         runs.chain([line("full", self.full)]).collect()
     }
 
-    /// The forces over the whole run, and two resyncs of it.
-    pub(super) fn forces(&self, latency: Nanos) -> [String; 2] {
+    /// The forces over the whole run, and two resyncs of it, `wide`.
+    pub(super) fn forces(&self, latency: Nanos, wide: f64) -> [String; 2] {
         let (zoom, lines) = (self.zoom(latency), self.force_lines(latency));
         let shown = |range: [f64; 2]| {
             let points = lines.iter().flat_map(|line| &line.points);
@@ -137,7 +138,7 @@ impl<'a> Plots<'a> {
         let y_near = Axis::around("force (N)", shown(zoom));
         let chart = |title: String, range: [f64; 2], y: Axis| Chart {
             lines: lines.clone(),
-            ..Chart::new(title, [WIDE, 270.0], Axis::linear("t (s)", range), y)
+            ..Chart::new(title, [wide, 270.0], Axis::linear("t (s)", range), y)
         };
         let mut whole = chart(self.title("Force", latency), self.whole(), y_whole);
         whole.band = Some(zoom);
@@ -147,8 +148,8 @@ impl<'a> Plots<'a> {
         [whole, near].map(|chart| chart.to_svg())
     }
 
-    /// The error of each model over time.
-    pub(super) fn errors(&self, latency: Nanos) -> String {
+    /// The error of each model over time, `wide`.
+    pub(super) fn errors(&self, latency: Nanos, wide: f64) -> String {
         let lines: Vec<Line<'a>> = self
             .runs(latency)
             .map(|(run, trace)| Line {
@@ -160,13 +161,13 @@ impl<'a> Plots<'a> {
         let values = lines.iter().flat_map(|line| &line.points).map(|(_, error)| *error);
         let largest = values.filter(|error| error.is_finite()).fold(1.0, f64::max).min(LARGEST_ERROR);
         let y = Axis::log("error (% of peak)", [SMALLEST_ERROR, largest * 1.2]);
-        let chart = Chart::new(self.title("Error", latency), [WIDE, 250.0], Axis::linear("t (s)", self.whole()), y);
+        let chart = Chart::new(self.title("Error", latency), [wide, 250.0], Axis::linear("t (s)", self.whole()), y);
         Chart { band: Some(self.zoom(latency)), lines, ..chart }.to_svg()
     }
 }
 
-/// Cost of a haptic tick against the error: every model and latency is a point, `full` lies on the bottom.
-pub(super) fn speed_against_error(comparison: &Comparison) -> String {
+/// Cost of a haptic tick against the error, `wide`: every model and latency is a point, `full` lies on the bottom.
+pub(super) fn speed_against_error(comparison: &Comparison, wide: f64) -> String {
     let models = models(comparison);
     let us = |run: &Measured| run.cost.tick_p50.0.max(1) as f64 * 1e-3;
     let period_us = comparison.haptic_period.0 as f64 * 1e-3;
@@ -196,7 +197,7 @@ pub(super) fn speed_against_error(comparison: &Comparison) -> String {
     Chart {
         marks: vec![Mark { at: period_us, label: "haptic period".to_owned() }],
         points: [point("full", Nanos::ZERO, &comparison.full)].into_iter().chain(runs).collect(),
-        ..Chart::new("Speed against error", [WIDE, 400.0], x, y)
+        ..Chart::new("Speed against error", [wide, 400.0], x, y)
     }
     .to_svg()
 }

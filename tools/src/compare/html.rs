@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::charts::{Plots, colour, models, speed_against_error};
+use super::charts::{Plots, WIDTHS, colour, models, speed_against_error};
 use super::figures::Comparison;
 use super::table::{COLUMNS, cell, clock, facts, rows};
 use crate::drawing::html::{escaped, page, sentence};
@@ -73,28 +73,30 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
         let _ = writeln!(style, "body:has(#k{number}:not(:checked)) .m{number} {{ display: none; }}");
     }
     body.push_str("</div>\n");
-    let mut figure = |id: &str, svg: &str, caption: &str| {
-        let _ = writeln!(body, "<figure id=\"{id}\"><div class=\"wide\">\n{svg}</div>");
+    // Twice, for a broad page and for a narrow one: the letters of a chart that is shrunk cannot be read.
+    let mut figure = |id: &str, [broad, narrow]: [String; 2], caption: &str| {
+        let _ = write!(body, "<figure id=\"{id}\"><div class=\"broad\">\n{broad}</div>");
+        let _ = writeln!(body, "<div class=\"narrow\">\n{narrow}</div>");
         let _ = writeln!(body, "<figcaption>{}</figcaption></figure>", sentence(caption));
     };
     figure(
         "speed",
-        &speed_against_error(comparison),
+        WIDTHS.map(|wide| speed_against_error(comparison, wide)),
         "Left is cheaper, down is nearer to `full`. Filled: results of the global model are there at once; hollow: late.",
     );
     for device in 0..comparison.full.devices.len() {
         let plots = Plots::new(comparison, device);
         for (number, latency) in comparison.latencies().into_iter().enumerate() {
-            let [whole, near] = plots.forces(latency);
-            let errors = plots.errors(latency);
+            let [[whole, near], [small_whole, small_near]] = WIDTHS.map(|wide| plots.forces(latency, wide));
+            let errors = WIDTHS.map(|wide| plots.errors(latency, wide));
             let around = "The same around two resyncs in the middle of the contact. Dashed: a result of the global model \
                           becomes visible.";
-            for (what, svg, caption) in [
-                ("force", whole, "Magnitude of the force on the tool. The shaded part is shown below."),
-                ("resync", near, around),
+            for (what, charts, caption) in [
+                ("force", [whole, small_whole], "Magnitude of the force on the tool. The shaded part is shown below."),
+                ("resync", [near, small_near], around),
                 ("error", errors, "Distance from the force of `full`; what is below the lowest line is drawn on it."),
             ] {
-                figure(&plots.id(&format!("{what}-{number}")), &svg, caption);
+                figure(&plots.id(&format!("{what}-{number}")), charts, caption);
             }
         }
     }
@@ -116,6 +118,8 @@ mod tests {
         ];
         let page = to_html(&Comparison { scene: "a&b".into(), runs, ..Comparison::default() });
         assert!(page.contains("<td class=\"why\" colspan=\"11\">too &lt;large&gt;</td>"), "{page}");
+        assert_eq!(page.matches("<div class=\"broad\">").count(), page.matches("<div class=\"narrow\">").count());
+        assert!(page.contains("viewBox=\"0 0 400 400\""), "a phone has its own");
         assert!(page.contains("nothing to compare") && page.contains("a&amp;b") && !page.contains("NaN"), "{page}");
     }
 }

@@ -20,6 +20,7 @@ text { font: 11px Helvetica, Arial, sans-serif; fill: #626b79; }
 .point { fill: currentColor; stroke: currentColor; stroke-width: 1.8; }
 .point.hollow { fill: #ffffff; }
 .label { fill: currentColor; font-weight: 600; }
+.leader { stroke: currentColor; stroke-width: .8; opacity: .6; }
 .c0 { color: #1d232d; } .c1 { color: #0072b2; } .c2 { color: #d55e00; } .c3 { color: #009e73; }
 .c4 { color: #aa4a94; } .c5 { color: #b58900; } .c6 { color: #2a9fd6; } .c7 { color: #7a5230; }
 .c8 { color: #969ca6; }

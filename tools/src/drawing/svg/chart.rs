@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::super::html::escaped;
 use super::axis::Axis;
+use super::label::{Area, LINE, Labels, Placed, length};
 use super::sign::Sign;
 use super::thin::thinned;
 
@@ -12,11 +13,6 @@ const HEAD: f64 = 26.0;
 const LEFT: f64 = 54.0;
 const RIGHT: f64 = 12.0;
 const FOOT: f64 = 38.0;
-/// What a letter of a label takes.
-const LETTER: f64 = 6.4;
-const LINE: f64 = 13.0;
-/// Where the label of a point may be, in lines below it: nearest first.
-const LABEL_LINES: [f64; 11] = [-0.1, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0, 5.0, -5.0];
 
 /// A curve.
 #[derive(Clone, Debug)]
@@ -157,7 +153,7 @@ impl Chart<'_> {
             if let Some(label) = label {
                 let y = bottom + 14.0;
                 // A label at the very edge would leave the picture.
-                let half = 0.6 * LETTER * label.chars().count() as f64;
+                let half = 0.6 * length(&label);
                 let (x, anchor) = if x + half > self.width { (self.width - 1.0, "end") } else { (x, "middle") };
                 let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{label}</text>");
             }
@@ -196,20 +192,27 @@ impl Chart<'_> {
 
     /// The labels of marks and levels, above all that is drawn.
     fn name_marks(&self, svg: &mut String) {
-        for mark in self.marks.iter().filter(|mark| !mark.label.is_empty()) {
-            let x = LEFT + self.px(mark.at);
-            let long = LETTER * mark.label.chars().count() as f64;
-            // On the side where there is room.
-            let (x, anchor) = if x - LEFT > long + 8.0 { (x - 4.0, "end") } else { (x + 4.0, "start") };
-            let (y, label) = (HEAD + LINE, escaped(&mark.label));
+        for Placed { label, at: (x, y), is_end } in self.mark_labels() {
+            let (anchor, label) = (if is_end { "end" } else { "start" }, escaped(label));
             let _ =
-                writeln!(svg, "<text class=\"halo\" x=\"{x:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{label}</text>");
+                writeln!(svg, "<text class=\"halo\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{label}</text>");
         }
-        for level in &self.levels {
-            let (x, y, label) = (LEFT + 6.0, HEAD + self.py(level.at), escaped(&level.label));
+    }
+
+    /// The labels of marks and levels.
+    fn mark_labels(&self) -> impl Iterator<Item = Placed<'_>> {
+        let marks = self.marks.iter().map(|mark| {
+            let x = LEFT + self.px(mark.at);
+            // On the side where there is room.
+            let is_end = x - LEFT > length(&mark.label) + 8.0;
+            Placed { label: &mark.label, at: (if is_end { x - 4.0 } else { x + 4.0 }, HEAD + LINE), is_end }
+        });
+        let levels = self.levels.iter().map(|level| {
+            let y = HEAD + self.py(level.at);
             let y = if y < HEAD + LINE + 4.0 { y + LINE } else { y - 4.0 };
-            let _ = writeln!(svg, "<text class=\"halo\" x=\"{x}\" y=\"{y:.1}\">{label}</text>");
-        }
+            Placed { label: &level.label, at: (LEFT + 6.0, y), is_end: false }
+        });
+        marks.chain(levels).filter(|placed| !placed.label.is_empty())
     }
 
     fn draw_bars(&self, svg: &mut String, bars: &Bars<'_>) {
@@ -247,56 +250,23 @@ impl Chart<'_> {
         let _ = writeln!(svg, "\"><title>{}</title></path>", escaped(line.name));
     }
 
-    /// Points, each with its label where no other one is.
+    /// Points, each with its label where nothing else is. A label without such a place is only read out where its point is
+    /// pointed at.
     fn draw_points(&self, svg: &mut String) {
         let place = |point: &Point| (LEFT + self.px(point.at.0), HEAD + self.py(point.at.1));
-        let mut taken: Vec<Area> = self.points.iter().map(|point| Area::around(place(point), 6.0, 6.0)).collect();
+        let mut labels = Labels::new(Area { left: LEFT, right: self.width, top: HEAD, bottom: HEAD + self.down() });
+        self.points.iter().for_each(|point| labels.take(Area::around(place(point), 6.0)));
+        self.mark_labels().for_each(|placed| labels.take(placed.area()));
         for point in &self.points {
             let (x, y) = place(point);
-            let long = LETTER * point.label.chars().count() as f64;
-            let right = LABEL_LINES.map(|lines| (x + 9.0, y + 4.0 + lines * LINE));
-            let left = LABEL_LINES.map(|lines| (x - 9.0 - long, y + 4.0 + lines * LINE));
-            let area = |(x, y): (f64, f64)| Area { left: x, right: x + long, top: y - LINE + 3.0, bottom: y + 3.0 };
-            let plot = Area { left: LEFT, right: self.width, top: HEAD, bottom: HEAD + self.down() };
-            let is_free =
-                |at: &&(f64, f64)| plot.holds(&area(**at)) && !taken.iter().any(|taken| taken.meets(&area(**at)));
-            let at = *right.iter().chain(&left).find(is_free).unwrap_or(&right[0]);
-            taken.push(area(at));
+            let label = labels.of_point(&point.label, (x, y));
             let (class, hollow) = (&point.class, if point.is_hollow { " hollow" } else { "" });
-            let label = escaped(&point.label);
             let sign = match point.sign {
                 Sign::Disc => format!("<circle class=\"point{hollow}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/>"),
                 sign => format!("<path class=\"point{hollow}\" d=\"{}\"/>", sign.path(x, y)),
             };
-            let _ = writeln!(
-                svg,
-                "<g class=\"{class}\">{sign}\
-                 <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\">{label}</text></g>",
-                at.0, at.1
-            );
+            let _ = writeln!(svg, "<g class=\"{class}\">{sign}{label}</g>");
         }
-    }
-}
-
-/// A rectangle of the picture.
-struct Area {
-    left: f64,
-    right: f64,
-    top: f64,
-    bottom: f64,
-}
-
-impl Area {
-    fn around((x, y): (f64, f64), dx: f64, dy: f64) -> Self {
-        Self { left: x - dx, right: x + dx, top: y - dy, bottom: y + dy }
-    }
-
-    fn meets(&self, other: &Self) -> bool {
-        self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
-    }
-
-    fn holds(&self, other: &Self) -> bool {
-        self.left <= other.left && other.right <= self.right && self.top <= other.top && other.bottom <= self.bottom
     }
 }
 
@@ -337,23 +307,5 @@ mod tests {
         // The plot is 534 by 136: zero is at the bottom, what is too large is cut off above.
         assert!(svg.contains("d=\"M0.0 136.0L534.0 -9.0\""), "{svg}");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-    }
-
-    #[test]
-    fn labels_of_points_at_one_place_do_not_lie_on_each_other() {
-        let mut chart = chart();
-        let point = |label: &str| Point {
-            class: "c1".into(),
-            label: label.into(),
-            at: (0.5, 1.0),
-            sign: Sign::Disc,
-            is_hollow: false,
-        };
-        chart.points = ["one", "two", "six"].map(point).into();
-        let svg = chart.to_svg();
-        let places: Vec<&str> = svg.lines().filter_map(|line| line.split("class=\"label\"").nth(1)).collect();
-        let place = |text: &str| text.split('>').next().unwrap_or_default().to_owned();
-        assert_eq!(places.len(), 3);
-        assert!(place(places[0]) != place(places[1]) && place(places[1]) != place(places[2]), "{places:?}");
     }
 }

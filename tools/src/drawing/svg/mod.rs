@@ -7,6 +7,7 @@ mod axis;
 mod chart;
 mod heat;
 mod heat_map;
+mod label;
 mod sign;
 mod thin;
 

@@ -22,7 +22,7 @@ pub(super) fn faces(locality: &Locality) -> Vec<&FaceMap> {
     faces
 }
 
-/// Errors in the band on `face`, the second axis upwards, every line ended by a newline.
+/// Errors between resyncs on `face`, the second axis upwards, every line ended by a newline.
 pub(super) fn map(face: &FaceMap, contact: u32) -> String {
     let (wide, high) = (face.first_m.len(), face.second_m.len());
     let every = wide.max(high).div_ceil(MOST).max(1);
@@ -31,7 +31,7 @@ pub(super) fn map(face: &FaceMap, contact: u32) -> String {
         format!("{} to {} mm", end(places.first()), end(places.last()))
     };
     let mut text = format!(
-        "Error in the band on {}, {} to the right ({}), {} upwards ({})",
+        "Error between resyncs on {}, {} to the right ({}), {} upwards ({})",
         face.face,
         face.axes[0],
         ends(&face.first_m),

@@ -14,7 +14,7 @@ const STATES: usize = 12;
 const ERROR: (&str, &str) = ("error\n%", "2 (sum of the Hankel singular values left out) / (sum of all)");
 const HINF: (&str, &str) = ("H-inf\n%", "largest error of the frequency response over its largest gain");
 /// The contact that stands for the worst ones.
-const WORST: &str = "the same at the contact of the surface that is worst in the band for the scene's patch";
+const WORST: &str = "the same at the contact of the surface that is worst between resyncs for the scene's patch";
 
 fn columns(of: &[(&str, &str)]) -> Vec<Column> {
     of.iter().map(|(head, meaning)| Column::new(*head, *meaning)).collect()

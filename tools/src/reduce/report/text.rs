@@ -88,7 +88,7 @@ mod tests {
             "An error of 0.500 % between resyncs is met by",
             "Measured in the time domain",
             "Errors of the patch over the surface (%)",
-            "Error in the band on z_max",
+            "Error between resyncs on z_max",
             "Patch sizes",
             "Reduced surroundings",
             "Table 1, 2D, zeta 1",

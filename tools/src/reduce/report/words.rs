@@ -19,7 +19,7 @@ pub(super) const RESPONSES: &str = "Errors are norms of the difference over all 
 
 /// How the maps are to be read.
 pub(super) const LOCALITY: &str = "Errors are norms of the difference of the 3 x 3 dynamic stiffnesses of patch and whole body at the \
-     contact, over the norm of the whole body's; in the band: rms over the logarithm of the frequency.";
+     contact, over the norm of the whole body's; between resyncs: rms over the logarithm of the frequency.";
 
 /// Times of a debug build are no times.
 pub(super) fn debug_note() -> Option<&'static str> {
@@ -28,8 +28,33 @@ pub(super) fn debug_note() -> Option<&'static str> {
 
 /// Is it local or not, in a sentence.
 pub fn locality_verdict(locality: &Locality) -> String {
-    let verdict = if locality.is_local { "Local at this contact" } else { "Not local" };
+    let verdict = match Extent::of(locality) {
+        Extent::Throughout => "Local at this contact",
+        Extent::BetweenResyncs => "Local at this contact between resyncs, not at rest",
+        Extent::None => "Not local",
+    };
     format!("{verdict}. {}", what_is_left_out(locality))
+}
+
+/// How far the paper's assumption holds at the contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Extent {
+    /// Between resyncs and at rest.
+    Throughout,
+    /// Between resyncs: a push that is held is another one until the global model puts it right.
+    BetweenResyncs,
+    None,
+}
+
+impl Extent {
+    /// A force at rest is as good as one between resyncs within the same limit.
+    pub(super) fn of(locality: &Locality) -> Self {
+        match locality.is_local {
+            false => Self::None,
+            true if locality.contact.at_rest_pct <= locality.band_limit_pct => Self::Throughout,
+            true => Self::BetweenResyncs,
+        }
+    }
 }
 
 /// What the tables come to, in a sentence; `None` without tables.
@@ -64,11 +89,11 @@ pub(super) fn what_is_left_out(locality: &Locality) -> String {
     let contact = &locality.contact;
     let worst = band_errors(locality).last().copied();
     let over = worst.map_or(String::new(), |worst| {
-        format!(", and {} in the band at the worst contact of the surface", percent(worst))
+        format!(", and {} between resyncs at the worst contact of the surface", percent(worst))
     });
     format!(
         "Without what lies outside the patch of {} nodes, the force at the contact is {} off between resyncs ({low} to {high} Hz) \
-         and {} at rest{over}. Local is what stays within {} and {} there.",
+         and {} at rest{over}. It counts as local up to {} between resyncs and {} at rest.",
         by(&locality.patch),
         percent(contact.band_pct),
         percent(contact.at_rest_pct),
@@ -91,7 +116,7 @@ pub(super) fn contact(locality: &Locality) -> String {
     let [x, y, z] = contact.position_m.map(|m| figure(1e3 * m));
     format!(
         "Contact: node {} at ({x}, {y}, {z}) mm, stiffness of the whole body along the normal {} N/m at rest; error of the patch \
-         {} at rest, {} in the band (rms), {} at its worst.",
+         {} at rest, {} between resyncs (rms), {} at the worst frequency there.",
         contact.node,
         figure(contact.stiffness_n_per_m),
         percent(contact.at_rest_pct),
@@ -148,16 +173,16 @@ mod tests {
         assert_eq!(
             locality_verdict(&locality),
             "Not local. Without what lies outside the patch of 4 x 4 x 2 nodes, the force at the contact is 7.20 % off between \
-             resyncs (10 to 1000 Hz) and 64.0 % at rest, and 24.0 % in the band at the worst contact of the surface. Local is what stays \
-             within 20.0 % and 100 % there."
+             resyncs (10 to 1000 Hz) and 64.0 % at rest, and 24.0 % between resyncs at the worst contact of the surface. It counts as \
+             local up to 20.0 % between resyncs and 100 % at rest."
         );
         locality.is_local = true;
         locality.faces.clear();
         let verdict = locality_verdict(&locality);
-        assert!(
-            verdict.starts_with("Local at this contact. ") && verdict.contains("64.0 % at rest. Local is"),
-            "{verdict}"
-        );
+        assert!(verdict.starts_with("Local at this contact between resyncs, not at rest. "), "{verdict}");
+        assert!(verdict.contains("64.0 % at rest. It counts"), "{verdict}");
+        locality.contact.at_rest_pct = 12.0;
+        assert!(locality_verdict(&locality).starts_with("Local at this contact. "));
     }
 
     #[test]

@@ -306,7 +306,7 @@ fn judge(out: &mut Locality, naming: &Naming) {
     }
     for (count, of, names, worst) in alike {
         out.warnings.push(format!(
-            "on {} the patch is not enough at {count} of {of} contacts{}, worst at {}: {:.0} % in the band, {:.0} % at rest",
+            "on {} the patch is not enough at {count} of {of} contacts{}, worst at {}: {:.0} % between resyncs, {:.0} % at rest",
             names.join(", "),
             if names.len() > 1 { " each" } else { "" },
             place(worst),
@@ -316,7 +316,7 @@ fn judge(out: &mut Locality, naming: &Naming) {
     }
     if out.reference_pct > REFERENCE_LIMIT_PCT {
         out.warnings.push(format!(
-            "this body rings: its response in the band is known to some {:.0} % only, at this contact, and all errors in the band are uncertain by as \
+            "this body rings: its response between resyncs is known to some {:.0} % only, at this contact, and all errors there are uncertain by as \
              much; `--measure` and `palpate compare` are not",
             out.reference_pct
         ));

@@ -35,7 +35,8 @@ pub(crate) fn charts(group: &GroupTiming) -> String {
     if is_measured(&group.execution) {
         let title = format!("{}: execution", group.name);
         let svg = histogram(&title, "execution", &group.execution, "c2", &limits);
-        out.push_str(&chart_figure(&svg, "How long a release worked, all actors together."));
+        let above = group.budget.map_or(String::new(), |budget| above_budget(&group.execution, budget));
+        out.push_str(&chart_figure(&svg, &format!("How long a release worked, all actors together.{above}")));
     }
     for actor in group.actors.iter().filter(|actor| is_measured(&actor.execution)) {
         let title = format!("{}: execution of {}", group.name, actor.name);
@@ -47,6 +48,22 @@ pub(crate) fn charts(group: &GroupTiming) -> String {
     }
     out.push_str("</div>\n");
     out
+}
+
+/// What it means that releases are right of the line of their budget, if some are.
+fn above_budget(execution: &Shape, budget: Nanos) -> String {
+    if execution.percentiles.max <= budget.0 {
+        return String::new();
+    }
+    // The share that is not above it, by the curve of all values.
+    let within =
+        execution.curve.iter().take_while(|&&(_, value)| value <= budget.0).last().map_or(0.0, |&(share, _)| share);
+    format!(
+        " Up to {:.0} % of them took longer than the budget of {}, which is what the schedule was checked with: the cores bore less \
+         than was planned, and only the deadline says whether a release was late.",
+        100.0 * (1.0 - within),
+        short(budget.0 as f64)
+    )
 }
 
 /// False if there is nothing, or all of it is zero: declared and not measured.

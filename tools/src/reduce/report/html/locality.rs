@@ -17,7 +17,12 @@ const MOST_SPREAD: f64 = 1e4;
 
 /// Is it local or not, where it fails, and the contact.
 pub(super) fn verdict(locality: &Locality) -> String {
-    let (class, badge) = if locality.is_local { ("good", "LOCAL") } else { ("bad", "NOT LOCAL") };
+    let (class, badge) = match words::Extent::of(locality) {
+        words::Extent::Throughout => ("good", "LOCAL"),
+        // No green beside a large error at rest.
+        words::Extent::BetweenResyncs => ("fair", "LOCAL BETWEEN RESYNCS"),
+        words::Extent::None => ("bad", "NOT LOCAL"),
+    };
     let mut out = format!(
         "<p class=\"lead {class}\"><span class=\"verdict\">{badge}</span> {}</p>\n",
         prose(&words::what_is_left_out(locality))
@@ -123,7 +128,7 @@ fn face_map(locality: &Locality, face: &FaceMap, scale: &HeatScale, of: fn(&Cont
 fn in_words(contact: &ContactLocality) -> String {
     let [x, y, z] = contact.position_m.map(|m| number(1e3 * m));
     format!(
-        "node {} at ({x}, {y}, {z}) mm: {} between resyncs, {} at its worst, {} at rest; {} N/m",
+        "node {} at ({x}, {y}, {z}) mm: {} between resyncs, {} at the worst frequency there, {} at rest; {} N/m",
         contact.node,
         percent(contact.band_pct),
         percent(contact.worst_pct),
@@ -197,6 +202,15 @@ mod tests {
     fn cells_lie_around_their_contacts() {
         assert_eq!(edges(&[0.0, 0.01, 0.03]), [0.0, 5.0, 20.0, 30.0]);
         assert_eq!(edges(&[0.02]), [19.5, 20.5]);
+    }
+
+    #[test]
+    fn a_large_error_at_rest_is_not_green() {
+        let mut locality = sample().locality.unwrap();
+        (locality.is_local, locality.contact.at_rest_pct) = (true, 68.0);
+        assert!(!verdict(&locality).contains("good") && verdict(&locality).contains("LOCAL BETWEEN RESYNCS"));
+        locality.contact.at_rest_pct = 5.0;
+        assert!(verdict(&locality).contains("class=\"lead good\""));
     }
 
     #[test]
