@@ -1,6 +1,5 @@
 //! Simulated device and hand in a session: against an independent implementation, repeated, replayed, and failing.
 
-#[path = "../src/model/tests/common/mod.rs"]
 mod common;
 
 use std::path::Path;
@@ -124,7 +123,7 @@ mod logged {
             last = force;
         }
         let told = |entry| if let LogEntry::Text(event) = entry { Some(event.message) } else { None };
-        let told: Vec<String> = LogReader::open(&log).unwrap().filter_map(told).collect();
+        let told: Vec<String> = LogReader::open(&log).unwrap().map(Result::unwrap).filter_map(told).collect();
         for cause in [
             Cause::Device(DeviceFault::Stale),
             Cause::DeviceNotFinite,
@@ -172,7 +171,7 @@ mod logged {
         assert_eq!(tools(&summary), straight, "it moves as it did");
         let told = turns(&summary);
         assert!((told[300].angle() - 0.2).abs() < 0.01 && told[50].angle() > 0.01, "{}", told[300]);
-        let logged = LogReader::open(&log).unwrap().filter_map(|entry| match entry {
+        let logged = LogReader::open(&log).unwrap().map(Result::unwrap).filter_map(|entry| match entry {
             LogEntry::Record(LogRecord::Tool(row)) => Some(row.orientation),
             _ => None,
         });

@@ -1,6 +1,5 @@
 //! Blocks of several materials: the kernel's forces against their springs one by one, as a test of its own works them out.
 
-#[path = "../src/model/tests/kernel_support/mod.rs"]
 mod kernel_support;
 
 use kernel_support::*;

@@ -246,10 +246,5 @@ mod tests {
         let names: Vec<_> = missing.iter().map(|finding| finding.name).collect();
         assert_eq!(names, ["kernel", "isolation", "throttling", "SMT", "governor", "C-states", "priority"]);
         assert!(missing.iter().all(|finding| finding.to_string().ends_with(finding.remedy)));
-        // Check that the guide has a section for each
-        let guide = include_str!("../../../docs/realtime.md").to_lowercase();
-        for finding in found {
-            assert!(guide.contains(&format!("\n### {}\n", finding.name.to_lowercase())), "no section {}", finding.name);
-        }
     }
 }

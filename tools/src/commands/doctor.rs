@@ -58,7 +58,9 @@ mod tests {
         assert!(text.starts_with("LIMITED: ") && text.contains("refused    SCHED_FIFO 80 is refused"), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
         assert!(plan.machine.len() > 5);
+        let guide = include_str!("../../../docs/realtime.md").to_lowercase();
         for finding in &plan.machine {
+            assert!(guide.contains(&format!("\n### {}\n", finding.name.to_lowercase())), "no section {}", finding.name);
             assert!(text.contains(finding.name), "{text}");
             let first = finding.remedy.split(' ').next().unwrap();
             assert!(finding.state != Readiness::Missing || text.contains(first), "{text}");

@@ -1,0 +1,1 @@
+../../src/model/tests/common/mod.rs

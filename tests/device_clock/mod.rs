@@ -1,0 +1,1 @@
+../../src/runtime/tests/device_clock/mod.rs

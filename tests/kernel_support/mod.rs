@@ -1,0 +1,1 @@
+../../src/model/tests/kernel_support/mod.rs
