@@ -54,7 +54,7 @@ pub struct LocalSpec {
     /// [`Scene::patch_size`](super::Scene::patch_size) says.
     pub patch: Option<[usize; 3]>,
     /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted. If absent, what
-    /// `error_pct` needs, or 150 without that.
+    /// `error_pct` needs, or 250 without that.
     pub basis: Option<usize>,
     /// Folder in which bases are kept from run to run; relative to the current one. If absent, it is the user's cache for a scene
     /// that was read from a file and runs in real time, and none for others.
@@ -104,13 +104,13 @@ impl LocalSpec {
         }
     }
 
-    /// The size that a basis is to have: a number of states that is given counts, then the budget, then 150 states.
+    /// The size that a basis is to have: a number of states that is given counts, then the budget, then 250 states.
     pub fn basis_size(&self) -> Size {
         match (self.basis, self.error_pct) {
             (Some(states), _) => Size::States(states),
             // `auto` may choose a model that does not meet less, and says so.
             (None, Some(error_pct)) => Size::ErrorPct(error_pct.max(Size::LEAST_PCT)),
-            (None, None) => Size::States(Size::MOST_STATES),
+            (None, None) => Size::States(Size::DEFAULT_STATES),
         }
     }
 }

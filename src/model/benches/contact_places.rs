@@ -1,5 +1,5 @@
 //! What a 1 kHz tick of `predictive` costs by the number of places at which a tool touches: spheres of growing radius on the 12^3
-//! body, two substeps, windows of 6 x 6 x 3 nodes, 150 states, a small circle. Each row is of 4,000 ticks after 400 that warm up.
+//! body, two substeps, windows of 6 x 6 x 3 nodes, 250 states, a small circle. Each row is of 4,000 ticks after 400 that warm up.
 //!
 //! `cargo bench -p palpate-model --bench contact_places`
 
@@ -16,7 +16,7 @@ use palpate_model::{Pose, Vec3};
 
 const TICKS: usize = 4_000;
 const WARM_UP: usize = 400;
-const STATES: usize = 150;
+const STATES: usize = 250;
 /// Radii and depths (mm).
 const TOOLS: [[f64; 2]; 8] =
     [[4.0, 1.0], [8.0, 3.0], [20.0, 3.0], [36.0, 3.0], [40.0, 4.0], [60.0, 5.0], [80.0, 5.0], [80.0, 7.0]];

@@ -3,15 +3,18 @@
 use super::Body;
 use crate::Vec3;
 
-/// The nodes of `body` that can move and are nearest to `patch` at rest, at most about `count`, in increasing order: those in a box that
-/// reaches equally far beyond the patch on all sides. `None` if those are all that can move.
+/// Of a wide patch the neighbourhood has so many times its nodes at least: else it would be little more than the patch.
+const SPREAD: usize = 4;
+
+/// The nodes of `body` that can move and are nearest to `patch` at rest, at most about `count` or four times as many as the patch has,
+/// in increasing order: those in a box that reaches equally far beyond the patch on all sides. `None` if those are all that can move.
 ///
 /// # Real-time
 /// Not real-time safe: allocates, and looks at every node.
 pub(crate) fn neighbourhood(body: &dyn Body, patch: &[u32], count: usize) -> Option<Vec<u32>> {
     let (rest, inverse_masses) = (body.rest(), body.inverse_masses());
     let movable = || (0..rest.len()).filter(|&node| inverse_masses[node] > 0.0);
-    let all = movable().count();
+    let (all, count) = (movable().count(), count.max(SPREAD * patch.len()));
     if all <= count {
         return None;
     }
@@ -52,5 +55,13 @@ mod tests {
         assert_eq!(neighbourhood(&block, &patch, 863).unwrap().len(), 500, "the next layer is not whole");
         assert_eq!(neighbourhood(&block, &patch, 864).unwrap().len(), 864);
         assert!(neighbourhood(&block, &patch, 15 * 15 * 14).is_none(), "held nodes do not count");
+        // A patch of 10 x 10 x 4 is not its own neighbourhood.
+        let wide: Vec<u32> = (0..3375)
+            .filter(|&id| {
+                let [i, j, k] = block.lattice().coordinates(id);
+                (2..12).contains(&i) && (2..12).contains(&j) && k > 10
+            })
+            .collect();
+        assert!(neighbourhood(&block, &wide, 500).unwrap().len() > 2 * wide.len());
     }
 }

@@ -321,6 +321,21 @@ mod tests {
         assert!(worst < 1e-6, "{worst}");
     }
 
+    #[test]
+    fn around_a_wide_window_all_of_its_ring_is_reduced() {
+        let block = Block::builder([26, 26, 16], [0.225, 0.225, 0.135]).fix(Face::ZMin).build().unwrap();
+        let nearest = crate::mesh::NearestTriangle::new(block.surface(), block.rest()).unwrap();
+        for size in [[14, 14, 6], [18, 10, 6], [22, 22, 3]] {
+            let mut patch = Vec::new();
+            block.patch(&[nearest.find(&crate::Vec3::new(0.113, 0.113, 0.135))], size, &mut patch);
+            let reduction = Reduction::new(&RestingBody::new(&block).unwrap(), &patch, 20).unwrap();
+            let ring = block.restriction(&patch).unwrap().ring(patch.len()).len();
+            assert_eq!(reduction.ring.len(), ring, "{size:?}");
+            // Check that there is more than the ring
+            assert!(reduction.far.nodes.len() > 2 * ring, "{size:?}: {} of {ring}", reduction.far.nodes.len());
+        }
+    }
+
     // Check a small body whose patch is all that can move but a corner: what is left hangs on the patch alone.
     #[test]
     fn surroundings_that_only_the_patch_holds_are_refused() {

@@ -95,9 +95,15 @@ impl RestingBody {
     }
 
     /// What of a large body is around `patch` (ids in increasing order), between nodes that are held, and the patch in its
-    /// numbering. `None` if that is all of it.
+    /// numbering. `None` if that is all of it. All that depends on the patch can move there as it does here.
     pub(super) fn around(&self, patch: &[u32]) -> Option<(Self, Vec<u32>)> {
-        let Cutout { nodes, body, .. } = self.body.cutout(&neighbourhood(&*self.body, patch, NEIGHBOURS)?)?;
+        let near = self.restriction(patch)?;
+        let (mut count, mut around) = (NEIGHBOURS, neighbourhood(&*self.body, patch, NEIGHBOURS)?);
+        while near.ring(patch.len()).iter().any(|node| around.binary_search(node).is_err()) {
+            count *= 2;
+            around = neighbourhood(&*self.body, patch, count)?;
+        }
+        let Cutout { nodes, body, .. } = self.body.cutout(&around)?;
         let place: HashMap<u32, u32> = nodes.iter().copied().zip(0..).collect();
         let patch: Vec<u32> = patch.iter().filter_map(|node| place.get(node).copied()).collect();
         Some((Self::alone(body), patch))

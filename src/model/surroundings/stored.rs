@@ -8,7 +8,7 @@ use super::resting::digest;
 use crate::linear_algebra::Matrix;
 
 /// What the bytes begin with; its number changes with what follows.
-const MAGIC: &[u8; 16] = b"palpate-basis-4\n";
+const MAGIC: &[u8; 16] = b"palpate-basis-5\n";
 const WORD: usize = size_of::<u64>();
 
 impl Basis {

@@ -193,7 +193,7 @@ impl LocalModel for Predictive {
         let window = &self.patch.window;
         self.patch.forces.resize(window.nodes.len(), Vec3::zeros());
         let known = self.reduces.then(|| resync.bases.get(&window.nodes[..window.movable])).flatten();
-        self.basis = known.cloned();
+        self.basis = known.filter(|basis| basis.answers.is_of(3 * window.ring)).cloned();
         for numbers in [&mut self.ring_positions, &mut self.ring_velocities, &mut self.ring_forces] {
             numbers.resize(3 * window.ring, 0.0);
         }
