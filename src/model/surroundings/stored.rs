@@ -5,11 +5,12 @@ use super::basis::Basis;
 use super::products::Columns;
 use super::reduced::{Damping, Reduced};
 use super::resting::digest;
+use crate::bytes::{BytesReader, BytesWriter};
 use crate::linear_algebra::Matrix;
 
 /// What the bytes begin with; its number changes with what follows.
 const MAGIC: &[u8; 16] = b"palpate-basis-5\n";
-const WORD: usize = size_of::<u64>();
+const SUM: usize = size_of::<u64>();
 
 impl Basis {
     /// All of it as bytes, with a checksum at the end. `key` comes first: what the basis was made of.
@@ -17,115 +18,77 @@ impl Basis {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn to_bytes(&self, key: u64) -> Vec<u8> {
-        let mut out = Writer(MAGIC.to_vec());
-        out.word(key);
-        out.ids(&self.patch);
-        out.reduced(&self.answers);
-        out.numbers(&self.estimate.map(|estimate| estimate.linear_pct).into_iter().collect::<Vec<_>>());
-        let sum = digest(&out.0);
-        out.word(sum);
-        out.0
+        let mut bytes = MAGIC.to_vec();
+        let mut to = BytesWriter(&mut bytes);
+        to.u64(key);
+        to.list(&self.patch, |to, &id| to.u32(id));
+        write(&self.answers, &mut to);
+        write_numbers(&mut to, self.estimate.map(|estimate| estimate.linear_pct).as_slice());
+        let sum = digest(to.0);
+        to.u64(sum);
+        bytes
     }
 
-    /// Reads [`to_bytes`](Self::to_bytes) back; `None` if the bytes are damaged, of another version or of another `key`.
+    /// Reads [`to_bytes`](Self::to_bytes) back; `None` if the bytes are damaged, of another version or of another `key`, or if one of its
+    /// numbers is none.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn from_bytes(bytes: &[u8], key: u64) -> Option<Self> {
-        let (body, sum) = bytes.split_at_checked(bytes.len().checked_sub(WORD)?)?;
+        let (body, sum) = bytes.split_at_checked(bytes.len().checked_sub(SUM)?)?;
         if u64::from_le_bytes(sum.try_into().ok()?) != digest(body) {
             return None;
         }
-        let mut from = Reader(body.strip_prefix(MAGIC)?);
-        if from.word()? != key {
+        let mut from = BytesReader(body.strip_prefix(MAGIC)?);
+        if from.u64()? != key {
             return None;
         }
-        let (patch, answers) = (from.ids()?, from.reduced()?);
-        let estimate = from.numbers()?.first().map(|&linear_pct| Estimate { linear_pct });
-        Some(Self { patch, answers, estimate })
+        let mut patch = Vec::new();
+        from.list(size_of::<u32>(), &mut patch, BytesReader::u32)?;
+        let answers = read(&mut from)?;
+        let estimate = read_numbers(&mut from)?.first().map(|&linear_pct| Estimate { linear_pct });
+        from.0.is_empty().then_some(Self { patch, answers, estimate })
     }
 }
 
-struct Writer(Vec<u8>);
-
-impl Writer {
-    fn word(&mut self, word: u64) {
-        self.0.extend_from_slice(&word.to_le_bytes());
-    }
-
-    fn ids(&mut self, ids: &[u32]) {
-        self.word(ids.len() as u64);
-        ids.iter().for_each(|&id| self.word(id.into()));
-    }
-
-    fn numbers(&mut self, numbers: &[f64]) {
-        self.word(numbers.len() as u64);
-        numbers.iter().for_each(|x| self.word(x.to_bits()));
-    }
-
-    fn columns(&mut self, columns: &Columns) {
-        let matrix = columns.to_matrix();
-        self.word(matrix.nrows() as u64);
-        self.numbers(matrix.as_slice());
-    }
-
-    fn reduced(&mut self, model: &Reduced) {
-        self.columns(&model.shapes);
-        self.numbers(&model.stiffness);
-        match &model.damping {
-            Damping::Diagonal(damping) => {
-                self.word(0);
-                self.numbers(damping);
-            }
-            Damping::Full(damping) => {
-                self.word(1);
-                self.numbers(damping);
-            }
-        }
-    }
+fn write(model: &Reduced, to: &mut BytesWriter<'_>) {
+    let shapes = model.shapes.to_matrix();
+    to.u32(shapes.nrows() as u32);
+    // They are singles that were made from less.
+    to.list(shapes.as_slice(), |to, &number| to.f32(number as f32));
+    write_numbers(to, &model.stiffness);
+    let (kind, damping) = match &model.damping {
+        Damping::Diagonal(damping) => (0, damping),
+        Damping::Full(damping) => (1, damping),
+    };
+    to.u8(kind);
+    write_numbers(to, damping);
 }
 
-struct Reader<'a>(&'a [u8]);
-
-impl Reader<'_> {
-    fn word(&mut self) -> Option<u64> {
-        let (word, rest) = self.0.split_at_checked(WORD)?;
-        self.0 = rest;
-        Some(u64::from_le_bytes(word.try_into().ok()?))
+fn read(from: &mut BytesReader<'_>) -> Option<Reduced> {
+    let (rows, mut shapes) = (from.u32()? as usize, Vec::new());
+    from.list(size_of::<f32>(), &mut shapes, |from| from.f32().map(f64::from))?;
+    if rows == 0 || !shapes.len().is_multiple_of(rows) {
+        return None;
     }
+    let shapes = Columns::new(&Matrix::from_vec(rows, shapes.len() / rows, shapes));
+    let stiffness = read_numbers(from)?;
+    let damping = match from.u8()? {
+        0 => Damping::Diagonal(read_numbers(from)?),
+        1 => Damping::Full(read_numbers(from)?),
+        _ => return None,
+    };
+    Some(Reduced { states: stiffness.len(), shapes, stiffness, damping })
+}
 
-    fn words(&mut self) -> Option<impl Iterator<Item = u64> + use<>> {
-        let count = usize::try_from(self.word()?).ok()?;
-        let (words, rest) = self.0.split_at_checked(count.checked_mul(WORD)?)?;
-        self.0 = rest;
-        let word = |bytes: &[u8]| u64::from_le_bytes(bytes.try_into().unwrap_or_default());
-        Some(words.chunks_exact(WORD).map(word).collect::<Vec<_>>().into_iter())
-    }
+fn write_numbers(to: &mut BytesWriter<'_>, numbers: &[f64]) {
+    to.list(numbers, |to, &number| to.f64(number));
+}
 
-    fn ids(&mut self) -> Option<Vec<u32>> {
-        self.words()?.map(|word| u32::try_from(word).ok()).collect()
-    }
-
-    fn numbers(&mut self) -> Option<Vec<f64>> {
-        Some(self.words()?.map(f64::from_bits).collect())
-    }
-
-    fn columns(&mut self) -> Option<Columns> {
-        let rows = usize::try_from(self.word()?).ok()?;
-        let numbers = self.numbers()?;
-        let is_matrix = rows > 0 && numbers.len().is_multiple_of(rows);
-        is_matrix.then(|| Columns::new(&Matrix::from_vec(rows, numbers.len() / rows, numbers)))
-    }
-
-    fn reduced(&mut self) -> Option<Reduced> {
-        let (shapes, stiffness) = (self.columns()?, self.numbers()?);
-        let damping = match self.word()? {
-            0 => Damping::Diagonal(self.numbers()?),
-            1 => Damping::Full(self.numbers()?),
-            _ => return None,
-        };
-        Some(Reduced { states: stiffness.len(), shapes, stiffness, damping })
-    }
+fn read_numbers(from: &mut BytesReader<'_>) -> Option<Vec<f64>> {
+    let mut numbers = Vec::new();
+    from.list(size_of::<f64>(), &mut numbers, BytesReader::f64)?;
+    Some(numbers)
 }
 
 #[cfg(test)]
@@ -152,5 +115,13 @@ mod tests {
             assert_eq!(Basis::from_bytes(&wrong, 7), None, "byte {at}");
             assert_eq!(Basis::from_bytes(&bytes[..at], 7), None, "cut at {at}");
         }
+        // Check what somebody may send who knows the checksum
+        let mut endless = basis.clone();
+        endless.answers.stiffness[3] = f64::NAN;
+        assert_eq!(Basis::from_bytes(&endless.to_bytes(7), 7), None);
+        let mut longer = bytes[..bytes.len() - SUM].to_vec();
+        longer.extend([0; 8]);
+        longer.extend(digest(&longer).to_le_bytes());
+        assert_eq!(Basis::from_bytes(&longer, 7), None);
     }
 }

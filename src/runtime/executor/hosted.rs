@@ -5,6 +5,7 @@ use crate::executor::beginning::since;
 use crate::executor::group_thread::{GroupThread, next_due};
 use crate::system::os;
 use crate::time::Nanos;
+use std::sync::Arc;
 
 /// The outcome of a call of [`HostedGroup::release`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -49,7 +50,9 @@ pub struct HostedGroup {
 }
 
 impl HostedGroup {
-    pub(crate) fn new(thread: GroupThread) -> Self {
+    pub(crate) fn new(mut thread: GroupThread) -> Self {
+        let beginning = Arc::clone(&thread.link.beginning);
+        thread.group.time_actors(move || beginning.elapsed());
         Self { thread: Some(thread), ended: false }
     }
 

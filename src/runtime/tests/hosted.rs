@@ -1,8 +1,8 @@
 //! Hosted groups: releases on a thread of the program's own, at whatever pace it keeps.
 
 use palpate_runtime::{
-    Actor, Execution, GroupMode, HostRelease, HostedGroup, Nanos, Outcome, RateGroup, Restart, RunningGraph, Runtime,
-    RuntimeFaultKind, STOP_BOUND, TickContext, actor_fn,
+    Actor, ActorTimes, Execution, GroupMode, HostRelease, HostedGroup, Nanos, Outcome, RateGroup, Restart,
+    RunningGraph, Runtime, RuntimeFaultKind, STOP_BOUND, TickContext, actor_fn,
 };
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -50,6 +50,30 @@ fn releases_run_on_the_thread_that_calls_and_keep_the_nominal_grid() {
     let calls = calls.lock().unwrap();
     assert!(calls.iter().all(|(_, _, thread)| *thread == std::thread::current().id()));
     assert!(calls.windows(2).all(|pair| pair[1].0 > pair[0].0));
+}
+
+// Check that what each actor takes is recorded as of a group with a thread of its own.
+#[test]
+fn several_actors_of_a_hosted_group_are_timed_apart() {
+    let mut graph = Runtime::builder(Execution::Threaded);
+    let mut drain = graph.drain();
+    let spinning = actor_fn("spinning", |_| {
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_micros(300) {}
+        Outcome::Continue
+    });
+    let idle = actor_fn("idle", |_| Outcome::Continue);
+    graph.group(RateGroup::hz(1000).name("haptic").hosted(), vec![idle, spinning]);
+    let mut running = graph.build().unwrap().start().unwrap();
+    let mut haptic = running.take_hosted("haptic").unwrap();
+    assert_eq!(haptic.release(), HostRelease::Ran);
+    drop(haptic);
+    running.stop();
+    let mut records = Vec::new();
+    drain.drain(&mut records);
+    let times: Vec<ActorTimes> = records.iter().filter_map(ActorTimes::from_record).collect();
+    assert_eq!((times.len(), times[0].actors), (1, 2));
+    assert!(times[0].spent()[1] >= Nanos(300_000), "{times:?}");
 }
 
 #[test]
