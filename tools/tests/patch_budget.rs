@@ -79,7 +79,7 @@ fn numbers_win_and_without_a_budget_the_patch_is_that_of_ever() {
     let named = run(session("error_pct = 0.4\npatch = [4, 4, 3]\nbasis = 20\n").log(log("named.mcap")));
     assert_eq!(environment(&named).model_reason, None);
     assert_eq!(as_run(&log("named.mcap")).local.patch, Some([4, 4, 3]));
-    let [left_out, default] = ["", "patch = [6, 6, 3]\nbasis = 150\n"].map(|local| run(session(local)));
+    let [left_out, default] = ["", "patch = [6, 6, 3]\nbasis = 250\n"].map(|local| run(session(local)));
     assert_eq!(left_out.records, default.records);
     assert_ne!(forces(&left_out), forces(&named));
     // A budget sizes no linear patch, however little it allows.
