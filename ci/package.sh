@@ -2,7 +2,7 @@
 # The crates as a registry would have them: each is packaged, and the packages compile against each other with the tests, benches and
 # examples that are in them, whose scenes, series and pictures are there. Not among all jobs: it compiles everything once more.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
-crates=(palpate-runtime palpate-model palpate-mesh palpate palpate-haply palpate-view palpate-cli)
+crates=(palpate-runtime palpate-model palpate-mesh palpate palpate-haply palpate-view palpate-link palpate-cli)
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
@@ -27,7 +27,7 @@ for crate in "${crates[@]}"; do
 done
 cp Cargo.lock "$folder"
 export CARGO_TARGET_DIR="$CARGO_TARGET_DIR/packaged"
-cargo check --quiet --manifest-path "$folder/Cargo.toml" --workspace --all-targets --exclude palpate-cli
+cargo check --quiet --manifest-path "$folder/Cargo.toml" --workspace --all-targets --exclude palpate-cli --exclude palpate-link
 cargo check --quiet --manifest-path "$folder/Cargo.toml" --package palpate-cli
 cargo test --quiet --manifest-path "$folder/Cargo.toml" --package palpate --test scene_files --test device_hand
 echo "the packages are whole"

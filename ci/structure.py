@@ -22,12 +22,15 @@ CRATES = {
     "palpate_runtime": ROOT / "src/runtime",
     "palpate_ffi": ROOT / "ffi/src",
     "palpate_haply": ROOT / "haply/src",
+    "palpate_link": ROOT / "link/src",
     "palpate_view": ROOT / "view/src",
     "palpate_cli": ROOT / "tools/src",
     "palpate_python": ROOT / "python/src",
 }
 # Their names are those of C, in one header, and of Python.
 FOREIGN = {"palpate_ffi", "palpate_python"}
+# Documented by its own job, as what it is built on takes ten minutes.
+ALONE = {"palpate_link"}
 ENGINE = ["palpate", "palpate_mesh", "palpate_model", "palpate_runtime"]
 ASIDE = {"tests", "benches", "examples", "target"}
 # Chosen by a cfg, these files are one: a kernel names its instruction sets and they name it.
@@ -75,7 +78,7 @@ def items(doc, crate):
 def names(doc):
     types = {"structs", "enums", "traits", "types", "unions"}
     owners, leaning, total = defaultdict(list), [], 0
-    for crate in (crate for crate in CRATES if crate not in FOREIGN):
+    for crate in (crate for crate in CRATES if crate not in FOREIGN | ALONE):
         found = list(items(doc, crate))
         total += len(found)
         print(f"{crate:<18}{len(found):>5}")

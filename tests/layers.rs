@@ -10,7 +10,7 @@ const ORDER: [(&str, &[&str]); 12] = [
     ("files", &["error"]),
     ("random", &[]),
     ("safety", &[]),
-    ("link", &["random"]),
+    ("link", &["error", "random"]),
     ("devices", &["error", "files", "random"]),
     ("scene", &["devices", "error", "files", "printable"]),
     ("log", &["error", "printable"]),
@@ -57,7 +57,7 @@ fn sources() -> Vec<(String, String)> {
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
-    ["src", "ffi/src", "haply/src", "python/src", "tools/src", "view/src"]
+    ["src", "ffi/src", "haply/src", "link/src", "python/src", "tools/src", "view/src"]
         .iter()
         .for_each(|folder| collect(&root.join(folder), &mut files));
     files.retain(|path| path.extension().is_some_and(|ending| ending == "rs"));

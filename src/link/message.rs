@@ -29,6 +29,10 @@ pub const MOST_TICKS: usize = 64;
 const MOST_HELD: usize = 1024;
 /// Bytes of a tick.
 const TICK: usize = 8 * 8;
+/// No session lasts longer: 34 years at 1 kHz.
+const LAST_TICK: u64 = 1 << 40;
+/// No tool is farther away (m): what a body would be pulled to by one that is would be no number for long.
+const FARTHEST: f64 = 1e3;
 /// How far from one the length of a turn may be.
 const UPRIGHT: f64 = 1e-6;
 
@@ -82,6 +86,8 @@ const BASIS: u16 = 3;
 const HELD: u16 = 4;
 const PING: u16 = 5;
 const PONG: u16 = 6;
+/// A [`Hello`](super::Hello), which is none of the messages of a session.
+pub(super) const HELLO: u16 = 7;
 
 /// Why a message is not believed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,8 +125,7 @@ impl Message {
                 to.u16(*tool);
                 to.list(&ticks[ticks.len().saturating_sub(MOST_TICKS)..], |to, (tick, pose)| {
                     to.u64(*tick);
-                    to.vector(&pose.position);
-                    wxyz(&pose.orientation).iter().for_each(|&part| to.f64(part));
+                    write_pose(to, pose);
                 });
             }
             Self::Model(parcel) => parcel.write(to),
@@ -165,23 +170,32 @@ impl Message {
     /// # Errors
     /// If it is none of this version, to the last byte.
     pub fn read(bytes: &[u8]) -> Result<(Header, Self), Refused> {
-        if bytes.len() > LARGEST {
-            return Err(Refused::TooLong(bytes.len()));
-        }
-        let mut from = BytesReader(bytes.strip_prefix(&MAGIC).ok_or(Refused::NoMessage)?);
-        let version = from.u16().ok_or(Refused::Malformed)?;
-        if version != VERSION {
-            return Err(Refused::Version(version));
-        }
-        let kind = from.u16().ok_or(Refused::Malformed)?;
+        let (kind, mut from) = read_kind(bytes)?;
         if !(TICKS..=PONG).contains(&kind) {
             return Err(Refused::Kind(kind));
         }
         Self::read_body(kind, &mut from).filter(|_| from.0.is_empty()).ok_or(Refused::Malformed)
     }
 
+    /// What the beginning alone tells: that bytes are no message, or one of another version, before they are kept for anybody.
+    ///
+    /// # Errors
+    /// If [`read`](Self::read) would refuse them for that.
+    pub fn glance(bytes: &[u8]) -> Result<Header, Refused> {
+        let (kind, mut from) = read_kind(bytes)?;
+        if !(TICKS..=PONG).contains(&kind) {
+            return Err(Refused::Kind(kind));
+        }
+        read_header(&mut from).ok_or(Refused::Malformed)
+    }
+
+    /// True for the message of a local model, by its beginning.
+    pub fn is_model(bytes: &[u8]) -> bool {
+        read_kind(bytes).is_ok_and(|(kind, _)| kind == MODEL)
+    }
+
     fn read_body(kind: u16, from: &mut BytesReader<'_>) -> Option<(Header, Self)> {
-        let header = Header { epoch: from.u64()?, number: from.u64()?, sent: Nanos(from.u64()?) };
+        let header = read_header(from)?;
         let message = match kind {
             TICKS => {
                 let (tool, mut ticks) = (from.u16()?, Vec::new());
@@ -206,22 +220,55 @@ impl Message {
     }
 }
 
-fn begin(header: Header, kind: u16, bytes: &mut Vec<u8>) -> BytesWriter<'_> {
+/// Begins what every message of this version begins with.
+pub(super) fn begin_kind(kind: u16, bytes: &mut Vec<u8>) -> BytesWriter<'_> {
     bytes.clear();
     bytes.extend_from_slice(&MAGIC);
     let mut to = BytesWriter(bytes);
     to.u16(VERSION);
     to.u16(kind);
+    to
+}
+
+/// The kind of a message of this version, and what follows.
+pub(super) fn read_kind(bytes: &[u8]) -> Result<(u16, BytesReader<'_>), Refused> {
+    if bytes.len() > LARGEST {
+        return Err(Refused::TooLong(bytes.len()));
+    }
+    let mut from = BytesReader(bytes.strip_prefix(&MAGIC).ok_or(Refused::NoMessage)?);
+    let version = from.u16().ok_or(Refused::Malformed)?;
+    if version != VERSION {
+        return Err(Refused::Version(version));
+    }
+    Ok((from.u16().ok_or(Refused::Malformed)?, from))
+}
+
+fn begin(header: Header, kind: u16, bytes: &mut Vec<u8>) -> BytesWriter<'_> {
+    let mut to = begin_kind(kind, bytes);
     to.u64(header.epoch);
     to.u64(header.number);
     to.u64(header.sent.0);
     to
 }
 
+fn read_header(from: &mut BytesReader<'_>) -> Option<Header> {
+    Some(Header { epoch: from.u64()?, number: from.u64()?, sent: Nanos(from.u64()?) })
+}
+
+pub(super) fn write_pose(to: &mut BytesWriter<'_>, pose: &Pose) {
+    to.vector(&pose.position);
+    wxyz(&pose.orientation).iter().for_each(|&part| to.f64(part));
+}
+
 fn read_tick(from: &mut BytesReader<'_>) -> Option<(u64, Pose)> {
-    let (tick, position) = (from.u64()?, from.vector()?);
+    Some((from.u64().filter(|&tick| tick <= LAST_TICK)?, read_pose(from)?))
+}
+
+/// A pose in reach, whose turn turns.
+pub(super) fn read_pose(from: &mut BytesReader<'_>) -> Option<Pose> {
+    let position = from.vector().filter(|place| place.amax() <= FARTHEST)?;
     let orientation = turn_of([from.f64()?, from.f64()?, from.f64()?, from.f64()?]);
-    ((orientation.norm() - 1.0).abs() <= UPRIGHT).then_some((tick, Pose { position, orientation }))
+    ((orientation.norm() - 1.0).abs() <= UPRIGHT).then_some(Pose { position, orientation })
 }
 
 #[cfg(test)]
@@ -280,9 +327,12 @@ mod tests {
             let ticks = vec![(1, Pose::at(Vec3::new(0.0, wrong, 0.0)))];
             assert_eq!(Message::read(&bytes_of(&Message::Ticks { tool: 0, ticks })).unwrap_err(), Refused::Malformed);
         }
-        let pose = Pose { position: Vec3::zeros(), orientation: turn_of([0.5, 0.0, 0.0, 0.0]) };
-        let ticks = vec![(1, pose)];
-        assert_eq!(Message::read(&bytes_of(&Message::Ticks { tool: 0, ticks })).unwrap_err(), Refused::Malformed);
+        let turned = Pose { position: Vec3::zeros(), orientation: turn_of([0.5, 0.0, 0.0, 0.0]) };
+        let far = Pose::at(Vec3::new(0.0, -1e200, 0.0));
+        for wrong in [(1, turned), (1, far), (u64::MAX, Pose::default())] {
+            let message = Message::Ticks { tool: 0, ticks: vec![wrong] };
+            assert_eq!(Message::read(&bytes_of(&message)).unwrap_err(), Refused::Malformed, "{wrong:?}");
+        }
     }
 
     #[test]

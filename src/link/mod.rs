@@ -5,11 +5,13 @@
 //! neither the local nor the global actor can tell that the other is elsewhere.
 
 mod clock;
+mod hello;
 mod message;
 mod transport;
 mod virtual_link;
 
 pub use clock::Clock;
+pub use hello::Hello;
 pub use message::{Header, LARGEST, MOST_TICKS, Message, Refused, VERSION};
 pub use transport::{Lane, Transport};
 pub use virtual_link::{Conditions, VirtualEnd, VirtualLink};

@@ -1,5 +1,7 @@
 //! What carries messages to the other computer.
 
+use super::Hello;
+use crate::error::Error;
 use crate::runtime::Nanos;
 
 /// How urgent a message is: an urgent one never waits behind one that is less so.
@@ -25,6 +27,20 @@ pub trait Transport: Send + std::fmt::Debug {
 
     /// Puts the next message that has come in place of `message`; false if there is none.
     fn receive(&mut self, now: Nanos, message: &mut Vec<u8>) -> bool;
+
+    /// Introduces the haptic side to the other one, before the session begins; waits until a first local model of every tool has come.
+    ///
+    /// # Errors
+    /// If nobody answers in time, or the other side refuses: with one line that says why.
+    fn connect(&mut self, hello: &Hello) -> Result<(), Error> {
+        let _ = hello;
+        Ok(())
+    }
+
+    /// Counts the peers: another one than before, such as a process that took the place of one that died, has another number.
+    fn peer(&mut self) -> u64 {
+        0
+    }
 
     /// The session begins: what was handed over until now has been delivered before it.
     fn begin(&mut self) {}

@@ -1,7 +1,8 @@
 //! Collects what a session is made of.
 
-use super::parts::{OpenHaply, Parts};
+use super::parts::{OpenHaply, Parts, Side};
 use crate::devices::{Device, ToolPath};
+use crate::link::Transport;
 use crate::model::body::Body;
 use crate::model::contact::ToolShape;
 use crate::model::local::BlendKind;
@@ -94,6 +95,15 @@ impl SessionBuilder {
     #[must_use]
     pub fn link(mut self, link: LinkSpec) -> Self {
         self.parts.scene.link = Some(link);
+        self
+    }
+
+    /// Takes the global models from another process, by `transport`: here are the devices, the local models and the log, there is a
+    /// [`GlobalSession`](super::GlobalSession) of the same scene. Conditions of a simulated [`link`](Self::link) are not added.
+    #[must_use]
+    pub fn global_over(mut self, transport: impl Transport + 'static) -> Self {
+        self.parts.side = Side::Haptic;
+        self.parts.transport = Some(Box::new(transport));
         self
     }
 

@@ -14,6 +14,7 @@
 
 mod builder;
 mod controls;
+mod global;
 mod parts;
 mod prepare;
 mod records;
@@ -25,6 +26,7 @@ mod words;
 pub use crate::actors::{LOG_FAILURE, SurfaceView, ToolView};
 pub use builder::SessionBuilder;
 pub use controls::Controls;
+pub use global::GlobalSession;
 pub use prepare::Choice;
 pub use records::SharedRecords;
 pub use replay::{Compared, Difference, LoggedFault, Replay, ReplayReport, Unrepeated, UnrepeatedRelease};

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crate::devices::Device;
 use crate::error::Error;
+use crate::link::Transport;
 use crate::model::body::Body;
 use crate::model::contact::ToolShape;
 use crate::runtime::{Disturbance, Execution, RateGroup, RuntimeBuilder};
@@ -13,9 +14,23 @@ use crate::scene::{HaplySpec, Scene};
 /// Opens the Haply device that a scene describes, for ticks of so many seconds.
 pub(super) type OpenHaply = fn(&HaplySpec, f64) -> Result<Box<dyn Device>, Error>;
 
+/// What of a session is in this process.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Side {
+    #[default]
+    Both,
+    /// Devices, local models and log: the global model is behind a link.
+    Haptic,
+    /// The global model and what reduces surroundings: the devices are behind a link.
+    Global,
+}
+
 /// Everything that a session is made of.
 #[derive(Debug)]
 pub(super) struct Parts {
+    pub(super) side: Side,
+    /// The way to the other side, of the haptic one.
+    pub(super) transport: Option<Box<dyn Transport>>,
     pub(super) scene: Scene,
     /// The scene is no file's: a program says by calls what is in it.
     pub(super) is_of_program: bool,
@@ -40,6 +55,8 @@ pub(super) struct Parts {
 impl Parts {
     pub(super) fn new(body: Option<Box<dyn Body>>, scene: Scene) -> Self {
         Self {
+            side: Side::default(),
+            transport: None,
             is_of_program: body.is_some(),
             endless: body.is_some(),
             scene,

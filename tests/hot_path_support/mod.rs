@@ -8,7 +8,7 @@ use std::io::Write;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Output};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 use palpate::devices::{Scripted, ToolPath};
@@ -21,7 +21,7 @@ use palpate::runtime::Nanos;
 use palpate::runtime::RateGroup;
 use palpate::runtime::exchange::exchange;
 use palpate::scene::{LinkSpec, StepKind};
-use palpate::session::Session;
+use palpate::session::{Session, SessionBuilder};
 
 pub use device::GUARDED;
 use device::{GuardedDevice, Progress};
@@ -64,6 +64,9 @@ pub struct Case {
     /// The global model is behind a link.
     pub is_linked: bool,
 }
+
+/// Puts the global model of a case into another session, for test programs that know a way there.
+pub static ELSEWHERE: OnceLock<fn(SessionBuilder, Case) -> SessionBuilder> = OnceLock::new();
 
 const VARIABLE: &str = "PALPATE_HOT_PATH_CHILD";
 const LOG: &str = "PALPATE_HOT_PATH_LOG";
@@ -121,6 +124,22 @@ impl Case {
 
     pub fn linked(self) -> Self {
         Self { is_linked: true, ..self }
+    }
+
+    fn shape(self) -> ToolShape {
+        if self.has_shape { ToolShape::Sphere { radius: 0.03 } } else { ToolShape::Point }
+    }
+
+    /// The session without devices and log.
+    pub fn body_and_models(self) -> SessionBuilder {
+        let block = Block::builder([6; 3], [0.1; 3]).node_mass(0.5e-3).stiffness(30.0).damping_ratio(0.3);
+        let block = block.fix(Face::ZMin).fix(Face::XMax).build().expect("a good block");
+        Session::builder(block)
+            .friction(0.5)
+            .model(self.model)
+            // One of the linear patches shows the implicit step.
+            .local_step(if self.model == LocalModelKind::ScaledBoundary { StepKind::Implicit } else { StepKind::Auto })
+            .crossfade_ms(10.0)
     }
 
     /// Runs it in a process of its own; `None`, with the reason printed, where the kernel refuses the filter.
@@ -228,22 +247,16 @@ pub fn child() {
     let (told, mut progress) = exchange(Progress::default);
     let lock = Arc::new(Mutex::new(()));
     let _held = lock.lock().expect("nobody else has it yet");
-    let shape = if case.has_shape { ToolShape::Sphere { radius: 0.03 } } else { ToolShape::Point };
-    let device = GuardedDevice::new(case.guard, case.offence, Arc::clone(&lock), told, shape.radius());
-    let block = Block::builder([6; 3], [0.1; 3]).node_mass(0.5e-3).stiffness(30.0).damping_ratio(0.3);
-    let block = block.fix(Face::ZMin).fix(Face::XMax).build().expect("a good block");
-    let session = Session::builder(block);
+    let device = GuardedDevice::new(case.guard, case.offence, Arc::clone(&lock), told, case.shape().radius());
+    let session = case.body_and_models();
     let session = match case.has_second {
         true => session.named_device("guarded", device).named_device("second", Scripted::new(pressing())),
-        false => session.device(device).tool(shape),
+        false => session.device(device).tool(case.shape()),
     };
-    let mut session = session
-        .friction(0.5)
-        .model(case.model)
-        // One of the linear patches shows the implicit step.
-        .local_step(if case.model == LocalModelKind::ScaledBoundary { StepKind::Implicit } else { StepKind::Auto })
-        .crossfade_ms(10.0)
-        .log(std::env::var_os(LOG).expect("set by the parent"));
+    let mut session = session.log(std::env::var_os(LOG).expect("set by the parent"));
+    if let Some(elsewhere) = ELSEWHERE.get() {
+        session = elsewhere(session, case);
+    }
     if case.is_linked {
         session = session.link(LinkSpec { delay_ms: 5.0, jitter_ms: 2.0, loss: 0.01, ..LinkSpec::default() });
     }

@@ -431,3 +431,19 @@ fn the_command_alone_runs_the_demo_in_real_time() {
     let forces = rows(&folder.succeed(&["export", "palpate-run.mcap", "--topic", "/force"]));
     assert_eq!(forces.len() as u64 + 1, json["groups"][0]["released"].as_u64().unwrap());
 }
+
+#[cfg(not(feature = "link"))]
+#[test]
+fn without_the_link_its_commands_say_in_one_line_how_to_get_it() {
+    let folder = Folder::new();
+    for args in [
+        &["serve", "scene.toml", "--listen", "tcp/127.0.0.1:7447"][..],
+        &["run", "scene.toml", "--global", "tcp/127.0.0.1:7447"],
+        &["link", "keys", "keys"],
+    ] {
+        let called = folder.call(args);
+        assert_eq!((called.code, called.err.lines().count()), (Some(2), 1), "{args:?}: {called:?}");
+        assert!(called.err.contains("--features link"), "{args:?}: {called:?}");
+    }
+    assert!(!folder.path("keys").exists());
+}

@@ -40,6 +40,8 @@ pub struct HapticBridge {
     /// When something of this epoch came last; `None` before.
     heard: Option<Nanos>,
     asked: Option<Nanos>,
+    /// The number of the peer that the epoch is of.
+    peer: u64,
     recorder: Recorder,
 }
 
@@ -59,14 +61,16 @@ impl HapticBridge {
     pub fn new(transport: Box<dyn Transport>, ends: Vec<HapticEnd>, image: Image, recorder: Recorder) -> Self {
         let tool = |end| Tool { end, recent: VecDeque::new(), newest: None, arrived: None };
         let (bases, clock, heard, asked) = Default::default();
-        let (post, tools) = (Post::new(transport), ends.into_iter().map(tool).collect());
-        Self { post, tools, image, bases, clock, heard, asked, recorder }
+        let (mut post, tools) = (Post::new(transport), ends.into_iter().map(tool).collect());
+        let peer = post.peer();
+        Self { post, tools, image, bases, clock, heard, asked, peer, recorder }
     }
 
-    /// A connection that has fallen silent is over: what still comes of it is dropped.
+    /// A connection that has fallen silent, or whose peer is another one now, is over: what still comes of it is dropped.
     fn begin_epoch_after_silence(&mut self, now: Nanos) -> bool {
         let is_silent = self.heard.is_some_and(|heard| now.saturating_sub(heard) >= SILENCE);
-        if is_silent {
+        let peer = self.post.peer();
+        if is_silent || std::mem::replace(&mut self.peer, peer) != peer {
             self.post.begin_epoch(self.post.epoch + 1);
             self.heard = None;
             self.tools.iter_mut().for_each(|tool| tool.newest = None);
@@ -125,8 +129,9 @@ impl HapticBridge {
             match message {
                 Message::Model(parcel) => {
                     let Some(tool) = self.tools.get_mut(parcel.tool()) else { continue };
-                    // One that was overtaken is outdated.
-                    if tool.newest.is_none_or(|newest| parcel.tick() > newest) {
+                    // One that was overtaken is outdated; one of a tick that has not been is none, and would never be old.
+                    let sent = tool.recent.back().map_or(0, |tick| tick.tick);
+                    if parcel.tick() <= sent && tool.newest.is_none_or(|newest| parcel.tick() > newest) {
                         tool.newest = Some(parcel.tick());
                         tool.arrived = Some(parcel);
                     }

@@ -107,6 +107,11 @@ impl Post {
         }
     }
 
+    /// Counts the peers.
+    pub(super) fn peer(&mut self) -> u64 {
+        self.transport.peer()
+    }
+
     /// Everything that was sent until now has arrived.
     pub(super) fn begin(&mut self) {
         self.transport.begin();

@@ -45,7 +45,7 @@ fn feedback(scene: &Scene) -> Result<(), Error> {
     let late = scene.local.feedback.filter(|&feedback| feedback != Feedback::Trajectory);
     late.map_or(Ok(()), |feedback| {
         let message = format!(
-            "is {:?}, which comes too late over a link and would tear the body: leave it out, or the table [link]",
+            "is {:?}, which comes too late over a link and would tear the body: leave it out, or do without a link",
             feedback.name()
         );
         Err(Error::scene("local.feedback", message))

@@ -37,6 +37,12 @@ pub(super) fn lateness(spec: Option<&LinkSpec>, haptic: Rate, own: Nanos) -> Nan
     (own + ways + haptic.period()).min(OLDEST.max(own))
 }
 
+/// How late results are over a real link, beside what makes them late without: what is lost on the way comes a round trip later, and
+/// nobody knows beforehand whether something will be.
+pub(super) fn real_lateness(round_trip: Nanos) -> Nanos {
+    Nanos(round_trip.0.saturating_mul(2)).min(OLDEST)
+}
+
 /// The group of the bridges: they pass on every tick, and nobody waits for them.
 pub(super) fn group(haptic: Rate) -> RateGroup {
     RateGroup::new(haptic).name(LINK)

@@ -7,6 +7,7 @@ mod budget;
 mod choice;
 mod device;
 mod groups;
+mod hello;
 mod kept;
 mod limits;
 mod link;
@@ -25,10 +26,11 @@ pub(super) use plan::ModelPlan;
 pub(super) use timing::Timing;
 pub(super) use tools::Tool;
 
-use super::parts::{Options, Parts};
+use super::parts::{Options, Parts, Side};
 use super::words::in_calls;
 use crate::actors::Settings;
-use crate::error::Error;
+use crate::error::{Error, ErrorKind};
+use crate::link::Transport;
 use crate::log::ModelReason;
 use crate::model::body::Stiffness;
 use crate::model::contact::Equations;
@@ -36,7 +38,7 @@ use crate::model::local::{Blend, Feedback, Kind, Template};
 use crate::model::mesh::Lattice;
 use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, Nanos, Plan, RateGroup};
-use crate::scene::{BodySpec, NodeSpec, ProbeSpec, Scene, StepKind, Volume};
+use crate::scene::{BodySpec, LinkSpec, NodeSpec, ProbeSpec, Scene, StepKind, Volume};
 use body::Start;
 use patch::PatchChoice;
 use situation::Situation;
@@ -61,12 +63,24 @@ pub(super) struct Prepared {
     pub(super) global: RateGroup,
     pub(super) until: Option<Nanos>,
     pub(super) options: Options,
+    pub(super) side: Side,
+    pub(super) transport: Option<Box<dyn Transport>>,
 }
 
 impl Prepared {
-    /// True if the local models use reduced surroundings, or may.
+    /// True if surroundings are reduced here.
     pub(super) fn reduces(&self) -> bool {
-        self.plan.resting.is_some()
+        self.plan.resting.is_some() && self.has_global()
+    }
+
+    /// True if devices and local models are here.
+    pub(super) fn has_haptic(&self) -> bool {
+        self.side != Side::Global
+    }
+
+    /// True if there is a global model beside the local ones, and it is here.
+    pub(super) fn has_global(&self) -> bool {
+        self.is_multi_rate() && self.side != Side::Haptic
     }
 
     /// True if there is a global model beside the local ones.
@@ -99,11 +113,12 @@ impl Prepared {
 
     /// The rate groups, in graph order.
     pub(super) fn groups(&self) -> Vec<RateGroup> {
-        let global = self.is_multi_rate().then(|| self.global.clone());
+        let local = self.has_haptic().then(|| self.local.clone());
+        let global = self.has_global().then(|| self.global.clone());
         let basis = self.reduces().then(|| self.basis_group());
         let link = self.is_linked().then(|| self.link_group());
         let others = basis.into_iter().chain(global).chain(link);
-        [self.local.clone()].into_iter().chain(others).chain([self.logger_group()]).collect()
+        local.into_iter().chain(others).chain([self.logger_group()]).collect()
     }
 
     /// The group that reduces surroundings: it looks for wishes as often as the global model makes them.
@@ -123,8 +138,8 @@ impl Prepared {
 /// Whatever cannot work, naming the field and what would be right.
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let mut scene = described(&parts)?;
-    let Parts { body, devices, attached, probes, global, local, open_haply, endless, .. } = parts;
-    let Parts { is_of_program, is_replay, options, .. } = parts;
+    let Parts { side, transport, body, devices, attached, probes, .. } = parts;
+    let Parts { global, local, open_haply, endless, is_of_program, is_replay, options, .. } = parts;
     let execution = options.execution;
     let rates = timing::rates(&scene)?;
     let mut start = Start::new(body, &scene, &attached, probes, rates[0])?;
@@ -138,6 +153,12 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let timing = Timing::new(rates, start.substeps, lateness, blend_ticks);
 
     let (kind, choice, measured) = choice::model(&mut scene, &mut start, timing, execution);
+    if side != Side::Both && kind == Kind::Full {
+        return Err(Error::scene(
+            "local.model",
+            "is full, which has no global model to be elsewhere: name another one",
+        ));
+    }
     let settings = unused::settings(&scene, kind, has_global).into_iter();
     let named = |field: &str| if is_of_program { in_calls(field, scene.local.blend.kind) } else { field.to_owned() };
     let mut unused = unused::in_words(&settings.map(named).collect::<Vec<_>>(), kind);
@@ -187,8 +208,21 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     };
     let until = (!endless).then(|| Nanos::from_secs_f64(scene.run.duration_s));
     let simulation = simulation(start, &scene, &tools)?;
-    let prepared =
-        Prepared { scene: as_run, simulation, tools, plan, choice, unused, sized_patch, local, global, until, options };
+    let prepared = Prepared {
+        scene: as_run,
+        simulation,
+        tools,
+        plan,
+        choice,
+        unused,
+        sized_patch,
+        local,
+        global,
+        until,
+        options,
+        side,
+        transport,
+    };
     Plan::check(execution, &prepared.groups())?;
     Ok(prepared)
 }
@@ -197,6 +231,14 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
 fn described(parts: &Parts) -> Result<Scene, Error> {
     let mut scene = parts.scene.clone();
     tools::complete(&mut scene, parts);
+    if parts.side != Side::Both {
+        if parts.options.execution == Execution::Virtual {
+            let message = "a link between two processes takes its own time: simulate one, by the table [link]";
+            return Err(Error::new(ErrorKind::Runtime, message));
+        }
+        // The rules of a scene with a link; what that one simulates is none of a real one's affair.
+        scene.link = Some(LinkSpec::default());
+    }
     scene.validate()?;
     for (field, group) in [("local", &parts.local), ("global", &parts.global)] {
         group.as_ref().map_or(Ok(()), |group| groups::check_group(field, group))?;

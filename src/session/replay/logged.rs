@@ -132,6 +132,9 @@ impl Gathered {
     fn check(mut self) -> Result<Logged, Error> {
         let environment = self.environment.take().ok_or_else(|| refusal("it does not say what was run"))?;
         check_instruction_set(&environment.instruction_set)?;
+        if environment.global_hz > 0.0 && !environment.groups.iter().any(|group| group.name == "global") {
+            return Err(refusal("its global model was in another process, by a link: what that did is in no log"));
+        }
         let session = self.session.take().ok_or_else(|| {
             refusal(format!("it has no attachment {}: what was run is not known", Environment::SESSION))
         })?;

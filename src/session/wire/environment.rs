@@ -97,11 +97,15 @@ fn groups(prepared: &Prepared) -> Vec<GroupInfo> {
     let basis = || GroupInfo { background: true, ..group(BASIS, timing.global) };
     let global = || GroupInfo { budget: prepared.global.declared_budget(), ..group("global", timing.global) };
     let logger = group("logger", prepared.logger_group().rate());
-    let bridges = || ["global bridge", "haptic bridge"].map(str::to_owned).into();
+    let [to_devices, to_global] = [prepared.has_global(), prepared.has_haptic()];
+    let bridges =
+        || [("global bridge", to_devices), ("haptic bridge", to_global)].into_iter().filter(|bridge| bridge.1);
+    let bridges = || bridges().map(|(name, _)| name.to_owned()).collect();
     let link = || GroupInfo { background: true, actors: bridges(), ..group(LINK, timing.haptic) };
     let optional =
-        [prepared.reduces().then(basis), prepared.is_multi_rate().then(global), prepared.is_linked().then(link)];
-    [local].into_iter().chain(optional.into_iter().flatten()).chain([logger]).collect()
+        [prepared.reduces().then(basis), prepared.has_global().then(global), prepared.is_linked().then(link)];
+    let local = prepared.has_haptic().then_some(local);
+    local.into_iter().chain(optional.into_iter().flatten()).chain([logger]).collect()
 }
 
 /// The haptic actors in the order of their ticks: two for each tool, or one for all after their devices.

@@ -3,7 +3,7 @@
 use super::global::ToolLink;
 use crate::actors::{GlobalBridge, GlobalEnd, HapticBridge, HapticEnd, LocalPorts, ModelMaker};
 use crate::error::{Error, ErrorKind};
-use crate::link::{Conditions, VirtualLink};
+use crate::link::{Conditions, Transport, VirtualLink};
 use crate::model::local::Image;
 use crate::model::simulation::Simulation;
 use crate::runtime::{Actor, RuntimeBuilder};
@@ -11,49 +11,87 @@ use crate::runtime::{Actor, RuntimeBuilder};
 /// Records between two drains: one every 50 ms.
 const RECORDS: usize = 256;
 
+/// What the bridges are between.
+pub(super) enum Ends {
+    /// Both sides are here, and between them is a simulated link.
+    Both(Conditions),
+    /// The devices are here, and the way to the other side.
+    Haptic(Box<dyn Transport>),
+    /// The global model is here, and the way to the other side.
+    Global(Box<dyn Transport>),
+}
+
+/// What a side that is here sends by.
+type Way = Option<Box<dyn Transport>>;
+
 /// The link of a session that has one.
 pub(super) struct Linking {
-    image: Image,
-    conditions: Conditions,
+    ends: Ends,
+    /// Of the body, where the devices are.
+    image: Option<Image>,
     haptic: Vec<HapticEnd>,
     global: Vec<GlobalEnd>,
 }
 
 impl Linking {
-    /// Under `conditions`, with the body of `simulation` on both sides.
+    /// Between `ends`, with the body of `simulation` on both sides.
     ///
     /// # Errors
     /// If the body cannot be copied.
-    pub(super) fn new(conditions: &Conditions, simulation: &Simulation) -> Result<Self, Error> {
-        let copy = simulation.duplicate();
-        let copy = copy.ok_or_else(|| Error::new(ErrorKind::Runtime, "a link needs a body that can be copied"))?;
+    pub(super) fn new(ends: Ends, simulation: &Simulation) -> Result<Self, Error> {
+        let copy = || {
+            let copy = simulation.duplicate();
+            copy.ok_or_else(|| Error::new(ErrorKind::Runtime, "a link needs a body that can be copied"))
+        };
+        let image = match ends {
+            Ends::Global(_) => None,
+            Ends::Both(_) | Ends::Haptic(_) => Some(Image::new(copy()?)),
+        };
         let (haptic, global) = Default::default();
-        Ok(Self { image: Image::new(copy), conditions: conditions.clone(), haptic, global })
+        Ok(Self { ends, image, haptic, global })
     }
 
-    /// Puts a bridge on either side between a local actor and the global one, with models of `maker`; up to so many `ticks` wait.
+    /// Puts a bridge on either side that is here, between a local actor and the global one, with models of `maker`; up to so many `ticks`
+    /// wait.
     pub(super) fn connect(
         &mut self,
         graph: &mut RuntimeBuilder,
         maker: &ModelMaker,
         ticks: usize,
-    ) -> (ToolLink, LocalPorts) {
-        let (local, departing) = (maker.clone(), maker.clone());
-        let (to_bridge, from_local) = graph.queue(ticks);
-        let (from_bridge, models) = graph.exchange(move || local.first());
-        self.haptic.push(HapticEnd { ticks: from_local, models: from_bridge });
-        let models_out = graph.exchange_port(move || departing.departing());
-        let link = ToolLink { ticks: graph.queue_port(ticks), geometry: None, models: models_out };
-        self.global.push(GlobalEnd { ticks: link.ticks.writer(), models: link.models.reader() });
-        (link, LocalPorts { models, ticks: to_bridge, geometry: None })
+    ) -> (Option<ToolLink>, Option<LocalPorts>) {
+        let local = self.image.is_some().then(|| {
+            let local = maker.clone();
+            let (to_bridge, from_local) = graph.queue(ticks);
+            let (from_bridge, models) = graph.exchange(move || local.first());
+            self.haptic.push(HapticEnd { ticks: from_local, models: from_bridge });
+            LocalPorts { models, ticks: to_bridge, geometry: None }
+        });
+        let has_global = !matches!(self.ends, Ends::Haptic(_));
+        let link = has_global.then(|| {
+            let departing = maker.clone();
+            let models_out = graph.exchange_port(move || departing.departing());
+            let link = ToolLink { ticks: graph.queue_port(ticks), geometry: None, models: models_out };
+            self.global.push(GlobalEnd { ticks: link.ticks.writer(), models: link.models.reader() });
+            link
+        });
+        (link, local)
     }
 
     /// The bridges in the order of their starts: what the global side tells at first is there when the haptic side begins.
     pub(super) fn bridges(self, graph: &mut RuntimeBuilder) -> Vec<Box<dyn Actor>> {
-        let [haptic, global] = VirtualLink::ends(self.conditions);
-        vec![
-            Box::new(GlobalBridge::new(Box::new(global), self.global)),
-            Box::new(HapticBridge::new(Box::new(haptic), self.haptic, self.image, graph.recorder(RECORDS))),
-        ]
+        let Self { ends, image, haptic, global } = self;
+        let (here, there): (Way, Way) = match ends {
+            Ends::Both(conditions) => {
+                let [haptic, global] = VirtualLink::ends(conditions);
+                (Some(Box::new(haptic)), Some(Box::new(global)))
+            }
+            Ends::Haptic(transport) => (Some(transport), None),
+            Ends::Global(transport) => (None, Some(transport)),
+        };
+        let global = there.map(|transport| Box::new(GlobalBridge::new(transport, global)) as Box<dyn Actor>);
+        let haptic = here.zip(image).map(|(transport, image)| {
+            Box::new(HapticBridge::new(transport, haptic, image, graph.recorder(RECORDS))) as Box<dyn Actor>
+        });
+        global.into_iter().chain(haptic).collect()
     }
 }

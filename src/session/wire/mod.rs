@@ -12,17 +12,20 @@ mod models;
 mod sink;
 
 use super::controls::Controls;
+use super::parts::Side;
 use super::prepare::{Prepared, Tool};
 use super::records::RecordSender;
 use super::running::{Memory, Outside, Running, Viewer};
 use crate::actors::{LoggerActor, LoggerOutcome, SceneWatch, SurfaceView, first_state};
 use crate::devices::DeviceState;
 use crate::error::{Error, ErrorKind};
+use crate::link::{Hello, Transport};
 use crate::model::{Pose, Vec3};
 use crate::runtime::{Actor, OutletPort, RecordDrain, Recording, Runtime, RuntimeBuilder, Stopwatch};
 use basis::BasisSide;
 use buffers::ticks_buffered;
 use haptic::ToolEnds;
+use link::Ends;
 use sink::Sinks;
 
 /// A recording that is executed again in place of a run of its own.
@@ -35,11 +38,43 @@ pub(super) struct Rerun {
 /// Starts what was prepared, or executes a recording of it again.
 ///
 /// # Errors
-/// If a device gives no first state, the log cannot be created or a thread cannot be started.
+/// If a device gives no first state, the other side of a link refuses, the log cannot be created or a thread cannot be started.
 pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Running, Error> {
     let rest = prepared.simulation.body().rest();
     let first: Vec<DeviceState> =
         prepared.tools.iter_mut().map(|tool| first_of(tool, rest)).collect::<Result<_, _>>()?;
+    if let Some(mut transport) = prepared.transport.take() {
+        transport.connect(&prepared.hello(&first)?)?;
+        prepared.transport = Some(transport);
+    }
+    start_at(prepared, first, rerun)
+}
+
+/// Starts the global side alone, with the tools where `hello` says, and the other side behind `transport`.
+///
+/// # Errors
+/// If there are not as many tools, one of them is far from the body, or a thread cannot be started.
+pub(super) fn start_global(
+    mut prepared: Prepared,
+    transport: Box<dyn Transport>,
+    hello: &Hello,
+) -> Result<Running, Error> {
+    let rest = prepared.simulation.body().rest();
+    if hello.tools.len() != prepared.tools.len() {
+        let [here, there] = [prepared.tools.len(), hello.tools.len()];
+        return Err(Error::new(ErrorKind::Runtime, format!("there are {here} tools here and {there} over the link")));
+    }
+    let mut first = Vec::new();
+    for (tool, (_, pose)) in prepared.tools.iter().zip(&hello.tools) {
+        let state = DeviceState { position: pose.position, orientation: pose.orientation, ..DeviceState::default() };
+        first.push(near(&state, tool, rest).map_err(|error| error.at("over the link"))?);
+    }
+    prepared.transport = Some(transport);
+    prepared.look_ahead(hello.round_trip);
+    start_at(prepared, first, None)
+}
+
+fn start_at(mut prepared: Prepared, first: Vec<DeviceState>, rerun: Option<Rerun>) -> Result<Running, Error> {
     let places: Vec<Pose> = first.iter().map(DeviceState::pose).collect();
     let mut environment = environment::environment(&prepared, &first)?;
     let memory = prepared.options.keep_records.then(Memory::default);
@@ -60,7 +95,9 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     let drain = graph.drain();
     let ticks = ticks_buffered(&prepared.plan);
     let (surfaces, scene) = surfaces(&mut graph, &prepared);
-    let mut ends: Vec<ToolEnds> = places.iter().map(|place| ToolEnds::new(&mut graph, place)).collect();
+    let has_haptic = prepared.has_haptic();
+    let with_devices = if has_haptic { places.as_slice() } else { &[] };
+    let mut ends: Vec<ToolEnds> = with_devices.iter().map(|place| ToolEnds::new(&mut graph, place)).collect();
     let views = ends.iter_mut().filter_map(ToolEnds::take_view).collect();
     let disbelieved = ends.iter_mut().filter_map(ToolEnds::take_disbelieved).collect();
     let viewer = Viewer::new(prepared.simulation.body().surface(), surfaces[0].reader(), views);
@@ -69,7 +106,7 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
         Some(_) => viewer.with_stress(prepared.simulation.body_as_made()),
         None => viewer,
     };
-    let bases = BasisSide::new(&mut graph, &prepared, &places)?;
+    let bases = if prepared.reduces() { BasisSide::new(&mut graph, &prepared, &places)? } else { None };
     if let Some(bases) = &bases {
         environment.model_reason = bases.reason(environment.model_reason.take());
     }
@@ -79,8 +116,15 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     let logger_group = prepared.logger_group();
     let link_group = prepared.link_group();
     let pointers = prepared.tools.iter_mut().map(|tool| tool.pointer.take()).collect();
-    let Prepared { simulation, tools, plan, local, global, until, .. } = prepared;
-    let (models, maker, bridges) = models::models(&mut graph, &plan, simulation, &places, surfaces, bases, settings)?;
+    let Prepared { simulation, tools, plan, local, global, until, side, transport, .. } = prepared;
+    let link = match (side, transport) {
+        (Side::Haptic, Some(transport)) => Some(Ends::Haptic(transport)),
+        (Side::Global, Some(transport)) => Some(Ends::Global(transport)),
+        _ => plan.link.clone().map(Ends::Both),
+    };
+    let (models, maker, bridges) =
+        models::models(&mut graph, &plan, (simulation, &places), surfaces, bases, settings, link)?;
+    let tools = if has_haptic { tools } else { Vec::new() };
     let haptic = haptic::actors(&mut graph, &plan, tools, ends, &first, models, ticks);
 
     let outcome = LoggerOutcome::default();
@@ -91,7 +135,9 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
             Box::new(logger.watching(scene).telling(disbelieved))
         }
     };
-    graph.group(local, haptic);
+    if has_haptic {
+        graph.group(local, haptic);
+    }
     if let Some((group, actor)) = reducing {
         graph.group(group, vec![actor]);
     }
@@ -113,18 +159,23 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
 /// The first state of a tool's device, or why there is none: a device that begins where it reaches no node of the body, at
 /// `rest` (m), tells another unit or nothing true, and everything that it tells later is measured from there.
 fn first_of(tool: &mut Tool, rest: &[Vec3]) -> Result<DeviceState, Error> {
-    let Tool { name, device, bounds, .. } = tool;
-    let first = first_state(&mut **device).and_then(|state| {
-        let away_m = rest.iter().map(|node| (node - state.position).norm()).fold(f64::INFINITY, f64::min);
-        if away_m <= bounds.reach_m {
-            return Ok(state);
-        }
-        let (place, reach_m): ([f64; 3], _) = (state.position.into(), bounds.reach_m);
-        let message =
-            format!("its first position is {place:?} m, {away_m:.3} m from the body, and it reaches {reach_m:.3} m");
-        Err(Error::new(ErrorKind::Device, message).at(format!("device `{}`", device.name())))
+    let first = first_state(&mut *tool.device);
+    let first = first.and_then(|state| {
+        near(&state, tool, rest).map_err(|error| error.at(format!("device `{}`", tool.device.name())))
     });
-    first.map_err(|error| if name.is_empty() { error } else { error.at(&*name) })
+    first.map_err(|error| if tool.name.is_empty() { error } else { error.at(&*tool.name) })
+}
+
+/// The first `state` of a tool, if it is within its reach of the body.
+fn near(state: &DeviceState, tool: &Tool, rest: &[Vec3]) -> Result<DeviceState, Error> {
+    let away_m = rest.iter().map(|node| (node - state.position).norm()).fold(f64::INFINITY, f64::min);
+    if away_m <= tool.bounds.reach_m {
+        return Ok(*state);
+    }
+    let (place, reach_m): ([f64; 3], _) = (state.position.into(), tool.bounds.reach_m);
+    let message =
+        format!("its first position is {place:?} m, {away_m:.3} m from the body, and it reaches {reach_m:.3} m");
+    Err(Error::new(ErrorKind::Device, message))
 }
 
 /// Where the body's surface is seen: by a program that draws, and by the log if it has the topic `/scene`.

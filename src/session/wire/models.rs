@@ -3,7 +3,7 @@
 use super::basis::BasisSide;
 use super::buffers::ticks_buffered;
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
-use super::link::Linking;
+use super::link::{Ends, Linking};
 use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, ModelMaker, Settings, SurfaceView};
 use crate::error::Error;
 use crate::model::Pose;
@@ -17,26 +17,26 @@ use crate::session::prepare::ModelPlan;
 pub(super) enum Models {
     /// The whole body with all tools, where its surface is shown, and what is changed while it runs.
     Whole(Simulation, Vec<OutletWriter<SurfaceView>>, ParameterReader<Settings>),
-    /// The models of each tool, and where the next ones come from.
+    /// The models of each tool, and where the next ones come from; none where the devices are elsewhere.
     Local(Vec<(Succession, LocalPorts)>),
 }
 
-/// What computes the forces; what makes the global actor, unless that is the whole body; and the bridges between the two, if there are
-/// any.
+/// What computes the forces; what makes the global actor, unless that is the whole body or elsewhere; and the bridges between the two,
+/// if there are any.
 pub(super) type Wired = (Models, Option<GlobalMaker>, Vec<Box<dyn Actor>>);
 
-/// Wires what computes the forces.
+/// Wires what computes the forces, with a link between `ends` if there is one.
 ///
 /// # Errors
 /// If there is a link and the body cannot be copied.
 pub(super) fn models(
     graph: &mut RuntimeBuilder,
     plan: &ModelPlan,
-    simulation: Simulation,
-    places: &[Pose],
+    (simulation, places): (Simulation, &[Pose]),
     surfaces: Vec<OutletPort<SurfaceView>>,
     bases: Option<BasisSide>,
     settings: Parameter<Settings>,
+    ends: Option<Ends>,
 ) -> Result<Wired, Error> {
     if !plan.is_multi_rate() {
         let surfaces = surfaces.iter().map(OutletPort::writer).collect();
@@ -54,7 +54,8 @@ pub(super) fn models(
     let ticks = ticks_buffered(plan);
     // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
     let nodes = simulation.state().positions.len();
-    let mut linking = plan.link.as_ref().map(|conditions| Linking::new(conditions, &simulation)).transpose()?;
+    let has_global = !matches!(ends, Some(Ends::Haptic(_)));
+    let mut linking = ends.map(|ends| Linking::new(ends, &simulation)).transpose()?;
     let mut connected = |_| match &mut linking {
         Some(linking) => linking.connect(graph, &maker, ticks),
         None => {
@@ -68,30 +69,33 @@ pub(super) fn models(
                 ticks: link.ticks.writer(),
                 geometry: link.geometry.as_ref().map(ExchangePort::writer),
             };
-            (link, ports)
+            (Some(link), Some(ports))
         }
     };
     let (tools, locals): (Vec<_>, Vec<_>) = places.iter().map(&mut connected).unzip();
-    let side = GlobalSide {
-        tools,
-        settings,
-        surroundings,
-        surfaces,
-        checkpoint: graph.outlet_port(Checkpoint::default),
-        recorder: graph.recorder_port(ticks),
-    };
-    let of_tool = |ports| (Succession::new([model(), model(), model()], plan.blend, Pose::default()), ports);
-    let models = Models::Local(locals.into_iter().map(of_tool).collect());
     let linked = linking.is_some();
-    let plan = GlobalPlan {
-        haptic: plan.timing.haptic,
-        global: plan.timing.global,
-        horizon: plan.timing.horizon,
-        models: maker,
-        patch: plan.window(),
-        bases: known,
-        linked,
-    };
+    let maker = has_global.then(|| {
+        let side = GlobalSide {
+            tools: tools.into_iter().flatten().collect(),
+            settings,
+            surroundings,
+            surfaces,
+            checkpoint: graph.outlet_port(Checkpoint::default),
+            recorder: graph.recorder_port(ticks),
+        };
+        let plan = GlobalPlan {
+            haptic: plan.timing.haptic,
+            global: plan.timing.global,
+            horizon: plan.timing.horizon,
+            models: maker,
+            patch: plan.window(),
+            bases: known,
+            linked,
+        };
+        GlobalMaker::new(simulation, places, plan, side)
+    });
+    let of_tool = |ports| (Succession::new([model(), model(), model()], plan.blend, Pose::default()), ports);
+    let models = Models::Local(locals.into_iter().flatten().map(of_tool).collect());
     let bridges = linking.map(|linking| linking.bridges(graph)).unwrap_or_default();
-    Ok((models, Some(GlobalMaker::new(simulation, places, plan, side)), bridges))
+    Ok((models, maker, bridges))
 }

@@ -6,6 +6,7 @@
 pub mod compare;
 pub mod doctor;
 pub mod export;
+pub mod link;
 pub mod list;
 pub mod log;
 pub mod mesh;
@@ -70,6 +71,10 @@ enum Command {
     Log(log::LogArgs),
     /// Show a scene in the browser and push it with the mouse, or play a log
     View(view::ViewArgs),
+    /// Be the global model of a haptic machine elsewhere, which runs the same scene with --global
+    Serve(link::ServeArgs),
+    /// Make what two computers need to know each other
+    Link(link::LinkArgs),
     /// Be a device's service without the device, to try a scene against it
     Mock(mock::MockArgs),
     /// Print what completes this command in a shell
@@ -81,7 +86,12 @@ enum Command {
 
 /// Version, features, and the instructions that the numerics use on this machine.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
-    let features = if cfg!(feature = "parallel") { "parallel" } else { "none" };
+    let features = match (cfg!(feature = "parallel"), cfg!(feature = "link")) {
+        (true, true) => "parallel, link",
+        (true, false) => "parallel",
+        (false, true) => "link",
+        (false, false) => "none",
+    };
     format!("{}\nfeatures: {features}\ninstructions: {}", env!("CARGO_PKG_VERSION"), InstructionSet::detect().name())
 });
 
@@ -92,7 +102,9 @@ pub fn main() -> ExitCode {
     // be written.
     let shown = Targets::new()
         .with_default(LevelFilter::WARN)
-        .with_targets([("palpate_runtime", LevelFilter::OFF), (LOG_FAILURE, LevelFilter::OFF)]);
+        .with_targets([("palpate_runtime", LevelFilter::OFF), (LOG_FAILURE, LevelFilter::OFF)])
+        // What zenoh says of connections, the link says in its own words.
+        .with_target("zenoh", LevelFilter::OFF);
     tracing_subscriber::fmt()
         .with_target(false)
         .without_time()
@@ -115,6 +127,8 @@ pub fn main() -> ExitCode {
             Some(Command::Log(args)) => log::run(&args),
             Some(Command::Replay(args)) => replay::run(&args),
             Some(Command::View(args)) => view::run(&args),
+            Some(Command::Serve(args)) => link::serve(&args),
+            Some(Command::Link(link::LinkArgs { command: link::LinkCommand::Keys(args) })) => link::keys(&args),
             Some(Command::Mock(args)) => mock::run(&args),
             Some(Command::Completions { shell }) => completions(shell),
         },

@@ -7,6 +7,7 @@ use palpate::scene::{ModelChoice, Scene};
 use palpate::session::{Session, SessionBuilder};
 use palpate::{Error, ErrorKind};
 
+use super::link::{self, AccessArgs};
 use super::{files, progress, shared};
 
 /// Where the log goes if nothing is said.
@@ -26,7 +27,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// Use this local model instead of the scene's own
-    #[arg(long, value_name = "NAME", value_parser = choice)]
+    #[arg(long, value_name = "NAME", value_parser = shared::choice)]
     pub model: Option<ModelChoice>,
     /// Also log the topic /scene for viewers: surface, tools and forces, 30 times a second
     #[arg(long)]
@@ -37,6 +38,11 @@ pub struct RunArgs {
     /// Print the schedule and what this system would refuse, and run nothing
     #[arg(long)]
     pub plan: bool,
+    /// Take the global models from `palpate serve` at this address, such as tls/big-machine:7447 or tcp/127.0.0.1:7447
+    #[arg(long, value_name = "ADDRESS")]
+    pub global: Option<String>,
+    #[command(flatten)]
+    pub access: AccessArgs,
     /// The log to write, overwritten if it exists; palpate-run.mcap if left out, palpate-virtual.mcap in virtual time
     #[arg(long, value_name = "LOG.mcap")]
     pub out: Option<PathBuf>,
@@ -74,6 +80,9 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
     }
     if args.no_cache {
         builder = builder.forget_bases();
+    }
+    if let Some(address) = &args.global {
+        builder = link::global_over(builder, address, &args.access)?;
     }
     if args.plan { plan(builder, &name) } else { execute(builder, out, &name) }
 }
@@ -120,11 +129,6 @@ fn execute(builder: SessionBuilder, log: &Path, name: &str) -> Result<(), Error>
         }
         _ => Ok(()),
     }
-}
-
-/// A local model or `auto` by name, or which there are.
-pub(super) fn choice(name: &str) -> Result<ModelChoice, String> {
-    ModelChoice::from_name(name).ok_or_else(|| format!("the local models are {}", ModelChoice::NAMES.join(", ")))
 }
 
 /// A local model by its name, or which there are.

@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 
 use palpate::log::Window;
 use palpate::runtime::Nanos;
+use palpate::scene::ModelChoice;
 use palpate::session::Running;
 use palpate::{Error, ErrorKind, printable};
 
@@ -50,6 +51,11 @@ impl Write for Complaints {
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
+}
+
+/// A local model or `auto` by name, or which there are.
+pub fn choice(name: &str) -> Result<ModelChoice, String> {
+    ModelChoice::from_name(name).ok_or_else(|| format!("the local models are {}", ModelChoice::NAMES.join(", ")))
 }
 
 /// The name of a file in a report: on one line, whatever it is called.

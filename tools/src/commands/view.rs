@@ -11,7 +11,7 @@ use palpate::scene::{ModelChoice, Scene};
 use palpate::{Error, ErrorKind};
 use palpate_view::{Options, Pushed, Server};
 
-use super::{files, progress, run, shared};
+use super::{files, progress, shared};
 
 /// How often it is looked whether the user interrupted.
 const LOOK: Duration = Duration::from_millis(100);
@@ -26,7 +26,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port: u16,
     /// Use this local model instead of the scene's own
-    #[arg(long, value_name = "NAME", value_parser = run::choice)]
+    #[arg(long, value_name = "NAME", value_parser = shared::choice)]
     pub model: Option<ModelChoice>,
     /// Also write a log of all of it, with pictures; overwritten if it exists
     #[arg(long, value_name = "LOG.mcap")]

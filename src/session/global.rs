@@ -1,0 +1,70 @@
+//! The global side of a session alone: its devices are behind a link, on another computer.
+
+use super::parts::{Parts, Side};
+use super::prepare::{Prepared, prepare};
+use super::running::Running;
+use super::wire;
+use super::{Choice, SessionBuilder};
+use crate::devices::{Device, DeviceState, Scripted, ToolPath};
+use crate::error::Error;
+use crate::link::{Hello, Transport};
+
+/// The global model of a session whose devices are in another process: ready to start when one says [`Hello`].
+///
+/// The other process has a session of the same scene, see [`SessionBuilder::global_over`].
+#[derive(Debug)]
+pub struct GlobalSession {
+    prepared: Prepared,
+    hello: Hello,
+}
+
+impl GlobalSession {
+    /// Checks everything that [`SessionBuilder::build`] does, but opens no device.
+    ///
+    /// # Errors
+    /// If something cannot work, naming the field and what would be right.
+    pub(super) fn of(mut parts: Parts) -> Result<Self, Error> {
+        // In the places of those that are elsewhere.
+        let none = Scripted::new(ToolPath::constant([0.0; 3])?);
+        let others = parts.scene.devices.len().saturating_sub(parts.devices.len());
+        parts.devices.iter_mut().for_each(|(_, device)| *device = Box::new(none.clone()));
+        parts
+            .devices
+            .extend(std::iter::repeat_n((), others).map(|()| (None, Box::new(none.clone()) as Box<dyn Device>)));
+        parts.side = Side::Global;
+        parts.endless = true;
+        let prepared = prepare(parts)?;
+        // Where the tools are is said by the other side.
+        let hello = prepared.hello(&vec![DeviceState::default(); prepared.tools.len()])?;
+        Ok(Self { prepared, hello })
+    }
+
+    /// What this side knows of itself, to hold against what [comes](Hello::difference).
+    pub fn hello(&self) -> &Hello {
+        &self.hello
+    }
+
+    /// The local model that was chosen and why; `None` if the scene or the program named one.
+    pub fn choice(&self) -> Option<&Choice> {
+        self.prepared.choice.as_ref()
+    }
+
+    /// Starts the global model, with the tools where `hello` says; local models go by `transport`, and tool ticks come by it. It runs until
+    /// it is stopped.
+    ///
+    /// # Errors
+    /// If the tools are not those of the scene or far from the body, or a thread cannot be started.
+    pub fn start(self, transport: impl Transport + 'static, hello: &Hello) -> Result<Running, Error> {
+        wire::start_global(self.prepared, Box::new(transport), hello)
+    }
+}
+
+impl SessionBuilder {
+    /// Makes the global side of the session ready to start; its devices are those of another process, and none is opened here.
+    ///
+    /// # Errors
+    /// If something cannot work, naming the field and what would be right.
+    pub fn build_global(self) -> Result<GlobalSession, Error> {
+        GlobalSession::of(self.parts)
+    }
+}

@@ -1,0 +1,234 @@
+//! A session in two parts, the global model behind a transport: as in two processes, but here both are in one.
+
+mod session_support;
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use palpate::link::{Header, Hello, Lane, Message, Transport};
+use palpate::model::Vec3;
+use palpate::model::body::Body;
+use palpate::model::local::Kind;
+use palpate::runtime::Nanos;
+use palpate::scene::Scene;
+use palpate::session::{GlobalSession, Running, Session, SessionBuilder};
+use palpate::{Error, ErrorKind};
+use session_support::*;
+
+type Way = Arc<Mutex<VecDeque<Vec<u8>>>>;
+
+/// What carries messages at once, as far as it is not cut.
+#[derive(Clone, Debug, Default)]
+struct Line {
+    ways: [Way; 2],
+    is_cut: Arc<Mutex<bool>>,
+    /// What was said over it.
+    hello: Arc<Mutex<Option<Hello>>>,
+    peer: Arc<Mutex<u64>>,
+}
+
+#[derive(Clone, Debug)]
+struct End {
+    line: Line,
+    side: usize,
+}
+
+impl Line {
+    fn end(&self, side: usize) -> End {
+        End { line: self.clone(), side }
+    }
+}
+
+impl Transport for End {
+    fn send(&mut self, _: Lane, message: &[u8], _: Nanos) {
+        if !*self.line.is_cut.lock().unwrap() {
+            self.line.ways[self.side].lock().unwrap().push_back(message.to_vec());
+        }
+    }
+
+    fn receive(&mut self, _: Nanos, message: &mut Vec<u8>) -> bool {
+        let Some(next) = self.line.ways[1 - self.side].lock().unwrap().pop_front() else { return false };
+        *message = next;
+        true
+    }
+
+    fn connect(&mut self, hello: &Hello) -> Result<(), Error> {
+        *self.line.hello.lock().unwrap() = Some(hello.clone());
+        let until = Instant::now() + Duration::from_secs(30);
+        while !self.line.ways[1].lock().unwrap().iter().any(|message| Message::is_model(message)) {
+            if Instant::now() > until {
+                return Err(Error::new(ErrorKind::Runtime, "nobody answers"));
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Ok(())
+    }
+
+    fn peer(&mut self) -> u64 {
+        *self.line.peer.lock().unwrap()
+    }
+}
+
+fn session(model: Kind) -> SessionBuilder {
+    Session::builder(block()).path(pressing()).model(model).friction(0.5)
+}
+
+/// Starts both sides of a session of `model`, which lasts so long.
+fn start(line: &Line, model: Kind, seconds: f64) -> (Running, Running) {
+    let haptic = session(model).keep_records().duration_s(seconds).global_over(line.end(0)).build().unwrap();
+    let haptic = std::thread::spawn(move || haptic.start().unwrap());
+    let global = serve(line, session(model).build_global().unwrap());
+    (haptic.join().unwrap(), global)
+}
+
+/// Starts the global side once the other one has said who it is.
+fn serve(line: &Line, global: GlobalSession) -> Running {
+    let hello = loop {
+        let hello = line.hello.lock().unwrap().clone();
+        if let Some(hello) = hello {
+            break hello;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    assert_eq!(global.hello().difference(&hello), None);
+    global.start(line.end(1), &hello).unwrap()
+}
+
+fn largest(forces: impl Iterator<Item = [f64; 3]>) -> f64 {
+    forces.map(norm).fold(0.0, f64::max)
+}
+
+#[test]
+fn two_sides_make_the_force_of_one() {
+    for model in [Kind::Hold, Kind::Patch, Kind::Predictive] {
+        let (haptic, global) = start(&Line::default(), model, 1.5);
+        haptic.wait();
+        let there = haptic.stop();
+        let served = global.stop();
+        assert_eq!((&there.runtime.fault, &served.runtime.fault), (&None, &None), "{model:?}");
+        let here = session(model).keep_records().duration_s(1.5).virtual_time().build().unwrap().run().unwrap();
+        let (there, here) = (forces(&there), forces(&here));
+        assert!(there.iter().skip(100).any(|force| force.model_version > 20), "{model:?}: no model came");
+        // In real time, on a machine that others use too: that the same body is felt, and not how well.
+        let peak = largest(here.iter().map(|force| force.force_n));
+        assert!(peak > 0.2);
+        let apart =
+            there.iter().zip(&here).map(|(a, b)| (Vec3::from(a.force_n) - Vec3::from(b.force_n)).norm_squared());
+        let rms = (apart.sum::<f64>() / here.len() as f64).sqrt() / peak;
+        println!("{model:?}: {:.2} % apart", 100.0 * rms);
+        assert!(rms < if model == Kind::Predictive { 0.1 } else { 0.5 }, "{model:?}: {rms}");
+    }
+}
+
+/// Check that the force is gone when the global side is, and comes back with another process that begins from the body at rest.
+#[test]
+fn a_global_side_that_dies_takes_the_force_away_and_another_one_gives_it_back() {
+    let line = Line::default();
+    let (haptic, global) = start(&line, Kind::Predictive, 4.0);
+    haptic.wait_for(Duration::from_millis(700));
+    *line.is_cut.lock().unwrap() = true;
+    global.stop();
+    haptic.wait_for(Duration::from_millis(800));
+    line.ways.iter().for_each(|way| way.lock().unwrap().clear());
+    *line.is_cut.lock().unwrap() = false;
+    *line.peer.lock().unwrap() += 1;
+    let returned = haptic.elapsed();
+    let global = serve(&line, session(Kind::Predictive).build_global().unwrap());
+    haptic.wait();
+    global.stop();
+    let summary = haptic.stop();
+    assert_eq!((&summary.runtime.fault, summary.runtime.lost_records), (&None, 0));
+    let commands = commands(&summary);
+    let felt = |from: f64, until: f64| {
+        let within =
+            commands.iter().filter(|c| c.time >= Nanos::from_secs_f64(from) && c.time < Nanos::from_secs_f64(until));
+        largest(within.map(|command| command.force_n))
+    };
+    assert!(felt(0.3, 0.7) > 0.1, "a force before");
+    assert_eq!(felt(1.1, 1.5), 0.0, "none without a model");
+    let back = returned.as_secs_f64();
+    assert!(felt(back, back + 1.5) > 0.1, "a force again, after {back} s");
+}
+
+/// A model of a tick that has not been would never be old: nobody believes it.
+#[test]
+fn a_model_from_the_future_is_not_believed() {
+    let line = Line::default();
+    let (haptic, global) = start(&line, Kind::Hold, 1.2);
+    haptic.wait_for(Duration::from_millis(600));
+    // What the global side said last, of a tick that is far ahead.
+    let mut forged = {
+        let mut wait = None;
+        while wait.is_none() {
+            wait = line.ways[1].lock().unwrap().iter().find(|message| Message::is_model(message)).cloned();
+        }
+        wait.unwrap()
+    };
+    *line.is_cut.lock().unwrap() = true;
+    global.stop();
+    let header = Message::glance(&forged).unwrap();
+    let Header { number, .. } = header;
+    forged[16..24].copy_from_slice(&(number + 1_000).to_le_bytes());
+    let tick = 8 + 3 * 8;
+    for (n, ahead) in [1_u64 << 20, u64::MAX - 3, u64::MAX].into_iter().enumerate() {
+        forged[16..24].copy_from_slice(&(number + 1_000 + n as u64).to_le_bytes());
+        forged[tick..tick + 8].copy_from_slice(&ahead.to_le_bytes());
+        assert!(Message::read(&forged).is_ok());
+        line.ways[1].lock().unwrap().push_back(forged.clone());
+    }
+    haptic.wait();
+    let summary = haptic.stop();
+    assert_eq!(summary.runtime.fault, None);
+    let last = commands(&summary).into_iter().rev().take(100);
+    assert_eq!(largest(last.map(|command| command.force_n)), 0.0, "its age takes the force away");
+}
+
+#[test]
+fn what_cannot_be_in_two_parts_is_refused_by_name() {
+    let refused =
+        |builder: SessionBuilder| builder.global_over(Line::default().end(0)).build().map(|_| ()).unwrap_err();
+    assert_eq!(refused(session(Kind::Full)).place(), "model()");
+    assert!(refused(session(Kind::Hold).virtual_time()).to_string().contains("simulate one"));
+    let own = AlteredBlock::new(block(), Body::forces);
+    let error = Session::builder(own).path(pressing()).model(Kind::Hold).build_global().map(|_| ()).unwrap_err();
+    assert_eq!(error.place(), "link", "{error}");
+    let global = Session::from_scene(Scene::demo()).model(Kind::Predictive).build_global().unwrap();
+    let far = Hello {
+        tools: vec![(String::new(), palpate::model::Pose::at(Vec3::new(9.0, 0.0, 0.0)))],
+        ..global.hello().clone()
+    };
+    let error = global.start(Line::default().end(1), &far).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("m from the body"), "{error}");
+    let global = Session::from_scene(Scene::demo()).model(Kind::Predictive).build_global().unwrap();
+    let error = global.start(Line::default().end(1), &Hello::default()).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("0 over the link"), "{error}");
+}
+
+#[test]
+fn the_log_of_one_side_is_not_replayed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (line, log) = (Line::default(), folder.path().join("haptic.mcap"));
+    let haptic = session(Kind::Hold).log(&log).duration_s(0.3).global_over(line.end(0)).build().unwrap();
+    let haptic = std::thread::spawn(move || haptic.run().unwrap());
+    let global = serve(&line, session(Kind::Hold).build_global().unwrap());
+    assert!(haptic.join().unwrap().log_error.is_none());
+    global.stop();
+    let error = session(Kind::Hold).replay(&log).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("in another process"), "{error}");
+}
+
+/// Check that what is of the devices, the log and the length of a run is each side's own, and nothing else.
+#[test]
+fn a_scene_that_differs_is_named_and_what_is_of_one_side_alone_is_not() {
+    let hello = |change: fn(&mut Scene)| {
+        let mut scene = Scene::demo();
+        change(&mut scene);
+        Session::from_scene(scene).model(Kind::Predictive).build_global().unwrap().hello().clone()
+    };
+    let here = hello(|_| ());
+    assert_eq!(here.difference(&hello(|scene| scene.run.duration_s = 1.0)), None);
+    assert_eq!(here.difference(&hello(|scene| scene.safety.max_force_n = Some(0.5))), None);
+    let named = here.difference(&hello(|scene| scene.global.rate_hz = 20.0)).unwrap();
+    assert!(named.contains("rate_hz = 30") && named.contains("rate_hz = 20"), "{named}");
+}

@@ -1,0 +1,68 @@
+//! `palpate serve`, `palpate link keys` and the option `--global`: the two models on two computers.
+//!
+//! What speaks to the network is compiled with the feature `link` alone.
+
+use std::path::PathBuf;
+
+use palpate::scene::ModelChoice;
+
+use super::shared;
+
+#[cfg_attr(feature = "link", path = "with_zenoh.rs")]
+#[cfg_attr(not(feature = "link"), path = "without.rs")]
+mod ways;
+
+pub use ways::{global_over, keys, serve};
+
+/// Who may speak with whom.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct AccessArgs {
+    /// The keys of this machine: a link.toml of `palpate link keys`
+    #[arg(long, value_name = "LINK.toml")]
+    pub config: Option<PathBuf>,
+    /// Allow plain TCP to another machine: whoever is on the way can read and steer
+    #[arg(long)]
+    pub insecure: bool,
+}
+
+/// The arguments of `palpate serve`.
+#[derive(Debug, clap::Args)]
+pub struct ServeArgs {
+    /// A scene file (TOML), or the name of a built-in scene (`palpate list`): the same one as on the haptic machine
+    pub scene: PathBuf,
+    /// Listen here, such as tls/0.0.0.0:7447 or tcp/127.0.0.1:7447
+    #[arg(long, value_name = "ADDRESS")]
+    pub listen: String,
+    /// Use this local model instead of the scene's own, as on the haptic machine
+    #[arg(long, value_name = "NAME", value_parser = shared::choice)]
+    pub model: Option<ModelChoice>,
+    /// Keep no reduced surroundings from run to run, and take none that were kept
+    #[arg(long)]
+    pub no_cache: bool,
+    #[command(flatten)]
+    pub access: AccessArgs,
+}
+
+/// The arguments of `palpate link`.
+#[derive(Debug, clap::Args)]
+pub struct LinkArgs {
+    #[command(subcommand)]
+    pub command: LinkCommand,
+}
+
+/// What there is to do for a link.
+#[derive(Debug, clap::Subcommand)]
+pub enum LinkCommand {
+    /// Make the keys by which two machines know each other: a folder for each, with a link.toml for --config
+    Keys(KeysArgs),
+}
+
+/// The arguments of `palpate link keys`.
+#[derive(Debug, clap::Args)]
+pub struct KeysArgs {
+    /// Where to put the two folders, `global` and `haptic`
+    pub folder: PathBuf,
+    /// A name or an address by which the haptic machine reaches the global one; may be given again
+    #[arg(long, value_name = "NAME")]
+    pub host: Vec<String>,
+}

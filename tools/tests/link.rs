@@ -1,0 +1,97 @@
+//! `palpate serve`, `palpate run --global` and `palpate link keys`, as a user calls them.
+#![cfg(feature = "link")]
+
+mod support;
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use support::Folder;
+
+/// `palpate serve` in a folder; killed when dropped.
+struct Serving(Child, BufReader<std::process::ChildStdout>);
+
+impl Serving {
+    fn start(folder: &Folder, args: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
+        command.arg("serve").args(args).current_dir(folder.path(".")).stdout(Stdio::piped());
+        let mut child = command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR")).spawn().unwrap();
+        let out = BufReader::new(child.stdout.take().unwrap());
+        let mut serving = Self(child, out);
+        assert!(serving.line().contains("listens at"));
+        serving
+    }
+
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.1.read_line(&mut line).unwrap();
+        line
+    }
+}
+
+impl Drop for Serving {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The address of a port that nobody listens at.
+fn free(protocol: &str) -> String {
+    let socket = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    format!("{protocol}/{}", socket.local_addr().unwrap())
+}
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.spoil(
+        "model = \"patch\"\npatch = [3, 3, 2]\nblend = { kind = \"crossfade\", ms = 10 }",
+        "model = \"predictive\"",
+    );
+    folder
+}
+
+#[test]
+fn two_commands_run_a_scene() {
+    let (folder, address) = (folder(), free("tcp"));
+    let mut serving = Serving::start(&folder, &["scene.toml", "--listen", &address]);
+    let report = folder.succeed(&["run", "scene.toml", "--global", &address, "--duration", "1", "--out", "felt.mcap"]);
+    assert!(report.contains("log: felt.mcap"), "{report}");
+    assert!(serving.line().contains("a haptic machine has come: 1 tool, round trip"));
+    assert!(folder.succeed(&["log", "info", "felt.mcap"]).contains("/link"));
+    let ended = Command::new("kill").args(["-INT", &serving.0.id().to_string()]).status().unwrap();
+    assert!(ended.success() && serving.line().contains("the session is over"));
+    assert_eq!(serving.0.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn three_commands_do_it_over_tls() {
+    let (folder, address) = (folder(), free("tls"));
+    let made = folder.succeed(&["link", "keys", "keys", "--host", "big-machine"]);
+    assert!(made.contains("keys/global is for the machine of `palpate serve`"), "{made}");
+    let _serving = Serving::start(&folder, &["scene.toml", "--listen", &address, "--config", "keys/global/link.toml"]);
+    let args = ["run", "scene.toml", "--global", &address, "--config", "keys/haptic/link.toml", "--out", "felt.mcap"];
+    assert!(folder.succeed(&args).contains("log: felt.mcap"));
+}
+
+#[test]
+fn what_cannot_be_is_refused_in_one_line() {
+    let (folder, address) = (folder(), free("tcp"));
+    let keys = ["link", "keys", "keys"];
+    folder.succeed(&keys);
+    for (args, code, words) in [
+        (&["serve", "scene.toml", "--listen", "tcp/0.0.0.0:7447"][..], 2, "--insecure"),
+        (&["run", "scene.toml", "--global", "tcp/big-machine:7447"], 2, "--insecure"),
+        (&["run", "scene.toml", "--global", "tls/big-machine:7447"], 2, "palpate link keys"),
+        (&["run", "scene.toml", "--global", "big-machine"], 2, "PROTOCOL/HOST:PORT"),
+        (&["run", "scene.toml", "--global", &address, "--virtual"], 1, "simulate one"),
+        (&["run", "scene.toml", "--global", &address, "--model", "full"], 2, "no global model"),
+        (&["run", "scene.toml", "--global", &address, "--config", "none.toml"], 2, "none.toml"),
+        (&["run", "scene.toml", "--global", &address, "--config", "scene.toml"], 2, "unknown field"),
+        (&keys, 2, "exists"),
+    ] {
+        let called = folder.call(args);
+        assert_eq!((called.code, called.err.lines().count()), (Some(code), 1), "{args:?}: {called:?}");
+        assert!(called.err.contains(words), "{args:?}: {called:?}");
+    }
+}
