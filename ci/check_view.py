@@ -305,6 +305,22 @@ def touch(check, browser):
     size(browser, 1280, "light")
 
 
+def calm(check, browser):
+    """Strips do not run for who asked for less motion; the body still follows the hand."""
+    drawn = "(({ strips, frames }) => [+strips, +frames])(document.getElementById('picture').dataset)"
+    for wish in ("no-preference", "reduce"):
+        browser.send("Emulation.setEmulatedMedia", media="", features=[{"name": "prefers-reduced-motion", "value": wish}])
+        time.sleep(0.2)
+        before, begin = browser.run(drawn), time.monotonic()
+        time.sleep(3)
+        strips, frames = (after - first for after, first in zip(browser.run(drawn), before))
+        passed = time.monotonic() - begin
+        # A slow machine draws few pictures: strips go with them, unless less motion was asked for.
+        holds = strips <= 2 * passed + 1 if wish == "reduce" else strips >= 0.5 * min(frames, 30 * passed)
+        check.that(holds, f"strips were drawn {strips} times in {passed:.1f} s and {frames} pictures, reduced motion: {wish}")
+    size(browser, 1280, "light")
+
+
 def commanded(palpate, log):
     """`/force_commanded` of a log by its time in microseconds (N)."""
     table = subprocess.run([palpate, "export", log, "--topic", "/force_commanded", "--format", "csv"], capture_output=True, text=True, check=True).stdout
@@ -341,6 +357,7 @@ def check_live(check, browser, palpate, log, shots):
         key(browser, "0")
         changes(check, browser, shots)
         smooth(check, browser)
+        calm(check, browser)
         pen(check, browser)
         gamepad(check, browser)
         layouts(check, browser, shots, "live")

@@ -50,7 +50,8 @@ void main() {
   colour = vec4(tint.rgb * diffuse, 1.0) * tint.a;
 }`;
 
-function program(gl, vertex, fragment) {
+// Begins a program of shaders; whoever asks for its result waits for it.
+function begun(gl, vertex, fragment) {
   const made = gl.createProgram();
   for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const shader = gl.createShader(kind);
@@ -59,6 +60,10 @@ function program(gl, vertex, fragment) {
     gl.attachShader(made, shader);
   }
   gl.linkProgram(made);
+  return made;
+}
+
+function program(gl, made) {
   if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made) || "no shader program");
   return new Proxy({ made }, { get: (own, name) => (name === "made" ? own.made : (own[name] ??= gl.getUniformLocation(made, name))) });
 }
@@ -67,8 +72,9 @@ function startPainter(canvas) {
   const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
   if (!gl) return false;
   painter.gl = gl;
-  painter.surface = program(gl, SURFACE_VERTEX, SURFACE_FRAGMENT);
-  painter.shapes = program(gl, SHAPE_VERTEX, SHAPE_FRAGMENT);
+  // Both are compiled at once, where the browser can.
+  const made = [begun(gl, SURFACE_VERTEX, SURFACE_FRAGMENT), begun(gl, SHAPE_VERTEX, SHAPE_FRAGMENT)];
+  [painter.surface, painter.shapes] = made.map((one) => program(gl, one));
   painter.array = gl.createVertexArray();
   gl.bindVertexArray(painter.array);
   for (const [name, size] of [["place", 3], ["normal", 3], ["value", 1]]) {

@@ -22,5 +22,7 @@ const state = {
   stats: null,
   isNew: { topology: false, surface: false },
 };
+// What moves by itself moves less: strips, and what a gamepad does to the hand.
+const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const element = (id) => document.getElementById(id);
 const MODES = ["free", "sticks", "slips", "lost: every node is held"];
