@@ -13,7 +13,7 @@ impl Size {
     /// The least error budget that can be kept (%): closer to the floor the states grow without end.
     pub const LEAST_PCT: f64 = 0.4;
 
-    /// A compromise on random scenes: with 150 states errors are half as large again, and with 350 a tick is a fifth dearer.
+    /// A compromise on random scenes: with 150 states errors are up to twice as large, and with 350 a tick is a fifth dearer.
     pub const DEFAULT_STATES: usize = 250;
 
     /// The largest number of states that is tried for an error budget.
