@@ -13,7 +13,7 @@ const MOST_TEXT: usize = 1 << 18;
 /// Bytes of a tool at least: the length of its name, and its pose.
 const TOOL: usize = 4 + 7 * 8;
 
-/// What the haptic side says of itself, and what the global side holds against its own.
+/// The haptic side's word of itself, which the global side holds against its own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hello {
     /// Names the process that speaks, for as long as it runs.
