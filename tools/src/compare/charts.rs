@@ -209,7 +209,7 @@ fn magnitudes(trace: &ForceTrace) -> impl Iterator<Item = f64> {
 /// A latency as a plot's title says it.
 fn in_words(latency: Nanos) -> String {
     match latency {
-        Nanos::ZERO => "results of the global model there at once".to_owned(),
-        late => format!("results of the global model {} ms late", milliseconds(late)),
+        Nanos::ZERO => "global results at once".to_owned(),
+        late => format!("global results {} ms late", milliseconds(late)),
     }
 }
