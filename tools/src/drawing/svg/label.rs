@@ -2,8 +2,8 @@
 
 use super::super::html::escaped;
 
-/// What a letter of a label takes. No fonts are measured here: it is a little more than an average one.
-const LETTER: f64 = 6.4;
+/// What a letter of a label takes. No fonts are measured here: it is what a digit takes, the widest of what labels are made of.
+const LETTER: f64 = 7.0;
 pub(super) const LINE: f64 = 13.0;
 /// The label of a point is at most so many lines above or below it.
 const MOST_LINES: i32 = 10;
