@@ -49,7 +49,7 @@ fn seen(settings: &Settings, from: u64, count: usize) -> Result<(), Error> {
     let listed = listed.map(|list| list.split(',').filter_map(|seed| seed.parse().ok()).collect());
     let seeds: Vec<u64> = listed.unwrap_or_else(|| (from..).filter(|&seed| !is_unseen(seed)).take(count).collect());
     let results = run_all(&seeds, settings, |result| println!("{result}"))?;
-    print!("{}", words::distributions(&results.iter().collect::<Vec<_>>()));
+    print!("{}", words::distributions(&results.iter().collect::<Vec<_>>(), true));
     Ok(())
 }
 

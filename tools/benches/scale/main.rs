@@ -1,6 +1,6 @@
 //! How large a body can be: cubes of 8^3 to 40^3 nodes at 1 and 4 kHz. What each part of each model costs, whether that fits
 //! one core for the haptic group and one for the global one, and how far `predictive` is from `full` one period late.
-//! Writes docs/scale.md and its picture.
+//! Writes all tables to target/scale.md, of which docs/scale.md has what a reader needs, and draws its picture.
 //!
 //! `cargo bench --bench scale`; with `-- --quick` a short form that prints and writes nothing, with
 //! `-- --only-errors` only the errors, printed as they come, with `-- --only-tissue` only the bodies of tetrahedra.
@@ -57,7 +57,7 @@ fn document(is_quick: bool) -> Result<(), Error> {
             print!("{text}");
             return Ok(());
         }
-        common::write("docs/scale.md", &text)
+        common::write("target/scale.md", &text)
     })
 }
 
