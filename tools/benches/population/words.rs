@@ -113,7 +113,7 @@ pub fn distributions(results: &[&CaseResult], is_by_kind: bool) -> String {
             rows.push(vec![
                 name.to_owned(),
                 word.to_owned(),
-                format!("{} of {}", runs.len(), those.len()),
+                format!("{}/{}", runs.len(), those.len()),
                 q(rms, 0.5),
                 q(rms, 0.9),
                 q(rms, 0.95),
