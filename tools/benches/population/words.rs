@@ -22,8 +22,7 @@ const ASKED_PCT: f64 = 1.0;
 const HEAD: &str = "\
 # How far off on scenes that nobody tuned
 
-See what to expect of `predictive` on a scene like yours; `palpate compare SCENE` measures yours itself. Half of the unseen scenes, 9 of 10 and
-the worst are in the first rows of the table, then each kind of body and of motion.
+See what to expect of `predictive` on a scene like yours, by kind of body and of motion; `palpate compare SCENE` measures yours itself.
 
 ```text
 cargo bench -p palpate-cli --bench population               # writes this page and its pictures
@@ -41,7 +40,7 @@ the force in % of the largest force of `full`; *jump* the largest change of the 
 largest force over that of `full`. *Tick* is the CPU time of a haptic tick, the median over scenes of p50 and p99 (with catching up); *periods*
 what the global model works, in periods of simulation. A basis takes its nominal time.
 
-The second table has what `auto` chooses with nominal costs, how far that is off one period late, and how often it was more than the usual
+The table after it has what `auto` chooses with nominal costs, how far that is off one period late, and how often it was more than the usual
 `error_pct` of 1 % off without a word of it.
 ";
 
@@ -97,7 +96,7 @@ fn chosen(results: &[&CaseResult]) -> String {
     format!("{}\n", table(&head, 1, &rows))
 }
 
-/// Of all models in time and late, of `predictive` by class and by motion too if `is_by_kind`; then of `auto`.
+/// Of all models in time and late; if `is_by_kind`, of `predictive` by class and by motion too, then of `auto`.
 pub fn distributions(results: &[&CaseResult], is_by_kind: bool) -> String {
     let mut rows = Vec::new();
     let mut add = |name: &str, kind: Kind, of: &dyn Fn(&CaseResult) -> bool| {
@@ -151,7 +150,8 @@ pub fn distributions(results: &[&CaseResult], is_by_kind: bool) -> String {
         "p99",
         "periods",
     ];
-    format!("{}\n{}", table(&head, 2, &rows), chosen(results))
+    let chosen = if is_by_kind { chosen(results) } else { String::new() };
+    format!("{}\n{chosen}", table(&head, 2, &rows))
 }
 
 /// The share of scenes above an error, by class, one period late.
