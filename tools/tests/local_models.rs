@@ -1,6 +1,6 @@
 //! Each local model against `full`, in virtual time: the error that is known for it, no more and no less.
 //!
-//! `cargo test --test local_models -- --nocapture` prints the table of the README.
+//! `cargo test --test local_models -- --nocapture` prints the table of docs/local_models.md.
 
 use std::path::Path;
 
@@ -66,7 +66,7 @@ impl Way {
     }
 }
 
-/// Every way that the README's table shows, by the name that it has there.
+/// Every way that the table shows, by the name that it has there.
 fn ways() -> [(&'static str, Way); 14] {
     let crossfade = BlendKind::Crossfade;
     [
