@@ -29,5 +29,5 @@ cp Cargo.lock "$folder"
 export CARGO_TARGET_DIR="$CARGO_TARGET_DIR/packaged"
 cargo check --quiet --manifest-path "$folder/Cargo.toml" --workspace --all-targets --exclude palpate-cli --exclude palpate-link
 cargo check --quiet --manifest-path "$folder/Cargo.toml" --package palpate-cli
-cargo test --quiet --manifest-path "$folder/Cargo.toml" --package palpate --test scene_files --test device_hand
+cargo test --quiet --manifest-path "$folder/Cargo.toml" --package palpate --test scenes --test devices
 echo "the packages are whole"

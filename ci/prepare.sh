@@ -6,7 +6,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
 # Everything is compiled once: what would make a second time quicker only costs.
 export CARGO_INCREMENTAL=0
-# Lines for a debugger in ninety programs would be written and linked for nobody; a panic says its own.
+# Lines for a debugger in sixty programs would be written and linked for nobody; a panic says its own.
 export CARGO_PROFILE_DEV_DEBUG=0
 # Bases that runs keep are no later run's.
 export XDG_CACHE_HOME="$CARGO_TARGET_DIR/cache"

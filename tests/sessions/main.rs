@@ -1,0 +1,10 @@
+//! Whole sessions in virtual time: contact, the safety layer, tools, bases and couplings, tick for tick.
+
+#[path = "../session_support/mod.rs"]
+mod session_support;
+
+mod bases;
+mod coupling;
+mod safety;
+mod tools;
+mod virtual_time;
