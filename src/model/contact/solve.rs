@@ -188,7 +188,12 @@ fn sweep<C: Copy + Mul<Vec3, Output = Vec3>>(
             row.sinking.as_ref().is_none_or(|(sinking, _)| {
                 let force = nearness.load(place) / d;
                 let depth = sinking.at(force);
-                (row.sunk.at(force) - depth).abs() <= FOUND * depth || !row.presses()
+                if row.presses() {
+                    return (row.sunk.at(force) - depth).abs() <= FOUND * depth;
+                }
+                // Around a larger force the tool was taken to sink in deeper than it does: that alone releases nothing.
+                let left = (closing[place].dot(&row.normal) - row.allowed) * d;
+                row.mode == ContactMode::Lost || row.glued || left <= depth + FOUND * sinking.most()
             })
         };
         if rows.iter().enumerate().all(is_as_taken) {
