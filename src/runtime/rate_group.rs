@@ -114,6 +114,8 @@ pub struct RateGroup {
     pub(crate) priority: Option<u8>,
     /// No real-time policy is what the group asked for.
     best_effort: bool,
+    /// Gives way to all other threads.
+    pub(crate) background: bool,
     pub(crate) overrun: OverrunPolicy,
     pub(crate) release: Release,
     pub(crate) wait: Wait,
@@ -138,6 +140,7 @@ impl RateGroup {
             stack: None,
             priority: None,
             best_effort: false,
+            background: false,
             overrun: OverrunPolicy::default(),
             release: Release::default(),
             wait: Wait::default(),
@@ -223,7 +226,7 @@ impl RateGroup {
     /// reported, the run goes on without.
     #[must_use]
     pub fn realtime_by_deadline(mut self) -> Self {
-        self.by_deadline = true;
+        (self.by_deadline, self.background) = (true, false);
         self
     }
 
@@ -239,7 +242,7 @@ impl RateGroup {
     #[must_use]
     pub fn realtime(mut self, priority: u8) -> Self {
         self.priority = Some(priority);
-        self.best_effort = false;
+        (self.best_effort, self.background) = (false, false);
         self
     }
 
@@ -250,6 +253,13 @@ impl RateGroup {
         self.by_deadline = false;
         self.best_effort = true;
         self
+    }
+
+    /// Asks for no real-time policy and lets its thread give way to all others that want the same processor: for work that may take its
+    /// time, on a machine that has little to spare.
+    #[must_use]
+    pub fn background(self) -> Self {
+        Self { background: true, ..self.best_effort() }
     }
 
     /// Asks for SCHED_FIFO with this priority unless the group has said what it wants, by [`realtime`](Self::realtime),

@@ -7,7 +7,7 @@ use crate::executor::Execution;
 use crate::graph::view::GraphView;
 use crate::rate_group::RateGroup;
 use crate::reports::text::{percent, places, short};
-use crate::system::grant::refusals;
+use crate::system::grant::{best_effort, refusals};
 use crate::system::machine::{MachineFinding, Readiness, findings};
 use crate::system::os;
 use crate::system::wait::Waiter;
@@ -79,6 +79,8 @@ pub struct GroupPlan {
     pub by_deadline: bool,
     /// The real-time priority asked for.
     pub priority: Option<u8>,
+    /// True if the group's thread gives way to all others.
+    pub background: bool,
     /// The way in which the group waits for its releases, in words.
     pub wait: String,
     /// The overrun policy: what becomes of releases that the group cannot make in time.
@@ -97,6 +99,7 @@ impl GroupPlan {
             cpus: group.cpus.clone(),
             by_deadline: group.by_deadline,
             priority: group.priority,
+            background: group.background,
             wait: match execution {
                 Execution::Virtual => "virtual".to_owned(),
                 Execution::Threaded => {
@@ -220,14 +223,16 @@ impl fmt::Display for Plan {
         write!(f, "\n{:width$}", "group")?;
         header.iter().try_for_each(|name| write!(f, " {name:>10}"))?;
         let wait_width = self.groups.iter().map(|group| group.wait.chars().count()).max().unwrap_or(0).max(4);
-        writeln!(f, "  core  {:15}{:wait_width$}  overrun", "policy", "wait")?;
+        let policy = |group: &GroupPlan| match (self.execution, group.priority) {
+            (Execution::Virtual, _) => "-".to_owned(),
+            (Execution::Threaded, Some(priority)) => format!("SCHED_FIFO {priority}"),
+            (Execution::Threaded, None) if group.by_deadline => "SCHED_DEADLINE".to_owned(),
+            (Execution::Threaded, None) => best_effort(group.background),
+        };
+        let policy_width = self.groups.iter().map(|group| policy(group).len()).max().unwrap_or(0).max(14) + 1;
+        writeln!(f, "  core  {:policy_width$}{:wait_width$}  overrun", "policy", "wait")?;
         for group in &self.groups {
-            let policy = match (self.execution, group.priority) {
-                (Execution::Virtual, _) => "-".to_owned(),
-                (Execution::Threaded, Some(priority)) => format!("SCHED_FIFO {priority}"),
-                (Execution::Threaded, None) if group.by_deadline => "SCHED_DEADLINE".to_owned(),
-                (Execution::Threaded, None) => "SCHED_OTHER".to_owned(),
-            };
+            let policy = policy(group);
             let core = match self.execution {
                 Execution::Virtual => "-".to_owned(),
                 Execution::Threaded => match (group.cpu, &group.cpus[..]) {
@@ -241,7 +246,7 @@ impl fmt::Display for Plan {
                 write!(f, " {:>10}", time.map_or("-".to_owned(), short))?;
             }
             let load = group.utilisation().map_or("-".to_owned(), percent);
-            writeln!(f, " {load:>10}  {core:>4}  {policy:15}{:wait_width$}  {}", group.wait, group.overrun)?;
+            writeln!(f, " {load:>10}  {core:>4}  {policy:policy_width$}{:wait_width$}  {}", group.wait, group.overrun)?;
         }
         writeln!(f)?;
         if self.total_load > 0.0 {

@@ -3,6 +3,7 @@
 use crate::executor::Execution;
 use crate::rate_group::RateGroup;
 use crate::reports::group_live::GroupLive;
+use crate::system::grant::best_effort;
 use crate::time::{Nanos, Rate};
 
 /// The picture of a graph: rate groups with their actors, and the ports that connect them.
@@ -179,7 +180,7 @@ impl GraphGroup {
             policy: match group.priority.filter(|_| threaded) {
                 Some(priority) => format!("SCHED_FIFO {priority}"),
                 None if threaded && group.by_deadline => "SCHED_DEADLINE".to_owned(),
-                None if threaded => "SCHED_OTHER".to_owned(),
+                None if threaded => best_effort(group.background),
                 None => "virtual time".to_owned(),
             },
             observer: group.observer,

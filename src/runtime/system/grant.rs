@@ -92,12 +92,17 @@ const FIFO: &str = "SCHED_FIFO";
 const DEADLINE: &str = "SCHED_DEADLINE";
 const OTHER: &str = "SCHED_OTHER";
 
-fn policy(fifo: bool, deadline: bool) -> &'static str {
+fn policy(fifo: bool, deadline: bool, background: bool) -> String {
     match (fifo, deadline) {
-        (_, true) => DEADLINE,
-        (true, _) => FIFO,
-        _ => OTHER,
+        (_, true) => DEADLINE.to_owned(),
+        (true, _) => FIFO.to_owned(),
+        _ => best_effort(background),
     }
+}
+
+/// The policy of a thread that is none of real time, and how it is said that it gives way.
+pub(crate) fn best_effort(background: bool) -> String {
+    if background { format!("{OTHER}, nice {}", os::BACKGROUND_NICE) } else { OTHER.to_owned() }
 }
 
 /// The group's three numbers; admission has seen to it that there is a budget.
@@ -117,12 +122,13 @@ pub(crate) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
     let cpus = if !spec.cpus.is_empty() && granted(os::pin_to(&spec.cpus)) { spec.cpus.clone() } else { Vec::new() };
     // After the cores: the kernel looks at them when it grants it.
     let by_deadline = spec.by_deadline && granted(ask_deadline(spec));
+    let background = spec.background && granted(os::give_way());
     // A thread that spins uses up its budget: under SCHED_DEADLINE it sleeps.
     let waiter = Waiter::new(spec.wait, priority.is_some(), spec.rate.period());
     let group = GroupGrant {
         name: spec.name.clone(),
-        policy_asked: policy(spec.priority.is_some(), spec.by_deadline).to_owned(),
-        policy: policy(priority.is_some(), by_deadline).to_owned(),
+        policy_asked: policy(spec.priority.is_some(), spec.by_deadline, spec.background),
+        policy: policy(priority.is_some(), by_deadline, background),
         priority_asked: spec.priority.unwrap_or(0),
         priority: priority.unwrap_or(0),
         cpu_asked: spec.cpu,

@@ -3,11 +3,14 @@
 //! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
 
 pub(crate) use imp::{
-    ThreadProbe, block_signals, is_root, lock_memory, may_lock_everything, monotonic, pin_to, set_deadline,
+    ThreadProbe, block_signals, give_way, is_root, lock_memory, may_lock_everything, monotonic, pin_to, set_deadline,
     set_realtime, set_timer_slack, sleep_until, stay_awake, thread_cpu,
 };
 
 use std::fs::read_to_string;
+
+/// The niceness of a thread that gives way.
+pub(crate) const BACKGROUND_NICE: i32 = 15;
 
 /// Moves the calling thread to one core.
 pub(crate) fn pin(cpu: usize) -> Result<(), String> {
@@ -200,6 +203,13 @@ mod imp {
         ))
     }
 
+    /// Lets the calling thread give way to others of its policy: one that computes all the time gets a thirtieth of a processor beside it.
+    pub(crate) fn give_way() -> Result<(), String> {
+        // SAFETY: the call takes numbers alone; 0 means the calling thread.
+        let result = unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, super::BACKGROUND_NICE) };
+        if result == 0 { Ok(()) } else { Err(format!("giving way refused: {}", Error::last_os_error())) }
+    }
+
     /// A thread seen from another one: the time that it computed, and whether it waits for anything but a processor.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct ThreadProbe {
@@ -338,6 +348,10 @@ mod imp {
     }
 
     pub(crate) fn set_realtime(_priority: u8) -> Result<(), String> {
+        Err(NOT_AVAILABLE.to_owned())
+    }
+
+    pub(crate) fn give_way() -> Result<(), String> {
         Err(NOT_AVAILABLE.to_owned())
     }
 

@@ -81,7 +81,7 @@ const RAMP_MARGIN_S: f64 = 0.005;
 
 /// The group that reduces surroundings, for wishes that come at `rate`.
 pub(super) fn basis_group(rate: Rate) -> RateGroup {
-    RateGroup::new(rate).name(BASIS)
+    RateGroup::new(rate).name(BASIS).background()
 }
 
 /// The group that takes records to the log, and pictures to one with `/scene`.
