@@ -199,15 +199,19 @@ impl GlobalActor {
         let mut cause = None;
         if newest.saturating_sub(self.now()) > self.plan.most_ticks() {
             let before = self.begin_way();
-            while self.take_samples(newest - self.plan.way_ticks()) {}
-            cause = self.go(before);
+            let mut taken = 0;
+            while self.take_samples(newest - self.plan.way_ticks()) {
+                taken += 1;
+            }
+            cause = self.go(before, taken);
         }
         loop {
             let before = self.begin_way();
-            if !self.take_samples(newest) {
+            let taken = (0..self.simulation.stride()).take_while(|_| self.take_samples(newest)).count();
+            if taken == 0 {
                 return cause;
             }
-            cause = cause.or(self.go(before));
+            cause = cause.or(self.go(before, taken));
         }
     }
 
@@ -236,41 +240,45 @@ impl GlobalActor {
     /// The samples of all tools come in step. Where one lacks a sample that another has, it is interpolated.
     fn take_samples(&mut self, newest: u64) -> bool {
         let Some(next) = self.next_tick().filter(|&next| next <= newest) else { return false };
+        let most = self.plan.way_ticks();
         for side in &mut self.tools {
             let sample = side.waiting.front().copied().unwrap_or(side.tool);
-            side.is_between = sample.tick > next;
-            side.tool = if side.is_between {
+            let is_between = sample.tick > next;
+            side.is_between |= is_between;
+            let before = side.tool;
+            side.tool = if is_between {
                 let share = next.saturating_sub(side.tool.tick) as f64 / (sample.tick - side.tool.tick) as f64;
                 ToolTick { tick: next, pose: side.tool.pose.towards(&sample.pose, share) }
             } else {
                 side.waiting.pop_front();
                 sample
             };
+            let way = ToolMotion { from: before.pose, to: side.tool.pose };
+            let ticks = next.saturating_sub(before.tick).min(most);
+            (1..=ticks).for_each(|i| side.history.push(way.at(i as f64 / ticks as f64)));
         }
         true
     }
 
-    /// Advances while each tool goes its way, which began at the tick `before`, in half a period's ticks at most.
-    fn go(&mut self, before: u64) -> Option<Cause> {
+    /// Advances while each tool goes its way of `taken` samples, which began at the tick `before`, in half a period's ticks at most.
+    fn go(&mut self, before: u64, taken: usize) -> Option<Cause> {
         let passed = self.now().saturating_sub(before);
         let ticks = passed.min(self.plan.way_ticks());
-        for i in 0..ticks {
-            let part = |side: &mut ToolSide| {
-                let way = ToolMotion { from: side.from, to: side.tool.pose };
-                let motion = way.part(i as f64 / ticks as f64, (i + 1) as f64 / ticks as f64);
-                side.history.push(motion.to);
-                motion
-            };
+        let stride = self.simulation.stride();
+        for begin in (0..ticks).step_by(stride as usize) {
+            let end = ticks.min(begin + u64::from(stride));
+            let [from, to] = [begin, end].map(|tick| tick as f64 / ticks as f64);
+            let part = |side: &ToolSide| ToolMotion { from: side.from, to: side.tool.pose }.part(from, to);
             self.motions.clear();
-            self.motions.extend(self.tools.iter_mut().map(part));
-            self.simulation.tick_all(&self.motions);
+            self.motions.extend(self.tools.iter().map(part));
+            self.simulation.step_all((end - begin) as u32, &self.motions);
         }
         if passed > ticks {
             // Nobody moved as the tools did here: what they will do is not to be told from it.
             self.tools.iter_mut().for_each(|side| side.history.restart(side.tool.pose));
             return Some(Cause::PathDropped);
         }
-        let is_interpolated = passed > 1 || self.tools.iter().any(|side| side.is_between);
+        let is_interpolated = passed > taken as u64 || self.tools.iter().any(|side| side.is_between);
         is_interpolated.then_some(Cause::SamplesLost)
     }
 

@@ -92,8 +92,8 @@ fn snapped<S: Simd>(s: S, value: S::V) -> S::V {
     s.keep(s.mask(u8::MAX), s.mul(value, value), s.splat(REST * REST), value)
 }
 
-/// Steps are so many times as many as stability asks for: elements that are bent or stretched are stiffer than at rest.
-pub(crate) const MARGIN: f64 = 1.3;
+/// Steps are chosen so many times as short as stability asks for, as elements that are bent or stretched are stiffer than at rest.
+pub const MARGIN: f64 = 1.3;
 
 /// Share of an eigenvalue up to which a body's is found.
 const PRECISION: f64 = 1e-7;

@@ -58,7 +58,9 @@ impl Simulation {
         let forces = vec![Vec3::zeros(); nodes];
         let (touches, rows, means) = Default::default();
         let body = Stiffened::new(body);
-        let moving = Moving { body, state, forces, touches, rows, law, stepping, candidates, inverse_masses, means };
+        let stride = 1;
+        let moving =
+            Moving { body, state, forces, touches, rows, law, stepping, stride, candidates, inverse_masses, means };
         let new = Self { moving, stiffness: Stiffness::default(), ahead: Box::default(), told: None };
         Ok(new.with_tool(contact))
     }
@@ -108,6 +110,7 @@ impl Simulation {
             rows,
             law: self.moving.law,
             stepping: self.moving.stepping,
+            stride: self.moving.stride,
             candidates: self.moving.candidates.clone(),
             inverse_masses: self.moving.inverse_masses.clone(),
             means: self.moving.means.clone(),
@@ -147,9 +150,46 @@ impl Simulation {
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
     pub fn tick_all(&mut self, motions: &[ToolMotion]) {
-        let stiffness = self.moving.body.stiffness().towards(self.stiffness, self.moving.stepping.tick);
+        self.step_all(1, motions);
+    }
+
+    /// Advances `ticks` haptic ticks in one step, at most [`stride`](Self::stride), while each tool moves straight along its own of `motions`, one
+    /// for each tool.
+    ///
+    /// # Panics
+    /// If a tool has none.
+    ///
+    /// # Real-time
+    /// Bounded and real-time safe if the body's forces are.
+    pub fn step_all(&mut self, ticks: u32, motions: &[ToolMotion]) {
+        let time = f64::from(ticks) * self.moving.stepping.tick;
+        let stiffness = self.moving.body.stiffness().towards(self.stiffness, time);
         self.moving.put_stiffness(stiffness);
-        self.moving.advance(|tool| motions[tool], &mut |_| ());
+        self.moving.advance(ticks, |tool| motions[tool], &mut |_| ());
+    }
+
+    /// Lets one step span up to so many haptic ticks ([`step_all`](Self::step_all)), and every step that runs ahead: a body need not
+    /// follow a haptic rate that is higher than its own stability asks for. Whoever says so knows that the body bears it.
+    ///
+    /// # Panics
+    /// If `ticks` is zero, or more than one where a tick has several substeps.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    #[must_use]
+    pub fn striding(mut self, ticks: u32) -> Self {
+        let substeps = self.moving.stepping.substeps;
+        assert!(ticks == 1 || ticks > 1 && substeps == 1, "steps of {ticks} ticks of {substeps} substeps");
+        self.moving.stride = ticks;
+        self
+    }
+
+    /// Haptic ticks that one step may span.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn stride(&self) -> u32 {
+        self.moving.stride
     }
 
     /// Nodes around a patch that run ahead, if nothing else is said.
@@ -166,8 +206,8 @@ impl Simulation {
         self
     }
 
-    /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the state at the
-    /// start of every substep and at the end, and goes back to the present. It ends early with a tick in which `watch` says no. Of a
+    /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), or until its last step of [`stride`](Self::stride)
+    /// ticks is a whole one, shows `watch` the state at the start of every step and at the end, and goes back to the present. It ends early with a tick in which `watch` says no. Of a
     /// large body only the neighbourhood of `patch` runs ahead (ids in increasing order).
     ///
     /// # Real-time

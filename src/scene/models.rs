@@ -14,6 +14,9 @@ pub struct GlobalSpec {
     pub rate_hz: f64,
     /// Explicit steps per millisecond; chosen from the stability limit if absent.
     pub substeps_per_ms: Option<u32>,
+    /// Haptic ticks that one step of the whole body spans; more than one where its stability allows steps longer than a haptic tick. Not in
+    /// `full`, which is simulated at the haptic rate.
+    pub ticks_per_step: u32,
     /// Cores that compute the forces of the whole body, also where it is simulated at the haptic rate (`full`); more than one takes the
     /// feature `parallel`.
     pub cores: usize,
@@ -31,6 +34,7 @@ impl Default for GlobalSpec {
         Self {
             rate_hz: 30.0,
             substeps_per_ms: None,
+            ticks_per_step: 1,
             cores: 1,
             ahead_nodes: Simulation::AHEAD,
             compute_latency_ms: 0.0,

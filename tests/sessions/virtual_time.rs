@@ -1,7 +1,8 @@
 //! The time convention of a session, in virtual time and to the last bit.
 
 use crate::session_support::*;
-use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState};
+use palpate::Error;
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
 use palpate::log::{ForceSample, LogRecord};
 use palpate::model::Vec3;
 use palpate::model::body::{Body, State};
@@ -11,6 +12,7 @@ use palpate::model::local::{Feedback, Kind as LocalModelKind};
 use palpate::model::simulation::{Simulation, Stepping};
 use palpate::runtime::{Nanos, Rate};
 use palpate::runtime::{OverrunPolicy, RateGroup};
+use palpate::scene::Scene;
 use palpate::session::{Session, SessionBuilder, Summary};
 
 const HAPTIC: Rate = Rate::hz(1000);
@@ -321,4 +323,53 @@ fn a_renderer_sees_the_newest_surface_tool_and_force() {
     let summary = running.stop();
     let row = forces(&summary).into_iter().find(|row| row.time == tool.time).unwrap();
     assert_eq!((tool.time, <[f64; 3]>::from(tool.computed_force)), (Nanos(150_000_000), row.force_n));
+}
+
+/// A block that bears steps of half a millisecond, at a haptic rate, with steps of the whole body of so many haptic ticks.
+fn in_strides(rate_hz: u32, ticks: u32) -> Result<Scene, Error> {
+    let text = format!(
+        "[body.block]\nnodes = [8, 8, 8]\nsize_m = [0.1, 0.1, 0.1]\n[body.material]\nnode_mass_kg = 0.0005\n\
+         stiffness_n_per_m = 30.0\ndamping_ratio = 0.3\n[contact]\nfriction = 0.5\n[local]\nrate_hz = {rate_hz}\n\
+         [global]\nticks_per_step = {ticks}\n[device]\ntool = {{ shape = \"sphere\", radius_m = 0.008 }}\n\
+         path_csv = \"scenes/paths/drag.csv\"\n[run]\nduration_s = 0.6\n"
+    );
+    let mut scene = Scene::from_toml(&text, "scene.toml", None)?;
+    let corners = vec![[0.04, 0.05, 0.109], [0.04, 0.05, 0.102], [0.06, 0.05, 0.102]];
+    scene.devices[0].path = Some(ToolPath::new(vec![0.0, 0.2, 0.6], corners).unwrap());
+    Ok(scene)
+}
+
+/// Check that a whole body whose steps are longer than a haptic tick serves a local model as well as one that follows each tick.
+#[test]
+fn a_global_model_may_take_steps_of_several_ticks() {
+    let forces = |ticks: u32, model: LocalModelKind| -> Vec<Vec3> {
+        let session = Session::from_scene(in_strides(4000, ticks).unwrap()).model(model).virtual_time().keep_records();
+        let summary = session.build().unwrap().run().unwrap();
+        let force =
+            |record: &LogRecord| if let LogRecord::Force(row) = record { Some(row.force_n.into()) } else { None };
+        summary.records.iter().filter_map(force).collect()
+    };
+    let full = forces(2, LocalModelKind::Full);
+    assert_eq!(full, forces(1, LocalModelKind::Full), "full is simulated at the haptic rate");
+    let peak = full.iter().fold(0.0_f64, |peak, force| peak.max(force.norm()));
+    let [short, long] = [1, 2].map(|ticks| {
+        let forces = forces(ticks, LocalModelKind::Predictive);
+        let squares: f64 = forces.iter().zip(&full).map(|(a, b)| (a - b).norm_squared()).sum();
+        100.0 * (squares / full.len() as f64).sqrt() / peak
+    });
+    println!("of {peak:.2} N: {short:.3} % in steps of a tick, {long:.3} % in steps of two");
+    assert!(short < 0.5 && long < 0.5 && short != long, "{short} {long}");
+}
+
+#[test]
+fn a_step_that_spans_more_ticks_than_are_stable_is_refused() {
+    let error = |rate_hz: u32, ticks: u32| {
+        let session = in_strides(rate_hz, ticks).and_then(|scene| Session::from_scene(scene).virtual_time().build());
+        session.err().map(|error| error.to_string())
+    };
+    assert_eq!((error(4000, 1), error(4000, 2)), (None, None));
+    for (rate, ticks, words) in [(4000, 3, "must be 1 to 2"), (1000, 2, "must be 1 to 1"), (4000, 0, "at least 1")] {
+        let error = error(rate, ticks).expect("it is refused");
+        assert!(error.contains("global.ticks_per_step") && error.contains(words), "{error}");
+    }
 }

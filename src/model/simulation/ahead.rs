@@ -46,9 +46,10 @@ impl Ahead {
         Self::with(self.most)
     }
 
-    /// Runs on from the present of `whole` for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), shows `watch` the
-    /// state at the start of every substep and at the end, and leaves `whole` as it was. It ends early with a tick in which `watch` says
-    /// no. Of a large body only the neighbourhood of `patch` runs ahead (ids in increasing order).
+    /// Runs on from the present of `whole` for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), or for as many more
+    /// as make its last step a whole one, shows `watch` the state at the start of every step and at the end, and leaves `whole` as it
+    /// was. It ends early with a tick in which `watch` says no. Of a large body only the neighbourhood of `patch` runs ahead (ids in
+    /// increasing order).
     pub(super) fn run(
         &mut self,
         whole: &mut Moving,
@@ -61,9 +62,15 @@ impl Ahead {
             patch.clone_into(&mut self.patch);
             self.part = Part::new(whole, patch, self.most);
         }
+        let stride = whole.stride;
+        let steps = (0..ticks.div_ceil(stride)).map(|step| step * stride);
+        let motion = |tool: usize, tick: u32| ToolMotion {
+            from: motion(tool, tick).from,
+            to: motion(tool, tick + stride - 1).to,
+        };
         if let Some(part) = &mut self.part {
             part.begin(whole);
-            for tick in 0..ticks {
+            for tick in steps {
                 part.drift(tick);
                 let Part { moving, places, .. } = part;
                 let shown = |state: &State| watch(Glimpse { state, places: Some(places) });
@@ -76,7 +83,8 @@ impl Ahead {
             self.present.clone_from(&whole.state);
             let (touches, means) = (whole.touches.clone(), whole.means.clone());
             let mut shown = |state: &State| watch(Glimpse { state, places: None });
-            let is_through = (0..ticks).all(|tick| advance_while(whole, |tool| motion(tool, tick), &mut shown));
+            let mut steps = steps;
+            let is_through = steps.all(|tick| advance_while(whole, |tool| motion(tool, tick), &mut shown));
             if is_through {
                 shown(&whole.state);
             }
@@ -158,6 +166,7 @@ impl Part {
             rows,
             law: whole.law,
             stepping: whole.stepping,
+            stride: whole.stride,
             candidates,
             means: whole.means.clone(),
             inverse_masses,
@@ -192,10 +201,10 @@ impl Part {
         moving.means.copy_from_slice(&whole.means);
     }
 
-    /// The rest of the body as it is expected to go on in the `tick`-th tick.
+    /// The rest of the body as it is expected to go on in the step that begins with the `tick`-th tick.
     fn drift(&mut self, tick: u32) {
         let State { velocities, .. } = &mut self.moving.state;
-        let t = (f64::from(tick) + 0.5) * self.moving.stepping.tick;
+        let t = (f64::from(tick) + 0.5 * f64::from(self.moving.stride)) * self.moving.stepping.tick;
         let [of_velocity, of_change] = [(-t / DECAY).exp(), t * (-t / CHANGE_DECAY).exp()];
         for (&node, [velocity, acceleration]) in self.rim.iter().zip(&self.drifts) {
             velocities[node as usize] = velocity * of_velocity + acceleration * of_change;
@@ -203,14 +212,14 @@ impl Part {
     }
 }
 
-/// A tick that is shown to `watch`; false if that says no.
+/// A whole step that is shown to `watch`; false if that says no.
 fn advance_while(
     moving: &mut Moving,
     motion: impl Fn(usize) -> ToolMotion,
     mut watch: impl FnMut(&State) -> bool,
 ) -> bool {
     let mut goes_on = true;
-    moving.advance(motion, &mut |state| goes_on = goes_on && watch(state));
+    moving.advance(moving.stride, motion, &mut |state| goes_on = goes_on && watch(state));
     goes_on
 }
 
@@ -273,7 +282,7 @@ mod tests {
         let mut whole = Vec::new();
         for tick in 60..120 {
             let motion = motion(&simulation, tick);
-            simulation.moving.advance(|_| motion, &mut |state| {
+            simulation.moving.advance(1, |_| motion, &mut |state| {
                 whole.extend(patch.iter().map(|&node| state.positions[node as usize]))
             });
         }
@@ -303,7 +312,7 @@ mod tests {
                 true
             },
         );
-        simulation.moving.advance(|_| still, &mut |_| ());
+        simulation.moving.advance(1, |_| still, &mut |_| ());
         let whole = patch.iter().map(|&node| simulation.state().positions[node as usize]);
         assert!(part[part.len() - patch.len()..].iter().copied().eq(whole));
     }

@@ -15,6 +15,8 @@ pub(super) struct Moving {
     pub(super) rows: Rows,
     pub(super) law: Law,
     pub(super) stepping: Stepping,
+    /// Haptic ticks that one step may span; more than one only of a stepping with one substep.
+    pub(super) stride: u32,
     /// The surface triangles that a tool may touch, in increasing order.
     pub(super) candidates: Vec<u32>,
     pub(super) inverse_masses: Vec<f64>,
@@ -23,10 +25,13 @@ pub(super) struct Moving {
 }
 
 impl Moving {
-    /// Advances one haptic tick along `motion`, of each tool, and shows `watch` the state at the start of every substep.
-    pub(super) fn advance(&mut self, motion: impl Fn(usize) -> ToolMotion, watch: &mut impl FnMut(&State)) {
-        let Self { body, state, forces, touches, rows, law, candidates, inverse_masses, stepping, means } = self;
-        let (n, d) = (f64::from(stepping.substeps), stepping.step());
+    /// Advances one haptic tick, or several in one step, along `motion` of each tool in all of that time, and shows `watch` the state at
+    /// the start of every step.
+    pub(super) fn advance(&mut self, ticks: u32, motion: impl Fn(usize) -> ToolMotion, watch: &mut impl FnMut(&State)) {
+        let Self { body, state, forces, touches, rows, law, candidates, inverse_masses, stepping, stride, means } =
+            self;
+        debug_assert!((1..=*stride).contains(&ticks), "{ticks} ticks in steps of at most {stride}");
+        let (n, d) = (f64::from(stepping.substeps), f64::from(ticks) * stepping.step());
         means.fill(Wrench::default());
         touches.iter_mut().for_each(Touch::begin);
         for u in 0..stepping.substeps {
@@ -52,5 +57,47 @@ impl Moving {
     pub(super) fn put_stiffness(&mut self, stiffness: Stiffness) {
         self.body.set_stiffness(stiffness);
         self.touches.iter_mut().for_each(|touch| touch.stiffness = stiffness);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Vec3;
+    use crate::body::{Block, Body, State};
+    use crate::contact::{Contact, Law, ToolMotion, ToolShape};
+    use crate::mesh::Face;
+    use crate::simulation::{Simulation, Stepping};
+
+    /// A sphere that is pressed 8 mm into a lattice within 0.2 s, in steps of as many ticks as `strides` says: force (N) and tick.
+    fn pressed(strides: impl Fn(u32) -> u32) -> Vec<(u32, f64)> {
+        let builder = Block::builder([8; 3], [0.1; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
+        let block = builder.fix(Face::ZMin).build().unwrap();
+        let (state, stepping) = (State::at_rest(block.rest()), Stepping { tick: 0.25e-3, substeps: 1 });
+        let law = Law { friction: 0.5.into(), ..Law::default() };
+        let simulation = Simulation::new(Box::new(block), state, Contact::default(), law, stepping).unwrap();
+        let mut simulation = simulation.with_shape(0, ToolShape::Sphere { radius: 0.008 }).striding(2);
+        let at = |tick: u32| Vec3::new(0.047, 0.0512, 0.108 - 0.008 * f64::from(tick) / 800.0);
+        let (mut tick, mut forces) = (0, Vec::new());
+        while tick < 800 {
+            let ticks = strides(tick);
+            simulation.step_all(ticks, &[ToolMotion::straight(at(tick), at(tick + ticks))]);
+            tick += ticks;
+            forces.push((tick, simulation.force(0).z));
+        }
+        forces
+    }
+
+    /// Check that longer steps feel what short ones do, and that no contact is lost where a step is shorter than the one before: what
+    /// pressed then is twice what presses now, and under that the tool would sink in deeper.
+    #[test]
+    fn steps_of_one_tick_and_of_two_feel_the_same() {
+        let expected = pressed(|_| 1);
+        let most = expected.iter().fold(0.0_f64, |most, (_, force)| most.max(*force));
+        let alternating = pressed(|tick| 1 + u32::from(tick % 7 < 5));
+        for (tick, force) in pressed(|_| 2).into_iter().chain(alternating) {
+            let (at, other) = expected[tick as usize - 1];
+            assert_eq!(at, tick);
+            assert!((force - other).abs() < 0.02 * most, "tick {tick}: {force} and {other} N of {most}");
+        }
     }
 }

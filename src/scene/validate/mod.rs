@@ -218,6 +218,9 @@ fn global(global: &GlobalSpec) -> Result<(), Error> {
         );
         return Err(Error::scene("global.substeps_per_ms", message));
     }
+    if global.ticks_per_step == 0 {
+        return Err(Error::scene("global.ticks_per_step", "is 0, must be at least 1"));
+    }
     if !(1..=MAX_CORES).contains(&global.cores) {
         return Err(Error::scene("global.cores", format!("is {}, must be 1 to {MAX_CORES}", global.cores)));
     }

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::model::Vec3;
 use crate::model::body::{Body, State};
 use crate::model::equilibrium::static_equilibrium;
-use crate::model::integrator::Spectrum;
+use crate::model::integrator::{MARGIN, Spectrum};
 use crate::runtime::Rate;
 use crate::scene::{Nodes, Scene, device_field};
 
@@ -60,6 +60,7 @@ impl Start {
         check_nodes(&*body, &attached, &probes)?;
         let tick = haptic.period_s();
         let (substeps, stable_substeps, stable_step) = substeps(&mut *body, scene.global.substeps_per_ms, tick)?;
+        check_stride(scene.global.ticks_per_step, substeps, stable_step / (MARGIN * tick))?;
         let state = match held {
             // The equilibrium that the run begins from.
             Some(held) => static_equilibrium(&mut *body, &held)?,
@@ -145,4 +146,15 @@ fn substeps(body: &mut dyn Body, per_ms: Option<u32>, tick: f64) -> Result<(u32,
         return Err(Error::scene("global.substeps_per_ms", message));
     }
     Ok((substeps as u32, spectrum.substeps(tick), stable))
+}
+
+/// Whether one step may span `ticks` haptic ticks of so many `substeps`, where as many as `stable` are stable with the usual margin.
+fn check_stride(ticks: u32, substeps: u32, stable: f64) -> Result<(), Error> {
+    if ticks == 1 || (substeps == 1 && f64::from(ticks) <= stable) {
+        return Ok(());
+    }
+    let most = if substeps == 1 { stable.max(1.0) as u32 } else { 1 };
+    let why = if substeps == 1 { "longer steps are unstable" } else { "each haptic tick is several steps already" };
+    let message = format!("is {ticks}, must be 1 to {most}, as {why} at this haptic rate");
+    Err(Error::scene("global.ticks_per_step", message))
 }

@@ -65,9 +65,10 @@ struct Cost {
 impl Cost {
     /// What a release of `group` takes at least, if that is within its period.
     fn budget(&self, group: &RateGroup) -> Result<Nanos, Error> {
-        let Timing { haptic, substeps, .. } = self.timing;
+        let Timing { haptic, substeps, stride, .. } = self.timing;
+        let stride = if self.kind == Kind::Full { 1 } else { stride };
         let ticks = haptic.as_hz() / group.rate().as_hz();
-        let evaluations = f64::from(substeps) * ticks;
+        let evaluations = f64::from(substeps) / f64::from(stride) * ticks;
         // A budget of zero would be refused, and a clock can be that coarse.
         let budget = Nanos::from_secs_f64(self.evaluation.as_secs_f64() * evaluations).max(Nanos(1));
         let period = group.rate().period();
@@ -97,7 +98,7 @@ mod tests {
     use crate::runtime::Rate;
 
     fn cost(evaluation_us: u64, kind: Kind) -> Cost {
-        let timing = Timing { haptic: Rate::hz(1000), global: Rate::hz(40), substeps: 2, horizon: 32 };
+        let timing = Timing { haptic: Rate::hz(1000), global: Rate::hz(40), substeps: 2, stride: 1, horizon: 32 };
         Cost { evaluation: Nanos(evaluation_us * 1000), timing, nodes: 1000, kind }
     }
 

@@ -134,6 +134,7 @@ mod tests {
         Situation {
             evaluation: Nanos(evaluation_us * 1000),
             origin: "measured",
+            stride: 1,
             substeps: 2,
             haptic_period_s: 1e-3,
             global_period_s: 1.0 / 30.0,

@@ -146,11 +146,12 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let has_global = global.is_some();
     let global = groups::global_group(global, &scene.global, rates[1], execution)?;
     let blend_ticks = (scene.local.blend.ms * 1e-3 / rates[0].period_s()).round().max(1.0) as u32;
-    let work = Nanos::from_secs_f64(start.body.nominal_evaluation() * f64::from(start.substeps));
+    let steps = f64::from(start.substeps) / f64::from(scene.global.ticks_per_step);
+    let work = Nanos::from_secs_f64(start.body.nominal_evaluation() * steps);
     let lateness = timing::lateness(&global, rates[0], work, options.in_real_time);
     let lateness = link::lateness(scene.link.as_ref(), rates[0], lateness);
     link::check(scene.link.as_ref(), &*start.body)?;
-    let timing = Timing::new(rates, start.substeps, lateness, blend_ticks);
+    let timing = Timing::new(rates, [start.substeps, scene.global.ticks_per_step], lateness, blend_ticks);
 
     let (kind, choice, measured) = choice::model(&mut scene, &mut start, timing, execution);
     if side != Side::Both && kind == Kind::Full {
@@ -203,7 +204,11 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         link: scene.link.as_ref().map(link::conditions),
         basis_folder,
         settings: Settings { friction: law.friction, stiffness: Stiffness::default(), model: kind },
-        stiffest: Stiffness::largest(start.stable_step, start.tick, start.substeps),
+        stiffest: Stiffness::largest(
+            start.stable_step,
+            start.tick * f64::from(scene.global.ticks_per_step),
+            start.substeps,
+        ),
         equations: law.equations,
     };
     let until = (!endless).then(|| Nanos::from_secs_f64(scene.run.duration_s));
@@ -297,7 +302,8 @@ fn simulation(start: Start, scene: &Scene, tools: &[Tool]) -> Result<Simulation,
     let mut contacts = tools.iter().map(|tool| tool.contact);
     let first = contacts.next().unwrap_or_default();
     let first = Simulation::new(body, state, first, scene.contact.law(), Stepping { tick, substeps })?
-        .looking_ahead_with(scene.global.ahead_nodes);
+        .looking_ahead_with(scene.global.ahead_nodes)
+        .striding(scene.global.ticks_per_step);
     let all = contacts.fold(first, Simulation::with_tool);
     Ok((0..).zip(tools).fold(all, |all, (index, tool)| all.with_shape(index, tool.shape)))
 }

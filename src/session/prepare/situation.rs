@@ -33,6 +33,8 @@ pub(super) struct Situation {
     pub(super) origin: &'static str,
     /// Evaluations per haptic tick.
     pub(super) substeps: u32,
+    /// Haptic ticks that one step of the global model spans.
+    pub(super) stride: u32,
     pub(super) haptic_period_s: f64,
     pub(super) global_period_s: f64,
     /// Haptic ticks that `predictive` and `predicted` look ahead.
@@ -91,12 +93,13 @@ impl Situation {
                 (force_evaluation(body, state), "measured", cores)
             }
         };
-        let Timing { haptic, global, substeps, horizon } = timing;
+        let Timing { haptic, global, substeps, stride, horizon } = timing;
         let [haptic_period_s, global_period_s] = [haptic, global].map(|rate| rate.period_s());
         Self {
             evaluation,
             origin,
             substeps,
+            stride,
             haptic_period_s,
             global_period_s,
             ahead_ticks: horizon,
@@ -138,8 +141,9 @@ impl Situation {
 
     /// What the global model does in one of its periods (s): it follows the tool, and looks ahead.
     fn global_work_s(&self, kind: Kind) -> f64 {
-        let follow = self.global_period_s / self.haptic_period_s * self.full_tick_s();
-        let run_ahead = self.ahead_share * f64::from(self.ahead_ticks) * self.full_tick_s();
+        let tick = self.full_tick_s() / f64::from(self.stride);
+        let follow = self.global_period_s / self.haptic_period_s * tick;
+        let run_ahead = self.ahead_share * f64::from(self.ahead_ticks) * tick;
         let ahead = match kind {
             Kind::Full => return 0.0,
             Kind::Predicted | Kind::Predictive => run_ahead,

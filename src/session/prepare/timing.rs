@@ -10,19 +10,27 @@ const PERIODS_AHEAD: f64 = 1.25;
 /// On threads a result may be later than the work says by this factor: contact, integration, the prediction, other threads.
 const LATE_WORK: f64 = 2.0;
 
-/// How often the whole body's forces are evaluated: `substeps` times per haptic tick; and for how many ticks ahead.
+/// How often the whole body's forces are evaluated: `substeps` times per haptic tick, by the global model once in `stride` ticks; and for
+/// how many ticks ahead.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Timing {
     pub(crate) haptic: Rate,
     pub(crate) global: Rate,
     pub(super) substeps: u32,
+    /// Haptic ticks that one step of the global model spans.
+    pub(super) stride: u32,
     /// Haptic ticks that a local model may have to reach ahead.
     pub(crate) horizon: u32,
 }
 
 impl Timing {
-    pub(super) fn new([haptic, global]: [Rate; 2], substeps: u32, lateness: Nanos, blend_ticks: u32) -> Self {
-        Self { haptic, global, substeps, horizon: horizon(haptic, global, lateness, blend_ticks) }
+    pub(super) fn new(
+        [haptic, global]: [Rate; 2],
+        [substeps, stride]: [u32; 2],
+        lateness: Nanos,
+        blend_ticks: u32,
+    ) -> Self {
+        Self { haptic, global, substeps, stride, horizon: horizon(haptic, global, lateness, blend_ticks) }
     }
 }
 

@@ -34,7 +34,7 @@ fn with_finer_steps(scene: &Scene) -> Result<Scene, Error> {
         (None, None) => return Err(Error::scene("body", "is missing")),
     };
     let mut finer = scene.clone();
-    finer.global.substeps_per_ms = Some(FINER_STEPS * per_ms);
+    (finer.global.substeps_per_ms, finer.global.ticks_per_step) = (Some(FINER_STEPS * per_ms), 1);
     Ok(finer)
 }
 
@@ -43,6 +43,6 @@ fn with_finer_mesh(scene: &Scene) -> Result<Option<Scene>, Error> {
     let Some(tetrahedra) = scene.body.as_ref().and_then(BodySpec::tetrahedra) else { return Ok(None) };
     let Some(body) = tetrahedra.refined(FINER_MESH)? else { return Ok(None) };
     let mut finer = Scene { body: Some(BodySpec::Tetrahedra(body)), ..scene.clone() };
-    finer.global.substeps_per_ms = None;
+    (finer.global.substeps_per_ms, finer.global.ticks_per_step) = (None, 1);
     Ok(Some(finer))
 }

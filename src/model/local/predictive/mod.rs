@@ -14,7 +14,7 @@ use crate::{Vec3, Wrench};
 /// A ring that moves by more than this share of the patch's extent in one step is torn along.
 const TORN: f64 = 0.05;
 /// So long before it was seen to be torn along (ticks) it was on the way to that.
-const TORN_TICKS: usize = 2;
+const TORN_TICKS: u32 = 2;
 
 /// The patch and what of the body depends on it stay non-linear. The ring, the patch's neighbours outside, moves as
 /// predicted for the expected path of the tool, and answers by the reduced surroundings to what the near part does
@@ -101,7 +101,9 @@ impl Predictive {
     fn predict(&mut self, resync: &mut ResyncView<'_>) {
         let ring = self.ring();
         let Self { patch: Patch { window, state, forces, stepping, .. }, near, path, ring_weights, .. } = self;
-        path.clear(window.ring, stepping.step(), (resync.horizon * stepping.substeps + 1) as usize);
+        let stride = resync.global.stride();
+        let steps = resync.horizon.div_ceil(stride) * stepping.substeps + 1;
+        path.clear(window.ring, (stepping.step(), stride as usize), steps as usize);
         if let Some(told) = resync.global.told() {
             if !path.take(&told.path) {
                 // Another path than this body's: the ring stands still, from the next model on it moves again.
@@ -112,7 +114,7 @@ impl Predictive {
         }
         let motion = |tool: usize, n| resync.tools[tool].motion(n, stepping.tick);
         let body = resync.global.body();
-        let (step, extent) = (stepping.step(), window.extent(body.rest()));
+        let (step, extent) = (f64::from(stride) * stepping.step(), window.extent(body.rest()));
         ring_weights.clear();
         ring_weights.extend(window.nodes[ring.clone()].iter().map(|&node| body.inverse_masses()[node as usize]));
         let reached = &window.nodes[..near.len()];
@@ -132,7 +134,7 @@ impl Predictive {
             if is_sound {
                 path.push(state, forces, ring.clone());
             } else {
-                path.drop_last(TORN_TICKS * stepping.substeps as usize);
+                path.drop_last((TORN_TICKS * stepping.substeps).div_ceil(stride) as usize);
             }
             is_sound
         });
@@ -160,8 +162,8 @@ impl Predictive {
         self.take_near_forces();
         let force = self.patch.step(tool, d);
         if let Some(basis) = &self.basis {
-            let expected = self.path.at(self.substep).forces;
-            deviations(&mut self.ring_forces, &self.patch.forces[self.patch.window.movable..], expected);
+            self.path.at(self.substep).write_forces(&mut self.ring_forces);
+            deviations(&mut self.ring_forces, &self.patch.forces[self.patch.window.movable..]);
             basis.answers.step(&mut self.surroundings, &self.ring_forces, d);
         }
         self.substep += 1;
@@ -172,11 +174,10 @@ impl Predictive {
     }
 }
 
-/// out = forces - expected, as far as `expected` reaches.
-fn deviations(out: &mut [f64], forces: &[Vec3], expected: &[f64]) {
-    let (out, expected) = (out.as_chunks_mut::<3>().0, expected.as_chunks::<3>().0);
-    for ((out, force), expected) in out.iter_mut().zip(forces).zip(expected) {
-        *out = [force.x - expected[0], force.y - expected[1], force.z - expected[2]];
+/// Puts how much `forces` differ from what was `expected` in its place, as far as it reaches.
+fn deviations(expected: &mut [f64], forces: &[Vec3]) {
+    for (expected, force) in expected.as_chunks_mut::<3>().0.iter_mut().zip(forces) {
+        *expected = [force.x - expected[0], force.y - expected[1], force.z - expected[2]];
     }
 }
 

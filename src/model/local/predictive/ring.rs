@@ -64,28 +64,31 @@ impl NearBody {
 pub(super) struct RingPath {
     /// Numbers of one quantity: three times the ring nodes.
     numbers: usize,
-    /// Substep (s).
+    /// Substep of the local model (s).
     step: f64,
-    /// Positions, velocities and forces at the start of each substep, one after the other.
+    /// Substeps from one sample to the next.
+    stride: usize,
+    /// Positions, velocities and forces at the start of each step of what ran ahead, one after the other.
     samples: Vec<f64>,
 }
 
-/// The ring at one time.
+/// The ring at one time, between two samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RingSample<'a> {
-    pub(super) positions: &'a [f64],
-    pub(super) velocities: &'a [f64],
-    pub(super) forces: &'a [f64],
+    /// Positions, velocities and forces before and after.
+    around: [[&'a [f64]; 3]; 2],
+    /// How far it is from the one to the other, below 1.
+    share: f64,
     /// How long the ring has gone on with its velocity since (s).
-    pub(super) coasted: f64,
+    coasted: f64,
     /// False once it stands still.
-    pub(super) moves: bool,
+    moves: bool,
 }
 
 impl RingPath {
-    /// Forgets all samples; the next are of `ring` nodes, `step` seconds apart, and there is room for `count`.
-    pub(super) fn clear(&mut self, ring: usize, step: f64, count: usize) {
-        (self.numbers, self.step) = (3 * ring, step);
+    /// Forgets all samples; the next are of `ring` nodes, `stride` substeps of `step` seconds apart, and there is room for `count`.
+    pub(super) fn clear(&mut self, ring: usize, (step, stride): (f64, usize), count: usize) {
+        (self.numbers, self.step, self.stride) = (3 * ring, step, stride);
         self.samples.clear();
         self.samples.reserve(3 * self.numbers * count);
     }
@@ -107,7 +110,7 @@ impl RingPath {
         fits
     }
 
-    /// Positions (m), velocities (m/s) and forces (N) at the start of each substep, one after the other.
+    /// Positions (m), velocities (m/s) and forces (N) at the start of each step, one after the other.
     pub(super) fn samples(&self) -> &[f64] {
         &self.samples
     }
@@ -121,12 +124,16 @@ impl RingPath {
     /// The ring at the start of substep `n`, which may lie past the end.
     pub(super) fn at(&self, n: usize) -> RingSample<'_> {
         let last = (self.samples.len() / (3 * self.numbers).max(1)).saturating_sub(1);
-        let sample = &self.samples[n.min(last) * 3 * self.numbers..];
-        let beyond = n.saturating_sub(last) as f64 * self.step;
+        let stride = self.stride.max(1);
+        let (before, since) = (n / stride, n % stride);
+        let sample = |at: usize| {
+            let sample = &self.samples[at.min(last) * 3 * self.numbers..];
+            [0, 1, 2].map(|quantity| &sample[quantity * self.numbers..(quantity + 1) * self.numbers])
+        };
+        let beyond = n.saturating_sub(last * stride) as f64 * self.step;
         RingSample {
-            positions: &sample[..self.numbers],
-            velocities: &sample[self.numbers..2 * self.numbers],
-            forces: &sample[2 * self.numbers..3 * self.numbers],
+            around: [sample(before), sample(if since == 0 { before } else { before + 1 })],
+            share: since as f64 / stride as f64,
             coasted: beyond.min(COASTING),
             moves: beyond < COASTING,
         }
@@ -136,14 +143,29 @@ impl RingPath {
 impl RingSample<'_> {
     /// Writes where the ring is (m) and its velocity (m/s).
     pub(super) fn write(&self, positions: &mut [f64], velocities: &mut [f64]) {
-        positions.copy_from_slice(self.positions);
-        if self.moves {
-            velocities.copy_from_slice(self.velocities);
-        } else {
+        self.between(0, positions);
+        self.between(1, velocities);
+        if self.coasted > 0.0 {
+            positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += v * self.coasted);
+        }
+        if !self.moves {
             velocities.fill(0.0);
         }
-        if self.coasted > 0.0 {
-            positions.iter_mut().zip(self.velocities).for_each(|(x, v)| *x += v * self.coasted);
+    }
+
+    /// Writes the forces on it (N).
+    pub(super) fn write_forces(&self, forces: &mut [f64]) {
+        self.between(2, forces);
+    }
+
+    fn between(&self, quantity: usize, out: &mut [f64]) {
+        let [before, after] = self.around.map(|sample| sample[quantity]);
+        if self.share == 0.0 {
+            out.copy_from_slice(before);
+            return;
+        }
+        for ((out, before), after) in out.iter_mut().zip(before).zip(after) {
+            *out = before + (after - before) * self.share;
         }
     }
 }
@@ -155,22 +177,40 @@ mod tests {
     #[test]
     fn past_its_end_the_ring_coasts_and_then_stands_still() {
         let mut path = RingPath::default();
-        path.clear(1, 1e-3, 3);
+        path.clear(1, (1e-3, 1), 3);
         for n in 0..3 {
             let state = State { positions: vec![Vec3::x() * f64::from(n)], velocities: vec![Vec3::x()] };
             path.push(&state, &[Vec3::y() * f64::from(n)], 0..1);
         }
-        let at = |n| {
-            let (mut x, mut v) = ([0.0; 3], [0.0; 3]);
-            path.at(n).write(&mut x, &mut v);
-            (x[0], v[0], path.at(n).forces[1])
-        };
+        let at = |n| at(&path, n);
         assert_eq!((at(1), at(2)), ((1.0, 1.0, 1.0), (2.0, 1.0, 2.0)));
         assert!((at(12).0 - 2.010).abs() < 1e-12 && at(12).1 == 1.0);
         assert!((at(100).0 - 2.015).abs() < 1e-12 && at(100).1 == 0.0 && at(100).2 == 2.0);
         path.drop_last(1);
-        assert_eq!(path.at(2).forces[1], 1.0);
+        assert_eq!(self::at(&path, 2).2, 1.0);
         path.drop_last(9);
-        assert_eq!(path.at(2).forces[1], 0.0, "the first stays");
+        assert_eq!(self::at(&path, 2).2, 0.0, "the first stays");
+    }
+
+    /// Position and velocity along x, and force along y.
+    fn at(path: &RingPath, n: usize) -> (f64, f64, f64) {
+        let [mut x, mut v, mut f] = [[0.0; 3]; 3];
+        path.at(n).write(&mut x, &mut v);
+        path.at(n).write_forces(&mut f);
+        (x[0], v[0], f[1])
+    }
+
+    #[test]
+    fn between_the_steps_of_what_ran_ahead_the_ring_goes_straight() {
+        let mut path = RingPath::default();
+        path.clear(1, (1e-3, 3), 2);
+        for n in [0.0, 1.0] {
+            let state = State { positions: vec![Vec3::x() * n], velocities: vec![Vec3::x() * (2.0 + n)] };
+            path.push(&state, &[Vec3::y() * 6.0 * n], 0..1);
+        }
+        let third = 1.0 / 3.0;
+        assert_eq!([at(&path, 0), at(&path, 1)], [(0.0, 2.0, 0.0), (third, 2.0 + third, 2.0)]);
+        assert_eq!(at(&path, 3), (1.0, 3.0, 6.0));
+        assert!((at(&path, 5).0 - 1.006).abs() < 1e-12, "two substeps past the end");
     }
 }
