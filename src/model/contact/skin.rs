@@ -299,6 +299,10 @@ impl Grain {
         let hertz = (9.0 / (16.0 * radius * self.modulus * self.modulus)).cbrt();
         // Where both grow alike, for a contact of radius sqrt(pi) sigma, the elements lack most.
         let turn = (2.0 * hertz / (3.0 * shown)).powi(3);
+        // A stranger's stiffness may be beyond every body: nothing is known of what the elements lack.
+        if ![shown, hertz, turn].iter().all(|figure| figure.is_finite()) {
+            return Sinking { shown: 0.0, hertz: 0.0, turn: 0.0, share: 0.0, most: self.most };
+        }
         let lacking = |force: f64| hertz * (force * force).cbrt() - shown * force;
         let share = if steady > turn { (lacking(steady) / lacking(turn)).max(0.0) } else { 1.0 };
         Sinking { shown, hertz, turn, share: share * self.share, most: self.most }
@@ -397,6 +401,16 @@ mod tests {
     /// Of a sphere of 8 mm on elements of 9 mm and 16 kPa.
     fn sinking(steady: f64) -> Sinking {
         Grain { modulus: 16e3, variance: 64e-6, most: 3e-3, share: 1.0 }.sinking(8e-3, steady)
+    }
+
+    #[test]
+    fn nothing_sinks_in_where_the_stiffness_is_beyond_every_body() {
+        for modulus in [f64::INFINITY, 1e300, 1e-300, 5e-324] {
+            let grain = Grain { modulus, variance: 64e-6, most: 3e-3, share: 1.0 };
+            let sinking = grain.sinking(8e-3, 1.0);
+            let Sunk { offset, slope } = sinking.tangent(1.0);
+            assert_eq!([sinking.at(1.0), sinking.most(), offset, slope], [0.0; 4], "{modulus}");
+        }
     }
 
     #[test]
