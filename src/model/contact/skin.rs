@@ -23,7 +23,10 @@ const REACH: f64 = 2.8;
 /// Nodes farther away than this share of c would count next to nothing.
 const CUT: f64 = 0.91;
 /// Edges, in tool radii, below which nothing is smoothed, and above which all of it is.
-const EDGES: [f64; 2] = [0.25, 0.5];
+const EDGES: [f64; 2] = [0.235, 0.245];
+/// Rounds in which edges are averaged over neighbours for that: a tool meets all of the surface around it in one way, as it would feel the
+/// border between smoothed corners and others.
+const ROUNDS: usize = 8;
 /// The least cosine between a node's normal and those of its triangles, at a sharp edge and on a smooth surface.
 const COSINES: [f64; 2] = [0.75, 0.95];
 /// How far an element by itself spreads a load on its node, squared, in squared edges.
@@ -54,12 +57,14 @@ impl Skin {
         let normals: Vec<Vec3> = (0..rest.len() as u32).map(|node| normal_at(surface, rest, node)).collect();
         let (mut starts, mut shares, mut depths) = (vec![0], Vec::new(), Vec::with_capacity(rest.len()));
         let (mut found, mut grains, mut longest) = (Vec::new(), Vec::new(), 0.0_f64);
+        let edges = mean_edges(surface, rest);
         for node in 0..rest.len() as u32 {
-            let (edge, sigma) = corner(surface, rest, &normals, node, radius, &mut found);
+            let coarse = ramp(edges[node as usize] / radius, EDGES);
+            let (edge, sigma) = corner(surface, rest, &normals, node, coarse, &mut found);
             longest = longest.max(edge);
             if let Some(&modulus) = moduli.get(node as usize) {
                 grains.push(Grain {
-                    share: ramp(edge / radius, EDGES),
+                    share: coarse,
                     modulus,
                     variance: sigma * sigma + ELEMENT * edge * edge,
                     most: MOST_SUNK * edge,
@@ -168,14 +173,14 @@ impl Skin {
     }
 }
 
-/// The nodes of one corner with their shares, the node alone if it is not smoothed. Returns the mean edge there, and how far its nodes spread
-/// along the surface in every direction (m).
+/// The nodes of one corner with their shares: the node alone if it is not smoothed, as where elements are not `coarse` (0 to 1). Returns
+/// the mean edge there, and how far its nodes spread along the surface in every direction (m).
 fn corner(
     surface: &Surface,
     rest: &[Vec3],
     normals: &[Vec3],
     node: u32,
-    radius: f64,
+    coarse: f64,
     found: &mut Vec<(u32, f64)>,
 ) -> (f64, f64) {
     found.clear();
@@ -197,7 +202,7 @@ fn corner(
         flatness = flatness.min(across.dot(&normal) / across.norm().max(f64::MIN_POSITIVE));
     }
     let edge = edges / f64::from(count.max(1));
-    let reach = REACH * edge * ramp(edge / radius, EDGES) * ramp(flatness, COSINES);
+    let reach = REACH * edge * coarse * ramp(flatness, COSINES);
     if reach < edge {
         return (edge, 0.0);
     }
@@ -292,6 +297,14 @@ impl Grain {
         Self { modulus: self.modulus * stiffness.factor(), ..self }
     }
 
+    /// What a sphere of `radius` (m) touches under `force` (N), pi (3 F R / (4 E*))^(2/3) (m^2, Hertz 1882), and how much of that coarse
+    /// elements leave to be told by it.
+    pub(super) fn touched(&self, radius: f64, force: f64) -> (f64, f64) {
+        // Never more than its section, however soft the body is.
+        let reach = (0.75 * force * radius / self.modulus).cbrt().min(radius);
+        (std::f64::consts::PI * reach * reach, self.share)
+    }
+
     /// What a sphere of `radius` (m) sinks in beside the elements while `steady` (N) has pressed on the mean of the last
     /// milliseconds.
     pub(super) fn sinking(&self, radius: f64, steady: f64) -> Sinking {
@@ -360,6 +373,24 @@ impl Sinking {
     fn bend(&self, force: f64) -> f64 {
         (1.0 + (self.lacking(force) / self.most).powi(8)).sqrt().sqrt().sqrt().recip()
     }
+}
+
+/// The mean edge (m) at each node and around it.
+fn mean_edges(surface: &Surface, rest: &[Vec3]) -> Vec<f64> {
+    let mean = |node: u32, of: &dyn Fn(u32) -> f64| {
+        let corners = surface.at_node(node).iter().flat_map(|&t| surface.triangles[t as usize]);
+        let others = corners.filter(|&other| other != node);
+        let (sum, count) = others.fold((0.0, 0), |(sum, count), other| (sum + of(other), count + 1));
+        sum / f64::from(count.max(1))
+    };
+    let nodes = 0..rest.len() as u32;
+    let length = |node: u32| mean(node, &|other| (rest[other as usize] - rest[node as usize]).norm());
+    let mut edges: Vec<f64> = nodes.clone().map(length).collect();
+    for _ in 0..ROUNDS {
+        let around = |node: u32| 0.5 * (edges[node as usize] + mean(node, &|other| edges[other as usize]));
+        edges = nodes.clone().map(around).collect();
+    }
+    edges
 }
 
 /// 0 below the first bound, 1 above the second, smooth in between.

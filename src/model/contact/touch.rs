@@ -252,7 +252,7 @@ impl Touch {
     }
 
     /// The area that it touches (m^2): a third of the triangles around each node that is touched, and of one that is
-    /// touched in part, that part.
+    /// touched in part, that part. Of a sphere on coarse elements no less than what it touches of a half space under its force.
     pub(crate) fn area(&self, surface: &Surface, positions: &[Vec3]) -> f64 {
         let mut shares = [(u32::MAX, 0.0); MOST_POINTS];
         let mut count = 0;
@@ -269,7 +269,18 @@ impl Touch {
                 }
             }
         }
-        shares[..count].iter().map(|&(node, share)| share.min(1.0) * area_at(surface, positions, node)).sum()
+        let seen: f64 =
+            shares[..count].iter().map(|&(node, share)| share.min(1.0) * area_at(surface, positions, node)).sum();
+        let (expected, coarse) = self.touched_of_half_space(surface, positions).unwrap_or_default();
+        seen + coarse * (expected - seen).max(0.0)
+    }
+
+    /// What a sphere would touch of a half space (m^2), and how coarse the elements are, from 0 to 1; `None` if it does not sink in.
+    fn touched_of_half_space(&self, surface: &Surface, positions: &[Vec3]) -> Option<(f64, f64)> {
+        let ToolShape::Sphere { radius } = self.shape else { return None };
+        let (corners, weights) = (surface.triangles[self.contact.triangle? as usize], &self.contact.weights);
+        let grain = self.skin.grain(corners, weights, &corners.map(|node| positions[node as usize]))?;
+        Some(grain.stiffened(self.stiffness).touched(radius, self.wrench.force.norm()))
     }
 }
 

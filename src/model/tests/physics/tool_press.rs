@@ -18,8 +18,9 @@ fn a_sphere_on_tissue_feels_the_force_of_hertz() {
         let ratio = pressed.wrench.force.z / force;
         println!("{size}: {ratio:.3}, {} places, area {:.2}", pressed.places, pressed.area / area);
         assert!((ratio - 1.0).abs() < limit, "elements of {size} m: {ratio}");
+        // One facet of a coarse surface is all that it touches, and that is tilted by up to two degrees.
         let sideways = pressed.wrench.force.xy().norm() / force;
-        assert!(sideways < 0.03, "{sideways}");
+        assert!(sideways < 0.04, "{sideways}");
     }
 }
 
