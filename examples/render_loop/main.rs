@@ -8,7 +8,7 @@
 //! Look for: the same median lateness of the haptic group in both rows, and the pictures. What else the machine does shows
 //! up in either row: a p99 is worth comparing on a quiet machine only.
 //!
-//! `cargo run --release --example render_loop`; with `-- --readme` it draws the README's picture, `docs/img/demo.svg`,
+//! `cargo run --release --example render_loop`; with `-- --readme` it draws `docs/img/demo.svg`, the picture of its page,
 //! from a run in virtual time instead.
 
 mod camera;
@@ -32,7 +32,7 @@ const FRAME_RATE: u32 = 60;
 const DURATION_S: f64 = 2.6;
 /// Frames that are written to files: the first at or after each of these times.
 const KEPT: [Nanos; 4] = [Nanos(700_000_000), Nanos(1_300_000_000), Nanos(1_700_000_000), Nanos(2_400_000_000)];
-/// The README's picture: the end of the drag.
+/// The picture of the documentation: the end of the drag.
 const README_TIME: Duration = Duration::from_millis(2000);
 
 /// What the renderer did.
@@ -117,7 +117,7 @@ fn render(mut viewer: Viewer, stopped: &Receiver<()>, folder: &Path) -> Result<F
     }
 }
 
-/// Draws the README's picture, the same at every call.
+/// Draws that picture, the same at every call.
 fn draw_readme() -> Result<(), Box<dyn Error>> {
     let mut running = Session::from_scene(liver()?).virtual_time().build()?.start()?;
     let mut viewer = running.take_viewer().ok_or("the viewer is already taken")?;
