@@ -199,10 +199,7 @@ impl GlobalActor {
         let mut cause = None;
         if newest.saturating_sub(self.now()) > self.plan.most_ticks() {
             let before = self.begin_way();
-            let mut taken = 0;
-            while self.take_samples(newest - self.plan.way_ticks()) {
-                taken += 1;
-            }
+            let taken = (0..).take_while(|_| self.take_samples(newest - self.plan.way_ticks())).count();
             cause = self.go(before, taken);
         }
         loop {

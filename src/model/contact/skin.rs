@@ -57,10 +57,12 @@ impl Skin {
         let normals: Vec<Vec3> = (0..rest.len() as u32).map(|node| normal_at(surface, rest, node)).collect();
         let (mut starts, mut shares, mut depths) = (vec![0], Vec::new(), Vec::with_capacity(rest.len()));
         let (mut found, mut grains, mut longest) = (Vec::new(), Vec::new(), 0.0_f64);
-        let edges = mean_edges(surface, rest);
+        let edges = edges(surface, rest);
+        let around = averaged(surface, edges.clone());
         for node in 0..rest.len() as u32 {
-            let coarse = ramp(edges[node as usize] / radius, EDGES);
-            let (edge, sigma) = corner(surface, rest, &normals, node, coarse, &mut found);
+            let edge = edges[node as usize];
+            let coarse = ramp(around[node as usize] / radius, EDGES);
+            let sigma = corner((surface, rest, &normals), node, [edge, coarse], &mut found);
             longest = longest.max(edge);
             if let Some(&modulus) = moduli.get(node as usize) {
                 grains.push(Grain {
@@ -173,38 +175,31 @@ impl Skin {
     }
 }
 
-/// The nodes of one corner with their shares: the node alone if it is not smoothed, as where elements are not `coarse` (0 to 1). Returns
-/// the mean edge there, and how far its nodes spread along the surface in every direction (m).
+/// The nodes of one corner with their shares: the node alone if it is not smoothed, as where its mean `edge` (m) is not `coarse` (0 to 1).
+/// Returns how far its nodes spread along the surface in every direction (m).
 fn corner(
-    surface: &Surface,
-    rest: &[Vec3],
-    normals: &[Vec3],
+    (surface, rest, normals): (&Surface, &[Vec3], &[Vec3]),
     node: u32,
-    coarse: f64,
+    [edge, coarse]: [f64; 2],
     found: &mut Vec<(u32, f64)>,
-) -> (f64, f64) {
+) -> f64 {
     found.clear();
     found.push((node, 1.0));
     let (here, normal) = (rest[node as usize], normals[node as usize]);
     let triangles = surface.at_node(node);
     if triangles.is_empty() {
-        return (0.0, 0.0);
+        return 0.0;
     }
     let corners = |t: u32| surface.triangles[t as usize];
-    let (mut edges, mut count, mut flatness) = (0.0, 0, 1.0_f64);
+    let mut flatness = 1.0_f64;
     for &t in triangles {
-        for other in corners(t).into_iter().filter(|&other| other != node) {
-            edges += (rest[other as usize] - here).norm();
-            count += 1;
-        }
         let [a, b, c] = corners(t).map(|n| rest[n as usize]);
         let across = (b - a).cross(&(c - a));
         flatness = flatness.min(across.dot(&normal) / across.norm().max(f64::MIN_POSITIVE));
     }
-    let edge = edges / f64::from(count.max(1));
     let reach = REACH * edge * coarse * ramp(flatness, COSINES);
     if reach < edge {
-        return (edge, 0.0);
+        return 0.0;
     }
     // Along the surface from node to node, as far as they count.
     let mut next = 0;
@@ -252,11 +247,11 @@ fn corner(
         found.iter_mut().for_each(|(_, share)| *share /= sum);
         let squares: f64 =
             found.iter().map(|&(other, share)| share * along(other).iter().map(|xi| xi * xi).sum::<f64>()).sum();
-        (edge, (0.5 * squares.max(0.0)).sqrt())
+        (0.5 * squares.max(0.0)).sqrt()
     } else {
         found.truncate(1);
         found[0].1 = 1.0;
-        (edge, 0.0)
+        0.0
     }
 }
 
@@ -375,20 +370,26 @@ impl Sinking {
     }
 }
 
-/// The mean edge (m) at each node and around it.
-fn mean_edges(surface: &Surface, rest: &[Vec3]) -> Vec<f64> {
-    let mean = |node: u32, of: &dyn Fn(u32) -> f64| {
-        let corners = surface.at_node(node).iter().flat_map(|&t| surface.triangles[t as usize]);
-        let others = corners.filter(|&other| other != node);
-        let (sum, count) = others.fold((0.0, 0), |(sum, count), other| (sum + of(other), count + 1));
-        sum / f64::from(count.max(1))
-    };
-    let nodes = 0..rest.len() as u32;
-    let length = |node: u32| mean(node, &|other| (rest[other as usize] - rest[node as usize]).norm());
-    let mut edges: Vec<f64> = nodes.clone().map(length).collect();
+/// The mean of `of` over the triangles' other corners around a node, each as often as it is one; 0 for a node of no triangle.
+fn mean_beside(surface: &Surface, node: u32, of: impl Fn(u32) -> f64) -> f64 {
+    let corners = surface.at_node(node).iter().flat_map(|&t| surface.triangles[t as usize]);
+    let others = corners.filter(|&other| other != node);
+    let (sum, count) = others.fold((0.0, 0), |(sum, count), other| (sum + of(other), count + 1));
+    sum / f64::from(count.max(1))
+}
+
+/// The mean edge at each node (m).
+fn edges(surface: &Surface, rest: &[Vec3]) -> Vec<f64> {
+    let length = |node: u32, other: u32| (rest[other as usize] - rest[node as usize]).norm();
+    (0..rest.len() as u32).map(|node| mean_beside(surface, node, |other| length(node, other))).collect()
+}
+
+/// The same averaged over what is around each node.
+fn averaged(surface: &Surface, mut edges: Vec<f64>) -> Vec<f64> {
     for _ in 0..ROUNDS {
-        let around = |node: u32| 0.5 * (edges[node as usize] + mean(node, &|other| edges[other as usize]));
-        edges = nodes.clone().map(around).collect();
+        let around =
+            |node: u32| 0.5 * (edges[node as usize] + mean_beside(surface, node, |other| edges[other as usize]));
+        edges = (0..edges.len() as u32).map(around).collect();
     }
     edges
 }

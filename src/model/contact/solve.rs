@@ -193,7 +193,7 @@ fn sweep<C: Copy + Mul<Vec3, Output = Vec3>>(
                 }
                 // Around a larger force the tool was taken to sink in deeper than it does: that alone releases nothing.
                 let left = (closing[place].dot(&row.normal) - row.allowed) * d;
-                row.mode == ContactMode::Lost || row.glued || left <= depth + FOUND * sinking.most()
+                row.mode == ContactMode::Lost || left <= depth + FOUND * sinking.most()
             })
         };
         if rows.iter().enumerate().all(is_as_taken) {
