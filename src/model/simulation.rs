@@ -153,11 +153,11 @@ impl Simulation {
         self.step_all(1, motions);
     }
 
-    /// Advances `ticks` haptic ticks in one step, at most [`stride`](Self::stride), while each tool moves straight along its own of `motions`, one
-    /// for each tool.
+    /// Advances `ticks` haptic ticks in one step, from one to [`stride`](Self::stride), while each tool moves straight along its own of
+    /// `motions`, one for each tool. A longer step may be unstable.
     ///
     /// # Panics
-    /// If a tool has none.
+    /// If a tool has none; with debug assertions, if a step may not have so many ticks.
     ///
     /// # Real-time
     /// Bounded and real-time safe if the body's forces are.
@@ -206,9 +206,10 @@ impl Simulation {
         self
     }
 
-    /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), or until its last step of [`stride`](Self::stride)
-    /// ticks is a whole one, shows `watch` the state at the start of every step and at the end, and goes back to the present. It ends early with a tick in which `watch` says no. Of a
-    /// large body only the neighbourhood of `patch` runs ahead (ids in increasing order).
+    /// Runs on for `ticks` haptic ticks along `motion` (of each tool in each tick, from 0), or until its last step of
+    /// [`stride`](Self::stride) ticks is a whole one, shows `watch` the state at the start of every step and at the end, and goes back
+    /// to the present. It ends early with a tick in which `watch` says no. Of a large body only the neighbourhood of `patch` runs ahead
+    /// (ids in increasing order).
     ///
     /// # Real-time
     /// For the global actor: costs as much as the ticks, of a large body those of a small one; allocates where the patch moves.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::common::{reference, rms_percent};
+use crate::session_support::force_vectors;
 use palpate::devices::{FaultKind, FaultSpec};
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
@@ -17,11 +18,6 @@ fn load(name: &str) -> Scene {
 
 fn run(scene: Scene) -> Summary {
     Session::from_scene(scene).virtual_time().keep_records().build().unwrap().run().unwrap()
-}
-
-fn forces(summary: &Summary) -> Vec<Vec3> {
-    let force = |record: &LogRecord| if let LogRecord::Force(row) = record { Some(row.force_n.into()) } else { None };
-    summary.records.iter().filter_map(force).collect()
 }
 
 fn tools(summary: &Summary) -> Vec<Vec3> {
@@ -42,7 +38,7 @@ fn absorbed(tools: &[Vec3], forces: &[Vec3]) -> f64 {
 fn a_hand_that_presses_and_lets_go_feels_the_reference_force() {
     let rows = reference("hand_release");
     let summary = run(load("hand_release").with_model(LocalModelKind::Full));
-    let (forces, tools) = (forces(&summary), tools(&summary));
+    let (forces, tools) = (force_vectors(&summary), tools(&summary));
     let (forces, tools) = (&forces[..rows.len()], &tools[..=rows.len()]);
     let expected: Vec<Vec3> = rows.iter().map(|row| Vec3::z() * row[2]).collect();
     let along: Vec<Vec3> = forces.iter().map(|force| Vec3::z() * force.z).collect();
@@ -68,7 +64,7 @@ fn a_run_with_a_hand_is_the_same_every_time() {
     let mut scene = load("device_faults");
     scene.run.duration_s = 0.9;
     let [one, other] = [0, 1].map(|_| run(scene.clone()));
-    assert_eq!((forces(&one), tools(&one)), (forces(&other), tools(&other)));
+    assert_eq!((force_vectors(&one), tools(&one)), (force_vectors(&other), tools(&other)));
     // Another seed of jitter and losses is another run.
     scene.devices[0].plant.seed = 2;
     assert_ne!(tools(&run(scene)), tools(&one));
@@ -208,7 +204,7 @@ mod logged {
         };
         let again = run(scene.clone());
         assert_eq!(tools(&again)[..501], tools(&summary)[..501]);
-        assert_eq!(forces(&again)[..500], forces(&summary)[..500]);
+        assert_eq!(force_vectors(&again)[..500], force_vectors(&summary)[..500]);
         scene.local.rate_hz = 2000.0;
         let finer = tools(&run(scene));
         assert!((0..500).all(|tick| (finer[2 * tick] - tools(&summary)[tick]).norm() < 1e-12));

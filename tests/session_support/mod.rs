@@ -73,6 +73,11 @@ pick!(global_ticks, Global, GlobalTick);
 pick!(resyncs, Resync, Resync);
 pick!(timings, Tick, TickTiming);
 
+/// The forces on the tool, tick by tick (N).
+pub fn force_vectors(summary: &Summary) -> Vec<Vec3> {
+    forces(summary).iter().map(|sample| sample.force_n.into()).collect()
+}
+
 /// The forces as bits, so that -0.0 differs from 0.0 and NaN equals itself.
 pub fn bits(force: [f64; 3]) -> [u64; 3] {
     force.map(f64::to_bits)

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::session_support::force_vectors;
 use palpate::log::LogRecord;
 use palpate::model::Vec3;
 use palpate::model::local::Kind as LocalModelKind;
@@ -28,14 +29,6 @@ fn run(scene: &Scene, coupling: bool) -> Summary {
     summary
 }
 
-fn forces(summary: &Summary) -> Vec<Vec3> {
-    let force = |record: &LogRecord| match record {
-        LogRecord::Force(row) => Some(Vec3::from(row.force_n)),
-        _ => None,
-    };
-    summary.records.iter().filter_map(force).collect()
-}
-
 /// What alternates from tick to tick: the root mean square of the fourth differences over the 16 that they make of it (N).
 fn roughness(forces: &[Vec3]) -> f64 {
     let fourth = |w: &[Vec3]| (w[4] - 4.0 * w[3] + 6.0 * w[2] - 4.0 * w[1] + w[0]).norm_squared();
@@ -60,7 +53,7 @@ fn a_coupled_tool_is_smoother_than_a_direct_one_on_soft_and_stiff_bodies_at_ever
                 let mut scene = scene.clone().with_model(model);
                 scene.local.rate_hz = rate_hz;
                 scene.body.as_mut().unwrap().mass_spring_mut().unwrap().material.stiffness_n_per_m = stiffness;
-                let [direct, coupled] = [false, true].map(|coupling| forces(&run(&scene, coupling)));
+                let [direct, coupled] = [false, true].map(|coupling| force_vectors(&run(&scene, coupling)));
                 let (rough, bound) = (roughness(&coupled), roughness(&direct).max(SMOOTH * peak(&coupled)));
                 let told =
                     format!("{rate_hz} Hz, {stiffness} N/m, {}: {rough:.1e} N, at most {bound:.1e} N", model.name());
@@ -91,7 +84,7 @@ fn a_coupled_device_that_is_let_go_calms_down_and_its_environment_stays_passive(
             };
             let (released, end, least_j) =
                 (swing(1.0, 1.5), swing(1.9, 2.4), coupled.report.devices[0].limits.energy.least_j);
-            let rough = [&direct, &coupled].map(|summary| roughness(&forces(summary)));
+            let rough = [&direct, &coupled].map(|summary| roughness(&force_vectors(summary)));
             let told = format!("{rate_hz} Hz, {}: {released:.1e} m, then {end:.1e} m, {least_j:.1e} J", model.name());
             println!("{told}, direct and coupled {:.1e} and {:.1e} N", rough[0], rough[1]);
             assert!(end < 0.8 * released && least_j >= -10e-6 && rough[1] <= rough[0], "{told}");

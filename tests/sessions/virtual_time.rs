@@ -1,5 +1,6 @@
 //! The time convention of a session, in virtual time and to the last bit.
 
+use crate::common::rms_percent;
 use crate::session_support::*;
 use palpate::Error;
 use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ToolPath};
@@ -344,20 +345,12 @@ fn in_strides(rate_hz: u32, ticks: u32) -> Result<Scene, Error> {
 fn a_global_model_may_take_steps_of_several_ticks() {
     let forces = |ticks: u32, model: LocalModelKind| -> Vec<Vec3> {
         let session = Session::from_scene(in_strides(4000, ticks).unwrap()).model(model).virtual_time().keep_records();
-        let summary = session.build().unwrap().run().unwrap();
-        let force =
-            |record: &LogRecord| if let LogRecord::Force(row) = record { Some(row.force_n.into()) } else { None };
-        summary.records.iter().filter_map(force).collect()
+        force_vectors(&session.build().unwrap().run().unwrap())
     };
     let full = forces(2, LocalModelKind::Full);
     assert_eq!(full, forces(1, LocalModelKind::Full), "full is simulated at the haptic rate");
-    let peak = full.iter().fold(0.0_f64, |peak, force| peak.max(force.norm()));
-    let [short, long] = [1, 2].map(|ticks| {
-        let forces = forces(ticks, LocalModelKind::Predictive);
-        let squares: f64 = forces.iter().zip(&full).map(|(a, b)| (a - b).norm_squared()).sum();
-        100.0 * (squares / full.len() as f64).sqrt() / peak
-    });
-    println!("of {peak:.2} N: {short:.3} % in steps of a tick, {long:.3} % in steps of two");
+    let [short, long] = [1, 2].map(|ticks| rms_percent(&forces(ticks, LocalModelKind::Predictive), &full));
+    println!("{short:.3} % in steps of a tick, {long:.3} % in steps of two");
     assert!(short < 0.5 && long < 0.5 && short != long, "{short} {long}");
 }
 
