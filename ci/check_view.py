@@ -14,8 +14,10 @@ import os
 import pty
 import shutil
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -70,7 +72,8 @@ STATE = """(() => {
   const { tool, deepest, deepestMm, frames, surfaces, firstMs, distance } = document.getElementById("picture").dataset;
   const place = (text) => (text ? text.split(",").map(Number) : null);
   const box = document.getElementById("picture").getBoundingClientRect();
-  return { status: text("status"), note: text("note"), time: parseFloat(text("n-time")), contact: text("n-contact"), commanded: text("n-commanded"), computed: text("n-computed"),
+  const away = document.getElementById("away");
+  return { away: away.hidden ? null : text("away-text"), status: text("status"), note: text("note"), time: parseFloat(text("n-time")), contact: text("n-contact"), commanded: text("n-commanded"), computed: text("n-computed"),
     tick: tick === undefined ? null : [tick, x, y, z].map(Number), tool: place(tool), deepest: place(deepest), deepest_mm: +deepestMm, frames: +frames, surfaces: +surfaces, stress: parseFloat(text("n-stress")), legend: text("legend-ticks"), first: firstMs ?? null, distance: +distance, left: box.left, top: box.top,
     scrub: document.getElementById("scrub").value, model: document.getElementById("model").value, friction: text("friction-value") };
 })()"""
@@ -90,6 +93,54 @@ class View:
         report = self.process.communicate(timeout=PATIENCE_S)[0]
         if self.process.returncode != 0:
             raise RuntimeError(f"palpate view ended with {self.process.returncode}: {report}")
+
+
+class Relay:
+    """Stands between browser and server at another of this machine's own addresses; what goes through it can be cut off or lost."""
+
+    def __init__(self, port):
+        self.port, self.pairs, self.lost, self.lets_in, self.mutes = port, [], set(), True, False
+        self.listener = socket.create_server(("127.0.0.2", port))
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        with contextlib.suppress(OSError):
+            while True:
+                near = self.listener.accept()[0]
+                if not self.lets_in:
+                    near.close()
+                    continue
+                pair = (near, socket.create_connection(("127.0.0.1", self.port)))
+                self.pairs.append(pair)
+                threading.Thread(target=self.pump, args=(pair, *pair, self.mutes), daemon=True).start()
+                threading.Thread(target=self.pump, args=(pair, *reversed(pair), False), daemon=True).start()
+
+    def pump(self, pair, source, sink, mutes):
+        count = 0
+        with contextlib.suppress(OSError):
+            while data := source.recv(1 << 16):
+                # What is muted says what it asks for and no more.
+                if pair not in self.lost and not (mutes and count > 0):
+                    sink.sendall(data)
+                count += 1
+        self.end(pair)
+
+    def end(self, pair):
+        for side in pair:
+            with contextlib.suppress(OSError):
+                side.shutdown(socket.SHUT_RDWR)
+
+    def cut(self):
+        for pair in self.pairs:
+            self.end(pair)
+
+    def lose(self):
+        """Nothing comes through any more, and nobody is told."""
+        self.lost |= set(self.pairs)
+
+    def close(self):
+        self.listener.close()
+        self.cut()
 
 
 def wait(browser, holds, what):
@@ -374,6 +425,85 @@ def check_live(check, browser, palpate, log, shots):
     check.faults += [f"live: {complaint}" for complaint in found]
 
 
+def check_return(check, browser, palpate, shots):
+    """A page whose connection ends, by whatever, comes back to the body that it pushed, and pushes on."""
+    view = View(palpate, "--model", "patch")
+    relay = Relay(int(view.url.split("#")[0].rsplit(":", 1)[1].strip("/")))
+    try:
+        size(browser, 1280, "light")
+        browser.open(view.url.replace("127.0.0.1", "127.0.0.2"))
+        wait(browser, lambda state: state["first"], "the first picture")
+        push(check, browser)
+        time.sleep(2)
+        before = browser.run(STATE)
+        gone = lambda: wait(browser, lambda state: state["away"] and state["status"] == "not connected", "words about the connection")
+
+        def back(what, since):
+            now = wait(browser, lambda state: not state["away"] and "you hold the tool" in state["status"] and state["time"] > since["time"] + 0.3, what)
+            # Where it was is the pointer: a limit that acts on the force lets the tool come nearer to it.
+            check.that(abs(now["distance"] - before["distance"]) < 1e-5, f"{what}: the pointer moved: {before} {now}")
+            check.that(now["contact"] != "free" and newtons(now["computed"]) > 0.3, f"{what}: the tool did not stay: {before} {now}")
+            return now
+
+        # The network goes, and the server cannot be reached for a while.
+        relay.lets_in = False
+        relay.cut()
+        lost = gone()
+        check.that("Trying again" in lost["away"] and "stays where it is" in lost["away"], f"it does not say what happens: {lost['away']}")
+        for width, scheme in ((1280, "light"), (390, "dark")):
+            size(browser, width, scheme)
+            shoot(browser, shots, f"away-{width}-{scheme}")
+            for fault in browser.run(LAYOUT):
+                check.that(False, f"away, {width} px, {scheme}: {fault}")
+        size(browser, 1280, "light")
+        relay.lets_in = True
+        now = back("coming back by itself", lost)
+        # A page that waits long comes at once when somebody looks at it.
+        relay.lets_in = False
+        relay.cut()
+        lost = wait(browser, lambda state: state["away"] and "8\u00a0s" in state["away"], "backing off")
+        relay.lets_in = True
+        begin = time.monotonic()
+        browser.run("document.dispatchEvent(new Event('visibilitychange'))")
+        now = back("coming back to be looked at", lost)
+        check.that(time.monotonic() - begin < 4, f"it took {time.monotonic() - begin:.1f} s to come back to be looked at")
+        # Nothing comes through any more, and neither side is told: the server believes the old connection to be there.
+        relay.lose()
+        lost = gone()
+        now = back("coming back from a dead connection", lost)
+        # A phone sleeps, and when it wakes up its connection has gone.
+        for cuts in (False, True):
+            browser.send("Emulation.setFocusEmulationEnabled", enabled=False)
+            browser.send("Page.setWebLifecycleState", state="frozen")
+            time.sleep(5)
+            if cuts:
+                relay.cut()
+            browser.send("Page.setWebLifecycleState", state="active")
+            # Awake, and still hidden until somebody looks at it.
+            browser.send("Emulation.setFocusEmulationEnabled", enabled=True)
+            now = back(f"waking up, {'cut off' if cuts else 'connected'}", now)
+        # It does not come to say its token, as if it slept then.
+        relay.mutes = True
+        relay.cut()
+        lost = wait(browser, lambda state: state["away"] and "token in time" in state["away"], "words about its silence")
+        relay.mutes = False
+        now = back("coming back after a silence", lost)
+        browser.run("document.getElementById('picture').focus()")
+        for _ in range(6):
+            key(browser, "ArrowUp")
+        wait(browser, lambda state: state["tool"][1] < now["tool"][1] - 4, "a push after coming back")
+        # A server that was started anew has another token, and says so.
+        browser.run("location.hash = 'f00'")
+        refused = wait(browser, lambda state: state["away"] and "does not know the token" in state["away"], "words about a wrong token")
+        time.sleep(1.5)
+        check.that(browser.run(STATE)["away"] == refused["away"], "it tries a token again that was refused")
+        browser.run(f"location.hash = '{view.url.partition('#')[2]}'")
+        wait(browser, lambda state: not state["away"] and "you hold the tool" in state["status"], "another address in the same tab")
+    finally:
+        relay.close()
+        view.stop()
+
+
 def check_log(check, browser, palpate, log, shots):
     forces = commanded(palpate, log)
     view = View(palpate, str(log))
@@ -415,6 +545,7 @@ def main():
         for domain in ("Page", "Runtime", "Network", "Log"):
             browser.send(f"{domain}.enable")
         check_live(check, browser, args.palpate, log, args.shots)
+        check_return(check, browser, args.palpate, args.shots)
         check_log(check, browser, args.palpate, log, args.shots)
         check_opening(check, args.palpate, args.folder)
     finally:

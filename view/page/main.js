@@ -85,7 +85,7 @@ if (startPainter(element("picture"))) {
   startKeys(element("picture"));
   startPanel();
   startPlayer();
-  connect();
+  startWire();
   requestAnimationFrame(frame);
 } else {
   say("This browser has no WebGL2, without which the body cannot be drawn.");

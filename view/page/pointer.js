@@ -16,7 +16,7 @@ function want(place) {
 
 // Once per picture, the newest place.
 function tellPointer() {
-  if (!hand.target || hand.target === hand.told) return;
+  if (!hand.target || hand.target === hand.told || isBehind()) return;
   hand.told = hand.target;
   send({ do: "move", device: state.device, to: hand.target.map((c) => Number(c.toFixed(7))) });
 }

@@ -1,30 +1,91 @@
 
 // The socket: what comes is read into the state, what the visitor does is sent. The token is in the part of the address that
 // browsers keep to themselves.
-const wire = { socket: null, wait: 500, bytes: 0, listeners: [] };
+const LEAST_WAIT = 500;
+const MOST_WAIT = 8000;
+// The server says something every two seconds at least.
+const MOST_QUIET = 8;
+// It does not know the token: there is no use in coming again.
+const REFUSED = 1008;
+const wire = { socket: null, key: null, wait: LEAST_WAIT, timer: 0, quiet: 0, isRefused: false, bytes: 0 };
 const TOOL = 17;
 const CONTACT = 8;
 
 function connect() {
+  clearTimeout(wire.timer);
   const token = location.hash.slice(1);
-  if (!token) return say("This address lacks its token: open the whole address that the command printed.");
+  if (!token) { wire.isRefused = true; return away("This address lacks its token: open the whole address that the command printed."); }
   const socket = new WebSocket(`ws://${location.host}/socket`);
   socket.binaryType = "arraybuffer";
-  wire.socket = socket;
-  socket.onopen = () => { socket.send(JSON.stringify({ do: "enter", token })); wire.wait = 500; wishStress(); };
-  socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : see(data));
-  socket.onclose = ({ code, reason }) => {
-    status(reason ? `closed: ${reason}` : "not connected");
-    if (code === 1008) return;
-    setTimeout(connect, wire.wait);
-    wire.wait = Math.min(8000, 2 * wire.wait);
-  };
+  Object.assign(wire, { socket, quiet: 0, isRefused: false });
+  const own = (act) => (event) => { if (wire.socket === socket) act(event); };
+  // With its key a page takes the place that it had, although the server may not know yet that it was gone.
+  socket.onopen = own(() => { socket.send(JSON.stringify({ do: "enter", token, again: wire.key })); wishStress(); });
+  socket.onmessage = own(({ data }) => { wire.quiet = 0; if (typeof data === "string") hear(JSON.parse(data)); else see(data); });
+  socket.onclose = own(lost);
   return undefined;
+}
+
+// The connection is lost. What is seen stays, marked as old, and it is tried again, less and less often.
+function lost({ code, reason }) {
+  wire.socket = null;
+  wire.isRefused = code === REFUSED;
+  if (wire.isRefused) return away("The server does not know the token of this address. If it was started anew, open the address that it printed then.");
+  const why = reason ? `The connection was closed: ${reason}.` : "The connection is lost.";
+  away(`${why} The tool stays where it is; picture and numbers are the last ones. Trying again in ${Number((wire.wait / 1000).toFixed(1))}\u00a0s.`);
+  wire.timer = setTimeout(connect, wire.wait);
+  wire.wait = Math.min(MOST_WAIT, 2 * wire.wait);
+  return undefined;
+}
+
+// Ends a connection on which nothing comes any more: of one that is dead no browser tells.
+function watchOver() {
+  if (!wire.socket) return;
+  wire.quiet += 1;
+  if (wire.quiet < MOST_QUIET) return;
+  const { socket } = wire;
+  wire.socket = null;
+  socket.close();
+  lost({ code: 0, reason: "" });
+}
+
+// Somebody looks again, or the network is back: nobody waits for the next try.
+function comeAgain() {
+  if (wire.socket || wire.isRefused || document.hidden) return;
+  wire.wait = LEAST_WAIT;
+  connect();
+}
+
+function startWire() {
+  setInterval(watchOver, 1000);
+  document.addEventListener("visibilitychange", comeAgain);
+  addEventListener("online", comeAgain);
+  addEventListener("pageshow", comeAgain);
+  element("try").addEventListener("click", () => { wire.isRefused = false; comeAgain(); });
+  // Another address in the same tab loads no other page.
+  addEventListener("hashchange", () => { const { socket } = wire; Object.assign(wire, { socket: null, key: null, wait: LEAST_WAIT }); socket?.close(); connect(); });
+  connect();
+}
+
+// Says over the picture why it stands still; nothing while it does not.
+function away(text) {
+  element("away").hidden = !text;
+  document.body.classList.toggle("is-away", Boolean(text));
+  if (!text) return;
+  Object.assign(state, { role: "away" });
+  hand.target = null;
+  setPlaying(false);
+  showHello();
+  status("not connected");
+  element("away-text").textContent = text;
 }
 
 function send(message) {
   if (wire.socket?.readyState === WebSocket.OPEN) wire.socket.send(JSON.stringify(message));
 }
+
+// True while what was sent before has not gone: of places only the newest counts.
+const isBehind = () => wire.socket?.readyState !== WebSocket.OPEN || wire.socket.bufferedAmount > 1000;
 
 function status(text) { if (element("status").textContent !== text) element("status").textContent = text; }
 function say(text) { element("note").textContent = text; }
@@ -33,6 +94,8 @@ function hear(message) {
   if (message.kind === "hello") {
     state.hello = message;
     state.role = message.role;
+    Object.assign(wire, { key: message.key, wait: LEAST_WAIT });
+    away("");
     hand.target = null;
     state.device = Math.min(state.device, Math.max(0, message.tools.length - 1));
     rings.forEach((ring) => ring.clear());

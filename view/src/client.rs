@@ -25,6 +25,8 @@ pub(crate) struct Outbox {
     samples: VecDeque<Bytes>,
     /// True if the browser shows the stress of the body.
     pub(crate) shows_stress: bool,
+    /// True if the same page has come again by another connection: this one is over.
+    pub(crate) is_replaced: bool,
     /// Messages that were not sent because newer ones took their places.
     pub(crate) dropped: u64,
 }

@@ -11,6 +11,13 @@ const TOKEN_BYTES: usize = 16;
 #[derive(Clone)]
 pub(crate) struct Token(String);
 
+impl std::fmt::Debug for Token {
+    /// Without what it is, which is no matter for a log.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Token")
+    }
+}
+
 impl Token {
     /// A new one, from the system's own random numbers.
     ///

@@ -20,6 +20,8 @@ pub(crate) const MOST_BROWSERS: usize = 4;
 #[derive(Debug)]
 pub(crate) struct Browser {
     pub(crate) number: u64,
+    /// By which its page is known when it comes again.
+    key: Token,
     outbox: Mutex<Outbox>,
 }
 
@@ -76,17 +78,28 @@ impl Hub {
         Self { token, state: Mutex::default(), over: Condvar::new(), wishes, recent: Mutex::default() }
     }
 
-    /// Lets a browser in that knows the token; `None` if there are too many.
-    pub(crate) fn enter(&self) -> Option<Arc<Browser>> {
+    /// Lets a browser in that knows the token; `None` if there are too many. A page that comes `again` takes the place that it had, and
+    /// the tool if it held it: a connection that broke off may seem to be there for long.
+    pub(crate) fn enter(&self, again: Option<&str>) -> Option<Arc<Browser>> {
         let state = &mut *locked(&self.state);
-        if state.browsers.len() >= MOST_BROWSERS {
+        let before = again.and_then(|key| state.browsers.iter().position(|browser| browser.key.is(key)));
+        if before.is_none() && state.browsers.len() >= MOST_BROWSERS {
             return None;
         }
+        let key = Token::new().ok()?;
         state.entered += 1;
-        let browser = Arc::new(Browser { number: state.entered, outbox: Mutex::default() });
+        let browser = Arc::new(Browser { number: state.entered, key, outbox: Mutex::default() });
+        let place = before.unwrap_or(state.browsers.len());
+        if let Some(place) = before {
+            let old = state.browsers.remove(place);
+            old.outbox().is_replaced = true;
+            if state.hand == Some(old.number) {
+                state.hand = Some(browser.number);
+            }
+        }
         state.hand.get_or_insert(browser.number);
         greet(state, &browser);
-        state.browsers.push(Arc::clone(&browser));
+        state.browsers.insert(place, Arc::clone(&browser));
         Some(browser)
     }
 
@@ -223,6 +236,7 @@ fn greet(state: &State, browser: &Browser) {
     if !hello.is_object() {
         return;
     }
+    hello["key"] = browser.key.text().into();
     hello["role"] = if state.hand == Some(browser.number) { "hand" } else { "watch" }.into();
     let mut outbox = browser.outbox();
     outbox.say(hello.to_string());

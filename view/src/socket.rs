@@ -22,12 +22,32 @@ const MOST_BYTES: usize = 4 << 10;
 const LOOK: Duration = Duration::from_millis(4);
 /// How long a write waits for a browser that does not read.
 const PUSH: Duration = Duration::from_millis(20);
-/// A browser that has taken nothing for so long is gone, or may come again.
+/// A browser that has taken nothing or not answered for so long is gone, or may come again.
 const GONE: Duration = Duration::from_secs(90);
+/// A browser is asked this often whether it is there. It answers by itself, whatever its page does.
+const ASK: Duration = Duration::from_secs(20);
+/// A page hears something at least this often, so that it knows a connection that is dead.
+const BEAT: Duration = Duration::from_secs(2);
+
+/// What is said when there is nothing to say.
+const HERE: &str = r#"{"kind":"here"}"#;
 
 /// Messages that a browser may send at once, and per second: a page sends one per picture of its screen.
 const BURST: f64 = 400.0;
 const PER_SECOND: f64 = 250.0;
+
+/// Why a connection is ended, in words, and for the page by a code: after [`CloseCode::Policy`] there is no use in coming again, after
+/// any other the page does by itself.
+type Farewell = (CloseCode, &'static str);
+const REFUSED: Farewell = (CloseCode::Policy, "the address lacks its token");
+/// A page that sleeps says nothing: it may know the token all the same.
+const SILENT: Farewell = (CloseCode::Again, "the page did not say its token in time");
+const FULL: Farewell = (CloseCode::Again, "too many browsers, close one");
+const FLOOD: Farewell = (CloseCode::Again, "too many messages");
+const NO_MESSAGE: Farewell = (CloseCode::Protocol, "that is no message of the page");
+const TOO_LONG: Farewell = (CloseCode::Size, "that message is too long");
+const REPLACED: Farewell = (CloseCode::Away, "the page has come again");
+const OVER: Farewell = (CloseCode::Away, "the server has ended");
 
 /// Messages that may still come: a bucket that fills with time.
 #[derive(Debug)]
@@ -57,10 +77,10 @@ pub(crate) fn serve(stream: TcpStream, rest: Vec<u8>, hub: &Hub) -> io::Result<(
     let config = WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES));
     let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
     let Some(browser) = enter(&mut socket, hub) else { return Ok(()) };
-    let refusal = talk(&mut socket, &browser, hub);
+    let farewell = talk(&mut socket, &browser, hub);
     hub.leave(&browser);
-    if let Some(words) = refusal {
-        close(&mut socket, words);
+    if let Some(farewell) = farewell {
+        close(&mut socket, farewell);
     }
     Ok(())
 }
@@ -68,47 +88,61 @@ pub(crate) fn serve(stream: TcpStream, rest: Vec<u8>, hub: &Hub) -> io::Result<(
 /// Waits for the token, and lets the browser in.
 fn enter(socket: &mut WebSocket<TcpStream>, hub: &Hub) -> Option<Arc<Browser>> {
     let begin = Instant::now();
-    while begin.elapsed() < PATIENCE && !hub.is_over() {
+    let farewell = loop {
+        if hub.is_over() {
+            break OVER;
+        }
+        if begin.elapsed() >= PATIENCE {
+            break SILENT;
+        }
         match socket.read() {
             Ok(Message::Text(text)) => match Wish::read(&text) {
-                Some(Wish::Enter { token }) if hub.token.is(&token) => {
-                    let browser = hub.enter();
-                    if browser.is_none() {
-                        close(socket, "too many browsers, close one");
-                    }
-                    return browser;
-                }
-                _ => break,
+                Some(Wish::Enter { token, again }) if hub.token.is(&token) => match hub.enter(again.as_deref()) {
+                    Some(browser) => return Some(browser),
+                    None => break FULL,
+                },
+                _ => break REFUSED,
             },
             Ok(Message::Ping(_) | Message::Pong(_)) => {}
             Err(error) if is_wait(&error) => {}
             _ => return None,
         }
-    }
-    close(socket, "the address lacks its token");
+    };
+    close(socket, farewell);
     None
 }
 
-/// Reads and sends until the browser goes, or until it is sent away with these words.
-fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Option<&'static str> {
-    let mut allowance = Allowance::new(Instant::now());
-    let (mut is_sent, mut moved) = (true, Instant::now());
+/// Reads and sends until the browser goes, or until it is sent away.
+fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Option<Farewell> {
+    let begin = Instant::now();
+    let mut allowance = Allowance::new(begin);
+    let (mut is_sent, mut moved, mut said, mut asked, mut heard) = (true, begin, begin, begin, begin);
     loop {
         if hub.is_over() {
-            return Some("the server has ended");
+            return Some(OVER);
         }
-        match socket.read() {
-            Ok(_) if !allowance.take(Instant::now()) => return Some("too many messages"),
+        if browser.outbox().is_replaced {
+            return Some(REPLACED);
+        }
+        let read = socket.read();
+        if read.is_ok() {
+            heard = Instant::now();
+        }
+        match read {
+            Ok(_) if !allowance.take(heard) => return Some(FLOOD),
             Ok(Message::Text(text)) => match Wish::read(&text) {
                 Some(wish) if !matches!(wish, Wish::Enter { .. }) => hub.wish(browser.number, wish),
-                _ => return Some("that is no message of the page"),
+                _ => return Some(NO_MESSAGE),
             },
             Ok(Message::Ping(_) | Message::Pong(_)) => {}
             Ok(Message::Close(_)) => return None,
-            Ok(_) => return Some("that is no message of the page"),
+            Ok(_) => return Some(NO_MESSAGE),
             Err(error) if is_wait(&error) => {}
-            Err(Error::Capacity(_)) => return Some("that message is too long"),
+            Err(Error::Capacity(_)) => return Some(TOO_LONG),
             Err(_) => return None,
+        }
+        if heard.elapsed() > GONE {
+            return None;
         }
         if !is_sent {
             is_sent = match socket.flush() {
@@ -116,6 +150,17 @@ fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Opti
                 Err(error) if is_wait(&error) && moved.elapsed() < GONE => false,
                 Err(_) => return None,
             };
+        }
+        if is_sent && asked.elapsed() > ASK {
+            asked = Instant::now();
+            is_sent = match socket.send(Message::Ping(bytes::Bytes::new())) {
+                Ok(()) => true,
+                Err(error) if is_wait(&error) => false,
+                Err(_) => return None,
+            };
+        }
+        if is_sent && said.elapsed() > BEAT {
+            browser.outbox().say(HERE.to_owned());
         }
         // Nothing new is handed over before the last message has gone: so no more than one waits here.
         while is_sent && let Some(message) = { browser.outbox().take() } {
@@ -128,6 +173,7 @@ fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Opti
                 Err(error) if is_wait(&error) => false,
                 Err(_) => return None,
             };
+            said = Instant::now();
             hub.count_sent(length);
         }
         if is_sent {
@@ -142,8 +188,8 @@ fn is_wait(error: &Error) -> bool {
 }
 
 /// Says why, and goes, whether it is heard or not.
-fn close(socket: &mut WebSocket<TcpStream>, words: &'static str) {
-    let frame = CloseFrame { code: CloseCode::Policy, reason: Utf8Bytes::from_static(words) };
+fn close(socket: &mut WebSocket<TcpStream>, (code, words): Farewell) {
+    let frame = CloseFrame { code, reason: Utf8Bytes::from_static(words) };
     let _ = socket.close(Some(frame));
     let _ = socket.flush();
     let _ = socket.get_ref().shutdown(std::net::Shutdown::Write);

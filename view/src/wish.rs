@@ -16,8 +16,8 @@ const STIFFNESS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Wish {
-    /// The visitor knows the token of the address.
-    Enter { token: String },
+    /// The visitor knows the token of the address. A page whose connection was cut comes `again` with the key that it was given.
+    Enter { token: String, again: Option<String> },
     /// The pointer of a device is at a place (m).
     Move { device: usize, to: [f64; 3] },
     /// Friction, stiffness or model become another while the session runs.
@@ -89,6 +89,9 @@ mod tests {
         let to = [0.1, -0.02, 3e-3];
         assert_eq!(Wish::read(r#"{"do":"move","device":0,"to":[0.1,-0.02,3e-3]}"#), Some(Wish::Move { device: 0, to }));
         assert_eq!(Wish::read(r#"{"do":"seek","time":1.5}"#), Some(Wish::Seek { time: 1.5 }));
+        let enter = |again: Option<&str>| Wish::Enter { token: "t".into(), again: again.map(str::to_owned) };
+        assert_eq!(Wish::read(r#"{"do":"enter","token":"t"}"#), Some(enter(None)));
+        assert_eq!(Wish::read(r#"{"do":"enter","token":"t","again":"k"}"#), Some(enter(Some("k"))));
         let change = Change { model: Some("hold".into()), friction: Some(0.3), ..Change::default() };
         assert_eq!(Wish::read(r#"{"do":"change","model":"hold","friction":0.3}"#), Some(Wish::Change(change)));
         assert_eq!(Wish::read(r#"{"do":"restart"}"#), Some(Wish::Restart {}));

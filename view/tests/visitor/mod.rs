@@ -81,10 +81,15 @@ pub fn find<T>(socket: &mut WebSocket<TcpStream>, mut wanted: impl FnMut(&Messag
 
 /// What the server says when it closes.
 pub fn farewell(socket: &mut WebSocket<TcpStream>) -> Option<String> {
+    farewell_with_code(socket).map(|(_, words)| words)
+}
+
+/// What the server says when it closes, and the code that says whether a page comes again by itself: not after 1008.
+pub fn farewell_with_code(socket: &mut WebSocket<TcpStream>) -> Option<(u16, String)> {
     let begin = Instant::now();
     while begin.elapsed() < PATIENCE {
         match socket.read() {
-            Ok(Message::Close(frame)) => return frame.map(|frame| frame.reason.to_string()),
+            Ok(Message::Close(frame)) => return frame.map(|frame| (frame.code.into(), frame.reason.to_string())),
             Ok(_) => {}
             Err(Error::Io(error))
                 if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {}
@@ -102,6 +107,21 @@ pub fn tool(message: &Message) -> Option<(f64, [f32; 3], [f32; 3])> {
         let vector = |n: usize| [float(n), float(n + 1), float(n + 2)];
         (f64::from_le_bytes(bytes[8..16].try_into().unwrap()), vector(0), vector(13))
     })
+}
+
+/// The key by which a page is known when it comes again.
+pub fn key(message: &Message) -> Option<String> {
+    let Message::Text(text) = message else { return None };
+    let message: serde_json::Value = serde_json::from_str(text).unwrap();
+    message.get("key").and_then(|key| key.as_str()).map(str::to_owned)
+}
+
+/// The page with this key, by another connection.
+pub fn enter_again(server: &Server, token: &str, key: &str) -> WebSocket<TcpStream> {
+    let address = server.address();
+    let mut socket = open(address, Some(&format!("http://{address}"))).unwrap();
+    say(&mut socket, &format!(r#"{{"do":"enter","token":"{token}","again":"{key}"}}"#));
+    socket
 }
 
 /// The role that a visitor is told.
