@@ -28,7 +28,7 @@ const HEAD: &str = "\
 Cubes of 0.1 m of the reference material: the same springs (30 N/m), node masses (0.5 g) and damping at every size, 2 explicit
 substeps per tick at 1 kHz and 1 at 4 kHz, as the stability limit asks for. A tool presses 8 mm into the top and drags with a
 friction coefficient of 1. The global model runs at 30 Hz and its results are one period late. A patch has 4 x 4 x 2 nodes,
-that of `predictive` 6 x 6 x 3, and its reduced surroundings 150 states.
+that of `predictive` 6 x 6 x 3, and its reduced surroundings as many states as by default.
 ";
 
 fn document(is_quick: bool) -> Result<(), Error> {
