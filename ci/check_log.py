@@ -34,12 +34,15 @@ def read(path):
             counts[channel.topic] += 1
             if message.log_time < last_time:
                 problems.append(f"{channel.topic}: log time {message.log_time} after {last_time}")
-            last_time = message.log_time
+            before, last_time = last_time, message.log_time
             time_ns = getattr(decoded, "time_ns", None)
             time_ns = decoded.scheduled_ns if time_ns is None else time_ns
             epoch_ns = int(environments[-1]["start_unix_ns"]) if environments else 0
-            if epoch_ns + time_ns != message.log_time:
-                problems.append(f"{channel.topic}: log time {message.log_time} but its message says {time_ns}")
+            if epoch_ns + time_ns != message.publish_time:
+                problems.append(f"{channel.topic}: publish time {message.publish_time} but its message says {time_ns}")
+            # A release that took more than a second is logged when it is over.
+            if message.log_time != message.publish_time and message.log_time != before:
+                problems.append(f"{channel.topic}: log time {message.log_time}, published at {message.publish_time}")
         indexed = {
             summary.channels[channel].topic: count
             for channel, count in summary.statistics.channel_message_counts.items()

@@ -132,6 +132,32 @@ fn messages_inside_a_chunk_are_put_in_time_order() {
     assert!(got.iter().map(time_of).is_sorted());
 }
 
+/// Check that what comes when younger messages have been written goes back in no reader's time, and keeps its own.
+#[test]
+fn a_message_that_comes_too_late_has_the_log_time_of_the_newest_before_it() {
+    let sent = entries(30);
+    // The second half first, each entry in a chunk of its own.
+    let (early, late) = sent.split_at(sent.len() / 2);
+    let bytes = log_of(&[late, early].concat(), 1);
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let times: Vec<[u64; 2]> = messages.map(|message| [message.log_time, message.publish_time]).collect();
+    assert!(times.is_sorted_by_key(|[logged, _]| *logged));
+    assert!(times.iter().any(|[logged, published]| logged > published));
+    let mut newest = 0;
+    for [logged, published] in times {
+        newest = published.max(newest);
+        assert_eq!(logged, newest);
+    }
+    let (got, damage) = read(&bytes);
+    assert_eq!(damage, None);
+    let sorted = |entries: &[LogEntry]| {
+        let mut bits: Vec<String> = bits(entries).iter().map(|bits| format!("{bits:?}")).collect();
+        bits.sort();
+        bits
+    };
+    assert!(sorted(&got) == sorted(&sent), "each with the time at which it was");
+}
+
 #[test]
 fn grants_known_after_the_start_replace_the_first_environment() {
     let late = Environment { granted: [("mlock".to_owned(), "granted".to_owned())].into(), ..environment() };

@@ -67,6 +67,8 @@ pub struct McapWriter<W: Write> {
     pending: Vec<Pending>,
     bytes: Vec<u8>,
     flushed_at: (Nanos, Nanos),
+    /// The largest log time that was written: no later message has a smaller one.
+    newest: u64,
 }
 
 impl McapWriter<BufWriter<File>> {
@@ -107,6 +109,7 @@ impl<W: Write> McapWriter<W> {
             pending: Vec::new(),
             bytes: Vec::with_capacity(CHUNK_BYTES),
             flushed_at: (Nanos::ZERO, Nanos::ZERO),
+            newest: 0,
         })
     }
 
@@ -254,8 +257,10 @@ impl<W: Write> McapWriter<W> {
         pending.sort_by_key(|message| message.time);
         for message in pending.drain(..) {
             let (channel_id, sequence) = self.channel(output, message.topic)?;
-            let log_time = self.environment.epoch_ns().saturating_add(message.time.0);
-            let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+            let publish_time = self.environment.epoch_ns().saturating_add(message.time.0);
+            // A release that took very long comes when younger ones have been written: readers expect the order of time.
+            self.newest = self.newest.max(publish_time);
+            let header = MessageHeader { channel_id, sequence, log_time: self.newest, publish_time };
             output.write_to_known_channel(&header, &self.bytes[message.start..message.end])?;
         }
         self.pending = pending;
