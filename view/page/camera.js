@@ -2,7 +2,7 @@
 // Where the picture is seen from: around a point, z up.
 const TANGENT = Math.tan((35 * Math.PI) / 360);
 const VIEWS = [[0.7, 0.5], [0, 0], [Math.PI, 0], [Math.PI / 2, 0], [-Math.PI / 2, 0], [-Math.PI / 2, Math.PI / 2], [-Math.PI / 2, -Math.PI / 2]];
-const camera = { yaw: -1.0, pitch: 0.5, distance: 0.3, target: [0, 0, 0] };
+const camera = { yaw: -1.0, pitch: 0.5, distance: 0.3, narrowness: 1, target: [0, 0, 0] };
 VIEWS[0] = [-1.0, 0.5];
 
 // The axes of the view: right, up and towards the viewer.
@@ -23,11 +23,20 @@ function projection(aspect) {
   return times(perspective(TANGENT, aspect, camera.distance / 50, camera.distance * 20), view);
 }
 
+// How much farther a narrow picture is seen from, so that the body fits it as well.
+const narrowness = ({ clientWidth, clientHeight }) => Math.max(1, (1.1 * clientHeight) / Math.max(1, clientWidth));
+
+// A picture that becomes wider or narrower, as when a phone is turned, shows as much of the body as before.
+function keepInPicture(picture) {
+  const now = narrowness(picture);
+  camera.distance *= now / camera.narrowness;
+  camera.narrowness = now;
+}
+
 // The whole body with room for a tool above it, in a picture of any shape.
 function look(number) {
-  const { clientWidth, clientHeight } = element("picture");
   [camera.yaw, camera.pitch] = VIEWS[number];
-  camera.distance = 1.85 * state.diagonal * Math.max(1, (1.1 * clientHeight) / Math.max(1, clientWidth));
+  camera.distance = 1.85 * state.diagonal * camera.narrowness;
   camera.target = plus(state.centre, [0, 0, 1], 0.12 * state.size);
 }
 

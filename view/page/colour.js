@@ -30,7 +30,7 @@ function showLegend() {
   element("legend-title").textContent = how.title;
   const top = colouring.top[state.colourBy];
   const list = element("legend-ticks");
-  const words = Array.from({ length: STEPS + 1 }, (_, n) => withUnit((n * top) / STEPS, how.unit, 2));
+  const words = Array.from({ length: STEPS + 1 }, (_, n) => (n === 0 ? "0" : withUnit((n * top) / STEPS, how.unit, 2)));
   if (list.dataset.words === words.join()) return;
   list.dataset.words = words.join();
   list.replaceChildren(...words.map((text) => Object.assign(document.createElement("li"), { textContent: text })));

@@ -4,7 +4,9 @@
 function fit(canvas) {
   const ratio = devicePixelRatio || 1;
   const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
-  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [Math.max(1, width), Math.max(1, height)];
+  if (canvas.width === width && canvas.height === height) return false;
+  [canvas.width, canvas.height] = [Math.max(1, width), Math.max(1, height)];
+  return true;
 }
 
 // Values at the arrows, and the axes in the corner.
@@ -34,18 +36,23 @@ function drawLabels(canvas) {
   // The legend stays free.
   const legend = element("legend");
   const [legendLeft, legendEnd] = legend.hidden ? [width, 0] : [legend.offsetLeft, legend.offsetTop + legend.offsetHeight];
-  for (const tool of state.tools) {
+  state.tools.forEach((tool, number) => {
+    // A label of a short arrow stands beside the tool, not on it.
+    const centre = onScreen(tool.position, width, height);
+    const radius = (state.hello?.tools[number]?.shape.radius ?? 0) / pixel(tool.position, height);
     for (const [force, name, tint] of [[tool.commanded, "commanded", "--one"], [tool.computed, "computed", "--two"]]) {
       const at = norm(force) > 0.02 && onScreen(plus(tool.position, force, perNewton()), width, height);
       if (!at) continue;
       // Both arrows end at the same place as a rule: the second label goes below the first.
       const right = at[1] < legendEnd + 45 ? legendLeft : width;
-      const place = [Math.max(4, Math.min(at[0] + 10, right - 132)), Math.max(12, Math.min(at[1], height - 40))];
+      const isOnTool = centre && Math.hypot(at[0] - centre[0], at[1] - centre[1]) < radius + 4;
+      const left = isOnTool ? centre[0] + radius : at[0];
+      const place = [Math.max(4, Math.min(left + 10, right - 132)), Math.max(12, Math.min(at[1], height - 40))];
       while (taken.some(([x, y]) => Math.abs(x - place[0]) < 130 && Math.abs(y - place[1]) < 15)) place[1] += 15;
       taken.push(place);
       write(`${name} ${withUnit(norm(force), "N")}`, ...place, style.getPropertyValue(tint));
     }
-  }
+  });
   const { right, up } = axes();
   const [x, y] = [38, 38];
   ["x", "y", "z"].forEach((name, n) => {
@@ -63,7 +70,7 @@ function drawLabels(canvas) {
 const clock = { strips: 0, numbers: 0, frames: 0, drawnStrips: 0 };
 function frame(now) {
   const picture = element("picture");
-  fit(picture);
+  if (fit(picture)) keepInPicture(picture);
   readGamepad(now);
   play(now);
   tellPointer();
