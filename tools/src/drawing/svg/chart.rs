@@ -200,19 +200,27 @@ impl Chart<'_> {
     }
 
     /// The labels of marks and levels.
-    fn mark_labels(&self) -> impl Iterator<Item = Placed<'_>> {
-        let marks = self.marks.iter().map(|mark| {
+    fn mark_labels(&self) -> Vec<Placed<'_>> {
+        let mut labels: Vec<Placed<'_>> = Vec::new();
+        for mark in self.marks.iter().filter(|mark| !mark.label.is_empty()) {
             let x = LEFT + self.px(mark.at);
             // On the side where there is room.
             let is_end = x - LEFT > length(&mark.label) + 8.0;
-            Placed { label: &mark.label, at: (if is_end { x - 4.0 } else { x + 4.0 }, HEAD + LINE), is_end }
-        });
+            let x = if is_end { x - 4.0 } else { x + 4.0 };
+            let mut label = Placed { label: &mark.label, at: (x, HEAD + LINE), is_end };
+            // Marks that are close together have their labels one below the other.
+            while labels.iter().any(|other| other.area().meets(&label.area())) {
+                label.at.1 += LINE;
+            }
+            labels.push(label);
+        }
         let levels = self.levels.iter().map(|level| {
             let y = HEAD + self.py(level.at);
             let y = if y < HEAD + LINE + 4.0 { y + LINE } else { y - 4.0 };
             Placed { label: &level.label, at: (LEFT + 6.0, y), is_end: false }
         });
-        marks.chain(levels).filter(|placed| !placed.label.is_empty())
+        labels.extend(levels.filter(|level| !level.label.is_empty()));
+        labels
     }
 
     fn draw_bars(&self, svg: &mut String, bars: &Bars<'_>) {
@@ -256,7 +264,7 @@ impl Chart<'_> {
         let place = |point: &Point| (LEFT + self.px(point.at.0), HEAD + self.py(point.at.1));
         let mut labels = Labels::new(Area { left: LEFT, right: self.width, top: HEAD, bottom: HEAD + self.down() });
         self.points.iter().for_each(|point| labels.take(Area::around(place(point), 6.0)));
-        self.mark_labels().for_each(|placed| labels.take(placed.area()));
+        self.mark_labels().iter().for_each(|placed| labels.take(placed.area()));
         for point in &self.points {
             let (x, y) = place(point);
             let label = labels.of_point(&point.label, (x, y));
@@ -307,5 +315,17 @@ mod tests {
         // The plot is 534 by 136: zero is at the bottom, what is too large is cut off above.
         assert!(svg.contains("d=\"M0.0 136.0L534.0 -9.0\""), "{svg}");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    }
+
+    #[test]
+    fn marks_that_are_close_together_have_labels_that_do_not_lie_on_each_other() {
+        let mark = |at, label: &str| Mark { at, label: label.to_owned() };
+        for at in [0.0, 0.02, 0.1, 0.5, 0.98] {
+            let marks = vec![mark(at, "budget"), mark(at + 0.01, "deadline"), mark(at + 0.02, "")];
+            let chart = Chart { marks, levels: Vec::new(), ..chart() };
+            let labels = chart.mark_labels();
+            assert_eq!(labels.len(), 2);
+            assert!(!labels[0].area().meets(&labels[1].area()), "{at}");
+        }
     }
 }

@@ -48,7 +48,7 @@ impl Area {
         Self { left: x, right: x + length(text), top: y - LINE + 3.0, bottom: y + 3.0 }
     }
 
-    fn meets(&self, other: &Self) -> bool {
+    pub(super) fn meets(&self, other: &Self) -> bool {
         self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
     }
 
