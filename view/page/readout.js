@@ -7,7 +7,7 @@ function readOut() {
   const put = (id, text) => { if (element(id).textContent !== text) element(id).textContent = text; };
   put("n-computed", withUnit(norm(tool.computed), "N"));
   put("n-commanded", withUnit(norm(tool.commanded), "N"));
-  put("n-parts", `${tool.commanded.map((c) => c.toFixed(2)).join(", ")} N`);
+  put("n-parts", `${tool.commanded.map((c) => (Math.round(100 * c) / 100 + 0).toFixed(2)).join(", ")} N`);
   put("n-contact", MODES[tool.mode] ?? "–");
   put("n-depth", withUnit(state.deepest, "m"));
   element("n-stress").parentElement.hidden = state.colourBy !== "stress";
