@@ -151,13 +151,12 @@ fn a_message_that_comes_too_late_has_the_log_time_of_the_newest_before_it() {
     let (got, damage) = read(&bytes);
     assert_eq!(damage, None);
     let sorted = |entries: &[LogEntry]| {
-        let is_environment = |entry: &&LogEntry| matches!(entry, LogEntry::Environment(_));
-        let others: Vec<LogEntry> = entries.iter().filter(|entry| !is_environment(entry)).cloned().collect();
-        let mut bits: Vec<String> = bits(&others).iter().map(|bits| format!("{bits:?}")).collect();
+        let mut bits: Vec<String> = bits(entries).iter().map(|bits| format!("{bits:?}")).collect();
         bits.sort();
         bits
     };
-    assert!(sorted(&got) == sorted(&sent), "each with the time at which it was");
+    assert_eq!(got[0], LogEntry::Environment(environment()));
+    assert!(sorted(&got[1..]) == sorted(&sent), "each with the time at which it was");
 }
 
 #[test]

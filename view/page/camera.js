@@ -1,9 +1,8 @@
 
 // Where the picture is seen from: around a point, z up.
 const TANGENT = Math.tan((35 * Math.PI) / 360);
-const VIEWS = [[0.7, 0.5], [0, 0], [Math.PI, 0], [Math.PI / 2, 0], [-Math.PI / 2, 0], [-Math.PI / 2, Math.PI / 2], [-Math.PI / 2, -Math.PI / 2]];
+const VIEWS = [[-1, 0.5], [0, 0], [Math.PI, 0], [Math.PI / 2, 0], [-Math.PI / 2, 0], [-Math.PI / 2, Math.PI / 2], [-Math.PI / 2, -Math.PI / 2]];
 const camera = { yaw: -1.0, pitch: 0.5, distance: 0.3, narrowness: 1, target: [0, 0, 0] };
-VIEWS[0] = [-1.0, 0.5];
 
 // The axes of the view: right, up and towards the viewer.
 function axes() {

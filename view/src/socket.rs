@@ -145,19 +145,14 @@ fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Opti
             return None;
         }
         if !is_sent {
-            is_sent = match socket.flush() {
-                Ok(()) => true,
-                Err(error) if is_wait(&error) && moved.elapsed() < GONE => false,
-                Err(_) => return None,
-            };
+            is_sent = has_gone(socket.flush())?;
+            if !is_sent && moved.elapsed() >= GONE {
+                return None;
+            }
         }
         if is_sent && asked.elapsed() > ASK {
             asked = Instant::now();
-            is_sent = match socket.send(Message::Ping(bytes::Bytes::new())) {
-                Ok(()) => true,
-                Err(error) if is_wait(&error) => false,
-                Err(_) => return None,
-            };
+            is_sent = has_gone(socket.send(Message::Ping(bytes::Bytes::new())))?;
         }
         if is_sent && said.elapsed() > BEAT {
             browser.outbox().say(HERE.to_owned());
@@ -168,17 +163,22 @@ fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Opti
                 Outgoing::Text(text) => (text.len(), Message::Text(text.into())),
                 Outgoing::Bytes(bytes) => (bytes.len(), Message::Binary(bytes)),
             };
-            is_sent = match socket.send(message) {
-                Ok(()) => true,
-                Err(error) if is_wait(&error) => false,
-                Err(_) => return None,
-            };
+            is_sent = has_gone(socket.send(message))?;
             said = Instant::now();
             hub.count_sent(length);
         }
         if is_sent {
             moved = Instant::now();
         }
+    }
+}
+
+/// True for what was written whole, false for what waits for room; `None` if the connection is over.
+fn has_gone(written: Result<(), Error>) -> Option<bool> {
+    match written {
+        Ok(()) => Some(true),
+        Err(error) if is_wait(&error) => Some(false),
+        Err(_) => None,
     }
 }
 

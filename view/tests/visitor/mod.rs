@@ -50,9 +50,18 @@ pub fn open(address: SocketAddr, origin: Option<&str>) -> Result<WebSocket<TcpSt
 
 /// A visitor that knows the token.
 pub fn enter(server: &Server, token: &str) -> WebSocket<TcpStream> {
+    visit(server, &format!(r#"{{"do":"enter","token":"{token}"}}"#))
+}
+
+/// The page with this key, by another connection.
+pub fn enter_again(server: &Server, token: &str, key: &str) -> WebSocket<TcpStream> {
+    visit(server, &format!(r#"{{"do":"enter","token":"{token}","again":"{key}"}}"#))
+}
+
+fn visit(server: &Server, words: &str) -> WebSocket<TcpStream> {
     let address = server.address();
     let mut socket = open(address, Some(&format!("http://{address}"))).unwrap();
-    say(&mut socket, &format!(r#"{{"do":"enter","token":"{token}"}}"#));
+    say(&mut socket, words);
     socket
 }
 
@@ -111,22 +120,16 @@ pub fn tool(message: &Message) -> Option<(f64, [f32; 3], [f32; 3])> {
 
 /// The key by which a page is known when it comes again.
 pub fn key(message: &Message) -> Option<String> {
-    let Message::Text(text) = message else { return None };
-    let message: serde_json::Value = serde_json::from_str(text).unwrap();
-    message.get("key").and_then(|key| key.as_str()).map(str::to_owned)
-}
-
-/// The page with this key, by another connection.
-pub fn enter_again(server: &Server, token: &str, key: &str) -> WebSocket<TcpStream> {
-    let address = server.address();
-    let mut socket = open(address, Some(&format!("http://{address}"))).unwrap();
-    say(&mut socket, &format!(r#"{{"do":"enter","token":"{token}","again":"{key}"}}"#));
-    socket
+    told(message, "key")
 }
 
 /// The role that a visitor is told.
 pub fn role(message: &Message) -> Option<String> {
+    told(message, "role")
+}
+
+fn told(message: &Message, field: &str) -> Option<String> {
     let Message::Text(text) = message else { return None };
     let message: serde_json::Value = serde_json::from_str(text).unwrap();
-    message.get("role").and_then(|role| role.as_str()).map(str::to_owned)
+    message.get(field).and_then(|value| value.as_str()).map(str::to_owned)
 }
