@@ -8,8 +8,9 @@
 //!
 //! The damper is theirs: with the balance E + E(0) < 0 it adds -alpha v, alpha = -(E + E(0)) / (dt
 //! |v|^2), no more than the device renders stably. What that cap leaves is carried: the balance stays negative. The cap also
-//! means that the damper alone guarantees nothing, so the deficit withdraws the force as well, in two steps: first the
-//! part along the motion, which is what gives energy out, then all of it. Both only shorten the force.
+//! means that the damper alone guarantees nothing, so the deficit withdraws the force as well, all of it at the tolerance. It does
+//! so whichever way the tool moves: what depended on the motion's direction would switch with every tremor, and what switches
+//! within a tick of delay gives out energy by itself.
 
 use super::force::{Force, dot, norm};
 
@@ -58,16 +59,7 @@ pub(crate) fn control(limits: &Passivity, balance_j: f64, force: Force, velocity
     let deficit = if balance_j.is_finite() { -balance_j / limits.tolerance_j } else { 1.0 };
     let speed_squared = dot(velocity, velocity);
     let moves = speed_squared > limits.noise_m_s * limits.noise_m_s;
-    let mut kept = force;
-    if moves {
-        // Along the motion less and less, none from half of the tolerance on.
-        let outwards = dot(force, velocity).max(0.0) / speed_squared;
-        let share = outwards * (2.0 * deficit).min(1.0);
-        kept = std::array::from_fn(|i| kept[i] - share * velocity[i]);
-    }
-    // All of it, from half of the tolerance to the whole.
-    let gain = (2.0 - 2.0 * deficit).clamp(0.0, 1.0);
-    let kept = kept.map(|c| c * gain);
+    let kept = force.map(|c| c * (1.0 - deficit).clamp(0.0, 1.0));
     let wanted = deficit * limits.tolerance_j / (dt * speed_squared);
     let damping = if moves { wanted.min(limits.max_damping_n_s_per_m) } else { 0.0 };
     let damping = if damping.is_finite() { damping } else { 0.0 };
@@ -141,14 +133,14 @@ mod tests {
     }
 
     #[test]
-    fn a_deficit_takes_first_what_pushes_along_the_motion_then_everything() {
+    fn a_deficit_takes_its_share_of_the_force_whichever_way_the_tool_moves() {
         let limits = Passivity { max_damping_n_s_per_m: 0.0, ..LIMITS };
-        let force = |balance: f64, v: [f64; 3]| control(&limits, balance, [1.0, 0.0, 1.0], v, 1e-3).force;
-        let half = force(-0.25e-3, [0.1, 0.0, 0.0]);
-        assert!((half[0] - 0.5).abs() < 1e-12 && half[2] == 1.0, "{half:?}");
-        assert_eq!(force(-0.25e-3, [-0.1, 0.0, 0.0]), [1.0, 0.0, 1.0], "what holds against the motion stays");
-        assert_eq!(force(-1e-3, [-0.1, 0.0, 0.0]), [0.0; 3]);
-        assert_eq!(force(f64::NAN, [0.0; 3]), [0.0; 3]);
+        let force = |balance: f64, v: [f64; 3]| control(&limits, balance, [1.0, 0.0, 2.0], v, 1e-3).force;
+        for v in [[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0], [0.0; 3]] {
+            let quarter = force(-0.25e-3, v);
+            assert!((quarter[0] - 0.75).abs() < 1e-12 && (quarter[2] - 1.5).abs() < 1e-12, "{quarter:?}");
+            assert_eq!([force(-1e-3, v), force(-2e-3, v), force(f64::NAN, v)], [[0.0; 3]; 3]);
+        }
     }
 
     // Check that a sampled spring gives out exactly K T v x more than it takes in: the leak that the literature names.

@@ -313,3 +313,56 @@ fn a_held_wall_swings_without_the_controller_and_rests_with_it() {
     assert!(none == 0 && acted > 0);
     assert!(with < 0.2 * without, "{with} m, {without} m without");
 }
+
+/// A hand that rests on a wall, as stiff as the device may render, after more energy has come out than there was.
+struct Resting {
+    /// Peak to peak in the last half second (m).
+    swings: f64,
+    /// What comes out after two seconds (J).
+    drained: f64,
+}
+
+fn resting_on_a_wall(seed: u64) -> Resting {
+    const SUBSTEPS: u32 = 10;
+    let random = &mut Random(seed);
+    let (mass, hand_k, wall_k) = (random.within(0.04, 0.3), random.within(50.0, 600.0), random.within(100.0, 600.0));
+    let hand_b = random.within(0.2, 2.0) * (hand_k * mass).sqrt();
+    let mut limits = Limits::new(&DeviceLimits::of_force(3.3));
+    (limits.start_up, limits.model_age, limits.tank) = (None, None, None);
+    (limits.max_slew_n_per_s, limits.ramp_s) = (random.within(100.0, 1000.0), 1e-3);
+    let passivity = limits.passivity.as_mut().unwrap();
+    passivity.max_damping_n_s_per_m = random.within(3.0, 8.0);
+    passivity.stored_j = -random.within(0.05, 0.95) * passivity.tolerance_j;
+    let mut pipeline = Pipeline::new(limits);
+    let pressed = random.within(0.3, 3.0);
+    let (mut x, mut v) = (-pressed / wall_k, 0.0);
+    let rest = x - pressed / hand_k;
+    let (mut range, mut then, mut energy) = ((f64::MAX, f64::MIN), 0.0, 0.0);
+    for n in 0..4000 {
+        let force = Request::Force([(-wall_k * x).max(0.0), 0.0, 0.0]);
+        let output = pipeline.apply(&Input::new(force, [x, 0.0, 0.0], 1e-3));
+        energy = output.energy_j;
+        if n == 2000 {
+            then = energy;
+        }
+        for _ in 0..SUBSTEPS {
+            let force = output.force[0] + hand_k * (rest - x) - hand_b * v;
+            v += force / mass * 1e-3 / f64::from(SUBSTEPS);
+            x += v * 1e-3 / f64::from(SUBSTEPS);
+        }
+        if n >= 3500 {
+            range = (range.0.min(x), range.1.max(x));
+        }
+    }
+    Resting { swings: range.1 - range.0, drained: then - energy }
+}
+
+/// A controller that switches as the tool trembles keeps the deficit that it is there to pay back.
+#[test]
+fn a_hand_that_rests_on_a_wall_comes_to_rest_whatever_has_come_out_before() {
+    for seed in 0..1000 {
+        let Resting { swings, drained } = resting_on_a_wall(seed);
+        assert!(swings < 1e-6, "seed {seed}: {swings} m");
+        assert!(drained < 1e-6, "seed {seed}: {drained} J");
+    }
+}
