@@ -323,3 +323,59 @@ mod hand_release {
         assert!(span(&without.z, 5700..6000) > 10.0 * swing && without.least_j < 10.0 * least_j);
     }
 }
+
+/// A light tool on a late model: what the model does not know of its motion comes back to it a period later.
+mod late {
+    use std::time::Duration;
+
+    use super::*;
+    use palpate::devices::{HandSpec, PlantSpec};
+    use palpate::log::{ForceSample, ServedBy};
+    use palpate::prelude::ToolPath;
+    use palpate::scene::{DeviceKind, RunSpec};
+
+    /// A sphere of 50 g on 300 N/m, as a pointer's, presses, and is pushed 0.3 mm aside at 2.5 s, half a second after the local model has
+    /// become `predictive`, of which no window has a basis.
+    #[test]
+    fn a_light_tool_that_sticks_comes_to_rest_before_there_is_a_basis() {
+        let mut scene = load("demo").with_model(LocalModelKind::Patch);
+        scene.global.compute_latency_ms = 20.0;
+        scene.global.basis_latency_ms = Some(60e3);
+        scene.local.keep_bases = false;
+        scene.run = RunSpec { duration_s: 4.0, switchable: true };
+        let device = &mut scene.devices[0];
+        device.kind = DeviceKind::Hand;
+        device.plant = PlantSpec {
+            mass_kg: 0.05,
+            damping_n_s_per_m: 3.7,
+            friction_n: 0.0,
+            encoder_step_m: 0.0,
+            ..device.plant.clone()
+        };
+        device.hand = HandSpec { mass_kg: 1e-4, damping_n_s_per_m: 4.0, ..device.hand.clone() };
+        let places = [0.115, 0.109, 0.0935, 0.0935, 0.0935, 0.0935].map(|z| [0.03, 0.0512, z]);
+        let places =
+            places.into_iter().zip([0.0, 0.0, 0.0, 0.0, 3e-4, 3e-4]).map(|([x, y, z], aside)| [x, y + aside, z]);
+        device.path = Some(ToolPath::new(vec![0.0, 0.5, 1.5, 2.5, 2.6, 10.0], places.collect()).unwrap());
+        let mut running = Session::from_scene(scene).virtual_time().keep_records().build().unwrap().start().unwrap();
+        let controls = running.take_controls().unwrap();
+        running.wait_for(Duration::from_secs(2));
+        controls.set_model(LocalModelKind::Predictive).unwrap();
+        running.wait();
+        let summary = running.stop();
+        let energy = |record: &LogRecord| if let LogRecord::Command(row) = record { Some(row.energy_j) } else { None };
+        let least_j = summary.records.iter().filter_map(energy).fold(f64::INFINITY, f64::min);
+        let force = |record: &LogRecord| if let LogRecord::Force(row) = record { Some(*row) } else { None };
+        let forces: Vec<ForceSample> = summary.records.iter().filter_map(force).collect();
+        assert!(forces[2200..4000].iter().all(|force| force.served_by == ServedBy::Predicted), "{summary}");
+        assert!(forces[2000].force_n[2] > 1.0, "it presses: {summary}");
+        let aside = tools(&summary)[3800..4000]
+            .iter()
+            .map(|place| place.y)
+            .fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)));
+        let swings = aside.1 - aside.0;
+        println!("{:.2} um aside in the last 200 ms, ledger least {least_j:.2e} J", 1e6 * swings);
+        assert!(swings < 20e-6, "{swings} m");
+        assert!(least_j >= 0.0, "{least_j} J");
+    }
+}

@@ -147,14 +147,13 @@ fn every_other_model_stays_bounded_on_nearly_incompressible_tissue() {
     }
 }
 
-/// Without its basis the ring moves as predicted, whatever the tool does: that is a model too, and the next best.
+/// Without its basis the ring moves as predicted for a tool that stays where it is: worse, and not wrong.
 #[test]
 fn without_a_basis_the_prediction_alone_serves() {
     let case = Case::new("hand");
     let (with, _) = case.error(ONE_PERIOD_MS, |_| ());
     let (without, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.basis = Some(0));
-    let (predicted, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.model = LocalModelKind::Predicted.into());
-    assert_eq!(without.rms, predicted.rms, "the same model by two names");
+    println!("{with:?} with, {without:?} without");
     assert!(with.rms < 0.5 * without.rms && without.rms < 20.0, "{with:?} against {without:?}");
 }
 

@@ -23,7 +23,7 @@ pub enum ServedBy {
     LinearBoundary = 4,
     ScaledBoundary = 5,
     Condensed = 6,
-    /// `predictive` without its basis: the ring moves as predicted, whatever happens.
+    /// Also `predictive` without its basis: the ring moves as predicted for tools that stay where they are, whatever happens.
     Predicted = 7,
     Predictive = 8,
 }

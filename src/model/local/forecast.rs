@@ -45,6 +45,11 @@ impl ToolForecast {
         Self { position, ..Self::default() }
     }
 
+    /// The forecast for a tool that stays where this one is now.
+    pub(super) fn staying(&self) -> Self {
+        Self { orientation: self.orientation, ..Self::at_rest(self.position) }
+    }
+
     /// The tool that is expected `t` seconds from now.
     fn pose(&self, t: f64) -> Pose {
         Pose { position: self.at(t), orientation: self.orientation }

@@ -23,7 +23,7 @@ const TORN_TICKS: u32 = 2;
 /// x_ring = x_predicted + Phi eta, eta'' = K eta + C eta' + Phi^T (f_near - f_near,predicted).
 ///
 /// It is built at the time of the global model's state; a model that comes late replays the tool's own path. While there
-/// is no basis the ring moves as predicted whatever happens. A contact that leaves the patch would press against nodes
+/// is no basis the ring moves as predicted for tools that stay where they are, whatever happens. A contact that leaves the patch would press against nodes
 /// that do not give way: from then on the last force is held.
 #[derive(Debug)]
 pub(super) struct Predictive {
@@ -112,7 +112,13 @@ impl Predictive {
             }
             return;
         }
-        let motion = |tool: usize, n| resync.tools[tool].motion(n, stepping.tick);
+        // What the tool does otherwise than expected moves the ring only by a basis. Without one a path that goes on with the tool's
+        // velocity is an error that comes back a period later and larger: a light tool on a late model swings ever wider.
+        let stays = self.reduces && self.basis.is_none();
+        let motion = |tool: usize, n| match &resync.tools[tool] {
+            forecast if stays => forecast.staying().motion(n, stepping.tick),
+            forecast => forecast.motion(n, stepping.tick),
+        };
         let body = resync.global.body();
         let (step, extent) = (f64::from(stride) * stepping.step(), window.extent(body.rest()));
         ring_weights.clear();
