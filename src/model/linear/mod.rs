@@ -1,5 +1,6 @@
 //! The linear model of a patch, and the implicit step that it can take.
 
+mod blocks;
 mod implicit;
 mod tangent;
 
