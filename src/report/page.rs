@@ -27,10 +27,10 @@ impl Page {
     }
 
     /// Adds text with a name in front, on as many lines as it needs.
-    pub fn wrapped(&mut self, name: &str, text: &str) {
+    pub fn named(&mut self, name: &str, text: &str) {
         let mut name = name;
         for line in wrap(text, WIDTH - NAME_WIDTH) {
-            self.named(name, line);
+            self.line(format!("{name:<NAME_WIDTH$}{line}"));
             name = "";
         }
     }
@@ -38,11 +38,6 @@ impl Page {
     /// Adds text without a name, on as many lines as it needs.
     pub fn paragraph(&mut self, text: &str) {
         wrap(text, WIDTH).into_iter().for_each(|line| self.line(line));
-    }
-
-    /// Adds a line with a name in front.
-    pub fn named(&mut self, name: &str, text: String) {
-        self.line(format!("{name:<NAME_WIDTH$}{text}"));
     }
 }
 

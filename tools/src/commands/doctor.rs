@@ -28,7 +28,7 @@ fn diagnosis(plan: &Plan) -> String {
     });
     page.line(String::new());
     for refusal in &plan.missing {
-        page.wrapped("refused", refusal);
+        page.named("refused", refusal);
     }
     for finding in &plan.machine {
         let state = match finding.state {
@@ -36,9 +36,9 @@ fn diagnosis(plan: &Plan) -> String {
             Readiness::Missing => "missing",
             Readiness::Unknown => "unknown",
         };
-        page.wrapped(state, &format!("{}: {}", finding.name, finding.found));
+        page.named(state, &format!("{}: {}", finding.name, finding.found));
         if finding.state == Readiness::Missing {
-            page.wrapped("  to do", finding.remedy);
+            page.named("  to do", finding.remedy);
         }
     }
     page.line(String::new());

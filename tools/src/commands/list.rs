@@ -14,7 +14,7 @@ pub fn run() -> Result<(), Error> {
     let mut page = Page::default();
     for scene in BuiltIn::all() {
         page.line(scene.name().to_owned());
-        page.wrapped("", &scene.about());
+        page.named("", &scene.about());
     }
     page.line(String::new());
     page.line("palpate run NAME, palpate view NAME, palpate compare NAME".to_owned());

@@ -15,7 +15,7 @@ pub fn against_to_text(against: &Against, [this, other]: [(&str, &TimingReport);
     let mut page = Page::default();
     for (name, (log, report)) in [("this", this), ("other", other)] {
         let (verdict, reason) = report.run.verdict();
-        page.wrapped(name, &format!("{log}: {}: {reason}", verdict.name()));
+        page.named(name, &format!("{log}: {}: {reason}", verdict.name()));
     }
     page.line(String::new());
     page.line(format!("{:<30}{:>10}{:>10}{:>9}   {}", "", "this", "other", "ratio", "95 % of ratios"));
@@ -33,7 +33,7 @@ pub fn against_to_text(against: &Against, [this, other]: [(&str, &TimingReport);
     page.line(String::new());
     page.line("* no doubt; intervals are of a block bootstrap; all figures: --json".to_owned());
     if !against.unmatched.is_empty() {
-        page.wrapped("unmatched", &against.unmatched.join(", "));
+        page.named("unmatched", &against.unmatched.join(", "));
     }
     page.text
 }

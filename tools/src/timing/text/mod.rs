@@ -34,6 +34,6 @@ fn cores(page: &mut Page, cores: &[CoreUse]) {
         let on = core.cpu.map_or("any".to_owned(), |cpu| format!("cpu {cpu}"));
         let groups: Vec<String> =
             core.groups.iter().map(|(group, share)| format!("{group} {:.1} %", 100.0 * share)).collect();
-        page.wrapped(if i == 0 { "cores" } else { "" }, &format!("{on}: {}", groups.join(", ")));
+        page.named(if i == 0 { "cores" } else { "" }, &format!("{on}: {}", groups.join(", ")));
     }
 }

@@ -19,7 +19,7 @@ const UNKNOWN: char = '.';
 /// The worst of them in a sentence, if it was too late.
 pub(super) fn sentence(page: &mut Page, report: &TimingReport) {
     if let Some(worst) = report.worst.first().filter(|worst| worst.is_trouble()) {
-        page.wrapped("worst", &in_words(worst));
+        page.named("worst", &in_words(worst));
     }
 }
 
