@@ -23,8 +23,8 @@ const TORN_TICKS: u32 = 2;
 /// x_ring = x_predicted + Phi eta, eta'' = K eta + C eta' + Phi^T (f_near - f_near,predicted).
 ///
 /// It is built at the time of the global model's state; a model that comes late replays the tool's own path. While there
-/// is no basis the ring moves as predicted for tools that stay where they are, whatever happens. A contact that leaves the patch would press against nodes
-/// that do not give way: from then on the last force is held.
+/// is no basis the ring moves as predicted for tools that stay where they are, whatever happens. A contact that leaves the
+/// patch would press against nodes that do not give way: from then on the last force is held.
 #[derive(Debug)]
 pub(super) struct Predictive {
     size: [usize; 3],
