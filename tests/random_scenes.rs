@@ -372,6 +372,12 @@ fn without_the_controller_some_of_the_same_scenes_give_out_more() {
     assert!(bounded < energy, "{bounded} of {energy}");
 }
 
+/// Their surroundings were torn along from the first step that ran ahead, so that the ring of `predictive` had no path at all.
+#[test]
+fn scenes_that_are_torn_at_once_stop_no_tick() {
+    assert!([2270, 6499].map(|seed| run(seed, true)).iter().all(|outcome| matches!(outcome, Outcome::Ran { .. })));
+}
+
 #[test]
 #[ignore = "ten thousand scenes take minutes: the figure of docs/safety.md"]
 fn the_same_for_ten_thousand_scenes() {

@@ -106,9 +106,8 @@ impl Predictive {
         path.clear(window.ring, (stepping.step(), stride as usize), steps as usize);
         if let Some(told) = resync.global.told() {
             if !path.take(&told.path) {
-                // Another path than this body's: the ring stands still, from the next model on it moves again.
-                near.forces(state, forces);
-                path.push(state, forces, ring);
+                // Another path than this body's. From the next model on the ring moves again.
+                self.stand_still();
             }
             return;
         }
@@ -145,6 +144,19 @@ impl Predictive {
             is_sound
         });
         self.take_present(resync);
+        if self.path.samples().is_empty() {
+            // It was torn along from the first.
+            self.stand_still();
+        }
+    }
+
+    /// Lets the ring stay where it is.
+    fn stand_still(&mut self) {
+        let ring = self.ring();
+        let Self { patch: Patch { state, forces, .. }, near, path, .. } = self;
+        state.velocities[ring.clone()].fill(Vec3::zeros());
+        near.forces(state, forces);
+        path.push(state, forces, ring);
     }
 
     /// The ring's nodes to `ring_positions` with `ring_velocities`.
