@@ -59,7 +59,8 @@ pub(crate) fn control(limits: &Passivity, balance_j: f64, force: Force, velocity
     let deficit = if balance_j.is_finite() { -balance_j / limits.tolerance_j } else { 1.0 };
     let speed_squared = dot(velocity, velocity);
     let moves = speed_squared > limits.noise_m_s * limits.noise_m_s;
-    let kept = force.map(|c| c * (1.0 - deficit).clamp(0.0, 1.0));
+    let share = (1.0 - deficit).max(0.0);
+    let kept = force.map(|c| c * share);
     let wanted = deficit * limits.tolerance_j / (dt * speed_squared);
     let damping = if moves { wanted.min(limits.max_damping_n_s_per_m) } else { 0.0 };
     let damping = if damping.is_finite() { damping } else { 0.0 };

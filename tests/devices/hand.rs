@@ -34,6 +34,13 @@ fn absorbed(tools: &[Vec3], forces: &[Vec3]) -> f64 {
     -(1..tools.len() - 1).map(work).sum::<f64>()
 }
 
+/// Largest less least of the ticks `range` (m).
+fn span(z: &[f64], range: std::ops::Range<usize>) -> f64 {
+    let ends = |(low, high): (f64, f64), z: &f64| (low.min(*z), high.max(*z));
+    let (low, high) = z[range].iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    high - low
+}
+
 #[test]
 fn a_hand_that_presses_and_lets_go_feels_the_reference_force() {
     let rows = reference("hand_release");
@@ -253,13 +260,6 @@ mod hand_release {
         (values.clone().map(|value| value * value).sum::<f64>() / values.count() as f64).sqrt()
     }
 
-    /// Largest less least of the ticks `range` (m).
-    fn span(z: &[f64], range: std::ops::Range<usize>) -> f64 {
-        let ends = |(low, high): (f64, f64), z: &f64| (low.min(*z), high.max(*z));
-        let (low, high) = z[range].iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends);
-        high - low
-    }
-
     #[test]
     fn every_local_model_but_hold_stays_passive_and_predictive_is_near_the_reference() {
         let rows = reference("hand_release");
@@ -369,11 +369,8 @@ mod late {
         let forces: Vec<ForceSample> = summary.records.iter().filter_map(force).collect();
         assert!(forces[2200..4000].iter().all(|force| force.served_by == ServedBy::Predicted), "{summary}");
         assert!(forces[2000].force_n[2] > 1.0, "it presses: {summary}");
-        let aside = tools(&summary)[3800..4000]
-            .iter()
-            .map(|place| place.y)
-            .fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)));
-        let swings = aside.1 - aside.0;
+        let aside: Vec<f64> = tools(&summary).iter().map(|place| place.y).collect();
+        let swings = span(&aside, 3800..4000);
         println!("{:.2} um aside in the last 200 ms, ledger least {least_j:.2e} J", 1e6 * swings);
         assert!(swings < 20e-6, "{swings} m");
         assert!(least_j >= 0.0, "{least_j} J");

@@ -22,7 +22,7 @@ impl Blocks {
     pub(super) fn take(&mut self, matrix: &DMatrix<f64>) {
         let (rows, columns) = (matrix.nrows() / 3, matrix.ncols() / 3);
         let most = (DENSE * (rows * columns) as f64) as usize;
-        self.clear();
+        self.fill();
         for columns in matrix.as_slice().chunks_exact(9 * rows) {
             let (first, others) = columns.split_at(3 * rows);
             let (second, third) = others.split_at(3 * rows);
@@ -35,13 +35,14 @@ impl Blocks {
                 }
             }
             self.ends.push(self.rows.len() as u32);
-        }
-        if self.rows.len() > most {
-            self.clear();
+            if self.rows.len() > most {
+                return self.fill();
+            }
         }
     }
 
-    fn clear(&mut self) {
+    /// Has none any more: most of the matrix is not zero.
+    pub(super) fn fill(&mut self) {
         self.ends.clear();
         self.rows.clear();
         self.numbers.clear();

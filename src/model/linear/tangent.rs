@@ -136,7 +136,7 @@ impl PatchTangent {
         if stiffness.shape() == (n, n) {
             let mut position = self.matrix.columns_mut(0, n);
             position += stiffness * share;
-            self.blocks.take(&self.matrix);
+            self.blocks.fill();
         }
     }
 

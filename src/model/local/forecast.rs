@@ -40,14 +40,15 @@ pub struct ToolForecast {
 }
 
 impl ToolForecast {
-    /// The forecast for a tool that rests at `position` (m).
-    pub fn at_rest(position: Vec3) -> Self {
-        Self { position, ..Self::default() }
+    /// The forecast for a tool that rests at `pose`.
+    pub fn at_rest(pose: impl Into<Pose>) -> Self {
+        let Pose { position, orientation } = pose.into();
+        Self { position, orientation, ..Self::default() }
     }
 
     /// The forecast for a tool that stays where this one is now.
     pub(super) fn staying(&self) -> Self {
-        Self { orientation: self.orientation, ..Self::at_rest(self.position) }
+        Self::at_rest(self.pose(0.0))
     }
 
     /// The tool that is expected `t` seconds from now.
@@ -143,7 +144,8 @@ impl ToolHistory {
     pub fn forecast(&self) -> ToolForecast {
         let now = self.positions[0];
         let back = std::array::from_fn(|look| self.positions[self.lead * (look + 1) / LOOKS] - now);
-        let forecast = ToolForecast { orientation: self.orientation, back, ..ToolForecast::at_rest(now) };
+        let pose = Pose { position: now, orientation: self.orientation };
+        let forecast = ToolForecast { back, ..ToolForecast::at_rest(pose) };
         let recent = self.known.min(ticks(SPAN, self.tick));
         if recent == 0 {
             return forecast;

@@ -277,29 +277,47 @@ fn without_the_controller_many_of_the_same_cases_break_the_bound() {
     assert!(broken > 100, "{broken} of 1000");
 }
 
+/// A hand, a spring and a damper to where it wants to be, that holds a device along one axis.
+struct Held {
+    mass: f64,
+    stiffness: f64,
+    damping: f64,
+    wants: f64,
+    x: f64,
+    v: f64,
+}
+
+impl Held {
+    /// A millisecond under the command `force` (N).
+    fn advance(&mut self, force: f64) {
+        const SUBSTEPS: u32 = 20;
+        for _ in 0..SUBSTEPS {
+            let force = force + self.stiffness * (self.wants - self.x) - self.damping * self.v;
+            self.v += force / self.mass * 1e-3 / f64::from(SUBSTEPS);
+            self.x += self.v * 1e-3 / f64::from(SUBSTEPS);
+        }
+    }
+}
+
 /// A hand that presses a device against a wall whose force is renewed every 33 ms: the amplitude in the last second (m).
 fn pressed_on_a_held_wall(passivity: bool) -> (f64, u32) {
-    const SUBSTEPS: u32 = 20;
-    let (mass, hand_k, hand_b, wall_k, rest) = (0.175, 300.0, 1.0, 600.0, -0.005);
+    let wall_k = 600.0;
+    let mut hand = Held { mass: 0.175, stiffness: 300.0, damping: 1.0, wants: -0.005, x: 0.001, v: 0.0 };
     let mut limits = Limits::new(&DeviceLimits::of_force(8.0));
     (limits.start_up, limits.model_age, limits.tank) = (None, None, None);
     limits.passivity = limits.passivity.filter(|_| passivity);
     let mut pipeline = Pipeline::new(limits);
-    let (mut x, mut v, mut wall, mut acted) = (0.001, 0.0, 0.0, 0);
+    let (mut wall, mut acted) = (0.0, 0);
     let mut range = (f64::MAX, f64::MIN);
     for n in 0..5000_u32 {
         if n % 33 == 0 {
-            wall = if x < 0.0 { -wall_k * x } else { 0.0 };
+            wall = if hand.x < 0.0 { -wall_k * hand.x } else { 0.0 };
         }
-        let output = pipeline.apply(&Input::new(Request::Force([wall, 0.0, 0.0]), [x, 0.0, 0.0], 1e-3));
+        let output = pipeline.apply(&Input::new(Request::Force([wall, 0.0, 0.0]), [hand.x, 0.0, 0.0], 1e-3));
         acted += u32::from(output.actions.0 & (Actions::PASSIVITY.0 | Actions::WITHDRAWN.0) != 0);
-        for _ in 0..SUBSTEPS {
-            let force = output.force[0] + hand_k * (rest - x) - hand_b * v;
-            v += force / mass * 1e-3 / f64::from(SUBSTEPS);
-            x += v * 1e-3 / f64::from(SUBSTEPS);
-        }
+        hand.advance(output.force[0]);
         if n >= 4000 {
-            range = (range.0.min(x), range.1.max(x));
+            range = (range.0.min(hand.x), range.1.max(hand.x));
         }
     }
     (range.1 - range.0, acted)
@@ -323,10 +341,9 @@ struct Resting {
 }
 
 fn resting_on_a_wall(seed: u64) -> Resting {
-    const SUBSTEPS: u32 = 10;
     let random = &mut Random(seed);
-    let (mass, hand_k, wall_k) = (random.within(0.04, 0.3), random.within(50.0, 600.0), random.within(100.0, 600.0));
-    let hand_b = random.within(0.2, 2.0) * (hand_k * mass).sqrt();
+    let [mass, stiffness, wall_k] = [[0.04, 0.3], [50.0, 600.0], [100.0, 600.0]].map(|[a, b]| random.within(a, b));
+    let damping = random.within(0.2, 2.0) * (stiffness * mass).sqrt();
     let mut limits = Limits::new(&DeviceLimits::of_force(3.3));
     (limits.start_up, limits.model_age, limits.tank) = (None, None, None);
     (limits.max_slew_n_per_s, limits.ramp_s) = (random.within(100.0, 1000.0), 1e-3);
@@ -335,23 +352,19 @@ fn resting_on_a_wall(seed: u64) -> Resting {
     passivity.stored_j = -random.within(0.05, 0.95) * passivity.tolerance_j;
     let mut pipeline = Pipeline::new(limits);
     let pressed = random.within(0.3, 3.0);
-    let (mut x, mut v) = (-pressed / wall_k, 0.0);
-    let rest = x - pressed / hand_k;
+    let x = -pressed / wall_k;
+    let mut hand = Held { mass, stiffness, damping, wants: x - pressed / stiffness, x, v: 0.0 };
     let (mut range, mut then, mut energy) = ((f64::MAX, f64::MIN), 0.0, 0.0);
     for n in 0..4000 {
-        let force = Request::Force([(-wall_k * x).max(0.0), 0.0, 0.0]);
-        let output = pipeline.apply(&Input::new(force, [x, 0.0, 0.0], 1e-3));
+        let force = Request::Force([(-wall_k * hand.x).max(0.0), 0.0, 0.0]);
+        let output = pipeline.apply(&Input::new(force, [hand.x, 0.0, 0.0], 1e-3));
         energy = output.energy_j;
         if n == 2000 {
             then = energy;
         }
-        for _ in 0..SUBSTEPS {
-            let force = output.force[0] + hand_k * (rest - x) - hand_b * v;
-            v += force / mass * 1e-3 / f64::from(SUBSTEPS);
-            x += v * 1e-3 / f64::from(SUBSTEPS);
-        }
+        hand.advance(output.force[0]);
         if n >= 3500 {
-            range = (range.0.min(x), range.1.max(x));
+            range = (range.0.min(hand.x), range.1.max(hand.x));
         }
     }
     Resting { swings: range.1 - range.0, drained: then - energy }

@@ -88,8 +88,7 @@ fn first_bases(
     let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
     let (mut triangles, mut bases) = (Vec::new(), Bases::default());
     for (index, &tool) in tools.iter().enumerate() {
-        let at_rest = ToolForecast { orientation: tool.orientation, ..ToolForecast::at_rest(tool.position) };
-        aim.triangles((simulation, index), &at_rest, [0.0; 2], &mut triangles);
+        aim.triangles((simulation, index), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
         let windows = Windows::new(simulation, index, prepared.plan.template.patch);
         let mut patch = Vec::new();
         windows.choose((simulation, index), &triangles, |_| true, &mut patch);

@@ -114,9 +114,10 @@ impl Predictive {
         // What the tool does otherwise than expected moves the ring only by a basis. Without one a path that goes on with the tool's
         // velocity is an error that comes back a period later and larger: a light tool on a late model swings ever wider.
         let stays = self.reduces && self.basis.is_none();
-        let motion = |tool: usize, n| match &resync.tools[tool] {
-            forecast if stays => forecast.staying().motion(n, stepping.tick),
-            forecast => forecast.motion(n, stepping.tick),
+        let motion = |tool: usize, n| {
+            let forecast = resync.tools[tool];
+            let forecast = if stays { forecast.staying() } else { forecast };
+            forecast.motion(n, stepping.tick)
         };
         let body = resync.global.body();
         let (step, extent) = (f64::from(stride) * stepping.step(), window.extent(body.rest()));
