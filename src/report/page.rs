@@ -41,16 +41,18 @@ impl Page {
     }
 }
 
-/// Lines of at most `width` columns, those after the first indented by two, that end between words.
+/// Lines of at most `width` columns that end between words: the first begins as `text` does, those after it are indented by two.
 fn wrap(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in text.split(' ') {
+    let words = text.trim_start_matches(' ');
+    let mut lines = vec![" ".repeat(text.len() - words.len())];
+    for word in words.split(' ') {
         let last = lines.last_mut().expect("there is a line");
-        if !last.is_empty() && last.chars().count() + 1 + word.chars().count() > width {
+        let is_begun = !last.trim_start().is_empty();
+        if is_begun && last.chars().count() + 1 + word.chars().count() > width {
             lines.push(format!("  {word}"));
             continue;
         }
-        if !last.is_empty() {
+        if is_begun {
             last.push(' ');
         }
         last.push_str(word);

@@ -277,7 +277,8 @@ mod tests {
         let text = busy_report().to_string();
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
         assert!(text.starts_with("LATE: 85899345900 periods skipped and 20 deadlines missed"), "{text}");
-        assert!(text.contains("haptic skipped: late wake 4294967295, long tick 4294967295"), "{text}");
+        assert!(text.contains("\n  haptic skipped: late wake 4294967295, long tick 4294967295"), "{text}");
+        assert!(text.contains("  jump     before blending  p50   10000 N   p99   10000 N"), "{text}");
         assert!(text.contains("and 996 more"), "{text}");
     }
 
