@@ -100,10 +100,15 @@ impl Flows {
         // A release after skipped ones computes what they would have: the first that was due then or later.
         let read = first(&self.haptic, |timing| timing.tick, built.last_tick)?;
         let taken = first(&self.global, |timing| timing.scheduled, built.time)?;
-        let served = first(&self.haptic, |timing| timing.scheduled, force.time)?;
         if taken.timing.scheduled != built.time {
             return None;
         }
+        // A local model that has fallen behind computes the force of an earlier release: the first that can know the model.
+        let served = first(&self.haptic, |timing| timing.scheduled, force.time)?;
+        let served = match served.timing.end < taken.timing.start {
+            true => first(&self.haptic, |timing| timing.end, taken.timing.start)?,
+            false => served,
+        };
         // On two cores a release may begin before the sample that it takes a little later is read.
         let mut time = Nanos::ZERO;
         let stations = [read, taken, served].map(|release| {
@@ -125,4 +130,37 @@ fn keep<T>(queue: &mut VecDeque<T>, item: T, most: usize) {
         queue.pop_front();
     }
     queue.push_back(item);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::events::Events;
+    use super::super::tracks::Tracks;
+    use super::*;
+
+    fn release(track: Track, tick: u64, period_ms: u64, took_us: u64) -> Placed {
+        let [scheduled, start] = [Nanos(tick * period_ms * 1_000_000); 2];
+        let end = start + Nanos(took_us * 1000);
+        Placed { track, timing: TickTiming { tick, scheduled, start, end, ..TickTiming::default() } }
+    }
+
+    // Check that a force which was due before its model was built, in a local model that has fallen behind, is drawn where the
+    // model could be known.
+    #[test]
+    fn a_force_of_a_local_model_that_is_behind_comes_after_its_model() {
+        let mut tracks = Tracks::default();
+        let mut events = Events::new(Vec::new()).unwrap();
+        let [haptic, global] =
+            [0, 1].map(|group| tracks.place(group, "group", (Nanos::ZERO, Nanos::ZERO), &mut events).unwrap());
+        let mut flows = Flows::default();
+        (0..100).for_each(|tick| flows.push_haptic(release(haptic, tick, 1, 200)));
+        flows.push_global(release(global, 1, 40, 20_000));
+        flows.push_model(&GlobalTick { time: Nanos(40_000_000), version: 2, first_tick: 1, last_tick: 30 });
+        for (time, model_version) in [(34, 1), (35, 2)] {
+            flows.push_force(&ForceSample { time: Nanos(time * 1_000_000), model_version, ..ForceSample::default() });
+        }
+        let complete = flows.take_complete();
+        let [Flow { sample_tick: 30, version: 2, stations, .. }] = complete[..] else { panic!("{complete:?}") };
+        assert_eq!(stations.map(|(_, time)| time.0 / 1_000_000), [30, 40, 40]);
+    }
 }
