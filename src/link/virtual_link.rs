@@ -2,7 +2,8 @@
 //!
 //! A line that is as wide as it is said to be takes packets of [`PACKET`] bytes, of the most urgent message first. A message of one packet
 //! that is lost is lost. Of a longer one the packets that are lost are sent again, as a transport of whole messages does: each time that
-//! takes one more round trip. What is repeated takes no room on the line.
+//! takes one more round trip. What is repeated takes no room on the line. A line that keeps the order, as TCP does, repeats short messages
+//! too, and whatever comes later waits for them.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -33,6 +34,8 @@ pub struct Conditions {
     pub duplicate: f64,
     /// Share of messages that are held back for one more delay, so that later ones overtake them.
     pub reorder: f64,
+    /// All comes in the order in which it went, and nothing that a repeat can bring is lost.
+    pub in_order: bool,
     /// Bits per second that the line takes; all at once if absent.
     pub bits_per_s: Option<f64>,
     /// Times in which nothing comes through: from, and until.
@@ -115,6 +118,8 @@ struct Way {
     /// By time, and by number where times are equal.
     arriving: BTreeMap<(Nanos, u64), Vec<u8>>,
     arrived: u64,
+    /// When the latest of them comes.
+    latest: Nanos,
 }
 
 #[derive(Debug)]
@@ -129,7 +134,7 @@ struct Waiting {
 impl Way {
     fn new(seed: u64) -> Self {
         let (lanes, arriving) = Default::default();
-        Self { seed, drawn: 0, lanes, free_at: Nanos::ZERO, arriving, arrived: 0 }
+        Self { seed, drawn: 0, lanes, free_at: Nanos::ZERO, arriving, arrived: 0, latest: Nanos::ZERO }
     }
 
     fn draw(&mut self) -> f64 {
@@ -181,7 +186,7 @@ impl Way {
         let packets = message.len().div_ceil(PACKET).max(1);
         let lose = |way: &mut Self, packets: usize| (0..packets).filter(|_| way.draw() < conditions.loss).count();
         let (mut lost, mut repeats) = (lose(self, packets), 0);
-        while packets > 1 && lost > 0 && repeats < MOST_REPEATS {
+        while (packets > 1 || conditions.in_order) && lost > 0 && repeats < MOST_REPEATS {
             lost = lose(self, lost);
             repeats += 1;
         }
@@ -192,13 +197,15 @@ impl Way {
         for _ in 0..copies {
             let jitter = Nanos((conditions.jitter.0 as f64 * self.draw()) as u64);
             if lost == 0 && !is_down {
-                self.arrive(gone + conditions.delay + jitter + back + repeated, message.clone());
+                let at = gone + conditions.delay + jitter + back + repeated;
+                self.arrive(if conditions.in_order { at.max(self.latest) } else { at }, message.clone());
             }
         }
     }
 
     fn arrive(&mut self, at: Nanos, message: Vec<u8>) {
         self.arrived += 1;
+        self.latest = self.latest.max(at);
         self.arriving.insert((at, self.arrived), message);
     }
 }
@@ -262,6 +269,16 @@ mod tests {
         assert!(short.len() < 100 && short.iter().all(|&(n, ms)| ms == u64::from(n) + 10));
         assert_eq!(long.len(), 100);
         assert!(long.iter().any(|&(n, ms)| ms == u64::from(n) + 30), "one round trip more: {long:?}");
+    }
+
+    #[test]
+    fn a_line_that_keeps_the_order_loses_nothing_and_holds_up_what_comes_after_a_loss() {
+        let delay = Nanos(10 * MS);
+        let came = arrivals(Conditions { delay, loss: 0.05, in_order: true, ..Conditions::default() }, 100);
+        assert_eq!(came.iter().map(|&(n, _)| n).collect::<Vec<_>>(), (0..100).collect::<Vec<u8>>());
+        let late = came.iter().find(|&&(n, ms)| ms > u64::from(n) + 10).expect("one of a hundred is lost");
+        assert_eq!(late.1, u64::from(late.0) + 30, "one round trip more");
+        assert!(came.contains(&(late.0 + 1, late.1)), "the next one waits: {came:?}");
     }
 
     #[test]
