@@ -105,6 +105,8 @@ impl Access {
             ("adminspace/enabled", "false"),
             // A peer that is gone is noticed soon.
             ("transport/link/tx/lease", "2000"),
+            // Who pushes into a dead connection holds up all others meanwhile, and may hold the routing tables: for so long (us) at most.
+            ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
         ];
         all.extend(common.map(|(key, value)| (key, value.to_owned())));
         all.push(("transport/link/rx/max_message_size", MOST_BYTES.to_string()));

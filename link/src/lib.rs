@@ -20,9 +20,11 @@
 //! All that zenoh does, it does on threads of its own: a bridge hands a message over and takes what has come, and waits for neither.
 
 mod access;
+mod connection;
 mod desk;
 mod haptic;
 mod inbox;
+mod keeper;
 mod keys;
 mod line;
 mod outbox;

@@ -1,0 +1,177 @@
+//! Looks after the connection of a running session: asks where it is silent, and opens another one where it is broken.
+
+use std::net::{SocketAddr, TcpStream};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
+use std::time::{Duration, Instant};
+
+use palpate::link::Hello;
+use zenoh::Config;
+
+use crate::connection::{ANSWERS_WITHIN, Connection, say};
+use crate::desk::Answer;
+use crate::inbox::Inbox;
+use crate::unique;
+
+/// A link that has been silent for so long is asked whether somebody is there: there may be another process by now.
+const ASKS_AFTER: Duration = Duration::from_millis(250);
+/// One from which nothing has come for so long is taken for broken, and another one is opened beside it.
+const REOPENS_AFTER: Duration = Duration::from_millis(1000);
+/// Whoever is not reached in this time is not there: no force outlives a longer round trip.
+const REACHED_WITHIN: Duration = Duration::from_millis(300);
+/// Another connection is waited for so long before yet another one is tried.
+const OPENS_WITHIN: Duration = Duration::from_millis(1000);
+/// A session that is welcome and yet silent for so long begins anew, under another number.
+const RENEWS_AFTER: Duration = Duration::from_secs(5);
+/// Between two looks.
+pub(crate) const LOOK: Duration = Duration::from_millis(50);
+
+/// What the bridge and the keeper of its connection share.
+#[derive(Debug, Default)]
+pub(crate) struct Shared {
+    pub(crate) inbox: Arc<Inbox>,
+    kept: Mutex<Kept>,
+    over: Condvar,
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Kept {
+    pub(crate) connection: Option<Connection>,
+    /// Names the process of the global side.
+    pub(crate) peer: u64,
+    is_over: bool,
+}
+
+impl Shared {
+    pub(crate) fn kept(&self) -> MutexGuard<'_, Kept> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Tells the keeper to end.
+    pub(crate) fn end(&self) {
+        self.kept().is_over = true;
+        self.over.notify_all();
+    }
+
+    fn is_over_after(&self, time: Duration) -> bool {
+        let kept = self.over.wait_timeout_while(self.kept(), time, |kept| !kept.is_over);
+        kept.map(|(kept, _)| kept.is_over).unwrap_or(true)
+    }
+
+    fn silent_for(&self) -> Duration {
+        self.inbox.silent_for().unwrap_or(Duration::MAX)
+    }
+}
+
+/// Looks after a connection while the session runs.
+pub(crate) struct Keeper {
+    shared: Arc<Shared>,
+    config: Config,
+    /// Where the global side may be reached, looked up while the network was there.
+    places: Vec<SocketAddr>,
+    hello: Hello,
+    /// When another connection was opened and welcome, which gets as long as the first to say something.
+    reopened: Option<Instant>,
+    /// It is silent, and yet welcome.
+    welcome_since: Option<Instant>,
+    is_refused: bool,
+}
+
+impl Keeper {
+    pub(crate) fn new(shared: Arc<Shared>, config: Config, places: Vec<SocketAddr>, hello: Hello) -> Self {
+        Self { shared, config, places, hello, reopened: None, welcome_since: None, is_refused: false }
+    }
+
+    /// Until the session is over.
+    pub(crate) fn keep(mut self) {
+        while !self.shared.is_over_after(LOOK) {
+            let silent_for = self.shared.silent_for();
+            if silent_for < ASKS_AFTER {
+                self.welcome_since = None;
+                continue;
+            }
+            let open_for = self.reopened.map_or(Duration::MAX, |at| at.elapsed());
+            let may_be_broken = silent_for.min(open_for) > REOPENS_AFTER;
+            // TCP waits longer and longer before it tries a dead path again, and so does who waits for it.
+            if may_be_broken && !self.is_reachable() {
+                continue;
+            }
+            let session = self.shared.kept().connection.as_ref().map(|connection| connection.zenoh.clone());
+            let within = if may_be_broken { REACHED_WITHIN } else { ANSWERS_WITHIN };
+            match session.and_then(|session| say(&session, &self.hello, within)) {
+                Some(answer) => self.take(answer),
+                None => {
+                    self.welcome_since = None;
+                    if may_be_broken {
+                        self.reopen();
+                    }
+                }
+            }
+        }
+        // Outside of the lock: a bridge may still look.
+        let connection = self.shared.kept().connection.take();
+        drop(connection);
+    }
+
+    fn is_reachable(&self) -> bool {
+        self.places.is_empty()
+            || self.places.iter().any(|place| TcpStream::connect_timeout(place, REACHED_WITHIN).is_ok())
+    }
+
+    fn take(&mut self, answer: Answer) {
+        match answer {
+            Answer::Welcome(peer) => {
+                self.is_refused = false;
+                self.shared.kept().peer = peer;
+                let since = *self.welcome_since.get_or_insert_with(Instant::now);
+                if since.elapsed() > RENEWS_AFTER {
+                    self.hello.session = unique();
+                    self.welcome_since = None;
+                    self.reopen();
+                }
+            }
+            Answer::Wait | Answer::Busy => self.welcome_since = None,
+            Answer::No(why) => {
+                if !std::mem::replace(&mut self.is_refused, true) {
+                    tracing::warn!(
+                        "the global side refuses: {}; there is no force until it does not",
+                        palpate::printable(&why)
+                    );
+                }
+            }
+        }
+    }
+
+    /// Opens another connection beside one that may be broken, and takes its place unless that has come back meanwhile.
+    fn reopen(&mut self) {
+        let Some(connection) = self.open() else { return };
+        if self.shared.silent_for() < ASKS_AFTER {
+            in_background("link closing", move || drop(connection));
+            return;
+        }
+        let session = connection.zenoh.clone();
+        let old = self.shared.kept().connection.replace(connection);
+        // Closing may wait for a peer that is not there.
+        in_background("link closing", move || drop(old));
+        if let Some(Answer::Welcome(peer)) = say(&session, &self.hello, ANSWERS_WITHIN) {
+            self.shared.kept().peer = peer;
+            self.reopened = Some(Instant::now());
+        }
+    }
+
+    /// Another connection, if there is one in time; one that comes later is closed.
+    fn open(&self) -> Option<Connection> {
+        let (send, opened) = mpsc::sync_channel(0);
+        let (config, session, inbox) = (self.config.clone(), self.hello.session, Arc::clone(&self.shared.inbox));
+        in_background("link opening", move || {
+            if let Ok(connection) = Connection::open(&config, session, &inbox) {
+                let _ = send.send(connection);
+            }
+        });
+        opened.recv_timeout(OPENS_WITHIN).ok()
+    }
+}
+
+/// Does it on a thread of its own. Where the system gives none, what `work` holds is dropped at once.
+fn in_background(name: &str, work: impl FnOnce() + Send + 'static) {
+    let _ = std::thread::Builder::new().name(name.to_owned()).spawn(work);
+}
