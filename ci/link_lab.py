@@ -1,18 +1,20 @@
 #!/usr/bin/env python3
 """Runs both sides of the link in two network namespaces, with delay and loss between them, and compares the force.
 
-    link_lab.py PALPATE OUT [--scenes NAME...] [--models NAME...] [--delays MS...] [--losses PCT...] [--seconds S] [--latency MS]
+    link_lab.py PALPATE OUT [--scenes NAME...] [--models NAME...] [--delays MS...] [--losses PCT...] [--seconds S]
 
 PALPATE is the command with the feature `link`. Needs root, iproute2 and /dev/net/tun. What is between the namespaces is a relay of IP
 packets in this program: netem is not in every kernel, and here chance has a seed. For each condition it prints the error of the force (rms,
 % of the peak of `full` in virtual time) and the largest change of the force in one tick beyond that of `full`, over the real link and over
-the virtual one, as a row of a table in Markdown. OUT is a folder for logs.
+the virtual one, as a row of a table in Markdown. Over the virtual link the global model takes as long as it did over the real one without
+loss: the age of its models as they came, less two delays. OUT is a folder for logs.
 """
 
 import argparse
 import csv
 import fcntl
 import heapq
+import json
 import math
 import os
 import random
@@ -27,7 +29,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 NAMES = {"haptic": "10.77.0.1", "global": "10.77.0.2"}
-PORT = 7447
+ADDRESS = f"tcp/{NAMES['global']}:7447"
 
 
 def run(*command):
@@ -89,10 +91,44 @@ class Lab:
                         number += 1
                         heapq.heappush(waiting, (time.monotonic() + self.delay_s, number, 1 - side, packet))
 
-    def inside(self, side, *command, **more):
-        # The link is measured, and not what else the machine is doing.
-        command = ["ip", "netns", "exec", f"lab-{side}", "chrt", "-f", "20", *map(str, command)]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
+    def inside(self, side, *command):
+        command = ["ip", "netns", "exec", f"lab-{side}", *map(str, command)]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def serve(self, palpate, scene, model):
+        """The global side of a scene, once it listens."""
+        process = self.inside("global", palpate, "serve", scene, "--listen", ADDRESS, "--model", model, "--insecure")
+        while "listens" not in (line := process.stdout.readline()):
+            if not line:
+                sys.exit(process.stderr.read())
+        return process
+
+    def haptic(self, palpate, *command):
+        """The haptic side: `palpate run` with these arguments, over the link."""
+        return self.inside("haptic", palpate, *command, "--global", ADDRESS, "--insecure")
+
+    def record(self, palpate, path, model, link, seconds, out):
+        """The log of a run of a scene over a link of this delay (ms) and loss (%); None where it failed."""
+        self.delay_s, self.loss = 0.0, 0.0
+        serve = self.serve(palpate, path, model)
+        self.delay_s, self.loss, self.chance = link[0] / 1e3, link[1] / 100, random.Random(1)
+        log = out / f"{path.stem}-{model}-{link[0]:g}-{link[1]:g}.mcap"
+        haptic = self.haptic(palpate, "run", path, "--model", model, "--duration", seconds, "--out", log)
+        _, said = haptic.communicate(timeout=120)
+        serve.send_signal(signal.SIGINT)
+        serve.communicate(timeout=60)
+        if haptic.returncode != 0:
+            print(said.strip(), file=sys.stderr)
+            return None
+        return log
+
+    def plug(self, side, is_in):
+        """Puts the cable of a side in, or pulls it."""
+        run("ip", "-n", f"lab-{side}", "link", "set", f"lab-{side}", "up" if is_in else "down")
+
+    def passed(self):
+        """Packets to the global and to the haptic side since the beginning, then bytes."""
+        return [*self.counts, *self.bytes]
 
     def close(self):
         self.is_over = True
@@ -110,6 +146,20 @@ def forces(palpate, log):
         for row in csv.DictReader(lines):
             found[round(1e3 * float(row["t_s"]))] = tuple(float(row[f"f{axis}_n"]) for axis in "xyz")
     return found
+
+
+def age_ms(palpate, log):
+    """How old a local model is as it comes, as a rule (ms)."""
+    return 1e-6 * json.loads(run(palpate, "timing", log, "--json"))["figures"]["resync.age.p50"]
+
+
+def commanded(palpate, log):
+    """Time (s) and size of each command (N)."""
+    table = log.with_suffix(".csv")
+    run(palpate, "export", log, "--topic", "/force_commanded", "--out", table)
+    with table.open() as lines:
+        rows = [[float(row[key]) for key in ("t_s", "fx_n", "fy_n", "fz_n")] for row in csv.DictReader(lines)]
+    return [(t_s, math.hypot(*force)) for t_s, *force in rows]
 
 
 def error(found, truth):
@@ -132,7 +182,7 @@ def scene_of(name, out, link=None, latency_ms=0):
     if link:
         place = next(place for place, line in enumerate(lines) if line.startswith("[global]"))
         lines.insert(place + 1, f"compute_latency_ms = {latency_ms}")
-        lines += ["[link]", f"delay_ms = {link[0]}", f"loss = {link[1] / 100}", "seed = 1"]
+        lines += ["[link]", f"delay_ms = {link[0]}", f"loss = {link[1] / 100}", "in_order = true", "seed = 1"]
     path = out / f"{name}{'-link' if link else ''}.toml"
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -151,13 +201,10 @@ def main():
     parser.add_argument("--delays", nargs="*", type=float, default=[0, 1, 5, 14, 33, 100])
     parser.add_argument("--losses", nargs="*", type=float, default=[0, 1, 5])
     parser.add_argument("--seconds", type=float, default=1.5)
-    parser.add_argument("--latency", type=float, default=20, help="what the global model's work takes here (ms), for the virtual link")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     palpate, out, seconds = args.palpate.resolve(), args.out.resolve(), str(args.seconds)
     lab = Lab()
-    address = f"tcp/{NAMES['global']}:{PORT}"
-    over = ["--insecure"]
     try:
         for scene in args.scenes:
             path = scene_of(scene, out)
@@ -169,28 +216,19 @@ def main():
             print("| delay ms | loss % | " + " | ".join(heads) + " |")
             print("| ---: " * (len(heads) + 2) + "|")
             for delay in args.delays:
+                takes_ms = {}
+                for model in args.models:
+                    log = lab.record(palpate, path, model, (delay, 0), seconds, out)
+                    takes_ms[model] = max(0.0, age_ms(palpate, log) - 2 * delay) if log else 0.0
                 for loss in args.losses:
                     cells = [f"{delay:g}", f"{loss:g}"]
                     for model in args.models:
-                        lab.delay_s, lab.loss = 0.0, 0.0
-                        serve = lab.inside("global", palpate, "serve", path, "--listen", address, "--model", model, *over)
-                        while "listens" not in (line := serve.stdout.readline()):
-                            if not line:
-                                sys.exit(serve.stderr.read())
-                        lab.delay_s, lab.loss, lab.chance = delay / 1e3, loss / 100, random.Random(1)
-                        log = out / f"{scene}-{model}-{delay:g}-{loss:g}.mcap"
-                        command = ["run", path, "--global", address, "--model", model, "--duration", seconds, "--out", log]
-                        haptic = lab.inside("haptic", palpate, *command, *over)
-                        _, said = haptic.communicate(timeout=120)
-                        serve.send_signal(signal.SIGINT)
-                        serve.communicate(timeout=60)
+                        log = lab.record(palpate, path, model, (delay, loss), seconds, out)
                         simulated = out / "virtual.mcap"
-                        with_link = scene_of(scene, out, (delay, loss), args.latency)
+                        with_link = scene_of(scene, out, (delay, loss), takes_ms[model])
                         run(palpate, "run", with_link, "--virtual", "--model", model, "--duration", seconds, "--out", simulated)
                         there = error(forces(palpate, simulated), truth)
-                        here = error(forces(palpate, log), truth) if haptic.returncode == 0 else None
-                        if here is None:
-                            print(said.strip(), file=sys.stderr)
+                        here = error(forces(palpate, log), truth) if log else None
                         for place in (0, 1):
                             cells += [figure(here[place]) if here else "-", figure(there[place])]
                     print("| " + " | ".join(cells) + " |", flush=True)
