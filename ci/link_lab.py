@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs both sides of the link in two network namespaces, with delay and loss between them, and compares the force.
 
-    link_lab.py PALPATE OUT [--scenes NAME...] [--models NAME...] [--delays MS...] [--losses PCT...] [--seconds S]
+    link_lab.py PALPATE OUT [--protocol tcp|tls] [--scenes NAME...] [--models NAME...] [--delays MS...] [--losses PCT...] [--seconds S]
 
 PALPATE is the command with the feature `link`. Needs root, iproute2 and /dev/net/tun. What is between the namespaces is a relay of IP
 packets in this program: netem is not in every kernel, and here chance has a seed. For each condition it prints the error of the force (rms,
@@ -19,6 +19,7 @@ import math
 import os
 import random
 import select
+import shutil
 import signal
 import struct
 import subprocess
@@ -29,7 +30,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 NAMES = {"haptic": "10.77.0.1", "global": "10.77.0.2"}
-ADDRESS = f"tcp/{NAMES['global']}:7447"
+PORT = 7447
+PROTOCOLS = ("tcp", "tls")
 
 
 def run(*command):
@@ -47,7 +49,14 @@ def open_tun(name):
 class Lab:
     """Two namespaces, and the packets between them."""
 
-    def __init__(self):
+    def __init__(self, palpate, out, protocol):
+        self.palpate, self.address = palpate, f"{protocol}/{NAMES['global']}:{PORT}"
+        self.access = {side: ["--insecure"] for side in NAMES}
+        if protocol != "tcp":
+            keys = out / "keys"
+            shutil.rmtree(keys, ignore_errors=True)
+            run(palpate, "link", "keys", keys, "--host", NAMES["global"])
+            self.access = {side: ["--config", keys / side / "link.toml"] for side in NAMES}
         self.delay_s, self.loss, self.is_over = 0.0, 0.0, False
         self.chance = random.Random(1)
         self.counts = [0, 0]
@@ -95,25 +104,25 @@ class Lab:
         command = ["ip", "netns", "exec", f"lab-{side}", *map(str, command)]
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
-    def serve(self, palpate, scene, model):
+    def serve(self, scene, model):
         """The global side of a scene, once it listens."""
-        process = self.inside("global", palpate, "serve", scene, "--listen", ADDRESS, "--model", model, "--insecure")
+        process = self.inside("global", self.palpate, "serve", scene, "--listen", self.address, "--model", model, *self.access["global"])
         while "listens" not in (line := process.stdout.readline()):
             if not line:
                 sys.exit(process.stderr.read())
         return process
 
-    def haptic(self, palpate, *command):
+    def haptic(self, *command):
         """The haptic side: `palpate run` with these arguments, over the link."""
-        return self.inside("haptic", palpate, *command, "--global", ADDRESS, "--insecure")
+        return self.inside("haptic", self.palpate, *command, "--global", self.address, *self.access["haptic"])
 
-    def record(self, palpate, path, model, link, seconds, out):
+    def record(self, path, model, link, seconds, out):
         """The log of a run of a scene over a link of this delay (ms) and loss (%); None where it failed."""
         self.delay_s, self.loss = 0.0, 0.0
-        serve = self.serve(palpate, path, model)
+        serve = self.serve(path, model)
         self.delay_s, self.loss, self.chance = link[0] / 1e3, link[1] / 100, random.Random(1)
         log = out / f"{path.stem}-{model}-{link[0]:g}-{link[1]:g}.mcap"
-        haptic = self.haptic(palpate, "run", path, "--model", model, "--duration", seconds, "--out", log)
+        haptic = self.haptic("run", path, "--model", model, "--duration", seconds, "--out", log)
         _, said = haptic.communicate(timeout=120)
         serve.send_signal(signal.SIGINT)
         serve.communicate(timeout=60)
@@ -196,6 +205,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("palpate", type=Path)
     parser.add_argument("out", type=Path)
+    parser.add_argument("--protocol", choices=PROTOCOLS, default="tcp")
     parser.add_argument("--scenes", nargs="*", default=["drag_friction", "hand", "demo", "liver"])
     parser.add_argument("--models", nargs="*", default=["predictive", "patch", "hold"])
     parser.add_argument("--delays", nargs="*", type=float, default=[0, 1, 5, 14, 33, 100])
@@ -204,7 +214,7 @@ def main():
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     palpate, out, seconds = args.palpate.resolve(), args.out.resolve(), str(args.seconds)
-    lab = Lab()
+    lab = Lab(palpate, out, args.protocol)
     try:
         for scene in args.scenes:
             path = scene_of(scene, out)
@@ -218,12 +228,12 @@ def main():
             for delay in args.delays:
                 takes_ms = {}
                 for model in args.models:
-                    log = lab.record(palpate, path, model, (delay, 0), seconds, out)
+                    log = lab.record(path, model, (delay, 0), seconds, out)
                     takes_ms[model] = max(0.0, age_ms(palpate, log) - 2 * delay) if log else 0.0
                 for loss in args.losses:
                     cells = [f"{delay:g}", f"{loss:g}"]
                     for model in args.models:
-                        log = lab.record(palpate, path, model, (delay, loss), seconds, out)
+                        log = lab.record(path, model, (delay, loss), seconds, out)
                         simulated = out / "virtual.mcap"
                         with_link = scene_of(scene, out, (delay, loss), takes_ms[model])
                         run(palpate, "run", with_link, "--virtual", "--model", model, "--duration", seconds, "--out", simulated)

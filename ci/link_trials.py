@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What a real line does to both sides of the link: a cable that is pulled, minutes of loss, and what the link costs.
 
-    link_trials.py PALPATE OUT cable [--turns N] [--most S]              the cable of either side is out, for as long as chance will
+    link_trials.py PALPATE OUT [--protocol tcp|tls] cable [--turns N] [--most S]   the cable of either side is out, for as long as chance will
     link_trials.py PALPATE OUT soak [--seconds S] [--delay MS] [--loss PCT]   memory of both sides, minute by minute
     link_trials.py PALPATE OUT cost [--rounds N] [--seconds S]           runs with and without the link in turn
 
@@ -22,7 +22,7 @@ import sys
 import time
 from pathlib import Path
 
-from link_lab import ROOT, Lab, commanded, run
+from link_lab import PROTOCOLS, ROOT, Lab, commanded, run
 
 MODEL = "predictive"
 # The force has come in after the start-up ramp, and the first bases are there.
@@ -55,8 +55,8 @@ class Sides:
 
     def __init__(self, lab, palpate, path, log, seconds):
         run_it = ["run", path, "--model", MODEL, "--duration", seconds, "--out", log]
-        self.serve, self.log, self.palpate = lab.serve(palpate, path, MODEL), log, palpate
-        self.haptic = lab.haptic(palpate, *run_it)
+        self.serve, self.log, self.palpate = lab.serve(path, MODEL), log, palpate
+        self.haptic = lab.haptic(*run_it)
         self.began = time.monotonic()
 
     def wait_until(self, seconds):
@@ -206,6 +206,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("palpate", type=Path)
     parser.add_argument("out", type=Path)
+    parser.add_argument("--protocol", choices=PROTOCOLS, default="tcp")
     trials = parser.add_subparsers(dest="trial", required=True)
     of = trials.add_parser("cable")
     of.add_argument("--turns", type=int, default=3)
@@ -222,9 +223,10 @@ def main():
     of.set_defaults(run=cost)
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
-    lab = Lab()
+    palpate, out = args.palpate.resolve(), args.out.resolve()
+    lab = Lab(palpate, out, args.protocol)
     try:
-        return 0 if args.run(lab, args.palpate.resolve(), args.out.resolve(), args) else 1
+        return 0 if args.run(lab, palpate, out, args) else 1
     finally:
         lab.close()
 

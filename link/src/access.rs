@@ -6,6 +6,12 @@ use std::path::{Path, PathBuf};
 use palpate::{Error, ErrorKind};
 use zenoh::Config;
 
+/// What `ZENOH_RUNTIME` has to be in the environment before the first thread of a program starts that uses `tls/`; the command `palpate` sets it.
+///
+/// Zenoh reads and writes a TLS connection on two threads at once, which is unsound and breaks it within seconds where both sides send all the
+/// time (its issue 2557). This has both done on one thread.
+pub const TLS_RUNTIME: &str = "(rx: (handover: tx))";
+
 /// What a message over zenoh may come to at most (bytes): a little more than any of the engine's.
 const MOST_BYTES: usize = palpate::link::LARGEST + 1024;
 
@@ -142,10 +148,13 @@ impl Access {
             return wrong("must have a host and a port, such as tls/big-machine:7447".to_owned());
         }
         match protocol {
-            "tls" if self.tls.is_some() => Ok(address),
-            "tls" => wrong(
+            "tls" if self.tls.is_none() => wrong(
                 "needs keys: make them with `palpate link keys DIR`, and name its link.toml by --config".to_owned(),
             ),
+            "tls" if std::env::var_os("ZENOH_RUNTIME").is_none_or(|runtime| runtime != TLS_RUNTIME) => wrong(format!(
+                "needs ZENOH_RUNTIME='{TLS_RUNTIME}' in the environment before the program starts: without it zenoh breaks the connection"
+            )),
+            "tls" => Ok(address),
             "tcp" if self.is_insecure || is_here(host) => Ok(address),
             "tcp" => {
                 let message = "is plain TCP to another machine, where whoever is on the way reads and steers: use tls/ with keys \

@@ -22,6 +22,7 @@ const FIRST_MODEL: Duration = Duration::from_secs(30);
 const OTHER_GONE: Duration = Duration::from_secs(3);
 /// After so long a message is shown that nothing has come yet.
 const TELLS_AFTER: Duration = Duration::from_secs(1);
+
 /// The way to the global side, which is [served](crate::serve) in another process.
 ///
 /// Whatever breaks on the way, it tries again until it is dropped, and the session goes on without force meanwhile.

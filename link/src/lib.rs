@@ -30,7 +30,7 @@ mod line;
 mod outbox;
 mod server;
 
-pub use access::Access;
+pub use access::{Access, TLS_RUNTIME};
 pub use haptic::GlobalSide;
 pub use keys::make_keys;
 pub use server::{Event, serve};

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use palpate::link::{Header, Hello, Message};
 use palpate::model::local::Kind;
-use palpate_link::{Access, GlobalSide, make_keys};
+use palpate_link::{Access, GlobalSide, TLS_RUNTIME, make_keys};
 use support::{Felt, Process, free_address, session, until};
 use zenoh::{Config, Wait};
 
@@ -165,22 +165,17 @@ fn keys_let_in_who_has_them_and_nobody_else() {
     let [ours, others] = ["ours", "others"].map(|name| folder.path().join(name));
     make_keys(&ours, &["big-machine.example".to_owned()]).unwrap();
     make_keys(&others, &[]).unwrap();
-    assert!(make_keys(&ours, &[]).is_err(), "keys that are there stay");
     let address = free_address().replace("tcp/", "tls/");
     let config = |folder: &Path, side: &str| folder.join(side).join("link.toml").display().to_string();
     let _global = Process::serve_with(&address, &config(&ours, "global"), 0.5);
-    let haptic = Process::haptic_with(&address, &config(&ours, "haptic"), 0.5, 3.0, &folder.path().join("felt"));
+    let felt = folder.path().join("felt");
+    let haptic = Process::haptic_with(&address, &config(&ours, "haptic"), 0.5, 10.0, &felt);
     haptic.waits_for("began");
     until(Instant::now(), 0.5);
     // Of another authority; the answer is that there is none.
-    let access = Access::read(&others.join("haptic").join("link.toml")).unwrap();
-    let mut stranger = GlobalSide::at(&address, &access).unwrap();
-    let refused = std::thread::spawn(move || {
-        let hello = session(Kind::Predictive, 0.5).build_global().unwrap().hello().clone();
-        palpate::link::Transport::connect(&mut stranger, &hello).unwrap_err().to_string()
-    });
-    assert_unmoved(&haptic.felt(), 0.7, 3.0);
-    let said = refused.join().unwrap();
+    let stranger = Process::haptic_with(&address, &config(&others, "haptic"), 0.5, 1.0, &felt);
+    assert_unmoved(&haptic.felt(), 0.7, 10.0);
+    let said = stranger.says();
     assert!(said.contains("does not answer"), "{said}");
     // Neither does plain TCP get in where TLS is spoken.
     let plain = address.replace("tls/", "tcp/");
@@ -189,10 +184,21 @@ fn keys_let_in_who_has_them_and_nobody_else() {
     config.insert_json5("connect/endpoints", &format!("[\"{plain}\"]")).unwrap();
     config.insert_json5("scouting/multicast/enabled", "false").unwrap();
     assert!(zenoh::open(config).wait().is_err());
+}
+
+#[test]
+fn keys_are_made_once_and_are_for_their_owner_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    make_keys(folder.path(), &[]).unwrap();
+    assert!(make_keys(folder.path(), &[]).is_err(), "keys that are there stay");
+    // This program was not told to read and write on one thread.
+    let access = Access::read(&folder.path().join("haptic").join("link.toml")).unwrap();
+    let said = GlobalSide::at("tls/127.0.0.1:7447", &access).unwrap_err().to_string();
+    assert!(said.contains(TLS_RUNTIME), "{said}");
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        let key = ours.join("global").join("global.key");
+        let key = folder.path().join("global").join("global.key");
         assert_eq!(std::fs::metadata(key).unwrap().permissions().mode() & 0o777, 0o600);
     }
 }

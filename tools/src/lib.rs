@@ -29,4 +29,6 @@ mod units;
 
 pub use commands::{OutputFile, WindowArgs, main};
 pub use export::{TableWriter, columns, export_rows, is_turned};
+#[cfg(feature = "link")]
+pub use palpate_link::TLS_RUNTIME;
 pub use reduce::{ReduceOptions, reduction_costs, reduction_json};

@@ -13,7 +13,7 @@ use palpate::model::body::Block;
 use palpate::model::local::Kind;
 use palpate::model::mesh::Face;
 use palpate::session::{Session, SessionBuilder, Summary};
-use palpate_link::{Access, Event, GlobalSide, serve};
+use palpate_link::{Access, Event, GlobalSide, TLS_RUNTIME, serve};
 
 const ROLE: &str = "PALPATE_LINK_ROLE";
 
@@ -156,6 +156,9 @@ pub struct Process {
 impl Process {
     fn start(role: String, out: PathBuf) -> Self {
         let mut command = Command::new(std::env::current_exe().unwrap());
+        if role.contains(" tls/") {
+            command.env("ZENOH_RUNTIME", TLS_RUNTIME);
+        }
         command.args(["--exact", AS_A_CHILD, "--nocapture"]).env(ROLE, role);
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::inherit()).spawn().unwrap();
         let (sender, lines) = std::sync::mpsc::channel();
