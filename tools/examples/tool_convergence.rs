@@ -104,13 +104,17 @@ fn slides() {
 
 fn refinement() {
     const NODES: [usize; 5] = [8, 12, 16, 20, 24];
-    println!("\n| middle of the block, 3 mm deep | {} | order |", NODES.map(|n| n.to_string()).join(" | "));
-    println!("| --- | {}---: |", "---: | ".repeat(NODES.len()));
-    for radius in RADII {
-        let middle = Vec3::new(0.5 * SIDE, 0.5 * SIDE, SIDE);
+    let middle = Vec3::new(0.5 * SIDE, 0.5 * SIDE, SIDE);
+    println!(
+        "\n| middle of the block | depth (mm) | {} | spread (%) | order |",
+        NODES.map(|n| n.to_string()).join(" | ")
+    );
+    println!("| --- | {}---: |", "---: | ".repeat(NODES.len() + 2));
+    for (radius, depth) in RADII.into_iter().flat_map(|radius| [(radius, 1e-3), (radius, DEPTH)]) {
         let forces =
-            NODES.map(|nodes| press(Box::new(lattice(nodes)), shape(radius), middle, Vec3::z(), DEPTH).wrench.force.z);
-        println!("| {} | {} | {} |", name(radius), newtons(&forces), order(&NODES, &forces));
+            NODES.map(|nodes| press(Box::new(lattice(nodes)), shape(radius), middle, Vec3::z(), depth).wrench.force.z);
+        let (spread, order) = (spread(&forces), order(&NODES, &forces));
+        println!("| {} | {:.0} | {} | {spread:.1} | {order} |", name(radius), 1e3 * depth, newtons(&forces));
     }
 }
 

@@ -1,6 +1,7 @@
 //! The block of point masses joined by springs to all 26 neighbours: the paper's body.
 
 use super::cutout::part_of;
+use super::half_space::contact_modulus;
 use super::kernel::{InstructionSet, LatticeKernel, NOMINAL_SPRING_S};
 use super::lattice_springs::LatticeSprings;
 use super::region::{Material, Region, materials};
@@ -275,20 +276,24 @@ impl Body for Block {
     }
 
     fn contact_moduli(&self) -> Vec<f64> {
-        // Springs in all directions are, on the mean of these, an elastic continuum with nu = 1/4: its shear modulus is the sum of
-        // k L^2 over the springs of a cell, by its volume, by 15.
-        let node = |at: [usize; 3]| self.rest[self.lattice.id(at) as usize];
-        let step = node([1, 1, 1]) - node([0, 0, 0]);
-        let squares: f64 = Lattice::FORWARD
-            .iter()
-            .map(|offset| (0..3).map(|axis| (offset[axis] as f64 * step[axis]).powi(2)).sum::<f64>())
-            .sum();
-        let shear = squares / (step.x * step.y * step.z) / 15.0;
+        let place = |at: [usize; 3]| self.rest[self.lattice.id(at) as usize];
+        let step = place([1, 1, 1]) - place([0, 0, 0]);
+        let volume = step.x * step.y * step.z;
+        let pull = |offset: [isize; 3]| {
+            let along = Vec3::from_fn(|axis, _| offset[axis] as f64 * step[axis]);
+            (along.normalize(), along.norm_squared() / volume)
+        };
+        // Of springs of 1 N/m.
+        let of_faces =
+            [Vec3::x(), Vec3::y(), Vec3::z()].map(|normal| contact_modulus(&Lattice::FORWARD.map(pull), normal));
         let of_node = |node: u32| {
             let springs = || self.springs.neighbours(&self.lattice, node);
             let stiffness: f64 = springs().map(|(_, spring)| spring.stiffness).sum::<f64>() / springs().count() as f64;
-            // E = 2 (1 + nu) G.
-            2.5 * shear * stiffness / (1.0 - 0.25 * 0.25)
+            let at = self.lattice.coordinates(node);
+            let is_of_face = |axis: &usize| at[*axis] == 0 || at[*axis] + 1 == self.lattice.nodes[*axis];
+            let faces = (0..3).filter(is_of_face).map(|axis| of_faces[axis]);
+            let count = faces.clone().count();
+            stiffness * if count == 0 { of_faces.iter().sum::<f64>() / 3.0 } else { faces.sum::<f64>() / count as f64 }
         };
         (0..self.rest.len() as u32).map(of_node).collect()
     }

@@ -2,6 +2,7 @@
 
 mod block;
 mod cutout;
+mod half_space;
 pub(crate) mod kernel;
 mod lattice_springs;
 mod neighbourhood;
@@ -175,7 +176,7 @@ pub trait Body: Send + Sync + std::fmt::Debug {
         Cutout::of(self, nodes)
     }
 
-    /// Contact modulus E / (1 - nu^2) of the material at each node (Pa), one per node; empty, the default, if it is not known. A
+    /// Contact modulus of the material at each node (Pa), E / (1 - nu^2) where all directions are alike; empty, the default, if it is not known. A
     /// tool with a shape sinks in as deep as this says where the body's elements are too coarse to show it.
     ///
     /// # Real-time
