@@ -33,8 +33,24 @@ fn a_sphere_feels_the_same_over_nodes_edges_and_faces_of_a_lattice() {
     };
     let (sphere, point) = (forces(SPHERE), forces(ToolShape::Point));
     println!("sphere {sphere:.4?}: {:.1} %, point {point:.4?}", spread(&sphere));
-    assert!(spread(&sphere) < 1.5, "{sphere:?}");
+    assert!(spread(&sphere) < 0.6, "{sphere:?}");
     assert!(point[3] > 1.8 * point[0], "{point:?}");
+}
+
+/// Check that a sphere does not feel how fine a lattice of the same material is, and that a point does.
+#[test]
+fn a_sphere_feels_the_same_on_coarse_and_fine_lattices() {
+    let middle = Vec3::new(0.5 * SIDE, 0.5 * SIDE, SIDE);
+    let forces = |shape: ToolShape| {
+        [8, 12, 16].map(|nodes| press(Box::new(lattice(nodes)), shape, middle, Vec3::z(), 1e-3).wrench.force.z)
+    };
+    for radius in [4e-3, 8e-3, 20e-3] {
+        let sphere = forces(ToolShape::Sphere { radius });
+        println!("{radius} m: {sphere:.4?}, {:.2} %", spread(&sphere));
+        assert!(spread(&sphere) < 0.5, "{sphere:?}");
+    }
+    let point = forces(ToolShape::Point);
+    assert!(point[0] > 1.8 * point[2], "{point:?}");
 }
 
 /// The same on an organ, pressed along one normal by as much from where the sphere just touches.
