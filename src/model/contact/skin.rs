@@ -31,6 +31,8 @@ const ROUNDS: usize = 8;
 const COSINES: [f64; 2] = [0.75, 0.95];
 /// How far an element by itself spreads a load on its node, squared, in squared edges.
 const ELEMENT: f64 = 0.04;
+/// Elements that are pressed together give way more than in proportion: by this times the square of what they show, over the whole depth.
+const CRUSHED: f64 = 0.05;
 /// The most that a tool sinks in beside the elements, in edges.
 const MOST_SUNK: f64 = 0.6;
 
@@ -272,8 +274,8 @@ pub struct Coarseness {
 /// How coarse the body is at some place, for a tool that sinks in.
 ///
 /// The elements show the sinking of a load that is spread over them, c F with c = 1 / (2 sqrt(pi) sigma E*), sigma the spread of
-/// corners and elements together. A sphere on a half space sinks in by (9 F^2 / (16 R E*^2))^(1/3) (Hertz 1882). What the
-/// elements lack of that the tool sinks in beside them.
+/// corners and elements together, and under large loads a little more. A sphere on a half space sinks in by
+/// (9 F^2 / (16 R E*^2))^(1/3) (Hertz 1882). What the elements lack of that the tool sinks in beside them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grain {
     /// E / (1 - nu^2) (Pa).
@@ -305,15 +307,16 @@ impl Grain {
     pub(super) fn sinking(&self, radius: f64, steady: f64) -> Sinking {
         let shown = 1.0 / (2.0 * (std::f64::consts::PI * self.variance).sqrt() * self.modulus);
         let hertz = (9.0 / (16.0 * radius * self.modulus * self.modulus)).cbrt();
-        // Where both grow alike, for a contact of radius sqrt(pi) sigma, the elements lack most.
-        let turn = (2.0 * hertz / (3.0 * shown)).powi(3);
+        // The elements lack most where they show the share s of the depth, 2 - 3 s - 4 c s^2 = 0.
+        let at_turn = ((9.0 + 32.0 * CRUSHED).sqrt() - 3.0) / (8.0 * CRUSHED);
+        let turn = (at_turn * hertz / shown).powi(3);
         // A stranger's stiffness may be beyond every body: nothing is known of what the elements lack.
         if ![shown, hertz, turn].iter().all(|figure| figure.is_finite()) {
             return Sinking { shown: 0.0, hertz: 0.0, turn: 0.0, share: 0.0, most: self.most };
         }
-        let lacking = |force: f64| hertz * (force * force).cbrt() - shown * force;
-        let share = if steady > turn { (lacking(steady) / lacking(turn)).max(0.0) } else { 1.0 };
-        Sinking { shown, hertz, turn, share: share * self.share, most: self.most }
+        let whole = Sinking { shown, hertz, turn, share: 1.0, most: self.most };
+        let share = if steady > turn { (whole.beyond(steady) / whole.beyond(turn)).max(0.0) } else { 1.0 };
+        Sinking { share: share * self.share, ..whole }
     }
 
     /// How much of a load at that squared distance (m^2) counts as one here.
@@ -352,14 +355,21 @@ impl Sinking {
         }
         // At no force it would be infinitely steep.
         let force = force.max(1e-9 * self.turn);
-        let slope = self.share * (2.0 / 3.0 * self.hertz / force.cbrt() - self.shown) * self.bend(force).powi(9);
+        let root = force.cbrt();
+        let crushed = 4.0 / 3.0 * CRUSHED * self.shown * (self.shown / self.hertz) * root;
+        let slope = self.share * (2.0 / 3.0 * self.hertz / root - self.shown - crushed) * self.bend(force).powi(9);
         Sunk { offset: self.at(force) - slope * force, slope }
     }
 
     /// What the elements lack (m) under `force` (N).
     fn lacking(&self, force: f64) -> f64 {
-        let force = force.clamp(0.0, self.turn);
-        self.share * (self.hertz * (force * force).cbrt() - self.shown * force)
+        self.share * self.beyond(force.clamp(0.0, self.turn))
+    }
+
+    /// The same of elements that are coarse by all means, where they show more and more of it too.
+    fn beyond(&self, force: f64) -> f64 {
+        let [whole, shown] = [self.hertz * (force * force).cbrt(), self.shown * force];
+        if shown == 0.0 { whole } else { whole - shown - CRUSHED * shown * (shown / whole) }
     }
 
     /// How much of that the tool sinks in: nearly all, but never as much as `most`. It comes near to that in a bend,
