@@ -16,7 +16,7 @@ pub(super) type Pull = (Vec3, f64);
 ///
 /// A force F along the normal n moves the surface at a distance r by F n . Q(t)^-1 n / (2 pi r), with t the direction there, Q the mean of
 /// (mm) - (ms) (ss)^-1 (sm) over all perpendicular m and s in the plane across t, and (ab)_jk = a_i C_ijkl b_l (Barnett and Lothe 1975); a round tool
-/// feels the mean over t (Vlassak and Nix 1993). The normal is that of a plane in which the springs mirror themselves.
+/// feels the mean over t (Vlassak and Nix 1993). The normal is an axis.
 pub(super) fn contact_modulus(pulls: &[Pull], normal: Vec3) -> f64 {
     let product = |a: Vec3, b: Vec3| -> Mat3 {
         pulls
@@ -66,7 +66,7 @@ mod tests {
         }
     }
 
-    /// Check that more steps change nothing, by the symmetry of a lattice: the faces of a cube are alike, and a stretched lattice's are not.
+    /// Check the symmetry of a lattice: the faces of a cube are alike, and those of a stretched one are not.
     #[test]
     fn faces_of_a_cube_are_alike() {
         let pulls = |stretch: f64| -> Vec<Pull> {

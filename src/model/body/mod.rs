@@ -176,8 +176,8 @@ pub trait Body: Send + Sync + std::fmt::Debug {
         Cutout::of(self, nodes)
     }
 
-    /// Contact modulus of the material at each node (Pa), E / (1 - nu^2) where all directions are alike; empty, the default, if it is not known. A
-    /// tool with a shape sinks in as deep as this says where the body's elements are too coarse to show it.
+    /// Contact modulus of the material at each node (Pa), one per node, E / (1 - nu^2) where all directions are alike; empty, the default,
+    /// if it is not known. A tool with a shape sinks in as deep as this says where the body's elements are too coarse to show it.
     ///
     /// # Real-time
     /// Not called in a tick: allocates.

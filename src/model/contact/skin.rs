@@ -278,7 +278,7 @@ pub struct Coarseness {
 /// (9 F^2 / (16 R E*^2))^(1/3) (Hertz 1882). What the elements lack of that the tool sinks in beside them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grain {
-    /// E / (1 - nu^2) (Pa).
+    /// The body's contact modulus (Pa).
     modulus: f64,
     /// sigma^2 (m^2), along any one direction.
     variance: f64,

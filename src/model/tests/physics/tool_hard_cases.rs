@@ -58,12 +58,15 @@ fn a_small_tool_that_is_pressed_deep_is_pushed_out_the_way_it_came() {
 }
 
 /// Check that no speed passes through a sheet that is one element thick, held at two sides. Faster than at 1.4 m/s a sphere of 5 mm turns a third
-/// of its cells inside out, which springs allow: then nothing is left that could hold it.
+/// of its cells inside out, which springs allow: its sheet stays below it, and may not push it back any more.
 #[test]
 fn a_fast_sphere_does_not_pass_through_a_sheet() {
-    for (speed, radii) in
-        [(1.0, [1e-3, 2e-3, 4e-3, 5e-3].as_slice()), (2.0, &[4e-3]), (3.0, &[1e-3, 2e-3, 4e-3]), (4.0, &[2e-3, 4e-3])]
-    {
+    for (speed, radii) in [
+        (1.0, [1e-3, 2e-3, 4e-3, 5e-3].as_slice()),
+        (2.0, &[4e-3]),
+        (3.0, &[1e-3, 2e-3, 4e-3, 5e-3]),
+        (4.0, &[2e-3, 4e-3]),
+    ] {
         for &radius in radii {
             let sheet = Block::builder([11, 11, 2], [0.02, 0.02, 0.002])
                 .stiffness(500.0)
@@ -84,7 +87,8 @@ fn a_fast_sphere_does_not_pass_through_a_sheet() {
                 largest(&felt),
                 felt[58].z
             );
-            assert!(felt[58].z > 0.0, "{speed} m/s, {radius} m: the sheet still holds the tool");
+            let may_turn_inside_out = radius > 4e-3 && speed > 1.4;
+            assert!(may_turn_inside_out || felt[58].z > 0.0, "{speed} m/s, {radius} m: the sheet still holds the tool");
             assert!(top < tool, "{speed} m/s, {radius} m: the sheet at {top} m is below the tool at {tool} m");
         }
     }
