@@ -394,7 +394,7 @@ impl Simulation {
     /// Not for a tick: looks at every triangle of the surface.
     pub fn coarseness(&self, tool: usize) -> Option<Coarseness> {
         let touch = &self.moving.touches[tool];
-        touch.has_shape().then(|| touch.skin.coarseness(&self.moving.body))
+        touch.has_shape().then(|| touch.skin.coarseness(&self.moving.body, touch.shape.radius()))
     }
 
     /// The shape of a tool.

@@ -4,7 +4,7 @@
 //! Look for: ratios to Hertz near one, spreads of a few percent for spheres where points feel a factor, and forces under
 //! refinement that come to a limit.
 //!
-//! `cargo run --release -p palpate-cli --example tool_convergence [-- slide|places|refine|hertz|all]`: without a word the slide,
+//! `cargo run --release -p palpate-cli --example tool_convergence [-- slide|places|refine|hertz|presses|all]`: without a word the slide,
 //! which takes seconds.
 
 #[path = "../../src/model/tests/tissue_support/mod.rs"]
@@ -24,8 +24,13 @@ const RATIOS: [f64; 3] = [0.3, 0.45, 0.49];
 
 fn main() {
     let asked = std::env::args().nth(1).unwrap_or_else(|| "slide".to_owned());
-    let parts: [(&str, fn()); 4] =
-        [("slide", slides), ("places", places), ("refine", refinement), ("hertz", table_of_hertz)];
+    let parts: [(&str, fn()); 5] = [
+        ("slide", slides),
+        ("places", places),
+        ("refine", refinement),
+        ("hertz", table_of_hertz),
+        ("presses", presses),
+    ];
     parts.into_iter().filter(|(name, _)| asked == "all" || asked == *name).for_each(|(_, part)| part());
 }
 
@@ -42,6 +47,43 @@ fn table_of_hertz() {
             });
             println!("| {:.0}, {:.0} | {ratio} | {} |", 1e3 * radius, 1e3 * depth, cells.join(" | "));
         }
+    }
+}
+
+/// Spheres of any radius and depth on elements of any size and Poisson's ratio: how far the force is from Hertz', by how much is
+/// touched.
+fn presses() {
+    const PRESSES: u32 = 200;
+    /// Radius of what is touched, in edges.
+    const BORDERS: [f64; 2] = [1.5, 2.3];
+    /// Steps of a sequence that fills four dimensions evenly: powers of the root of x^5 = x + 1.
+    const STEPS: [f64; 4] = [0.8567, 0.7339, 0.6287, 0.5386];
+    let mut errors = [const { Vec::new() }; 4];
+    for n in 1..=PRESSES {
+        let [size, coarse, ratio, deep] = STEPS.map(|step| (0.5 + f64::from(n) * step).fract());
+        let size = 1.4e-3 + 1.6e-3 * size;
+        // Each square of a face is cut in two.
+        let edge = (2.0 + 2.0_f64.sqrt()) / 3.0 * size;
+        let radius = edge / (0.12 + 0.2 * coarse);
+        let depth = radius / (3.5 * (30.0_f64 / 3.5).powf(deep));
+        if radius > 16e-3 || depth > 3.5e-3 {
+            continue;
+        }
+        let ratio = 0.3 + 0.19 * ratio;
+        let share = press_tissue(radius, depth, ratio, size).wrench.force.z / hertz(radius, depth, ratio).0;
+        let touched = (radius * depth).sqrt() / edge;
+        let class = BORDERS.iter().filter(|&&border| touched > border).count();
+        errors[class].push(100.0 * (share - 1.0).abs());
+        errors[3].push(100.0 * (share - 1.0).abs());
+    }
+    println!("\n| touched: radius in edges | presses | half (%) | 9 of 10 (%) | worst (%) |");
+    println!("| --- | ---: | ---: | ---: | ---: |");
+    let [low, high] = BORDERS;
+    let names = [format!("up to {low}"), format!("{low} to {high}"), format!("more than {high}"), "all".to_owned()];
+    for (name, mut errors) in names.into_iter().zip(errors) {
+        errors.sort_by(f64::total_cmp);
+        let at = |share: f64| errors[((errors.len() - 1) as f64 * share).round() as usize];
+        println!("| {name} | {} | {:.1} | {:.1} | {:.1} |", errors.len(), at(0.5), at(0.9), at(1.0));
     }
 }
 

@@ -35,19 +35,13 @@ impl Deformable<'_> {
         self.surface.triangles[triangle as usize].map(|node| node as usize)
     }
 
-    /// The corner at `node` as a tool with that `skin` meets it (m): now, and `ahead` seconds from now if nothing presses.
-    pub(super) fn smoothed_corner(&self, skin: &Skin, node: u32, ahead: f64) -> [Vec3; 2] {
-        let at = |node: u32| {
-            let (x, v) = (self.positions[node as usize], self.velocities[node as usize]);
-            [x, x + v * ahead]
-        };
-        match skin.corner(node) {
-            [] => at(node),
-            shares => shares.iter().fold([Vec3::zeros(); 2], |[now, then], &(other, share)| {
-                let [x, end] = at(other);
-                [now + x * share, then + end * share]
-            }),
-        }
+    /// The corner at `node` as a tool with that `skin` meets it where elements are so `fine` (m): now, and `ahead` seconds from now
+    /// if nothing presses.
+    pub(super) fn corner(&self, skin: &Skin, fine: f64, node: u32, ahead: f64) -> [Vec3; 2] {
+        skin.shares(node, fine).fold([Vec3::zeros(); 2], |[now, then], (other, share)| {
+            let (x, v) = (self.positions[other as usize], self.velocities[other as usize]);
+            [now + x * share, then + (x + v * ahead) * share]
+        })
     }
 
     /// The share of the step after which the contact acts: 0 for one that exists, the hit's for a new one.

@@ -54,7 +54,8 @@ impl Search {
         let mut vicinity = std::mem::take(&mut self.vicinities[tool]);
         vicinity.update(body, touch, motion, d);
         self.corners.clear();
-        self.corners.extend(vicinity.nodes.iter().map(|&node| body.smoothed_corner(&touch.skin, node, d)));
+        self.corners
+            .extend(vicinity.nodes.iter().map(|&node| body.corner(&touch.skin, touch.steady.fineness, node, d)));
         if !self.find_passed(&vicinity, touch, motion) {
             self.find_near(&vicinity, touch, &motion.to);
         }
@@ -83,14 +84,14 @@ impl Search {
     }
 
     fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) {
-        let (shape, skin) = (&touch.shape, &*touch.skin);
+        let (shape, skin, coarse) = (&touch.shape, &*touch.skin, 1.0 - touch.steady.fineness);
         let (radius, axis) = (shape.radius(), shape.axis(pose));
         let is_long = shape.half_axis() != Vec3::zeros();
         // The nearest place in front of the surface, and the nearest behind it.
         let (mut front, mut behind) = (f64::INFINITY, None::<Near>);
         for (&triangle, places) in vicinity.triangles.iter().zip(&vicinity.corners) {
             let corners = places.map(|place| self.corners[place as usize][1]);
-            let depths = places.map(|place| skin.depth(vicinity.nodes[place as usize] as usize));
+            let depths = places.map(|place| coarse * skin.depth(vicinity.nodes[place as usize] as usize));
             // It touches, or is the nearest of all.
             let touching = radius + depths.into_iter().fold(0.0, f64::max);
             let distance = touching.max(front.min(radius + MAX_DEPTH));

@@ -1,7 +1,7 @@
 //! One place at which a tool may touch, as a row of the system for the impulses of all of them.
 
 use super::ContactMode;
-use super::skin::{Grain, Sinking, Sunk};
+use super::grain::{Grain, Sinking, Sunk};
 use crate::Vec3;
 
 /// One place at which a tool may touch: its point of the surface is the mean of some nodes.

@@ -4,11 +4,11 @@ use std::cmp::Ordering;
 
 use super::deformable::Deformable;
 use super::exact::Exact;
+use super::grain::Sunk;
 use super::near::{Near, Search};
 use super::nearness::Nearness;
 use super::resolve::{IMMOVABLE, Place, RECOVERY, approach};
 use super::row::Row;
-use super::skin::Sunk;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
 use super::{ContactMode, Law, ToolMotion};
@@ -155,10 +155,12 @@ impl Rows {
     pub(super) fn add_shape(
         &mut self,
         body: &Deformable<'_>,
-        (tool, touch): (usize, &Touch),
+        (tool, touch): (usize, &mut Touch),
         motion: ToolMotion,
         d: f64,
     ) {
+        touch.settle(body.surface, body.positions, d);
+        let touch = &*touch;
         self.search.find(body, (tool, touch), motion, d);
         for place in 0..self.search.near.len() {
             let near = self.search.near[place];
@@ -170,9 +172,7 @@ impl Rows {
         let first = self.nodes.len();
         let corners = body.surface.triangles[near.triangle as usize];
         for (node, weight) in corners.into_iter().zip(near.weights).filter(|&(_, weight)| weight > 0.0) {
-            let shares = touch.skin.corner(node);
-            let alone = [(node, 1.0)];
-            for &(node, share) in if shares.is_empty() { &alone[..] } else { shares } {
+            for (node, share) in touch.skin.shares(node, touch.steady.fineness) {
                 // Corners share nodes.
                 let place = &mut self.listed[node as usize];
                 if *place == 0 {

@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use super::closest;
+use super::grain::Grain;
 use super::row::Row;
 use super::skin::Skin;
+use super::steady::Steady;
 use super::triangle::interpolate;
 use super::{Contact, ContactMode, ContactPoint, ToolShape};
 use crate::body::{Body, Stiffness};
@@ -18,9 +20,6 @@ pub(super) const MOST_POINTS: usize = 192;
 /// What is within so many radii of a tool's axis is its footprint.
 const FOOTPRINT: f64 = 1.1;
 
-/// The time over which a force is a steady one (s).
-const STEADY: f64 = 5e-3;
-
 /// A tool on a body: its shape, its contact, and what it felt in the last step.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Touch {
@@ -33,8 +32,8 @@ pub(crate) struct Touch {
     pub(crate) wrench: Wrench,
     /// How stiff the body is that it touches.
     pub(crate) stiffness: Stiffness,
-    /// The force that has pressed on the mean of the last milliseconds (N).
-    pub(super) steady: f64,
+    /// What it has pressed with lately.
+    pub(super) steady: Steady,
     /// Where a tool with a shape touched in this tick; forces are summed over its steps.
     felt: Vec<Felt>,
     /// The same for whoever watches: forces are means over the last whole tick, triangles the body's.
@@ -100,8 +99,8 @@ impl Touch {
         contact: impl Fn(&Contact) -> Contact,
         id: impl Fn(u32) -> Option<u32>,
     ) {
-        (self.contact, self.wrench, self.steady) = (contact(&other.contact), Wrench::default(), other.steady);
-        self.stiffness = other.stiffness;
+        (self.contact, self.wrench) = (contact(&other.contact), Wrench::default());
+        (self.steady, self.stiffness) = (other.steady, other.stiffness);
         self.points.clone_from(&other.points);
         self.pressed.clear();
         // Whether a place stuck is told by its triangle: corners have other numbers here.
@@ -117,13 +116,13 @@ impl Touch {
         &self.felt
     }
 
-    /// The force that has pressed on the mean of the last milliseconds (N).
-    pub(crate) fn steady(&self) -> f64 {
+    /// What it has pressed with lately.
+    pub(crate) fn steady(&self) -> Steady {
         self.steady
     }
 
     /// Goes on from what was felt on another computer in a tick of `steps` steps.
-    pub(crate) fn go_on_from(&mut self, contact: Contact, steady: f64, felt: &[Felt], steps: u32) {
+    pub(crate) fn go_on_from(&mut self, contact: Contact, steady: Steady, felt: &[Felt], steps: u32) {
         (self.contact, self.steady) = (contact, steady);
         self.felt.clear();
         self.felt.extend_from_slice(&felt[..felt.len().min(MOST_POINTS)]);
@@ -178,6 +177,20 @@ impl Touch {
         near.map_or(self.contact.mode == ContactMode::Stick, stuck)
     }
 
+    /// A step of `d` seconds begins: the elements are as fine as they are for what is touched.
+    pub(super) fn settle(&mut self, surface: &Surface, positions: &[Vec3], d: f64) {
+        let grain = self.grain(surface, positions);
+        let edges = grain.map_or(0.0, |grain| grain.edges_touched(self.shape.radius(), self.steady.force));
+        self.steady.settle(edges, d);
+    }
+
+    /// The grain of the body where the tool touches, if it does and that is known.
+    fn grain(&self, surface: &Surface, positions: &[Vec3]) -> Option<Grain> {
+        let (corners, weights) = (surface.triangles[self.contact.triangle? as usize], &self.contact.weights);
+        let grain = self.skin.grain(corners, weights, &corners.map(|node| positions[node as usize]))?;
+        Some(grain.stiffened(self.stiffness))
+    }
+
     /// What a tool with a shape, at `pose` after a step of `d` seconds, feels of `rows`.
     pub(super) fn feel<'a>(&mut self, rows: impl Iterator<Item = (&'a Row, &'a [(u32, f64)])>, pose: &Pose, d: f64) {
         self.felt.iter_mut().for_each(|felt| felt.is_pressing = false);
@@ -215,7 +228,8 @@ impl Touch {
                 self.felt.push(felt);
             }
         }
-        self.steady += (pushed.norm() / d - self.steady) * (d / STEADY).min(1.0);
+        let radius = self.shape.radius();
+        self.steady.follow(pushed.norm() / d * radius / (radius + self.shape.half_axis().norm()), d);
         self.contact = match lost {
             _ if count > 0 => {
                 let mode = if sticks { ContactMode::Stick } else { ContactMode::Slip };
@@ -271,16 +285,14 @@ impl Touch {
         }
         let seen: f64 =
             shares[..count].iter().map(|&(node, share)| share.min(1.0) * area_at(surface, positions, node)).sum();
-        let (expected, coarse) = self.touched_of_half_space(surface, positions).unwrap_or_default();
-        seen + coarse * (expected - seen).max(0.0)
+        let expected = self.touched_of_half_space(surface, positions).unwrap_or_default();
+        seen + (1.0 - self.steady.fineness) * (expected - seen).max(0.0)
     }
 
-    /// What a sphere would touch of a half space (m^2), and how coarse the elements are, from 0 to 1; `None` if it does not sink in.
-    fn touched_of_half_space(&self, surface: &Surface, positions: &[Vec3]) -> Option<(f64, f64)> {
+    /// What a sphere would touch of a half space (m^2); `None` if it does not sink in.
+    fn touched_of_half_space(&self, surface: &Surface, positions: &[Vec3]) -> Option<f64> {
         let ToolShape::Sphere { radius } = self.shape else { return None };
-        let (corners, weights) = (surface.triangles[self.contact.triangle? as usize], &self.contact.weights);
-        let grain = self.skin.grain(corners, weights, &corners.map(|node| positions[node as usize]))?;
-        Some(grain.stiffened(self.stiffness).touched(radius, self.wrench.force.norm()))
+        Some(self.grain(surface, positions)?.touched(radius, self.wrench.force.norm()))
     }
 }
 

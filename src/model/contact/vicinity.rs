@@ -26,16 +26,16 @@ pub(super) struct Vicinity {
     axis: [Vec3; 2],
     positions: Vec<Vec3>,
     is_known: bool,
-    /// By node of the body: its place in `nodes` and that in `smoothed`, from one on.
+    /// By node of the body: its place in `nodes` and that in `boxes`, from one on.
     places: Vec<[u32; 2]>,
-    /// The corners that were looked at, at both ends of the step (m).
-    smoothed: Vec<[Vec3; 2]>,
+    /// The corners that were looked at, from their least coordinates to their largest (m): at both ends of the step, and smoothed or not.
+    boxes: Vec<[Vec3; 2]>,
 }
 
 impl Vicinity {
     /// Of a tool on a body of so many nodes and candidates: not known yet.
     pub(super) fn make_room(&mut self, nodes: usize, candidates: usize) {
-        let Self { triangles, corners, nodes: listed, positions, places, smoothed, is_known, .. } = self;
+        let Self { triangles, corners, nodes: listed, positions, places, boxes, is_known, .. } = self;
         *is_known = false;
         triangles.clear();
         triangles.reserve(candidates);
@@ -43,8 +43,8 @@ impl Vicinity {
         corners.reserve(candidates);
         listed.clear();
         listed.reserve(nodes);
-        smoothed.clear();
-        smoothed.reserve(nodes);
+        boxes.clear();
+        boxes.reserve(nodes);
         positions.resize(nodes, Vec3::zeros());
         places.resize(nodes, [0; 2]);
     }
@@ -78,33 +78,31 @@ impl Vicinity {
         let (skin, radius) = (&*touch.skin, touch.shape.radius());
         let [[a, b], [c, e]] = [&motion.from, &motion.to].map(|pose| touch.shape.axis(pose));
         let way = [a.inf(&b).inf(&c).inf(&e), a.sup(&b).sup(&c).sup(&e)];
-        let Self { triangles, corners, nodes, axis, positions, is_known, places, smoothed } = self;
+        let Self { triangles, corners, nodes, axis, positions, is_known, places, boxes } = self;
         (*axis, *is_known) = ([c, e], true);
         positions.copy_from_slice(body.positions);
         places.fill([0; 2]);
         triangles.clear();
         corners.clear();
         nodes.clear();
-        smoothed.clear();
+        boxes.clear();
         for &triangle in body.candidates {
             let ids = body.surface.triangles[triangle as usize];
             let depth = ids.iter().fold(MAX_DEPTH, |most: f64, &node| most.max(skin.depth(node as usize)));
             let distance = radius + depth + MARGIN;
             // A smoothed corner is near its node.
-            let moving = ids.map(|node| {
-                let (x, v) = (body.positions[node as usize], body.velocities[node as usize]);
-                [x, x + v * d]
-            });
+            let moving = ids.map(|node| body.corner(skin, 1.0, node, d));
             if !is_near(&way, distance + skin.reach(), &moving) {
                 continue;
             }
             let moving = ids.map(|node| {
                 let [_, place] = &mut places[node as usize];
                 if *place == 0 {
-                    smoothed.push(body.smoothed_corner(skin, node, d));
-                    *place = smoothed.len() as u32;
+                    let [[a, b], [c, e]] = [0.0, 1.0].map(|fine| body.corner(skin, fine, node, d));
+                    boxes.push([a.inf(&b).inf(&c).inf(&e), a.sup(&b).sup(&c).sup(&e)]);
+                    *place = boxes.len() as u32;
                 }
-                smoothed[*place as usize - 1]
+                boxes[*place as usize - 1]
             });
             if !is_near(&way, distance, &moving) {
                 continue;

@@ -71,10 +71,12 @@ fn tools(prepared: &Prepared) -> Option<String> {
             None => format!("{shape}, glued by its centre"),
             Some(found) => {
                 let (edge, sinking) = (mm(found.edge), if found.sinks { ", sinking by Hertz" } else { "" });
+                let until = found.fine_from.map(|radius| format!(" until it touches {} around", mm(radius)));
+                let until = until.unwrap_or_default();
                 match 100.0 * found.smoothed {
                     0.0 => format!("{shape}; elements of {edge} are fine against it"),
                     share => format!(
-                        "{shape}; elements of {edge} are coarse against it: corners smoothed on {share:.0} % of the surface{sinking}"
+                        "{shape}; elements of {edge} are coarse against it{until}: corners smoothed on {share:.0} % of the surface{sinking}"
                     ),
                 }
             }

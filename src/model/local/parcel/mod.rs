@@ -10,7 +10,7 @@ mod path;
 
 use crate::body::{State, Stiffness};
 use crate::bytes::{BytesReader, BytesWriter};
-use crate::contact::{Contact, ContactMode, ContactPoint, Felt, Friction};
+use crate::contact::{Contact, ContactMode, ContactPoint, Felt, Friction, Steady};
 use crate::surroundings::Bases;
 use crate::{Vec3, Wrench};
 
@@ -40,7 +40,7 @@ pub struct Parcel {
     nodes: Vec<u32>,
     state: State,
     contact: Contact,
-    steady: f64,
+    steady: Steady,
     felt: Vec<Felt>,
     wrench: Wrench,
     /// Nodes that other tools press, with the force on each (N).
@@ -99,7 +99,7 @@ impl Parcel {
             to.vector(v);
         });
         write_contact(to, &self.contact);
-        to.f64(self.steady);
+        [self.steady.force, self.steady.fineness].into_iter().for_each(|number| to.f64(number));
         to.list(&self.felt, write_felt);
         to.vector(&self.wrench.force);
         to.vector(&self.wrench.torque);
@@ -131,7 +131,8 @@ impl Parcel {
             parcel.state.velocities.push(v);
         }
         parcel.contact = read_contact(from)?;
-        parcel.steady = from.f64()?;
+        let [force, fineness] = [from.f64()?, from.f64().filter(|fineness| (0.0..=1.0).contains(fineness))?];
+        parcel.steady = Steady { force, fineness };
         from.list(FELT, &mut parcel.felt, read_felt)?;
         parcel.wrench = Wrench { force: from.vector()?, torque: from.vector()? };
         from.list(PRESSED, &mut parcel.beside, |from| Some((from.u32()?, from.vector()?)))?;

@@ -25,6 +25,33 @@ fn a_sphere_on_tissue_feels_the_force_of_hertz() {
     }
 }
 
+/// Check that a sphere that is held is held still where elements are just becoming fine against what it touches: how it meets the surface
+/// there hangs on the force, and the force on that. (If both followed each other in 5 ms the force would swing by its own size.)
+#[test]
+fn a_sphere_is_held_still_where_elements_become_fine() {
+    let (radius, size) = (0.0149_f64, 3e-3);
+    for depth in [2.1e-3, 2.4e-3, 2.7e-3, 3.2e-3] {
+        let body = graded(size, 1.6 * (radius * depth).sqrt(), 0.49);
+        let mut simulation = resting(Box::new(body), ToolShape::Sphere { radius });
+        let above = |tick: u32| radius + 1e-4 - (depth + 1e-4) * f64::from(tick.min(100)) / 100.0;
+        let at = |tick: u32| Vec3::new(3e-4, 2e-4, above(tick));
+        let felt = |tick: u32| {
+            let force = simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force.z;
+            // What is left is no swing of the body by itself.
+            simulation.state_mut().velocities.iter_mut().for_each(|v| *v *= 0.93);
+            force
+        };
+        let forces: Vec<f64> = (0..400).map(felt).collect();
+        let calm = spread(&forces[300..]);
+        println!(
+            "{depth} m: {:.4} N, {:.3} of Hertz', {calm:.2} %",
+            forces[399],
+            forces[399] / hertz(radius, depth, 0.49).0
+        );
+        assert!(calm < 1.0, "{depth} m: {:?}", &forces[300..]);
+    }
+}
+
 /// Check that a sphere does not feel where the nodes of the lattice are, and that a point does.
 #[test]
 fn a_sphere_feels_the_same_over_nodes_edges_and_faces_of_a_lattice() {
