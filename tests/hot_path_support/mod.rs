@@ -8,7 +8,7 @@ use std::io::Write;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Output};
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use palpate::devices::{Scripted, ToolPath};
@@ -67,6 +67,10 @@ pub struct Case {
 
 /// Puts the global model of a case into another session, for test programs that know a way there.
 pub static ELSEWHERE: OnceLock<fn(SessionBuilder, Case) -> SessionBuilder> = OnceLock::new();
+
+/// Held while a child runs. Its haptic thread may keep a core to itself, as ticks of an unoptimised build take longer than their period:
+/// the threads of another child on that core would not run before this one ends.
+static ALONE: Mutex<()> = Mutex::new(());
 
 const VARIABLE: &str = "PALPATE_HOT_PATH_CHILD";
 const LOG: &str = "PALPATE_HOT_PATH_LOG";
@@ -144,6 +148,7 @@ impl Case {
 
     /// Runs it in a process of its own; `None`, with the reason printed, where the kernel refuses the filter.
     pub fn run(self) -> Option<Ended> {
+        let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = tempfile::tempdir().expect("a temporary folder");
         let log = folder.path().join("run.mcap");
         let Output { status, stdout, stderr } = Command::new(std::env::current_exe().expect("its own path"))
