@@ -50,6 +50,13 @@ pub(super) fn weights(corners: &[Vec3; 3], point: &Vec3) -> [f64; 3] {
     [1.0 - v - w, v, w]
 }
 
+/// The share of the segment from `a` to `b` at which it is nearest to `point`.
+pub(super) fn share_at([a, b]: &[Vec3; 2], point: &Vec3) -> f64 {
+    let along = b - a;
+    let length = along.norm_squared();
+    if length == 0.0 { 0.0 } else { ((point - a).dot(&along) / length).clamp(0.0, 1.0) }
+}
+
 /// The share of the segment from `a` to `b` at which it is nearest to the triangle `corners`.
 pub(super) fn share_of_axis([a, b]: &[Vec3; 2], corners: &[Vec3; 3]) -> f64 {
     let along = b - a;

@@ -48,7 +48,7 @@ impl Grain {
     }
 
     /// What a sphere of `radius` (m) sinks in beside the elements while it is `steady`.
-    pub(super) fn sinking(&self, radius: f64, Steady { force: steady, fineness }: Steady) -> Sinking {
+    pub(super) fn sinking(&self, radius: f64, Steady { force: steady, fineness, .. }: Steady) -> Sinking {
         let shown = 1.0 / (2.0 * (std::f64::consts::PI * self.variance).sqrt() * self.modulus);
         let hertz = (9.0 / (16.0 * radius * self.modulus * self.modulus)).cbrt();
         // The elements lack most where they show the share s of the depth, 2 - 3 s - 4 c s^2 = 0.
@@ -153,14 +153,14 @@ mod tests {
     /// Of a sphere of 8 mm on elements of 9 mm and 16 kPa.
     fn sinking(steady: f64) -> Sinking {
         Grain { modulus: 16e3, variance: 64e-6, most: 3e-3, edge: 9e-3 }
-            .sinking(8e-3, Steady { force: steady, fineness: 0.0 })
+            .sinking(8e-3, Steady { force: steady, ..Steady::default() })
     }
 
     #[test]
     fn nothing_sinks_in_where_the_stiffness_is_beyond_every_body() {
         for modulus in [f64::INFINITY, 1e300, 1e-300, 5e-324] {
             let grain = Grain { modulus, variance: 64e-6, most: 3e-3, edge: 9e-3 };
-            let sinking = grain.sinking(8e-3, Steady { force: 1.0, fineness: 0.0 });
+            let sinking = grain.sinking(8e-3, Steady { force: 1.0, ..Steady::default() });
             let Sunk { offset, slope } = sinking.tangent(1.0);
             assert_eq!([sinking.at(1.0), sinking.most(), offset, slope], [0.0; 4], "{modulus}");
         }

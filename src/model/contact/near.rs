@@ -2,6 +2,7 @@
 
 use super::ToolMotion;
 use super::closest;
+use super::corners::{Corners, chord};
 use super::deformable::Deformable;
 use super::passing;
 use super::touch::{MOST_POINTS, Touch};
@@ -33,19 +34,21 @@ pub(super) struct Search {
     vicinities: Vec<Vicinity>,
     /// The corners of a vicinity as the tool meets them at the start of the step, and at its end if nothing presses (m).
     corners: Vec<[Vec3; 2]>,
+    fine: Corners,
 }
 
 impl Search {
     /// For so many tools.
     pub(super) fn new(tools: usize) -> Self {
         let vicinities = vec![Vicinity::default(); tools];
-        Self { near: Vec::with_capacity(MOST_POINTS), vicinities, corners: Vec::new() }
+        Self { near: Vec::with_capacity(MOST_POINTS), vicinities, ..Self::default() }
     }
 
     /// Makes room for a body of so many nodes and candidates, and forgets another one.
     pub(super) fn make_room(&mut self, nodes: usize, candidates: usize) {
         self.vicinities.iter_mut().for_each(|vicinity| vicinity.make_room(nodes, candidates));
         self.corners.reserve(nodes);
+        self.fine.make_room(nodes);
     }
 
     /// Finds the places that would overlap with a tool at the end of the step if nothing pressed.
@@ -84,13 +87,16 @@ impl Search {
     }
 
     fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) {
-        let (shape, skin, coarse) = (&touch.shape, &*touch.skin, 1.0 - touch.steady.fineness);
+        let (shape, skin, fine) = (&touch.shape, &*touch.skin, touch.steady.fineness);
+        let coarse = 1.0 - fine;
         let (radius, axis) = (shape.radius(), shape.axis(pose));
         let is_long = shape.half_axis() != Vec3::zeros();
+        let Self { near: list, corners, fine: met, .. } = self;
+        met.find(vicinity, |place| corners[place as usize][1], touch, &axis, |found| keep(list, found));
         // The nearest place in front of the surface, and the nearest behind it.
         let (mut front, mut behind) = (f64::INFINITY, None::<Near>);
         for (&triangle, places) in vicinity.triangles.iter().zip(&vicinity.corners) {
-            let corners = places.map(|place| self.corners[place as usize][1]);
+            let corners = places.map(|place| corners[place as usize][1]);
             let depths = places.map(|place| coarse * skin.depth(vicinity.nodes[place as usize] as usize));
             // It touches, or is the nearest of all.
             let touching = radius + depths.into_iter().fold(0.0, f64::max);
@@ -127,9 +133,16 @@ impl Search {
                     continue;
                 }
                 front = front.min(distance);
-                let near = near(distance);
-                if near.gap < 0.0 {
-                    self.keep(near, radius);
+                if fine == 1.0 && met.are_met(places, &weights) {
+                    continue;
+                }
+                let mut near = near(distance);
+                near.gap += fine * chord(&corners, &weights, radius);
+                let same = 1e-12 * radius * radius;
+                let is_new =
+                    |found: &[Near]| found.iter().all(|known| (known.place - near.place).norm_squared() >= same);
+                if near.gap < 0.0 && is_new(list) {
+                    keep(list, near);
                 }
             }
         }
@@ -138,23 +151,19 @@ impl Search {
             && -(behind.gap + radius) < front * (1.0 - 1e-9)
             && -(behind.gap + radius) < MAX_DEPTH + radius
         {
-            self.near.clear();
-            self.near.push(behind);
+            list.clear();
+            list.push(behind);
         }
     }
+}
 
-    /// Each place once, and of too many the deepest.
-    fn keep(&mut self, near: Near, radius: f64) {
-        let same = 1e-12 * radius * radius;
-        if self.near.iter().any(|known| (known.place - near.place).norm_squared() < same) {
-            return;
-        }
-        if self.near.len() < MOST_POINTS {
-            self.near.push(near);
-        } else if let Some(shallowest) = self.near.iter_mut().max_by(|a, b| a.gap.total_cmp(&b.gap))
-            && near.gap < shallowest.gap
-        {
-            *shallowest = near;
-        }
+/// Adds a place; of too many the deepest are kept.
+fn keep(places: &mut Vec<Near>, near: Near) {
+    if places.len() < MOST_POINTS {
+        places.push(near);
+    } else if let Some(shallowest) = places.iter_mut().max_by(|a, b| a.gap.total_cmp(&b.gap))
+        && near.gap < shallowest.gap
+    {
+        *shallowest = near;
     }
 }

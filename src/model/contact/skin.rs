@@ -12,7 +12,7 @@
 //! over the nodes around it, X at rest, N the normals there. Forces on a corner go to the nodes with the same shares, so
 //! momentum is kept to the last digit. c is 2.8 edges, and goes to zero (y_k = x_k) towards sharp edges of the body. Under a tool
 //! that touches much more than an edge is long each corner goes to its node, 1 - f of the way back to y_k: there the tool meets
-//! several triangles at once, and how fine the elements are, f, hangs on its [steady force](super::steady::Steady).
+//! [many corners](super::corners), and how fine the elements are, f, hangs on its [steady force](super::steady::Steady).
 
 use super::grain::{COARSE, Grain, ramp};
 use super::steady::Steady;
@@ -158,6 +158,11 @@ impl Skin {
     /// How far the corner of `node` lies below it at rest (m).
     pub(super) fn depth(&self, node: usize) -> f64 {
         self.depths.get(node).copied().unwrap_or(0.0)
+    }
+
+    /// The mean edge around `node` (m); zero if the body's contact modulus is not known.
+    pub(super) fn edge(&self, node: usize) -> f64 {
+        self.grains.get(node).map_or(0.0, |grain| grain.edge)
     }
 
     /// That of a window: `nodes` are the ids of its nodes here, `place` gives the place of an id. Nodes whose corner is made of

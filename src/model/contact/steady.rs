@@ -5,7 +5,7 @@ const STEADY: f64 = 5e-3;
 
 /// The radius of what a tool touches, in edges, below which elements are coarse, and above which they are fine. In between they stay what they
 /// were: how the tool meets the surface changes the force by a few percent, and must not follow it to and fro.
-const FINE: [f64; 2] = [1.6, 1.8];
+const FINE: [f64; 2] = [1.4, 1.6];
 /// The time in which the one goes over into the other (s).
 const CHANGE: f64 = 30e-3;
 
@@ -17,6 +17,8 @@ pub(crate) struct Steady {
     /// How fine the elements are for what the tool touches, from 0 to 1: coarse ones are met by smoothed corners and as deep as they cannot
     /// show, fine ones as they are.
     pub(crate) fineness: f64,
+    /// Where that goes: to 1 if true.
+    pub(crate) is_fine: bool,
 }
 
 impl Steady {
@@ -30,8 +32,9 @@ impl Steady {
 
     /// Before a step of `d` seconds of a tool that touches so many `edges` around.
     pub(super) fn settle(&mut self, edges: f64, d: f64) {
-        let is_fine = edges > FINE[1] || (edges > FINE[0] && self.fineness > 0.5);
-        let way = if is_fine { 1.0 - self.fineness } else { -self.fineness };
+        // On the way from one to the other the force may pass a border again.
+        self.is_fine = edges > FINE[1] || (edges > FINE[0] && self.is_fine);
+        let way = if self.is_fine { 1.0 - self.fineness } else { -self.fineness };
         self.fineness += way.clamp(-d / CHANGE, d / CHANGE);
     }
 }
@@ -46,11 +49,19 @@ mod tests {
             (0..100).for_each(|_| steady.settle(edges, 5e-4));
             steady
         };
-        let fineness = [0.5, 1.7, 1.9, 1.7, 1.5].into_iter().scan(Steady::default(), |steady, edges| {
+        let fineness = [0.5, 1.5, 1.7, 1.5, 1.3].into_iter().scan(Steady::default(), |steady, edges| {
             *steady = after(*steady, edges);
             Some(steady.fineness)
         });
         assert_eq!(fineness.collect::<Vec<_>>(), [0.0, 0.0, 1.0, 1.0, 0.0]);
+    }
+
+    /// The force changes by a few percent on the way, and what is touched with it.
+    #[test]
+    fn a_change_goes_on_to_its_end() {
+        let mut steady = Steady::default();
+        (0..100).for_each(|n| steady.settle(if n == 0 { 1.65 } else { 1.5 }, 5e-4));
+        assert_eq!(steady.fineness, 1.0);
     }
 
     #[test]

@@ -99,7 +99,9 @@ impl Parcel {
             to.vector(v);
         });
         write_contact(to, &self.contact);
-        [self.steady.force, self.steady.fineness].into_iter().for_each(|number| to.f64(number));
+        let Steady { force, fineness, is_fine } = self.steady;
+        [force, fineness].into_iter().for_each(|number| to.f64(number));
+        to.u8(is_fine.into());
         to.list(&self.felt, write_felt);
         to.vector(&self.wrench.force);
         to.vector(&self.wrench.torque);
@@ -132,7 +134,7 @@ impl Parcel {
         }
         parcel.contact = read_contact(from)?;
         let [force, fineness] = [from.f64()?, from.f64().filter(|fineness| (0.0..=1.0).contains(fineness))?];
-        parcel.steady = Steady { force, fineness };
+        parcel.steady = Steady { force, fineness, is_fine: read_bool(from)? };
         from.list(FELT, &mut parcel.felt, read_felt)?;
         parcel.wrench = Wrench { force: from.vector()?, torque: from.vector()? };
         from.list(PRESSED, &mut parcel.beside, |from| Some((from.u32()?, from.vector()?)))?;

@@ -235,12 +235,11 @@ fn a_resting_sphere_does_not_creep() {
 /// The most by which the force falls, as a share of the largest, while a sphere is pressed in by 5 mm, so slowly that the body
 /// does not swing.
 fn falls(body: Box<dyn Body>, radius: f64, place: Vec3) -> f64 {
-    let mut simulation = tool_support::resting(body, sphere(radius));
+    let mut body = tool_support::Calm::new(body, sphere(radius));
     let at = |k: i32| place + Vec3::z() * (radius - 1e-5 * f64::from(k));
     let (mut most, mut fell) = (0.0_f64, 0.0_f64);
     for k in 0..500 {
-        let force = simulation.tick(ToolMotion::straight(at(k), at(k + 1))).force.z;
-        simulation.state_mut().velocities.iter_mut().for_each(|v| *v *= 0.9);
+        let force = body.tick(ToolMotion::straight(at(k), at(k + 1)), tool_support::CALM).force.z;
         fell = fell.max(most - force);
         most = most.max(force);
     }

@@ -11,6 +11,8 @@ use crate::tissue_support::{bent::centred, body, organ, orient};
 
 /// Young's modulus of the tissue that is pressed (Pa).
 pub const YOUNG: f64 = 5000.0;
+/// What velocities keep in a tick while a body is to come to rest.
+pub const CALM: f64 = 0.93;
 /// Side of the block of springs (m).
 pub const SIDE: f64 = 0.1;
 
@@ -21,6 +23,38 @@ pub fn resting(mut body: Box<dyn Body>, shape: ToolShape) -> Simulation {
     Simulation::new(body, state, Contact::default(), Law::default(), stepping).expect("it fits").with_shape(0, shape)
 }
 
+/// A body that swings no longer than one asks for, where tissue of little viscosity would.
+pub struct Calm {
+    pub simulation: Simulation,
+    /// Steps in a tick of a millisecond.
+    steps: u32,
+}
+
+impl Calm {
+    /// At rest, without contact yet and without friction.
+    pub fn new(mut body: Box<dyn Body>, shape: ToolShape) -> Self {
+        let steps = Stepping::stable_substeps(&mut *body, 1e-3);
+        let stepping = Stepping { tick: 1e-3 / f64::from(steps), substeps: 1 };
+        let state = State::at_rest(body.rest());
+        let simulation = Simulation::new(body, state, Contact::default(), Law::default(), stepping).expect("it fits");
+        Self { simulation: simulation.with_shape(0, shape), steps }
+    }
+
+    /// A tick in which velocities keep so large a `share`. They lose the rest in equal parts after each step: all at once would drive the modes
+    /// that swing in time with it.
+    pub fn tick(&mut self, motion: ToolMotion, share: f64) -> Wrench {
+        let n = f64::from(self.steps);
+        let mut sum = Wrench::default();
+        for step in 0..self.steps {
+            let step = f64::from(step);
+            sum += self.simulation.tick(motion.part(step / n, (step + 1.0) / n));
+            let velocities = &mut self.simulation.state_mut().velocities;
+            velocities.iter_mut().for_each(|v| *v *= share.powf(1.0 / n));
+        }
+        sum / n
+    }
+}
+
 /// What a tool that is pressed in feels at last.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pressed {
@@ -29,30 +63,32 @@ pub struct Pressed {
     pub places: usize,
     /// m^2
     pub area: f64,
+    /// The force came to rest.
+    pub rests: bool,
 }
 
 /// Presses a tool until its near side is `depth` (m) below `place`, along `outward`, and waits for the body to come to rest.
 pub fn press(body: Box<dyn Body>, shape: ToolShape, place: Vec3, outward: Vec3, depth: f64) -> Pressed {
-    let mut simulation = resting(body, shape);
+    let mut body = Calm::new(body, shape);
     let above = |tick: u32| {
         let s = (f64::from(tick) / 60.0).min(1.0);
         1e-4 - (depth + 1e-4) * s * s * (3.0 - 2.0 * s)
     };
     let at = |tick: u32| place + outward * (shape.radius() + above(tick));
-    let (mut wrench, mut before) = (Wrench::default(), f64::NAN);
+    let (mut wrench, mut before, mut rests) = (Wrench::default(), f64::NAN, false);
     for tick in 0..1000 {
-        wrench = simulation.tick(ToolMotion::straight(at(tick), at(tick + 1)));
-        // Tissue of little viscosity swings for long.
-        simulation.state_mut().velocities.iter_mut().for_each(|v| *v *= 0.93);
+        wrench = body.tick(ToolMotion::straight(at(tick), at(tick + 1)), CALM);
         if tick > 100 && tick % 20 == 0 {
             let now = wrench.force.norm();
-            if (now - before).abs() < 1e-4 * now {
+            rests = (now - before).abs() < 1e-4 * now;
+            if rests {
                 break;
             }
             before = now;
         }
     }
-    Pressed { wrench, places: simulation.contact_points(0).len(), area: simulation.contact_area(0) }
+    let Calm { simulation, .. } = body;
+    Pressed { wrench, places: simulation.contact_points(0).len(), area: simulation.contact_area(0), rests }
 }
 
 /// How far below `place` (m), along `outward`, the near side of a tool is that just touches.
@@ -75,18 +111,17 @@ pub fn slide(
     depth: f64,
     seconds: f64,
 ) -> Vec<f64> {
-    let mut simulation = resting(body, shape);
+    let mut body = Calm::new(body, shape);
     let in_by = |tick: i32| 1e-4 - (depth + 1e-4) * (f64::from(tick) / 200.0).min(1.0);
     let along = |tick: i32| (f64::from(tick - 600) * 1e-3 / seconds).clamp(0.0, 1.0);
     let at = |tick: i32| from + (to - from) * along(tick) + outward * (shape.radius() + in_by(tick));
     let ticks = 600 + (1e3 * seconds) as i32;
     let mut forces = Vec::new();
     for tick in 0..ticks {
-        let force = simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force.dot(&outward);
-        if tick < 600 {
-            simulation.state_mut().velocities.iter_mut().for_each(|v| *v *= 0.93);
-        } else {
-            forces.push(force);
+        let motion = ToolMotion::straight(at(tick), at(tick + 1));
+        let force = body.tick(motion, if tick < 600 { CALM } else { 1.0 }).force;
+        if tick >= 600 {
+            forces.push(force.dot(&outward));
         }
     }
     forces
@@ -172,8 +207,13 @@ pub fn hertz(radius: f64, depth: f64, poisson_ratio: f64) -> (f64, f64) {
 
 /// A sphere in the middle of a block of tissue that is fine where it touches.
 pub fn press_tissue(radius: f64, depth: f64, poisson_ratio: f64, size: f64) -> Pressed {
-    let body = graded(size, 1.6 * (radius * depth).sqrt(), poisson_ratio);
-    press(Box::new(body), ToolShape::Sphere { radius }, Vec3::zeros(), Vec3::z(), depth)
+    press_tissue_at([0.0; 2], radius, depth, poisson_ratio, size)
+}
+
+/// The same beside the middle, where there is a node, by so many elements.
+pub fn press_tissue_at([x, y]: [f64; 2], radius: f64, depth: f64, poisson_ratio: f64, size: f64) -> Pressed {
+    let body = graded(size, 1.6 * (radius * depth).sqrt() + size * x.abs().max(y.abs()), poisson_ratio);
+    press(Box::new(body), ToolShape::Sphere { radius }, Vec3::new(x, y, 0.0) * size, Vec3::z(), depth)
 }
 
 /// The reference organ, held at its bottom.
