@@ -17,6 +17,9 @@ use crate::{Pose, Vec3, Wrench};
 /// 1.5 mm touches some 70.
 pub(super) const MOST_POINTS: usize = 192;
 
+/// The share of the mean pressure below which a node of fine elements is at the rim of what is touched.
+const RIM: f64 = 0.5;
+
 /// What is within so many radii of a tool's axis is its footprint.
 const FOOTPRINT: f64 = 1.1;
 
@@ -266,27 +269,35 @@ impl Touch {
     }
 
     /// The area that it touches (m^2): a third of the triangles around each node that is touched, and of one that is
-    /// touched in part, that part. Of a sphere on coarse elements no less than what it touches of a half space under its force.
+    /// touched in part, that part. Of a sphere on coarse elements no less than what it touches of a half space under its force; of fine ones
+    /// nodes at the rim, which it only just reaches, count by how much they press.
     pub(crate) fn area(&self, surface: &Surface, positions: &[Vec3]) -> f64 {
-        let mut shares = [(u32::MAX, 0.0); MOST_POINTS];
+        let mut touched = [Touched::default(); MOST_POINTS];
         let mut count = 0;
         for felt in self.felt.iter().filter(|felt| felt.is_pressing) {
             let corners = surface.triangles[felt.point.triangle as usize];
             for (node, weight) in corners.into_iter().zip(felt.weights).filter(|&(_, weight)| weight > 0.0) {
-                match shares[..count].iter_mut().find(|(known, _)| *known == node) {
-                    Some((_, share)) => *share += weight,
-                    None if count < MOST_POINTS => {
-                        shares[count] = (node, weight);
-                        count += 1;
-                    }
-                    None => {}
+                let known = touched[..count].iter().position(|known| known.node == node);
+                let place = known.unwrap_or(count);
+                let Some(known) = touched.get_mut(place) else { continue };
+                if place == count {
+                    *known = Touched { node, area: area_at(surface, positions, node), ..Touched::default() };
+                    count += 1;
                 }
+                known.share += weight;
+                known.push += weight * felt.impulse.norm();
             }
         }
-        let seen: f64 =
-            shares[..count].iter().map(|&(node, share)| share.min(1.0) * area_at(surface, positions, node)).sum();
+        let touched = &touched[..count];
+        let seen: f64 = touched.iter().map(|node| node.share.min(1.0) * node.area).sum();
+        let rim = RIM * touched.iter().map(|node| node.push).sum::<f64>() / seen.max(f64::MIN_POSITIVE);
+        let fine = self.steady.fineness;
+        let seen = touched.iter().fold(0.0, |sum, &Touched { area, share, push, .. }| {
+            let pressing = if push < rim * area { push / (rim * area) } else { 1.0 };
+            sum + share.min(1.0) * area * (1.0 - fine * (1.0 - pressing))
+        });
         let expected = self.touched_of_half_space(surface, positions).unwrap_or_default();
-        seen + (1.0 - self.steady.fineness) * (expected - seen).max(0.0)
+        seen + (1.0 - fine) * (expected - seen).max(0.0)
     }
 
     /// What a sphere would touch of a half space (m^2); `None` if it does not sink in.
@@ -294,6 +305,18 @@ impl Touch {
         let ToolShape::Sphere { radius } = self.shape else { return None };
         Some(self.grain(surface, positions)?.touched(radius, self.wrench.force.norm()))
     }
+}
+
+/// A node that is touched.
+#[derive(Clone, Copy, Default)]
+struct Touched {
+    node: u32,
+    /// Around it (m^2).
+    area: f64,
+    /// How much of it is touched.
+    share: f64,
+    /// N s
+    push: f64,
 }
 
 /// True if a triangle comes as near as `distance` (m) to the segment `axis`.
