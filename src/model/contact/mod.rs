@@ -28,6 +28,7 @@ mod passing;
 mod resolve;
 mod row;
 mod rows;
+mod search;
 mod shape;
 mod skin;
 mod solve;
