@@ -38,10 +38,16 @@ impl Deformable<'_> {
     /// The corner at `node` as a tool with that `skin` meets it where elements are so `fine` (m): now, and `ahead` seconds from now
     /// if nothing presses.
     pub(super) fn corner(&self, skin: &Skin, fine: f64, node: u32, ahead: f64) -> [Vec3; 2] {
-        skin.shares(node, fine).fold([Vec3::zeros(); 2], |[now, then], (other, share)| {
-            let (x, v) = (self.positions[other as usize], self.velocities[other as usize]);
-            [now + x * share, then + (x + v * ahead) * share]
-        })
+        let [x, v] = [self.positions[node as usize], self.velocities[node as usize]];
+        let corner = skin.corner(node);
+        if corner.is_empty() || fine == 1.0 {
+            return [x, x + v * ahead];
+        }
+        let [mean_x, mean_v] = corner.iter().fold([Vec3::zeros(); 2], |[x, v], &(other, share)| {
+            [x + self.positions[other as usize] * share, v + self.velocities[other as usize] * share]
+        });
+        let [x, v] = [mean_x + (x - mean_x) * fine, mean_v + (v - mean_v) * fine];
+        [x, x + v * ahead]
     }
 
     /// The share of the step after which the contact acts: 0 for one that exists, the hit's for a new one.
