@@ -52,15 +52,21 @@ impl Corners {
             let across = (b - a).cross(&(c - a));
             places.iter().for_each(|&place| self.outward[place as usize] += across);
         }
+        // A vicinity numbers its nodes in the order in which its triangles name them.
+        let mut next = 0;
         for (&triangle, places) in vicinity.triangles.iter().zip(&vicinity.corners) {
             for (corner, &number) in places.iter().enumerate() {
+                if number != next {
+                    continue;
+                }
+                next += 1;
                 let place = at(number);
                 let share = closest::share_at(axis, &place);
                 let away = axis[0] + (axis[1] - axis[0]) * share - place;
                 let (number, node) = (number as usize, vicinity.nodes[number as usize] as usize);
                 let beyond = (1.0 - fine) * skin.depth(node) + fine * curved * mean_chord(skin.edge(node), radius);
                 let gap = away.norm() - radius - beyond;
-                if self.is_met[number] || gap >= 0.0 || away.dot(&self.outward[number]) <= 0.0 {
+                if gap >= 0.0 || away.dot(&self.outward[number]) <= 0.0 {
                     continue;
                 }
                 let Some(normal) = away.try_normalize(0.0) else { continue };
