@@ -246,14 +246,14 @@ impl Simulation {
         stiffness: Stiffness,
         tool: usize,
         wrench: Wrench,
-        touch: impl FnOnce(&mut Touch, u32),
+        touch: impl FnOnce(&mut Touch),
     ) -> &mut Told {
         if self.stiffness() != stiffness {
             self.stiffness = stiffness;
             self.moving.put_stiffness(stiffness);
         }
         self.moving.means[tool] = wrench;
-        touch(&mut self.moving.touches[tool], self.moving.stepping.substeps);
+        touch(&mut self.moving.touches[tool]);
         self.told.get_or_insert_default()
     }
 

@@ -71,6 +71,10 @@ impl Body for Part {
         self.body.forces(state, forces);
     }
 
+    fn stable_share(&mut self, state: &State) -> f64 {
+        self.body.stable_share(state)
+    }
+
     fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
         self.body.node_forces(state, nodes, forces);
     }

@@ -194,6 +194,15 @@ pub trait Body: Send + Sync + std::fmt::Debug {
         None
     }
 
+    /// The longest stable explicit step in `state`, the one whose [`forces`](Self::forces) were asked for last, over that at rest, at
+    /// most 1: steps are divided where a body that is crushed has become too stiff for them. The default is 1: springs do not stiffen.
+    ///
+    /// # Real-time
+    /// Called once per haptic tick: bounded, must not allocate or block.
+    fn stable_share(&mut self, _state: &State) -> f64 {
+        1.0
+    }
+
     /// What one evaluation of all forces takes (s) on no machine in particular, for runs that must be the same on all of
     /// them. The default is 0.3 us for each node.
     ///

@@ -141,6 +141,10 @@ impl Body for Stiffened {
         forces.iter_mut().for_each(|force| *force *= self.stiffness.factor());
     }
 
+    fn stable_share(&mut self, state: &State) -> f64 {
+        self.made.stable_share(state)
+    }
+
     fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
         if self.is_as_made() {
             return self.made.node_forces(state, nodes, forces);

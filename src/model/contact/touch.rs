@@ -37,7 +37,7 @@ pub(crate) struct Touch {
     pub(crate) stiffness: Stiffness,
     /// What it has pressed with lately.
     pub(super) steady: Steady,
-    /// Where a tool with a shape touched in this tick; forces are summed over its steps.
+    /// Where a tool with a shape touched in this tick; forces are summed over its steps, and means once it is over.
     felt: Vec<Felt>,
     /// The same for whoever watches: forces are means over the last whole tick, triangles the body's.
     points: Vec<ContactPoint>,
@@ -87,12 +87,10 @@ impl Touch {
     /// A tick of `steps` steps is over: forces are means over it. `id` gives the body's id of a triangle.
     pub(crate) fn end(&mut self, steps: u32, id: impl Fn(u32) -> u32) {
         let share = 1.0 / f64::from(steps);
+        self.felt.iter_mut().for_each(|felt| felt.point.force *= share);
         self.points.clear();
-        self.points.extend(self.felt.iter().map(|felt| ContactPoint {
-            triangle: id(felt.point.triangle),
-            force: felt.point.force * share,
-            ..felt.point
-        }));
+        let points = self.felt.iter().map(|felt| ContactPoint { triangle: id(felt.point.triangle), ..felt.point });
+        self.points.extend(points);
     }
 
     /// Goes on from what another one felt: `contact` gives the numbering of a contact here, `id` that of a triangle.
@@ -114,7 +112,7 @@ impl Touch {
         }));
     }
 
-    /// Where it touched in the last tick; forces are summed over the steps.
+    /// Where it touched in the last tick, with the mean forces.
     pub(crate) fn felt(&self) -> &[Felt] {
         &self.felt
     }
@@ -124,12 +122,12 @@ impl Touch {
         self.steady
     }
 
-    /// Goes on from what was felt on another computer in a tick of `steps` steps.
-    pub(crate) fn go_on_from(&mut self, contact: Contact, steady: Steady, felt: &[Felt], steps: u32) {
+    /// Goes on from what was felt on another computer in a tick.
+    pub(crate) fn go_on_from(&mut self, contact: Contact, steady: Steady, felt: &[Felt]) {
         (self.contact, self.steady) = (contact, steady);
         self.felt.clear();
         self.felt.extend_from_slice(&felt[..felt.len().min(MOST_POINTS)]);
-        self.end(steps, |triangle| triangle);
+        self.end(1, |triangle| triangle);
     }
 
     /// Appends the triangles of a surface with nodes at `positions` (m) that the tool touches, or may touch soon, at `pose`, or if

@@ -103,14 +103,14 @@ impl Patch {
         self.beyond.follow(to.position, &self.law.friction)
     }
 
-    /// What the tool at `at` feels after a tick with `wrench`: that, or what is beyond the patch if the contact leaves it.
-    pub(super) fn feel(&mut self, wrench: Wrench, at: &Pose) -> Wrench {
+    /// What the tool at `at` feels after a tick of `steps` steps with `wrench`: that, or what is beyond the patch if the contact leaves it.
+    pub(super) fn feel(&mut self, wrench: Wrench, at: &Pose, steps: u32) -> Wrench {
         // A state that is not finite touches nothing: its zero force would look like a free tool.
         if !self.state.is_finite() {
             return Vec3::repeat(f64::NAN).into();
         }
         let window = &self.window;
-        self.touch.end(self.stepping.substeps, |triangle| window.triangles[triangle as usize]);
+        self.touch.end(steps, |triangle| window.triangles[triangle as usize]);
         match self.strayed.take() {
             Some(normal) => self.beyond.leave(normal, at.position, self.felt),
             None => {

@@ -26,18 +26,24 @@ pub(super) struct Moving {
 
 impl Moving {
     /// Advances one haptic tick, or several in one step, along `motion` of each tool in all of that time, and shows `watch` the state at
-    /// the start of every step.
+    /// the start of every step that the stepping has.
     pub(super) fn advance(&mut self, ticks: u32, motion: impl Fn(usize) -> ToolMotion, watch: &mut impl FnMut(&State)) {
         let Self { body, state, forces, touches, rows, law, candidates, inverse_masses, stepping, stride, means } =
             self;
         debug_assert!((1..=*stride).contains(&ticks), "{ticks} ticks in steps of at most {stride}");
-        let (n, d) = (f64::from(stepping.substeps), f64::from(ticks) * stepping.step());
         means.fill(Wrench::default());
         touches.iter_mut().for_each(Touch::begin);
-        for u in 0..stepping.substeps {
-            let u = f64::from(u);
-            watch(state);
-            body.forces(state, forces);
+        body.forces(state, forces);
+        let divided = stepping.divided(body.stable_share(state));
+        let parts = divided.substeps / stepping.substeps;
+        let (n, d) = (f64::from(divided.substeps), f64::from(ticks) * divided.step());
+        for step in 0..divided.substeps {
+            if step > 0 {
+                body.forces(state, forces);
+            }
+            if step % parts == 0 {
+                watch(state);
+            }
             let mut deformable = Deformable {
                 positions: &mut state.positions,
                 velocities: &mut state.velocities,
@@ -45,12 +51,12 @@ impl Moving {
                 surface: body.surface(),
                 candidates,
             };
-            let part = |tool| motion(tool).part(u / n, (u + 1.0) / n);
+            let part = |tool| motion(tool).part(f64::from(step) / n, f64::from(step + 1) / n);
             step_all(&mut deformable, forces, touches, rows, law, part, d);
             means.iter_mut().zip(&*touches).for_each(|(sum, touch)| *sum += touch.wrench);
         }
         means.iter_mut().for_each(|sum| *sum = *sum / n);
-        touches.iter_mut().for_each(|touch| touch.end(stepping.substeps, |triangle| triangle));
+        touches.iter_mut().for_each(|touch| touch.end(divided.substeps, |triangle| triangle));
     }
 
     /// The body is so stiff from now on.

@@ -17,6 +17,12 @@ pub struct Stepping {
     pub substeps: u32,
 }
 
+/// How many times shorter than at rest the longest stable step may be before steps are divided. They have a margin of 1.3, most of which
+/// is left for what the body does within the tick, and for what it does not know of itself.
+const BORNE: f64 = 1.05;
+/// Parts of a step at most.
+const MOST_PARTS: f64 = 4.0;
+
 impl Default for Stepping {
     /// One substep per millisecond.
     fn default() -> Self {
@@ -36,6 +42,13 @@ impl Stepping {
     /// The substep d (s).
     pub fn step(&self) -> f64 {
         self.tick / f64::from(self.substeps)
+    }
+
+    /// The same with every step in so many parts that a body whose longest stable step is `share` of that at rest bears them.
+    pub(crate) fn divided(&self, share: f64) -> Self {
+        // What is not a number is zero parts.
+        let parts = (1.0 / (BORNE * share)).ceil().clamp(1.0, MOST_PARTS) as u32;
+        Self { substeps: self.substeps * parts.max(1), ..*self }
     }
 
     /// Runs one tick: calls `substep` for each part of the tool's motion and returns the mean of what it gives.

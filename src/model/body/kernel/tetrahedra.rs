@@ -111,6 +111,20 @@ impl TetrahedraKernel {
     }
 }
 
+impl TetrahedraKernel {
+    /// Calls `found` with the nodes of each element whose faces had grown more than `limit` times in area, squared, in the last
+    /// evaluation; none if pressures are the elements' own.
+    pub(crate) fn stretched(&self, limit: f64, mut found: impl FnMut([u32; 4])) {
+        for part in &self.parts {
+            for (corners, stretches) in part.corners.iter().zip(&part.stretches) {
+                for (lane, _) in stretches.iter().enumerate().filter(|(_, stretch)| **stretch > limit) {
+                    found([0, 1, 2, 3].map(|corner| self.order[part.own.start + corners[corner][lane] as usize]));
+                }
+            }
+        }
+    }
+}
+
 /// Gives every node of every part its J - 1, from what all parts found.
 fn average(parts: &mut [Part], inverse_volumes: &[f64], cores: &Cores) {
     if let [part] = parts {
@@ -154,6 +168,16 @@ struct Batch {
     inverse_volume: Lane,
 }
 
+/// Eight elements at rest, for the first of two passes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Resting {
+    /// V (m^3).
+    volume: Lane,
+    /// Over the sum of the squares of twice the areas of the faces at the first corner (1/m^4).
+    inverse_faces: Lane,
+}
+
 /// The elements that belong to a range of nodes, with working memory of their own: what one core does.
 #[derive(Clone, Debug)]
 struct Part {
@@ -162,8 +186,9 @@ struct Part {
     end: usize,
     corners: Vec<Corners>,
     batches: Vec<Batch>,
-    /// V of eight elements (m^3).
-    volumes: Vec<Lane>,
+    resting: Vec<Resting>,
+    /// By how much the squares of the elements' faces at their first corner have grown: their sum over that at rest.
+    stretches: Vec<Lane>,
     /// True if an element has a viscosity.
     is_viscous: bool,
     nodes: Vec<Motion>,
@@ -183,7 +208,8 @@ impl Part {
             end,
             corners: Vec::new(),
             batches: Vec::new(),
-            volumes: Vec::new(),
+            resting: Vec::new(),
+            stretches: Vec::new(),
             is_viscous: elements.iter().any(|(_, element)| element.viscosity != 0.0),
             nodes: vec![Motion::default(); count + 1],
             forces: vec![Push::default(); count + 1],
@@ -193,6 +219,7 @@ impl Part {
         for members in colour(&nodes, count) {
             part.push(&members, &nodes, elements);
         }
+        part.stretches.resize(part.resting.len(), [0.0; LANES]);
         part
     }
 
@@ -207,7 +234,7 @@ impl Part {
             offset: zero,
             inverse_volume: zero,
         };
-        let mut volumes = zero;
+        let mut resting = Resting { volume: zero, inverse_faces: zero };
         for (lane, &member) in members.iter().enumerate() {
             let element = &elements[member].1;
             (0..4).for_each(|corner| corners[corner][lane] = nodes[member][corner]);
@@ -220,11 +247,12 @@ impl Part {
             batch.pressure[lane] = -element.bulk / 6.0;
             batch.offset[lane] = element.shear_modulus / 6.0;
             batch.inverse_volume[lane] = 1.0 / (6.0 * element.volume);
-            volumes[lane] = element.volume;
+            resting.volume[lane] = element.volume;
+            resting.inverse_faces[lane] = 1.0 / element.faces();
         }
         self.corners.push(corners);
         self.batches.push(batch);
-        self.volumes.push(volumes);
+        self.resting.push(resting);
     }
 
     /// Takes the nodes' motion over and computes their growth, or with pressures of single elements the forces.
@@ -235,8 +263,8 @@ impl Part {
         }
         if is_averaged {
             self.growth.fill(0.0);
-            let Self { corners, volumes, nodes, growth, .. } = self;
-            set.run(Growth { corners, volumes, nodes, growth });
+            let Self { corners, resting, nodes, growth, stretches, .. } = self;
+            set.run(Growth { corners, resting, nodes, growth, stretches });
         } else {
             self.evaluate::<false>(set);
         }
@@ -277,26 +305,30 @@ fn dot<S: Simd>(s: S, a: &[S::V; 3], b: &[S::V; 3]) -> S::V {
     s.fused(a[2], b[2], s.fused(a[1], b[1], s.mul(a[0], b[0])))
 }
 
-/// First of two passes with average nodal pressure: by how much the volume at each node has grown.
+/// First of two passes with average nodal pressure: by how much the volume at each node and the faces of each element have grown.
 struct Growth<'a> {
     corners: &'a [Corners],
-    volumes: &'a [Lane],
+    resting: &'a [Resting],
     nodes: &'a [Motion],
     growth: &'a mut [f64],
+    stretches: &'a mut [Lane],
 }
 
 impl Work for Growth<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { corners, volumes, nodes, growth } = self;
+        let Self { corners, resting, nodes, growth, stretches } = self;
         let sixth = s.splat(1.0 / 6.0);
-        for (corners, volumes) in corners.iter().zip(volumes) {
+        for ((corners, resting), stretch) in corners.iter().zip(resting).zip(stretches) {
             let [[x1, y1, z1, _], _] = s.differences(nodes, &corners[0], &corners[1]);
             let [[x2, y2, z2, _], _] = s.differences(nodes, &corners[0], &corners[2]);
             let [[x3, y3, z3, _], _] = s.differences(nodes, &corners[0], &corners[3]);
-            let determinant = dot(s, &[x1, y1, z1], &cross(s, &[x2, y2, z2], &[x3, y3, z3]));
+            let (d1, d2, d3) = ([x1, y1, z1], [x2, y2, z2], [x3, y3, z3]);
+            let (c1, c2, c3) = (cross(s, &d2, &d3), cross(s, &d3, &d1), cross(s, &d1, &d2));
+            let faces = s.add(s.add(dot(s, &c1, &c1), dot(s, &c2, &c2)), dot(s, &c3, &c3));
+            s.store(s.mul(faces, s.load(&resting.inverse_faces)), stretch);
             let mut grown = [0.0; LANES];
-            s.store(s.sub(s.mul(determinant, sixth), s.load(volumes)), &mut grown);
+            s.store(s.sub(s.mul(dot(s, &d1, &c1), sixth), s.load(&resting.volume)), &mut grown);
             for corner in corners {
                 for lane in 0..LANES {
                     growth[corner[lane] as usize] += grown[lane];

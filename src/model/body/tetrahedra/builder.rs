@@ -3,6 +3,7 @@
 use super::element::Element;
 use super::places::Places;
 use super::solid::Solid;
+use super::stiffening::Stiffening;
 use super::{Tetrahedra, Tissue, TissueRegion, Where};
 use crate::Mat3;
 use crate::body::kernel::TetrahedraKernel;
@@ -91,10 +92,13 @@ impl TetrahedraBuilder {
         let mut inverse_masses = inverse(masses);
         inverse_masses.iter_mut().zip(is_held).filter(|(_, is_held)| *is_held).for_each(|(w, _)| *w = 0.0);
         let inverse_volumes = self.nodal_pressure.then(|| inverse(volumes));
+        let kernel = TetrahedraKernel::new(nodes, &elements, inverse_volumes.as_deref());
+        let solid = Solid::new(nodes, elements, inverse_volumes);
         let mut body = Tetrahedra {
             surface: Surface::new(nodes, mesh.surface_triangles()).map_err(|error| error.at("mesh"))?,
-            kernel: TetrahedraKernel::new(nodes, &elements, inverse_volumes.as_deref()),
-            solid: Solid::new(nodes, elements, inverse_volumes),
+            stiffening: Stiffening::new(&solid, &inverse_masses, &mesh.points),
+            kernel,
+            solid,
             volume: quality.volume,
             mesh,
             left_out,

@@ -54,6 +54,20 @@ impl Element {
         self.inverse * self.inverse.transpose() * self.volume
     }
 
+    /// The sum of the squares of twice the areas of the faces at node 0 at rest (m^4).
+    pub(crate) fn faces(&self) -> f64 {
+        // cof D = det D D^-T.
+        (6.0 * self.volume).powi(2) * self.inverse.norm_squared()
+    }
+
+    /// The gradient of the shape function of `node` at rest (1/m).
+    pub(super) fn gradient(&self, node: u32) -> Vec3 {
+        match self.nodes.iter().position(|&corner| corner == node) {
+            Some(corner @ 1..) => self.inverse.row(corner - 1).transpose(),
+            _ => -self.inverse.row_sum().transpose(),
+        }
+    }
+
     pub(super) fn moved(&self, state: &State) -> Moved {
         let edges = |vectors: &[Vec3]| {
             let [a, b, c, d] = self.nodes.map(|node| vectors[node as usize]);

@@ -6,6 +6,7 @@ mod part;
 mod places;
 mod restriction;
 mod solid;
+mod stiffening;
 mod tissue;
 mod window;
 
@@ -20,6 +21,7 @@ use crate::error::ModelError;
 use crate::mesh::{LeftOut, Surface, TetrahedralMesh};
 use crate::{Mat3, Vec3};
 use solid::Solid;
+use stiffening::Stiffening;
 
 /// A body of linear tetrahedra, made by [`Tetrahedra::builder`]: a continuum of stable neo-Hookean tissue with Young's modulus,
 /// Poisson's ratio, density and viscosity, lumped masses and, by default, average nodal pressure.
@@ -56,6 +58,7 @@ pub struct Tetrahedra {
     solid: Solid,
     volume: f64,
     kernel: TetrahedraKernel,
+    stiffening: Stiffening,
 }
 
 impl Tetrahedra {
@@ -138,6 +141,10 @@ impl Body for Tetrahedra {
 
     fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
         self.solid.tangent(state, nodes, clamp, emit);
+    }
+
+    fn stable_share(&mut self, state: &State) -> f64 {
+        self.stiffening.share(&self.kernel, &self.solid, &self.inverse_masses, state)
     }
 
     fn duplicate(&self) -> Option<Box<dyn Body>> {

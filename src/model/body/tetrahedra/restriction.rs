@@ -47,6 +47,7 @@ impl Tetrahedra {
         let body = Self {
             surface: Surface::default(),
             kernel: TetrahedraKernel::new(order.len(), &part, inverse_volumes.as_deref()),
+            stiffening: self.stiffening.of_part(order.len()),
             volume: part.iter().map(|element| element.volume).sum(),
             solid: Solid::new(order.len(), part, inverse_volumes),
             inverse_masses: order.iter().map(|&node| self.inverse_masses[node as usize]).collect(),

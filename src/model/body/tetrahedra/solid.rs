@@ -1,6 +1,6 @@
 //! Elements and how they hang together: forces and tangents in the rows of some nodes.
 
-use super::element::{EdgeTangent, Element};
+use super::element::{EdgeTangent, Element, Moved};
 use crate::body::{State, TangentBlock};
 use crate::mesh::Lists;
 use crate::{Mat3, Vec3};
@@ -108,7 +108,7 @@ impl Solid {
         let share = |&node: &u32| {
             let mut share: Vec<(u32, Vec3)> = Vec::new();
             for element in self.at(node) {
-                for (corner, gradient) in element.nodes.into_iter().zip(volume_gradients(element, state)) {
+                for (corner, gradient) in element.nodes.into_iter().zip(volume_gradients(&element.moved(state))) {
                     let gradient = gradient * inverse_volumes[node as usize];
                     match share.iter_mut().find(|(other, _)| *other == corner) {
                         Some((_, sum)) => *sum += gradient,
@@ -130,7 +130,7 @@ impl Solid {
         let mut pushes: Vec<(u32, Vec3)> = Vec::new();
         for element in self.at(row) {
             let corner = element.nodes.iter().position(|&corner| corner == row).unwrap_or(0);
-            let push = volume_gradients(element, state)[corner] * (-0.25 * element.bulk);
+            let push = volume_gradients(&element.moved(state))[corner] * (-0.25 * element.bulk);
             for node in element.nodes {
                 match pushes.iter_mut().find(|(other, _)| *other == node) {
                     Some((_, sum)) => *sum += push,
@@ -148,8 +148,8 @@ impl Solid {
 }
 
 /// The gradients of an element's volume by the positions of its nodes (m^2).
-fn volume_gradients(element: &Element, state: &State) -> [Vec3; 4] {
-    let areas = element.moved(state).areas / 6.0;
+pub(super) fn volume_gradients(moved: &Moved) -> [Vec3; 4] {
+    let areas = moved.areas / 6.0;
     let column = |n: usize| areas.column(n).into_owned();
     [-areas.column_sum(), column(0), column(1), column(2)]
 }

@@ -147,7 +147,7 @@ impl LocalModel for LinearPatch {
         if self.ticks == self.boundary.moving_ticks() {
             self.hold_rim();
         }
-        self.patch.feel(wrench, &tool.to)
+        self.patch.feel(wrench, &tool.to, stepping.substeps)
     }
 
     fn built_at(&self) -> u64 {

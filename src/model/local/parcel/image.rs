@@ -45,8 +45,8 @@ impl Image {
             (state.positions[node as usize], state.velocities[node as usize]) = (*x, *v);
         }
         self.simulation.set_friction(parcel.friction);
-        let told = self.simulation.be_told(parcel.stiffness, index, parcel.wrench, |touch, steps| {
-            touch.go_on_from(parcel.contact, parcel.steady, &parcel.felt, steps);
+        let told = self.simulation.be_told(parcel.stiffness, index, parcel.wrench, |touch| {
+            touch.go_on_from(parcel.contact, parcel.steady, &parcel.felt);
         });
         told.beside.clone_from(&parcel.beside);
         told.path.clone_from(&parcel.path);

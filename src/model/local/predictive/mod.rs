@@ -177,16 +177,17 @@ impl Predictive {
         }
     }
 
-    fn substep(&mut self, tool: ToolMotion, d: f64) -> Wrench {
+    /// A step of `d` seconds; the path is sampled `from` and `to` so many substeps after the tick's start.
+    fn step(&mut self, tool: ToolMotion, d: f64, [from, to]: [f64; 2]) -> Wrench {
         self.take_near_forces();
         let force = self.patch.step(tool, d);
+        let start = self.substep as f64;
         if let Some(basis) = &self.basis {
-            self.path.at(self.substep).write_forces(&mut self.ring_forces);
+            self.path.at(start + from).write_forces(&mut self.ring_forces);
             deviations(&mut self.ring_forces, &self.patch.forces[self.patch.window.movable..]);
             basis.answers.step(&mut self.surroundings, &self.ring_forces, d);
         }
-        self.substep += 1;
-        self.path.at(self.substep).write(&mut self.ring_positions, &mut self.ring_velocities);
+        self.path.at(start + to).write(&mut self.ring_positions, &mut self.ring_velocities);
         self.surroundings.add_ring(&mut self.ring_positions, &mut self.ring_velocities);
         self.place_ring();
         force
@@ -230,9 +231,17 @@ impl LocalModel for Predictive {
             return wrench;
         }
         let stepping = self.patch.stepping;
+        let divided = stepping.divided(self.near.stable_share());
+        let parts = f64::from(divided.substeps / stepping.substeps);
         self.patch.touch.begin();
-        let wrench = stepping.tick(tool, |tool, d| self.substep(tool, d));
-        self.patch.feel(wrench, &tool.to)
+        let mut steps = 0.0;
+        let wrench = divided.tick(tool, |tool, d| {
+            let from = steps;
+            steps += 1.0;
+            self.step(tool, d, [from / parts, steps / parts])
+        });
+        self.substep += stepping.substeps as usize;
+        self.patch.feel(wrench, &tool.to, divided.substeps)
     }
 
     fn built_at(&self) -> u64 {

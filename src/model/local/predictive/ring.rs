@@ -45,6 +45,12 @@ impl NearBody {
         self.forces.len()
     }
 
+    /// The longest stable step where its forces were asked for last, over that at rest.
+    pub(super) fn stable_share(&mut self) -> f64 {
+        let Self { restriction, state, .. } = self;
+        restriction.as_mut().map_or(1.0, |near| near.body.stable_share(state))
+    }
+
     /// Writes the force that it puts on each node of the window (N); patch, ring and held nodes come first there as here.
     pub(super) fn forces(&mut self, window: &State, forces: &mut [Vec3]) {
         let count = self.forces.len();
@@ -121,19 +127,20 @@ impl RingPath {
         self.samples.truncate(self.samples.len().saturating_sub(count * size).max(size));
     }
 
-    /// The ring at the start of substep `n`, which may lie past the end.
-    pub(super) fn at(&self, n: usize) -> RingSample<'_> {
+    /// The ring `substeps` after the first sample, which may lie past the end.
+    pub(super) fn at(&self, substeps: f64) -> RingSample<'_> {
         let last = (self.samples.len() / (3 * self.numbers).max(1)).saturating_sub(1);
-        let stride = self.stride.max(1);
-        let (before, since) = (n / stride, n % stride);
+        let stride = self.stride.max(1) as f64;
+        let before = (substeps / stride) as usize;
+        let since = substeps - before as f64 * stride;
         let sample = |at: usize| {
             let sample = &self.samples[at.min(last) * 3 * self.numbers..];
             [0, 1, 2].map(|quantity| &sample[quantity * self.numbers..(quantity + 1) * self.numbers])
         };
-        let beyond = n.saturating_sub(last * stride) as f64 * self.step;
+        let beyond = (substeps - last as f64 * stride).max(0.0) * self.step;
         RingSample {
-            around: [sample(before), sample(if since == 0 { before } else { before + 1 })],
-            share: since as f64 / stride as f64,
+            around: [sample(before), sample(if since == 0.0 { before } else { before + 1 })],
+            share: since / stride,
             coasted: beyond.min(COASTING),
             moves: beyond < COASTING,
         }
@@ -193,10 +200,10 @@ mod tests {
     }
 
     /// Position and velocity along x, and force along y.
-    fn at(path: &RingPath, n: usize) -> (f64, f64, f64) {
+    fn at(path: &RingPath, n: u32) -> (f64, f64, f64) {
         let [mut x, mut v, mut f] = [[0.0; 3]; 3];
-        path.at(n).write(&mut x, &mut v);
-        path.at(n).write_forces(&mut f);
+        path.at(n.into()).write(&mut x, &mut v);
+        path.at(n.into()).write_forces(&mut f);
         (x[0], v[0], f[1])
     }
 

@@ -12,6 +12,7 @@ mod tool_support;
 mod built_anew;
 mod contact_hard_cases;
 mod contact_invariants;
+mod crushed_tissue;
 mod implicit_step;
 mod paper_equations;
 mod parcel;

@@ -1,0 +1,108 @@
+//! How much shorter the stable step of a crushed body is.
+//!
+//! A nearly incompressible body is as stiff as its pressures answer to its volumes. With average nodal pressure their part of the
+//! linearisation is a sum over nodes, w^2 = lambda/4 M^-1 sum h h^T / V, h the gradients of the volumes around the node by the positions.
+//! These are areas, and grow where elements are flattened. The largest term of one node follows the largest eigenvalue closely: on
+//! spheres that were pressed 4 to 12 mm deep into tissue with a Poisson's ratio of 0.45 and 0.49, at 0.05 to 3 m/s, their ratio was 0.99
+//! to 1.35 times that at rest wherever steps have to be divided. Viscosity brakes a node by its own block of C, which grows with the
+//! square of the stretch.
+
+use super::solid::{Solid, volume_gradients};
+use crate::body::State;
+use crate::body::kernel::TetrahedraKernel;
+use crate::integrator::Spectrum;
+use crate::{Mat3, Vec3};
+
+/// By how much the faces of an element have grown in area, squared, before its nodes are looked at.
+const STRETCHED: f64 = 1.5;
+/// The largest eigenvalue over the largest term of a node: 2.2 to 3.7 at rest.
+const COUPLED: f64 = 2.6;
+/// The same of viscosity: 1.1 to 1.4.
+const BRAKED: f64 = 1.4;
+
+/// Finds the node that allows the shortest step.
+#[derive(Clone, Debug)]
+pub(super) struct Stiffening {
+    /// The longest stable step at rest, by the same measure (s).
+    at_rest: f64,
+    /// Working memory: nodes of stretched elements, and for each node if it is one of them, and a sum that is zero in between.
+    stretched: Vec<u32>,
+    is_stretched: Vec<bool>,
+    sums: Vec<Vec3>,
+}
+
+impl Stiffening {
+    /// Of a body at rest.
+    pub(super) fn new(solid: &Solid, inverse_masses: &[f64], rest: &[Vec3]) -> Self {
+        let mut new = Self::with(f64::INFINITY, rest.len());
+        if solid.inverse_volumes.is_some() {
+            let (state, nodes) = (State::at_rest(rest), 0..rest.len() as u32);
+            let steps = nodes.map(|node| new.stable_step(solid, inverse_masses, &state, node));
+            new.at_rest = steps.fold(f64::INFINITY, f64::min);
+        }
+        new
+    }
+
+    /// Of a part with `nodes` nodes of the body, which takes the body's steps.
+    pub(super) fn of_part(&self, nodes: usize) -> Self {
+        Self::with(self.at_rest, nodes)
+    }
+
+    fn with(at_rest: f64, nodes: usize) -> Self {
+        let (stretched, is_stretched) = (Vec::with_capacity(nodes), vec![false; nodes]);
+        Self { at_rest, stretched, is_stretched, sums: vec![Vec3::zeros(); nodes] }
+    }
+
+    /// The longest stable step in `state`, the last that the `kernel` has evaluated, over that at rest; at most 1.
+    pub(super) fn share(
+        &mut self,
+        kernel: &TetrahedraKernel,
+        solid: &Solid,
+        inverse_masses: &[f64],
+        state: &State,
+    ) -> f64 {
+        let Self { stretched, is_stretched, .. } = self;
+        kernel.stretched(STRETCHED, |nodes| {
+            for node in nodes {
+                if !std::mem::replace(&mut is_stretched[node as usize], true) {
+                    stretched.push(node);
+                }
+            }
+        });
+        let mut share: f64 = 1.0;
+        while let Some(node) = self.stretched.pop() {
+            self.is_stretched[node as usize] = false;
+            share = share.min(self.stable_step(solid, inverse_masses, state, node) / self.at_rest);
+        }
+        share
+    }
+
+    /// The longest stable step of `node` (s).
+    fn stable_step(&mut self, solid: &Solid, inverse_masses: &[f64], state: &State, node: u32) -> f64 {
+        let Some(inverse_volumes) = &solid.inverse_volumes else { return f64::INFINITY };
+        let (mut shear, mut damping) = (0.0, Mat3::zeros());
+        for element in solid.at(node) {
+            let root = element.bulk.sqrt();
+            let (moved, gradient) = (element.moved(state), element.gradient(node));
+            for (corner, area) in element.nodes.into_iter().zip(volume_gradients(&moved)) {
+                self.sums[corner as usize] += area * root;
+            }
+            shear += element.shear_modulus * element.volume * gradient.norm_squared();
+            if element.viscosity > 0.0 {
+                let stretch = moved.edges * element.inverse;
+                let along = stretch * gradient;
+                damping += (stretch * stretch.transpose() * gradient.norm_squared() + along * along.transpose())
+                    * (element.viscosity * element.volume);
+            }
+        }
+        let swelling = |corner: u32| {
+            std::mem::take(&mut self.sums[corner as usize]).norm_squared() * inverse_masses[corner as usize]
+        };
+        let swelling: f64 = solid.at(node).flat_map(|element| element.nodes).map(swelling).sum();
+        let (inverse_mass, quarter) = (inverse_masses[node as usize], 0.25 * inverse_volumes[node as usize]);
+        let stiffness = COUPLED * (swelling * quarter + shear * inverse_mass);
+        // Near the largest eigenvalue of the block, without an iteration.
+        let damping = BRAKED * (damping * damping).norm().sqrt() * inverse_mass;
+        Spectrum { stiffness, damping }.stable_step()
+    }
+}
