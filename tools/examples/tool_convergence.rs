@@ -4,7 +4,7 @@
 //! Look for: ratios to Hertz near one, spreads of a few percent for spheres where points feel a factor, and forces under
 //! refinement that come to a limit.
 //!
-//! `cargo run --release -p palpate-cli --example tool_convergence [-- slide|places|refine|hertz|presses|all]`: without a word the slide,
+//! `cargo run --release -p palpate-cli --example tool_convergence [-- slide|places|refine|hertz|presses|crushed|all]`: without a word the slide,
 //! which takes seconds.
 
 #[path = "../../src/model/tests/tissue_support/mod.rs"]
@@ -24,12 +24,13 @@ const RATIOS: [f64; 3] = [0.3, 0.45, 0.49];
 
 fn main() {
     let asked = std::env::args().nth(1).unwrap_or_else(|| "slide".to_owned());
-    let parts: [(&str, fn()); 5] = [
+    let parts: [(&str, fn()); 6] = [
         ("slide", slides),
         ("places", places),
         ("refine", refinement),
         ("hertz", table_of_hertz),
         ("presses", presses),
+        ("crushed", crushed),
     ];
     parts.into_iter().filter(|(name, _)| asked == "all" || asked == *name).for_each(|(_, part)| part());
 }
@@ -83,6 +84,56 @@ fn presses() {
     println!("| --- | ---: | ---: | ---: | ---: |");
     let [low, high] = BORDERS;
     let names = [format!("up to {low}"), format!("{low} to {high}"), format!("more than {high}"), "all".to_owned()];
+    print_errors(names, errors);
+}
+
+/// Spheres that crush slabs of any tissue to a part of their thickness, at any speed: how far the largest force is from that in a quarter of
+/// the steps, and how many ran away.
+fn crushed() {
+    const PRESSES: u32 = 100;
+    /// Depth as a share of the slab's thickness.
+    const BORDERS: [f64; 2] = [0.4, 0.6];
+    /// As in `presses`, for seven dimensions: powers of the root of x^8 = x + 1, which is 1.0970.
+    const STEPS: [f64; 7] = [0.9116, 0.8310, 0.7576, 0.6906, 0.6296, 0.5739, 0.5232];
+    let (mut errors, mut runaways) = ([const { Vec::new() }; 4], 0);
+    for n in 1..=PRESSES {
+        let [thick, size, radius, deep, ratio, fast, viscosity] = STEPS.map(|step| (0.5 + f64::from(n) * step).fract());
+        let (thick, size, radius) = (6e-3 + 14e-3 * thick, 1.8e-3 + 1.7e-3 * size, 3e-3 + 6e-3 * radius);
+        let depth = (0.3 + 0.5 * deep) * thick.min(1.6 * radius);
+        let (ratio, viscosity) = ([0.3, 0.45, 0.48, 0.49][(4.0 * ratio) as usize], 4.0 * viscosity);
+        // From 5 cm/s to 3 m/s.
+        let speed = 0.05 * 60.0_f64.powf(fast);
+        let peak = |times: u32| {
+            let felt =
+                crush(tissue_support::slab(thick, size, ratio, viscosity), thick, radius, [depth, speed], times, 60);
+            felt.into_iter()
+                .fold(0.0_f64, |peak, force| if force.is_finite() { peak.max(force) } else { f64::INFINITY })
+        };
+        let [felt, expected] = [1, 4].map(peak);
+        if expected > 50.0 || felt > 1.5 * expected + 0.05 {
+            runaways += 1;
+            println!("ran away: {felt:.1e} of {expected:.1e} N, {:.1} mm deep in {:.1} mm", 1e3 * depth, 1e3 * thick);
+            continue;
+        }
+        let class = BORDERS.iter().filter(|&&border| depth > border * thick).count();
+        errors[class].push(100.0 * (felt / expected - 1.0).abs());
+        errors[3].push(100.0 * (felt / expected - 1.0).abs());
+    }
+    println!("\nForces that ran away: {runaways} of {PRESSES}.");
+    println!("\n| depth of the thickness | presses | half (%) | 9 of 10 (%) | worst (%) |");
+    println!("| --- | ---: | ---: | ---: | ---: |");
+    let [low, high] = BORDERS.map(|share| 100.0 * share);
+    let names = [
+        format!("{low:.0} % or less"),
+        format!("{low:.0} to {high:.0} %"),
+        format!("more than {high:.0} %"),
+        "all".to_owned(),
+    ];
+    print_errors(names, errors);
+}
+
+/// A row for each class of presses.
+fn print_errors(names: [String; 4], errors: [Vec<f64>; 4]) {
     for (name, mut errors) in names.into_iter().zip(errors) {
         errors.sort_by(f64::total_cmp);
         let at = |share: f64| errors[((errors.len() - 1) as f64 * share).round() as usize];

@@ -1,22 +1,14 @@
 //! Tissue that is crushed becomes too stiff for steps that are stable at rest.
 
-use crate::tissue_support::{Noise, body, irregular_box};
+use crate::tissue_support::{Noise, WIDE, slab};
+use crate::tool_support::{crush, resting};
 use palpate_model::Vec3;
-use palpate_model::body::{Body, State, TangentBlock, Tetrahedra, Tissue};
-use palpate_model::contact::{Contact, Law, ToolMotion, ToolShape};
+use palpate_model::body::{Body, State, TangentBlock, Tetrahedra};
+use palpate_model::contact::{ToolMotion, ToolShape};
 use palpate_model::integrator::Spectrum;
 use palpate_model::local::{Kind, ResyncView, Template, ToolForecast};
 use palpate_model::mesh::Surface;
-use palpate_model::simulation::{Simulation, Stepping};
 use palpate_model::surroundings::Bases;
-
-const WIDE: f64 = 0.03;
-
-fn slab(thick: f64, size: f64, poisson_ratio: f64, viscosity: f64) -> Tetrahedra {
-    let cells = [WIDE, WIDE, thick].map(|extent| ((extent / size) as usize).max(2));
-    let tissue = Tissue { young_modulus: 5e3, poisson_ratio, density: 1060.0, viscosity };
-    body(irregular_box(cells, [WIDE, WIDE, thick], 0.15), tissue, true)
-}
 
 /// A body around a state that is not its rest: its forces are what they are more than there.
 #[derive(Debug)]
@@ -89,22 +81,6 @@ fn the_longest_stable_step_of_a_crushed_body_is_known() {
     }
 }
 
-/// A sphere of `radius` that goes down at `speed` (m/s) until it is `depth` deep in the middle of a slab.
-fn way(thick: f64, radius: f64, depth: f64, speed: f64) -> impl Fn(u32) -> Vec3 {
-    move |tick| {
-        let down = (speed * 1e-3 * f64::from(tick)).min(depth + 1e-4);
-        Vec3::new(0.51 * WIDE, 0.488 * WIDE, thick + radius + 1e-4 - down)
-    }
-}
-
-fn simulation(body: Tetrahedra, radius: f64, substeps: u32) -> Simulation {
-    let state = State::at_rest(body.rest());
-    let stepping = Stepping { tick: 1e-3, substeps };
-    Simulation::new(Box::new(body), state, Contact::default(), Law::default(), stepping)
-        .unwrap()
-        .with_shape(0, ToolShape::Sphere { radius })
-}
-
 /// Check that presses that are slow, or fast, into tissue that can hardly be compressed feel as they do in steps of a quarter; with the steps
 /// that are stable at rest all of them ran away.
 #[test]
@@ -115,19 +91,13 @@ fn deep_presses_do_not_run_away() {
         (19.5e-3, 3.0e-3, 0.48, 3.1, 8.8e-3, 10.8e-3, 1.05),
         (13.0e-3, 2.1e-3, 0.45, 0.8, 5.8e-3, 7.4e-3, 3.13),
     ] {
-        let body = slab(thick, size, poisson_ratio, viscosity);
-        let substeps = Stepping::stable_substeps(&mut body.clone(), 1e-3);
-        let at = way(thick, radius, depth, speed);
-        let ticks = (depth / speed * 1e3) as u32 + 30;
-        let peak = |substeps: u32| {
-            let mut simulation = simulation(body.clone(), radius, substeps);
-            (0..ticks).fold(0.0_f64, |peak, tick| {
-                let force = simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force.norm();
-                assert!(force.is_finite(), "{speed} m/s, tick {tick}");
-                peak.max(force)
-            })
+        let peak = |times: u32| {
+            let body = slab(thick, size, poisson_ratio, viscosity);
+            let felt = crush(body, thick, radius, [depth, speed], times, 30);
+            felt.into_iter()
+                .fold(0.0_f64, |peak, force| if force.is_finite() { peak.max(force) } else { f64::INFINITY })
         };
-        let [felt, expected] = [1, 4].map(|times| peak(times * substeps));
+        let [felt, expected] = [1, 4].map(peak);
         println!("{speed} m/s: {felt:.3} of {expected:.3} N");
         assert!((felt / expected - 1.0).abs() < 0.25, "{speed} m/s: {felt} of {expected} N");
     }
@@ -138,10 +108,15 @@ fn deep_presses_do_not_run_away() {
 fn a_local_model_of_crushed_tissue_does_not_run_away() {
     let (thick, radius, depth, speed) = (9.3e-3, 7e-3, 6.9e-3, 0.25);
     let body = slab(thick, 2.4e-3, 0.49, 2.6);
-    let substeps = Stepping::stable_substeps(&mut body.clone(), 1e-3);
     let template = Template::new(Kind::Predicted, [9, 9, 4], &body).unwrap();
-    let mut global = simulation(body, radius, substeps);
-    let at = way(thick, radius, depth, speed);
+    let mut global = resting(Box::new(body), ToolShape::Sphere { radius });
+    let at = |tick: u32| {
+        Vec3::new(
+            0.51 * WIDE,
+            0.488 * WIDE,
+            (thick + radius - speed * 1e-3 * f64::from(tick)).max(thick + radius - depth),
+        )
+    };
     let taken_over = 20;
     for tick in 0..taken_over {
         global.tick(ToolMotion::straight(at(tick), at(tick + 1)));

@@ -137,6 +137,16 @@ pub fn body(mesh: TetrahedralMesh, tissue: Tissue, is_averaged: bool) -> Tetrahe
     builder.fix(bottom()).build().expect("a valid body")
 }
 
+/// Width of a slab (m).
+pub const WIDE: f64 = 0.03;
+
+/// A slab of tissue, `thick` (m) and held at its bottom, with irregular elements of `size` (m).
+pub fn slab(thick: f64, size: f64, poisson_ratio: f64, viscosity: f64) -> Tetrahedra {
+    let cells = [WIDE, WIDE, thick].map(|extent| ((extent / size) as usize).max(2));
+    let tissue = Tissue { young_modulus: 5e3, poisson_ratio, density: 1060.0, viscosity };
+    body(irregular_box(cells, [WIDE, WIDE, thick], 0.15), tissue, true)
+}
+
 /// A state with displacements up to `size` (m) and velocities up to `speed` (m/s).
 pub fn shaken(rest: &[Vec3], size: f64, speed: f64) -> State {
     let mut noise = Noise(3);

@@ -7,7 +7,7 @@ use palpate_model::mesh::{Face, Group, TetrahedralMesh};
 use palpate_model::simulation::{Simulation, Stepping};
 use palpate_model::{Vec3, Wrench};
 
-use crate::tissue_support::{bent::centred, body, organ, orient};
+use crate::tissue_support::{WIDE, bent::centred, body, organ, orient};
 
 /// Young's modulus of the tissue that is pressed (Pa).
 pub const YOUNG: f64 = 5000.0;
@@ -17,8 +17,13 @@ pub const CALM: f64 = 0.93;
 pub const SIDE: f64 = 0.1;
 
 /// A body without contact yet, at rest, with steps that are stable and no friction.
-pub fn resting(mut body: Box<dyn Body>, shape: ToolShape) -> Simulation {
-    let stepping = Stepping { tick: 1e-3, substeps: Stepping::stable_substeps(&mut *body, 1e-3) };
+pub fn resting(body: Box<dyn Body>, shape: ToolShape) -> Simulation {
+    resting_in(body, shape, 1)
+}
+
+/// The same in so many times the steps.
+pub fn resting_in(mut body: Box<dyn Body>, shape: ToolShape, times: u32) -> Simulation {
+    let stepping = Stepping { tick: 1e-3, substeps: times * Stepping::stable_substeps(&mut *body, 1e-3) };
     let state = State::at_rest(body.rest());
     Simulation::new(body, state, Contact::default(), Law::default(), stepping).expect("it fits").with_shape(0, shape)
 }
@@ -53,6 +58,18 @@ impl Calm {
         }
         sum / n
     }
+}
+
+/// What a sphere of `radius` (m) feels in each tick (N) as it goes down at `speed` (m/s) to `depth` (m) in the middle of a `slab` that
+/// is `thick` (m), in so many times the steps that are stable at rest, and for `rest` ticks after.
+pub fn crush(slab: Tetrahedra, thick: f64, radius: f64, [depth, speed]: [f64; 2], times: u32, rest: u32) -> Vec<f64> {
+    let at = |tick: u32| {
+        let down = (speed * 1e-3 * f64::from(tick)).min(depth + 1e-4);
+        Vec3::new(0.51 * WIDE, 0.488 * WIDE, thick + radius + 1e-4 - down)
+    };
+    let mut simulation = resting_in(Box::new(slab), ToolShape::Sphere { radius }, times);
+    let ticks = (depth / speed * 1e3) as u32 + rest;
+    (0..ticks).map(|tick| simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force.norm()).collect()
 }
 
 /// What a tool that is pressed in feels at last.
