@@ -3,8 +3,8 @@
 //! A nearly incompressible body is as stiff as its pressures answer to its volumes. With average nodal pressure their part of the
 //! linearisation is a sum over nodes, w^2 = lambda/4 M^-1 sum h h^T / V, h the gradients of the volumes around the node by the positions.
 //! These are areas, and grow where elements are flattened. The largest term of one node follows the largest eigenvalue closely: on
-//! spheres that were pressed 4 to 12 mm deep into tissue with a Poisson's ratio of 0.45 and 0.49, at 0.05 to 3 m/s, their ratio was 0.99
-//! to 1.35 times that at rest wherever steps have to be divided. Viscosity brakes a node by its own block of C, which grows with the
+//! spheres that were pressed 4 to 12 mm deep into tissue with a Poisson's ratio of 0.45 and 0.49, at 0.05 to 3 m/s, their ratio was 0.9
+//! to 1.4 times that at rest wherever steps have to be divided. Viscosity brakes a node by its own block of C, which grows with the
 //! square of the stretch.
 
 use super::solid::{Solid, volume_gradients};
