@@ -109,9 +109,7 @@ impl TetrahedraKernel {
             }
         });
     }
-}
 
-impl TetrahedraKernel {
     /// Calls `found` with the nodes of each element whose faces had grown more than `limit` times in area, squared, in the last
     /// evaluation; none if pressures are the elements' own.
     pub(crate) fn stretched(&self, limit: f64, mut found: impl FnMut([u32; 4])) {

@@ -60,16 +60,25 @@ impl Calm {
     }
 }
 
-/// What a sphere of `radius` (m) feels in each tick (N) as it goes down at `speed` (m/s) to `depth` (m) in the middle of a `slab` that
-/// is `thick` (m), in so many times the steps that are stable at rest, and for `rest` ticks after.
-pub fn crush(slab: Tetrahedra, thick: f64, radius: f64, [depth, speed]: [f64; 2], times: u32, rest: u32) -> Vec<f64> {
-    let at = |tick: u32| {
-        let down = (speed * 1e-3 * f64::from(tick)).min(depth + 1e-4);
-        Vec3::new(0.51 * WIDE, 0.488 * WIDE, thick + radius + 1e-4 - down)
-    };
+/// Where a sphere of `radius` (m) is at the start of a tick as it goes down at `speed` (m/s) to `depth` (m) in the middle of a slab that is
+/// `thick` (m).
+pub fn down(thick: f64, radius: f64, [depth, speed]: [f64; 2]) -> impl Fn(u32) -> Vec3 {
+    move |tick| {
+        let way = (speed * 1e-3 * f64::from(tick)).min(depth + 1e-4);
+        Vec3::new(0.51 * WIDE, 0.488 * WIDE, thick + radius + 1e-4 - way)
+    }
+}
+
+/// The largest force (N) on a sphere that goes [`down`] into `slab` in so many times the steps that are stable at rest, and in `rest` ticks
+/// after; infinite if one is not finite.
+pub fn crush(slab: Tetrahedra, thick: f64, radius: f64, way: [f64; 2], times: u32, rest: u32) -> f64 {
+    let at = down(thick, radius, way);
     let mut simulation = resting_in(Box::new(slab), ToolShape::Sphere { radius }, times);
-    let ticks = (depth / speed * 1e3) as u32 + rest;
-    (0..ticks).map(|tick| simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force.norm()).collect()
+    let ticks = (way[0] / way[1] * 1e3) as u32 + rest;
+    (0..ticks).fold(0.0, |peak: f64, tick| {
+        let force = simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force.norm();
+        if force.is_finite() { peak.max(force) } else { f64::INFINITY }
+    })
 }
 
 /// What a tool that is pressed in feels at last.
