@@ -2,13 +2,6 @@
 
 use crate::Vec3;
 
-/// False if whatever is in the box from `low` to `high` is surely farther than `distance` (m) from the axis.
-pub(super) fn may_be_near([from, to]: &[Vec3; 2], distance: f64, low: &Vec3, high: &Vec3) -> bool {
-    // How far the box of the axis is from the other, along each edge.
-    let apart = (from.inf(to) - high).sup(&(low - from.sup(to))).sup(&Vec3::zeros());
-    apart.norm_squared() <= distance * distance
-}
-
 /// The place on a triangle that is nearest to a point.
 ///
 /// Source: Ericson, Real-Time Collision Detection (2005), section 5.1.5.

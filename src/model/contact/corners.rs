@@ -37,9 +37,7 @@ impl Corners {
         axis: &[Vec3; 2],
         mut keep: impl FnMut(Near),
     ) {
-        let (skin, fine, radius) = (&*touch.skin, touch.steady.fineness, touch.shape.radius());
-        // Along a capsule surfaces that it has pressed in are straight.
-        let curved = if touch.shape.half_axis() == Vec3::zeros() { 1.0 } else { 0.5 };
+        let (fine, radius) = (touch.steady.fineness, touch.shape.radius());
         self.is_met.clear();
         self.is_met.resize(vicinity.nodes.len(), false);
         if fine == 0.0 {
@@ -64,8 +62,7 @@ impl Corners {
                 let share = closest::share_at(axis, &place);
                 let away = axis[0] + (axis[1] - axis[0]) * share - place;
                 let (number, node) = (number as usize, vicinity.nodes[number as usize] as usize);
-                let beyond = (1.0 - fine) * skin.depth(node) + fine * curved * mean_chord(skin.edge(node), radius);
-                let gap = away.norm() - radius - beyond;
+                let gap = away.norm() - radius - beyond(touch, node);
                 if gap >= 0.0 || away.dot(&self.outward[number]) <= 0.0 {
                     continue;
                 }
@@ -81,6 +78,14 @@ impl Corners {
     pub(super) fn are_met(&self, places: &[u32; 3], weights: &[f64; 3]) -> bool {
         places.iter().zip(weights).all(|(place, weight)| *weight == 0.0 || self.is_met[*place as usize])
     }
+}
+
+/// How far from the tool's own surface the corner at `node` is met (m).
+pub(super) fn beyond(touch: &Touch, node: usize) -> f64 {
+    let (skin, fine) = (&touch.skin, touch.steady.fineness);
+    // Along a capsule surfaces that it has pressed in are straight.
+    let curved = if touch.shape.half_axis() == Vec3::zeros() { 1.0 } else { 0.5 };
+    (1.0 - fine) * skin.depth(node) + fine * curved * mean_chord(skin.edge(node), touch.shape.radius())
 }
 
 /// How deep a place of a triangle whose corners lie on a sphere of `radius` (m) is inside it (m); no deeper than where elements are as coarse as

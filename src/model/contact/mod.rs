@@ -19,6 +19,7 @@ mod corners;
 mod coupled;
 mod deformable;
 mod exact;
+mod extent;
 mod friction;
 mod grain;
 mod near;

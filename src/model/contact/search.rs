@@ -2,13 +2,14 @@
 
 use super::ToolMotion;
 use super::closest;
-use super::corners::{Corners, chord};
+use super::corners::{self, Corners, chord};
 use super::deformable::Deformable;
+use super::extent::Extent;
 use super::near::Near;
 use super::passing;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
-use super::vicinity::{MAX_DEPTH, Vicinity};
+use super::vicinity::{MAX_DEPTH, NARROW, Vicinity};
 use crate::{Pose, Vec3};
 
 /// Within so many radii of the surface the way from there to the axis is rounding: an axis that goes through a triangle is at none.
@@ -18,39 +19,60 @@ const ON_SURFACE: f64 = 1e-3;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Search {
     pub(super) near: Vec<Near>,
-    /// Of each tool.
-    vicinities: Vec<Vicinity>,
+    /// Of each tool: the wide one, and the part of it that is looked at while little moves.
+    vicinities: Vec<[Vicinity; 2]>,
     /// The corners of a vicinity as the tool meets them at the start of the step, and at its end if nothing presses (m).
     corners: Vec<[Vec3; 2]>,
     fine: Corners,
+    /// How far the triangles of a vicinity are from the tool's axis at least, squared (m^2).
+    apart: Vec<f64>,
+    /// Working memory for what passes through the surface.
+    sides: Vec<u8>,
 }
 
 impl Search {
     /// For so many tools.
     pub(super) fn new(tools: usize) -> Self {
-        let vicinities = vec![Vicinity::default(); tools];
+        let vicinities = vec![<[Vicinity; 2]>::default(); tools];
         Self { near: Vec::with_capacity(MOST_POINTS), vicinities, ..Self::default() }
     }
 
     /// Makes room for a body of so many nodes and candidates, and forgets another one.
     pub(super) fn make_room(&mut self, nodes: usize, candidates: usize) {
-        self.vicinities.iter_mut().for_each(|vicinity| vicinity.make_room(nodes, candidates));
+        self.vicinities.iter_mut().flatten().for_each(|vicinity| vicinity.make_room(nodes, candidates));
         self.corners.reserve(nodes);
+        self.sides.reserve(nodes);
+        self.apart.reserve(candidates);
         self.fine.make_room(nodes);
     }
 
     /// Finds the places that would overlap with a tool at the end of the step if nothing pressed.
     pub(super) fn find(&mut self, body: &Deformable<'_>, (tool, touch): (usize, &Touch), motion: ToolMotion, d: f64) {
         self.near.clear();
-        let mut vicinity = std::mem::take(&mut self.vicinities[tool]);
-        vicinity.update(body, touch, motion, d);
+        let [mut wide, mut narrow] = std::mem::take(&mut self.vicinities[tool]);
+        if wide.update(body, touch, motion, d) {
+            narrow.forget();
+        }
+        let is_narrow = narrow.is_narrow(body, touch, motion, d);
+        let vicinity = if is_narrow { &narrow } else { &wide };
         self.corners.clear();
         self.corners
             .extend(vicinity.nodes.iter().map(|&node| body.corner(&touch.skin, touch.steady.fineness, node, d)));
-        if !self.find_passed(&vicinity, touch, motion) {
-            self.find_near(&vicinity, touch, &motion.to);
+        if !self.find_passed(vicinity, touch, motion) {
+            let front = self.find_near(vicinity, touch, &motion.to);
+            if !is_narrow {
+                // What is nearest stays so near, or nearer: what is farther is neither the nearest nor touched.
+                let radius = touch.shape.radius();
+                let nearest = (front + NARROW).min(radius + MAX_DEPTH);
+                let beyond = |place: u32| corners::beyond(touch, wide.nodes[place as usize] as usize);
+                narrow.narrow(&wide, (body, touch), motion, d, |number, more| {
+                    let beyond = wide.corners[number].into_iter().map(beyond).fold(0.0, f64::max);
+                    let reach = nearest.max(radius + beyond) + more;
+                    self.apart[number] <= reach * reach
+                });
+            }
         }
-        self.vicinities[tool] = vicinity;
+        self.vicinities[tool] = [wide, narrow];
     }
 
     /// A place of the surface that the axis passes within the step; whatever else is near at its end is the far side.
@@ -61,8 +83,8 @@ impl Search {
         for end in 0..ends {
             let share = [0.0, 1.0, 0.5][end];
             let [from, to] = [from, to].map(|[a, b]| a + (b - a) * share);
-            let candidates = vicinity.corners.iter().map(|nodes| nodes.map(|node| self.corners[node as usize]));
-            let Some((found, weights)) = passing::first(candidates, [from, to]) else { continue };
+            let found = passing::first(&vicinity.corners, &self.corners, [from, to], &mut self.sides);
+            let Some((found, weights)) = found else { continue };
             let corners = vicinity.corners[found].map(|node| self.corners[node as usize][1]);
             let place = interpolate(&weights, &corners);
             let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
@@ -74,12 +96,15 @@ impl Search {
         !self.near.is_empty()
     }
 
-    fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) {
+    /// Whatever is near at the end of the step; returns how far the nearest place in front of the surface is from the axis (m).
+    fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) -> f64 {
         let (shape, skin, fine) = (&touch.shape, &*touch.skin, touch.steady.fineness);
         let coarse = 1.0 - fine;
         let (radius, axis) = (shape.radius(), shape.axis(pose));
         let is_long = shape.half_axis() != Vec3::zeros();
-        let Self { near: list, corners, fine: met, .. } = self;
+        let around_axis = Extent::around(&axis);
+        let Self { near: list, corners, fine: met, apart, .. } = self;
+        apart.clear();
         met.find(vicinity, |place| corners[place as usize][1], touch, &axis, |found| keep(list, found));
         // The nearest place in front of the surface, and the nearest behind it.
         let (mut front, mut behind) = (f64::INFINITY, None::<Near>);
@@ -89,10 +114,12 @@ impl Search {
             // It touches, or is the nearest of all.
             let touching = radius + depths.into_iter().fold(0.0, f64::max);
             let distance = touching.max(front.min(radius + MAX_DEPTH));
-            let [a, b, c] = &corners;
-            if !closest::may_be_near(&axis, distance, &a.inf(b).inf(c), &a.sup(b).sup(c)) {
+            let squared = Extent::around(&corners).apart_squared(&around_axis);
+            apart.push(squared);
+            if squared > distance * distance {
                 continue;
             }
+            let [a, b, c] = &corners;
             let across = (b - a).cross(&(c - a));
             let shares = [closest::share_of_axis(&axis, &corners), 0.0, 1.0];
             for share in if is_long { &shares[..] } else { &shares[..1] } {
@@ -142,6 +169,7 @@ impl Search {
             list.clear();
             list.push(behind);
         }
+        front
     }
 }
 
@@ -153,5 +181,68 @@ fn keep(places: &mut Vec<Near>, near: Near) {
         && near.gap < shallowest.gap
     {
         *shallowest = near;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::skin::Skin;
+    use super::super::{Contact, ToolShape};
+    use super::*;
+    use crate::body::{Block, Body, State};
+    use crate::mesh::Face;
+
+    /// A tool that goes to and fro over a top that swings, faster and faster, at times a jump: what it finds hangs on where things are, and
+    /// not on what was looked at before.
+    #[test]
+    fn whoever_looks_at_little_finds_what_a_search_of_everything_does() {
+        let block = Block::builder([9, 9, 3], [0.08, 0.08, 0.02]).fix(Face::ZMin).build().unwrap();
+        let candidates: Vec<u32> = (0..block.surface().triangles.len() as u32).collect();
+        let (mut found, mut inside, mut narrow) = (0, 0, 0);
+        let half_axis = Vec3::new(6e-3, 2e-3, 1e-3);
+        for shape in [
+            ToolShape::Sphere { radius: 4e-3 },
+            ToolShape::Sphere { radius: 40e-3 },
+            ToolShape::Capsule { radius: 3e-3, half_axis },
+        ] {
+            let mut touch = Touch::new(shape, Arc::new(Skin::new(&block, shape.radius())), Contact::default());
+            let mut kept = Search::new(1);
+            kept.make_room(block.rest().len(), candidates.len());
+            let at = |t: f64| {
+                let depth =
+                    2e-3 + 4e-3 * (17.0 * t).sin() + shape.radius() * (f64::from((t * 3.0) as i32 % 5) - 3.0).max(0.0);
+                Vec3::new(0.04 + 0.03 * (9.0 * t).sin(), 0.041 + 0.02 * (7.0 * t).cos(), 0.02 + shape.radius() - depth)
+            };
+            for step in 0..600 {
+                let [t, next] = [step, step + 1].map(|step| (f64::from(step) * 1e-3).powi(2) * 4.0);
+                touch.steady.fineness = if step % 200 < 150 { 0.0 } else { f64::from(step % 200 - 150) / 50.0 };
+                let State { mut positions, mut velocities } = State::at_rest(block.rest());
+                for (x, v) in positions.iter_mut().zip(&mut velocities) {
+                    let phase = 100.0 * x.x + 60.0 * x.y + 30.0 * t;
+                    (x.z, v.z) = (x.z + 1e-3 * phase.sin(), 0.03 * phase.cos());
+                }
+                let body = Deformable {
+                    positions: &mut positions,
+                    velocities: &mut velocities,
+                    inverse_masses: block.inverse_masses(),
+                    surface: block.surface(),
+                    candidates: &candidates,
+                };
+                let motion = ToolMotion::straight(at(t), at(next));
+                let mut anew = Search::new(1);
+                anew.make_room(block.rest().len(), candidates.len());
+                let [wide, small] = &kept.vicinities[0];
+                let is_known = small.is_narrow(&body, &touch, motion, 1e-3) && !wide.triangles.is_empty();
+                kept.find(&body, (0, &touch), motion, 1e-3);
+                anew.find(&body, (0, &touch), motion, 1e-3);
+                assert_eq!(format!("{:?}", kept.near), format!("{:?}", anew.near), "{shape:?}, step {step}");
+                found += kept.near.len();
+                inside += usize::from(kept.near.iter().any(|near| near.gap < -shape.radius()));
+                narrow += usize::from(is_known);
+            }
+        }
+        assert!(found > 3000 && inside > 20 && (600..1700).contains(&narrow), "{found} {inside} {narrow}");
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::closest;
+use super::extent::Extent;
 use super::grain::Grain;
 use super::row::Row;
 use super::skin::Skin;
@@ -319,12 +320,11 @@ struct Touched {
 
 /// True if a triangle comes as near as `distance` (m) to the segment `axis`.
 fn is_near(corners: &[Vec3; 3], axis: &[Vec3; 2], distance: f64) -> bool {
-    let [a, b, c] = corners;
     let place = || {
         let centre = axis[0] + (axis[1] - axis[0]) * closest::share_of_axis(axis, corners);
         interpolate(&closest::weights(corners, &centre), corners) - centre
     };
-    closest::may_be_near(axis, distance, &a.inf(b).inf(c), &a.sup(b).sup(c))
+    Extent::around(axis).apart_squared(&Extent::around(corners)) <= distance * distance
         && place().norm_squared() <= distance * distance
 }
 

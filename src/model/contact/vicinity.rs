@@ -1,18 +1,19 @@
 //! The triangles that a tool with a shape may come near: found once, and again when something has moved far.
 
 use super::ToolMotion;
-use super::closest::may_be_near;
 use super::deformable::Deformable;
+use super::extent::Extent;
 use super::touch::Touch;
 use crate::Vec3;
 
 /// A centre that is farther than this below the surface, beside the tool's radius, has lost it (m).
 pub(super) const MAX_DEPTH: f64 = 5e-3;
 
-/// Triangles are found for tools and surfaces that move by so much together (m).
+/// Triangles are found for tools and surfaces that move by so much together: among all, and among those that were found so (m).
 const MARGIN: f64 = 3e-3;
+pub(super) const NARROW: f64 = 1e-3;
 
-/// The triangles that a tool may come near until it and the surface have moved by [`MARGIN`] together. All others are so far that
+/// The triangles that a tool may come near until it and the surface have moved by so much together. All others are so far that
 /// no search would take one: what is found hangs on where things are and not on when this was made.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vicinity {
@@ -20,40 +21,101 @@ pub(super) struct Vicinity {
     pub(super) triangles: Vec<u32>,
     /// Their corners, as places in `nodes`.
     pub(super) corners: Vec<[u32; 3]>,
-    /// Each once.
+    /// Each once, in the order in which the triangles name them.
     pub(super) nodes: Vec<u32>,
     /// The ends of the tool's axis, and all nodes of the body, when it was made (m).
     axis: [Vec3; 2],
     positions: Vec<Vec3>,
+    /// How fine the elements were.
+    fineness: f64,
     is_known: bool,
-    /// By node of the body: its place in `nodes` and that in `boxes`, from one on.
-    places: Vec<[u32; 2]>,
-    /// The corners that were looked at, from their least coordinates to their largest (m): at both ends of the step, and smoothed or not.
-    boxes: Vec<[Vec3; 2]>,
+    /// By node of the body: its place in `nodes`, from one on; zero for all others.
+    places: Vec<u32>,
+    /// By node of the body: its place in `extents`, from one on. Working memory.
+    seen: Vec<u32>,
+    /// Around the corners that were looked at: at both ends of the step, and smoothed or not.
+    extents: Vec<Extent>,
 }
 
 impl Vicinity {
     /// Of a tool on a body of so many nodes and candidates: not known yet.
     pub(super) fn make_room(&mut self, nodes: usize, candidates: usize) {
-        let Self { triangles, corners, nodes: listed, positions, places, boxes, is_known, .. } = self;
-        *is_known = false;
-        triangles.clear();
-        triangles.reserve(candidates);
-        corners.clear();
-        corners.reserve(candidates);
-        listed.clear();
-        listed.reserve(nodes);
-        boxes.clear();
-        boxes.reserve(nodes);
-        positions.resize(nodes, Vec3::zeros());
-        places.resize(nodes, [0; 2]);
+        self.forget();
+        self.triangles.reserve(candidates);
+        self.corners.reserve(candidates);
+        self.nodes.reserve(nodes);
+        self.extents.clear();
+        self.extents.reserve(nodes);
+        self.positions.resize(nodes, Vec3::zeros());
+        self.places.clear();
+        self.places.resize(nodes, 0);
+        self.seen.resize(nodes, 0);
     }
 
-    /// Makes it what it says for a step of `d` seconds.
-    pub(super) fn update(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) {
-        if !self.is_known || self.moved(body, touch, motion, d) > MARGIN {
+    /// It is not known any more.
+    pub(super) fn forget(&mut self) {
+        self.is_known = false;
+        self.triangles.clear();
+        self.corners.clear();
+        self.nodes.drain(..).for_each(|node| self.places[node as usize] = 0);
+    }
+
+    /// Makes it what it says for a step of `d` seconds, of all candidates. True if it was made anew.
+    pub(super) fn update(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) -> bool {
+        let is_new = !self.is_known || self.moved(body, touch, motion, d) > MARGIN;
+        if is_new {
             self.find(body, touch, motion, d);
         }
+        is_new
+    }
+
+    /// True if it is still what a [narrow](Self::narrow) one says, for a step of `d` seconds.
+    pub(super) fn is_narrow(&self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) -> bool {
+        // Corners move too while elements become finer.
+        self.is_known && self.fineness == touch.steady.fineness && self.moved(body, touch, motion, d) <= NARROW
+    }
+
+    /// Becomes the part of `wide` whose triangles are, by their number there, within a reach (m) that is given for how much more than
+    /// what is touched it has to hold. Nothing is known if in one such step too much moves.
+    pub(super) fn narrow(
+        &mut self,
+        wide: &Self,
+        (body, touch): (&Deformable<'_>, &Touch),
+        motion: ToolMotion,
+        d: f64,
+        is_within: impl Fn(usize, f64) -> bool,
+    ) {
+        self.forget();
+        self.begin(body, touch, motion);
+        let moved = self.moved(body, touch, motion, d);
+        self.is_known = moved <= NARROW;
+        if !self.is_known {
+            return;
+        }
+        for (number, (&triangle, corners)) in wide.triangles.iter().zip(&wide.corners).enumerate() {
+            if is_within(number, NARROW + moved) {
+                self.add(triangle, corners.map(|place| wide.nodes[place as usize]));
+            }
+        }
+    }
+
+    /// Things are where it is made.
+    fn begin(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion) {
+        (self.axis, self.fineness) = (touch.shape.axis(&motion.to), touch.steady.fineness);
+        self.positions.copy_from_slice(body.positions);
+    }
+
+    fn add(&mut self, triangle: u32, nodes: [u32; 3]) {
+        let Self { triangles, corners, nodes: listed, places, .. } = self;
+        triangles.push(triangle);
+        corners.push(nodes.map(|node| {
+            let place = &mut places[node as usize];
+            if *place == 0 {
+                listed.push(node);
+                *place = listed.len() as u32;
+            }
+            *place - 1
+        }));
     }
 
     /// How far the tool and the surface have moved together at most at the end of the step (m).
@@ -76,54 +138,35 @@ impl Vicinity {
 
     fn find(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) {
         let (skin, radius) = (&*touch.skin, touch.shape.radius());
-        let [[a, b], [c, e]] = [&motion.from, &motion.to].map(|pose| touch.shape.axis(pose));
-        let way = [a.inf(&b).inf(&c).inf(&e), a.sup(&b).sup(&c).sup(&e)];
-        let Self { triangles, corners, nodes, axis, positions, is_known, places, boxes } = self;
-        (*axis, *is_known) = ([c, e], true);
-        positions.copy_from_slice(body.positions);
-        places.fill([0; 2]);
-        triangles.clear();
-        corners.clear();
-        nodes.clear();
-        boxes.clear();
+        let way = [&motion.from, &motion.to].map(|pose| touch.shape.axis(pose));
+        let way = Extent::around(way.as_flattened());
+        self.forget();
+        self.begin(body, touch, motion);
+        self.is_known = true;
+        self.seen.fill(0);
+        self.extents.clear();
         for &triangle in body.candidates {
             let ids = body.surface.triangles[triangle as usize];
             let depth = ids.iter().fold(MAX_DEPTH, |most: f64, &node| most.max(skin.depth(node as usize)));
             let distance = radius + depth + MARGIN;
+            let is_near = |extent: Extent, distance: f64| way.apart_squared(&extent) <= distance * distance;
             // A smoothed corner is near its node.
             let moving = ids.map(|node| body.corner(skin, 1.0, node, d));
-            if !is_near(&way, distance + skin.reach(), &moving) {
+            if !is_near(Extent::around(moving.as_flattened()), distance + skin.reach()) {
                 continue;
             }
-            let moving = ids.map(|node| {
-                let [_, place] = &mut places[node as usize];
+            let [a, b, c] = ids.map(|node| {
+                let place = &mut self.seen[node as usize];
                 if *place == 0 {
-                    let [[a, b], [c, e]] = [0.0, 1.0].map(|fine| body.corner(skin, fine, node, d));
-                    boxes.push([a.inf(&b).inf(&c).inf(&e), a.sup(&b).sup(&c).sup(&e)]);
-                    *place = boxes.len() as u32;
+                    let moving = [0.0, 1.0].map(|fine| body.corner(skin, fine, node, d));
+                    self.extents.push(Extent::around(moving.as_flattened()));
+                    *place = self.extents.len() as u32;
                 }
-                boxes[*place as usize - 1]
+                self.extents[*place as usize - 1]
             });
-            if !is_near(&way, distance, &moving) {
-                continue;
+            if is_near(a.and(&b).and(&c), distance) {
+                self.add(triangle, ids);
             }
-            triangles.push(triangle);
-            corners.push(ids.map(|node| {
-                let [place, _] = &mut places[node as usize];
-                if *place == 0 {
-                    nodes.push(node);
-                    *place = nodes.len() as u32;
-                }
-                *place - 1
-            }));
         }
     }
-}
-
-/// False if a triangle is surely farther than `distance` (m) from the segment `way` while its corners go from one place to another.
-pub(super) fn is_near(way: &[Vec3; 2], distance: f64, corners: &[[Vec3; 2]; 3]) -> bool {
-    let [[a, d], [b, e], [c, f]] = corners;
-    let low = a.inf(b).inf(c).inf(d).inf(e).inf(f);
-    let high = a.sup(b).sup(c).sup(d).sup(e).sup(f);
-    may_be_near(way, distance, &low, &high)
 }

@@ -12,6 +12,7 @@ mod products;
 mod reduced;
 mod reduction;
 mod resting;
+mod square;
 #[cfg(test)]
 mod stability;
 mod stored;

@@ -128,7 +128,7 @@ fn word(lower: f32, upper: f32) -> u32 {
 
 /// As a single, or nothing.
 #[inline(always)]
-fn rounded(x: f64) -> f32 {
+pub(super) fn rounded(x: f64) -> f32 {
     // Written so that what is no number stays none.
     if x.abs() < f64::from(NOTHING) { 0.0 } else { x as f32 }
 }

@@ -1,6 +1,7 @@
 //! A linear model in few states, in modal form, that answers to forces on a ring of nodes.
 
 use super::products::{Columns, Scratch};
+use super::square::{Square, SquareScratch};
 use crate::body::Stiffness;
 
 /// What the velocities do to the states' accelerations.
@@ -8,8 +9,26 @@ use crate::body::Stiffness;
 pub(super) enum Damping {
     /// Proportional to the stiffness: one number per state (1/s).
     Diagonal(Vec<f64>),
-    /// r rows of r (1/s).
-    Full(Vec<f64>),
+    /// Of every state to every other (1/s).
+    Full(Square),
+}
+
+impl Damping {
+    /// Row by row, with the zeros of a diagonal one.
+    #[cfg(test)]
+    pub(super) fn to_matrix(&self) -> crate::linear_algebra::Matrix {
+        match self {
+            Self::Diagonal(damping) => crate::linear_algebra::Matrix::from_diagonal(&damping.clone().into()),
+            Self::Full(damping) => damping.to_matrix(),
+        }
+    }
+
+    fn scratch(&self) -> SquareScratch {
+        match self {
+            Self::Diagonal(_) => SquareScratch::default(),
+            Self::Full(damping) => damping.scratch(),
+        }
+    }
 }
 
 /// eta'' = K eta + C eta' + Phi^T f with Phi^T M Phi = 1 and a diagonal K; the ring moves by Phi eta.
@@ -32,7 +51,7 @@ impl Reduced {
     pub(crate) fn is_of(&self, ring: usize) -> bool {
         let damping = match &self.damping {
             Damping::Diagonal(damping) => damping.len() == self.states,
-            Damping::Full(damping) => damping.len() == self.states * self.states,
+            Damping::Full(damping) => damping.size() == self.states,
         };
         damping && self.stiffness.len() == self.states && self.shapes.shape() == (ring, self.states)
     }
@@ -42,7 +61,8 @@ impl Reduced {
     /// # Real-time
     /// Bounded, real-time safe.
     pub(crate) fn step(&self, motion: &mut ReducedMotion, forces: &[f64], d: f64) {
-        let ReducedMotion { eta, rate, acceleration, displacements, velocities, scratch, stiffness } = motion;
+        let ReducedMotion { eta, rate, acceleration, damped, displacements, velocities, scratch, square, stiffness } =
+            motion;
         let (s, root) = (stiffness.factor(), stiffness.root());
         self.shapes.project(forces, scratch, acceleration);
         match &self.damping {
@@ -52,9 +72,8 @@ impl Reduced {
                 }
             }
             Damping::Full(damping) => {
-                for (a, row) in acceleration.iter_mut().zip(damping.chunks_exact(self.states)) {
-                    *a += root * row.iter().zip(&*rate).map(|(c, rate)| c * rate).sum::<f64>();
-                }
+                damping.times(rate, square, damped);
+                acceleration.iter_mut().zip(&*damped).for_each(|(a, damped)| *a += root * damped);
             }
         }
         for (((eta, rate), a), k) in eta.iter_mut().zip(&mut *rate).zip(acceleration).zip(&self.stiffness) {
@@ -73,10 +92,13 @@ pub(crate) struct ReducedMotion {
     eta: Vec<f64>,
     rate: Vec<f64>,
     acceleration: Vec<f64>,
+    /// What of it damping makes, where that takes a product.
+    damped: Vec<f64>,
     /// Of the ring (m, m/s), three numbers for each node.
     displacements: Vec<f64>,
     velocities: Vec<f64>,
     scratch: Scratch,
+    square: SquareScratch,
     /// Of the body, in that of the basis.
     stiffness: Stiffness,
 }
@@ -89,15 +111,16 @@ impl ReducedMotion {
     /// Not called in a tick: may allocate.
     pub(crate) fn rest(&mut self, model: Option<&Reduced>, stiffness: Stiffness) {
         self.stiffness = stiffness;
-        let Self { eta, rate, acceleration, displacements, velocities, scratch, .. } = self;
+        let Self { eta, rate, acceleration, damped, displacements, velocities, scratch, square, .. } = self;
         let (rows, states) = model.map_or((0, 0), |model| model.shapes.shape());
-        for (vector, length) in
-            [(eta, states), (rate, states), (acceleration, states), (displacements, rows), (velocities, rows)]
-        {
+        let of_states = [eta, rate, acceleration, damped].map(|vector| (vector, states));
+        let of_ring = [displacements, velocities].map(|vector| (vector, rows));
+        for (vector, length) in of_states.into_iter().chain(of_ring) {
             vector.clear();
             vector.resize(length, 0.0);
         }
         *scratch = model.map(|model| model.shapes.scratch()).unwrap_or_default();
+        *square = model.map(|model| model.damping.scratch()).unwrap_or_default();
     }
 
     /// Adds the displacements (m) and velocities (m/s) of the ring, three numbers for each node.

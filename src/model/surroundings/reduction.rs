@@ -7,6 +7,7 @@ use super::far::Far;
 use super::products::Columns;
 use super::reduced::{Damping, Reduced};
 use super::resting::RestingBody;
+use super::square::Square;
 use crate::body::Restriction;
 use crate::error::ModelError;
 use crate::linear_algebra::{
@@ -215,7 +216,10 @@ fn reduced(far: &Far, ring: &[u32], shapes: &Matrix) -> Option<Reduced> {
     let shapes = product(shapes, &modes);
     let damping = match far.proportional_damping() {
         Some(share) => Damping::Diagonal(values.iter().map(|value| share * value).collect()),
-        None => Damping::Full(product_t(&modes, &product(&damping, &modes)).data.into()),
+        None => {
+            let damping = product_t(&modes, &product(&damping, &modes));
+            Damping::Full(Square::new(states, |row, column| damping[(row, column)]))
+        }
     };
     let on_ring = Columns::new(&shapes.select_rows(&far.unknowns_of(ring)));
     Some(Reduced { states, shapes: on_ring, stiffness: values, damping })

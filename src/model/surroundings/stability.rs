@@ -8,7 +8,6 @@
 use nalgebra::DMatrix;
 
 use super::near::Near;
-use super::reduced::Damping;
 use super::uneven::{random, uneven};
 use super::{Basis, RestingBody};
 use crate::body::Body;
@@ -20,10 +19,7 @@ fn margin(body: &dyn Body, patch: &[u32], basis: &Basis, d: f64) -> f64 {
     let near = Near::new(&body.restriction(patch).unwrap(), patch.len());
     let (on_ring, states) = (basis.answers.shapes.to_matrix(), basis.states());
     let stiffness = Matrix::from_fn(states, states, |i, j| if i == j { basis.answers.stiffness[i] } else { 0.0 });
-    let damping = match &basis.answers.damping {
-        Damping::Diagonal(of) => Matrix::from_fn(states, states, |i, j| if i == j { of[i] } else { 0.0 }),
-        Damping::Full(rows) => Matrix::from_fn(states, states, |i, j| rows[i * states + j]),
-    };
+    let damping = basis.answers.damping.to_matrix();
     let k = near.beside(&near.stiffness, &on_ring, &stiffness, -1.0);
     let c = near.beside(&near.damping, &on_ring, &damping, -1.0);
     let m = near.beside(&near.mass, &on_ring, &Matrix::identity(states, states), 1.0);

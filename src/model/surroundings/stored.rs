@@ -5,11 +5,12 @@ use super::basis::Basis;
 use super::products::Columns;
 use super::reduced::{Damping, Reduced};
 use super::resting::digest;
+use super::square::Square;
 use crate::bytes::{BytesReader, BytesWriter};
 use crate::linear_algebra::Matrix;
 
 /// What the bytes begin with; its number changes with what follows.
-const MAGIC: &[u8; 16] = b"palpate-basis-5\n";
+const MAGIC: &[u8; 16] = b"palpate-basis-6\n";
 const SUM: usize = size_of::<u64>();
 
 impl Basis {
@@ -57,17 +58,20 @@ fn write(model: &Reduced, to: &mut BytesWriter<'_>) {
     // They are singles that were made from less.
     to.list(shapes.as_slice(), |to, &number| to.f32(number as f32));
     write_numbers(to, &model.stiffness);
-    let (kind, damping) = match &model.damping {
-        Damping::Diagonal(damping) => (0, damping),
-        Damping::Full(damping) => (1, damping),
-    };
-    to.u8(kind);
-    write_numbers(to, damping);
+    match &model.damping {
+        Damping::Diagonal(damping) => {
+            to.u8(0);
+            write_numbers(to, damping);
+        }
+        Damping::Full(damping) => {
+            to.u8(1);
+            to.list(damping.to_matrix().as_slice(), |to, &number| to.f32(number as f32));
+        }
+    }
 }
 
 fn read(from: &mut BytesReader<'_>) -> Option<Reduced> {
-    let (rows, mut shapes) = (from.u32()? as usize, Vec::new());
-    from.list(size_of::<f32>(), &mut shapes, |from| from.f32().map(f64::from))?;
+    let (rows, shapes) = (from.u32()? as usize, read_singles(from)?);
     if rows == 0 || !shapes.len().is_multiple_of(rows) {
         return None;
     }
@@ -75,7 +79,11 @@ fn read(from: &mut BytesReader<'_>) -> Option<Reduced> {
     let stiffness = read_numbers(from)?;
     let damping = match from.u8()? {
         0 => Damping::Diagonal(read_numbers(from)?),
-        1 => Damping::Full(read_numbers(from)?),
+        1 => {
+            let (states, damping) = (stiffness.len(), read_singles(from)?);
+            let is_whole = damping.len() == states * states;
+            Damping::Full(is_whole.then(|| Square::new(states, |row, column| damping[column * states + row]))?)
+        }
         _ => return None,
     };
     Some(Reduced { states: stiffness.len(), shapes, stiffness, damping })
@@ -83,6 +91,12 @@ fn read(from: &mut BytesReader<'_>) -> Option<Reduced> {
 
 fn write_numbers(to: &mut BytesWriter<'_>, numbers: &[f64]) {
     to.list(numbers, |to, &number| to.f64(number));
+}
+
+fn read_singles(from: &mut BytesReader<'_>) -> Option<Vec<f64>> {
+    let mut singles = Vec::new();
+    from.list(size_of::<f32>(), &mut singles, |from| from.f32().map(f64::from))?;
+    Some(singles)
 }
 
 fn read_numbers(from: &mut BytesReader<'_>) -> Option<Vec<f64>> {
