@@ -54,10 +54,10 @@ impl Extent {
 
     /// On which of its six sides all of these places are, a bit for each. What has one in common for all its corners is outside.
     #[inline]
-    pub(super) fn sides(&self, places: &[Vec3; 2]) -> u8 {
+    pub(super) fn sides(&self, [from, to]: &[Vec3; 2]) -> u8 {
         let mut sides = 0;
         for axis in 0..3 {
-            let [a, b] = [places[0][axis], places[1][axis]];
+            let [a, b] = [from[axis], to[axis]];
             sides |= u8::from(a < self.low[axis] && b < self.low[axis]) << axis;
             sides |= u8::from(a > self.high[axis] && b > self.high[axis]) << (3 + axis);
         }
