@@ -88,8 +88,10 @@ fn a_tick_with_the_whole_body_makes_no_system_call_and_never_allocates() {
 }
 
 #[test]
-fn a_tick_with_the_whole_body_and_two_tools_makes_no_system_call_and_never_allocates() {
-    assert_silent(Case::new(LocalModelKind::Full, Guard::SystemCalls).with_second());
+fn a_tick_with_two_tools_makes_no_system_call_and_never_allocates() {
+    for model in [LocalModelKind::Full, LocalModelKind::Patch, LocalModelKind::Predictive] {
+        assert_silent(Case::new(model, Guard::SystemCalls).with_second());
+    }
 }
 
 /// The bridges are off the real-time thread, and the ports are what they are without them.

@@ -1,14 +1,12 @@
 //! The global actor: advances the whole body along the tool's path and publishes the next local model.
 
-use std::collections::VecDeque;
-
 use super::cause::Cause;
 use super::global_ports::{GlobalPorts, GlobalSharedPorts, ToolPorts};
+use super::global_tool::ToolSide;
 use super::messages::{ToolTick, show};
 use super::model_maker::ModelMaker;
 use crate::error::Error;
 use crate::log::GlobalTick;
-use crate::model::Pose;
 use crate::model::contact::ToolMotion;
 use crate::model::local::{Aim, Kind, ResyncView, ToolForecast, ToolHistory, Windows};
 use crate::model::simulation::Simulation;
@@ -64,56 +62,6 @@ impl GlobalPlan {
     }
 }
 
-/// What the global model knows of one tool.
-#[derive(Debug)]
-struct ToolSide {
-    ports: ToolPorts,
-    /// Samples that have come and are not taken yet.
-    waiting: VecDeque<ToolTick>,
-    /// The tool at the last tick taken: the state's own time.
-    tool: ToolTick,
-    /// Where it comes from.
-    from: Pose,
-    /// Its sample of the last tick was missing.
-    is_between: bool,
-    history: ToolHistory,
-    /// Where local models may be made, if there are bases.
-    windows: Windows,
-    /// The newest model that was published.
-    version: u64,
-    /// Triangles that the window of its next model has to hold.
-    triangles: Vec<u32>,
-    /// The patch of its next model.
-    patch: Vec<u32>,
-}
-
-impl ToolSide {
-    /// Takes the patch's geometry in place of the global model's own, if it belongs to the same tick.
-    fn take_feedback(&mut self, ctx: &TickContext, simulation: &mut Simulation, index: usize) {
-        if let Some(reader) = &mut self.ports.geometry {
-            reader.refresh(ctx);
-            let geometry = reader.get();
-            if geometry.tick == self.tool.tick && geometry.is_usable() {
-                geometry.write_to(simulation, index);
-            }
-        }
-    }
-
-    /// The patch that the next model is made for, if there are bases: the best window that has one, or the best of all; the widest
-    /// while nobody knows where the tool is going.
-    fn choose_patch(&mut self, at: (&Simulation, usize), bases: &Bases) {
-        let has_basis = |patch: &[u32]| bases.get(patch).is_some();
-        if !self.windows.choose(at, &self.triangles, has_basis, &mut self.patch) {
-            self.windows.choose(at, &self.triangles, |_| true, &mut self.patch);
-        }
-        if self.history.is_new()
-            && let Some(widest) = self.windows.widest(self.triangles[0], &self.patch).filter(|patch| has_basis(patch))
-        {
-            widest.clone_into(&mut self.patch);
-        }
-    }
-}
-
 /// Runs the slow, detailed simulation.
 ///
 /// # Real-time
@@ -128,8 +76,9 @@ pub struct GlobalActor {
     tools: Vec<ToolSide>,
     /// Something else than the tools has changed since the last models.
     is_changed: bool,
-    /// Working memory: where each tool is and is expected.
+    /// Working memory: where each tool is and is expected, and the triangle that it touches or is nearest to.
     forecasts: Vec<ToolForecast>,
+    nearest: Vec<u32>,
     /// Working memory: how each tool moves in a tick.
     motions: Vec<ToolMotion>,
     /// Working memory: where a tool is going, and the window there.
@@ -155,20 +104,13 @@ impl GlobalActor {
         assert_eq!([tools.len(), of_tools.len()], [simulation.tools(); 2], "ports and places for each tool");
         let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
         let has_bases = shared.surroundings.is_some();
-        let side = |(index, (&tool, ports)): (usize, (&ToolTick, ToolPorts))| ToolSide {
-            windows: if has_bases { Windows::new(&simulation, index, plan.patch) } else { Windows::default() },
-            ports,
-            waiting: VecDeque::new(),
-            tool,
-            from: tool.pose,
-            is_between: false,
-            history: ToolHistory::new(tool.pose, plan.haptic.period_s(), plan.lead_s()),
-            version: 0,
-            triangles: Vec::new(),
-            patch: Vec::new(),
+        let side = |(index, (&tool, ports)): (usize, (&ToolTick, ToolPorts))| {
+            let windows = if has_bases { Windows::new(&simulation, index, plan.patch) } else { Windows::default() };
+            let history = ToolHistory::new(tool.pose, plan.haptic.period_s(), plan.lead_s());
+            ToolSide::new(tool, windows, history, ports)
         };
         let tools = tools.iter().zip(of_tools).enumerate().map(side).collect();
-        let (forecasts, motions, triangles_ahead, patch_ahead) = Default::default();
+        let (forecasts, nearest, motions, triangles_ahead, patch_ahead) = Default::default();
         let is_changed = true;
         Ok(Self {
             simulation,
@@ -178,6 +120,7 @@ impl GlobalActor {
             tools,
             is_changed,
             forecasts,
+            nearest,
             motions,
             triangles_ahead,
             patch_ahead,
@@ -295,8 +238,11 @@ impl GlobalActor {
         for (index, (side, tool)) in self.tools.iter_mut().zip(&self.forecasts).enumerate() {
             self.aim.triangles((&self.simulation, index), tool, now, &mut side.triangles);
         }
+        self.nearest.clear();
+        self.nearest.extend(self.tools.iter().map(|side| side.triangles[0]));
         let has_bases = self.has_bases();
         if has_bases {
+            self.look_beside();
             self.publish_wishes(ctx);
         }
         let (kind, is_changed) = (self.ports.settings.get().model, std::mem::take(&mut self.is_changed));
@@ -314,6 +260,7 @@ impl GlobalActor {
                 global: &mut self.simulation,
                 tick: side.tool.tick,
                 triangles: &side.triangles,
+                nearest: &self.nearest,
                 patch: has_bases.then_some(&side.patch),
                 tools: &self.forecasts,
                 index,
@@ -327,6 +274,17 @@ impl GlobalActor {
             version = side.version;
         }
         version
+    }
+
+    /// Finds for each tool which nodes the others press.
+    fn look_beside(&mut self) {
+        for index in 0..self.tools.len() {
+            let mut beside = std::mem::take(&mut self.tools[index].beside);
+            let [soon, now] = &mut beside;
+            self.simulation.pressed_beside(index, |other| &self.tools[other].triangles, soon);
+            self.simulation.pressed_beside(index, |other| &self.nearest[other..=other], now);
+            self.tools[index].beside = beside;
+        }
     }
 
     /// True if local models take bases.
@@ -367,15 +325,18 @@ impl GlobalActor {
         for (index, (side, tool)) in self.tools.iter().zip(&self.forecasts).enumerate() {
             let at = (&self.simulation, index);
             let (ahead, patch) = (&mut self.triangles_ahead, &mut self.patch_ahead);
-            side.windows.choose(at, &side.triangles, |_| true, patch);
+            let beside = side.beside.each_ref().map(Vec::as_slice);
+            side.windows.choose(at, &side.triangles, [&[]; 2], |_| true, patch);
             wish(patch);
             if self.simulation.contact(index).glued {
                 // It stays where it is.
                 continue;
             }
+            side.windows.choose(at, &side.triangles, beside, |_| true, patch);
+            wish(patch);
             for [after, lead] in [[period, lead]].into_iter().chain(PREFETCH_S.map(|after| [after, 0.0])) {
                 self.aim.triangles(at, tool, [after, lead], ahead);
-                side.windows.choose(at, ahead, |_| true, patch);
+                side.windows.choose(at, ahead, beside, |_| true, patch);
                 wish(patch);
             }
             side.windows.around(side.triangles[0], NEIGHBOURS).for_each(&mut wish);

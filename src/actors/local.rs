@@ -1,13 +1,13 @@
-//! The local actor: turns the newest tool sample into a force at the haptic rate, by models that a global one sends.
+//! The local actor: turns the newest tool samples into forces at the haptic rate, by models that a global one sends.
 
 use super::cause::Cause;
 use super::messages::ToolTick;
 use super::ticks::{self, ResyncTicks};
 use super::tool::{LocalTool, Serving};
-use crate::model::local::{LocalModel, PatchGeometry, Succession};
+use crate::model::local::{LocalModel, PatchGeometry, Succession, Ways};
 use crate::runtime::{Actor, GroupMode, Outcome, QueueWriter, Rate, Reader, TickContext, Writer};
 
-/// The ports of a [`LocalActor`], besides those of its tool.
+/// The ports of one tool of a [`LocalActor`], besides those that it has by itself.
 #[derive(Debug)]
 pub struct LocalPorts {
     /// Newer models arrive here.
@@ -18,50 +18,37 @@ pub struct LocalPorts {
     pub geometry: Option<Writer<PatchGeometry>>,
 }
 
-/// Runs the fast, small simulation of one tool.
-///
-/// # Real-time
-/// Bounded, by eight haptic ticks a release, and real-time safe if its models are.
+/// One tool with the models that serve it.
 #[derive(Debug)]
-pub struct LocalActor {
-    models: Succession,
-    tool: LocalTool,
-    ports: LocalPorts,
-    resyncs: ResyncTicks,
-    begun: bool,
+pub struct LocalSide {
+    /// The models.
+    pub models: Succession,
+    /// The tool.
+    pub tool: LocalTool,
+    /// What they say to the global one.
+    pub ports: LocalPorts,
 }
 
-impl LocalActor {
-    /// An actor for `tool` over `models`; `haptic` and `global` are the rates of the two groups.
-    pub fn new(models: Succession, tool: LocalTool, [haptic, global]: [Rate; 2], ports: LocalPorts) -> Self {
-        Self { models, tool, ports, resyncs: ResyncTicks::new(haptic, global), begun: false }
-    }
-
-    /// Release 0: the first sample and the first model, no force.
+impl LocalSide {
+    /// Release 0: the first sample and the first model.
     fn begin(&mut self, ctx: &TickContext) {
-        self.begun = true;
         self.ports.models.refresh(ctx);
+        self.tool.begin();
         let version = self.ports.models.version() as u32;
-        self.models.begin(self.tool.begin(), self.ports.models.get_mut(), version);
-        self.publish_state(ctx);
+        self.models.begin(self.ports.models.get_mut(), version);
     }
 
-    /// Advances the model to this release, or as far towards it as one release may.
-    fn advance(&mut self, ctx: &TickContext) {
-        for left in ticks::due(ctx, self.models.now()) {
-            let way = self.tool.go(left, ctx.dt_nominal);
-            let served = self.models.tick(way.to);
-            self.tool.feel(served, &way, &self.models.serving().contact());
-            self.publish_state(ctx);
+    /// Takes what has come since the last release.
+    fn take_arrivals(&mut self, ctx: &TickContext, ways: &Ways) {
+        if self.ports.models.refresh(ctx) {
+            let version = self.ports.models.version() as u32;
+            self.models.offer(self.ports.models.get_mut(), version, ways);
         }
     }
 
-    /// Tells the global model where the tool and the patch are.
-    fn publish_state(&mut self, ctx: &TickContext) {
-        let (tick, pose) = (self.models.now(), self.tool.pose());
-        if self.resyncs.has(tick)
-            && let Some(geometry) = &mut self.ports.geometry
-        {
+    /// Tells the global model where the tool is at the end of `tick`, and where the patch is if there is a resync.
+    fn publish_state(&mut self, ctx: &TickContext, tick: u64, is_resync: bool) {
+        if is_resync && let Some(geometry) = &mut self.ports.geometry {
             let buffer = geometry.buffer();
             buffer.tick = tick;
             if self.models.serving().geometry(buffer) {
@@ -69,12 +56,12 @@ impl LocalActor {
             }
         }
         // A full queue is counted; the global model sees the gap and interpolates over it.
-        self.ports.ticks.push(ctx, ToolTick { tick, pose });
+        self.ports.ticks.push(ctx, ToolTick { tick, pose: self.tool.pose() });
     }
 
-    /// Commands and records the force; false if it is not finite.
-    fn finish(&mut self, ctx: &TickContext) -> bool {
-        let (model, tick) = (self.models.serving(), self.models.now());
+    /// Commands and records the force after the last tick; false if it is not finite.
+    fn finish(&mut self, ctx: &TickContext, tick: u64) -> bool {
+        let model = self.models.serving();
         let serving = Serving {
             tick,
             kind: model.serves_as(),
@@ -91,6 +78,49 @@ impl LocalActor {
     }
 }
 
+/// Runs the fast, small simulations around the tools. Every model knows the way of all tools: where they meet it resolves them together.
+///
+/// # Real-time
+/// Bounded, by eight haptic ticks a release, and real-time safe if its models are.
+#[derive(Debug)]
+pub struct LocalActor {
+    sides: Vec<LocalSide>,
+    ways: Ways,
+    resyncs: ResyncTicks,
+    begun: bool,
+}
+
+impl LocalActor {
+    /// An actor for the tools of `sides`, in the order of their devices; `haptic` and `global` are the rates of the two groups.
+    pub fn new(sides: Vec<LocalSide>, [haptic, global]: [Rate; 2]) -> Self {
+        let ways = Ways::new(sides.len());
+        Self { sides, ways, resyncs: ResyncTicks::new(haptic, global), begun: false }
+    }
+
+    /// Release 0: no force.
+    fn begin(&mut self, ctx: &TickContext) {
+        self.begun = true;
+        self.sides.iter_mut().for_each(|side| side.begin(ctx));
+        self.publish_states(ctx);
+    }
+
+    /// Advances the models by one tick, the first of those that are `left`.
+    fn advance(&mut self, ctx: &TickContext, left: u64) {
+        self.ways.go(self.sides.iter_mut().map(|side| side.tool.go(left, ctx.dt_nominal)));
+        for (side, way) in self.sides.iter_mut().zip(self.ways.of(self.ways.now())) {
+            let served = side.models.tick(&self.ways);
+            side.tool.feel(served, way, &side.models.serving().contact());
+        }
+        self.publish_states(ctx);
+    }
+
+    fn publish_states(&mut self, ctx: &TickContext) {
+        let tick = self.ways.now();
+        let is_resync = self.resyncs.has(tick);
+        self.sides.iter_mut().for_each(|side| side.publish_state(ctx, tick, is_resync));
+    }
+}
+
 impl Actor for LocalActor {
     fn name(&self) -> &str {
         "local"
@@ -98,23 +128,22 @@ impl Actor for LocalActor {
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         if ctx.mode == GroupMode::Stopping {
-            // The device brings itself to rest.
+            // The devices bring themselves to rest.
             return Outcome::Continue;
         }
-        self.tool.refresh(ctx);
+        self.sides.iter_mut().for_each(|side| side.tool.refresh(ctx));
         if !self.begun {
             self.begin(ctx);
             return Outcome::Continue;
         }
-        if self.ports.models.refresh(ctx) {
-            let version = self.ports.models.version() as u32;
-            self.models.offer(self.ports.models.get_mut(), version);
-        }
-        self.advance(ctx);
-        match self.finish(ctx) {
-            true => Outcome::Continue,
+        self.sides.iter_mut().for_each(|side| side.take_arrivals(ctx, &self.ways));
+        ticks::due(ctx, self.ways.now()).for_each(|left| self.advance(ctx, left));
+        let now = self.ways.now();
+        // All of them, whatever the others are.
+        match self.sides.iter_mut().map(|side| usize::from(!side.finish(ctx, now))).sum::<usize>() {
+            0 => Outcome::Continue,
             // The next resync brings a good model.
-            false => Outcome::Degraded(Cause::LocalNotFinite.code()),
+            _ => Outcome::Degraded(Cause::LocalNotFinite.code()),
         }
     }
 }

@@ -1,16 +1,15 @@
 //! The actors of a haptic session: thin glue between models, devices, logs and the runtime.
 //!
 //! ```text
-//! device --DeviceSample---> local --ToolTick, PatchGeometry--> global
-//!        <--ComputedForce--       <--local model--              --Wishes--> basis
-//!                                                               <--Bases--
+//! devices --DeviceSample---> local --ToolTick, PatchGeometry--> global
+//!         <--ComputedForce--       <--local models--             --Wishes--> basis
+//!                                                                <--Bases--
 //! every actor --records--> logger
 //! ```
 //!
-//! There is a device and a local actor for each tool, and one global actor for all. What a program changes while it runs, `Settings`,
-//! goes to the global actor and comes to the local ones with the next model. Where there is a link, two bridges stand between the local
-//! actors and the global one. For `full` one actor with the whole body stands
-//! in place of local and global ones:
+//! There is a device actor for each tool, and one local and one global actor for all. What a program changes while it runs, `Settings`,
+//! goes to the global actor and comes to the local one with the next models. Where there is a link, two bridges stand between the local
+//! actor and the global one. For `full` one actor with the whole body stands in place of both:
 //!
 //! ```text
 //! devices --DeviceSample---> whole
@@ -25,6 +24,7 @@ mod cause;
 mod device;
 mod global;
 mod global_ports;
+mod global_tool;
 mod local;
 mod log_file;
 mod log_sink;
@@ -46,7 +46,7 @@ pub(crate) use bridge::{GlobalBridge, GlobalEnd, HapticBridge, HapticEnd};
 pub(crate) use device::{DeviceActor, DevicePorts, GAP_S, first_state};
 pub(crate) use global::{GlobalActor, GlobalPlan};
 pub(crate) use global_ports::{GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
-pub(crate) use local::{LocalActor, LocalPorts};
+pub(crate) use local::{LocalActor, LocalPorts, LocalSide};
 pub(crate) use messages::{Checkpoint, ComputedForce, DeviceSample, ToolTick};
 pub(crate) use model_maker::ModelMaker;
 pub(crate) use scene_watch::SceneWatch;

@@ -19,7 +19,7 @@ use crate::runtime::Nanos;
 
 const MAGIC: [u8; 4] = *b"plnk";
 /// The version of the format: of another one nothing is read.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// No message is longer (bytes).
 pub const LARGEST: usize = 1 << 25;
 
@@ -316,9 +316,9 @@ mod tests {
         assert_eq!(Message::read(b"GET / HTTP/1.1").unwrap_err(), Refused::NoMessage);
         bytes[6] = 99;
         assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Kind(99));
-        bytes[4] = 2;
-        assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Version(2));
-        assert!(Refused::Version(2).to_string().contains("version 2, this is version 1"));
+        bytes[4] = 1;
+        assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Version(1));
+        assert!(Refused::Version(1).to_string().contains("version 1, this is version 2"));
     }
 
     #[test]

@@ -226,12 +226,9 @@ impl Simulation {
     /// The nodes that all tools but `tool` press, each with the force on it (N).
     ///
     /// # Real-time
-    /// Bounded, real-time safe.
+    /// Not for a tick: allocates.
     pub(crate) fn exerted_beside(&self, tool: usize) -> impl Iterator<Item = (u32, Vec3)> {
-        let told = self.told.as_ref().map(|told| told.beside.iter().copied());
-        let own = if told.is_some() { 0..0 } else { 0..self.moving.touches.len() };
-        let own = own.filter(move |&other| other != tool).flat_map(|other| self.exerted(other));
-        told.into_iter().flatten().chain(own)
+        (0..self.moving.touches.len()).filter(move |&other| other != tool).flat_map(|other| self.exerted(other))
     }
 
     /// What the simulation that this is an image of has told; `None` for one of its own.
@@ -239,35 +236,43 @@ impl Simulation {
         self.told.as_ref()
     }
 
-    /// Makes this the image of another one, which is so stiff, has `told` of the surroundings of `tool`, felt `wrench` there and touched
-    /// as `touch` is told to.
-    pub(crate) fn be_told(
-        &mut self,
-        stiffness: Stiffness,
-        tool: usize,
-        wrench: Wrench,
-        touch: impl FnOnce(&mut Touch),
-    ) -> &mut Told {
+    /// Makes this the image of another one, which is so stiff and has told of the ring's `path`.
+    pub(crate) fn be_told(&mut self, stiffness: Stiffness, path: &[f64]) {
         if self.stiffness() != stiffness {
             self.stiffness = stiffness;
             self.moving.put_stiffness(stiffness);
         }
+        let told = self.told.get_or_insert_default();
+        told.exerted.resize_with(self.moving.touches.len(), Vec::new);
+        told.path.clear();
+        told.path.extend_from_slice(path);
+    }
+
+    /// The image of a tool: it felt `wrench`, touched as `touch` is told to, and `exerted` forces on nodes (N).
+    pub(crate) fn be_told_of(
+        &mut self,
+        tool: usize,
+        wrench: Wrench,
+        exerted: &[(u32, Vec3)],
+        touch: impl FnOnce(&mut Touch),
+    ) {
         self.moving.means[tool] = wrench;
         touch(&mut self.moving.touches[tool]);
-        self.told.get_or_insert_default()
+        if let Some(told) = self.told.as_mut().and_then(|told| told.exerted.get_mut(tool)) {
+            exerted.clone_into(told);
+        }
     }
 
     /// The nodes that `tool` touches with the force on each (N): of a point its mean over the last tick, of a tool with a shape
     /// that of the last step.
-    fn exerted(&self, tool: usize) -> Vec<(u32, Vec3)> {
-        let touch = &self.moving.touches[tool];
-        if touch.has_shape() {
-            return touch.pressed().to_vec();
+    pub(crate) fn exerted(&self, tool: usize) -> Vec<(u32, Vec3)> {
+        if let Some(told) = &self.told {
+            return told.exerted[tool].clone();
         }
-        let Contact { triangle, weights, .. } = touch.contact;
-        let force = self.moving.means[tool].force;
-        let nodes = triangle.map(|triangle| self.moving.body.surface().triangles[triangle as usize]);
-        nodes.into_iter().flat_map(|nodes| (0..3).map(move |i| (nodes[i], -force * weights[i]))).collect()
+        let mut exerted = Vec::new();
+        let (surface, force) = (self.moving.body.surface(), self.moving.means[tool].force);
+        self.moving.touches[tool].each_exerted(surface, force, |node, force| exerted.push((node, force)));
+        exerted
     }
 
     /// The body that is simulated, as stiff as it is now.
@@ -427,6 +432,24 @@ impl Simulation {
         nodes.sort_unstable();
         nodes.dedup();
         self.moving.touches[tool].complete(&self.moving.body, triangles, nodes);
+    }
+
+    /// Puts the nodes that all tools but `tool` press, and would press at the `triangles` of each, in place of `nodes`: what a patch has to
+    /// hold if the others are to be resolved in it.
+    ///
+    /// # Real-time
+    /// For the global actor, at each resync: bounded; allocates.
+    pub fn pressed_beside<'a>(&self, tool: usize, triangles: impl Fn(usize) -> &'a [u32], nodes: &mut Vec<u32>) {
+        nodes.clear();
+        let mut pressed = Vec::new();
+        for other in (0..self.tools()).filter(|&other| other != tool) {
+            self.pressed_at(other, triangles(other), &mut pressed);
+            nodes.append(&mut pressed);
+        }
+        let can_move = |node: &u32| self.moving.inverse_masses[*node as usize] > 0.0;
+        nodes.extend(self.exerted_beside(tool).map(|(node, _)| node).filter(can_move));
+        nodes.sort_unstable();
+        nodes.dedup();
     }
 
     /// Appends the triangles that `tool` touches, or may touch soon, at `pose`, or if its radius were larger by `margin` (m), each

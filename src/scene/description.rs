@@ -153,12 +153,11 @@ impl Scene {
     }
 
     /// The patch window that was asked for, or the usual one: 6 x 6 x 3 for `predictive` and `predicted`, 4 x 4 x 3 if the body is of
-    /// tetrahedra, whose nodes have more neighbours, as far as a block has room for it; 4 x 4 x 2, the paper's, for the other models, and for
-    /// several devices, whose windows are to hold one tool each.
+    /// tetrahedra, whose nodes have more neighbours, as far as a block has room for it; 4 x 4 x 2, the paper's, for the other models.
     pub fn patch_size(&self) -> [usize; 3] {
         let looks_ahead = matches!(self.local.model.named(), Some(Kind::Predicted | Kind::Predictive));
         self.local.patch.unwrap_or_else(|| match &self.body {
-            _ if !looks_ahead || self.devices.len() > 1 => [4, 4, 2],
+            _ if !looks_ahead => [4, 4, 2],
             Some(BodySpec::MassSpring(spec)) => fitting_patch([6, 6, 3], &spec.block),
             Some(BodySpec::Tetrahedra(_)) => [4, 4, 3],
             None => [6, 6, 3],

@@ -59,6 +59,7 @@ fn row([radius, depth]: [f64; 2]) {
         global: &mut sim,
         tick: 500,
         triangles: &triangles,
+        nearest: &[],
         patch: Some(&patch),
         tools: &[ToolForecast::at_rest(tool)],
         index: 0,
@@ -72,7 +73,7 @@ fn row([radius, depth]: [f64; 2]) {
     let (mut times, mut places) = (Vec::with_capacity(TICKS), 0);
     for k in 0..WARM_UP + TICKS {
         let start = Instant::now();
-        std::hint::black_box(model.tick(ToolMotion::straight(circle(k), circle(k + 1))));
+        std::hint::black_box(model.tick(&[ToolMotion::straight(circle(k), circle(k + 1))]));
         times.push(start.elapsed().as_secs_f64() * 1e6);
         places += if k < WARM_UP { 0 } else { model.contact_points().len() };
     }

@@ -48,6 +48,7 @@ fn rebuild(patch: &mut dyn LocalModel, sim: &mut Simulation) {
         global: sim,
         tick: 100,
         triangles: &[triangle],
+        nearest: &[],
         patch: None,
         tools: &[ToolForecast::default()],
         index: 0,
@@ -68,7 +69,7 @@ fn patch_tick(c: &mut Criterion) {
         c.bench_function(&format!("patch 4x4x2: one 1 kHz tick with contact, {name}"), |b| {
             b.iter(|| {
                 k += 1;
-                black_box(patch.tick(ToolMotion::straight(circle(k - 1), circle(k))))
+                black_box(patch.tick(&[ToolMotion::straight(circle(k - 1), circle(k))]))
             });
         });
         assert!(patch.contact().is_touching(), "the tick measured has a contact in it");

@@ -169,7 +169,7 @@ pub struct ContactPoint {
 ///
 /// # Real-time
 /// A plain value: its methods are wait-free and real-time safe.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToolMotion {
     /// The tool at the start of the step.
     pub from: Pose,

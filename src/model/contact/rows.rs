@@ -75,6 +75,14 @@ impl Rows {
         self.search.make_room(nodes, candidates);
     }
 
+    /// Forgets what it knows of the tools: they have other numbers from now on.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub(crate) fn forget(&mut self) {
+        self.search.forget();
+    }
+
     pub(super) fn clear(&mut self) {
         self.rows.clear();
         self.nodes.clear();

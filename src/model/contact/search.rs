@@ -46,6 +46,11 @@ impl Search {
         self.fine.make_room(nodes);
     }
 
+    /// Forgets what it keeps of the tools.
+    pub(super) fn forget(&mut self) {
+        self.vicinities.iter_mut().flatten().for_each(Vicinity::forget);
+    }
+
     /// Finds the places that would overlap with a tool at the end of the step if nothing pressed.
     pub(super) fn find(&mut self, body: &Deformable<'_>, (tool, touch): (usize, &Touch), motion: ToolMotion, d: f64) {
         self.near.clear();

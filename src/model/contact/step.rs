@@ -79,11 +79,15 @@ pub(crate) fn step_all(
         return;
     }
     integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
+    if touches.iter().all(|touch| !touch.has_shape()) && !share_nodes(body, touches, &motion, d) {
+        press_apart(body, touches, law, &motion, d);
+        return;
+    }
     press_all(body, touches, rows, law, &motion, d, |rows, body| rows.solve(body, law, d));
 }
 
 /// One step by the implicit `system` of a linear patch, explicit but for that: `forces` are those at its end for unchanged velocities, and
-/// every node answers to the tool's impulse. The equations are the corrected ones.
+/// every node answers to the tools' impulses. The equations are the corrected ones.
 ///
 /// # Real-time
 /// Bounded, real-time safe if `rows` has room: 9 n^2 multiply-adds for n nodes, and what detection costs.
@@ -91,22 +95,23 @@ pub(crate) fn step_implicit(
     body: &mut Deformable<'_>,
     system: &mut ImplicitStep,
     forces: &[Vec3],
-    touch: &mut Touch,
+    touches: &mut [Touch],
     rows: &mut Rows,
     law: &Law,
-    tool: ToolMotion,
+    motion: impl Fn(usize) -> ToolMotion,
 ) {
     let d = system.step();
     system.accelerate(body.velocities, forces);
-    if touch.has_shape() {
-        let touches = std::slice::from_mut(touch);
-        press_all(body, touches, rows, law, &|_| tool, d, |rows, body| rows.solve_coupled(body, system, law));
+    if let [touch] = &mut *touches
+        && !touch.has_shape()
+    {
+        let force = move_with_tool(body, &mut touch.contact, law, motion(0), d, |body, place, tool, d_c| {
+            resolve_coupled(body, system, law, place, tool, d_c)
+        });
+        touch.wrench = force.into();
         return;
     }
-    let force = move_with_tool(body, &mut touch.contact, law, tool, d, |body, place, tool, d_c| {
-        resolve_coupled(body, system, law, place, tool, d_c)
-    });
-    touch.wrench = force.into();
+    press_all(body, touches, rows, law, &motion, d, |rows, body| rows.solve_coupled(body, system, law));
 }
 
 /// From the velocities without contact on: detection, `solution` for all places, motion, tracking.
@@ -120,10 +125,6 @@ fn press_all(
     solution: impl FnOnce(&mut Rows, &mut Deformable<'_>),
 ) {
     rows.clear();
-    if touches.iter().all(|touch| !touch.has_shape()) && !share_nodes(body, touches, motion, d) {
-        press_apart(body, touches, law, motion, d);
-        return;
-    }
     for (tool, touch) in touches.iter_mut().enumerate() {
         if touch.has_shape() {
             rows.add_shape(body, (tool, touch), motion(tool), d);

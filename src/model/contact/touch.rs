@@ -267,6 +267,17 @@ impl Touch {
         &self.pressed
     }
 
+    /// Tells `each` node that it presses with the force on that (N): of a tool with a shape those of the last step, of a point its share of
+    /// `force`, which is that on the tool.
+    pub(crate) fn each_exerted(&self, surface: &Surface, force: Vec3, mut each: impl FnMut(u32, Vec3)) {
+        if self.has_shape() {
+            self.pressed.iter().for_each(|&(node, force)| each(node, force));
+        } else if let Some(triangle) = self.contact.triangle {
+            let nodes = surface.triangles[triangle as usize];
+            nodes.into_iter().zip(self.contact.weights).for_each(|(node, weight)| each(node, -force * weight));
+        }
+    }
+
     /// The area that it touches (m^2): a third of the triangles around each node that is touched, and of one that is
     /// touched in part, that part. Of a sphere on coarse elements no less than what it touches of a half space under its force; of fine ones
     /// nodes at the rim, which it only just reaches, count by how much they press.

@@ -118,15 +118,6 @@ impl PatchTangent {
         self.origin.velocities.extend(nodes.iter().map(|&node| state.velocities[node as usize]));
     }
 
-    /// Adds a constant `force` (N) on the patch's node at `place`: what another tool exerts.
-    ///
-    /// # Real-time
-    /// For the global actor: bounded.
-    pub(crate) fn add_force(&mut self, place: usize, force: Vec3) {
-        let mut rows = self.force.fixed_rows_mut::<3>(3 * place);
-        rows += force;
-    }
-
     /// Adds `share` of `stiffness` (N/m, 3n x 3n, a derivative of the force as K is) to K.
     ///
     /// # Real-time

@@ -25,7 +25,7 @@ impl LocalModel for Hold {
         self.watched.take(resync.global.state());
     }
 
-    fn tick(&mut self, _: ToolMotion) -> Wrench {
+    fn tick(&mut self, _: &[ToolMotion]) -> Wrench {
         self.wrench
     }
 

@@ -27,7 +27,7 @@ pub use forecast::{ToolForecast, ToolHistory};
 pub use hold::Hold;
 pub use kind::Kind;
 pub use parcel::{Image, Parcel};
-pub use succession::{Blend, BlendKind, Jump, Resynced, Served, Succession};
+pub use succession::{Blend, BlendKind, Jump, Resynced, Served, Succession, Ways};
 pub use template::Template;
 pub use windows::Windows;
 
@@ -41,6 +41,9 @@ pub struct ResyncView<'a> {
     /// The surface triangle to build around (the contact's, or the one nearest to the tool), then those that the tool is
     /// expected over before the next model serves.
     pub triangles: &'a [u32],
+    /// The surface triangle that each tool touches, or is nearest to: those whose place a window holds are resolved in it. None of them if
+    /// the list is empty.
+    pub nearest: &'a [u32],
     /// The patch to use, if it is not to be the one around the triangles: node ids in increasing order.
     pub patch: Option<&'a [u32]>,
     /// The forecast of each tool: where it is, and where it is expected.
@@ -61,12 +64,15 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// For the global actor: may allocate, at first use and where its size changes.
     fn rebuild(&mut self, resync: ResyncView<'_>);
 
-    /// Advances one haptic tick while the tool moves along `tool`; returns the mean force and torque on the tool, which are
-    /// not finite if the model has diverged.
+    /// Advances one haptic tick while each tool of the session moves along its own of `tools`; returns the mean force and torque on the tool
+    /// that the model is for, which are not finite if the model has diverged.
+    ///
+    /// # Panics
+    /// If `tools` are fewer than those of the global model that it was built from.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    fn tick(&mut self, tool: ToolMotion) -> Wrench;
+    fn tick(&mut self, tools: &[ToolMotion]) -> Wrench;
 
     /// The haptic tick that the model's state was built at; catching up starts there.
     ///
@@ -94,7 +100,8 @@ pub trait LocalModel: Send + std::fmt::Debug {
         true
     }
 
-    /// Ticks that it is advanced per haptic tick until it has caught up, more than one; another model serves meanwhile.
+    /// Ticks that it is advanced per haptic tick until it has caught up, more than one; another model serves meanwhile. Several tools
+    /// share them.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

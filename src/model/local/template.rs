@@ -34,10 +34,11 @@ use crate::surroundings::{Condensation, RestingBody};
 /// // At every resync the local model is built from the global one; then it runs on by itself.
 /// let mut model = template.empty();
 /// let tools = &[ToolForecast::at_rest(Vec3::new(0.03, 0.03, 0.05))];
-/// let (triangles, bases) = (&[triangle], &Bases::default());
-/// model.rebuild(ResyncView { global: &mut global, tick: 0, triangles, patch: None, tools, index: 0, horizon: 33, bases });
+/// let (triangles, bases, patch) = (&[triangle], &Bases::default(), None);
+/// let (global, nearest) = (&mut global, triangles);
+/// model.rebuild(ResyncView { global, tick: 0, triangles, nearest, patch, tools, index: 0, horizon: 33, bases });
 /// let start = tools[0].position;
-/// let force = model.tick(ToolMotion::straight(start, start + Vec3::z() * 1e-3)).force;
+/// let force = model.tick(&[ToolMotion::straight(start, start + Vec3::z() * 1e-3)]).force;
 /// assert!(force.z < 0.0, "it pulls the tool back");
 /// # Ok(())
 /// # }
@@ -158,8 +159,8 @@ impl Template {
         Ok(if self.is_implicit { made.with_implicit_steps() } else { made })
     }
 
-    /// An empty model, to be rebuilt in place. That of [`Kind::Full`] is for one tool; where nothing but `full` is wanted it is the
-    /// [`Simulation`](crate::simulation::Simulation) itself with all tools.
+    /// An empty model, to be rebuilt in place. Of [`Kind::Full`] each tool has a body of its own; where nothing but `full` is wanted it is
+    /// the [`Simulation`](crate::simulation::Simulation) itself with all tools.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.

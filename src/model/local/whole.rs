@@ -5,14 +5,16 @@ use crate::contact::{Contact, ContactPoint, ToolMotion};
 use crate::simulation::Simulation;
 use crate::{Vec3, Wrench};
 
-/// The whole body with its tool, as it was in the global model when it was built, and by itself from there on.
+/// The whole body with all tools, as it was in the global model when it was built, and by itself from there on.
 ///
-/// It follows the tool as the global model does, a tick at a time, so it needs no resync and is never old; it is built anew only where
-/// something else than the tool changes. With several tools it would not know the way of the others.
+/// It follows the tools as the global model does, a tick at a time, so it needs no resync and is never old; it is built anew only where
+/// something else than the tools changes.
 #[derive(Debug, Default)]
 pub(super) struct Whole {
     /// `None` before it is built, and for a body that cannot be copied.
     simulation: Option<Simulation>,
+    /// The tool that it serves.
+    tool: usize,
     /// The tick of its state.
     now: u64,
     /// Nodes that are watched.
@@ -24,16 +26,16 @@ const CATCH_UP_TICKS: u64 = 3;
 
 impl LocalModel for Whole {
     fn rebuild(&mut self, resync: ResyncView<'_>) {
-        (self.simulation, self.now) = (resync.global.duplicate(), resync.tick);
+        (self.simulation, self.tool, self.now) = (resync.global.duplicate(), resync.index, resync.tick);
     }
 
-    fn tick(&mut self, tool: ToolMotion) -> Wrench {
+    fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
         let none = Wrench::from(Vec3::repeat(f64::NAN));
         self.now += 1;
         let Some(simulation) = &mut self.simulation else { return none };
-        let wrench = simulation.tick(tool);
+        simulation.tick_all(tools);
         // A state that is not finite touches nothing: its zero force would look like a free tool.
-        if simulation.state().is_finite() { wrench } else { none }
+        if simulation.state().is_finite() { simulation.wrench(self.tool) } else { none }
     }
 
     fn built_at(&self) -> u64 {
@@ -53,15 +55,15 @@ impl LocalModel for Whole {
     }
 
     fn contact(&self) -> Contact {
-        self.simulation.as_ref().map_or(Contact::default(), |simulation| *simulation.contact(0))
+        self.simulation.as_ref().map_or(Contact::default(), |simulation| *simulation.contact(self.tool))
     }
 
     fn contact_points(&self) -> &[ContactPoint] {
-        self.simulation.as_ref().map_or(&[], |simulation| simulation.contact_points(0))
+        self.simulation.as_ref().map_or(&[], |simulation| simulation.contact_points(self.tool))
     }
 
     fn contact_area(&self) -> f64 {
-        self.simulation.as_ref().map_or(0.0, |simulation| simulation.contact_area(0))
+        self.simulation.as_ref().map_or(0.0, |simulation| simulation.contact_area(self.tool))
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {

@@ -101,8 +101,9 @@ impl Windows {
     }
 
     /// Puts the patch for tool number `tool` over `triangles` in place of `nodes`: of the windows that are `usable` and hold all that
-    /// it presses there the one in whose middle they lie best, or one of its own if there is none. A tool that is glued, and goes
-    /// nowhere, always has its own. True if it is a usable one.
+    /// it presses there the one in whose middle they lie best, or one of its own if there is none. One that holds the nodes of the first of
+    /// `beside` too, which other tools press, comes before one that holds those of the second, and that before others. A tool that is
+    /// glued, and goes nowhere, always has its own. True if it is a usable one.
     ///
     /// # Real-time
     /// For the global actor: looks at all windows; `nodes` may grow.
@@ -110,6 +111,7 @@ impl Windows {
         &self,
         (simulation, tool): (&Simulation, usize),
         triangles: &[u32],
+        beside: [&[u32]; 2],
         usable: impl Fn(&[u32]) -> bool,
         nodes: &mut Vec<u32>,
     ) -> bool {
@@ -118,7 +120,8 @@ impl Windows {
             let mut window = (1..=WAYS + 1).rev().filter_map(|count| {
                 let first = if count > WAYS { triangles } else { &triangles[..count.min(triangles.len())] };
                 simulation.pressed_at(tool, first, nodes);
-                self.best(first, nodes, &usable)
+                let shared = beside.into_iter().filter(|nodes| !nodes.is_empty());
+                shared.chain([&[][..]]).find_map(|beside| self.best(first, [nodes, beside], &usable))
             });
             if let Some(window) = window.next() {
                 window.patch.clone_into(nodes);
@@ -146,8 +149,8 @@ impl Windows {
         best.map(|(_, window)| &window.patch[..])
     }
 
-    fn best(&self, triangles: &[u32], pressed: &[u32], usable: impl Fn(&[u32]) -> bool) -> Option<&Window> {
-        let holds = |patch: &[u32]| pressed.iter().all(|node| patch.binary_search(node).is_ok());
+    fn best(&self, triangles: &[u32], pressed: [&[u32]; 2], usable: impl Fn(&[u32]) -> bool) -> Option<&Window> {
+        let holds = |patch: &[u32]| pressed.into_iter().flatten().all(|node| patch.binary_search(node).is_ok());
         let mut best: Option<(&Window, f64)> = None;
         for window in &self.windows {
             if best.is_some_and(|(best, _)| best.layer != window.layer) {
@@ -209,7 +212,7 @@ mod tests {
             let (mut pressed, mut patch, mut used) = (Vec::new(), Vec::new(), Vec::new());
             let top = top(&simulation);
             for &triangle in &top {
-                assert!(windows.choose((&simulation, 0), &[triangle], |_| true, &mut patch));
+                assert!(windows.choose((&simulation, 0), &[triangle], [&[]; 2], |_| true, &mut patch));
                 simulation.pressed_at(0, &[triangle], &mut pressed);
                 assert!(pressed.iter().all(|node| patch.contains(node)), "{shape:?}: triangle {triangle}");
                 assert!(patch.is_sorted());
@@ -229,7 +232,7 @@ mod tests {
         let at = |x: f64| nearest.find(&Vec3::new(x, 0.041, 0.08));
         let mut patch = Vec::new();
         let mut chosen = |triangles: &[u32]| {
-            assert!(windows.choose((&simulation, 0), triangles, |_| true, &mut patch));
+            assert!(windows.choose((&simulation, 0), triangles, [&[]; 2], |_| true, &mut patch));
             patch.clone()
         };
         let resting = chosen(&[at(0.041)]);
@@ -250,10 +253,10 @@ mod tests {
         let windows = Windows::new(&simulation, 0, SIZE);
         let triangle = top(&simulation)[40];
         let (mut best, mut ready) = (Vec::new(), Vec::new());
-        windows.choose((&simulation, 0), &[triangle], |_| true, &mut best);
-        assert!(windows.choose((&simulation, 0), &[triangle], |patch| patch != best, &mut ready));
+        windows.choose((&simulation, 0), &[triangle], [&[]; 2], |_| true, &mut best);
+        assert!(windows.choose((&simulation, 0), &[triangle], [&[]; 2], |patch| patch != best, &mut ready));
         assert_ne!(best, ready);
-        assert!(!windows.choose((&simulation, 0), &[triangle], |_| false, &mut ready), "none is ready");
+        assert!(!windows.choose((&simulation, 0), &[triangle], [&[]; 2], |_| false, &mut ready), "none is ready");
         assert!(windows.around(triangle, 7).count() == 7 && windows.around(triangle, 1).next().is_some());
     }
 }

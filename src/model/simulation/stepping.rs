@@ -2,7 +2,6 @@
 
 use crate::Wrench;
 use crate::body::Body;
-use crate::contact::ToolMotion;
 use crate::integrator::Spectrum;
 
 /// How time is divided: ticks of the haptic rate, each of several explicit substeps.
@@ -51,12 +50,12 @@ impl Stepping {
         Self { substeps: self.substeps * parts.max(1), ..*self }
     }
 
-    /// Runs one tick: calls `substep` for each part of the tool's motion and returns the mean of what it gives.
-    pub(crate) fn tick(&self, tool: ToolMotion, mut substep: impl FnMut(ToolMotion, f64) -> Wrench) -> Wrench {
+    /// Runs one tick: calls `substep` for each part of it, from and to a share of the tick, and returns the mean of what it gives.
+    pub(crate) fn tick(&self, mut substep: impl FnMut([f64; 2], f64) -> Wrench) -> Wrench {
         let n = f64::from(self.substeps);
         let sum = (0..self.substeps).fold(Wrench::default(), |sum, u| {
             let u = f64::from(u);
-            sum + substep(tool.part(u / n, (u + 1.0) / n), self.step())
+            sum + substep([u / n, (u + 1.0) / n], self.step())
         });
         sum / n
     }

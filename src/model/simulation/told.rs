@@ -2,11 +2,11 @@
 
 use crate::Vec3;
 
-/// What a simulation on another computer tells of one tool's surroundings, which its image cannot find out by itself.
+/// What a simulation on another computer tells of the surroundings of tools, which its image cannot find out by itself.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Told {
-    /// Nodes that the other tools press, with the force on each (N).
-    pub(crate) beside: Vec<(u32, Vec3)>,
+    /// Nodes that each tool presses, with the force on each (N).
+    pub(crate) exerted: Vec<Vec<(u32, Vec3)>>,
     /// How the patch's ring is predicted to move: positions (m), velocities (m/s) and near forces (N) at each substep.
     pub(crate) path: Vec<f64>,
 }

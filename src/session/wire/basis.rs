@@ -77,7 +77,7 @@ impl BasisSide {
     }
 }
 
-/// The bases of the window that each tool is over, and of the widest there.
+/// The bases of the window that each tool is over, of one that holds the others too, and of the widest there.
 fn first_bases(
     prepared: &Prepared,
     resting: &RestingBody,
@@ -86,14 +86,21 @@ fn first_bases(
 ) -> Result<Bases, Error> {
     let simulation = &prepared.simulation;
     let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
-    let (mut triangles, mut bases) = (Vec::new(), Bases::default());
-    for (index, &tool) in tools.iter().enumerate() {
+    let (mut bases, mut beside) = (Bases::default(), Vec::new());
+    let triangles = |(index, &tool): (usize, &Pose)| {
+        let mut triangles = Vec::new();
         aim.triangles((simulation, index), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
+        triangles
+    };
+    let of_tools: Vec<Vec<u32>> = tools.iter().enumerate().map(triangles).collect();
+    for (index, triangles) in of_tools.iter().enumerate() {
         let windows = Windows::new(simulation, index, prepared.plan.template.patch);
-        let mut patch = Vec::new();
-        windows.choose((simulation, index), &triangles, |_| true, &mut patch);
+        simulation.pressed_beside(index, |other| &of_tools[other], &mut beside);
+        let [mut patch, mut shared] = [Vec::new(), Vec::new()];
+        windows.choose((simulation, index), triangles, [&[]; 2], |_| true, &mut patch);
+        windows.choose((simulation, index), triangles, [&beside, &[]], |_| true, &mut shared);
         let widest = windows.widest(triangles[0], &patch).filter(|_| !simulation.contact(index).glued);
-        for patch in std::iter::once(&patch[..]).chain(widest) {
+        for patch in [&patch[..], &shared[..]].into_iter().chain(widest) {
             // What cannot be reduced is told by the actor, when it is wanted.
             if bases.get(patch).is_none()
                 && let Ok(Some(basis)) = store.get(resting, patch)

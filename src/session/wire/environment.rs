@@ -110,13 +110,10 @@ fn groups(prepared: &Prepared) -> Vec<GroupInfo> {
     local.into_iter().chain(optional.into_iter().flatten()).chain([logger]).collect()
 }
 
-/// The haptic actors in the order of their ticks: two for each tool, or one for all after their devices.
+/// The haptic actors in the order of their ticks: the device of each tool, then what computes the forces on all.
 fn haptic_actors(prepared: &Prepared) -> Vec<String> {
-    let named = |tool: &str, actor: &str| if tool.is_empty() { actor.to_owned() } else { format!("{tool}/{actor}") };
-    let (own, shared): (&[_], _) =
-        if prepared.is_multi_rate() { (&["device", "local"], None) } else { (&["device"], Some("local".to_owned())) };
-    let of_tool = |tool: &Tool| own.iter().map(|actor| named(&tool.name, actor)).collect::<Vec<_>>();
-    prepared.tools.iter().flat_map(of_tool).chain(shared).collect()
+    let device = |tool: &Tool| if tool.name.is_empty() { "device".to_owned() } else { format!("{}/device", tool.name) };
+    prepared.tools.iter().map(device).chain(["local".to_owned()]).collect()
 }
 
 fn first_tool((device, first): (u16, &DeviceState)) -> ToolSample {

@@ -1,10 +1,9 @@
-//! The haptic group: a device and a local actor for each tool, or one with the whole body for all, with what they say to each
-//! other.
+//! The haptic group: a device actor for each tool and one that computes the forces on all, with what they say to each other.
 
 use super::models::Models;
 use crate::actors::{
-    ComputedForce, DeviceActor, DevicePorts, DeviceSample, Disbelieved, LocalActor, LocalTool, LocalToolPorts,
-    ToolView, WholeActor,
+    ComputedForce, DeviceActor, DevicePorts, DeviceSample, Disbelieved, LocalActor, LocalSide, LocalTool,
+    LocalToolPorts, ToolView, WholeActor,
 };
 use crate::devices::DeviceState;
 use crate::log::ContactSample;
@@ -98,10 +97,13 @@ pub(super) fn actors(
             devices
         }
         Models::Local(models) => {
-            let local =
-                |(tool, (models, ports))| Box::new(LocalActor::new(models, tool, rates, ports)) as Box<dyn Actor>;
-            let locals = simulated.into_iter().zip(models).map(local);
-            devices.into_iter().zip(locals).flat_map(|(device, local)| [device, local]).collect()
+            let side = |(tool, (models, ports))| LocalSide { models, tool, ports };
+            let sides: Vec<LocalSide> = simulated.into_iter().zip(models).map(side).collect();
+            // There are none where the devices are elsewhere.
+            if !sides.is_empty() {
+                devices.push(Box::new(LocalActor::new(sides, rates)));
+            }
+            devices
         }
     }
 }

@@ -94,7 +94,7 @@ pub(super) fn models(
         };
         GlobalMaker::new(simulation, places, plan, side)
     });
-    let of_tool = |ports| (Succession::new([model(), model(), model()], plan.blend, Pose::default()), ports);
+    let of_tool = |ports| (Succession::new([model(), model(), model()], plan.blend), ports);
     let models = Models::Local(locals.into_iter().flatten().map(of_tool).collect());
     let bridges = linking.map(|linking| linking.bridges(graph)).unwrap_or_default();
     Ok((models, maker, bridges))

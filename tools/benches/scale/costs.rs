@@ -160,7 +160,7 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
         let half = horizon as usize / 2;
         let served = least_of_rounds(|_| {
             rebuild(&mut *model, &mut sim, horizon, patch, bases);
-            ticks(half, |k| model.tick(motion(k)).force)
+            ticks(half, |k| model.tick(&[motion(k)]).force)
         });
         Ok((least, served))
     };
@@ -216,6 +216,7 @@ fn rebuild(model: &mut dyn LocalModel, sim: &mut Simulation, horizon: u32, patch
         global: sim,
         tick: 0,
         triangles: &[triangle],
+        nearest: &[],
         patch: Some(patch),
         tools: &[forecast],
         index: 0,

@@ -62,8 +62,9 @@ impl LinearPatch {
         Drift { time: ticks * self.patch.stepping.tick + if is_moving { t } else { 0.0 }, is_moving }
     }
 
-    /// One step from `t` seconds into the present tick; returns the force and torque on the tool.
-    fn step(&mut self, tool: ToolMotion, t: f64, d: f64) -> Wrench {
+    /// One step from `t` seconds into the present tick, each tool along `motion` of its number; returns the force and torque on the
+    /// patch's own.
+    fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, t: f64, d: f64) -> Wrench {
         // An implicit step takes its forces at its end.
         let ahead = if self.is_implicit { d } else { 0.0 };
         let drift = self.drift(t + ahead);
@@ -72,11 +73,11 @@ impl LinearPatch {
         let (x, v) = (&patch.state.positions[..movable], &patch.state.velocities[..movable]);
         tangent.forces(x, v, ahead, drift, &mut patch.forces);
         if self.is_implicit {
-            patch.with_contact(|body, forces, touch, rows, law| {
-                step_implicit(body, system, forces, touch, rows, law, tool);
+            patch.with_contact(|body, forces, (touches, numbers, rows), law| {
+                step_implicit(body, system, forces, touches, rows, law, |tool| motion(numbers[tool]));
             })
         } else {
-            patch.step(tool, d)
+            patch.step(motion, d)
         }
     }
 
@@ -117,11 +118,6 @@ impl LocalModel for LinearPatch {
                 break;
             }
         }
-        for (node, force) in resync.global.exerted_beside(resync.index) {
-            if let Some(place) = window.movable(node) {
-                tangent.add_force(place, force);
-            }
-        }
         self.ticks = 0;
         (patch.stepping, self.is_implicit) =
             stable_stepping(spec.is_implicit, tangent, &patch.inverse_masses, patch.stepping, &patch.law);
@@ -132,14 +128,15 @@ impl LocalModel for LinearPatch {
         }
     }
 
-    fn tick(&mut self, tool: ToolMotion) -> Wrench {
-        if let Some(wrench) = self.patch.beyond(&tool.to) {
+    fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
+        let to = tools[self.patch.tools.number()].to;
+        if let Some(wrench) = self.patch.beyond(&to) {
             return wrench;
         }
         let (stepping, mut t) = (self.patch.stepping, 0.0);
-        self.patch.touch.begin();
-        let wrench = stepping.tick(tool, |tool, d| {
-            let wrench = self.step(tool, t, d);
+        self.patch.tools.begin();
+        let wrench = stepping.tick(|[from, to], d| {
+            let wrench = self.step(|tool| tools[tool].part(from, to), t, d);
             t += d;
             wrench
         });
@@ -147,7 +144,7 @@ impl LocalModel for LinearPatch {
         if self.ticks == self.boundary.moving_ticks() {
             self.hold_rim();
         }
-        self.patch.feel(wrench, &tool.to, stepping.substeps)
+        self.patch.feel(wrench, &to, stepping.substeps)
     }
 
     fn built_at(&self) -> u64 {
@@ -196,9 +193,10 @@ impl LocalModel for LinearPatch {
             Feedback::Trajectory => return false,
             Feedback::Geometry => (0..patch.window.movable).for_each(|place| patch.tell(geometry, place)),
             Feedback::ContactNodes => {
-                let touched = patch.touch.contact.triangle.filter(|_| !patch.touch.has_shape());
+                let touch = patch.tools.own();
+                let touched = touch.contact.triangle.filter(|_| !touch.has_shape());
                 let corners = touched.map(|t| patch.window.surface.triangles[t as usize]);
-                let pressed = patch.touch.pressed().iter().map(|&(node, _)| node);
+                let pressed = touch.pressed().iter().map(|&(node, _)| node);
                 for place in corners
                     .into_iter()
                     .flatten()
@@ -238,8 +236,18 @@ mod tests {
         let spec = LinearSpec { size: [4, 4, 2], feedback, is_implicit: false };
         let mut model = LinearPatch::new(spec, boundary);
         let (tools, bases) = (&[ToolForecast::default()], &Bases::default());
-        let triangles = &[top];
-        model.rebuild(ResyncView { global, tick: 0, triangles, patch: None, tools, index: 0, horizon: 0, bases });
+        let (triangles, nearest) = (&[top], &[top]);
+        model.rebuild(ResyncView {
+            global,
+            tick: 0,
+            triangles,
+            nearest,
+            patch: None,
+            tools,
+            index: 0,
+            horizon: 0,
+            bases,
+        });
         model
     }
 
@@ -253,7 +261,7 @@ mod tests {
         let mut seen = Vec::new();
         for _ in 0..5 {
             seen.push((model.drift(0.5e-3), model.patch.state.positions[rim].x - start.x));
-            model.tick(ToolMotion::straight(tool, tool));
+            model.tick(&[ToolMotion::straight(tool, tool)]);
         }
         let near = |a: f64, b: f64| (a - b).abs() < 1e-15;
         for (tick, (drift, moved)) in seen.into_iter().enumerate() {
@@ -263,7 +271,7 @@ mod tests {
             assert!(near(moved, ticks * 1e-3 * 0.1), "tick {tick}: the rim moved {moved}");
         }
         let mut still = rebuilt(Feedback::Trajectory, Boundary::Still, (&mut global, top));
-        still.tick(ToolMotion::straight(tool, tool));
+        still.tick(&[ToolMotion::straight(tool, tool)]);
         assert_eq!((still.drift(0.0), still.patch.state.positions[rim]), (Drift::default(), start));
     }
 

@@ -3,7 +3,7 @@
 use super::super::linear::LinearPatch;
 use super::super::predictive::Predictive;
 use super::super::{Kind, LocalModel, ResyncView};
-use super::Parcel;
+use super::{Parcel, Pressing};
 use crate::Wrench;
 use crate::body::Body;
 use crate::contact::{Contact, ToolMotion};
@@ -45,8 +45,8 @@ impl Departing {
             around.flat_map(|triangle| body.triangles[triangle as usize]).collect()
         };
         let mut nodes: Vec<u32> = surface(&resync);
-        let ResyncView { global, tick, triangles, patch, tools, index, horizon, bases } = resync;
-        let view = ResyncView { global: &mut *global, tick, triangles, patch, tools, index, horizon, bases };
+        let ResyncView { global, tick, triangles, nearest, patch, tools, index, horizon, bases } = resync;
+        let view = ResyncView { global: &mut *global, tick, triangles, nearest, patch, tools, index, horizon, bases };
         match &mut self.model {
             Model::Hold => {}
             Model::Linear(model) => {
@@ -82,30 +82,35 @@ fn around(body: &dyn Body, patch: &[u32]) -> Vec<u32> {
 
 impl LocalModel for Departing {
     fn rebuild(&mut self, resync: ResyncView<'_>) {
-        let ResyncView { global, tick, triangles, patch, tools, index, horizon, bases } = resync;
-        let view = ResyncView { global: &mut *global, tick, triangles, patch, tools, index, horizon, bases };
+        let ResyncView { global, tick, triangles, nearest, patch, tools, index, horizon, bases } = resync;
+        let view = ResyncView { global: &mut *global, tick, triangles, nearest, patch, tools, index, horizon, bases };
         self.parcel.nodes = self.nodes(view);
-        let Parcel { nodes, state, felt, beside, .. } = &mut self.parcel;
-        let (all, touch) = (global.state(), global.touch(index));
+        let Parcel { nodes, state, tools: pressing, .. } = &mut self.parcel;
+        let all = global.state();
         state.positions.clear();
         state.positions.extend(nodes.iter().map(|&node| all.positions[node as usize]));
         state.velocities.clear();
         state.velocities.extend(nodes.iter().map(|&node| all.velocities[node as usize]));
-        touch.felt().clone_into(felt);
-        beside.clear();
-        beside.extend(global.exerted_beside(index));
+        pressing.resize_with(global.tools(), Pressing::default);
+        for (number, pressing) in pressing.iter_mut().enumerate() {
+            let touch = global.touch(number);
+            (pressing.contact, pressing.steady, pressing.wrench) =
+                (touch.contact, touch.steady(), global.wrench(number));
+            touch.felt().clone_into(&mut pressing.felt);
+            pressing.exerted = global.exerted(number);
+        }
         let parcel = &mut self.parcel;
         (parcel.tick, parcel.tool, parcel.place) = (tick, index as u16, tools[index].position);
         (parcel.friction, parcel.stiffness) = (global.law().friction, global.stiffness());
         triangles.clone_into(&mut parcel.triangles);
         parcel.patch = patch.map(<[u32]>::to_vec);
-        (parcel.contact, parcel.steady, parcel.wrench) = (touch.contact, touch.steady(), global.wrench(index));
+        nearest.clone_into(&mut parcel.nearest);
         if parcel.bases.len() != bases.len() {
             parcel.bases.clone_from(bases);
         }
     }
 
-    fn tick(&mut self, _: ToolMotion) -> Wrench {
+    fn tick(&mut self, _: &[ToolMotion]) -> Wrench {
         Wrench::default()
     }
 
@@ -126,7 +131,7 @@ impl LocalModel for Departing {
     }
 
     fn contact(&self) -> Contact {
-        self.parcel.contact
+        self.parcel.tools.get(usize::from(self.parcel.tool)).map(|tool| tool.contact).unwrap_or_default()
     }
 
     fn watch(&mut self, nodes: &[u32]) {

@@ -1,8 +1,7 @@
 //! The global model as far as it is known on another computer.
 
 use super::super::{LocalModel, ResyncView, ToolForecast};
-use super::{MOST_FELT, Parcel};
-use crate::Vec3;
+use super::{MOST_FELT, Parcel, Pressing};
 use crate::simulation::Simulation;
 use crate::surroundings::{Bases, Basis};
 
@@ -45,16 +44,18 @@ impl Image {
             (state.positions[node as usize], state.velocities[node as usize]) = (*x, *v);
         }
         self.simulation.set_friction(parcel.friction);
-        let told = self.simulation.be_told(parcel.stiffness, index, parcel.wrench, |touch| {
-            touch.go_on_from(parcel.contact, parcel.steady, &parcel.felt);
-        });
-        told.beside.clone_from(&parcel.beside);
-        told.path.clone_from(&parcel.path);
+        self.simulation.be_told(parcel.stiffness, &parcel.path);
+        for (tool, pressing) in parcel.tools.iter().enumerate() {
+            self.simulation.be_told_of(tool, pressing.wrench, &pressing.exerted, |touch| {
+                touch.go_on_from(pressing.contact, pressing.steady, &pressing.felt);
+            });
+        }
         self.tools[index] = ToolForecast::at_rest(parcel.place);
         model.rebuild(ResyncView {
             global: &mut self.simulation,
             tick: parcel.tick,
             triangles: &parcel.triangles,
+            nearest: &parcel.nearest,
             patch: parcel.patch(),
             tools: &self.tools,
             index,
@@ -86,14 +87,19 @@ impl Image {
         let (nodes, triangles) = (body.rest().len(), body.surface().triangles.len());
         let is_node = |&node: &u32| (node as usize) < nodes;
         let is_triangle = |&triangle: &u32| (triangle as usize) < triangles;
-        let is_told = |(node, _): &(u32, Vec3)| is_node(node);
-        let felt = parcel.felt.len() <= MOST_FELT && parcel.felt.iter().all(|felt| is_triangle(&felt.point.triangle));
-        let touched = parcel.contact.triangle.is_none_or(|triangle| is_triangle(&triangle));
-        let looked_at = parcel.nodes.iter().all(is_node) && parcel.beside.iter().all(is_told);
+        let presses = |tool: &Pressing| {
+            let felt = tool.felt.len() <= MOST_FELT && tool.felt.iter().all(|felt| is_triangle(&felt.point.triangle));
+            let touched = tool.contact.triangle.is_none_or(|triangle| is_triangle(&triangle));
+            felt && touched && tool.exerted.iter().all(|(node, _)| is_node(node))
+        };
+        let tools = self.tools.len();
+        let pressed = parcel.tools.len() == tools && parcel.tools.iter().all(presses);
+        let nearest = [0, tools].contains(&parcel.nearest.len()) && parcel.nearest.iter().all(is_triangle);
         let around = (1..=MOST_TRIANGLES).contains(&parcel.triangles.len());
-        felt && touched
-            && looked_at
+        pressed
+            && nearest
             && around
+            && parcel.nodes.iter().all(is_node)
             && parcel.triangles.iter().all(is_triangle)
             && parcel.patch().is_none_or(|patch| self.is_patch(patch))
     }

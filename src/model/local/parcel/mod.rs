@@ -39,12 +39,9 @@ pub struct Parcel {
     /// The nodes that the model looks at, with their state.
     nodes: Vec<u32>,
     state: State,
-    contact: Contact,
-    steady: Steady,
-    felt: Vec<Felt>,
-    wrench: Wrench,
-    /// Nodes that other tools press, with the force on each (N).
-    beside: Vec<(u32, Vec3)>,
+    /// How each tool of the scene presses, and the triangles that they are nearest to, as in [`ResyncView`](super::ResyncView).
+    tools: Vec<Pressing>,
+    nearest: Vec<u32>,
     /// Numbers of one quantity of the ring's path, three for each node, and the path.
     ring: usize,
     path: Vec<f64>,
@@ -52,11 +49,23 @@ pub struct Parcel {
     bases: Bases,
 }
 
+/// How a tool presses.
+#[derive(Clone, Debug, Default)]
+struct Pressing {
+    contact: Contact,
+    steady: Steady,
+    felt: Vec<Felt>,
+    wrench: Wrench,
+    /// The nodes that it presses, with the force on each (N).
+    exerted: Vec<(u32, Vec3)>,
+}
+
 /// Bytes of the parts of lists at least.
 const NODE: usize = 4;
 const STATE: usize = NODE + 6 * 8;
 const PRESSED: usize = NODE + 3 * 8;
 const FELT: usize = NODE + 15 * 8 + 2;
+const PRESSING: usize = 3 * NODE + 14 * 8 + 3;
 /// Places at which a tool touches.
 const MOST_FELT: usize = 1024;
 
@@ -98,17 +107,8 @@ impl Parcel {
             to.vector(x);
             to.vector(v);
         });
-        write_contact(to, &self.contact);
-        let Steady { force, fineness, is_fine } = self.steady;
-        [force, fineness].into_iter().for_each(|number| to.f64(number));
-        to.u8(is_fine.into());
-        to.list(&self.felt, write_felt);
-        to.vector(&self.wrench.force);
-        to.vector(&self.wrench.torque);
-        to.list(&self.beside, |to, (node, force)| {
-            to.u32(*node);
-            to.vector(force);
-        });
+        to.list(&self.tools, write_pressing);
+        to.list(&self.nearest, |to, &triangle| to.u32(triangle));
         path::write(to, self.ring, &self.path);
     }
 
@@ -132,12 +132,8 @@ impl Parcel {
             parcel.state.positions.push(x);
             parcel.state.velocities.push(v);
         }
-        parcel.contact = read_contact(from)?;
-        let [force, fineness] = [from.f64()?, from.f64().filter(|fineness| (0.0..=1.0).contains(fineness))?];
-        parcel.steady = Steady { force, fineness, is_fine: read_bool(from)? };
-        from.list(FELT, &mut parcel.felt, read_felt)?;
-        parcel.wrench = Wrench { force: from.vector()?, torque: from.vector()? };
-        from.list(PRESSED, &mut parcel.beside, |from| Some((from.u32()?, from.vector()?)))?;
+        from.list(PRESSING, &mut parcel.tools, read_pressing)?;
+        from.list(NODE, &mut parcel.nearest, BytesReader::u32)?;
         parcel.ring = path::read(from, &mut parcel.path)?;
         Some(parcel)
     }
@@ -146,6 +142,31 @@ impl Parcel {
 /// That of an unbounded friction is infinite.
 fn read_coefficient(from: &mut BytesReader<'_>) -> Option<f64> {
     from.u64().map(f64::from_bits).filter(|&coefficient| coefficient >= 0.0)
+}
+
+fn write_pressing(to: &mut BytesWriter<'_>, tool: &Pressing) {
+    write_contact(to, &tool.contact);
+    let Steady { force, fineness, is_fine } = tool.steady;
+    [force, fineness].into_iter().for_each(|number| to.f64(number));
+    to.u8(is_fine.into());
+    to.list(&tool.felt, write_felt);
+    to.vector(&tool.wrench.force);
+    to.vector(&tool.wrench.torque);
+    to.list(&tool.exerted, |to, (node, force)| {
+        to.u32(*node);
+        to.vector(force);
+    });
+}
+
+fn read_pressing(from: &mut BytesReader<'_>) -> Option<Pressing> {
+    let contact = read_contact(from)?;
+    let [force, fineness] = [from.f64()?, from.f64().filter(|fineness| (0.0..=1.0).contains(fineness))?];
+    let steady = Steady { force, fineness, is_fine: read_bool(from)? };
+    let mut tool = Pressing { contact, steady, ..Pressing::default() };
+    from.list(FELT, &mut tool.felt, read_felt)?;
+    tool.wrench = Wrench { force: from.vector()?, torque: from.vector()? };
+    from.list(PRESSED, &mut tool.exerted, |from| Some((from.u32()?, from.vector()?)))?;
+    Some(tool)
 }
 
 fn write_contact(to: &mut BytesWriter<'_>, contact: &Contact) {

@@ -33,8 +33,6 @@ pub(super) struct Predictive {
     /// Its window nodes are the patch, the ring, then what stands still; the ring is moved by its path.
     patch: Patch,
     near: NearBody,
-    /// Movable nodes that other tools touch, with the force that they exert at the resync, and are taken to go on with (N).
-    others: Vec<(usize, Vec3)>,
     path: RingPath,
     /// Substeps since it was built.
     substep: usize,
@@ -54,13 +52,12 @@ impl Predictive {
     pub(super) fn new(size: [usize; 3], reduces: bool) -> Self {
         let (patch, near, path, surroundings) = Default::default();
         let (ring_positions, ring_velocities, ring_forces, ring_weights) = Default::default();
-        let (others, substep, basis) = Default::default();
+        let (substep, basis) = Default::default();
         Self {
             size,
             reduces,
             patch,
             near,
-            others,
             path,
             substep,
             basis,
@@ -172,15 +169,13 @@ impl Predictive {
     fn take_near_forces(&mut self) {
         let Patch { state, forces, .. } = &mut self.patch;
         self.near.forces(state, forces);
-        for &(place, force) in &self.others {
-            forces[place] += force;
-        }
     }
 
-    /// A step of `d` seconds; the path is sampled `from` and `to` so many substeps after the tick's start.
-    fn step(&mut self, tool: ToolMotion, d: f64, [from, to]: [f64; 2]) -> Wrench {
+    /// A step of `d` seconds, each tool along `motion` of its number; the path is sampled `from` and `to` so many substeps after the
+    /// tick's start.
+    fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, d: f64, [from, to]: [f64; 2]) -> Wrench {
         self.take_near_forces();
-        let force = self.patch.step(tool, d);
+        let force = self.patch.step(motion, d);
         let start = self.substep as f64;
         if let Some(basis) = &self.basis {
             self.path.at(start + from).write_forces(&mut self.ring_forces);
@@ -218,30 +213,24 @@ impl LocalModel for Predictive {
         for numbers in [&mut self.ring_positions, &mut self.ring_velocities, &mut self.ring_forces] {
             numbers.resize(3 * window.ring, 0.0);
         }
-        let beside = resync.global.exerted_beside(resync.index);
-        self.others.clear();
-        self.others.extend(beside.filter_map(|(node, force)| Some((window.movable(node)?, force))));
         self.take_present(&resync);
         self.predict(&mut resync);
         self.surroundings.rest(self.basis.as_ref().map(|basis| &basis.answers), resync.global.stiffness());
     }
 
-    fn tick(&mut self, tool: ToolMotion) -> Wrench {
-        if let Some(wrench) = self.patch.beyond(&tool.to) {
+    fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
+        let end = tools[self.patch.tools.number()].to;
+        if let Some(wrench) = self.patch.beyond(&end) {
             return wrench;
         }
         let stepping = self.patch.stepping;
         let divided = stepping.divided(self.near.stable_share());
-        let parts = f64::from(divided.substeps / stepping.substeps);
-        self.patch.touch.begin();
-        let mut steps = 0.0;
-        let wrench = divided.tick(tool, |tool, d| {
-            let from = steps;
-            steps += 1.0;
-            self.step(tool, d, [from / parts, steps / parts])
-        });
+        let substeps = f64::from(stepping.substeps);
+        self.patch.tools.begin();
+        let wrench = divided
+            .tick(|[from, to], d| self.step(|tool| tools[tool].part(from, to), d, [from * substeps, to * substeps]));
         self.substep += stepping.substeps as usize;
-        self.patch.feel(wrench, &tool.to, divided.substeps)
+        self.patch.feel(wrench, &end, divided.substeps)
     }
 
     fn built_at(&self) -> u64 {

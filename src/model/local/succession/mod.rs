@@ -1,15 +1,16 @@
 //! From one local model to the next: swap in, catch up, blend.
 
 mod blend;
+mod ways;
 
 use super::LocalModel;
-use crate::contact::ToolMotion;
-use crate::{Pose, Vec3, Wrench};
+use crate::{Vec3, Wrench};
 
 pub use blend::{Blend, BlendKind, Jump};
+pub use ways::Ways;
 
-/// Tool positions that are remembered for catching up; an older model is not used.
-const HISTORY: usize = 1024;
+/// Ticks that a model is advanced in one at least until it has caught up: with one it never would.
+const FEWEST: u64 = 2;
 
 /// The result of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,7 +34,7 @@ pub struct Resynced {
     pub jump: Jump,
 }
 
-/// The local model that serves, the one that it replaced and the one that is about to replace it.
+/// The local model that serves a tool, the one that it replaced and the one that is about to replace it.
 ///
 /// Models are moved by swapping boxes: nothing is cloned, allocated or dropped while it runs.
 #[derive(Debug)]
@@ -46,89 +47,72 @@ pub struct Succession {
     blend: Blend,
     version: u32,
     resync: Resynced,
-    /// The tool at the end of tick t at place t % HISTORY.
-    history: Vec<Pose>,
-    /// The last tick.
-    now: u64,
 }
 
 impl Succession {
-    /// Starts with `models` to rotate through and resyncs blended by `blend`; the tool is at `tool` at tick 0.
-    /// The first serves until another is offered.
+    /// Starts with `models` to rotate through and resyncs blended by `blend`. The first serves until another is offered.
     ///
     /// # Real-time
-    /// Not real-time safe: allocates.
-    pub fn new(models: [Box<dyn LocalModel>; 3], blend: Blend, tool: Pose) -> Self {
+    /// Wait-free, real-time safe.
+    pub fn new(models: [Box<dyn LocalModel>; 3], blend: Blend) -> Self {
         let [serving, fading, arriving] = models;
-        Self {
-            serving,
-            fading,
-            arriving,
-            arrival: None,
-            blend,
-            version: 0,
-            resync: Resynced::default(),
-            history: vec![tool; HISTORY],
-            now: 0,
-        }
+        Self { serving, fading, arriving, arrival: None, blend, version: 0, resync: Resynced::default() }
     }
 
-    /// Puts the tool at `tool` and lets `model` serve at once: for tick 0. `model` gets a spare in exchange.
+    /// Lets `model` serve at once: for tick 0. `model` gets a spare in exchange.
     ///
     /// # Real-time
-    /// Bounded, real-time safe.
-    pub fn begin(&mut self, tool: Pose, model: &mut Box<dyn LocalModel>, version: u32) {
-        self.history.fill(tool);
+    /// Wait-free, real-time safe.
+    pub fn begin(&mut self, model: &mut Box<dyn LocalModel>, version: u32) {
         std::mem::swap(&mut self.serving, model);
         self.version = version;
     }
 
-    /// Takes a newer model in exchange for a spare. A model that is still catching up is given up for it.
+    /// Takes a newer model in exchange for a spare. A model that is still catching up is given up for it, and one that is older than
+    /// what `ways` remember is refused: it could not be brought to the present.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn offer(&mut self, model: &mut Box<dyn LocalModel>, version: u32) {
+    pub fn offer(&mut self, model: &mut Box<dyn LocalModel>, version: u32, ways: &Ways) {
         let reached = model.built_at();
-        // Older than the memory of the tool's path: it could not be brought to the present.
-        if self.now.saturating_sub(reached) >= HISTORY as u64 {
-            return;
+        if ways.reaches_back_to(reached) {
+            std::mem::swap(&mut self.arriving, model);
+            self.arrival = Some((version, reached));
         }
-        std::mem::swap(&mut self.arriving, model);
-        self.arrival = Some((version, reached));
     }
 
-    /// Advances one tick: the tool moves in a straight line to `tool`.
+    /// Advances one tick: the last of `ways`.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn tick(&mut self, tool: Pose) -> Served {
-        self.catch_up();
-        let motion = ToolMotion { from: self.at(self.now), to: tool };
-        self.now += 1;
-        let place = self.now as usize % HISTORY;
-        self.history[place] = tool;
-        let new = self.serving.tick(motion);
+    pub fn tick(&mut self, ways: &Ways) -> Served {
+        self.catch_up(ways);
+        let motions = ways.of(ways.now());
+        let new = self.serving.tick(motions);
         if !self.blend.is_under_way() {
             return Served { wrench: new, ..Served::default() };
         }
-        let old = if self.blend.needs_old() { self.fading.tick(motion) } else { new };
+        let old = if self.blend.needs_old() { self.fading.tick(motions) } else { new };
         // A diverged old model must not spoil a good new one.
         let old = if old.is_finite() { old } else { new };
         let (wrench, jump) = self.blend.mix(new, old);
         Served { wrench, resync: jump.map(|jump| Resynced { jump, ..self.resync }), swap_step: self.blend.step_now() }
     }
 
-    /// Brings an arrived model nearer to the present; when it is there and no blend is under way, it serves.
-    fn catch_up(&mut self) {
+    /// Brings an arrived model nearer to the start of the last tick; when it is there and no blend is under way, it serves.
+    fn catch_up(&mut self, ways: &Ways) {
         let Some((version, mut reached)) = self.arrival else { return };
+        let begun = ways.now() - 1;
         if self.arriving.catches_up() {
-            let until = self.now.min(reached + self.arriving.catch_up_ticks());
+            // What a release may take is shared by the tools.
+            let most = (self.arriving.catch_up_ticks() / ways.tools() as u64).max(FEWEST);
+            let until = begun.min(reached + most);
             while reached < until {
-                self.arriving.tick(ToolMotion { from: self.at(reached), to: self.at(reached + 1) });
                 reached += 1;
+                self.arriving.tick(ways.of(reached));
             }
             self.arrival = Some((version, reached));
-            if reached < self.now {
+            if reached < begun {
                 return;
             }
         }
@@ -139,13 +123,8 @@ impl Succession {
         std::mem::swap(&mut self.fading, &mut self.serving);
         std::mem::swap(&mut self.serving, &mut self.arriving);
         self.version = version;
-        self.resync =
-            Resynced { version, age: self.now.saturating_sub(self.serving.built_at()), ..Resynced::default() };
+        self.resync = Resynced { version, age: begun.saturating_sub(self.serving.built_at()), ..Resynced::default() };
         self.blend.begin();
-    }
-
-    fn at(&self, tick: u64) -> Pose {
-        self.history[tick as usize % HISTORY]
     }
 
     /// The model that serves now.
@@ -163,21 +142,13 @@ impl Succession {
     pub fn version(&self) -> u32 {
         self.version
     }
-
-    /// The number of the last tick.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn now(&self) -> u64 {
-        self.now
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::{Kind, ResyncView};
     use super::*;
-    use crate::contact::Contact;
+    use crate::contact::{Contact, ToolMotion};
 
     /// Adds up the motion that it was given; its force is its base plus that.
     #[derive(Debug)]
@@ -191,8 +162,8 @@ mod tests {
 
     impl LocalModel for Counting {
         fn rebuild(&mut self, _: ResyncView<'_>) {}
-        fn tick(&mut self, tool: ToolMotion) -> Wrench {
-            self.travelled += tool.way();
+        fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
+            self.travelled += tools[0].way();
             self.ticks += 1;
             Vec3::new(self.base, self.travelled.y, self.ticks as f64).into()
         }
@@ -217,11 +188,29 @@ mod tests {
         Box::new(Counting { base, built_at, catches_up, travelled: Vec3::zeros(), ticks: 0 })
     }
 
-    fn succession(blend_ticks: u32) -> Succession {
-        let blend = Blend::new(BlendKind::Crossfade, blend_ticks);
-        let mut models = Succession::new([-1.0; 3].map(|base| model(base, 0, true)), blend, Pose::default());
-        models.begin(Pose::default(), &mut model(1.0, 0, true), 0);
-        models
+    /// A succession with the ways of its one tool.
+    struct Followed {
+        models: Succession,
+        ways: Ways,
+    }
+
+    impl Followed {
+        fn new(blend_ticks: u32) -> Self {
+            let blend = Blend::new(BlendKind::Crossfade, blend_ticks);
+            let mut models = Succession::new([-1.0; 3].map(|base| model(base, 0, true)), blend);
+            models.begin(&mut model(1.0, 0, true), 0);
+            Self { models, ways: Ways::new(1) }
+        }
+
+        fn tick(&mut self, t: u64) -> Served {
+            self.ways.go(std::iter::once(ToolMotion::straight(tool(t - 1), tool(t))));
+            assert_eq!(self.ways.now(), t);
+            self.models.tick(&self.ways)
+        }
+
+        fn offer(&mut self, mut model: Box<dyn LocalModel>, version: u32) {
+            self.models.offer(&mut model, version, &self.ways);
+        }
     }
 
     /// The tool at the end of tick t: it never moves evenly.
@@ -231,23 +220,23 @@ mod tests {
 
     #[test]
     fn a_model_that_is_in_time_serves_from_the_next_tick() {
-        let mut models = succession(0);
-        (1..=33).for_each(|t| assert_eq!(models.tick(tool(t).into()).wrench.force.x, 1.0));
-        models.offer(&mut model(2.0, 33, true), 7);
-        let served = models.tick(tool(34).into());
-        assert_eq!((served.wrench.force.x, models.version()), (2.0, 7));
+        let mut models = Followed::new(0);
+        (1..=33).for_each(|t| assert_eq!(models.tick(t).wrench.force.x, 1.0));
+        models.offer(model(2.0, 33, true), 7);
+        let served = models.tick(34);
+        assert_eq!((served.wrench.force.x, models.models.version()), (2.0, 7));
         assert_eq!(served.wrench.force.y, tool(34).y - tool(33).y, "its motion is that of the tick alone");
         assert_eq!(served.resync.map(|resync| (resync.version, resync.age)), Some((7, 0)));
     }
 
     #[test]
     fn a_late_model_replays_the_tools_own_path_while_the_old_one_serves() {
-        let mut models = succession(0);
+        let mut models = Followed::new(0);
         (1..=60).for_each(|t| {
-            models.tick(tool(t).into());
+            models.tick(t);
         });
-        models.offer(&mut model(2.0, 33, true), 1);
-        let served: Vec<Vec3> = (61..=70).map(|t| models.tick(tool(t).into()).wrench.force).collect();
+        models.offer(model(2.0, 33, true), 1);
+        let served: Vec<Vec3> = (61..=70).map(|t| models.tick(t).wrench.force).collect();
         // 27 ticks late, 8 caught up per tick while one more falls due: the old model serves ticks 61 to 63.
         let swap = served.iter().position(|force| force.x == 2.0).unwrap();
         assert_eq!(swap, 3);
@@ -258,43 +247,43 @@ mod tests {
 
     #[test]
     fn a_model_without_a_state_of_its_own_serves_at_once() {
-        let mut models = succession(0);
+        let mut models = Followed::new(0);
         (1..=60).for_each(|t| {
-            models.tick(tool(t).into());
+            models.tick(t);
         });
-        models.offer(&mut model(2.0, 33, false), 1);
-        assert_eq!(models.tick(tool(61).into()).wrench.force.x, 2.0);
+        models.offer(model(2.0, 33, false), 1);
+        assert_eq!(models.tick(61).wrench.force.x, 2.0);
     }
 
     #[test]
     fn a_newer_model_waits_for_the_end_of_a_blend_and_an_ancient_one_is_refused() {
-        let mut models = succession(10);
+        let mut models = Followed::new(10);
         (1..=33).for_each(|t| {
-            models.tick(tool(t).into());
+            models.tick(t);
         });
-        models.offer(&mut model(2.0, 33, true), 1);
-        assert_eq!(models.tick(tool(34).into()).wrench.force.x, 1.0, "a crossfade begins with the old force");
-        models.offer(&mut model(3.0, 34, true), 2);
-        let forces: Vec<f64> = (35..=60).map(|t| models.tick(tool(t).into()).wrench.force.x).collect();
+        models.offer(model(2.0, 33, true), 1);
+        assert_eq!(models.tick(34).wrench.force.x, 1.0, "a crossfade begins with the old force");
+        models.offer(model(3.0, 34, true), 2);
+        let forces: Vec<f64> = (35..=60).map(|t| models.tick(t).wrench.force.x).collect();
         assert!(forces.windows(2).all(|f| f[1] >= f[0] && f[1] - f[0] < 0.11), "{forces:?}");
         assert_eq!(*forces.last().unwrap(), 3.0);
 
-        let mut models = succession(0);
+        let mut models = Followed::new(0);
         (1..=2000).for_each(|t| {
-            models.tick(tool(t).into());
+            models.tick(t);
         });
-        models.offer(&mut model(2.0, 33, true), 1);
-        assert_eq!(models.tick(tool(2001).into()).wrench.force.x, 1.0);
+        models.offer(model(2.0, 33, true), 1);
+        assert_eq!(models.tick(2001).wrench.force.x, 1.0);
     }
 
     #[test]
     fn a_diverged_old_model_does_not_spoil_the_blend() {
-        let mut models = succession(10);
-        models.offer(&mut model(f64::NAN, 0, true), 1);
+        let mut models = Followed::new(10);
+        models.offer(model(f64::NAN, 0, true), 1);
         (1..=33).for_each(|t| {
-            models.tick(tool(t).into());
+            models.tick(t);
         });
-        models.offer(&mut model(2.0, 33, true), 2);
-        assert!((34..=44).all(|t| models.tick(tool(t).into()).wrench.force.x == 2.0));
+        models.offer(model(2.0, 33, true), 2);
+        assert!((34..=44).all(|t| models.tick(t).wrench.force.x == 2.0));
     }
 }

@@ -33,6 +33,7 @@ fn build(model: &mut dyn LocalModel, simulation: &mut Simulation, tool: Vec3) {
         global: simulation,
         tick: PRESSES,
         triangles: &[triangle],
+        nearest: &[],
         patch: None,
         tools: &[ToolForecast::at_rest(tool)],
         index: 0,
@@ -44,7 +45,7 @@ fn build(model: &mut dyn LocalModel, simulation: &mut Simulation, tool: Vec3) {
 /// The forces of a drag by `way` (m) in each tick, far out of the patch.
 fn drag(model: &mut dyn LocalModel, from: Vec3, way: Vec3) -> Vec<[u64; 3]> {
     let at = |tick: u32| from + way * f64::from(tick);
-    let force = |tick| model.tick(ToolMotion::straight(at(tick), at(tick + 1))).force;
+    let force = |tick| model.tick(&[ToolMotion::straight(at(tick), at(tick + 1))]).force;
     (0..60).map(force).map(|force| [force.x, force.y, force.z].map(f64::to_bits)).collect()
 }
 

@@ -116,6 +116,7 @@ fn a_local_model_of_crushed_tissue_does_not_run_away() {
         global: &mut global,
         tick: 0,
         triangles: &triangles,
+        nearest: &[],
         patch: None,
         tools: &[ToolForecast { velocity: -Vec3::z() * speed, ..ToolForecast::at_rest(at(taken_over)) }],
         index: 0,
@@ -124,7 +125,7 @@ fn a_local_model_of_crushed_tissue_does_not_run_away() {
     });
     for tick in taken_over..taken_over + 33 {
         let motion = ToolMotion::straight(at(tick), at(tick + 1));
-        let (felt, expected) = (local.tick(motion).force.z, global.tick(motion).force.z);
+        let (felt, expected) = (local.tick(&[motion]).force.z, global.tick(motion).force.z);
         assert!((felt / expected - 1.0).abs() < 0.06, "tick {tick}: {felt} of {expected} N");
     }
 }

@@ -37,6 +37,7 @@ fn patch(factor: f64, zeta: f64, friction: f64, is_implicit: bool, ticks: u32) -
         global: &mut sim,
         tick: 0,
         triangles: &[triangle],
+        nearest: &[],
         patch: None,
         tools: &[ToolForecast::default()],
         index: 0,
@@ -60,7 +61,7 @@ fn run(mut model: Box<dyn LocalModel>, ticks: u32) -> (Vec<Vec3>, Vec<ContactMod
     (0..MS)
         .map(|ms| {
             let forces =
-                (ms * ticks..(ms + 1) * ticks).map(|n| model.tick(ToolMotion::straight(at(n), at(n + 1))).force);
+                (ms * ticks..(ms + 1) * ticks).map(|n| model.tick(&[ToolMotion::straight(at(n), at(n + 1))]).force);
             (forces.sum::<Vec3>() / f64::from(ticks), model.contact().mode)
         })
         .unzip()

@@ -25,3 +25,4 @@ mod tissue_restriction;
 mod tool_hard_cases;
 mod tool_invariants;
 mod tool_press;
+mod two_tools;

@@ -24,12 +24,12 @@ fn at_rest(shape: ToolShape) -> Simulation {
     simulation.with_tool(Contact::default()).with_shape(0, shape)
 }
 
-/// The same after both have pressed, and where they are.
-fn pressed(shape: ToolShape) -> (Simulation, [Vec3; 2]) {
+/// The same after both have pressed, the second at x = `beside` (m), and where they are.
+fn pressed(shape: ToolShape, beside: f64) -> (Simulation, [Vec3; 2]) {
     let mut simulation = at_rest(shape);
     let at = |tick: u64| {
         let down = 0.0705 - 1e-4 * tick as f64;
-        [Vec3::new(0.033, 0.0362, down + shape.radius()), Vec3::new(0.052, 0.0362, down)]
+        [Vec3::new(0.033, 0.0362, down + shape.radius()), Vec3::new(beside, 0.0362, down)]
     };
     for tick in 0..PRESSES {
         let [from, to] = [at(tick), at(tick + 1)];
@@ -51,11 +51,13 @@ fn patch_and_bases(simulation: &Simulation) -> (Vec<u32>, Bases) {
 }
 
 fn build(model: &mut dyn LocalModel, (simulation, tools): (&mut Simulation, &[Vec3; 2]), patch: &[u32], bases: &Bases) {
-    let triangle = simulation.contact(0).triangle.unwrap();
+    let nearest: [u32; 2] = std::array::from_fn(|tool| simulation.contact(tool).triangle.unwrap());
+    let triangle = nearest[0];
     model.rebuild(ResyncView {
         global: simulation,
         tick: PRESSES,
         triangles: &[triangle],
+        nearest: &nearest,
         patch: (!bases.is_empty()).then_some(patch),
         tools: &tools.map(ToolForecast::at_rest),
         index: 0,
@@ -64,10 +66,14 @@ fn build(model: &mut dyn LocalModel, (simulation, tools): (&mut Simulation, &[Ve
     });
 }
 
-/// What is felt in each tick of a drag.
-fn drag(model: &mut dyn LocalModel, from: Vec3) -> Vec<Vec3> {
-    let at = |tick: u32| from + Vec3::new(2e-4, 1e-4, -5e-5) * f64::from(tick);
-    (0..40).map(|tick| model.tick(ToolMotion::straight(at(tick), at(tick + 1))).force).collect()
+/// What the first tool feels in each tick of a drag of both.
+fn drag(model: &mut dyn LocalModel, from: [Vec3; 2]) -> Vec<Vec3> {
+    let at = |tick: u32| from.map(|from| from + Vec3::new(2e-4, 1e-4, -5e-5) * f64::from(tick));
+    let motions = |tick| {
+        let [from, to] = [at(tick), at(tick + 1)];
+        [0, 1].map(|tool| ToolMotion::straight(from[tool], to[tool]))
+    };
+    (0..40).map(|tick| model.tick(&motions(tick)).force).collect()
 }
 
 fn sent(parcel: &Parcel) -> Vec<u8> {
@@ -78,8 +84,10 @@ fn sent(parcel: &Parcel) -> Vec<u8> {
 
 #[test]
 fn a_model_that_is_built_over_there_is_the_one_that_would_be_built_here() {
-    for shape in [ToolShape::Point, ToolShape::Sphere { radius: 6e-3 }] {
-        let (mut simulation, tools) = pressed(shape);
+    // The second tool is outside of the patch, or in it.
+    let shapes = [ToolShape::Point, ToolShape::Sphere { radius: 6e-3 }];
+    for (shape, beside) in shapes.into_iter().flat_map(|shape| [0.052, 0.041].map(|beside| (shape, beside))) {
+        let (mut simulation, tools) = pressed(shape, beside);
         let (patch, bases) = patch_and_bases(&simulation);
         for kind in Kind::ALL.into_iter().filter(|&kind| kind != Kind::Full) {
             let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
@@ -99,7 +107,7 @@ fn a_model_that_is_built_over_there_is_the_one_that_would_be_built_here() {
             assert_eq!(there.contact(), here.contact(), "{kind:?}");
             assert_eq!(there.contact_points(), here.contact_points(), "{kind:?}");
             assert_eq!(there.contact_area(), here.contact_area(), "{kind:?}");
-            let forces = [drag(&mut *here, tools[0]), drag(&mut *there, tools[0])];
+            let forces = [drag(&mut *here, tools), drag(&mut *there, tools)];
             let largest = forces[0].iter().map(Vec3::norm).fold(0.0, f64::max);
             let apart = forces[0].iter().zip(&forces[1]).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
             println!("{kind:?} {shape:?}: {} bytes, {:.1e} of {largest:.2} N apart", bytes.len(), apart);
@@ -112,7 +120,7 @@ fn a_model_that_is_built_over_there_is_the_one_that_would_be_built_here() {
 
 #[test]
 fn a_parcel_of_another_body_is_refused_and_a_path_of_another_ring_is_not_gone() {
-    let (mut simulation, tools) = pressed(ToolShape::Point);
+    let (mut simulation, tools) = pressed(ToolShape::Point, 0.052);
     let (patch, bases) = patch_and_bases(&simulation);
     let template = Template::new(Kind::Predictive, [4, 4, 2], simulation.body()).unwrap();
     let mut departing = template.departing();
@@ -142,7 +150,7 @@ proptest! {
     ) {
         thread_local! {
             static GOOD: Vec<(Kind, Vec<u8>)> = {
-                let (mut simulation, tools) = pressed(ToolShape::Sphere { radius: 6e-3 });
+                let (mut simulation, tools) = pressed(ToolShape::Sphere { radius: 6e-3 }, 0.041);
                 let (patch, bases) = patch_and_bases(&simulation);
                 [Kind::Hold, Kind::Patch, Kind::Predictive].map(|kind| {
                     let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
@@ -168,7 +176,7 @@ proptest! {
         let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
         let mut model = template.empty();
         if Image::new(simulation).rebuild(&parcel, &Bases::default(), &mut *model) {
-            drag(&mut *model, Vec3::new(0.033, 0.0362, 0.07));
+            drag(&mut *model, [0.033, 0.052].map(|x| Vec3::new(x, 0.0362, 0.07)));
         }
     }
 }

@@ -1,0 +1,73 @@
+//! One tool on the side of the global actor.
+
+use std::collections::VecDeque;
+
+use super::global_ports::ToolPorts;
+use super::messages::ToolTick;
+use crate::model::Pose;
+use crate::model::local::{ToolHistory, Windows};
+use crate::model::simulation::Simulation;
+use crate::model::surroundings::Bases;
+use crate::runtime::TickContext;
+
+/// What the global model knows of one tool.
+#[derive(Debug)]
+pub(super) struct ToolSide {
+    pub(super) ports: ToolPorts,
+    /// Samples that have come and are not taken yet.
+    pub(super) waiting: VecDeque<ToolTick>,
+    /// The tool at the last tick taken: the state's own time.
+    pub(super) tool: ToolTick,
+    /// Where it comes from.
+    pub(super) from: Pose,
+    /// Its sample of the last tick was missing.
+    pub(super) is_between: bool,
+    pub(super) history: ToolHistory,
+    /// Where local models may be made, if there are bases.
+    pub(super) windows: Windows,
+    /// The newest model that was published.
+    pub(super) version: u64,
+    /// Triangles that the window of its next model has to hold.
+    pub(super) triangles: Vec<u32>,
+    /// The nodes that other tools press, or may press before the next model serves, and those that they press now: what that is to hold
+    /// too, if there is one that does.
+    pub(super) beside: [Vec<u32>; 2],
+    /// The patch of its next model.
+    pub(super) patch: Vec<u32>,
+}
+
+impl ToolSide {
+    /// Of a tool that has rested where it is at `tool`.
+    pub(super) fn new(tool: ToolTick, windows: Windows, history: ToolHistory, ports: ToolPorts) -> Self {
+        let (waiting, is_between, version) = Default::default();
+        let (triangles, beside, patch) = Default::default();
+        let from = tool.pose;
+        Self { ports, waiting, tool, from, is_between, history, windows, version, triangles, beside, patch }
+    }
+
+    /// Takes the patch's geometry in place of the global model's own, if it belongs to the same tick.
+    pub(super) fn take_feedback(&mut self, ctx: &TickContext, simulation: &mut Simulation, index: usize) {
+        if let Some(reader) = &mut self.ports.geometry {
+            reader.refresh(ctx);
+            let geometry = reader.get();
+            if geometry.tick == self.tool.tick && geometry.is_usable() {
+                geometry.write_to(simulation, index);
+            }
+        }
+    }
+
+    /// The patch that the next model is made for, if there are bases: the best window that has one, or the best of all; the widest
+    /// while nobody knows where the tool is going.
+    pub(super) fn choose_patch(&mut self, at: (&Simulation, usize), bases: &Bases) {
+        let has_basis = |patch: &[u32]| bases.get(patch).is_some();
+        let beside = self.beside.each_ref().map(Vec::as_slice);
+        if !self.windows.choose(at, &self.triangles, beside, has_basis, &mut self.patch) {
+            self.windows.choose(at, &self.triangles, [&[]; 2], |_| true, &mut self.patch);
+        }
+        if self.history.is_new()
+            && let Some(widest) = self.windows.widest(self.triangles[0], &self.patch).filter(|patch| has_basis(patch))
+        {
+            widest.clone_into(&mut self.patch);
+        }
+    }
+}
