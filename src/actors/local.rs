@@ -107,8 +107,11 @@ impl LocalActor {
     /// Advances the models by one tick, the first of those that are `left`.
     fn advance(&mut self, ctx: &TickContext, left: u64) {
         self.ways.go(self.sides.iter_mut().map(|side| side.tool.go(left, ctx.dt_nominal)));
+        let mut may_catch_up = true;
         for (side, way) in self.sides.iter_mut().zip(self.ways.of(self.ways.now())) {
-            let served = side.models.tick(&self.ways);
+            let is_behind = side.models.is_behind(&self.ways);
+            let served = side.models.tick(&self.ways, may_catch_up);
+            may_catch_up &= !is_behind;
             side.tool.feel(served, way, &side.models.serving().contact());
         }
         self.publish_states(ctx);

@@ -100,8 +100,7 @@ pub trait LocalModel: Send + std::fmt::Debug {
         true
     }
 
-    /// Ticks that it is advanced per haptic tick until it has caught up, more than one; another model serves meanwhile. Several tools
-    /// share them.
+    /// Ticks that it is advanced per haptic tick until it has caught up, more than one; another model serves meanwhile.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

@@ -1,5 +1,6 @@
 //! Random but ordinary scenes: a case is its seed.
 
+use std::f64::consts::TAU;
 use std::fmt;
 
 use palpate::Error;
@@ -8,7 +9,8 @@ use palpate::model::body::Shape;
 use palpate::model::local::{BlendKind, Kind};
 use palpate::model::mesh::Face;
 use palpate::scene::{
-    BlendSpec, BlockSpec, BodySpec, FrictionSpec, MassSpringSpec, MaterialSpec, RegionSpec, Scene, TissueSpec, ToolSpec,
+    BlendSpec, BlockSpec, BodySpec, DeviceSpec, FrictionSpec, MassSpringSpec, MaterialSpec, RegionSpec, Scene,
+    TissueSpec, ToolSpec,
 };
 use palpate_mesh::{Sizes, organs};
 
@@ -63,14 +65,15 @@ pub struct Case {
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { seed, class, motion, inside, scene } = self;
-        let tool = scene.devices[0].tool.name();
-        write!(f, "{seed:>4} {} {inside}, {}, {tool}, {} Hz", class.name(), motion.name(), scene.local.rate_hz)
+        let tools: Vec<&str> = scene.devices.iter().map(|device| device.tool.name()).collect();
+        let (class, motion, tools) = (class.name(), motion.name(), tools.join(" and "));
+        write!(f, "{seed:>4} {class} {inside}, {motion}, {tools}, {} Hz", scene.local.rate_hz)
     }
 }
 
 impl Case {
-    /// The scene of `seed`.
-    pub fn new(seed: u64) -> Result<Self, Error> {
+    /// The scene of `seed`, with one tool or a pair.
+    pub fn new(seed: u64, is_pair: bool) -> Result<Self, Error> {
         // Not by the remainder that says what is unseen.
         let random = &mut Random(0x70a1_9a7e ^ (seed << 20));
         let class = random.one_of(&[
@@ -106,7 +109,29 @@ impl Case {
         scene.run.duration_s = DURATION_S;
         let radius = scene.devices[0].tool.shape().radius();
         scene.devices[0].path = Some(path(motion, &ground, radius, random)?);
-        Ok(Self { seed, class, motion, inside, scene })
+        let mut case = Self { seed, class, motion, inside, scene };
+        if is_pair {
+            case.add_second(ground, random)?;
+        }
+        Ok(case)
+    }
+
+    /// A second tool, which does something of its own at most some cells from the first: their ways may meet.
+    fn add_second(&mut self, ground: Ground, random: &mut Random) -> Result<(), Error> {
+        let (motion, angle) = (random.one_of(&Motion::ALL), random.within(0.0, TAU));
+        let away = ground.cell_m * random.within(0.0, 5.0);
+        let moved = |n: usize| ground.centre_m[n] + away * [angle.cos(), angle.sin()][n];
+        let room =
+            |n: usize| moved(n).clamp(ground.centre_m[n] - ground.room_m[n], ground.centre_m[n] + ground.room_m[n]);
+        let ground = Ground { centre_m: [room(0), room(1)], room_m: ground.room_m.map(|room| 0.5 * room), ..ground };
+        let mut second = DeviceSpec { name: Some("second".to_owned()), ..DeviceSpec::default() };
+        if random.chance(0.6) {
+            second.tool = ToolSpec::Sphere { radius_m: ground.cell_m * random.within(0.4, 1.2) };
+        }
+        second.path = Some(path(motion, &ground, second.tool.shape().radius(), random)?);
+        self.scene.devices[0].name = Some("first".to_owned());
+        self.scene.devices.push(second);
+        Ok(())
     }
 }
 

@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench population`; with `-- --quick` a short form that prints and writes nothing; with `-- --seen` the two
 //! thirds of the cases that may be looked at while working, case by case, written nowhere; `--cases N` how many, `--from N` the first
-//! seed, or `--only A,B` which; `--patch A,B,C`, `--basis N`, `--basis-latency MS` and `--budget PERCENT` in place of the defaults;
+//! seed, or `--only A,B` which; `--pairs` those with two tools; `--patch A,B,C`, `--basis N`, `--basis-latency MS` and `--budget PERCENT` in place of the defaults;
 //! `--models A,B` in place of `predictive` and `patch`; `--link MS,SHARE` with the global model behind a link of so much delay one way
 //! and such a share of lost packets.
 
@@ -25,14 +25,18 @@ use palpate::scene::LinkSpec;
 
 use cases::is_unseen;
 use runs::{Settings, run_all};
+use words::Populations;
 
-/// Cases of the document.
+/// Cases of the document, with one tool and with two.
 const CASES: u64 = 180;
+const PAIRS: u64 = 90;
 
 fn document(is_quick: bool, settings: &Settings) -> Result<(), Error> {
-    let seeds: Vec<u64> = if is_quick { vec![0, 5] } else { (0..CASES).collect() };
-    let results = run_all(&seeds, settings, |_| ())?;
-    let document = words::document(&results);
+    let seeds = |count: u64| -> Vec<u64> { if is_quick { vec![0, 5] } else { (0..count).collect() } };
+    let of_pairs = Settings { pairs: true, ..settings.clone() };
+    let single = run_all(&seeds(CASES), settings, |_| ())?;
+    let pairs = run_all(&seeds(PAIRS), &of_pairs, |_| ())?;
+    let document = words::document(&Populations { single, pairs });
     if is_quick {
         print!("{}", document.text);
         return Ok(());
@@ -71,6 +75,7 @@ fn main() -> ExitCode {
         }),
         basis: number("--basis"),
         latency_ms: value("--basis-latency").and_then(|value| value.parse().ok()),
+        pairs: std::env::args().any(|argument| argument == "--pairs"),
         link: value("--link").map(|conditions| {
             let mut numbers = conditions.split(',').map(|number| number.parse().expect("--link takes MS,SHARE"));
             let mut next = || numbers.next().expect("--link takes MS,SHARE");

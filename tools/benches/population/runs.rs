@@ -23,6 +23,8 @@ pub struct Settings {
     pub patch: Option<[usize; 3]>,
     pub basis: Option<usize>,
     pub latency_ms: Option<f64>,
+    /// Two tools in place of one.
+    pub pairs: bool,
     /// What is between local and global model.
     pub link: Option<LinkSpec>,
 }
@@ -156,7 +158,7 @@ pub fn run_all(
 
 fn run(seed: u64, settings: &Settings) -> Result<CaseResult, Error> {
     let begun = Instant::now();
-    let mut case = Case::new(seed)?;
+    let mut case = Case::new(seed, settings.pairs)?;
     settings.apply(&mut case.scene);
     let session = Session::from_scene(case.scene.clone().with_model(ModelChoice::Auto)).virtual_time().build()?;
     let choice = session.choice().expect("auto chooses");

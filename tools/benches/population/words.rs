@@ -42,16 +42,31 @@ what the global model works, in periods of simulation. A basis takes its nominal
 
 The table after it has what `auto` chooses with nominal costs, how far that is off one period late, and how often it was more than the usual
 `error_pct` of 1 % off without a word of it.
+
+*Two tools* are scenes made in the same way with a second tool, a point or a sphere, that does something of its own at most five cells from the
+first: they press the same nodes, cross and part. Errors are those of the tool that is farther off; a tick is that of both.
 ";
 
-pub fn document(results: &[CaseResult]) -> Document {
+/// The cases with one tool and with two.
+pub struct Populations {
+    pub single: Vec<CaseResult>,
+    pub pairs: Vec<CaseResult>,
+}
+
+pub fn document(Populations { single, pairs }: &Populations) -> Document {
     let mut text = format!("{HEAD}\n{}\n", measured_on("cargo bench --bench population"));
-    for (name, of_unseen) in [("Unseen", true), ("Seen", false)] {
+    let parts = [
+        ("Unseen", single, true, true),
+        ("Seen", single, false, false),
+        ("Two tools, unseen", pairs, true, false),
+        ("Two tools, seen", pairs, false, false),
+    ];
+    for (name, results, of_unseen, is_by_kind) in parts {
         let of: Vec<&CaseResult> = results.iter().filter(|result| is_unseen(result.seed) == of_unseen).collect();
-        let _ = write!(text, "\n## {name} ({} scenes)\n\n{}", of.len(), distributions(&of, of_unseen));
+        let _ = write!(text, "\n## {name} ({} scenes)\n\n{}", of.len(), distributions(&of, is_by_kind));
     }
     text.push_str("\n![Share of scenes above an error](img/population_error.svg)\n\n![Error against cost](img/population_cost.svg)\n");
-    let pictures = vec![("population_error", errors(results)), ("population_cost", costs(results))];
+    let pictures = vec![("population_error", errors(single, pairs)), ("population_cost", costs(single))];
     let pictures = pictures.into_iter().map(|(name, picture)| (name.to_owned(), picture.to_svg())).collect();
     Document { text, pictures }
 }
@@ -154,17 +169,18 @@ pub fn distributions(results: &[&CaseResult], is_by_kind: bool) -> String {
     format!("{}\n{chosen}", table(&head, 2, &rows))
 }
 
-/// The share of scenes above an error, by class, one period late.
-fn errors(results: &[CaseResult]) -> Picture {
-    let of_class = |(number, class): (usize, Class)| {
-        let of: Vec<&CaseResult> = results.iter().filter(|result| result.class == class).collect();
+/// The share of scenes above an error, by class and of two tools, one period late.
+fn errors(single: &[CaseResult], pairs: &[CaseResult]) -> Picture {
+    let of_class = |class: Class| (class.name(), single.iter().filter(|result| result.class == class).collect());
+    let of = Class::ALL.into_iter().map(of_class).chain([("two tools", pairs.iter().collect())]);
+    let series = |(number, (name, of)): (usize, (&str, Vec<&CaseResult>))| {
         let mut errors: Vec<f64> = runs(&of, Kind::Predictive, true).into_iter().map(|run| run.rms).collect();
         errors.sort_by(f64::total_cmp);
         let count = errors.len();
-        let label = |place: usize| if place + 1 == count { class.name().to_owned() } else { String::new() };
+        let label = |place: usize| if place + 1 == count { name.to_owned() } else { String::new() };
         let point = |(place, error): (usize, f64)| (error, (count - place) as f64 / count as f64, label(place));
         Series {
-            name: class.name().to_owned(),
+            name: name.to_owned(),
             colour: Colour::numbered(number),
             is_joined: true,
             sign: Sign::Disc,
@@ -178,7 +194,7 @@ fn errors(results: &[CaseResult]) -> Picture {
         y: "share of scenes".to_owned(),
         marks: Vec::new(),
         levels: vec![(0.5, "half".to_owned()), (0.1, "a tenth".to_owned())],
-        series: Class::ALL.into_iter().enumerate().map(of_class).collect(),
+        series: of.enumerate().map(series).collect(),
     }
 }
 

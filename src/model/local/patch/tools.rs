@@ -16,6 +16,8 @@ pub(in crate::local) struct Tools {
     /// So many touch here; others follow that have left.
     present: usize,
     pub(super) rows: Rows,
+    /// So many tools these have room for.
+    room: usize,
     /// Movable nodes that tools press which are not held, with the force on each at the resync, which is taken to go on (N).
     beside: Vec<(usize, Vec3)>,
 }
@@ -48,7 +50,9 @@ impl Tools {
             let is_held = |&node: &u32| window.movable(node).is_some() || masses[node as usize] == 0.0;
             let is_here = resync.nearest.get(other).is_some_and(|&triangle| {
                 global.pressed_at(other, &[triangle], &mut pressed);
-                pressed.iter().all(is_held) && exerted.iter().all(|(node, _)| is_held(node))
+                window.triangle(triangle).is_some()
+                    && pressed.iter().all(is_held)
+                    && exerted.iter().all(|(node, _)| is_held(node))
             });
             if is_here {
                 self.numbers.push(other);
@@ -57,9 +61,9 @@ impl Tools {
             }
         }
         self.present = self.numbers.len();
-        if self.touches.len() != self.present {
-            self.touches.resize_with(self.present, Touch::default);
-            self.rows = Rows::with_room(self.present);
+        self.touches.resize_with(self.present, Touch::default);
+        if self.room < self.present {
+            (self.rows, self.room) = (Rows::with_room(self.present), self.present);
         }
         for (mine, &number) in self.touches.iter_mut().zip(&self.numbers) {
             let touch = global.touch(number);

@@ -9,9 +9,6 @@ use crate::{Vec3, Wrench};
 pub use blend::{Blend, BlendKind, Jump};
 pub use ways::Ways;
 
-/// Ticks that a model is advanced in one at least until it has caught up: with one it never would.
-const FEWEST: u64 = 2;
-
 /// The result of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
@@ -81,12 +78,23 @@ impl Succession {
         }
     }
 
-    /// Advances one tick: the last of `ways`.
+    /// True if a model has arrived that has more than one tick to make up before it can serve in the last tick of `ways`.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn is_behind(&self, ways: &Ways) -> bool {
+        self.arriving.catches_up() && self.arrival.is_some_and(|(_, reached)| reached + 2 < ways.now())
+    }
+
+    /// Advances one tick: the last of `ways`. A model that [is behind](Self::is_behind) comes nearer if it `may_catch_up`: of several tools the
+    /// models catch up one after the other, so that a tick takes no longer than for one.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn tick(&mut self, ways: &Ways) -> Served {
-        self.catch_up(ways);
+    pub fn tick(&mut self, ways: &Ways, may_catch_up: bool) -> Served {
+        if may_catch_up || !self.is_behind(ways) {
+            self.catch_up(ways);
+        }
         let motions = ways.of(ways.now());
         let new = self.serving.tick(motions);
         if !self.blend.is_under_way() {
@@ -104,9 +112,7 @@ impl Succession {
         let Some((version, mut reached)) = self.arrival else { return };
         let begun = ways.now() - 1;
         if self.arriving.catches_up() {
-            // What a release may take is shared by the tools.
-            let most = (self.arriving.catch_up_ticks() / ways.tools() as u64).max(FEWEST);
-            let until = begun.min(reached + most);
+            let until = begun.min(reached + self.arriving.catch_up_ticks());
             while reached < until {
                 reached += 1;
                 self.arriving.tick(ways.of(reached));
@@ -203,9 +209,13 @@ mod tests {
         }
 
         fn tick(&mut self, t: u64) -> Served {
+            self.tick_if(t, true)
+        }
+
+        fn tick_if(&mut self, t: u64, may_catch_up: bool) -> Served {
             self.ways.go(std::iter::once(ToolMotion::straight(tool(t - 1), tool(t))));
             assert_eq!(self.ways.now(), t);
-            self.models.tick(&self.ways)
+            self.models.tick(&self.ways, may_catch_up)
         }
 
         fn offer(&mut self, mut model: Box<dyn LocalModel>, version: u32) {
@@ -243,6 +253,26 @@ mod tests {
         assert!(served[..swap].iter().all(|force| force.x == 1.0));
         assert_eq!(served[swap].y, tool(64).y - tool(33).y, "nothing of the path is missing");
         assert_eq!(served[swap].z, 31.0, "each tick once");
+    }
+
+    #[test]
+    fn a_model_that_is_behind_waits_until_it_may_catch_up_and_one_that_is_not_serves() {
+        let mut models = Followed::new(0);
+        (1..=60).for_each(|t| {
+            models.tick(t);
+        });
+        models.offer(model(2.0, 33, true), 1);
+        // Another tool's model catches up meanwhile.
+        assert!(
+            (61..=70).all(|t| models.tick_if(t, false).wrench.force.x == 1.0 && models.models.is_behind(&models.ways))
+        );
+        let served: Vec<Vec3> = (71..=80).map(|t| models.tick(t).wrench.force).collect();
+        let swap = served.iter().position(|force| force.x == 2.0).unwrap();
+        // 37 ticks late.
+        assert_eq!((swap, served[swap].y), (5, tool(76).y - tool(33).y));
+        assert!(!models.models.is_behind(&models.ways));
+        models.offer(model(3.0, 80, true), 2);
+        assert_eq!(models.tick_if(81, false).wrench.force.x, 3.0);
     }
 
     #[test]

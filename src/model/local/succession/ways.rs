@@ -33,11 +33,6 @@ impl Ways {
         self.motions[places].iter_mut().zip(motions).for_each(|(place, motion)| *place = motion);
     }
 
-    /// The number of tools.
-    pub(super) fn tools(&self) -> usize {
-        self.tools
-    }
-
     /// The last tick.
     ///
     /// # Real-time
