@@ -2,6 +2,7 @@
 
 mod ahead;
 mod moving;
+mod recorded;
 mod stepping;
 mod told;
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::moving::Moving;
+use super::recorded::Recorded;
 use crate::Vec3;
 use crate::body::{Cutout, State, Stiffened, neighbourhood};
 use crate::contact::{Contact, Rows, Skin, ToolMotion, Touch};
@@ -23,12 +24,14 @@ pub(super) struct Ahead {
     /// `None` if the neighbourhood of the patch is the whole body.
     part: Option<Part>,
     present: State,
+    /// Of several tools: what was seen for the one before.
+    recorded: Recorded,
 }
 
 impl Default for Ahead {
     fn default() -> Self {
-        let (patch, part, present) = Default::default();
-        Self { most: Self::NODES, patch, part, present }
+        let (patch, part, present, recorded) = Default::default();
+        Self { most: Self::NODES, patch, part, present, recorded }
     }
 }
 
@@ -60,7 +63,11 @@ impl Ahead {
     ) {
         if self.patch != patch {
             patch.clone_into(&mut self.patch);
-            self.part = Part::new(whole, patch, self.most);
+            let part = Part::new(whole, patch, self.most);
+            if self.part.is_some() || part.is_some() {
+                self.recorded.forget();
+            }
+            self.part = part;
         }
         let stride = whole.stride;
         let steps = (0..ticks.div_ceil(stride)).map(|step| step * stride);
@@ -68,28 +75,64 @@ impl Ahead {
             from: motion(tool, tick).from,
             to: motion(tool, tick + stride - 1).to,
         };
-        if let Some(part) = &mut self.part {
+        let Self { part, present, recorded, .. } = self;
+        if let Some(part) = part.as_mut() {
             part.begin(whole);
-            for tick in steps {
+            part.drift(0);
+        }
+        let tools = whole.touches.len();
+        if tools > 1 {
+            let motions = steps.clone().flat_map(|tick| (0..tools).map(move |tool| (tool, tick)));
+            let motions = motions.map(|(tool, tick)| motion(tool, tick)).collect();
+            let now = part.as_ref().map_or(&whole.state, |part| &part.moving.state);
+            if recorded.is_of(&motions, now, whole) {
+                let places = part.as_ref().map(|part| &part.places[..]);
+                recorded.states().all(|state| watch(Glimpse { state, places }));
+                return;
+            }
+            recorded.begin(motions, whole);
+        }
+        let mut record = |state: &State| {
+            if tools > 1 {
+                recorded.push(state);
+            }
+        };
+        let is_through = if let Some(part) = part {
+            let is_through = steps.into_iter().all(|tick| {
                 part.drift(tick);
                 let Part { moving, places, .. } = part;
-                let shown = |state: &State| watch(Glimpse { state, places: Some(places) });
-                if !advance_while(moving, |tool| motion(tool, tick), shown) {
-                    return;
-                }
+                advance_while(
+                    moving,
+                    |tool| motion(tool, tick),
+                    |state| {
+                        record(state);
+                        watch(Glimpse { state, places: Some(places) })
+                    },
+                )
+            });
+            if is_through {
+                record(&part.moving.state);
+                watch(Glimpse { state: &part.moving.state, places: Some(&part.places) });
             }
-            watch(Glimpse { state: &part.moving.state, places: Some(&part.places) });
+            is_through
         } else {
-            self.present.clone_from(&whole.state);
+            present.clone_from(&whole.state);
             let (touches, means) = (whole.touches.clone(), whole.means.clone());
-            let mut shown = |state: &State| watch(Glimpse { state, places: None });
+            let mut shown = |state: &State| {
+                record(state);
+                watch(Glimpse { state, places: None })
+            };
             let mut steps = steps;
             let is_through = steps.all(|tick| advance_while(whole, |tool| motion(tool, tick), &mut shown));
             if is_through {
                 shown(&whole.state);
             }
-            std::mem::swap(&mut whole.state, &mut self.present);
+            std::mem::swap(&mut whole.state, present);
             (whole.touches, whole.means) = (touches, means);
+            is_through
+        };
+        if !is_through {
+            recorded.forget();
         }
     }
 }
@@ -291,6 +334,54 @@ mod tests {
         assert!(moved(first, last) > 4e-3, "{}", moved(first, last));
         let wrong = moved(&part[..whole.len()], &whole);
         assert!(wrong < 0.02 * moved(first, last), "{wrong} of {}", moved(first, last));
+    }
+
+    /// Check that nothing else is shown than what would be seen anew, of the whole body and of a part.
+    #[test]
+    fn what_ran_ahead_for_one_tool_is_shown_to_the_others_while_nothing_has_changed() {
+        for most in [Ahead::NODES, 400] {
+            let with = |ticks: u32, friction: f64| {
+                let (simulation, patch) = simulation(12);
+                let mut simulation = simulation.with_tool(Contact::default()).looking_ahead_with(most);
+                simulation.set_friction(friction.into());
+                for tick in 0..ticks {
+                    let motion = motion(&simulation, tick);
+                    simulation.tick_all(&[motion; 2]);
+                }
+                (simulation, patch)
+            };
+            let (mut simulation, patch) = with(30, 0.5);
+            let anew = |ticks, friction, from| seen(&mut with(ticks, friction).0, &patch, from);
+            let first = seen(&mut simulation, &patch, 30);
+            assert_eq!(simulation.ahead.part.is_some(), most == 400);
+            let runs = simulation.ahead.recorded.begun;
+            assert!(seen(&mut simulation, &patch, 30) == first && simulation.ahead.recorded.begun == runs);
+            // Around another patch another part runs ahead, but the whole body is the same.
+            seen(&mut simulation, &patch[1..], 30);
+            assert_eq!(simulation.ahead.recorded.begun == runs, most == Ahead::NODES);
+            seen(&mut simulation, &patch, 30);
+            let runs = simulation.ahead.recorded.begun;
+            assert!(
+                seen(&mut simulation, &patch, 31) == anew(30, 0.5, 31) && simulation.ahead.recorded.begun == runs + 1
+            );
+            simulation.set_friction(0.1.into());
+            seen(&mut simulation, &patch, 31);
+            assert_eq!(simulation.ahead.recorded.begun, runs + 2);
+            simulation.set_friction(0.5.into());
+            let motion = motion(&simulation, 30);
+            simulation.tick_all(&[motion; 2]);
+            assert!(seen(&mut simulation, &patch, 31) == anew(31, 0.5, 31));
+            // One that is cut off is no record.
+            let mut shown = 0;
+            let expected = |_, tick| self::motion(&with(0, 0.5).0, 32 + tick);
+            for _ in 0..2 {
+                simulation.look_ahead(&patch, 5, expected, |_| {
+                    shown += 1;
+                    shown != 3
+                });
+            }
+            assert_eq!(shown, 3 + 5 * 4 + 1);
+        }
     }
 
     #[test]
