@@ -332,8 +332,10 @@ impl GlobalActor {
                 // It stays where it is.
                 continue;
             }
-            side.windows.choose(at, &side.triangles, beside, |_| true, patch);
-            wish(patch);
+            if self.tools.len() > 1 {
+                side.windows.choose(at, &side.triangles, beside, |_| true, patch);
+                wish(patch);
+            }
             for [after, lead] in [[period, lead]].into_iter().chain(PREFETCH_S.map(|after| [after, 0.0])) {
                 self.aim.triangles(at, tool, [after, lead], ahead);
                 side.windows.choose(at, ahead, beside, |_| true, patch);

@@ -142,11 +142,14 @@ impl Actor for LocalActor {
         self.sides.iter_mut().for_each(|side| side.take_arrivals(ctx, &self.ways));
         ticks::due(ctx, self.ways.now()).for_each(|left| self.advance(ctx, left));
         let now = self.ways.now();
-        // All of them, whatever the others are.
-        match self.sides.iter_mut().map(|side| usize::from(!side.finish(ctx, now))).sum::<usize>() {
-            0 => Outcome::Continue,
+        let mut is_finite = true;
+        for side in &mut self.sides {
+            is_finite &= side.finish(ctx, now);
+        }
+        match is_finite {
+            true => Outcome::Continue,
             // The next resync brings a good model.
-            _ => Outcome::Degraded(Cause::LocalNotFinite.code()),
+            false => Outcome::Degraded(Cause::LocalNotFinite.code()),
         }
     }
 }
