@@ -16,7 +16,7 @@ mod whole;
 mod windows;
 
 use crate::body::State;
-use crate::contact::{Contact, ContactPoint, ToolMotion};
+use crate::contact::{Contact, ContactPoint, Skin, ToolMotion};
 use crate::simulation::Simulation;
 use crate::surroundings::Bases;
 use crate::{Vec3, Wrench};
@@ -54,6 +54,14 @@ pub struct ResyncView<'a> {
     pub horizon: u32,
     /// The reduced surroundings that have been computed so far.
     pub bases: &'a Bases,
+}
+
+impl ResyncView<'_> {
+    /// The surface as the tools meet it that may be resolved in the model: its own, and others if it is told where they are.
+    fn skins(&self) -> impl Iterator<Item = &Skin> {
+        let is_told_of = |&tool: &usize| tool == self.index || tool < self.nearest.len();
+        (0..self.global.tools()).filter(is_told_of).map(|tool| &*self.global.touch(tool).skin)
+    }
 }
 
 /// A model that turns tool motion into force at the haptic rate.

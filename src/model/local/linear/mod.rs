@@ -93,9 +93,9 @@ impl LocalModel for LinearPatch {
         // A point's patch is around its triangle; a tool with a shape comes with all that it may touch.
         let triangles = if touch.has_shape() { resync.triangles } else { &resync.triangles[..1] };
         let (global, size, tool) = (&*resync.global, self.spec.size, resync.index);
-        let (body, skin) = (global.body(), &touch.skin);
+        let body = global.body();
         let patch = |nodes: &mut Vec<u32>| global.patch(tool, triangles, size, nodes);
-        self.patch.window.rebuild(body, triangles, skin, patch, |_| [&[], &[]]);
+        self.patch.window.rebuild(body, triangles, resync.skins(), patch, |_| [&[], &[]]);
         self.patch.take_present(&resync);
         if self.boundary.moving_ticks() == 0 {
             // The rim stands still, and so must the velocities that a contact on it would see.

@@ -33,12 +33,13 @@ pub(in crate::local) struct Window {
 
 impl Window {
     /// Makes the window anew around surface triangles `triangles` for the nodes that `patch` gives, in increasing order, and
-    /// those that `neighbours` gives for them, the ring and held ones; costs as much as the patch, whatever the body.
+    /// those that `neighbours` gives for them, the ring and held ones, to be met with `skins`; costs as much as the patch, whatever the
+    /// body.
     pub(in crate::local) fn rebuild<'a>(
         &mut self,
         body: &dyn Body,
         triangles: &[u32],
-        skin: &Skin,
+        skins: impl Iterator<Item = &'a Skin>,
         patch: impl FnOnce(&mut Vec<u32>),
         neighbours: impl FnOnce(&[u32]) -> [&'a [u32]; 2],
     ) {
@@ -72,10 +73,12 @@ impl Window {
             self.add_triangles(whole, node);
         }
         self.add_corners(whole, candidates);
-        // Corners of candidates as a tool with a shape meets them.
-        for place in 0..3 * candidates {
-            let node = whole.triangles[self.triangles[place / 3] as usize][place % 3];
-            skin.corner(node).iter().for_each(|&(other, _)| self.add_node(other));
+        // Corners of candidates as tools with a shape meet them.
+        for skin in skins {
+            for place in 0..3 * candidates {
+                let node = whole.triangles[self.triangles[place / 3] as usize][place % 3];
+                skin.corner(node).iter().for_each(|&(other, _)| self.add_node(other));
+            }
         }
         self.candidates.clear();
         self.candidates.extend(0..candidates as u32);
@@ -197,5 +200,35 @@ impl Window {
     pub(in crate::local) fn gather(&self, global: &[Vec3], local: &mut Vec<Vec3>) {
         local.clear();
         local.extend(self.nodes.iter().map(|&node| global[node as usize]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::Block;
+    use crate::mesh::Face;
+
+    /// A tool meets a corner that lacks a node nowhere near where it is.
+    #[test]
+    fn every_tool_finds_all_nodes_of_the_corners_that_it_may_meet() {
+        let body = Block::builder([9; 3], [0.08; 3]).fix(Face::ZMin).build().unwrap();
+        let skins = [Skin::default(), Skin::new(&body, 6e-3), Skin::new(&body, 1.2e-2)];
+        let top = |&node: &u32| body.rest()[node as usize].z > 0.079;
+        let patch: Vec<u32> = (0..body.rest().len() as u32).filter(top).skip(30).take(4).collect();
+        let triangles: Vec<u32> = body.surface().at_node(patch[0]).to_vec();
+        let mut window = Window::default();
+        window.rebuild(&body, &triangles, skins.iter(), |nodes| nodes.extend(&patch), |_| [&[], &[]]);
+        assert!(window.candidates.len() > triangles.len());
+        for skin in &skins {
+            let mut local = Skin::default();
+            skin.localise(&window.nodes, |node| window.node(node), &mut local);
+            for &triangle in &window.candidates {
+                for corner in window.surface.triangles[triangle as usize] {
+                    let global = skin.corner(window.nodes[corner as usize]);
+                    assert_eq!(local.corner(corner).len(), global.len());
+                }
+            }
+        }
     }
 }

@@ -204,8 +204,7 @@ impl LocalModel for Predictive {
             Some(patch) => nodes.extend_from_slice(patch),
             None => resync.global.patch(resync.index, triangles, size, nodes),
         };
-        let skin = &resync.global.touch(resync.index).skin;
-        self.patch.window.rebuild(body, triangles, skin, patch, |nodes| self.near.rebuild(body, nodes));
+        self.patch.window.rebuild(body, triangles, resync.skins(), patch, |nodes| self.near.rebuild(body, nodes));
         let window = &self.patch.window;
         self.patch.forces.resize(window.nodes.len(), Vec3::zeros());
         let known = self.reduces.then(|| resync.bases.get(&window.nodes[..window.movable])).flatten();
