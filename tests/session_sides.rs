@@ -56,7 +56,7 @@ impl Transport for End {
     fn connect(&mut self, hello: &Hello) -> Result<(), Error> {
         *self.line.hello.lock().unwrap() = Some(hello.clone());
         let until = Instant::now() + Duration::from_secs(30);
-        while !self.line.ways[1].lock().unwrap().iter().any(|message| Message::is_model(message)) {
+        while !self.line.ways[1].lock().unwrap().iter().any(|message| Message::has_models(message)) {
             if Instant::now() > until {
                 return Err(Error::new(ErrorKind::Runtime, "nobody answers"));
             }
@@ -162,7 +162,7 @@ fn a_model_from_the_future_is_not_believed() {
     let mut forged = {
         let mut wait = None;
         while wait.is_none() {
-            wait = line.ways[1].lock().unwrap().iter().find(|message| Message::is_model(message)).cloned();
+            wait = line.ways[1].lock().unwrap().iter().find(|message| Message::has_models(message)).cloned();
         }
         wait.unwrap()
     };

@@ -42,7 +42,7 @@ impl Inbox {
         }
         held.heard = Some(Instant::now());
         if held.messages.len() < MOST_MESSAGES && held.bytes + message.len() <= MOST_BYTES {
-            held.models += usize::from(Message::is_model(message));
+            held.models += usize::from(Message::has_models(message));
             held.bytes += message.len();
             held.messages.push_back(message.to_vec());
         }

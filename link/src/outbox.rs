@@ -64,7 +64,7 @@ impl Outbox {
     pub(crate) fn put(&self, lane: Lane, message: &[u8]) {
         let place = match lane {
             Lane::Urgent => 0,
-            Lane::Model { .. } => 1,
+            Lane::Models => 1,
             Lane::Bulk => 2,
         };
         self.lanes[place].put(lane, message);
@@ -87,7 +87,7 @@ impl Queue {
 
     fn put(&self, lane: Lane, message: &[u8]) {
         let mut waiting = self.waiting();
-        if let Lane::Model { .. } = lane {
+        if let Lane::Models = lane {
             waiting.messages.retain(|(other, _)| *other != lane);
         }
         if waiting.messages.len() >= MOST_WAITING {
@@ -125,12 +125,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_waiting_models_only_the_newest_of_each_tool_goes_and_of_ticks_the_newest_ones() {
+    fn of_waiting_models_only_the_newest_go_and_of_ticks_the_newest_ones() {
         let queue = Queue::default();
-        for n in 0..5 {
-            queue.put(Lane::Model { tool: u16::from(n % 2) }, &[n]);
-        }
-        assert_eq!([queue.next(), queue.next()], [Some(vec![3]), Some(vec![4])]);
+        (0..5).for_each(|n| queue.put(Lane::Models, &[n]));
+        assert_eq!(queue.next(), Some(vec![4]));
         (0..MOST_WAITING + 3).for_each(|n| queue.put(Lane::Urgent, &n.to_le_bytes()));
         assert_eq!(queue.next(), Some(3_usize.to_le_bytes().into()));
         queue.waiting().is_over = true;

@@ -8,7 +8,7 @@ use super::model_maker::ModelMaker;
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::contact::ToolMotion;
-use crate::model::local::{Aim, Kind, ResyncView, ToolForecast, ToolHistory, Windows};
+use crate::model::local::{Aim, Beside, Kind, ResyncView, ToolForecast, ToolHistory, Windows};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{Actor, ActorError, Nanos, Outcome, Rate, Stopwatch, TickContext};
@@ -79,6 +79,11 @@ pub struct GlobalActor {
     /// Working memory: where each tool is and is expected, and the triangle that it touches or is nearest to.
     forecasts: Vec<ToolForecast>,
     nearest: Vec<u32>,
+    /// The newest models that were published.
+    version: u64,
+    /// Working memory: the tools that no model serves yet, and the triangles that one is built around.
+    unserved: Vec<usize>,
+    around: Vec<u32>,
     /// Working memory: how each tool moves in a tick.
     motions: Vec<ToolMotion>,
     /// Working memory: where a tool is going, and the window there.
@@ -110,8 +115,8 @@ impl GlobalActor {
             ToolSide::new(tool, windows, history, ports)
         };
         let tools = tools.iter().zip(of_tools).enumerate().map(side).collect();
+        let (version, unserved, around, is_changed) = (0, Vec::new(), Vec::new(), true);
         let (forecasts, nearest, motions, triangles_ahead, patch_ahead) = Default::default();
-        let is_changed = true;
         Ok(Self {
             simulation,
             aim,
@@ -121,6 +126,9 @@ impl GlobalActor {
             is_changed,
             forecasts,
             nearest,
+            version,
+            unserved,
+            around,
             motions,
             triangles_ahead,
             patch_ahead,
@@ -246,43 +254,77 @@ impl GlobalActor {
             self.publish_wishes(ctx);
         }
         let (kind, is_changed) = (self.ports.settings.get().model, std::mem::take(&mut self.is_changed));
-        let mut version = 0;
-        for (index, side) in self.tools.iter_mut().enumerate() {
-            // The whole body goes on by itself.
-            if kind == Kind::Full && !is_changed {
-                version = side.version;
-                continue;
-            }
+        // The whole body goes on by itself.
+        if kind != Kind::Full || is_changed {
+            self.choose_hosts(kind, has_bases);
+            self.build_models(kind, has_bases);
+            self.version = self.ports.models.publish(ctx);
+        }
+        self.version
+    }
+
+    /// Finds for each tool its patch, if there are bases, and which others its model may serve too.
+    fn choose_hosts(&mut self, kind: Kind, has_bases: bool) {
+        let mut pressed = std::mem::take(&mut self.patch_ahead);
+        for index in 0..self.tools.len() {
+            let side = &mut self.tools[index];
             if has_bases {
                 side.choose_patch((&self.simulation, index), &self.plan.bases);
             }
+            let mut held = std::mem::take(&mut side.held);
+            held.clear();
+            let patch = &self.tools[index].patch;
+            held.extend((0..self.tools.len()).filter(|&other| {
+                if !has_bases {
+                    return !kind.has_patch();
+                }
+                self.simulation.pressed_at(other, &self.tools[other].triangles, &mut pressed);
+                pressed.iter().all(|node| patch.binary_search(node).is_ok())
+            }));
+            self.tools[index].held = held;
+        }
+        self.patch_ahead = pressed;
+    }
+
+    /// Builds the next local models: as few as serve all tools, those first that serve most.
+    fn build_models(&mut self, kind: Kind, has_bases: bool) {
+        let models = self.ports.models.buffer();
+        self.plan.models.put(kind, self.simulation.body_as_made(), models);
+        self.unserved.clear();
+        self.unserved.extend(0..self.tools.len());
+        self.unserved.sort_by_key(|&tool| std::cmp::Reverse(self.tools[tool].held.len()));
+        while !self.unserved.is_empty() {
+            let host = self.unserved.remove(0);
+            let (side, unserved) = (&self.tools[host], &mut self.unserved);
+            let held = || side.held.iter().filter(|tool| unserved.contains(tool));
+            self.around.clear();
+            self.around.extend_from_slice(&side.triangles);
+            self.around.extend(held().flat_map(|&tool| &self.tools[tool].triangles));
             let resync = ResyncView {
                 global: &mut self.simulation,
                 tick: side.tool.tick,
-                triangles: &side.triangles,
+                triangles: &self.around,
                 nearest: &self.nearest,
                 patch: has_bases.then_some(&side.patch),
                 tools: &self.forecasts,
-                index,
+                index: host,
                 horizon: self.plan.horizon,
                 bases: &self.plan.bases,
             };
-            let model = side.ports.models.buffer();
-            self.plan.models.put(kind, resync.global.body_as_made(), model);
-            Stopwatch::around(self.ports.build_cost.as_mut(), || model.rebuild(resync));
-            side.version = side.ports.models.publish(ctx);
-            version = side.version;
+            Stopwatch::around(self.ports.build_cost.as_mut(), || models.rebuild(resync));
+            unserved.retain(|tool| !(side.held.contains(tool) && models.share(host, *tool)));
         }
-        version
     }
 
-    /// Finds for each tool which nodes the others press.
+    /// Finds for each tool what the others press.
     fn look_beside(&mut self) {
         for index in 0..self.tools.len() {
             let mut beside = std::mem::take(&mut self.tools[index].beside);
-            let [soon, now] = &mut beside;
-            self.simulation.pressed_beside(index, |other| &self.tools[other].triangles, soon);
-            self.simulation.pressed_beside(index, |other| &self.nearest[other..=other], now);
+            self.simulation.pressed_beside(index, |other| &self.tools[other].triangles, &mut beside.soon);
+            self.simulation.pressed_beside(index, |other| &self.nearest[other..=other], &mut beside.now);
+            beside.triangles.clear();
+            let others = self.nearest.iter().enumerate().filter(|&(other, _)| other != index);
+            beside.triangles.extend(others.map(|(_, triangle)| triangle));
             self.tools[index].beside = beside;
         }
     }
@@ -325,20 +367,19 @@ impl GlobalActor {
         for (index, (side, tool)) in self.tools.iter().zip(&self.forecasts).enumerate() {
             let at = (&self.simulation, index);
             let (ahead, patch) = (&mut self.triangles_ahead, &mut self.patch_ahead);
-            let beside = side.beside.each_ref().map(Vec::as_slice);
-            side.windows.choose(at, &side.triangles, [&[]; 2], |_| true, patch);
+            side.windows.choose(at, &side.triangles, &Beside::default(), |_| true, patch);
             wish(patch);
             if self.simulation.contact(index).glued {
                 // It stays where it is.
                 continue;
             }
             if self.tools.len() > 1 {
-                side.windows.choose(at, &side.triangles, beside, |_| true, patch);
+                side.windows.choose(at, &side.triangles, &side.beside, |_| true, patch);
                 wish(patch);
             }
             for [after, lead] in [[period, lead]].into_iter().chain(PREFETCH_S.map(|after| [after, 0.0])) {
                 self.aim.triangles(at, tool, [after, lead], ahead);
-                side.windows.choose(at, ahead, beside, |_| true, patch);
+                side.windows.choose(at, ahead, &side.beside, |_| true, patch);
                 wish(patch);
             }
             side.windows.around(side.triangles[0], NEIGHBOURS).for_each(&mut wish);

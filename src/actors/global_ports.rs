@@ -3,7 +3,7 @@
 use super::basis::Wishes;
 use super::messages::{Checkpoint, SurfaceView, ToolTick};
 use super::settings::Settings;
-use crate::model::local::{LocalModel, PatchGeometry};
+use crate::model::local::{LocalModels, PatchGeometry};
 use crate::model::surroundings::Bases;
 use crate::runtime::{OutletWriter, ParameterReader, QueueReader, Reader, Recorder, Stopwatch, Writer};
 
@@ -19,6 +19,8 @@ pub struct GlobalPorts {
 /// The ports of a [`GlobalActor`](super::GlobalActor) that are there once, for however many tools.
 #[derive(Debug)]
 pub struct GlobalSharedPorts {
+    /// The next local models.
+    pub models: Writer<LocalModels>,
     /// What is changed while it runs.
     pub settings: ParameterReader<Settings>,
     /// To and from the basis actor, if the models use what it makes.
@@ -40,8 +42,6 @@ pub struct ToolPorts {
     pub ticks: QueueReader<ToolTick>,
     /// The patch's geometry at the tick of the resync, if it is fed back.
     pub geometry: Option<Reader<PatchGeometry>>,
-    /// The next local model.
-    pub models: Writer<Box<dyn LocalModel>>,
 }
 
 /// The global half of the ports of a [`BasisActor`](super::BasisActor).

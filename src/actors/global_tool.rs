@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use super::global_ports::ToolPorts;
 use super::messages::ToolTick;
 use crate::model::Pose;
-use crate::model::local::{ToolHistory, Windows};
+use crate::model::local::{Beside, ToolHistory, Windows};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::TickContext;
@@ -25,13 +25,12 @@ pub(super) struct ToolSide {
     pub(super) history: ToolHistory,
     /// Where local models may be made, if there are bases.
     pub(super) windows: Windows,
-    /// The newest model that was published.
-    pub(super) version: u64,
     /// Triangles that the window of its next model has to hold.
     pub(super) triangles: Vec<u32>,
-    /// The nodes that other tools press, or may press before the next model serves, and those that they press now: what that is to hold
-    /// too, if there is one that does.
-    pub(super) beside: [Vec<u32>; 2],
+    /// What the others press.
+    pub(super) beside: Beside,
+    /// The others whose places its next model holds: it may serve them too.
+    pub(super) held: Vec<usize>,
     /// The patch of its next model.
     pub(super) patch: Vec<u32>,
 }
@@ -39,10 +38,10 @@ pub(super) struct ToolSide {
 impl ToolSide {
     /// Of a tool that has rested where it is at `tool`.
     pub(super) fn new(tool: ToolTick, windows: Windows, history: ToolHistory, ports: ToolPorts) -> Self {
-        let (waiting, is_between, version) = Default::default();
-        let (triangles, beside, patch) = Default::default();
+        let (waiting, is_between) = Default::default();
+        let (triangles, beside, held, patch) = Default::default();
         let from = tool.pose;
-        Self { ports, waiting, tool, from, is_between, history, windows, version, triangles, beside, patch }
+        Self { ports, waiting, tool, from, is_between, history, windows, triangles, beside, held, patch }
     }
 
     /// Takes the patch's geometry in place of the global model's own, if it belongs to the same tick.
@@ -60,9 +59,8 @@ impl ToolSide {
     /// while nobody knows where the tool is going.
     pub(super) fn choose_patch(&mut self, at: (&Simulation, usize), bases: &Bases) {
         let has_basis = |patch: &[u32]| bases.get(patch).is_some();
-        let beside = self.beside.each_ref().map(Vec::as_slice);
-        if !self.windows.choose(at, &self.triangles, beside, has_basis, &mut self.patch) {
-            self.windows.choose(at, &self.triangles, [&[]; 2], |_| true, &mut self.patch);
+        if !self.windows.choose(at, &self.triangles, &self.beside, has_basis, &mut self.patch) {
+            self.windows.choose(at, &self.triangles, &Beside::default(), |_| true, &mut self.patch);
         }
         if self.history.is_new()
             && let Some(widest) = self.windows.widest(self.triangles[0], &self.patch).filter(|patch| has_basis(patch))

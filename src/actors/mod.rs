@@ -46,7 +46,7 @@ pub(crate) use bridge::{GlobalBridge, GlobalEnd, HapticBridge, HapticEnd};
 pub(crate) use device::{DeviceActor, DevicePorts, GAP_S, first_state};
 pub(crate) use global::{GlobalActor, GlobalPlan};
 pub(crate) use global_ports::{GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
-pub(crate) use local::{LocalActor, LocalPorts, LocalSide};
+pub(crate) use local::{LocalActor, LocalPorts, LocalSide, LocalSource};
 pub(crate) use messages::{Checkpoint, ComputedForce, DeviceSample, ToolTick};
 pub(crate) use model_maker::ModelMaker;
 pub(crate) use scene_watch::SceneWatch;

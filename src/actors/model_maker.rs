@@ -1,7 +1,7 @@
 //! Empty local models of whichever kind is wanted.
 
 use crate::model::body::Body;
-use crate::model::local::{Kind, LocalModel, Template};
+use crate::model::local::{Kind, LocalModel, LocalModels, Template};
 
 /// Makes the local models of a session, whose kind may change while it runs.
 #[derive(Clone, Debug)]
@@ -23,20 +23,20 @@ impl ModelMaker {
         Self { templates: vec![first], patches, probes }
     }
 
-    /// An empty model as at the start.
+    /// Empty models for so many `tools`, as at the start.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn first(&self) -> Box<dyn LocalModel> {
-        self.watching(&self.templates[0])
+    pub fn first(&self, tools: usize) -> LocalModels {
+        LocalModels::new(tools, || self.watching(&self.templates[0]))
     }
 
-    /// An empty model as at the start, for the side of the global one where the local one is built elsewhere.
+    /// Empty models as at the start, for the side of the global one where the local ones are built elsewhere.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn departing(&self) -> Box<dyn LocalModel> {
-        self.watch(self.templates[0].departing())
+    pub fn departing(&self, tools: usize) -> LocalModels {
+        LocalModels::new(tools, || self.watch(self.templates[0].departing()))
     }
 
     fn watching(&self, template: &Template) -> Box<dyn LocalModel> {
@@ -48,13 +48,13 @@ impl ModelMaker {
         model
     }
 
-    /// Puts a model of `kind` for `body`, as it was made, in place of one of another kind. A kind that there may not be changes
+    /// Puts models of `kind` for `body`, as it was made, in place of those of another kind. A kind that there may not be changes
     /// nothing: only a damaged log asks for one.
     ///
     /// # Real-time
     /// For the global actor: may allocate, and takes its time when a kind is needed for the first time.
-    pub fn put(&mut self, kind: Kind, body: &dyn Body, model: &mut Box<dyn LocalModel>) {
-        if model.kind() == kind {
+    pub fn put(&mut self, kind: Kind, body: &dyn Body, models: &mut LocalModels) {
+        if models.kind() == kind {
             return;
         }
         if !self.templates.iter().any(|template| template.kind == kind) {
@@ -63,7 +63,7 @@ impl ModelMaker {
             self.templates.extend(made);
         }
         if let Some(template) = self.templates.iter().find(|template| template.kind == kind) {
-            *model = self.watching(template);
+            *models = LocalModels::new(models.hosts().len(), || self.watching(template));
         }
     }
 }

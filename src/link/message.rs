@@ -12,14 +12,14 @@
 use std::fmt;
 
 use crate::model::bytes::{BytesReader, BytesWriter};
-use crate::model::local::Parcel;
+use crate::model::local::Shipment;
 use crate::model::surroundings::Basis;
 use crate::model::{Pose, turn_of, wxyz};
 use crate::runtime::Nanos;
 
 const MAGIC: [u8; 4] = *b"plnk";
 /// The version of the format: of another one nothing is read.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 /// No message is longer (bytes).
 pub const LARGEST: usize = 1 << 25;
 
@@ -58,8 +58,8 @@ pub enum Message {
         /// Number of the haptic tick, and where the tool is at its end.
         ticks: Vec<(u64, Pose)>,
     },
-    /// To the haptic side: what the next local model is built from.
-    Model(Box<Parcel>),
+    /// To the haptic side: what the next local models are built from.
+    Models(Shipment),
     /// To the haptic side: reduced surroundings, once.
     Basis {
         /// What names it.
@@ -81,7 +81,7 @@ pub enum Message {
 }
 
 const TICKS: u16 = 1;
-const MODEL: u16 = 2;
+const MODELS: u16 = 2;
 const BASIS: u16 = 3;
 const HELD: u16 = 4;
 const PING: u16 = 5;
@@ -128,7 +128,7 @@ impl Message {
                     write_pose(to, pose);
                 });
             }
-            Self::Model(parcel) => parcel.write(to),
+            Self::Models(shipment) => shipment.write(to),
             Self::Basis { key, basis } => {
                 to.u64(*key);
                 to.0.extend_from_slice(&basis.to_bytes(*key));
@@ -142,11 +142,6 @@ impl Message {
         }
     }
 
-    /// Writes a model's message without a copy of the parcel.
-    pub fn write_model(parcel: &Parcel, header: Header, bytes: &mut Vec<u8>) {
-        parcel.write(&mut begin(header, MODEL, bytes));
-    }
-
     /// Writes the message of a basis without a copy of it.
     pub fn write_basis(key: u64, basis: &Basis, header: Header, bytes: &mut Vec<u8>) {
         let to = &mut begin(header, BASIS, bytes);
@@ -157,7 +152,7 @@ impl Message {
     fn kind(&self) -> u16 {
         match self {
             Self::Ticks { .. } => TICKS,
-            Self::Model(_) => MODEL,
+            Self::Models(_) => MODELS,
             Self::Basis { .. } => BASIS,
             Self::Held(_) => HELD,
             Self::Ping => PING,
@@ -189,9 +184,9 @@ impl Message {
         read_header(&mut from).ok_or(Refused::Malformed)
     }
 
-    /// True for the message of a local model, by its beginning.
-    pub fn is_model(bytes: &[u8]) -> bool {
-        read_kind(bytes).is_ok_and(|(kind, _)| kind == MODEL)
+    /// True for the message of local models, by its beginning.
+    pub fn has_models(bytes: &[u8]) -> bool {
+        read_kind(bytes).is_ok_and(|(kind, _)| kind == MODELS)
     }
 
     fn read_body(kind: u16, from: &mut BytesReader<'_>) -> Option<(Header, Self)> {
@@ -202,7 +197,7 @@ impl Message {
                 from.list(TICK, &mut ticks, read_tick)?;
                 Self::Ticks { tool, ticks }
             }
-            MODEL => Self::Model(Box::new(Parcel::read(from)?)),
+            MODELS => Self::Models(Shipment::read(from)?),
             BASIS => {
                 let key = from.u64()?;
                 let basis = Box::new(Basis::from_bytes(std::mem::take(&mut from.0), key)?);
@@ -275,6 +270,9 @@ pub(super) fn read_pose(from: &mut BytesReader<'_>) -> Option<Pose> {
 mod tests {
     use super::*;
     use crate::model::Vec3;
+    use crate::model::body::Block;
+    use crate::model::local::{Kind, LocalModels, Template};
+    use crate::model::mesh::Face;
 
     const HEADER: Header = Header { epoch: 3, number: 9, sent: Nanos(5) };
 
@@ -284,6 +282,12 @@ mod tests {
         bytes
     }
 
+    fn shipment() -> Shipment {
+        let block = Block::builder([3; 3], [0.02; 3]).fix(Face::ZMin).build().unwrap();
+        let template = Template::new(Kind::Hold, [2; 3], &block).unwrap();
+        Shipment::of(&LocalModels::new(1, || template.departing()))
+    }
+
     fn some() -> [Message; 5] {
         let ticks = (1..9).map(|tick| (tick, Pose::at(Vec3::new(tick as f64, -0.0, 1e-300)))).collect();
         [
@@ -291,7 +295,7 @@ mod tests {
             Message::Held(vec![1, u64::MAX]),
             Message::Ping,
             Message::Pong { sent: Nanos(1), received: Nanos(2) },
-            Message::Model(Box::default()),
+            Message::Models(shipment()),
         ]
     }
 
@@ -318,7 +322,7 @@ mod tests {
         assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Kind(99));
         bytes[4] = 1;
         assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Version(1));
-        assert!(Refused::Version(1).to_string().contains("version 1, this is version 2"));
+        assert!(Refused::Version(1).to_string().contains("version 1, this is version 3"));
     }
 
     #[test]

@@ -9,11 +9,8 @@ use crate::runtime::Nanos;
 pub enum Lane {
     /// Few bytes, every millisecond: tool ticks, clock, control.
     Urgent,
-    /// The newest local model of a tool: of those that wait to go, only the last is worth sending.
-    Model {
-        /// The tool that it is for.
-        tool: u16,
-    },
+    /// The newest local models: of those that wait to go, only the last are worth sending.
+    Models,
     /// Large and needed once: bases.
     Bulk,
 }
@@ -28,7 +25,7 @@ pub trait Transport: Send + std::fmt::Debug {
     /// Puts the next message that has come in place of `message`; false if there is none.
     fn receive(&mut self, now: Nanos, message: &mut Vec<u8>) -> bool;
 
-    /// Introduces the haptic side to the other one, before the session begins; waits until a first local model of every tool has come.
+    /// Introduces the haptic side to the other one, before the session begins; waits until the first local models have come.
     ///
     /// # Errors
     /// If nobody answers in time, or the other side refuses: with one line that says why.

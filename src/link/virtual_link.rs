@@ -145,11 +145,11 @@ impl Way {
     fn wait(&mut self, lane: Lane, message: &[u8], now: Nanos) {
         let place = match lane {
             Lane::Urgent => 0,
-            Lane::Model { .. } => 1,
+            Lane::Models => 1,
             Lane::Bulk => 2,
         };
         let waiting = &mut self.lanes[place];
-        if let Lane::Model { .. } = lane {
+        if let Lane::Models = lane {
             // One that has begun to go goes on.
             waiting.retain(|other| other.lane != lane || other.left < other.message.len());
         }
@@ -299,7 +299,7 @@ mod tests {
                 here.send(Lane::Bulk, &[9; 20 * PACKET], now);
             }
             if ms < 5 {
-                here.send(Lane::Model { tool: 0 }, &[ms as u8; 3 * PACKET], now);
+                here.send(Lane::Models, &[ms as u8; 3 * PACKET], now);
             }
             if ms == 2 {
                 here.send(Lane::Urgent, &[7; 10], now);

@@ -1,13 +1,15 @@
 //! The bridge beside the global actor: tool ticks in, local models and bases out.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::super::messages::ToolTick;
 use super::post::Post;
 use super::{MOST_MESSAGES, key_of};
 use crate::link::{Lane, Message, Transport};
 use crate::model::Pose;
-use crate::model::local::{LocalModel, Parcel};
+use crate::model::local::{LocalModels, Parcel, Shipment};
+use crate::model::surroundings::{Bases, Basis};
 use crate::runtime::{Actor, ActorError, Nanos, Outcome, QueueWriter, Reader, TickContext};
 
 /// A basis that is not there after so long is sent again.
@@ -20,8 +22,6 @@ const MOST_ON_THE_WAY: usize = 4;
 pub struct GlobalEnd {
     /// The tool at every haptic tick that came.
     pub ticks: QueueWriter<ToolTick>,
-    /// The next local model: one that is [built elsewhere](crate::model::local::Template::departing).
-    pub models: Reader<Box<dyn LocalModel>>,
 }
 
 /// Carries local models to the haptic side, and the tool ticks that come from there to the global actor.
@@ -31,6 +31,8 @@ pub struct GlobalEnd {
 #[derive(Debug)]
 pub struct GlobalBridge {
     post: Post,
+    /// The next local models: such as are [built elsewhere](crate::model::local::Template::departing).
+    models: Reader<LocalModels>,
     tools: Vec<GlobalEnd>,
     /// The newest tick of each tool.
     newest: Vec<u64>,
@@ -46,22 +48,19 @@ struct SentBases {
 }
 
 impl GlobalBridge {
-    /// A bridge for the tools of `ends`.
-    pub fn new(transport: Box<dyn Transport>, ends: Vec<GlobalEnd>) -> Self {
+    /// A bridge for the tools of `ends`, whose next local models come by `models`: such as are
+    /// [built elsewhere](crate::model::local::Template::departing).
+    pub fn new(transport: Box<dyn Transport>, models: Reader<LocalModels>, ends: Vec<GlobalEnd>) -> Self {
         let newest = vec![0; ends.len()];
-        Self { post: Post::new(transport), tools: ends, newest, bases: SentBases::default() }
+        Self { post: Post::new(transport), models, tools: ends, newest, bases: SentBases::default() }
     }
 
     fn send_models(&mut self, ctx: &TickContext) {
-        let Self { post, tools, bases, .. } = self;
-        for end in tools {
-            if end.models.refresh(ctx)
-                && let Some(parcel) = end.models.get().parcel()
-            {
-                bases.send(post, parcel, ctx.scheduled);
-                let lane = Lane::Model { tool: parcel.tool() as u16 };
-                post.send_with(lane, ctx.scheduled, |header, bytes| Message::write_model(parcel, header, bytes));
-            }
+        let Self { post, models, bases, .. } = self;
+        if models.refresh(ctx) {
+            let shipment = Shipment::of(models.get());
+            bases.send(post, shipment.parcels(), ctx.scheduled);
+            post.send(Lane::Models, ctx.scheduled, &Message::Models(shipment));
         }
     }
 
@@ -81,7 +80,7 @@ impl GlobalBridge {
                     self.post.send(Lane::Urgent, ctx.scheduled, &answer);
                 }
                 // Of the other direction.
-                Message::Model(_) | Message::Basis { .. } | Message::Pong { .. } => {}
+                Message::Models(_) | Message::Basis { .. } | Message::Pong { .. } => {}
             }
         }
     }
@@ -100,11 +99,13 @@ impl GlobalBridge {
 }
 
 impl SentBases {
-    /// Sends what the haptic side lacks of the bases that `parcel` knows, the one that it needs itself first.
-    fn send(&mut self, post: &mut Post, parcel: &Parcel, now: Nanos) {
+    /// Sends what the haptic side lacks of the bases that `parcels` know, those that they need themselves first.
+    fn send(&mut self, post: &mut Post, parcels: &[Parcel], now: Nanos) {
         self.give_up_late(now);
-        let needed = parcel.patch().and_then(|patch| parcel.bases().get(patch)).map(|basis| &**basis);
-        for basis in needed.into_iter().chain(parcel.bases().iter()) {
+        let of_patch = |parcel: &'_ Parcel| parcel.bases().get(parcel.patch()?).map(Arc::clone);
+        let needed: Vec<Arc<Basis>> = parcels.iter().filter_map(of_patch).collect();
+        let known = parcels.first().map(Parcel::bases);
+        for basis in needed.iter().map(|basis| &**basis).chain(known.into_iter().flat_map(Bases::iter)) {
             let key = key_of(basis.patch());
             if self.begin(key, now) {
                 post.send_with(Lane::Bulk, now, |header, bytes| Message::write_basis(key, basis, header, bytes));

@@ -8,7 +8,7 @@ use super::post::Post;
 use super::{MOST_MESSAGES, SILENCE, key_of};
 use crate::link::{Clock, Lane, MOST_TICKS, Message, Transport};
 use crate::log::LinkSample;
-use crate::model::local::{Image, LocalModel, Parcel};
+use crate::model::local::{Image, LocalModels, Shipment};
 use crate::model::surroundings::{Bases, Basis};
 use crate::runtime::{Actor, ActorError, Nanos, Outcome, QueueReader, Recorder, TickContext, Writer};
 
@@ -22,8 +22,6 @@ const ASKS_EVERY: Nanos = Nanos(50_000_000);
 pub struct HapticEnd {
     /// The tool at every haptic tick.
     pub ticks: QueueReader<ToolTick>,
-    /// The next local model.
-    pub models: Writer<Box<dyn LocalModel>>,
 }
 
 /// Carries tool ticks to the global side, and builds the local models that come from there.
@@ -34,6 +32,12 @@ pub struct HapticEnd {
 pub struct HapticBridge {
     post: Post,
     tools: Vec<Tool>,
+    /// The next local models.
+    models: Writer<LocalModels>,
+    /// The tick of the newest of this epoch.
+    newest: Option<u64>,
+    /// The newest that have come in this release.
+    arrived: Option<Shipment>,
     image: Image,
     bases: Bases,
     clock: Clock,
@@ -50,20 +54,22 @@ struct Tool {
     end: HapticEnd,
     /// Oldest first.
     recent: VecDeque<ToolTick>,
-    /// The tick of the newest model of this epoch.
-    newest: Option<u64>,
-    /// The newest that has come in this release.
-    arrived: Option<Box<Parcel>>,
 }
 
 impl HapticBridge {
-    /// A bridge for the tools of `ends`, which builds models by the `image` of the body over there.
-    pub fn new(transport: Box<dyn Transport>, ends: Vec<HapticEnd>, image: Image, recorder: Recorder) -> Self {
-        let tool = |end| Tool { end, recent: VecDeque::new(), newest: None, arrived: None };
-        let (bases, clock, heard, asked) = Default::default();
+    /// A bridge for the tools of `ends`, which builds `models` by the `image` of the body over there.
+    pub fn new(
+        transport: Box<dyn Transport>,
+        ends: Vec<HapticEnd>,
+        models: Writer<LocalModels>,
+        image: Image,
+        recorder: Recorder,
+    ) -> Self {
+        let tool = |end| Tool { end, recent: VecDeque::new() };
+        let (newest, arrived, bases, clock, heard, asked) = Default::default();
         let (mut post, tools) = (Post::new(transport), ends.into_iter().map(tool).collect());
         let peer = post.peer();
-        Self { post, tools, image, bases, clock, heard, asked, peer, recorder }
+        Self { post, tools, models, newest, arrived, image, bases, clock, heard, asked, peer, recorder }
     }
 
     /// A connection that has fallen silent, or whose peer is another one now, is over: what still comes of it is dropped.
@@ -73,7 +79,7 @@ impl HapticBridge {
         if is_silent || std::mem::replace(&mut self.peer, peer) != peer {
             self.post.begin_epoch(self.post.epoch + 1);
             self.heard = None;
-            self.tools.iter_mut().for_each(|tool| tool.newest = None);
+            self.newest = None;
         }
         self.heard.is_none()
     }
@@ -127,13 +133,14 @@ impl HapticBridge {
             let Some((header, message)) = self.post.receive(now, false) else { return };
             self.heard = Some(now);
             match message {
-                Message::Model(parcel) => {
-                    let Some(tool) = self.tools.get_mut(parcel.tool()) else { continue };
+                Message::Models(shipment) => {
                     // One that was overtaken is outdated; one of a tick that has not been is none, and would never be old.
-                    let sent = tool.recent.back().map_or(0, |tick| tick.tick);
-                    if parcel.tick() <= sent && tool.newest.is_none_or(|newest| parcel.tick() > newest) {
-                        tool.newest = Some(parcel.tick());
-                        tool.arrived = Some(parcel);
+                    let tick = shipment.tick();
+                    let sent = |tool: &Tool| tool.recent.back().map_or(0, |tick| tick.tick);
+                    let has_been = self.tools.iter().map(sent).min().is_some_and(|sent| tick <= sent);
+                    if has_been && self.newest.is_none_or(|newest| tick > newest) {
+                        self.newest = Some(tick);
+                        self.arrived = Some(shipment);
                     }
                 }
                 Message::Basis { key, basis } => self.keep(key, *basis),
@@ -154,12 +161,10 @@ impl HapticBridge {
     }
 
     fn publish(&mut self, ctx: &TickContext) {
-        for tool in &mut self.tools {
-            if let Some(parcel) = tool.arrived.take()
-                && self.image.rebuild(&parcel, &self.bases, &mut **tool.end.models.buffer())
-            {
-                tool.end.models.publish(ctx);
-            }
+        if let Some(shipment) = self.arrived.take()
+            && self.image.rebuild(&shipment, &self.bases, self.models.buffer())
+        {
+            self.models.publish(ctx);
         }
     }
 }

@@ -75,9 +75,9 @@ fn row([radius, depth]: [f64; 2]) {
         let start = Instant::now();
         std::hint::black_box(model.tick(&[ToolMotion::straight(circle(k), circle(k + 1))]));
         times.push(start.elapsed().as_secs_f64() * 1e6);
-        places += if k < WARM_UP { 0 } else { model.contact_points().len() };
+        places += if k < WARM_UP { 0 } else { model.contact_points(0).len() };
     }
-    assert_eq!(model.serves_as(), Kind::Predictive, "the contact is inside the patch");
+    assert_eq!(model.serves_as(0), Kind::Predictive, "the contact is inside the patch");
     let times = &mut times[WARM_UP..];
     times.sort_by(f64::total_cmp);
     let share = |percent: usize| times[TICKS * percent / 100];

@@ -72,7 +72,7 @@ fn patch_tick(c: &mut Criterion) {
                 black_box(patch.tick(&[ToolMotion::straight(circle(k - 1), circle(k))]))
             });
         });
-        assert!(patch.contact().is_touching(), "the tick measured has a contact in it");
+        assert!(patch.contact(0).is_touching(), "the tick measured has a contact in it");
     }
 }
 

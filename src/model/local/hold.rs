@@ -4,29 +4,40 @@ use super::{Kind, LocalModel, ResyncView, Watched};
 use crate::contact::{Contact, ContactPoint, ToolMotion};
 use crate::{Vec3, Wrench};
 
-/// The force and torque of the global model's last tick, held until the next.
+/// The forces and torques of the global model's last tick, held until the next.
 #[derive(Clone, Debug, Default)]
 pub struct Hold {
-    wrench: Wrench,
-    contact: Contact,
-    points: Vec<ContactPoint>,
-    area: f64,
+    tools: Vec<Held>,
+    /// The tool that it is built around.
+    own: usize,
     built_at: u64,
     watched: Watched,
 }
 
+/// What one tool felt.
+#[derive(Clone, Debug, Default)]
+struct Held {
+    wrench: Wrench,
+    contact: Contact,
+    points: Vec<ContactPoint>,
+    area: f64,
+}
+
 impl LocalModel for Hold {
     fn rebuild(&mut self, resync: ResyncView<'_>) {
-        self.wrench = resync.global.wrench(resync.index);
-        self.contact = *resync.global.contact(resync.index);
-        resync.global.contact_points(resync.index).clone_into(&mut self.points);
-        self.area = resync.global.contact_area(resync.index);
-        self.built_at = resync.tick;
-        self.watched.take(resync.global.state());
+        let global = &*resync.global;
+        self.tools.resize_with(global.tools(), Held::default);
+        for (tool, held) in self.tools.iter_mut().enumerate() {
+            (held.wrench, held.contact) = (global.wrench(tool), *global.contact(tool));
+            global.contact_points(tool).clone_into(&mut held.points);
+            held.area = global.contact_area(tool);
+        }
+        (self.own, self.built_at) = (resync.index, resync.tick);
+        self.watched.take(global.state());
     }
 
     fn tick(&mut self, _: &[ToolMotion]) -> Wrench {
-        self.wrench
+        self.wrench(self.own).unwrap_or_default()
     }
 
     fn built_at(&self) -> u64 {
@@ -37,7 +48,11 @@ impl LocalModel for Hold {
         Kind::Hold
     }
 
-    fn serves_as(&self) -> Kind {
+    fn wrench(&self, tool: usize) -> Option<Wrench> {
+        self.tools.get(tool).map(|held| held.wrench)
+    }
+
+    fn serves_as(&self, _: usize) -> Kind {
         Kind::Hold
     }
 
@@ -45,16 +60,16 @@ impl LocalModel for Hold {
         false
     }
 
-    fn contact(&self) -> Contact {
-        self.contact
+    fn contact(&self, tool: usize) -> Contact {
+        self.tools.get(tool).map(|held| held.contact).unwrap_or_default()
     }
 
-    fn contact_points(&self) -> &[ContactPoint] {
-        &self.points
+    fn contact_points(&self, tool: usize) -> &[ContactPoint] {
+        self.tools.get(tool).map_or(&[], |held| &held.points)
     }
 
-    fn contact_area(&self) -> f64 {
-        self.area
+    fn contact_area(&self, tool: usize) -> f64 {
+        self.tools.get(tool).map_or(0.0, |held| held.area)
     }
 
     fn global_position(&self, probe: usize) -> Option<Vec3> {

@@ -7,6 +7,7 @@ mod forecast;
 mod hold;
 mod kind;
 mod linear;
+mod models;
 mod parcel;
 mod patch;
 mod predictive;
@@ -26,10 +27,11 @@ pub use feedback::{Feedback, PatchGeometry};
 pub use forecast::{ToolForecast, ToolHistory};
 pub use hold::Hold;
 pub use kind::Kind;
-pub use parcel::{Image, Parcel};
+pub use models::LocalModels;
+pub use parcel::{Image, Parcel, Shipment};
 pub use succession::{Blend, BlendKind, Jump, Resynced, Served, Succession, Ways};
 pub use template::Template;
-pub use windows::Windows;
+pub use windows::{Beside, Windows};
 
 /// The global model at a resync, and what is expected: what a local model is built from.
 #[derive(Debug)]
@@ -48,7 +50,7 @@ pub struct ResyncView<'a> {
     pub patch: Option<&'a [u32]>,
     /// The forecast of each tool: where it is, and where it is expected.
     pub tools: &'a [ToolForecast],
-    /// The tool that the model is for.
+    /// The tool that the model is built around.
     pub index: usize,
     /// Haptic ticks that the model may have to reach ahead, catching up included.
     pub horizon: u32,
@@ -73,7 +75,7 @@ pub trait LocalModel: Send + std::fmt::Debug {
     fn rebuild(&mut self, resync: ResyncView<'_>);
 
     /// Advances one haptic tick while each tool of the session moves along its own of `tools`; returns the mean force and torque on the tool
-    /// that the model is for, which are not finite if the model has diverged.
+    /// that the model is built around, which are not finite if the model has diverged.
     ///
     /// # Panics
     /// If `tools` are fewer than those of the global model that it was built from.
@@ -94,11 +96,18 @@ pub trait LocalModel: Send + std::fmt::Debug {
     /// Wait-free, real-time safe.
     fn kind(&self) -> Kind;
 
-    /// The kind of model that made the force of the last tick: its own, or the one that it falls back to.
+    /// The mean force and torque on tool number `tool` in the last tick, if it is resolved in the model: the one that it is built around is,
+    /// and others may be. They are not finite if the model has diverged.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    fn serves_as(&self) -> Kind;
+    fn wrench(&self, tool: usize) -> Option<Wrench>;
+
+    /// The kind of model that made the force on tool number `tool` in the last tick: its own, or the one that it falls back to.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    fn serves_as(&self, tool: usize) -> Kind;
 
     /// True if the model's state has to be advanced to the present before it can serve.
     ///
@@ -116,25 +125,26 @@ pub trait LocalModel: Send + std::fmt::Debug {
         8
     }
 
-    /// The tool's contact in this model; its triangle is a global id.
+    /// The contact of tool number `tool` in this model; its triangle is a global id.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    fn contact(&self) -> Contact;
+    fn contact(&self, tool: usize) -> Contact;
 
-    /// The places where a tool with a shape touches; none for a point, whose one place [`contact`](Self::contact) tells. Triangles are global ids.
+    /// The places where tool number `tool` touches if it has a shape; none for a point, whose one place [`contact`](Self::contact) tells.
+    /// Triangles are global ids.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    fn contact_points(&self) -> &[ContactPoint] {
+    fn contact_points(&self, _tool: usize) -> &[ContactPoint] {
         &[]
     }
 
-    /// The area in which a tool with a shape touches (m^2), as fine as the surface's triangles tell; zero for a point.
+    /// The area in which tool number `tool` touches if it has a shape (m^2), as fine as the surface's triangles tell; zero for a point.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    fn contact_area(&self) -> f64 {
+    fn contact_area(&self, _tool: usize) -> f64 {
         0.0
     }
 

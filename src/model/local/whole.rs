@@ -13,10 +13,12 @@ use crate::{Vec3, Wrench};
 pub(super) struct Whole {
     /// `None` before it is built, and for a body that cannot be copied.
     simulation: Option<Simulation>,
-    /// The tool that it serves.
-    tool: usize,
+    /// The tool that it is built around.
+    own: usize,
     /// The tick of its state.
     now: u64,
+    /// A state that is not finite touches nothing: its zero force would look like a free tool.
+    is_finite: bool,
     /// Nodes that are watched.
     watched: Vec<u32>,
 }
@@ -26,16 +28,17 @@ const CATCH_UP_TICKS: u64 = 3;
 
 impl LocalModel for Whole {
     fn rebuild(&mut self, resync: ResyncView<'_>) {
-        (self.simulation, self.tool, self.now) = (resync.global.duplicate(), resync.index, resync.tick);
+        (self.simulation, self.own, self.now) = (resync.global.duplicate(), resync.index, resync.tick);
+        self.is_finite = self.simulation.is_some();
     }
 
     fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
-        let none = Wrench::from(Vec3::repeat(f64::NAN));
         self.now += 1;
-        let Some(simulation) = &mut self.simulation else { return none };
-        simulation.tick_all(tools);
-        // A state that is not finite touches nothing: its zero force would look like a free tool.
-        if simulation.state().is_finite() { simulation.wrench(self.tool) } else { none }
+        if let Some(simulation) = &mut self.simulation {
+            simulation.tick_all(tools);
+            self.is_finite = simulation.state().is_finite();
+        }
+        self.wrench(self.own).unwrap_or_default()
     }
 
     fn built_at(&self) -> u64 {
@@ -46,7 +49,12 @@ impl LocalModel for Whole {
         Kind::Full
     }
 
-    fn serves_as(&self) -> Kind {
+    fn wrench(&self, tool: usize) -> Option<Wrench> {
+        let simulation = self.simulation.as_ref().filter(|_| self.is_finite);
+        Some(simulation.map_or(Vec3::repeat(f64::NAN).into(), |simulation| simulation.wrench(tool)))
+    }
+
+    fn serves_as(&self, _: usize) -> Kind {
         Kind::Full
     }
 
@@ -54,16 +62,16 @@ impl LocalModel for Whole {
         CATCH_UP_TICKS
     }
 
-    fn contact(&self) -> Contact {
-        self.simulation.as_ref().map_or(Contact::default(), |simulation| *simulation.contact(self.tool))
+    fn contact(&self, tool: usize) -> Contact {
+        self.simulation.as_ref().map_or(Contact::default(), |simulation| *simulation.contact(tool))
     }
 
-    fn contact_points(&self) -> &[ContactPoint] {
-        self.simulation.as_ref().map_or(&[], |simulation| simulation.contact_points(self.tool))
+    fn contact_points(&self, tool: usize) -> &[ContactPoint] {
+        self.simulation.as_ref().map_or(&[], |simulation| simulation.contact_points(tool))
     }
 
-    fn contact_area(&self) -> f64 {
-        self.simulation.as_ref().map_or(0.0, |simulation| simulation.contact_area(self.tool))
+    fn contact_area(&self, tool: usize) -> f64 {
+        self.simulation.as_ref().map_or(0.0, |simulation| simulation.contact_area(tool))
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {

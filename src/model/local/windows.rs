@@ -54,6 +54,17 @@ struct Window {
     layer: usize,
 }
 
+/// What tools press that a window is not chosen for, and is to hold too if one does.
+#[derive(Clone, Debug, Default)]
+pub struct Beside {
+    /// The nodes that they press, or may press before the next model serves, in increasing order.
+    pub soon: Vec<u32>,
+    /// Those that they press now.
+    pub now: Vec<u32>,
+    /// The triangles that they touch, or are nearest to.
+    pub triangles: Vec<u32>,
+}
+
 impl Windows {
     /// Those of tool number `tool`: of `size` nodes along the surface, along it, into depth around a point; around all that a shape may
     /// touch of three nodes along the surface, as that is wide by itself.
@@ -101,9 +112,9 @@ impl Windows {
     }
 
     /// Puts the patch for tool number `tool` over `triangles` in place of `nodes`: of the windows that are `usable` and hold all that
-    /// it presses there the one in whose middle they lie best, or one of its own if there is none. One that holds the nodes of the first of
-    /// `beside` too, which other tools press, comes before one that holds those of the second, and that before others. A tool that is
-    /// glued, and goes nowhere, always has its own. True if it is a usable one.
+    /// it presses there the one in whose middle they lie best, or one of its own if there is none. One that holds what others will press
+    /// `beside` too comes before one that holds what they press now, and that before others; in its middle is then what lies between all
+    /// of them. A tool that is glued, and goes nowhere, always has its own. True if it is a usable one.
     ///
     /// # Real-time
     /// For the global actor: looks at all windows; `nodes` may grow.
@@ -111,7 +122,7 @@ impl Windows {
         &self,
         (simulation, tool): (&Simulation, usize),
         triangles: &[u32],
-        beside: [&[u32]; 2],
+        beside: &Beside,
         usable: impl Fn(&[u32]) -> bool,
         nodes: &mut Vec<u32>,
     ) -> bool {
@@ -120,8 +131,10 @@ impl Windows {
             let mut window = (1..=WAYS + 1).rev().filter_map(|count| {
                 let first = if count > WAYS { triangles } else { &triangles[..count.min(triangles.len())] };
                 simulation.pressed_at(tool, first, nodes);
-                let shared = beside.into_iter().filter(|nodes| !nodes.is_empty());
-                shared.chain([&[][..]]).find_map(|beside| self.best(first, [nodes, beside], &usable))
+                let shared = [&beside.soon, &beside.now].into_iter().filter(|nodes| !nodes.is_empty());
+                let together = || first.iter().chain(&beside.triangles);
+                let mut shared = shared.filter_map(|also| self.best(together(), [nodes, also], &usable));
+                shared.next().or_else(|| self.best(first.iter(), [nodes, &[]], &usable))
             });
             if let Some(window) = window.next() {
                 window.patch.clone_into(nodes);
@@ -149,7 +162,13 @@ impl Windows {
         best.map(|(_, window)| &window.patch[..])
     }
 
-    fn best(&self, triangles: &[u32], pressed: [&[u32]; 2], usable: impl Fn(&[u32]) -> bool) -> Option<&Window> {
+    /// The least of the usable windows that hold what is `pressed`, and of these the one in whose middle `triangles` lie best.
+    fn best<'a>(
+        &self,
+        triangles: impl Iterator<Item = &'a u32> + Clone,
+        pressed: [&[u32]; 2],
+        usable: impl Fn(&[u32]) -> bool,
+    ) -> Option<&Window> {
         let holds = |patch: &[u32]| pressed.into_iter().flatten().all(|node| patch.binary_search(node).is_ok());
         let mut best: Option<(&Window, f64)> = None;
         for window in &self.windows {
@@ -157,7 +176,7 @@ impl Windows {
                 break;
             }
             let far = |&triangle: &u32| (self.triangles[triangle as usize] - window.middle).norm_squared();
-            let farthest = triangles.iter().map(far).fold(0.0, f64::max);
+            let farthest = triangles.clone().map(far).fold(0.0, f64::max);
             if best.is_none_or(|(_, least)| farthest < least) && holds(&window.patch) && usable(&window.patch) {
                 best = Some((window, farthest));
             }
@@ -212,7 +231,7 @@ mod tests {
             let (mut pressed, mut patch, mut used) = (Vec::new(), Vec::new(), Vec::new());
             let top = top(&simulation);
             for &triangle in &top {
-                assert!(windows.choose((&simulation, 0), &[triangle], [&[]; 2], |_| true, &mut patch));
+                assert!(windows.choose((&simulation, 0), &[triangle], &Beside::default(), |_| true, &mut patch));
                 simulation.pressed_at(0, &[triangle], &mut pressed);
                 assert!(pressed.iter().all(|node| patch.contains(node)), "{shape:?}: triangle {triangle}");
                 assert!(patch.is_sorted());
@@ -232,7 +251,7 @@ mod tests {
         let at = |x: f64| nearest.find(&Vec3::new(x, 0.041, 0.08));
         let mut patch = Vec::new();
         let mut chosen = |triangles: &[u32]| {
-            assert!(windows.choose((&simulation, 0), triangles, [&[]; 2], |_| true, &mut patch));
+            assert!(windows.choose((&simulation, 0), triangles, &Beside::default(), |_| true, &mut patch));
             patch.clone()
         };
         let resting = chosen(&[at(0.041)]);
@@ -253,10 +272,13 @@ mod tests {
         let windows = Windows::new(&simulation, 0, SIZE);
         let triangle = top(&simulation)[40];
         let (mut best, mut ready) = (Vec::new(), Vec::new());
-        windows.choose((&simulation, 0), &[triangle], [&[]; 2], |_| true, &mut best);
-        assert!(windows.choose((&simulation, 0), &[triangle], [&[]; 2], |patch| patch != best, &mut ready));
+        windows.choose((&simulation, 0), &[triangle], &Beside::default(), |_| true, &mut best);
+        assert!(windows.choose((&simulation, 0), &[triangle], &Beside::default(), |patch| patch != best, &mut ready));
         assert_ne!(best, ready);
-        assert!(!windows.choose((&simulation, 0), &[triangle], [&[]; 2], |_| false, &mut ready), "none is ready");
+        assert!(
+            !windows.choose((&simulation, 0), &[triangle], &Beside::default(), |_| false, &mut ready),
+            "none is ready"
+        );
         assert!(windows.around(triangle, 7).count() == 7 && windows.around(triangle, 1).next().is_some());
     }
 }

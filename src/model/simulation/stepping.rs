@@ -1,6 +1,5 @@
 //! How the time of a simulation is divided.
 
-use crate::Wrench;
 use crate::body::Body;
 use crate::integrator::Spectrum;
 
@@ -50,13 +49,9 @@ impl Stepping {
         Self { substeps: self.substeps * parts.max(1), ..*self }
     }
 
-    /// Runs one tick: calls `substep` for each part of it, from and to a share of the tick, and returns the mean of what it gives.
-    pub(crate) fn tick(&self, mut substep: impl FnMut([f64; 2], f64) -> Wrench) -> Wrench {
+    /// The parts of one tick, from and to a share of it.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = [f64; 2]> + use<> {
         let n = f64::from(self.substeps);
-        let sum = (0..self.substeps).fold(Wrench::default(), |sum, u| {
-            let u = f64::from(u);
-            sum + substep([u / n, (u + 1.0) / n], self.step())
-        });
-        sum / n
+        (0..self.substeps).map(move |u| [f64::from(u) / n, f64::from(u + 1) / n])
     }
 }

@@ -6,7 +6,7 @@ use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::log::ModelReason;
 use crate::model::Pose;
-use crate::model::local::{Aim, Kind, ToolForecast, Windows};
+use crate::model::local::{Aim, Beside, Kind, ToolForecast, Windows};
 use crate::model::surroundings::{Bases, RestingBody, Size};
 use crate::runtime::{Actor, ExchangePort, Nanos, RuntimeBuilder};
 use crate::session::prepare::{Prepared, extended};
@@ -86,7 +86,7 @@ fn first_bases(
 ) -> Result<Bases, Error> {
     let simulation = &prepared.simulation;
     let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
-    let (mut bases, mut beside) = (Bases::default(), Vec::new());
+    let (mut bases, mut beside) = (Bases::default(), Beside::default());
     let triangles = |(index, &tool): (usize, &Pose)| {
         let mut triangles = Vec::new();
         aim.triangles((simulation, index), &ToolForecast::at_rest(tool), [0.0; 2], &mut triangles);
@@ -95,10 +95,12 @@ fn first_bases(
     let of_tools: Vec<Vec<u32>> = tools.iter().enumerate().map(triangles).collect();
     for (index, triangles) in of_tools.iter().enumerate() {
         let windows = Windows::new(simulation, index, prepared.plan.template.patch);
-        simulation.pressed_beside(index, |other| &of_tools[other], &mut beside);
+        simulation.pressed_beside(index, |other| &of_tools[other], &mut beside.soon);
+        let others = of_tools.iter().enumerate().filter(|&(other, _)| other != index);
+        beside.triangles = others.map(|(_, triangles)| triangles[0]).collect();
         let [mut patch, mut shared] = [Vec::new(), Vec::new()];
-        windows.choose((simulation, index), triangles, [&[]; 2], |_| true, &mut patch);
-        windows.choose((simulation, index), triangles, [&beside, &[]], |_| true, &mut shared);
+        windows.choose((simulation, index), triangles, &Beside::default(), |_| true, &mut patch);
+        windows.choose((simulation, index), triangles, &beside, |_| true, &mut shared);
         let widest = windows.widest(triangles[0], &patch).filter(|_| !simulation.contact(index).glued);
         for patch in [&patch[..], &shared[..]].into_iter().chain(widest) {
             // What cannot be reduced is told by the actor, when it is wanted.

@@ -6,7 +6,7 @@ use crate::actors::{
 };
 use crate::error::{Error, ErrorKind};
 use crate::model::Pose;
-use crate::model::local::{LocalModel, PatchGeometry};
+use crate::model::local::{LocalModels, PatchGeometry};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{
@@ -18,22 +18,18 @@ use crate::runtime::{
 pub(super) struct ToolLink {
     pub(super) ticks: QueuePort<ToolTick>,
     pub(super) geometry: Option<ExchangePort<PatchGeometry>>,
-    pub(super) models: ExchangePort<Box<dyn LocalModel>>,
 }
 
 impl ToolLink {
     fn take(&self) -> ToolPorts {
-        ToolPorts {
-            ticks: self.ticks.reader(),
-            geometry: self.geometry.as_ref().map(ExchangePort::reader),
-            models: self.models.writer(),
-        }
+        ToolPorts { ticks: self.ticks.reader(), geometry: self.geometry.as_ref().map(ExchangePort::reader) }
     }
 }
 
 /// The ports whose global halves a new actor takes again.
 pub(super) struct GlobalSide {
     pub(super) tools: Vec<ToolLink>,
+    pub(super) models: ExchangePort<LocalModels>,
     pub(super) settings: Parameter<Settings>,
     pub(super) surroundings: Option<(ExchangePort<Wishes>, ExchangePort<Bases>)>,
     pub(super) surfaces: Vec<OutletPort<SurfaceView>>,
@@ -48,6 +44,7 @@ impl GlobalSide {
             .as_ref()
             .map(|(wishes, bases)| SurroundingsPorts { wishes: wishes.writer(), bases: bases.reader() });
         let shared = GlobalSharedPorts {
+            models: self.models.writer(),
             settings: self.settings.reader(),
             surroundings,
             surfaces: self.surfaces.iter().map(OutletPort::writer).collect(),

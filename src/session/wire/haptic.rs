@@ -97,11 +97,10 @@ pub(super) fn actors(
             devices
         }
         Models::Local(models) => {
-            let side = |(tool, (models, ports))| LocalSide { models, tool, ports };
-            let sides: Vec<LocalSide> = simulated.into_iter().zip(models).map(side).collect();
-            // There are none where the devices are elsewhere.
-            if !sides.is_empty() {
-                devices.push(Box::new(LocalActor::new(sides, rates)));
+            if let Some((source, ports)) = models {
+                let side = |(tool, ports)| LocalSide { tool, ports };
+                let sides = simulated.into_iter().zip(ports).map(side).collect();
+                devices.push(Box::new(LocalActor::new(sides, source, rates)));
             }
             devices
         }

@@ -4,9 +4,9 @@ use super::global::ToolLink;
 use crate::actors::{GlobalBridge, GlobalEnd, HapticBridge, HapticEnd, LocalPorts, ModelMaker};
 use crate::error::{Error, ErrorKind};
 use crate::link::{Conditions, Transport, VirtualLink};
-use crate::model::local::Image;
+use crate::model::local::{Image, LocalModels};
 use crate::model::simulation::Simulation;
-use crate::runtime::{Actor, RuntimeBuilder};
+use crate::runtime::{Actor, ExchangePort, Reader, RuntimeBuilder, Writer};
 
 /// Records between two drains: one every 50 ms.
 const RECORDS: usize = 256;
@@ -31,6 +31,9 @@ pub(super) struct Linking {
     image: Option<Image>,
     haptic: Vec<HapticEnd>,
     global: Vec<GlobalEnd>,
+    /// From the bridge to the local actor, and from the global one to the bridge.
+    arriving: Option<Writer<LocalModels>>,
+    departing: Option<Reader<LocalModels>>,
 }
 
 impl Linking {
@@ -47,39 +50,58 @@ impl Linking {
             Ends::Global(_) => None,
             Ends::Both(_) | Ends::Haptic(_) => Some(Image::new(copy()?)),
         };
-        let (haptic, global) = Default::default();
-        Ok(Self { ends, image, haptic, global })
+        let (haptic, global, arriving, departing) = Default::default();
+        Ok(Self { ends, image, haptic, global, arriving, departing })
     }
 
-    /// Puts a bridge on either side that is here, between a local actor and the global one, with models of `maker`; up to so many `ticks`
-    /// wait.
+    fn has_global(&self) -> bool {
+        !matches!(self.ends, Ends::Haptic(_))
+    }
+
+    /// Puts a bridge on either side that is here, between a tool of the local actor and the global one; up to so many `ticks` wait.
     pub(super) fn connect(
         &mut self,
         graph: &mut RuntimeBuilder,
-        maker: &ModelMaker,
         ticks: usize,
     ) -> (Option<ToolLink>, Option<LocalPorts>) {
         let local = self.image.is_some().then(|| {
-            let local = maker.clone();
             let (to_bridge, from_local) = graph.queue(ticks);
-            let (from_bridge, models) = graph.exchange(move || local.first());
-            self.haptic.push(HapticEnd { ticks: from_local, models: from_bridge });
-            LocalPorts { models, ticks: to_bridge, geometry: None }
+            self.haptic.push(HapticEnd { ticks: from_local });
+            LocalPorts { ticks: to_bridge, geometry: None }
         });
-        let has_global = !matches!(self.ends, Ends::Haptic(_));
-        let link = has_global.then(|| {
-            let departing = maker.clone();
-            let models_out = graph.exchange_port(move || departing.departing());
-            let link = ToolLink { ticks: graph.queue_port(ticks), geometry: None, models: models_out };
-            self.global.push(GlobalEnd { ticks: link.ticks.writer(), models: link.models.reader() });
+        let link = self.has_global().then(|| {
+            let link = ToolLink { ticks: graph.queue_port(ticks), geometry: None };
+            self.global.push(GlobalEnd { ticks: link.ticks.writer() });
             link
         });
         (link, local)
     }
 
+    /// Likewise for the models of so many `tools`, which `maker` makes: where the global actor puts them, and where the local one gets them.
+    pub(super) fn connect_models(
+        &mut self,
+        graph: &mut RuntimeBuilder,
+        maker: &ModelMaker,
+        tools: usize,
+    ) -> (Option<ExchangePort<LocalModels>>, Option<Reader<LocalModels>>) {
+        let local = self.image.is_some().then(|| {
+            let maker = maker.clone();
+            let (from_bridge, models) = graph.exchange(move || maker.first(tools));
+            self.arriving = Some(from_bridge);
+            models
+        });
+        let global = self.has_global().then(|| {
+            let maker = maker.clone();
+            let models = graph.exchange_port(move || maker.departing(tools));
+            self.departing = Some(models.reader());
+            models
+        });
+        (global, local)
+    }
+
     /// The bridges in the order of their starts: what the global side tells at first is there when the haptic side begins.
     pub(super) fn bridges(self, graph: &mut RuntimeBuilder) -> Vec<Box<dyn Actor>> {
-        let Self { ends, image, haptic, global } = self;
+        let Self { ends, image, haptic, global, arriving, departing } = self;
         let (here, there): (Way, Way) = match ends {
             Ends::Both(conditions) => {
                 let [haptic, global] = VirtualLink::ends(conditions);
@@ -88,9 +110,12 @@ impl Linking {
             Ends::Haptic(transport) => (Some(transport), None),
             Ends::Global(transport) => (None, Some(transport)),
         };
-        let global = there.map(|transport| Box::new(GlobalBridge::new(transport, global)) as Box<dyn Actor>);
-        let haptic = here.zip(image).map(|(transport, image)| {
-            Box::new(HapticBridge::new(transport, haptic, image, graph.recorder(RECORDS))) as Box<dyn Actor>
+        let global = there
+            .zip(departing)
+            .map(|(transport, models)| Box::new(GlobalBridge::new(transport, models, global)) as Box<dyn Actor>);
+        let haptic = here.zip(image).zip(arriving).map(|((transport, image), models)| {
+            let recorder = graph.recorder(RECORDS);
+            Box::new(HapticBridge::new(transport, haptic, models, image, recorder)) as Box<dyn Actor>
         });
         global.into_iter().chain(haptic).collect()
     }

@@ -4,7 +4,7 @@ use super::basis::BasisSide;
 use super::buffers::ticks_buffered;
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
 use super::link::{Ends, Linking};
-use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, ModelMaker, Settings, SurfaceView};
+use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, LocalSource, ModelMaker, Settings, SurfaceView};
 use crate::error::Error;
 use crate::model::Pose;
 use crate::model::local::{PatchGeometry, Succession};
@@ -17,8 +17,8 @@ use crate::session::prepare::ModelPlan;
 pub(super) enum Models {
     /// The whole body with all tools, where its surface is shown, and what is changed while it runs.
     Whole(Simulation, Vec<OutletWriter<SurfaceView>>, ParameterReader<Settings>),
-    /// The models of each tool, and where the next ones come from; none where the devices are elsewhere.
-    Local(Vec<(Succession, LocalPorts)>),
+    /// The models, and the ports of each tool; none where the devices are elsewhere.
+    Local(Option<(LocalSource, Vec<LocalPorts>)>),
 }
 
 /// What computes the forces; what makes the global actor, unless that is the whole body or elsewhere; and the bridges between the two,
@@ -47,36 +47,40 @@ pub(super) fn models(
         None => Default::default(),
     };
     let maker = ModelMaker::new(plan.template.clone(), plan.kinds.clone(), plan.probes.clone());
-    let first = maker.clone();
-    let model = move || first.first();
+    let (first, count) = (maker.clone(), places.len());
+    let empty = move || first.first(count);
     // A model that comes later may feed back, if the first one does not.
     let feeds_back = plan.template.feeds_back() || plan.kinds.len() > 1;
     let ticks = ticks_buffered(plan);
     // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
     let nodes = simulation.state().positions.len();
-    let has_global = !matches!(ends, Some(Ends::Haptic(_)));
     let mut linking = ends.map(|ends| Linking::new(ends, &simulation)).transpose()?;
     let mut connected = |_| match &mut linking {
-        Some(linking) => linking.connect(graph, &maker, ticks),
+        Some(linking) => linking.connect(graph, ticks),
         None => {
             let link = ToolLink {
                 ticks: graph.queue_port(ticks),
                 geometry: feeds_back.then(|| graph.exchange_port(move || PatchGeometry::with_room(nodes))),
-                models: graph.exchange_port(model.clone()),
             };
-            let ports = LocalPorts {
-                models: link.models.reader(),
-                ticks: link.ticks.writer(),
-                geometry: link.geometry.as_ref().map(ExchangePort::writer),
-            };
+            let ports =
+                LocalPorts { ticks: link.ticks.writer(), geometry: link.geometry.as_ref().map(ExchangePort::writer) };
             (Some(link), Some(ports))
         }
     };
     let (tools, locals): (Vec<_>, Vec<_>) = places.iter().map(&mut connected).unzip();
+    let (next, arrivals) = match &mut linking {
+        Some(linking) => linking.connect_models(graph, &maker, count),
+        None => {
+            let next = graph.exchange_port(empty.clone());
+            let arrivals = next.reader();
+            (Some(next), Some(arrivals))
+        }
+    };
     let linked = linking.is_some();
-    let maker = has_global.then(|| {
+    let maker = next.map(|models| {
         let side = GlobalSide {
             tools: tools.into_iter().flatten().collect(),
+            models,
             settings,
             surroundings,
             surfaces,
@@ -94,8 +98,11 @@ pub(super) fn models(
         };
         GlobalMaker::new(simulation, places, plan, side)
     });
-    let of_tool = |ports| (Succession::new([model(), model(), model()], plan.blend), ports);
-    let models = Models::Local(locals.into_iter().flatten().map(of_tool).collect());
+    let source = arrivals.map(|arrivals| {
+        let models = Succession::new([empty(), empty(), empty()], plan.blend);
+        (LocalSource { models, arrivals }, locals.into_iter().flatten().collect())
+    });
+    let models = Models::Local(source);
     let bridges = linking.map(|linking| linking.bridges(graph)).unwrap_or_default();
     Ok((models, maker, bridges))
 }

@@ -62,9 +62,8 @@ impl LinearPatch {
         Drift { time: ticks * self.patch.stepping.tick + if is_moving { t } else { 0.0 }, is_moving }
     }
 
-    /// One step from `t` seconds into the present tick, each tool along `motion` of its number; returns the force and torque on the
-    /// patch's own.
-    fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, t: f64, d: f64) -> Wrench {
+    /// One step from `t` seconds into the present tick, each tool along `motion` of its number.
+    fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, t: f64, d: f64) {
         // An implicit step takes its forces at its end.
         let ahead = if self.is_implicit { d } else { 0.0 };
         let drift = self.drift(t + ahead);
@@ -75,9 +74,9 @@ impl LinearPatch {
         if self.is_implicit {
             patch.with_contact(|body, forces, (touches, numbers, rows), law| {
                 step_implicit(body, system, forces, touches, rows, law, |tool| motion(numbers[tool]));
-            })
+            });
         } else {
-            patch.step(motion, d)
+            patch.step(motion, d);
         }
     }
 
@@ -129,22 +128,21 @@ impl LocalModel for LinearPatch {
     }
 
     fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
-        let to = tools[self.patch.tools.number()].to;
-        if let Some(wrench) = self.patch.beyond(&to) {
-            return wrench;
+        let ends = |tool: usize| tools[tool].to;
+        if self.patch.is_left() {
+            return self.patch.feel(ends, 1);
         }
         let (stepping, mut t) = (self.patch.stepping, 0.0);
         self.patch.tools.begin();
-        let wrench = stepping.tick(|[from, to], d| {
-            let wrench = self.step(|tool| tools[tool].part(from, to), t, d);
-            t += d;
-            wrench
-        });
+        for [from, to] in stepping.parts() {
+            self.step(|tool| tools[tool].part(from, to), t, stepping.step());
+            t += stepping.step();
+        }
         self.ticks = self.ticks.saturating_add(1);
         if self.ticks == self.boundary.moving_ticks() {
             self.hold_rim();
         }
-        self.patch.feel(wrench, &to, stepping.substeps)
+        self.patch.feel(ends, stepping.substeps)
     }
 
     fn built_at(&self) -> u64 {
@@ -155,20 +153,24 @@ impl LocalModel for LinearPatch {
         self.boundary.kind()
     }
 
-    fn serves_as(&self) -> Kind {
-        if self.patch.has_left() { Kind::Hold } else { self.boundary.kind() }
+    fn wrench(&self, tool: usize) -> Option<Wrench> {
+        self.patch.wrench(tool)
     }
 
-    fn contact(&self) -> Contact {
-        self.patch.global_contact()
+    fn serves_as(&self, tool: usize) -> Kind {
+        if self.patch.has_left(tool) { Kind::Hold } else { self.boundary.kind() }
     }
 
-    fn contact_points(&self) -> &[ContactPoint] {
-        self.patch.contact_points()
+    fn contact(&self, tool: usize) -> Contact {
+        self.patch.contact(tool)
     }
 
-    fn contact_area(&self) -> f64 {
-        self.patch.contact_area()
+    fn contact_points(&self, tool: usize) -> &[ContactPoint] {
+        self.patch.contact_points(tool)
+    }
+
+    fn contact_area(&self, tool: usize) -> f64 {
+        self.patch.contact_area(tool)
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {
@@ -186,25 +188,19 @@ impl LocalModel for LinearPatch {
     fn geometry(&self, geometry: &mut PatchGeometry) -> bool {
         let patch = &self.patch;
         geometry.clear();
-        geometry.contact = self.contact();
+        geometry.contact = patch.contact(patch.own);
         match self.spec.feedback {
             // What has left is as it was then.
-            _ if patch.has_left() => return false,
+            _ if patch.has_left(patch.own) => return false,
             Feedback::Trajectory => return false,
             Feedback::Geometry => (0..patch.window.movable).for_each(|place| patch.tell(geometry, place)),
             Feedback::ContactNodes => {
-                let touch = patch.tools.own();
-                let touched = touch.contact.triangle.filter(|_| !touch.has_shape());
-                let corners = touched.map(|t| patch.window.surface.triangles[t as usize]);
-                let pressed = touch.pressed().iter().map(|&(node, _)| node);
-                for place in corners
-                    .into_iter()
-                    .flatten()
-                    .chain(pressed)
-                    .filter(|&place| (place as usize) < patch.window.movable)
-                {
-                    patch.tell(geometry, place as usize);
-                }
+                let Some(touch) = patch.tools.touch(patch.own) else { return false };
+                touch.each_exerted(&patch.window.surface, Vec3::zeros(), |place, _| {
+                    if (place as usize) < patch.window.movable {
+                        patch.tell(geometry, place as usize);
+                    }
+                });
             }
         }
         true

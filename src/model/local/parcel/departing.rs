@@ -96,11 +96,12 @@ impl LocalModel for Departing {
             let touch = global.touch(number);
             (pressing.contact, pressing.steady, pressing.wrench) =
                 (touch.contact, touch.steady(), global.wrench(number));
+            pressing.place = tools[number].position;
             touch.felt().clone_into(&mut pressing.felt);
             pressing.exerted = global.exerted(number);
         }
         let parcel = &mut self.parcel;
-        (parcel.tick, parcel.tool, parcel.place) = (tick, index as u16, tools[index].position);
+        (parcel.tick, parcel.tool) = (tick, index as u16);
         (parcel.friction, parcel.stiffness) = (global.law().friction, global.stiffness());
         triangles.clone_into(&mut parcel.triangles);
         parcel.patch = patch.map(<[u32]>::to_vec);
@@ -122,7 +123,15 @@ impl LocalModel for Departing {
         self.kind
     }
 
-    fn serves_as(&self) -> Kind {
+    fn wrench(&self, tool: usize) -> Option<Wrench> {
+        match &self.model {
+            Model::Hold => self.parcel.tools.get(tool).map(|pressing| pressing.wrench),
+            Model::Linear(model) => model.wrench(tool),
+            Model::Predictive(model) => model.wrench(tool),
+        }
+    }
+
+    fn serves_as(&self, _: usize) -> Kind {
         Kind::Hold
     }
 
@@ -130,8 +139,8 @@ impl LocalModel for Departing {
         false
     }
 
-    fn contact(&self) -> Contact {
-        self.parcel.tools.get(usize::from(self.parcel.tool)).map(|tool| tool.contact).unwrap_or_default()
+    fn contact(&self, tool: usize) -> Contact {
+        self.parcel.tools.get(tool).map(|pressing| pressing.contact).unwrap_or_default()
     }
 
     fn watch(&mut self, nodes: &[u32]) {

@@ -1,7 +1,7 @@
 //! The global model as far as it is known on another computer.
 
-use super::super::{LocalModel, ResyncView, ToolForecast};
-use super::{MOST_FELT, Parcel, Pressing};
+use super::super::{LocalModels, ResyncView, ToolForecast};
+use super::{MOST_FELT, Parcel, Pressing, Shipment};
 use crate::simulation::Simulation;
 use crate::surroundings::{Bases, Basis};
 
@@ -28,15 +28,29 @@ impl Image {
         Self { simulation, tools }
     }
 
-    /// Builds `model` as it would have been built where `parcel` comes from, with what there is of the `bases` here. False if the
-    /// parcel is one of another body: then nothing has been done.
+    /// Builds `models` as they would have been built where `shipment` comes from, with what there is of the `bases` here. False if it is one
+    /// of another body or of other tools: then `models` are not to be used.
     ///
     /// # Real-time
-    /// Not for a tick: costs what building a model costs but for looking ahead, and allocates.
-    pub fn rebuild(&mut self, parcel: &Parcel, bases: &Bases, model: &mut dyn LocalModel) -> bool {
+    /// Not for a tick: costs what building models costs but for looking ahead, and allocates.
+    pub fn rebuild(&mut self, shipment: &Shipment, bases: &Bases, models: &mut LocalModels) -> bool {
+        if [shipment.hosts().len(), models.hosts().len()] != [self.tools.len(); 2] {
+            return false;
+        }
+        for parcel in shipment.parcels() {
+            match self.view(parcel, bases) {
+                Some(resync) => models.rebuild(resync),
+                None => return false,
+            }
+        }
+        shipment.hosts().enumerate().all(|(tool, host)| models.share(host, tool))
+    }
+
+    /// What `parcel` tells; `None` if it does not fit.
+    fn view<'a>(&'a mut self, parcel: &'a Parcel, bases: &'a Bases) -> Option<ResyncView<'a>> {
         let index = parcel.tool();
         if index >= self.tools.len() || !self.fits(parcel) {
-            return false;
+            return None;
         }
         let state = self.simulation.state_mut();
         let states = parcel.state.positions.iter().zip(&parcel.state.velocities);
@@ -49,9 +63,9 @@ impl Image {
             self.simulation.be_told_of(tool, pressing.wrench, &pressing.exerted, |touch| {
                 touch.go_on_from(pressing.contact, pressing.steady, &pressing.felt);
             });
+            self.tools[tool] = ToolForecast::at_rest(pressing.place);
         }
-        self.tools[index] = ToolForecast::at_rest(parcel.place);
-        model.rebuild(ResyncView {
+        Some(ResyncView {
             global: &mut self.simulation,
             tick: parcel.tick,
             triangles: &parcel.triangles,
@@ -61,8 +75,7 @@ impl Image {
             index,
             horizon: 0,
             bases,
-        });
-        true
+        })
     }
 
     /// True if `basis` can be one of this body.

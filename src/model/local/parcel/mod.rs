@@ -7,6 +7,7 @@
 mod departing;
 mod image;
 mod path;
+mod shipment;
 
 use crate::body::{State, Stiffness};
 use crate::bytes::{BytesReader, BytesWriter};
@@ -16,6 +17,7 @@ use crate::{Vec3, Wrench};
 
 pub(super) use departing::{Departing, Model};
 pub use image::Image;
+pub use shipment::Shipment;
 
 /// The ingredients of a local model, but for the body: they cross a link, and the model is built on the other side.
 ///
@@ -25,7 +27,7 @@ pub use image::Image;
 pub struct Parcel {
     /// The haptic tick of the state.
     tick: u64,
-    /// The tool that the model is for.
+    /// The tool that the model is built around.
     tool: u16,
     /// As in [`ResyncView`](super::ResyncView).
     triangles: Vec<u32>,
@@ -34,8 +36,6 @@ pub struct Parcel {
     /// Friction and stiffness, which may change while a session runs.
     friction: Friction,
     stiffness: Stiffness,
-    /// Where the tool is (m).
-    place: Vec3,
     /// The nodes that the model looks at, with their state.
     nodes: Vec<u32>,
     state: State,
@@ -52,6 +52,8 @@ pub struct Parcel {
 /// How a tool presses.
 #[derive(Clone, Debug, Default)]
 struct Pressing {
+    /// Where it is (m).
+    place: Vec3,
     contact: Contact,
     steady: Steady,
     felt: Vec<Felt>,
@@ -65,7 +67,7 @@ const NODE: usize = 4;
 const STATE: usize = NODE + 6 * 8;
 const PRESSED: usize = NODE + 3 * 8;
 const FELT: usize = NODE + 15 * 8 + 2;
-const PRESSING: usize = 3 * NODE + 14 * 8 + 3;
+const PRESSING: usize = 3 * NODE + 17 * 8 + 3;
 /// Places at which a tool touches.
 const MOST_FELT: usize = 1024;
 
@@ -75,7 +77,7 @@ impl Parcel {
         self.tick
     }
 
-    /// The tool that the model is for.
+    /// The tool that the model is built around.
     pub fn tool(&self) -> usize {
         self.tool.into()
     }
@@ -99,7 +101,6 @@ impl Parcel {
         to.list(self.patch.as_deref().unwrap_or_default(), |to, &node| to.u32(node));
         let Friction { kinetic, breakaway, stribeck } = self.friction;
         [kinetic, breakaway, stribeck, self.stiffness.factor()].into_iter().for_each(|number| to.f64(number));
-        to.vector(&self.place);
         let State { positions, velocities } = &self.state;
         let nodes: Vec<_> = self.nodes.iter().zip(positions.iter().zip(velocities)).collect();
         to.list(&nodes, |to, &(&node, (x, v))| {
@@ -124,7 +125,6 @@ impl Parcel {
         let [kinetic, breakaway] = [read_coefficient(from)?, read_coefficient(from)?];
         parcel.friction = Friction { kinetic, breakaway, stribeck: from.f64().filter(|&speed| speed >= 0.0)? };
         parcel.stiffness = Stiffness::times(from.f64()?)?;
-        parcel.place = from.vector()?;
         let mut states = Vec::new();
         from.list(STATE, &mut states, |from| Some((from.u32()?, from.vector()?, from.vector()?)))?;
         for (node, x, v) in states {
@@ -145,6 +145,7 @@ fn read_coefficient(from: &mut BytesReader<'_>) -> Option<f64> {
 }
 
 fn write_pressing(to: &mut BytesWriter<'_>, tool: &Pressing) {
+    to.vector(&tool.place);
     write_contact(to, &tool.contact);
     let Steady { force, fineness, is_fine } = tool.steady;
     [force, fineness].into_iter().for_each(|number| to.f64(number));
@@ -159,10 +160,10 @@ fn write_pressing(to: &mut BytesWriter<'_>, tool: &Pressing) {
 }
 
 fn read_pressing(from: &mut BytesReader<'_>) -> Option<Pressing> {
-    let contact = read_contact(from)?;
+    let (place, contact) = (from.vector()?, read_contact(from)?);
     let [force, fineness] = [from.f64()?, from.f64().filter(|fineness| (0.0..=1.0).contains(fineness))?];
     let steady = Steady { force, fineness, is_fine: read_bool(from)? };
-    let mut tool = Pressing { contact, steady, ..Pressing::default() };
+    let mut tool = Pressing { place, contact, steady, ..Pressing::default() };
     from.list(FELT, &mut tool.felt, read_felt)?;
     tool.wrench = Wrench { force: from.vector()?, torque: from.vector()? };
     from.list(PRESSED, &mut tool.exerted, |from| Some((from.u32()?, from.vector()?)))?;

@@ -1,16 +1,15 @@
 //! What the models with a patch have in common: the part of the body that they hold, its nodes and the surface around them in
 //! compact numbering, and what the tool feels of it.
 
+mod feeling;
 mod tools;
 mod window;
 
+use self::feeling::Feeling;
 use self::tools::Tools;
-use super::beyond::Beyond;
 use super::{PatchGeometry, ResyncView, Watched};
 use crate::body::State;
-use crate::contact::{
-    Contact, ContactPoint, Deformable, Law, Normals, Rows, ToolMotion, Touch, contact_normal, interpolate, step_all,
-};
+use crate::contact::{Contact, ContactPoint, Deformable, Law, Rows, ToolMotion, Touch, step_all};
 use crate::simulation::Stepping;
 use crate::{Pose, Vec3, Wrench};
 
@@ -30,13 +29,10 @@ pub(super) struct Patch {
     pub(super) stepping: Stepping,
     pub(super) built_at: u64,
     pub(super) watched: Watched,
-    /// In the last tick whose contact was inside the patch.
-    felt: Wrench,
+    /// The tool that it is for.
+    pub(super) own: usize,
     /// Of all window nodes (m).
     rest: Vec<Vec3>,
-    /// The normal of the surface at rest where the contact presses on a node that gives way in the body, but not here.
-    strayed: Option<Vec3>,
-    beyond: Beyond,
 }
 
 impl Patch {
@@ -46,32 +42,11 @@ impl Patch {
         window.gather(&global.state().positions, &mut self.state.positions);
         window.gather(&global.state().velocities, &mut self.state.velocities);
         window.gather_movable(global.body().inverse_masses(), &mut self.inverse_masses);
-        self.tools.take_present(resync, window);
-        (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
         window.gather(global.body().rest(), &mut self.rest);
-        self.strayed = None;
-        // Not what this patch knew before: which one is built anew hangs on the threads, and a replay is to be the same.
-        self.beyond = Beyond::default();
-        self.felt = global.wrench(resync.index);
-        self.learn(global.wrench(resync.index), resync.tools[resync.index].position);
+        self.tools.take_present(resync, window, &self.rest);
+        (self.law, self.stepping, self.built_at) = (*global.law(), global.stepping(), resync.tick);
+        self.own = resync.index;
         self.watched.take(global.state());
-    }
-
-    /// Where it touches the surface at rest (m), and the outward unit normal there.
-    fn rest_contact(&self) -> Option<(Vec3, Vec3)> {
-        let Contact { triangle, weights, .. } = self.tools.own().contact;
-        let (surface, triangle) = (&self.window.surface, triangle?);
-        let corners = surface.triangles[triangle as usize].map(|node| self.rest[node as usize]);
-        let normal = contact_normal(Normals::Face, surface, &self.rest, triangle, &weights);
-        Some((interpolate(&weights, &corners), normal))
-    }
-
-    /// The tool felt `wrench` at `at` (m).
-    fn learn(&mut self, wrench: Wrench, at: Vec3) {
-        if let Some((place, normal)) = self.rest_contact() {
-            let depth = (place - at).dot(&normal) + self.tools.own().shape.radius();
-            self.beyond.learn(wrench.force.dot(&normal), depth);
-        }
     }
 
     /// Makes room for what an implicit step of the tool needs.
@@ -82,46 +57,44 @@ impl Patch {
         rows.reserve_coupling(touches.iter().map(places).sum());
     }
 
-    /// True once the contact has left the patch.
-    pub(super) fn has_left(&self) -> bool {
-        self.beyond.has_left()
+    /// True once none of its tools touches it any more: there is nothing left to advance.
+    pub(super) fn is_left(&self) -> bool {
+        self.tools.are_gone()
     }
 
-    /// What a tool that goes to `to` feels, once the contact has left the patch.
-    pub(super) fn beyond(&mut self, to: &Pose) -> Option<Wrench> {
-        self.beyond.follow(to.position, &self.law.friction)
+    /// True once tool number `tool` has left it.
+    pub(super) fn has_left(&self, tool: usize) -> bool {
+        self.tools.feeling(tool).is_some_and(Feeling::is_beyond)
     }
 
-    /// What the tool at `at` feels after a tick of `steps` steps with `wrench`: that, or what is beyond the patch if the contact leaves it.
-    pub(super) fn feel(&mut self, wrench: Wrench, at: &Pose, steps: u32) -> Wrench {
+    /// What tool number `tool` felt in the last tick, in the patch or beyond it; `None` if it is none of those on the patch.
+    pub(super) fn wrench(&self, tool: usize) -> Option<Wrench> {
+        self.tools.feeling(tool).map(Feeling::felt)
+    }
+
+    /// A tick of `steps` steps is over, at whose end the tool of each number is at a pose of `end`; what its own feels.
+    pub(super) fn feel(&mut self, end: impl Fn(usize) -> Pose, steps: u32) -> Wrench {
         // A state that is not finite touches nothing: its zero force would look like a free tool.
-        if !self.state.is_finite() {
-            return Vec3::repeat(f64::NAN).into();
+        if self.state.is_finite() {
+            self.tools.end_tick(end, steps, (&self.window, &self.rest), &self.law.friction);
+        } else {
+            self.tools.spoil();
         }
-        self.tools.end(steps, &self.window);
-        match self.strayed.take() {
-            Some(normal) => self.beyond.leave(normal, at.position, self.felt),
-            None => {
-                self.learn(wrench, at.position);
-                self.felt = wrench;
-            }
-        }
-        self.felt
+        self.wrench(self.own).unwrap_or_default()
     }
 
-    /// One explicit step of `d` seconds under the forces and the tools', each of which moves along `motion` of its number; returns the
-    /// force and torque on the patch's own.
-    pub(super) fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, d: f64) -> Wrench {
+    /// One explicit step of `d` seconds under the forces and the tools', each of which moves along `motion` of its number.
+    pub(super) fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, d: f64) {
         self.with_contact(|body, forces, (touches, numbers, rows), law| {
             step_all(body, forces, touches, rows, law, |tool| motion(numbers[tool]), d);
         })
     }
 
-    /// Does `step` with the patch, its forces, the tools on it with their numbers, and its law; returns the force and torque on its own.
+    /// Does `step` with the patch, its forces, the tools on it with their numbers, and its law.
     pub(super) fn with_contact(
         &mut self,
         step: impl FnOnce(&mut Deformable<'_>, &[Vec3], (&mut [Touch], &[usize], &mut Rows), &Law),
-    ) -> Wrench {
+    ) {
         self.tools.add_beside(&self.window, &mut self.forces);
         let mut deformable = Deformable {
             positions: &mut self.state.positions,
@@ -131,27 +104,22 @@ impl Patch {
             candidates: &self.window.candidates,
         };
         step(&mut deformable, &self.forces, self.tools.present(), &self.law);
-        self.tools.let_go(&self.window);
-        let own = self.tools.own();
-        if self.window.has_left(own) {
-            self.strayed = Some(self.rest_contact().map_or(Vec3::zeros(), |(_, normal)| normal));
-        }
-        own.wrench
+        self.tools.end_step(&self.window, &self.rest);
     }
 
-    /// The contact in the body's numbering.
-    pub(super) fn global_contact(&self) -> Contact {
-        self.window.globalised(&self.tools.own().contact)
+    /// The contact of tool number `tool` in the body's numbering.
+    pub(super) fn contact(&self, tool: usize) -> Contact {
+        self.tools.touch(tool).map(|touch| self.window.globalised(&touch.contact)).unwrap_or_default()
     }
 
-    /// The places where a tool with a shape touches, in the body's numbering.
-    pub(super) fn contact_points(&self) -> &[ContactPoint] {
-        self.tools.own().points()
+    /// The places where tool number `tool` touches if it has a shape, in the body's numbering.
+    pub(super) fn contact_points(&self, tool: usize) -> &[ContactPoint] {
+        self.tools.touch(tool).map_or(&[], Touch::points)
     }
 
     /// The area that it touches (m^2).
-    pub(super) fn contact_area(&self) -> f64 {
-        self.tools.own().area(&self.window.surface, &self.state.positions)
+    pub(super) fn contact_area(&self, tool: usize) -> f64 {
+        self.tools.touch(tool).map_or(0.0, |touch| touch.area(&self.window.surface, &self.state.positions))
     }
 
     /// Where a node of the body is (m), if the patch moves it.

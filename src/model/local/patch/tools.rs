@@ -3,19 +3,21 @@
 use std::sync::Arc;
 
 use super::super::ResyncView;
+use super::feeling::Feeling;
 use super::window::Window;
-use crate::Vec3;
-use crate::contact::{Contact, Rows, Touch};
+use crate::contact::{Contact, Friction, Rows, Touch};
+use crate::{Pose, Vec3};
 
 /// The tools that are resolved together on a patch, and what those exert that are not.
 #[derive(Clone, Debug, Default)]
 pub(in crate::local) struct Tools {
-    /// The number of each, that of the tool that the patch is for first.
+    /// The number of each.
     numbers: Vec<usize>,
     touches: Vec<Touch>,
+    feelings: Vec<Feeling>,
     /// So many touch here; others follow that have left.
     present: usize,
-    pub(super) rows: Rows,
+    rows: Rows,
     /// So many tools these have room for.
     room: usize,
     /// Movable nodes that tools press which are not held, with the force on each at the resync, which is taken to go on (N).
@@ -23,14 +25,23 @@ pub(in crate::local) struct Tools {
 }
 
 impl Tools {
-    /// The tool that the patch is for.
-    pub(in crate::local) fn own(&self) -> &Touch {
-        &self.touches[0]
+    /// The touch of the tool of that number, if it is one of these.
+    pub(in crate::local) fn touch(&self, number: usize) -> Option<&Touch> {
+        self.place(number).map(|place| &self.touches[place])
     }
 
-    /// The number of that one.
-    pub(in crate::local) fn number(&self) -> usize {
-        self.numbers[0]
+    /// What that tool feels.
+    pub(super) fn feeling(&self, number: usize) -> Option<&Feeling> {
+        self.place(number).map(|place| &self.feelings[place])
+    }
+
+    fn place(&self, number: usize) -> Option<usize> {
+        self.numbers.iter().position(|&known| known == number)
+    }
+
+    /// True once none of them touches here.
+    pub(super) fn are_gone(&self) -> bool {
+        self.present == 0
     }
 
     /// Those that are resolved here, with the number of each.
@@ -38,8 +49,9 @@ impl Tools {
         (&mut self.touches[..self.present], &self.numbers, &mut self.rows)
     }
 
-    /// Takes the tools as they are at a resync: the patch's own, and all others whose places `window` holds.
-    pub(super) fn take_present(&mut self, resync: &ResyncView<'_>, window: &Window) {
+    /// Takes the tools as they are at a resync: the patch's own, and all others whose places `window` holds, whose nodes at rest are at
+    /// `rest` (m).
+    pub(super) fn take_present(&mut self, resync: &ResyncView<'_>, window: &Window, rest: &[Vec3]) {
         let global = &*resync.global;
         self.beside.clear();
         self.numbers.clear();
@@ -62,6 +74,7 @@ impl Tools {
         }
         self.present = self.numbers.len();
         self.touches.resize_with(self.present, Touch::default);
+        self.feelings.clear();
         if self.room < self.present {
             (self.rows, self.room) = (Rows::with_room(self.present), self.present);
         }
@@ -73,8 +86,10 @@ impl Tools {
             mine.restart(touch, |contact| window.localised(contact), |triangle| window.triangle(triangle));
             let skin = Arc::make_mut(&mut mine.skin);
             touch.skin.localise(&window.nodes, |node| window.node(node), skin);
+            let at = resync.tools[number].position;
+            self.feelings.push(Feeling::new(global.wrench(number), at, mine, (&window.surface, rest)));
         }
-        if self.present > 1 || self.own().has_shape() {
+        if self.touches.len() > 1 || self.touches[0].has_shape() {
             self.rows.make_room(window.nodes.len(), window.candidates.len());
         }
     }
@@ -101,22 +116,47 @@ impl Tools {
     /// A tick begins.
     pub(in crate::local) fn begin(&mut self) {
         self.touches[..self.present].iter_mut().for_each(Touch::begin);
+        self.feelings.iter_mut().for_each(Feeling::begin);
     }
 
-    /// A tick of `steps` steps is over.
-    pub(super) fn end(&mut self, steps: u32, window: &Window) {
-        let id = |triangle: u32| window.triangles[triangle as usize];
-        self.touches[..self.present].iter_mut().for_each(|touch| touch.end(steps, id));
-    }
-
-    /// After a step: those that press on nodes that give way in the body, but not here, go on as they pressed last. The patch's own
-    /// stays.
-    pub(super) fn let_go(&mut self, window: &Window) {
-        while let Some(gone) = (1..self.present).find(|&tool| window.has_left(&self.touches[tool])) {
+    /// A step is over. Those that press on nodes that give way in the body, but not here, go on as they pressed last.
+    pub(super) fn end_step(&mut self, window: &Window, rest: &[Vec3]) {
+        self.feelings
+            .iter_mut()
+            .zip(&self.touches[..self.present])
+            .for_each(|(feeling, touch)| feeling.add(touch.wrench));
+        while let Some(gone) = (0..self.present).find(|&tool| window.has_left(&self.touches[tool])) {
+            self.feelings[gone].stray(&self.touches[gone], (&window.surface, rest));
             self.present -= 1;
             self.touches.swap(gone, self.present);
             self.numbers.swap(gone, self.present);
+            self.feelings.swap(gone, self.present);
             self.rows.forget();
         }
+    }
+
+    /// A tick of `steps` steps is over, at whose end the tool of each number is at a pose of `end`.
+    pub(super) fn end_tick(
+        &mut self,
+        end: impl Fn(usize) -> Pose,
+        steps: u32,
+        (window, rest): (&Window, &[Vec3]),
+        friction: &Friction,
+    ) {
+        let id = |triangle: u32| window.triangles[triangle as usize];
+        for ((touch, feeling), &number) in self.touches.iter_mut().zip(&mut self.feelings).zip(&self.numbers) {
+            let at = end(number).position;
+            if feeling.is_beyond() {
+                feeling.follow(at, friction);
+            } else {
+                touch.end(steps, id);
+                feeling.end(at, steps, touch, (&window.surface, rest));
+            }
+        }
+    }
+
+    /// From now on nobody feels anything that is finite.
+    pub(super) fn spoil(&mut self) {
+        self.feelings.iter_mut().for_each(Feeling::spoil);
     }
 }

@@ -13,6 +13,8 @@ use crate::{Vec3, Wrench};
 
 /// A ring that moves by more than this share of the patch's extent in one step is torn along.
 const TORN: f64 = 0.05;
+/// Nodes that are moved at most to catch up in one haptic tick.
+const CATCH_UP_NODES: usize = 3600;
 /// So long before it was seen to be torn along (ticks) it was on the way to that.
 const TORN_TICKS: u32 = 2;
 
@@ -173,9 +175,9 @@ impl Predictive {
 
     /// A step of `d` seconds, each tool along `motion` of its number; the path is sampled `from` and `to` so many substeps after the
     /// tick's start.
-    fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, d: f64, [from, to]: [f64; 2]) -> Wrench {
+    fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, d: f64, [from, to]: [f64; 2]) {
         self.take_near_forces();
-        let force = self.patch.step(motion, d);
+        self.patch.step(motion, d);
         let start = self.substep as f64;
         if let Some(basis) = &self.basis {
             self.path.at(start + from).write_forces(&mut self.ring_forces);
@@ -185,7 +187,6 @@ impl Predictive {
         self.path.at(start + to).write(&mut self.ring_positions, &mut self.ring_velocities);
         self.surroundings.add_ring(&mut self.ring_positions, &mut self.ring_velocities);
         self.place_ring();
-        force
     }
 }
 
@@ -218,18 +219,20 @@ impl LocalModel for Predictive {
     }
 
     fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
-        let end = tools[self.patch.tools.number()].to;
-        if let Some(wrench) = self.patch.beyond(&end) {
-            return wrench;
+        let ends = |tool: usize| tools[tool].to;
+        if self.patch.is_left() {
+            return self.patch.feel(ends, 1);
         }
         let stepping = self.patch.stepping;
         let divided = stepping.divided(self.near.stable_share());
         let substeps = f64::from(stepping.substeps);
         self.patch.tools.begin();
-        let wrench = divided
-            .tick(|[from, to], d| self.step(|tool| tools[tool].part(from, to), d, [from * substeps, to * substeps]));
+        for [from, to] in divided.parts() {
+            let on_path = [from * substeps, to * substeps];
+            self.step(|tool| tools[tool].part(from, to), divided.step(), on_path);
+        }
         self.substep += stepping.substeps as usize;
-        self.patch.feel(wrench, &end, divided.substeps)
+        self.patch.feel(ends, divided.substeps)
     }
 
     fn built_at(&self) -> u64 {
@@ -240,24 +243,32 @@ impl LocalModel for Predictive {
         if self.reduces { Kind::Predictive } else { Kind::Predicted }
     }
 
-    fn serves_as(&self) -> Kind {
+    fn catch_up_ticks(&self) -> u64 {
+        (CATCH_UP_NODES / self.patch.window.nodes.len().max(1)).clamp(2, 8) as u64
+    }
+
+    fn wrench(&self, tool: usize) -> Option<Wrench> {
+        self.patch.wrench(tool)
+    }
+
+    fn serves_as(&self, tool: usize) -> Kind {
         match &self.basis {
-            _ if self.patch.has_left() => Kind::Hold,
+            _ if self.patch.has_left(tool) => Kind::Hold,
             None => Kind::Predicted,
             Some(_) => Kind::Predictive,
         }
     }
 
-    fn contact(&self) -> Contact {
-        self.patch.global_contact()
+    fn contact(&self, tool: usize) -> Contact {
+        self.patch.contact(tool)
     }
 
-    fn contact_points(&self) -> &[ContactPoint] {
-        self.patch.contact_points()
+    fn contact_points(&self, tool: usize) -> &[ContactPoint] {
+        self.patch.contact_points(tool)
     }
 
-    fn contact_area(&self) -> f64 {
-        self.patch.contact_area()
+    fn contact_area(&self, tool: usize) -> f64 {
+        self.patch.contact_area(tool)
     }
 
     fn position(&self, node: u32) -> Option<Vec3> {

@@ -76,7 +76,10 @@ impl Blend {
     /// The blended force and torque of one tick, and the resync's jump when the blend is over. `old` is read where it is
     /// [needed](Self::needs_old).
     pub(crate) fn mix(&mut self, new: Wrench, old: Wrench) -> (Wrench, Option<Jump>) {
-        let Some(elapsed) = self.elapsed else { return (new, None) };
+        let Some(elapsed) = self.elapsed else {
+            self.step_now = Vec3::zeros();
+            return (new, None);
+        };
         if elapsed == 0 {
             self.step = old - new;
             self.jump.before = self.step.force.norm();

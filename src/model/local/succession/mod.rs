@@ -3,7 +3,7 @@
 mod blend;
 mod ways;
 
-use super::LocalModel;
+use super::LocalModels;
 use crate::{Vec3, Wrench};
 
 pub use blend::{Blend, BlendKind, Jump};
@@ -31,87 +31,99 @@ pub struct Resynced {
     pub jump: Jump,
 }
 
-/// The local model that serves a tool, the one that it replaced and the one that is about to replace it.
+/// The local models that serve the tools of a session, those that they replaced and those that are about to replace them.
 ///
-/// Models are moved by swapping boxes: nothing is cloned, allocated or dropped while it runs.
+/// Models are moved by swapping: nothing is cloned, allocated or dropped while it runs.
 #[derive(Debug)]
 pub struct Succession {
-    serving: Box<dyn LocalModel>,
-    fading: Box<dyn LocalModel>,
-    arriving: Box<dyn LocalModel>,
+    serving: LocalModels,
+    fading: LocalModels,
+    arriving: LocalModels,
     /// Version and tick that `arriving` has reached; `None` if it is a spare.
     arrival: Option<(u32, u64)>,
-    blend: Blend,
+    /// Of each tool; all begin and end in the same ticks.
+    blends: Vec<Blend>,
+    /// Likewise, what the last tick gave.
+    served: Vec<Served>,
     version: u32,
     resync: Resynced,
 }
 
 impl Succession {
-    /// Starts with `models` to rotate through and resyncs blended by `blend`. The first serves until another is offered.
+    /// Starts with `models` to rotate through, all for the same tools, and resyncs blended by `blend`. The first serve until others are
+    /// offered.
     ///
     /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn new(models: [Box<dyn LocalModel>; 3], blend: Blend) -> Self {
+    /// Not real-time safe: allocates.
+    pub fn new(models: [LocalModels; 3], blend: Blend) -> Self {
         let [serving, fading, arriving] = models;
-        Self { serving, fading, arriving, arrival: None, blend, version: 0, resync: Resynced::default() }
+        let tools = serving.hosts().len();
+        let (blends, served) = (vec![blend; tools], vec![Served::default(); tools]);
+        Self { serving, fading, arriving, arrival: None, blends, served, version: 0, resync: Resynced::default() }
     }
 
-    /// Lets `model` serve at once: for tick 0. `model` gets a spare in exchange.
+    /// Lets `models` serve at once: for tick 0. They get spares in exchange.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn begin(&mut self, model: &mut Box<dyn LocalModel>, version: u32) {
-        std::mem::swap(&mut self.serving, model);
+    pub fn begin(&mut self, models: &mut LocalModels, version: u32) {
+        std::mem::swap(&mut self.serving, models);
         self.version = version;
     }
 
-    /// Takes a newer model in exchange for a spare. A model that is still catching up is given up for it, and one that is older than
-    /// what `ways` remember is refused: it could not be brought to the present.
+    /// Takes newer models in exchange for spares. Models that are still catching up are given up for them, unless they are nearer to the
+    /// present by now: where catching up takes longer than a period, none would ever serve. Those that are older than what `ways` remember
+    /// are refused: they could not be brought to the present.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn offer(&mut self, model: &mut Box<dyn LocalModel>, version: u32, ways: &Ways) {
-        let reached = model.built_at();
-        if ways.reaches_back_to(reached) {
-            std::mem::swap(&mut self.arriving, model);
+    pub fn offer(&mut self, models: &mut LocalModels, version: u32, ways: &Ways) {
+        let reached = models.built_at();
+        let is_nearest = self.arrival.is_none_or(|(_, arriving)| arriving <= reached);
+        if is_nearest && ways.reaches_back_to(reached) {
+            std::mem::swap(&mut self.arriving, models);
             self.arrival = Some((version, reached));
         }
     }
 
-    /// True if a model has arrived that has more than one tick to make up before it can serve in the last tick of `ways`.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn is_behind(&self, ways: &Ways) -> bool {
-        self.arriving.catches_up() && self.arrival.is_some_and(|(_, reached)| reached + 2 < ways.now())
-    }
-
-    /// Advances one tick: the last of `ways`. A model that [is behind](Self::is_behind) comes nearer if it `may_catch_up`: of several tools the
-    /// models catch up one after the other, so that a tick takes no longer than for one.
+    /// Advances one tick: the last of `ways`. Models that have arrived late come nearer to the present if they `may_catch_up`: not in a
+    /// release that is itself behind, which would fall behind further.
     ///
     /// # Real-time
     /// Bounded, real-time safe.
-    pub fn tick(&mut self, ways: &Ways, may_catch_up: bool) -> Served {
-        if may_catch_up || !self.is_behind(ways) {
+    pub fn tick(&mut self, ways: &Ways, may_catch_up: bool) {
+        if may_catch_up {
             self.catch_up(ways);
         }
         let motions = ways.of(ways.now());
-        let new = self.serving.tick(motions);
-        if !self.blend.is_under_way() {
-            return Served { wrench: new, ..Served::default() };
+        self.serving.tick(motions);
+        let needs_old = self.blends[0].needs_old();
+        if needs_old {
+            self.fading.tick(motions);
         }
-        let old = if self.blend.needs_old() { self.fading.tick(motions) } else { new };
-        // A diverged old model must not spoil a good new one.
-        let old = if old.is_finite() { old } else { new };
-        let (wrench, jump) = self.blend.mix(new, old);
-        Served { wrench, resync: jump.map(|jump| Resynced { jump, ..self.resync }), swap_step: self.blend.step_now() }
+        for (tool, (blend, served)) in self.blends.iter_mut().zip(&mut self.served).enumerate() {
+            let new = self.serving.wrench(tool);
+            // A diverged old model must not spoil a good new one.
+            let old = needs_old.then(|| self.fading.wrench(tool)).filter(Wrench::is_finite).unwrap_or(new);
+            let (wrench, jump) = blend.mix(new, old);
+            let resync = jump.map(|jump| Resynced { jump, ..self.resync });
+            *served = Served { wrench, resync, swap_step: blend.step_now() };
+        }
     }
 
-    /// Brings an arrived model nearer to the start of the last tick; when it is there and no blend is under way, it serves.
+    /// What the last tick gave to tool number `tool`.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn served(&self, tool: usize) -> Served {
+        self.served[tool]
+    }
+
+    /// Brings arrived models nearer to the start of the last tick; when they are there and no blend is under way, they serve.
     fn catch_up(&mut self, ways: &Ways) {
         let Some((version, mut reached)) = self.arrival else { return };
         let begun = ways.now() - 1;
-        if self.arriving.catches_up() {
+        if self.arriving.catch_up() {
             let until = begun.min(reached + self.arriving.catch_up_ticks());
             while reached < until {
                 reached += 1;
@@ -122,7 +134,7 @@ impl Succession {
                 return;
             }
         }
-        if self.blend.is_under_way() {
+        if self.blends[0].is_under_way() {
             return;
         }
         self.arrival = None;
@@ -130,18 +142,18 @@ impl Succession {
         std::mem::swap(&mut self.serving, &mut self.arriving);
         self.version = version;
         self.resync = Resynced { version, age: begun.saturating_sub(self.serving.built_at()), ..Resynced::default() };
-        self.blend.begin();
+        self.blends.iter_mut().for_each(Blend::begin);
     }
 
-    /// The model that serves now.
+    /// The models that serve now.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn serving(&self) -> &dyn LocalModel {
-        &*self.serving
+    pub fn serving(&self) -> &LocalModels {
+        &self.serving
     }
 
-    /// The version of the model that serves.
+    /// The version of the models that serve.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -152,11 +164,11 @@ impl Succession {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, ResyncView};
+    use super::super::{Kind, LocalModel, ResyncView};
     use super::*;
     use crate::contact::{Contact, ToolMotion};
 
-    /// Adds up the motion that it was given; its force is its base plus that.
+    /// Adds up the motion that it was given; its force is its base plus that. It resolves the tools from `first` to `last`.
     #[derive(Debug)]
     struct Counting {
         base: f64,
@@ -164,6 +176,7 @@ mod tests {
         catches_up: bool,
         travelled: Vec3,
         ticks: u64,
+        tools: std::ops::RangeInclusive<usize>,
     }
 
     impl LocalModel for Counting {
@@ -171,7 +184,11 @@ mod tests {
         fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
             self.travelled += tools[0].way();
             self.ticks += 1;
-            Vec3::new(self.base, self.travelled.y, self.ticks as f64).into()
+            Wrench::default()
+        }
+        fn wrench(&self, tool: usize) -> Option<Wrench> {
+            let force = Vec3::new(self.base, self.travelled.y, self.ticks as f64);
+            self.tools.contains(&tool).then_some(force.into())
         }
         fn built_at(&self) -> u64 {
             self.built_at
@@ -179,22 +196,32 @@ mod tests {
         fn kind(&self) -> Kind {
             Kind::Patch
         }
-        fn serves_as(&self) -> Kind {
+        fn serves_as(&self, _: usize) -> Kind {
             Kind::Patch
         }
         fn catches_up(&self) -> bool {
             self.catches_up
         }
-        fn contact(&self) -> Contact {
+        fn contact(&self, _: usize) -> Contact {
             Contact::default()
         }
     }
 
-    fn model(base: f64, built_at: u64, catches_up: bool) -> Box<dyn LocalModel> {
-        Box::new(Counting { base, built_at, catches_up, travelled: Vec3::zeros(), ticks: 0 })
+    fn model(base: f64, built_at: u64, catches_up: bool) -> LocalModels {
+        models(&[base], built_at, catches_up)
     }
 
-    /// A succession with the ways of its one tool.
+    /// One for each tool, which resolves that and the next ones.
+    fn models(bases: &[f64], built_at: u64, catches_up: bool) -> LocalModels {
+        let mut number = 0..;
+        LocalModels::new(bases.len(), || {
+            let first = number.next().unwrap();
+            let (travelled, ticks, tools) = (Vec3::zeros(), 0, first..=bases.len());
+            Box::new(Counting { base: bases[first], built_at, catches_up, travelled, ticks, tools })
+        })
+    }
+
+    /// A succession with the ways of its tools.
     struct Followed {
         models: Succession,
         ways: Ways,
@@ -202,24 +229,27 @@ mod tests {
 
     impl Followed {
         fn new(blend_ticks: u32) -> Self {
+            Self::of(&[1.0], blend_ticks)
+        }
+
+        fn of(bases: &[f64], blend_ticks: u32) -> Self {
             let blend = Blend::new(BlendKind::Crossfade, blend_ticks);
-            let mut models = Succession::new([-1.0; 3].map(|base| model(base, 0, true)), blend);
-            models.begin(&mut model(1.0, 0, true), 0);
-            Self { models, ways: Ways::new(1) }
+            let spare = || models(&vec![-1.0; bases.len()], 0, true);
+            let mut succession = Succession::new([spare(), spare(), spare()], blend);
+            succession.begin(&mut models(bases, 0, true), 0);
+            Self { models: succession, ways: Ways::new(bases.len()) }
         }
 
         fn tick(&mut self, t: u64) -> Served {
-            self.tick_if(t, true)
-        }
-
-        fn tick_if(&mut self, t: u64, may_catch_up: bool) -> Served {
-            self.ways.go(std::iter::once(ToolMotion::straight(tool(t - 1), tool(t))));
+            let motion = ToolMotion::straight(tool(t - 1), tool(t));
+            self.ways.go(std::iter::repeat(motion));
             assert_eq!(self.ways.now(), t);
-            self.models.tick(&self.ways, may_catch_up)
+            self.models.tick(&self.ways, true);
+            self.models.served(0)
         }
 
-        fn offer(&mut self, mut model: Box<dyn LocalModel>, version: u32) {
-            self.models.offer(&mut model, version, &self.ways);
+        fn offer(&mut self, mut models: LocalModels, version: u32) {
+            self.models.offer(&mut models, version, &self.ways);
         }
     }
 
@@ -256,23 +286,47 @@ mod tests {
     }
 
     #[test]
-    fn a_model_that_is_behind_waits_until_it_may_catch_up_and_one_that_is_not_serves() {
-        let mut models = Followed::new(0);
+    fn models_that_catch_up_slowly_serve_though_newer_ones_come_meanwhile() {
+        let mut followed = Followed::new(0);
         (1..=60).for_each(|t| {
-            models.tick(t);
+            followed.tick(t);
         });
-        models.offer(model(2.0, 33, true), 1);
-        // Another tool's model catches up meanwhile.
-        assert!(
-            (61..=70).all(|t| models.tick_if(t, false).wrench.force.x == 1.0 && models.models.is_behind(&models.ways))
-        );
-        let served: Vec<Vec3> = (71..=80).map(|t| models.tick(t).wrench.force).collect();
-        let swap = served.iter().position(|force| force.x == 2.0).unwrap();
-        // 37 ticks late.
-        assert_eq!((swap, served[swap].y), (5, tool(76).y - tool(33).y));
-        assert!(!models.models.is_behind(&models.ways));
-        models.offer(model(3.0, 80, true), 2);
-        assert_eq!(models.tick_if(81, false).wrench.force.x, 3.0);
+        followed.offer(model(2.0, 33, true), 1);
+        // It has come to 57 when the next one arrives.
+        (61..=63).for_each(|t| assert_eq!(followed.tick(t).wrench.force.x, 1.0));
+        followed.offer(model(3.0, 54, true), 2);
+        assert_eq!(followed.tick(64).wrench.force.x, 2.0);
+        // One that is nearer takes the place of one that is not.
+        followed.offer(model(4.0, 20, true), 3);
+        followed.offer(model(5.0, 64, true), 4);
+        assert_eq!((followed.tick(65).wrench.force.x, followed.models.version()), (5.0, 4));
+    }
+
+    /// Check that a tick takes no longer for several tools than for one while models catch up.
+    #[test]
+    fn late_models_of_several_tools_come_to_the_present_together_and_a_shared_one_counts_once() {
+        for (shared, ticks) in [(false, 8), (true, 3)] {
+            let mut followed = Followed::of(&[1.0, 1.5], 0);
+            (1..=60).for_each(|t| {
+                followed.tick(t);
+            });
+            let mut late = models(&[2.0, 2.5], 33, true);
+            assert!(!shared || late.share(0, 1));
+            followed.offer(late, 1);
+            let forces = |t| {
+                followed.tick(t);
+                [0, 1].map(|tool| followed.models.served(tool).wrench.force)
+            };
+            let served: Vec<[Vec3; 2]> = (61..=80).map(forces).collect();
+            // 27 ticks late, 4 caught up per tick while one more falls due, or 8.
+            let swap = served.iter().position(|[force, _]| force.x == 2.0).unwrap();
+            assert_eq!(swap, ticks);
+            assert!(served[..swap].iter().all(|[a, b]| (a.x, b.x) == (1.0, 1.5)));
+            let [own, other] = served[swap];
+            assert_eq!((other.x, other.yz()), (if shared { 2.0 } else { 2.5 }, own.yz()));
+            assert_eq!(own.y, tool(61 + swap as u64).y - tool(33).y, "nothing of the path is missing");
+        }
+        assert!(!models(&[1.0, 2.0], 0, true).share(1, 0), "a model serves nobody whom it does not resolve");
     }
 
     #[test]

@@ -103,8 +103,8 @@ fn a_patch_on_a_held_face_reports_the_lost_contact_too() {
     let corners = sim.body().surface().triangles[bottom as usize].map(|n| sim.body().rest()[n as usize]);
     let below = (corners[0] + corners[1] + corners[2]) / 3.0 - Vec3::z() * 0.001;
     let force = patch.tick(&[ToolMotion::straight(below, below + Vec3::z() * 0.002)]).force;
-    assert_eq!((force, patch.contact().mode), (Vec3::zeros(), ContactMode::Lost));
-    assert_eq!(patch.contact().triangle, Some(bottom));
+    assert_eq!((force, patch.contact(0).mode), (Vec3::zeros(), ContactMode::Lost));
+    assert_eq!(patch.contact(0).triangle, Some(bottom));
 }
 
 #[test]

@@ -62,7 +62,7 @@ fn run(mut model: Box<dyn LocalModel>, ticks: u32) -> (Vec<Vec3>, Vec<ContactMod
         .map(|ms| {
             let forces =
                 (ms * ticks..(ms + 1) * ticks).map(|n| model.tick(&[ToolMotion::straight(at(n), at(n + 1))]).force);
-            (forces.sum::<Vec3>() / f64::from(ticks), model.contact().mode)
+            (forces.sum::<Vec3>() / f64::from(ticks), model.contact(0).mode)
         })
         .unzip()
 }

@@ -4,7 +4,7 @@ use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, State};
 use palpate_model::bytes::{BytesReader, BytesWriter};
 use palpate_model::contact::{Contact, Law, ToolMotion, ToolShape};
-use palpate_model::local::{Image, Kind, LocalModel, Parcel, ResyncView, Template, ToolForecast};
+use palpate_model::local::{Image, Kind, LocalModels, ResyncView, Shipment, Template, ToolForecast};
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
 use palpate_model::surroundings::{Bases, Basis, RestingBody};
@@ -50,72 +50,99 @@ fn patch_and_bases(simulation: &Simulation) -> (Vec<u32>, Bases) {
     (patch, bases)
 }
 
-fn build(model: &mut dyn LocalModel, (simulation, tools): (&mut Simulation, &[Vec3; 2]), patch: &[u32], bases: &Bases) {
+/// Builds one model that serves both tools if it resolves them, else two.
+fn build(models: &mut LocalModels, (simulation, tools): (&mut Simulation, &[Vec3; 2]), patch: &[u32], bases: &Bases) {
     let nearest: [u32; 2] = std::array::from_fn(|tool| simulation.contact(tool).triangle.unwrap());
-    let triangle = nearest[0];
-    model.rebuild(ResyncView {
-        global: simulation,
-        tick: PRESSES,
-        triangles: &[triangle],
-        nearest: &nearest,
-        patch: (!bases.is_empty()).then_some(patch),
-        tools: &tools.map(ToolForecast::at_rest),
-        index: 0,
-        horizon: HORIZON,
-        bases,
-    });
+    for index in 0..2 {
+        if index == 0 || !models.share(0, index) {
+            models.rebuild(ResyncView {
+                global: simulation,
+                tick: PRESSES,
+                triangles: &nearest[index..=index],
+                nearest: &nearest,
+                patch: (!bases.is_empty() && index == 0).then_some(patch),
+                tools: &tools.map(ToolForecast::at_rest),
+                index,
+                horizon: HORIZON,
+                bases,
+            });
+        }
+    }
 }
 
-/// What the first tool feels in each tick of a drag of both.
-fn drag(model: &mut dyn LocalModel, from: [Vec3; 2]) -> Vec<Vec3> {
+/// What the tools feel in each tick of a drag of both.
+fn drag(models: &mut LocalModels, from: [Vec3; 2]) -> Vec<[Vec3; 2]> {
     let at = |tick: u32| from.map(|from| from + Vec3::new(2e-4, 1e-4, -5e-5) * f64::from(tick));
     let motions = |tick| {
         let [from, to] = [at(tick), at(tick + 1)];
         [0, 1].map(|tool| ToolMotion::straight(from[tool], to[tool]))
     };
-    (0..40).map(|tick| model.tick(&motions(tick)).force).collect()
+    let felt = |tick| {
+        models.tick(&motions(tick));
+        [0, 1].map(|tool| models.wrench(tool).force)
+    };
+    (0..40).map(felt).collect()
 }
 
-fn sent(parcel: &Parcel) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    parcel.write(&mut BytesWriter(&mut bytes));
-    bytes
+fn empty(template: &Template) -> LocalModels {
+    LocalModels::new(2, || template.empty())
+}
+
+/// What is sent of the models of a body that has been pressed.
+fn sent(
+    template: &Template,
+    pressed: (&mut Simulation, &[Vec3; 2]),
+    (patch, bases): (&[u32], &Bases),
+) -> (Shipment, Vec<u8>) {
+    let mut departing = LocalModels::new(2, || template.departing());
+    build(&mut departing, pressed, patch, bases);
+    let (shipment, mut bytes) = (Shipment::of(&departing), Vec::new());
+    shipment.write(&mut BytesWriter(&mut bytes));
+    (shipment, bytes)
 }
 
 #[test]
-fn a_model_that_is_built_over_there_is_the_one_that_would_be_built_here() {
+fn models_that_are_built_over_there_are_those_that_would_be_built_here() {
     // The second tool is outside of the patch, or in it.
     let shapes = [ToolShape::Point, ToolShape::Sphere { radius: 6e-3 }];
+    let mut shared = [0; 2];
     for (shape, beside) in shapes.into_iter().flat_map(|shape| [0.052, 0.041].map(|beside| (shape, beside))) {
         let (mut simulation, tools) = pressed(shape, beside);
         let (patch, bases) = patch_and_bases(&simulation);
         for kind in Kind::ALL.into_iter().filter(|&kind| kind != Kind::Full) {
             let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
             let bases = if kind == Kind::Predictive { bases.clone() } else { Bases::default() };
-            let [mut here, mut there] = [template.empty(), template.empty()];
-            build(&mut *here, (&mut simulation, &tools), &patch, &bases);
-            let mut departing = template.departing();
-            build(&mut *departing, (&mut simulation, &tools), &patch, &bases);
+            let [mut here, mut there] = [empty(&template), empty(&template)];
+            build(&mut here, (&mut simulation, &tools), &patch, &bases);
+            shared[here.hosts()[1]] += 1;
 
-            let bytes = sent(departing.parcel().unwrap());
+            let (_, bytes) = sent(&template, (&mut simulation, &tools), (&patch, &bases));
             let mut from = BytesReader(&bytes);
-            let parcel = Parcel::read(&mut from).unwrap();
-            assert!(from.0.is_empty() && parcel.tick() == PRESSES);
+            let shipment = Shipment::read(&mut from).unwrap();
+            assert!(from.0.is_empty() && shipment.tick() == PRESSES);
             let mut image = Image::new(at_rest(shape));
-            assert!(image.rebuild(&parcel, &bases, &mut *there));
-            assert_eq!((there.serves_as(), there.built_at()), (kind, PRESSES));
-            assert_eq!(there.contact(), here.contact(), "{kind:?}");
-            assert_eq!(there.contact_points(), here.contact_points(), "{kind:?}");
-            assert_eq!(there.contact_area(), here.contact_area(), "{kind:?}");
-            let forces = [drag(&mut *here, tools), drag(&mut *there, tools)];
-            let largest = forces[0].iter().map(Vec3::norm).fold(0.0, f64::max);
-            let apart = forces[0].iter().zip(&forces[1]).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-            println!("{kind:?} {shape:?}: {} bytes, {:.1e} of {largest:.2} N apart", bytes.len(), apart);
-            // To the last bit, but for a path that is rounded.
-            let looks_ahead = matches!(kind, Kind::Predicted | Kind::Predictive);
-            assert!(apart <= if looks_ahead { 2e-5 * largest } else { 0.0 }, "{kind:?}: {apart} of {largest}");
+            assert!(image.rebuild(&shipment, &bases, &mut there));
+            assert_eq!((there.hosts(), there.built_at()), (here.hosts(), PRESSES));
+            for tool in 0..2 {
+                let [here, there] = [here.of(tool), there.of(tool)];
+                assert_eq!(there.serves_as(tool), here.serves_as(tool), "{kind:?}");
+                assert_eq!(there.contact(tool), here.contact(tool), "{kind:?}");
+                assert_eq!(there.contact_points(tool), here.contact_points(tool), "{kind:?}");
+                assert_eq!(there.contact_area(tool), here.contact_area(tool), "{kind:?}");
+            }
+            let forces = [drag(&mut here, tools), drag(&mut there, tools)];
+            for tool in 0..2 {
+                let largest = forces[0].iter().map(|force| force[tool].norm()).fold(0.0, f64::max);
+                let apart = forces[0].iter().zip(&forces[1]).map(|(a, b)| (a[tool] - b[tool]).norm());
+                let apart = apart.fold(0.0, f64::max);
+                println!("{kind:?} {shape:?}: {} bytes, {:.1e} of {largest:.2} N apart", bytes.len(), apart);
+                // To the last bit, but for a path that is rounded.
+                let looks_ahead = matches!(kind, Kind::Predicted | Kind::Predictive);
+                assert!(apart <= if looks_ahead { 2e-5 * largest } else { 0.0 }, "{kind:?}: {apart} of {largest}");
+            }
         }
     }
+    assert!(shared.iter().all(|&count| count >= 6), "models for both tools, and one for each: {shared:?}");
 }
 
 #[test]
@@ -123,16 +150,15 @@ fn a_parcel_of_another_body_is_refused_and_a_path_of_another_ring_is_not_gone() 
     let (mut simulation, tools) = pressed(ToolShape::Point, 0.052);
     let (patch, bases) = patch_and_bases(&simulation);
     let template = Template::new(Kind::Predictive, [4, 4, 2], simulation.body()).unwrap();
-    let mut departing = template.departing();
-    build(&mut *departing, (&mut simulation, &tools), &patch, &bases);
-    let parcel = departing.parcel().unwrap();
+    let (shipment, _) = sent(&template, (&mut simulation, &tools), (&patch, &bases));
     let small = Block::builder([4; 3], [0.03; 3]).fix(Face::ZMin).build().unwrap();
     let state = State::at_rest(small.rest());
     let stepping = Stepping { tick: 1e-3, substeps: 2 };
     let other = Simulation::new(Box::new(small), state, Contact::default(), Law::default(), stepping).unwrap();
-    let mut image = Image::new(other);
-    let mut model = template.empty();
-    assert!(!image.rebuild(parcel, &bases, &mut *model));
+    let mut image = Image::new(other.with_tool(Contact::default()));
+    assert!(!image.rebuild(&shipment, &bases, &mut empty(&template)));
+    let one = &mut LocalModels::new(1, || template.empty());
+    assert!(!Image::new(at_rest(ToolShape::Point)).rebuild(&shipment, &bases, one), "models for other tools");
     assert!(!image.has_room_for(bases.iter().next().unwrap()));
     assert!(Image::new(at_rest(ToolShape::Point)).has_room_for(bases.iter().next().unwrap()));
 }
@@ -154,10 +180,8 @@ proptest! {
                 let (patch, bases) = patch_and_bases(&simulation);
                 [Kind::Hold, Kind::Patch, Kind::Predictive].map(|kind| {
                     let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
-                    let mut departing = template.departing();
                     let bases = if kind == Kind::Predictive { bases.clone() } else { Bases::default() };
-                    build(&mut *departing, (&mut simulation, &tools), &patch, &bases);
-                    (kind, sent(departing.parcel().unwrap()))
+                    (kind, sent(&template, (&mut simulation, &tools), (&patch, &bases)).1)
                 }).into()
             };
         }
@@ -171,12 +195,12 @@ proptest! {
             bytes.get_mut(place).into_iter().for_each(|byte| *byte ^= flip);
         }
         bytes.truncate(bytes.len().saturating_sub(cut % 3 * cut));
-        let Some(parcel) = Parcel::read(&mut BytesReader(&bytes)) else { return Ok(()) };
+        let Some(shipment) = Shipment::read(&mut BytesReader(&bytes)) else { return Ok(()) };
         let simulation = at_rest(ToolShape::Sphere { radius: 6e-3 });
         let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
-        let mut model = template.empty();
-        if Image::new(simulation).rebuild(&parcel, &Bases::default(), &mut *model) {
-            drag(&mut *model, [0.033, 0.052].map(|x| Vec3::new(x, 0.0362, 0.07)));
+        let mut models = empty(&template);
+        if Image::new(simulation).rebuild(&shipment, &Bases::default(), &mut models) {
+            drag(&mut models, [0.033, 0.052].map(|x| Vec3::new(x, 0.0362, 0.07)));
         }
     }
 }

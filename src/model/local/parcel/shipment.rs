@@ -1,0 +1,67 @@
+//! The parcels of one resync.
+
+use super::Parcel;
+use crate::bytes::{BytesReader, BytesWriter};
+use crate::local::LocalModels;
+
+/// What the local models of all tools are built from on another computer: they cross a link together, as they serve together.
+///
+/// # Real-time
+/// Not for a tick: allocates.
+#[derive(Clone, Debug, Default)]
+pub struct Shipment {
+    /// One for each model that serves somebody.
+    parcels: Vec<Parcel>,
+    /// The tool around which the model is built that serves each tool.
+    hosts: Vec<u16>,
+}
+
+impl Shipment {
+    /// What `models` are built from, if they are [for that](crate::local::Template::departing).
+    pub fn of(models: &LocalModels) -> Self {
+        let hosts = models.hosts().iter().map(|&host| host as u16).collect();
+        Self { parcels: models.parcels().cloned().collect(), hosts }
+    }
+
+    /// Appends all of it but the bases.
+    pub fn write(&self, to: &mut BytesWriter<'_>) {
+        to.list(&self.hosts, |to, &host| to.u16(host));
+        self.parcels.iter().for_each(|parcel| parcel.write(to));
+    }
+
+    /// Takes what [`write`](Self::write) has appended; `None` if the bytes cannot be that, or the parcels cannot be of one resync. Whether
+    /// they fit a body is what [`Image::rebuild`](super::Image::rebuild) asks.
+    pub fn read(from: &mut BytesReader<'_>) -> Option<Self> {
+        let mut shipment = Self::default();
+        from.list(2, &mut shipment.hosts, BytesReader::u16)?;
+        let models = shipment.hosts().enumerate().filter(|(tool, host)| tool == host).count();
+        for _ in 0..models {
+            shipment.parcels.push(Parcel::read(from)?);
+        }
+        shipment.is_sound().then_some(shipment)
+    }
+
+    /// The haptic tick of the states.
+    pub fn tick(&self) -> u64 {
+        self.parcels.first().map_or(0, Parcel::tick)
+    }
+
+    /// One for each model that serves somebody.
+    pub fn parcels(&self) -> &[Parcel] {
+        &self.parcels
+    }
+
+    /// The tools, each with the one around which its model is built.
+    pub(super) fn hosts(&self) -> impl ExactSizeIterator<Item = usize> {
+        self.hosts.iter().map(|&host| host.into())
+    }
+
+    /// True if there is one parcel for each tool that has a model, in their order, and such a one serves every tool.
+    fn is_sound(&self) -> bool {
+        let serves_itself = |tool: usize| self.hosts.get(tool).is_some_and(|&host| usize::from(host) == tool);
+        let mut owners = self.hosts().enumerate().filter(|(tool, host)| tool == host).map(|(tool, _)| tool);
+        !self.hosts.is_empty()
+            && self.hosts().all(serves_itself)
+            && self.parcels.iter().all(|parcel| owners.next() == Some(parcel.tool()) && parcel.tick() == self.tick())
+    }
+}
