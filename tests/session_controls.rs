@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use palpate::devices::Scripted;
 use palpate::log::{ForceSample, LogRecord, ServedBy};
 use palpate::model::local::Kind;
 use palpate::prelude::*;
@@ -14,16 +15,34 @@ const EVERY: [Kind; 8] = Kind::ALL;
 
 /// A block of 6^3 nodes that is pressed 4 mm deep from 0.2 s on, and dragged from 0.6 s to 1.6 s if it is to be.
 fn pressed(model: Kind, drags: bool) -> SessionBuilder {
-    let body = Block::builder([6; 3], [0.05; 3]).stiffness(30.0).damping_ratio(0.3).node_mass(0.5e-3).fix(Face::ZMin);
-    let end = if drags { 0.032 } else { 0.022 };
-    let places =
-        [[0.022, 0.023, 0.052], [0.022, 0.023, 0.046], [0.022, 0.023, 0.046], [end, 0.023, 0.046], [end, 0.023, 0.046]];
-    let path = ToolPath::new(vec![0.0, 0.2, 0.6, 1.6, 10.0], places.to_vec()).unwrap();
-    Session::builder(body.build().unwrap()).path(path).friction(0.4).crossfade_ms(10.0).model(model)
+    Session::builder(block()).path(path(0.023, drags)).friction(0.4).crossfade_ms(10.0).model(model)
 }
 
-/// Runs for so many seconds, and does what is wanted at its times (ms).
+/// The same with a second tool 10 mm beside.
+fn pressed_twice(model: Kind, drags: bool) -> SessionBuilder {
+    let [left, right] = [0.023, 0.033].map(|y| Scripted::new(path(y, drags)));
+    let session = Session::builder(block()).named_device("left", left).named_device("right", right);
+    session.friction(0.4).crossfade_ms(10.0).model(model)
+}
+
+fn block() -> Block {
+    let body = Block::builder([6; 3], [0.05; 3]).stiffness(30.0).damping_ratio(0.3).node_mass(0.5e-3).fix(Face::ZMin);
+    body.build().unwrap()
+}
+
+fn path(y: f64, drags: bool) -> ToolPath {
+    let end = if drags { 0.032 } else { 0.022 };
+    let places = [[0.022, y, 0.052], [0.022, y, 0.046], [0.022, y, 0.046], [end, y, 0.046], [end, y, 0.046]];
+    ToolPath::new(vec![0.0, 0.2, 0.6, 1.6, 10.0], places.to_vec()).unwrap()
+}
+
+/// Runs for so many seconds, and does what is wanted at its times (ms); the forces on the first device.
 fn run(session: SessionBuilder, ms: u64, wanted: &[Act<'_>]) -> Vec<ForceSample> {
+    run_all(session, ms, wanted).into_iter().filter(|force| force.device == 0).collect()
+}
+
+/// Likewise, of all devices.
+fn run_all(session: SessionBuilder, ms: u64, wanted: &[Act<'_>]) -> Vec<ForceSample> {
     let session = session.virtual_time().keep_records().duration_s(1e-3 * ms as f64);
     let mut running = session.build().unwrap().start().unwrap();
     let controls = running.take_controls().unwrap();
@@ -55,19 +74,28 @@ fn settled(forces: &[ForceSample]) -> f64 {
 
 #[test]
 fn full_beside_a_global_model_is_full_to_the_last_bit() {
-    let alone = run(pressed(Kind::Full, true), 900, &[]);
-    let beside = run(pressed(Kind::Full, true).switchable(), 900, &[]);
-    assert!(alone.iter().map(size).fold(0.0, f64::max) > 0.1);
-    assert_eq!(alone.len(), beside.len());
-    for (a, b) in alone.iter().zip(&beside) {
-        assert_eq!((a.time, a.force_n.map(f64::to_bits)), (b.time, b.force_n.map(f64::to_bits)));
-        assert_eq!((b.served_by, b.model_age_s), (ServedBy::Full, 0.0));
+    for pressed in [pressed, pressed_twice] {
+        let sorted = |session| {
+            let mut forces = run_all(session, 900, &[]);
+            forces.sort_by_key(|force| (force.time, force.device));
+            forces
+        };
+        let [alone, beside] = [pressed(Kind::Full, true), pressed(Kind::Full, true).switchable()].map(sorted);
+        assert!(alone.iter().map(size).fold(0.0, f64::max) > 0.1);
+        assert_eq!(alone.len(), beside.len());
+        for (a, b) in alone.iter().zip(&beside) {
+            assert_eq!((a.time, a.device), (b.time, b.device));
+            assert_eq!(a.force_n.map(f64::to_bits), b.force_n.map(f64::to_bits));
+            assert_eq!((b.served_by, b.model_age_s), (ServedBy::Full, 0.0));
+        }
     }
 }
 
 #[test]
 fn every_model_takes_over_from_every_other_while_the_tool_touches() {
-    for from in [Kind::Hold, Kind::Full, Kind::Predictive] {
+    let one =
+        [Kind::Hold, Kind::Full, Kind::Predictive].map(|from| (from, pressed as fn(Kind, bool) -> SessionBuilder));
+    for (from, pressed) in one.into_iter().chain([(Kind::Full, pressed_twice as fn(Kind, bool) -> SessionBuilder)]) {
         let acts: Vec<_> =
             EVERY.iter().map(|&kind| move |controls: &Controls| controls.set_model(kind).unwrap()).collect();
         let wanted: Vec<Act<'_>> =

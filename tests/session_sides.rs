@@ -171,7 +171,8 @@ fn a_model_from_the_future_is_not_believed() {
     let header = Message::glance(&forged).unwrap();
     let Header { number, .. } = header;
     forged[16..24].copy_from_slice(&(number + 1_000).to_le_bytes());
-    let tick = 8 + 3 * 8;
+    // After the header the host of the one tool, and its parcel, which begins with the tick.
+    let tick = 8 + 3 * 8 + 4 + 2;
     for (n, ahead) in [1_u64 << 20, u64::MAX - 3, u64::MAX].into_iter().enumerate() {
         forged[16..24].copy_from_slice(&(number + 1_000 + n as u64).to_le_bytes());
         forged[tick..tick + 8].copy_from_slice(&ahead.to_le_bytes());

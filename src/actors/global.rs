@@ -1,22 +1,18 @@
-//! The global actor: advances the whole body along the tool's path and publishes the next local model.
+//! The global actor: advances the whole body along the tools' paths and publishes the next local models.
 
 use super::cause::Cause;
 use super::global_ports::{GlobalPorts, GlobalSharedPorts, ToolPorts};
 use super::global_tool::ToolSide;
 use super::messages::{ToolTick, show};
 use super::model_maker::ModelMaker;
+use super::next_models::NextModels;
 use crate::error::Error;
 use crate::log::GlobalTick;
 use crate::model::contact::ToolMotion;
-use crate::model::local::{Aim, Beside, Kind, ResyncView, ToolForecast, ToolHistory, Windows};
+use crate::model::local::{Kind, ToolHistory, Windows};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{Actor, ActorError, Nanos, Outcome, Rate, Stopwatch, TickContext};
-
-/// Times at which a tool is looked for ahead: by then a basis may be ready (s).
-const PREFETCH_S: [f64; 3] = [0.15, 0.3, 0.6];
-/// Windows around a tool that are made ready before it comes there.
-const NEIGHBOURS: usize = 7;
 
 /// The time whose tool samples a release follows at most, if two periods of its own are less (s): one that finds more
 /// starts again from its newest surface and the newest tool, so that under load it does not fall behind without end.
@@ -70,25 +66,16 @@ impl GlobalPlan {
 #[derive(Debug)]
 pub struct GlobalActor {
     simulation: Simulation,
-    aim: Aim,
     ports: GlobalSharedPorts,
     plan: GlobalPlan,
     tools: Vec<ToolSide>,
+    next: NextModels,
+    /// The newest local models that were published.
+    version: u64,
     /// Something else than the tools has changed since the last models.
     is_changed: bool,
-    /// Working memory: where each tool is and is expected, and the triangle that it touches or is nearest to.
-    forecasts: Vec<ToolForecast>,
-    nearest: Vec<u32>,
-    /// The newest models that were published.
-    version: u64,
-    /// Working memory: the tools that no model serves yet, and the triangles that one is built around.
-    unserved: Vec<usize>,
-    around: Vec<u32>,
     /// Working memory: how each tool moves in a tick.
     motions: Vec<ToolMotion>,
-    /// Working memory: where a tool is going, and the window there.
-    triangles_ahead: Vec<u32>,
-    patch_ahead: Vec<u32>,
 }
 
 impl GlobalActor {
@@ -107,7 +94,7 @@ impl GlobalActor {
     ) -> Result<Self, Error> {
         let GlobalPorts { tools: of_tools, shared } = ports;
         assert_eq!([tools.len(), of_tools.len()], [simulation.tools(); 2], "ports and places for each tool");
-        let aim = Aim::new(simulation.body().surface(), &simulation.state().positions)?;
+        let next = NextModels::new(&simulation)?;
         let has_bases = shared.surroundings.is_some();
         let side = |(index, (&tool, ports)): (usize, (&ToolTick, ToolPorts))| {
             let windows = if has_bases { Windows::new(&simulation, index, plan.patch) } else { Windows::default() };
@@ -115,24 +102,8 @@ impl GlobalActor {
             ToolSide::new(tool, windows, history, ports)
         };
         let tools = tools.iter().zip(of_tools).enumerate().map(side).collect();
-        let (version, unserved, around, is_changed) = (0, Vec::new(), Vec::new(), true);
-        let (forecasts, nearest, motions, triangles_ahead, patch_ahead) = Default::default();
-        Ok(Self {
-            simulation,
-            aim,
-            ports: shared,
-            plan,
-            tools,
-            is_changed,
-            forecasts,
-            nearest,
-            version,
-            unserved,
-            around,
-            motions,
-            triangles_ahead,
-            patch_ahead,
-        })
+        let (version, motions, is_changed) = (0, Vec::new(), true);
+        Ok(Self { simulation, ports: shared, plan, tools, next, version, is_changed, motions })
     }
 
     /// The haptic tick of the state.
@@ -236,97 +207,27 @@ impl GlobalActor {
         self.tools.iter().map(waiting).reduce(|a, b| Some(a?.min(b?)))?
     }
 
-    /// Builds the next local model of each tool around its contact, or around the surface nearest to it, and where it is
-    /// going.
+    /// Builds the next local models around the tools' contacts, or around the surface nearest to them, and where they are going.
     fn publish_models(&mut self, ctx: &TickContext) -> u64 {
-        self.forecasts.clear();
-        self.forecasts.extend(self.tools.iter().map(|side| side.history.forecast()));
-        self.aim.refit(&self.simulation.state().positions);
-        let now = [0.0, self.plan.lead_s()];
-        for (index, (side, tool)) in self.tools.iter_mut().zip(&self.forecasts).enumerate() {
-            self.aim.triangles((&self.simulation, index), tool, now, &mut side.triangles);
-        }
-        self.nearest.clear();
-        self.nearest.extend(self.tools.iter().map(|side| side.triangles[0]));
+        self.next.aim((&self.simulation, &mut self.tools), self.plan.lead_s());
         let has_bases = self.has_bases();
         if has_bases {
-            self.look_beside();
+            self.next.look_beside((&self.simulation, &mut self.tools));
             self.publish_wishes(ctx);
         }
         let (kind, is_changed) = (self.ports.settings.get().model, std::mem::take(&mut self.is_changed));
         // The whole body goes on by itself.
         if kind != Kind::Full || is_changed {
-            self.choose_hosts(kind, has_bases);
-            self.build_models(kind, has_bases);
-            self.version = self.ports.models.publish(ctx);
+            let Self { simulation, ports, plan, tools, next, .. } = self;
+            let models = ports.models.buffer();
+            plan.models.put(kind, simulation.body_as_made(), models);
+            next.choose((simulation, tools), kind, has_bases.then_some(&plan.bases));
+            Stopwatch::around(ports.build_cost.as_mut(), || {
+                next.build((simulation, tools), (plan.horizon, &plan.bases, has_bases), models);
+            });
+            self.version = ports.models.publish(ctx);
         }
         self.version
-    }
-
-    /// Finds for each tool its patch, if there are bases, and which others its model may serve too.
-    fn choose_hosts(&mut self, kind: Kind, has_bases: bool) {
-        let mut pressed = std::mem::take(&mut self.patch_ahead);
-        for index in 0..self.tools.len() {
-            let side = &mut self.tools[index];
-            if has_bases {
-                side.choose_patch((&self.simulation, index), &self.plan.bases);
-            }
-            let mut held = std::mem::take(&mut side.held);
-            held.clear();
-            let patch = &self.tools[index].patch;
-            held.extend((0..self.tools.len()).filter(|&other| {
-                if !has_bases {
-                    return !kind.has_patch();
-                }
-                self.simulation.pressed_at(other, &self.tools[other].triangles, &mut pressed);
-                pressed.iter().all(|node| patch.binary_search(node).is_ok())
-            }));
-            self.tools[index].held = held;
-        }
-        self.patch_ahead = pressed;
-    }
-
-    /// Builds the next local models: as few as serve all tools, those first that serve most.
-    fn build_models(&mut self, kind: Kind, has_bases: bool) {
-        let models = self.ports.models.buffer();
-        self.plan.models.put(kind, self.simulation.body_as_made(), models);
-        self.unserved.clear();
-        self.unserved.extend(0..self.tools.len());
-        self.unserved.sort_by_key(|&tool| std::cmp::Reverse(self.tools[tool].held.len()));
-        while !self.unserved.is_empty() {
-            let host = self.unserved.remove(0);
-            let (side, unserved) = (&self.tools[host], &mut self.unserved);
-            let held = || side.held.iter().filter(|tool| unserved.contains(tool));
-            self.around.clear();
-            self.around.extend_from_slice(&side.triangles);
-            self.around.extend(held().flat_map(|&tool| &self.tools[tool].triangles));
-            let resync = ResyncView {
-                global: &mut self.simulation,
-                tick: side.tool.tick,
-                triangles: &self.around,
-                nearest: &self.nearest,
-                patch: has_bases.then_some(&side.patch),
-                tools: &self.forecasts,
-                index: host,
-                horizon: self.plan.horizon,
-                bases: &self.plan.bases,
-            };
-            Stopwatch::around(self.ports.build_cost.as_mut(), || models.rebuild(resync));
-            unserved.retain(|tool| !(side.held.contains(tool) && models.share(host, *tool)));
-        }
-    }
-
-    /// Finds for each tool what the others press.
-    fn look_beside(&mut self) {
-        for index in 0..self.tools.len() {
-            let mut beside = std::mem::take(&mut self.tools[index].beside);
-            self.simulation.pressed_beside(index, |other| &self.tools[other].triangles, &mut beside.soon);
-            self.simulation.pressed_beside(index, |other| &self.nearest[other..=other], &mut beside.now);
-            beside.triangles.clear();
-            let others = self.nearest.iter().enumerate().filter(|&(other, _)| other != index);
-            beside.triangles.extend(others.map(|(_, triangle)| triangle));
-            self.tools[index].beside = beside;
-        }
     }
 
     /// True if local models take bases.
@@ -351,41 +252,15 @@ impl GlobalActor {
         }
     }
 
-    /// Asks for the bases that are missing: of the window that is the best now, of those where the tool is going, and of those
-    /// around it.
+    /// Asks for the bases that are missing.
     fn publish_wishes(&mut self, ctx: &TickContext) {
-        let Some(ports) = &mut self.ports.surroundings else { return };
-        let wishes = ports.wishes.buffer();
-        wishes.patches.clear();
-        let bases = &self.plan.bases;
-        let mut wish = |patch: &[u32]| {
-            if bases.get(patch).is_none() && !wishes.patches.iter().any(|wished| wished == patch) {
-                wishes.patches.push(patch.to_vec());
+        if let Some(ports) = &mut self.ports.surroundings {
+            let (period, lead) = (self.plan.global.period_s(), self.plan.lead_s());
+            let wishes = ports.wishes.buffer();
+            self.next.wish((&self.simulation, &self.tools), [period, lead], &self.plan.bases, wishes);
+            if !wishes.patches.is_empty() {
+                ports.wishes.publish(ctx);
             }
-        };
-        let (period, lead) = (self.plan.global.period_s(), self.plan.lead_s());
-        for (index, (side, tool)) in self.tools.iter().zip(&self.forecasts).enumerate() {
-            let at = (&self.simulation, index);
-            let (ahead, patch) = (&mut self.triangles_ahead, &mut self.patch_ahead);
-            side.windows.choose(at, &side.triangles, &Beside::default(), |_| true, patch);
-            wish(patch);
-            if self.simulation.contact(index).glued {
-                // It stays where it is.
-                continue;
-            }
-            if self.tools.len() > 1 {
-                side.windows.choose(at, &side.triangles, &side.beside, |_| true, patch);
-                wish(patch);
-            }
-            for [after, lead] in [[period, lead]].into_iter().chain(PREFETCH_S.map(|after| [after, 0.0])) {
-                self.aim.triangles(at, tool, [after, lead], ahead);
-                side.windows.choose(at, ahead, &side.beside, |_| true, patch);
-                wish(patch);
-            }
-            side.windows.around(side.triangles[0], NEIGHBOURS).for_each(&mut wish);
-        }
-        if !wishes.patches.is_empty() {
-            ports.wishes.publish(ctx);
         }
     }
 

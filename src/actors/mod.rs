@@ -31,6 +31,7 @@ mod log_sink;
 mod logger;
 mod messages;
 mod model_maker;
+mod next_models;
 mod scene_watch;
 mod settings;
 mod throttle;

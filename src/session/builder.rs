@@ -46,7 +46,7 @@ impl SessionBuilder {
 
     /// Adds a device of the program's own; without one the tool follows the scene's path.
     ///
-    /// Each of several devices has its own contact and local model, and needs a name: see
+    /// Each of several devices has its own contact, and needs a name: see
     /// [`named_device`](Self::named_device).
     #[must_use]
     pub fn device(mut self, device: impl Device + 'static) -> Self {
@@ -309,8 +309,8 @@ impl SessionBuilder {
     }
 
     /// Lets the local model be changed while the session runs, by [`Controls::set_model`](super::Controls::set_model). `full` then runs
-    /// beside a global model, with the same forces, if there is one device; what a session can be switched to takes memory, and a
-    /// thread for reduced surroundings.
+    /// beside a global model, with the same forces; what a session can be switched to takes memory, and a thread for reduced
+    /// surroundings.
     #[must_use]
     pub fn switchable(mut self) -> Self {
         self.parts.scene.run.switchable = true;
@@ -331,7 +331,7 @@ impl SessionBuilder {
         self
     }
 
-    /// Measures, in virtual time, the CPU time of every release and of every build of a local model, for
+    /// Measures, in virtual time, the CPU time of every release and of building the local models of every resync, for
     /// [`RuntimeReport::costs`](crate::runtime::RuntimeReport::costs) and [`Summary::builds`](super::Summary::builds).
     #[must_use]
     pub fn measure_cost(mut self) -> Self {

@@ -279,7 +279,7 @@ pub struct Summary {
     pub log_error: Option<Error>,
     /// All records, if they were [kept](super::SessionBuilder::keep_records).
     pub records: Vec<LogRecord>,
-    /// CPU time of building each local model, if [cost was measured](super::SessionBuilder::measure_cost); none for
+    /// CPU time of building the local models of each resync, if [it was measured](super::SessionBuilder::measure_cost); none for
     /// `full`, which is never built anew.
     pub builds: Option<Histogram>,
 }

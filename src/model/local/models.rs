@@ -67,6 +67,9 @@ impl LocalModels {
     }
 
     /// What the models that serve somebody are built from on another computer, if they are for that.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn parcels(&self) -> impl Iterator<Item = &Parcel> {
         self.serving().filter_map(LocalModel::parcel)
     }

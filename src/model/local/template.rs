@@ -159,8 +159,8 @@ impl Template {
         Ok(if self.is_implicit { made.with_implicit_steps() } else { made })
     }
 
-    /// An empty model, to be rebuilt in place. Of [`Kind::Full`] each tool has a body of its own; where nothing but `full` is wanted it is
-    /// the [`Simulation`](crate::simulation::Simulation) itself with all tools.
+    /// An empty model, to be rebuilt in place. One of [`Kind::Full`] serves all tools; where nothing but `full` is wanted it is the
+    /// [`Simulation`](crate::simulation::Simulation) itself.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.

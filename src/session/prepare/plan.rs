@@ -56,10 +56,8 @@ impl ModelPlan {
 /// and rates allow.
 pub(super) fn kinds(scene: &Scene, first: Kind, situation: impl FnOnce() -> Situation) -> Vec<(Kind, [usize; 3])> {
     let mut kinds = vec![(first, scene.patch_size())];
-    // Several tools with `full` share one body, which no local model does.
-    let several = scene.devices.len() > 1;
     // Over a link both sides make their models of one kind.
-    if !scene.run.switchable || scene.link.is_some() || (several && first == Kind::Full) {
+    if !scene.run.switchable || scene.link.is_some() {
         return kinds;
     }
     let situation = situation();
@@ -67,7 +65,7 @@ pub(super) fn kinds(scene: &Scene, first: Kind, situation: impl FnOnce() -> Situ
     let mut usual = scene.clone();
     usual.local.patch = None;
     for kind in situation.possible.iter().copied().filter(|kind| *kind != first) {
-        let fits = kind != Kind::Full || (!several && situation.tight_share().is_some());
+        let fits = kind != Kind::Full || situation.tight_share().is_some();
         if fits {
             kinds.push((kind, usual.clone().with_model(kind).patch_size()));
         }

@@ -91,6 +91,8 @@ pub struct CaseResult {
     pub auto: (Kind, bool),
     /// Models by name, in time and late; `None` with the reason for what did not run to its end.
     pub runs: Vec<(Kind, [Result<Run, String>; 2])>,
+    /// `full` in twice as many steps.
+    pub finer: Option<Run>,
     seconds: f64,
 }
 
@@ -123,6 +125,9 @@ impl fmt::Display for CaseResult {
                     Err(why) => write!(f, " {why};")?,
                 }
             }
+        }
+        if let Some(finer) = &self.finer {
+            write!(f, " | 2x steps {:.3} max {:.1}", finer.rms, finer.max)?;
         }
         let (auto, warns) = self.auto;
         write!(f, " | auto {}{} ({:.1} s)", auto.name(), if warns { ", unsure" } else { "" }, self.seconds)
@@ -167,7 +172,7 @@ fn run(seed: u64, settings: &Settings) -> Result<CaseResult, Error> {
     if auto.0 != Kind::Full && !models.contains(&auto.0) {
         models.push(auto.0);
     }
-    let options = CompareOptions { models, ..CompareOptions::default() };
+    let options = CompareOptions { models, finer: true, ..CompareOptions::default() };
     let comparison = Comparison::measure(&case.scene, &options, |_| ())
         .map_err(|error| Error::new(error.kind(), format!("case {case}: {error}")))?;
     let full = &comparison.full;
@@ -186,6 +191,7 @@ fn run(seed: u64, settings: &Settings) -> Result<CaseResult, Error> {
         peak_n: full.peak_n(),
         auto,
         runs: options.models.iter().map(|&kind| of(kind)).collect(),
+        finer: comparison.finer.first().and_then(|run| run.measured()).map(|run| Run::of(run, full)),
         seconds: begun.elapsed().as_secs_f64(),
     })
 }

@@ -38,7 +38,8 @@ nothing was chosen by what they say.
 Each runs for 1.2 s in virtual time with the models' defaults, with results of the global model at once (*in time*) or one period late. *rms* is the error of
 the force in % of the largest force of `full`; *jump* the largest change of the force in one tick beyond that of `full`, in the same; *peak* the
 largest force over that of `full`. *Tick* is the CPU time of a haptic tick, the median over scenes of p50 and p99 (with catching up); *periods*
-what the global model works, in periods of simulation. A basis takes its nominal time.
+what the global model works, in periods of simulation. A basis takes its nominal time. *2x steps* is `full` itself in twice as many steps: on
+scenes in which a tool sticks and slips anew that is as far off as a model.
 
 The table after it has what `auto` chooses with nominal costs, how far that is off one period late, and how often it was more than the usual
 `error_pct` of 1 % off without a word of it.
@@ -114,41 +115,33 @@ fn chosen(results: &[&CaseResult]) -> String {
 /// Of all models in time and late; if `is_by_kind`, of `predictive` by class and by motion too, then of `auto`.
 pub fn distributions(results: &[&CaseResult], is_by_kind: bool) -> String {
     let mut rows = Vec::new();
-    let mut add = |name: &str, kind: Kind, of: &dyn Fn(&CaseResult) -> bool| {
+    let row = |name: &str, word: &str, runs: &[&Run], scenes: usize| {
+        let q = |of: fn(&Run) -> f64, share| figure(quantile(runs.iter().map(|run| of(run)).collect(), share));
+        let (rms, jump) = (|run: &Run| run.rms, |run: &Run| run.jump);
+        let errors =
+            [q(rms, 0.5), q(rms, 0.9), q(rms, 0.95), q(rms, 1.0), q(jump, 0.9), q(jump, 1.0), q(|run| run.peak, 1.0)];
+        let costs = [q(|run| run.tick_us[0], 0.5), q(|run| run.tick_us[1], 0.5), q(|run| run.periods, 0.5)];
+        let first = [name.to_owned(), word.to_owned(), format!("{}/{scenes}", runs.len())];
+        first.into_iter().chain(errors).chain(costs).collect::<Vec<_>>()
+    };
+    let of = |name: &str, kind: Kind, of: &dyn Fn(&CaseResult) -> bool| -> Vec<Vec<String>> {
         let those: Vec<&CaseResult> = results.iter().copied().filter(|result| of(result)).collect();
-        for (late, word) in [(false, "in time"), (true, "late")] {
-            let runs = runs(&those, kind, late);
-            if runs.is_empty() {
-                continue;
-            }
-            let q = |of: fn(&Run) -> f64, share| figure(quantile(runs.iter().map(|run| of(run)).collect(), share));
-            let rms = |run: &Run| run.rms;
-            let jump = |run: &Run| run.jump;
-            rows.push(vec![
-                name.to_owned(),
-                word.to_owned(),
-                format!("{}/{}", runs.len(), those.len()),
-                q(rms, 0.5),
-                q(rms, 0.9),
-                q(rms, 0.95),
-                q(rms, 1.0),
-                q(jump, 0.9),
-                q(jump, 1.0),
-                q(|run| run.peak, 1.0),
-                q(|run| run.tick_us[0], 0.5),
-                q(|run| run.tick_us[1], 0.5),
-                q(|run| run.periods, 0.5),
-            ]);
-        }
+        let in_time_or_late = [(false, "in time"), (true, "late")].into_iter();
+        let runs = in_time_or_late.map(|(late, word)| (word, runs(&those, kind, late)));
+        runs.filter(|(_, runs)| !runs.is_empty()).map(|(word, runs)| row(name, word, &runs, those.len())).collect()
     };
     for kind in Kind::ALL {
-        add(&format!("all, `{}`", kind.name()), kind, &|_| true);
+        rows.extend(of(&format!("all, `{}`", kind.name()), kind, &|_| true));
     }
+    let finer: Vec<&Run> = results.iter().filter_map(|result| result.finer.as_ref()).collect();
+    let mut itself = row("all, `full` in 2x steps", "itself", &finer, results.len());
+    itself.splice(10.., ["-"; 3].map(str::to_owned));
+    rows.push(itself);
     for class in Class::ALL.into_iter().filter(|_| is_by_kind) {
-        add(class.name(), Kind::Predictive, &|result| result.class == class);
+        rows.extend(of(class.name(), Kind::Predictive, &|result| result.class == class));
     }
     for motion in Motion::ALL.into_iter().filter(|_| is_by_kind) {
-        add(motion.name(), Kind::Predictive, &|result| result.motion == motion);
+        rows.extend(of(motion.name(), Kind::Predictive, &|result| result.motion == motion));
     }
     let head = [
         "scenes",

@@ -129,9 +129,9 @@ pub struct ModelCost {
     pub global_load: f64,
     /// Number of local models that were built.
     pub builds: u64,
-    /// CPU time that half of the builds of a local model stay within.
+    /// CPU time that half of the builds of a resync's local models stay within.
     pub build_p50: Nanos,
-    /// CPU time that 99 % of the builds of a local model stay within.
+    /// CPU time that 99 % of these stay within.
     pub build_p99: Nanos,
 }
 

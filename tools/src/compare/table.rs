@@ -137,7 +137,7 @@ pub(super) const COLUMNS: [Column; 11] = [
     Column {
         head: ["build", "p50", "us"],
         width: 7,
-        meaning: "CPU time of building a local model, once per resync, p50",
+        meaning: "CPU time of building the local models of a resync, p50",
         value: |of| of.cost.filter(|cost| cost.builds > 0).map(|cost| cost.build_p50.0 as f64 * 1e-3),
     },
 ];

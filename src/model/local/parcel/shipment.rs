@@ -18,12 +18,18 @@ pub struct Shipment {
 
 impl Shipment {
     /// What `models` are built from, if they are [for that](crate::local::Template::departing).
+    ///
+    /// # Real-time
+    /// Not for a tick: allocates.
     pub fn of(models: &LocalModels) -> Self {
         let hosts = models.hosts().iter().map(|&host| host as u16).collect();
         Self { parcels: models.parcels().cloned().collect(), hosts }
     }
 
     /// Appends all of it but the bases.
+    ///
+    /// # Real-time
+    /// Not for a tick: allocates.
     pub fn write(&self, to: &mut BytesWriter<'_>) {
         to.list(&self.hosts, |to, &host| to.u16(host));
         self.parcels.iter().for_each(|parcel| parcel.write(to));
@@ -31,6 +37,9 @@ impl Shipment {
 
     /// Takes what [`write`](Self::write) has appended; `None` if the bytes cannot be that, or the parcels cannot be of one resync. Whether
     /// they fit a body is what [`Image::rebuild`](super::Image::rebuild) asks.
+    ///
+    /// # Real-time
+    /// Not for a tick: allocates.
     pub fn read(from: &mut BytesReader<'_>) -> Option<Self> {
         let mut shipment = Self::default();
         from.list(2, &mut shipment.hosts, BytesReader::u16)?;
@@ -42,11 +51,17 @@ impl Shipment {
     }
 
     /// The haptic tick of the states.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn tick(&self) -> u64 {
         self.parcels.first().map_or(0, Parcel::tick)
     }
 
     /// One for each model that serves somebody.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
     pub fn parcels(&self) -> &[Parcel] {
         &self.parcels
     }

@@ -14,7 +14,7 @@ use crate::{Vec3, Wrench};
 /// A ring that moves by more than this share of the patch's extent in one step is torn along.
 const TORN: f64 = 0.05;
 /// Nodes that are moved at most to catch up in one haptic tick.
-const CATCH_UP_NODES: usize = 3600;
+const CATCH_UP_NODES: usize = 5000;
 /// So long before it was seen to be torn along (ticks) it was on the way to that.
 const TORN_TICKS: u32 = 2;
 
