@@ -54,7 +54,7 @@ struct Window {
     layer: usize,
 }
 
-/// What tools press that a window is not chosen for, and is to hold too if one does.
+/// The nodes and triangles that other tools press than the one for which a window is chosen: it is to hold them too, if there is one.
 #[derive(Clone, Debug, Default)]
 pub struct Beside {
     /// The nodes that they press, or may press before the next model serves, in increasing order.

@@ -4,7 +4,7 @@ use super::Parcel;
 use crate::bytes::{BytesReader, BytesWriter};
 use crate::local::LocalModels;
 
-/// What the local models of all tools are built from on another computer: they cross a link together, as they serve together.
+/// The ingredients of the local models of all tools, to be built on another computer: they cross a link together, as they serve together.
 ///
 /// # Real-time
 /// Not for a tick: allocates.
