@@ -4,6 +4,9 @@ use super::Parcel;
 use crate::bytes::{BytesReader, BytesWriter};
 use crate::local::LocalModels;
 
+/// A parcel is larger in memory than its least bytes: more tools than this are nobody's.
+const MOST_TOOLS: usize = 64;
+
 /// The ingredients of the local models of all tools, to be built on another computer: they cross a link together, as they serve together.
 ///
 /// # Real-time
@@ -43,6 +46,9 @@ impl Shipment {
     pub fn read(from: &mut BytesReader<'_>) -> Option<Self> {
         let mut shipment = Self::default();
         from.list(2, &mut shipment.hosts, BytesReader::u16)?;
+        if shipment.hosts.len() > MOST_TOOLS {
+            return None;
+        }
         let models = shipment.hosts().enumerate().filter(|(tool, host)| tool == host).count();
         for _ in 0..models {
             shipment.parcels.push(Parcel::read(from)?);

@@ -163,6 +163,21 @@ fn a_parcel_of_another_body_is_refused_and_a_path_of_another_ring_is_not_gone() 
     assert!(Image::new(at_rest(ToolShape::Point)).has_room_for(bases.iter().next().unwrap()));
 }
 
+#[test]
+fn a_shipment_for_more_tools_than_anybody_has_is_refused() {
+    let (mut simulation, tools) = pressed(ToolShape::Point, 0.041);
+    let template = Template::new(Kind::Hold, [4, 4, 2], simulation.body()).unwrap();
+    let (_, bytes) = sent(&template, (&mut simulation, &tools), (&[], &Bases::default()));
+    // One model, and so many tools that it serves.
+    let of = |tools: u32| {
+        let mut all = tools.to_le_bytes().to_vec();
+        all.extend((0..tools).flat_map(|_| 0_u16.to_le_bytes()));
+        all.extend(&bytes[4 + 2 * 2..]);
+        Shipment::read(&mut BytesReader(&all)).is_some()
+    };
+    assert_eq!([of(0), of(1), of(2), of(64), of(65)], [false, true, true, true, false]);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
