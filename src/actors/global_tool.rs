@@ -29,7 +29,7 @@ pub(super) struct ToolSide {
     pub(super) triangles: Vec<u32>,
     /// What the others press.
     pub(super) beside: Beside,
-    /// The others whose places its next model holds: it may serve them too.
+    /// The tools whose whole way lies where its next model is made: that may serve them too.
     pub(super) held: Vec<usize>,
     /// The patch of its next model.
     pub(super) patch: Vec<u32>,

@@ -1,7 +1,6 @@
 //! The bridge beside the global actor: tool ticks in, local models and bases out.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use super::super::messages::ToolTick;
 use super::post::Post;
@@ -9,20 +8,12 @@ use super::{MOST_MESSAGES, key_of};
 use crate::link::{Lane, Message, Transport};
 use crate::model::Pose;
 use crate::model::local::{LocalModels, Parcel, Shipment};
-use crate::model::surroundings::{Bases, Basis};
 use crate::runtime::{Actor, ActorError, Nanos, Outcome, QueueWriter, Reader, TickContext};
 
 /// A basis that is not there after so long is sent again.
 const SENT_AGAIN: Nanos = Nanos(3_000_000_000);
 /// Bases that are on their way at the same time: more would wait for one another, and the first ones are wanted first.
 const MOST_ON_THE_WAY: usize = 4;
-
-/// The ports of a [`GlobalBridge`] for one tool.
-#[derive(Debug)]
-pub struct GlobalEnd {
-    /// The tool at every haptic tick that came.
-    pub ticks: QueueWriter<ToolTick>,
-}
 
 /// Carries local models to the haptic side, and the tool ticks that come from there to the global actor.
 ///
@@ -33,7 +24,8 @@ pub struct GlobalBridge {
     post: Post,
     /// The next local models: such as are [built elsewhere](crate::model::local::Template::departing).
     models: Reader<LocalModels>,
-    tools: Vec<GlobalEnd>,
+    /// Where the ticks of each tool go.
+    ticks: Vec<QueueWriter<ToolTick>>,
     /// The newest tick of each tool.
     newest: Vec<u64>,
     bases: SentBases,
@@ -48,11 +40,11 @@ struct SentBases {
 }
 
 impl GlobalBridge {
-    /// A bridge for the tools of `ends`, whose next local models come by `models`: such as are
+    /// A bridge for the tools whose ticks go to `ticks`, and whose next local models come by `models`: such as are
     /// [built elsewhere](crate::model::local::Template::departing).
-    pub fn new(transport: Box<dyn Transport>, models: Reader<LocalModels>, ends: Vec<GlobalEnd>) -> Self {
-        let newest = vec![0; ends.len()];
-        Self { post: Post::new(transport), models, tools: ends, newest, bases: SentBases::default() }
+    pub fn new(transport: Box<dyn Transport>, models: Reader<LocalModels>, ticks: Vec<QueueWriter<ToolTick>>) -> Self {
+        let newest = vec![0; ticks.len()];
+        Self { post: Post::new(transport), models, ticks, newest, bases: SentBases::default() }
     }
 
     fn send_models(&mut self, ctx: &TickContext) {
@@ -87,12 +79,12 @@ impl GlobalBridge {
 
     /// Passes on what is new of `ticks`: most of them came before.
     fn pass(&mut self, ctx: &TickContext, tool: usize, ticks: Vec<(u64, Pose)>) {
-        let (Some(end), Some(newest)) = (self.tools.get_mut(tool), self.newest.get_mut(tool)) else { return };
+        let (Some(onward), Some(newest)) = (self.ticks.get_mut(tool), self.newest.get_mut(tool)) else { return };
         for (tick, pose) in ticks {
             if tick > *newest {
                 *newest = tick;
                 // A full queue is counted; the global model sees the gap and interpolates over it.
-                end.ticks.push(ctx, ToolTick { tick, pose });
+                onward.push(ctx, ToolTick { tick, pose });
             }
         }
     }
@@ -102,10 +94,10 @@ impl SentBases {
     /// Sends what the haptic side lacks of the bases that `parcels` know, those that they need themselves first.
     fn send(&mut self, post: &mut Post, parcels: &[Parcel], now: Nanos) {
         self.give_up_late(now);
-        let of_patch = |parcel: &'_ Parcel| parcel.bases().get(parcel.patch()?).map(Arc::clone);
-        let needed: Vec<Arc<Basis>> = parcels.iter().filter_map(of_patch).collect();
-        let known = parcels.first().map(Parcel::bases);
-        for basis in needed.iter().map(|basis| &**basis).chain(known.into_iter().flat_map(Bases::iter)) {
+        let needed = parcels.iter().filter_map(|parcel| parcel.bases().get(parcel.patch()?)).map(|basis| &**basis);
+        // They all know the same.
+        let known = parcels.iter().take(1).flat_map(|parcel| parcel.bases().iter());
+        for basis in needed.chain(known) {
             let key = key_of(basis.patch());
             if self.begin(key, now) {
                 post.send_with(Lane::Bulk, now, |header, bytes| Message::write_basis(key, basis, header, bytes));

@@ -17,13 +17,6 @@ const REPEATED: usize = 8;
 /// Between two questions for the time.
 const ASKS_EVERY: Nanos = Nanos(50_000_000);
 
-/// The ports of a [`HapticBridge`] for one tool.
-#[derive(Debug)]
-pub struct HapticEnd {
-    /// The tool at every haptic tick.
-    pub ticks: QueueReader<ToolTick>,
-}
-
 /// Carries tool ticks to the global side, and builds the local models that come from there.
 ///
 /// # Real-time
@@ -51,23 +44,23 @@ pub struct HapticBridge {
 
 #[derive(Debug)]
 struct Tool {
-    end: HapticEnd,
+    ticks: QueueReader<ToolTick>,
     /// Oldest first.
     recent: VecDeque<ToolTick>,
 }
 
 impl HapticBridge {
-    /// A bridge for the tools of `ends`, which builds `models` by the `image` of the body over there.
+    /// A bridge for the tools whose ticks come by `ticks`, which builds `models` by the `image` of the body over there.
     pub fn new(
         transport: Box<dyn Transport>,
-        ends: Vec<HapticEnd>,
+        ticks: Vec<QueueReader<ToolTick>>,
         models: Writer<LocalModels>,
         image: Image,
         recorder: Recorder,
     ) -> Self {
-        let tool = |end| Tool { end, recent: VecDeque::new() };
+        let tool = |ticks| Tool { ticks, recent: VecDeque::new() };
         let (newest, arrived, bases, clock, heard, asked) = Default::default();
-        let (mut post, tools) = (Post::new(transport), ends.into_iter().map(tool).collect());
+        let (mut post, tools) = (Post::new(transport), ticks.into_iter().map(tool).collect());
         let peer = post.peer();
         Self { post, tools, models, newest, arrived, image, bases, clock, heard, asked, peer, recorder }
     }
@@ -87,7 +80,7 @@ impl HapticBridge {
     fn send_ticks(&mut self, ctx: &TickContext) {
         for (number, tool) in (0..).zip(&mut self.tools) {
             let mut new = 0;
-            while let Some(tick) = tool.end.ticks.pop(ctx) {
+            while let Some(tick) = tool.ticks.pop(ctx) {
                 if tool.recent.len() == MOST_TICKS {
                     tool.recent.pop_front();
                 }

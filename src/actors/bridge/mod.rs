@@ -16,8 +16,8 @@ mod post;
 
 use crate::runtime::Nanos;
 
-pub use global::{GlobalBridge, GlobalEnd};
-pub use haptic::{HapticBridge, HapticEnd};
+pub use global::GlobalBridge;
+pub use haptic::HapticBridge;
 
 /// A haptic side that has heard nothing for so long takes the connection for gone: by default no force is left by then.
 pub const SILENCE: Nanos = Nanos(500_000_000);

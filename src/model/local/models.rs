@@ -119,7 +119,7 @@ impl LocalModels {
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn catch_up(&self) -> bool {
+    pub fn have_to_catch_up(&self) -> bool {
         self.serving().any(LocalModel::catches_up)
     }
 

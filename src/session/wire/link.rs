@@ -1,12 +1,12 @@
 //! The two bridges of a link, and what is between them and the actors beside them.
 
 use super::global::ToolLink;
-use crate::actors::{GlobalBridge, GlobalEnd, HapticBridge, HapticEnd, LocalPorts, ModelMaker};
+use crate::actors::{GlobalBridge, HapticBridge, LocalPorts, ModelMaker, ToolTick};
 use crate::error::{Error, ErrorKind};
 use crate::link::{Conditions, Transport, VirtualLink};
 use crate::model::local::{Image, LocalModels};
 use crate::model::simulation::Simulation;
-use crate::runtime::{Actor, ExchangePort, Reader, RuntimeBuilder, Writer};
+use crate::runtime::{Actor, ExchangePort, QueueReader, QueueWriter, Reader, RuntimeBuilder, Writer};
 
 /// Records between two drains: one every 50 ms.
 const RECORDS: usize = 256;
@@ -29,8 +29,9 @@ pub(super) struct Linking {
     ends: Ends,
     /// Of the body, where the devices are.
     image: Option<Image>,
-    haptic: Vec<HapticEnd>,
-    global: Vec<GlobalEnd>,
+    /// From the local actor to the bridge, and from the bridge to the global one: of each tool.
+    haptic: Vec<QueueReader<ToolTick>>,
+    global: Vec<QueueWriter<ToolTick>>,
     /// From the bridge to the local actor, and from the global one to the bridge.
     arriving: Option<Writer<LocalModels>>,
     departing: Option<Reader<LocalModels>>,
@@ -66,12 +67,12 @@ impl Linking {
     ) -> (Option<ToolLink>, Option<LocalPorts>) {
         let local = self.image.is_some().then(|| {
             let (to_bridge, from_local) = graph.queue(ticks);
-            self.haptic.push(HapticEnd { ticks: from_local });
+            self.haptic.push(from_local);
             LocalPorts { ticks: to_bridge, geometry: None }
         });
         let link = self.has_global().then(|| {
             let link = ToolLink { ticks: graph.queue_port(ticks), geometry: None };
-            self.global.push(GlobalEnd { ticks: link.ticks.writer() });
+            self.global.push(link.ticks.writer());
             link
         });
         (link, local)

@@ -123,7 +123,7 @@ impl Succession {
     fn catch_up(&mut self, ways: &Ways) {
         let Some((version, mut reached)) = self.arrival else { return };
         let begun = ways.now() - 1;
-        if self.arriving.catch_up() {
+        if self.arriving.have_to_catch_up() {
             let until = begun.min(reached + self.arriving.catch_up_ticks());
             while reached < until {
                 reached += 1;
