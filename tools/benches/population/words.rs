@@ -38,8 +38,8 @@ nothing was chosen by what they say.
 Each runs for 1.2 s in virtual time with the models' defaults, with results of the global model at once (*in time*) or one period late. *rms* is the error of
 the force in % of the largest force of `full`; *jump* the largest change of the force in one tick beyond that of `full`, in the same; *peak* the
 largest force over that of `full`. *Tick* is the CPU time of a haptic tick, the median over scenes of p50 and p99 (with catching up); *periods*
-what the global model works, in periods of simulation. A basis takes its nominal time. *2x steps* is `full` itself in twice as many steps: on
-scenes in which a tool sticks and slips anew that is as far off as a model.
+what the global model works, in periods of simulation. A basis takes its nominal time. *2x steps* is `full` itself in twice as many steps: how far
+off the reference is.
 
 The table after it has what `auto` chooses with nominal costs, how far that is off one period late, and how often it was more than the usual
 `error_pct` of 1 % off without a word of it.
