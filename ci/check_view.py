@@ -1,6 +1,6 @@
 """Opens the page of `palpate view` in chromium, pushes the body, and compares what is shown with the log of that run.
 
-Usage: check_view.py PALPATE FOLDER [--shots FOLDER] [--chromium PROGRAM]; writes logs to FOLDER
+Usage: check_view.py PALPATE FOLDER [--linked] [--shots FOLDER] [--chromium PROGRAM]; writes logs to FOLDER
 
 Drives the browser as check_page.py does. The picture is drawn by Chromium's own software renderer.
 """
@@ -506,6 +506,45 @@ def check_return(check, browser, palpate, shots):
         view.stop()
 
 
+def check_linked(check, browser, palpate, log, shots):
+    """The body is in another process: the surface that is shown is that one's, and what a visitor changes reaches it."""
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        address = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+    serving = subprocess.Popen([palpate, "serve", "demo", "--model", "patch", "--listen", address], stdout=subprocess.DEVNULL)
+    view = None
+    try:
+        view = View(palpate, "demo", "--model", "patch", "--global", address, "--out", str(log))
+        start(browser, view)
+        push(check, browser)
+        offered = browser.run("[...document.getElementById('model').options].map((option) => option.value)")
+        check.that(offered == ["patch"], f"over a link the page offers {offered}")
+        seen = []
+        for _ in range(8):
+            seen.append(browser.run(STATE)["tick"])
+            time.sleep(0.2)
+        shoot(browser, shots, "linked-1280-light")
+        before = browser.run(STATE)
+        choose(browser, "stiffness", browser.run("document.getElementById('stiffness').max"))
+        wait(browser, lambda state: newtons(state["computed"]) > 1.08 * newtons(before["computed"]), "a stiffer body over there")
+        smooth(check, browser)
+        # What is put in the place of this session begins with the body at rest, there too.
+        browser.run("document.getElementById('reset').click()")
+        wait(browser, lambda state: state["time"] < before["time"] and state["frames"] > 5, "a reset")
+        # One that stands still is no body that may be felt, and the page is the same when it goes on.
+        serving.send_signal(signal.SIGSTOP)
+        time.sleep(1.5)
+        serving.send_signal(signal.SIGCONT)
+        last = browser.run(STATE)
+        wait(browser, lambda state: state["surfaces"] > last["surfaces"] + 5, "a surface again")
+        found = complaints(browser, view.url.split("#")[0])
+    finally:
+        if view:
+            view.stop()
+        serving.kill()
+    check_forces(check, seen, commanded(palpate, log), "linked")
+    check.faults += [f"linked: {complaint}" for complaint in found]
+
+
 def check_log(check, browser, palpate, log, shots):
     forces = commanded(palpate, log)
     view = View(palpate, str(log))
@@ -538,6 +577,7 @@ def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("palpate", help="the program")
     arguments.add_argument("folder", type=Path, help="for logs")
+    arguments.add_argument("--linked", action="store_true", help="only with the body in another process; for a program with the feature `link`")
     arguments.add_argument("--shots", type=Path, help="keep screenshots here")
     arguments.add_argument("--chromium", default=shutil.which("chromium") or "chromium")
     args = arguments.parse_args()
@@ -546,10 +586,13 @@ def main():
     try:
         for domain in ("Page", "Runtime", "Network", "Log"):
             browser.send(f"{domain}.enable")
-        check_live(check, browser, args.palpate, log, args.shots)
-        check_return(check, browser, args.palpate, args.shots)
-        check_log(check, browser, args.palpate, log, args.shots)
-        check_opening(check, args.palpate, args.folder)
+        if args.linked:
+            check_linked(check, browser, args.palpate, log, args.shots)
+        else:
+            check_live(check, browser, args.palpate, log, args.shots)
+            check_return(check, browser, args.palpate, args.shots)
+            check_log(check, browser, args.palpate, log, args.shots)
+            check_opening(check, args.palpate, args.folder)
     finally:
         with contextlib.suppress(RuntimeError):
             browser.close()

@@ -7,6 +7,7 @@ use palpate::devices::Scripted;
 use palpate::log::{ForceSample, LogRecord, ServedBy};
 use palpate::model::local::Kind;
 use palpate::prelude::*;
+use palpate::scene::LinkSpec;
 
 /// What is done at a time (ms).
 type Act<'a> = (u64, &'a dyn Fn(&Controls));
@@ -172,6 +173,27 @@ fn friction_that_is_changed_is_what_holds_a_dragged_tool() {
         let (before, after) = (ratio(&[]), ratio(&[(700, &|controls| controls.set_friction(0.1.into()).unwrap())]));
         // The surface leans under the tool, so that the ratio is not the coefficient itself.
         assert!(after < before - 0.15, "{model:?}: {before} {after}");
+    }
+}
+
+/// Check that what is changed crosses a link that loses some of what it is given, and takes its time there: the force is as ever for
+/// one way and the time that a model takes on the other.
+#[test]
+fn over_a_link_friction_and_stiffness_change_when_they_have_crossed_it() {
+    let link = || LinkSpec { delay_ms: 20.0, loss: 0.05, seed: 3, ..LinkSpec::default() };
+    for model in [Kind::Hold, Kind::Patch, Kind::Predictive] {
+        let over = |wanted: &[Act<'_>]| run(pressed(model, true).link(link()), 1500, wanted);
+        let as_made = over(&[]);
+        let change: Act<'_> = (1200, &|controls| {
+            controls.set_stiffness(1.5).unwrap();
+            controls.set_friction(0.1.into()).unwrap();
+        });
+        let changed = over(&[change]);
+        let first = as_made.iter().zip(&changed).position(|(a, b)| a.force_n != b.force_n).unwrap();
+        assert!((1240..1400).contains(&first), "{model:?}: {first} ms");
+        let normal = |forces: &[ForceSample]| forces.last().unwrap().force_n[2];
+        let ratio = normal(&changed) / normal(&as_made);
+        assert!((1.2..1.6).contains(&ratio), "{model:?}: {ratio} times as hard");
     }
 }
 

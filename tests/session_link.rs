@@ -2,6 +2,8 @@
 
 mod session_support;
 
+use std::time::Duration;
+
 use palpate::log::ForceSample;
 use palpate::model::Vec3;
 use palpate::model::body::Body;
@@ -150,7 +152,11 @@ fn a_session_over_a_link_is_replayed_bit_for_bit() {
     let scene = || Session::from_scene(Scene::demo()).model(Kind::Predictive).link(bad());
     for (name, builder) in [("virtual", scene().virtual_time()), ("threads", scene())] {
         let log = folder.path().join(name);
-        let summary = builder.duration_s(1.0).log(&log).build().unwrap().run().unwrap();
+        let mut running = builder.duration_s(1.0).log(&log).build().unwrap().start().unwrap();
+        running.wait_for(Duration::from_millis(500));
+        running.take_controls().unwrap().set_friction(0.1.into()).unwrap();
+        running.wait();
+        let summary = running.stop();
         assert!(summary.log_error.is_none() && summary.report.devices[0].force.ticks > 500);
         let report = Session::replay(&log).unwrap().run().unwrap();
         assert!(report.is_identical() && report.force.logged > 500, "{name}: {report}");

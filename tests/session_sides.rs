@@ -26,6 +26,8 @@ struct Line {
     /// What was said over it.
     hello: Arc<Mutex<Option<Hello>>>,
     peer: Arc<Mutex<u64>>,
+    /// Pictures of the body that were sent.
+    pictures: Arc<Mutex<usize>>,
 }
 
 #[derive(Clone, Debug)]
@@ -41,7 +43,8 @@ impl Line {
 }
 
 impl Transport for End {
-    fn send(&mut self, _: Lane, message: &[u8], _: Nanos) {
+    fn send(&mut self, lane: Lane, message: &[u8], _: Nanos) {
+        *self.line.pictures.lock().unwrap() += usize::from(lane == Lane::Pictures);
         if !*self.line.is_cut.lock().unwrap() {
             self.line.ways[self.side].lock().unwrap().push_back(message.to_vec());
         }
@@ -150,6 +153,72 @@ fn a_global_side_that_dies_takes_the_force_away_and_another_one_gives_it_back() 
     assert!(felt(cut - 0.4, cut) > 0.1, "a force before");
     assert_eq!(felt(cut + 0.4, returned), 0.0, "none without a model");
     assert!(felt(back, back + 1.5) > 0.1, "a force again, after {back} s");
+}
+
+/// Pictures that have been sent over a line so far.
+fn pictures(line: &Line) -> usize {
+    *line.pictures.lock().unwrap()
+}
+
+/// Check that whoever looks sees the surface where it is pressed, and how it swells beside, as the global model has it; that its nodes
+/// are there to single precision, and that nothing of it crosses while nobody looks.
+#[test]
+fn the_surface_crosses_while_somebody_looks_at_it() {
+    let line = Line::default();
+    let (mut haptic, global) = start(&line, Kind::Patch, 60.0);
+    let mut viewer = haptic.take_viewer().unwrap();
+    assert!(!viewer.knows_stress());
+    let first = viewer.surface().clone();
+    assert_eq!((first.time, first.positions.as_slice()), (Nanos::ZERO, block().rest()));
+    haptic.wait_for(Duration::from_millis(1200));
+    let unseen = pictures(&line);
+    assert!((1..20).contains(&unseen), "the first half second, in which somebody might have looked: {unseen}");
+    haptic.wait_for(Duration::from_millis(300));
+    assert_eq!(pictures(&line), unseen, "nobody looks");
+    let (mut newest, mut shown) = (Nanos::ZERO, 0);
+    for _ in 0..60 {
+        haptic.wait_for(Duration::from_millis(10));
+        let surface = viewer.surface();
+        assert!(surface.time >= newest, "none comes back");
+        shown += usize::from(surface.time > newest);
+        newest = surface.time;
+    }
+    assert!(shown > 8 && newest > Nanos(1_500_000_000), "{shown} pictures until {newest}");
+    let tool = viewer.tool().position;
+    let surface = viewer.surface();
+    let (rest, nodes) = (block().rest().to_vec(), block().surface().nodes());
+    let beneath = (0..rest.len()).min_by(|&a, &b| {
+        let away = |node: usize| (surface.positions[node] - tool).norm();
+        away(a).total_cmp(&away(b))
+    });
+    let sunk = rest[beneath.unwrap()].z - surface.positions[beneath.unwrap()].z;
+    assert!(sunk > 1e-3, "{sunk} m");
+    let stays = |node: &u32| surface.positions[*node as usize] == rest[*node as usize];
+    assert!(
+        (0..rest.len() as u32).filter(|node| !nodes.contains(node)).all(|node| stays(&node)),
+        "what is below does not cross"
+    );
+    // What the program sets is what the other side has.
+    let (here, mut there) = (haptic.take_controls().unwrap(), global);
+    here.set_stiffness(1.5).unwrap();
+    here.set_friction(0.25.into()).unwrap();
+    haptic.wait_for(Duration::from_millis(600));
+    let controls = there.take_controls().unwrap();
+    assert_eq!((controls.stiffness(), controls.friction().kinetic), (1.5, 0.25));
+    assert_eq!(viewer.surface().stiffness.factor(), 1.5);
+    // A picture of what has not been, and one of another body.
+    *line.is_cut.lock().unwrap() = true;
+    haptic.wait_for(Duration::from_millis(50));
+    let last = viewer.surface().time;
+    for (number, time, count) in [(1, Nanos(u64::MAX), nodes.len()), (2, last + Nanos(1), nodes.len() + 1)] {
+        let forged = Message::Surface { time, stiffness: Default::default(), places: vec![[9.0; 3]; count] };
+        let mut bytes = Vec::new();
+        forged.write(Header { epoch: 1, number: (1 << 40) + number, sent: Nanos::ZERO }, &mut bytes);
+        line.ways[1].lock().unwrap().push_back(bytes);
+    }
+    haptic.wait_for(Duration::from_millis(50));
+    assert_eq!(viewer.surface().time, last);
+    assert_eq!((haptic.stop().runtime.fault, there.stop().runtime.fault), (None, None));
 }
 
 /// A model of a tick that has not been would never be old: nobody believes it.

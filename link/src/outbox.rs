@@ -15,18 +15,19 @@ const MOST_WAITING: usize = 256;
 /// How the lanes go, the most urgent first.
 ///
 /// A blocking message can stall a dropping one of its own priority (zenoh issue 2584), so each lane has a priority and a thread of its own.
-/// Ticks that cannot go at once are worth nothing a moment later. A model or a basis goes at the pace of the line; dropped half way, as
+/// Ticks that cannot go at once are worth nothing a moment later. Everything else goes at the pace of the line; dropped half way, as
 /// zenoh does with what takes longer than 50 ms, it would never arrive over a slow one.
-const LANES: [(&str, Priority, CongestionControl); 3] = [
+const LANES: [(&str, Priority, CongestionControl); Lane::COUNT] = [
     ("urgent", Priority::RealTime, CongestionControl::Drop),
     ("model", Priority::InteractiveHigh, CongestionControl::Block),
     ("bulk", Priority::DataLow, CongestionControl::Block),
+    ("pictures", Priority::Background, CongestionControl::Block),
 ];
 
 /// The sending half of a line; its threads end when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Outbox {
-    lanes: [Arc<Queue>; 3],
+    lanes: [Arc<Queue>; Lane::COUNT],
 }
 
 #[derive(Debug, Default)]
@@ -37,7 +38,7 @@ struct Queue {
 
 #[derive(Debug, Default)]
 struct Waiting {
-    messages: VecDeque<(Lane, Vec<u8>)>,
+    messages: VecDeque<Vec<u8>>,
     is_over: bool,
 }
 
@@ -62,12 +63,7 @@ impl Outbox {
 
     /// Hands over a message; never waits for the network.
     pub(crate) fn put(&self, lane: Lane, message: &[u8]) {
-        let place = match lane {
-            Lane::Urgent => 0,
-            Lane::Models => 1,
-            Lane::Bulk => 2,
-        };
-        self.lanes[place].put(lane, message);
+        self.lanes[lane as usize].put(lane, message);
     }
 }
 
@@ -87,13 +83,13 @@ impl Queue {
 
     fn put(&self, lane: Lane, message: &[u8]) {
         let mut waiting = self.waiting();
-        if let Lane::Models = lane {
-            waiting.messages.retain(|(other, _)| *other != lane);
+        if lane.keeps_the_newest() {
+            waiting.messages.clear();
         }
         if waiting.messages.len() >= MOST_WAITING {
             waiting.messages.pop_front();
         }
-        waiting.messages.push_back((lane, message.to_vec()));
+        waiting.messages.push_back(message.to_vec());
         drop(waiting);
         self.changed.notify_one();
     }
@@ -105,7 +101,7 @@ impl Queue {
             if waiting.is_over {
                 return None;
             }
-            if let Some((_, message)) = waiting.messages.pop_front() {
+            if let Some(message) = waiting.messages.pop_front() {
                 return Some(message);
             }
             waiting = self.changed.wait(waiting).unwrap_or_else(PoisonError::into_inner);

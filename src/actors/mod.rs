@@ -38,12 +38,13 @@ mod throttle;
 mod ticks;
 mod tool;
 mod touched;
+mod tunable;
 mod whole;
 
 pub(crate) use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub(crate) use basis_store::BasisStore;
 pub(crate) use believed::{Bounds, Disbelieved};
-pub(crate) use bridge::{GlobalBridge, HapticBridge};
+pub(crate) use bridge::{GlobalBridge, GlobalBridgePorts, HapticBridge, HapticBridgePorts};
 pub(crate) use device::{DeviceActor, DevicePorts, GAP_S, first_state};
 pub(crate) use global::{GlobalActor, GlobalPlan};
 pub(crate) use global_ports::{GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};
@@ -53,6 +54,7 @@ pub(crate) use model_maker::ModelMaker;
 pub(crate) use scene_watch::SceneWatch;
 pub(crate) use settings::Settings;
 pub(crate) use tool::{LocalTool, LocalToolPorts};
+pub(crate) use tunable::Tunable;
 pub(crate) use whole::WholeActor;
 
 // Part of what a session shows.

@@ -11,7 +11,9 @@
 
 use std::fmt;
 
+use crate::model::body::Stiffness;
 use crate::model::bytes::{BytesReader, BytesWriter};
+use crate::model::contact::Friction;
 use crate::model::local::Shipment;
 use crate::model::surroundings::Basis;
 use crate::model::{Pose, turn_of, wxyz};
@@ -19,7 +21,7 @@ use crate::runtime::Nanos;
 
 const MAGIC: [u8; 4] = *b"plnk";
 /// The version of the format: of another one nothing is read.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 4;
 /// No message is longer (bytes).
 pub const LARGEST: usize = 1 << 25;
 
@@ -27,6 +29,8 @@ pub const LARGEST: usize = 1 << 25;
 pub const MOST_TICKS: usize = 64;
 /// Bases that one message names at most.
 const MOST_HELD: usize = 1024;
+/// Bytes of a place of the surface.
+const PLACE: usize = 3 * 4;
 /// Bytes of a tick.
 const TICK: usize = 8 * 8;
 /// No session lasts longer: 34 years at 1 kHz.
@@ -67,8 +71,26 @@ pub enum Message {
         /// The surroundings.
         basis: Box<Basis>,
     },
-    /// To the global side: the bases that are there, by their keys.
-    Held(Vec<u64>),
+    /// To the global side, again and again: what is there and what is wanted.
+    Wants {
+        /// The bases that are there, by their keys.
+        held: Vec<u64>,
+        /// Friction between tools and body.
+        friction: Friction,
+        /// What the body's stiffness is to go to.
+        stiffness: Stiffness,
+        /// Somebody looks at the surface.
+        is_watched: bool,
+    },
+    /// To the haptic side, while somebody looks: the body's surface.
+    Surface {
+        /// The haptic time that it belongs to.
+        time: Nanos,
+        /// How stiff the body is.
+        stiffness: Stiffness,
+        /// Positions (m) of the [surface's nodes](crate::model::mesh::Surface::nodes).
+        places: Vec<[f32; 3]>,
+    },
     /// To the global side: what time is it?
     Ping,
     /// To the haptic side: when the ping was sent, by the clock there, and when it came in, by the clock here.
@@ -83,11 +105,12 @@ pub enum Message {
 const TICKS: u16 = 1;
 const MODELS: u16 = 2;
 const BASIS: u16 = 3;
-const HELD: u16 = 4;
+const WANTS: u16 = 4;
 const PING: u16 = 5;
 const PONG: u16 = 6;
+const SURFACE: u16 = 7;
 /// A [`Hello`](super::Hello), which is none of the messages of a session.
-pub(super) const HELLO: u16 = 7;
+pub(super) const HELLO: u16 = 8;
 
 /// Why a message is not believed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,7 +156,17 @@ impl Message {
                 to.u64(*key);
                 to.0.extend_from_slice(&basis.to_bytes(*key));
             }
-            Self::Held(keys) => to.list(&keys[..keys.len().min(MOST_HELD)], |to, &key| to.u64(key)),
+            Self::Wants { held, friction, stiffness, is_watched } => {
+                to.list(&held[..held.len().min(MOST_HELD)], |to, &key| to.u64(key));
+                friction.write(to);
+                to.f64(stiffness.factor());
+                to.u8((*is_watched).into());
+            }
+            Self::Surface { time, stiffness, places } => {
+                to.u64(time.0);
+                to.f64(stiffness.factor());
+                to.list(places, |to, place| place.iter().for_each(|&coordinate| to.f32(coordinate)));
+            }
             Self::Ping => {}
             Self::Pong { sent, received } => {
                 to.u64(sent.0);
@@ -154,7 +187,8 @@ impl Message {
             Self::Ticks { .. } => TICKS,
             Self::Models(_) => MODELS,
             Self::Basis { .. } => BASIS,
-            Self::Held(_) => HELD,
+            Self::Wants { .. } => WANTS,
+            Self::Surface { .. } => SURFACE,
             Self::Ping => PING,
             Self::Pong { .. } => PONG,
         }
@@ -166,7 +200,7 @@ impl Message {
     /// If it is none of this version, to the last byte.
     pub fn read(bytes: &[u8]) -> Result<(Header, Self), Refused> {
         let (kind, mut from) = read_kind(bytes)?;
-        if !(TICKS..=PONG).contains(&kind) {
+        if !(TICKS..=SURFACE).contains(&kind) {
             return Err(Refused::Kind(kind));
         }
         Self::read_body(kind, &mut from).filter(|_| from.0.is_empty()).ok_or(Refused::Malformed)
@@ -178,7 +212,7 @@ impl Message {
     /// If [`read`](Self::read) would refuse them for that.
     pub fn glance(bytes: &[u8]) -> Result<Header, Refused> {
         let (kind, mut from) = read_kind(bytes)?;
-        if !(TICKS..=PONG).contains(&kind) {
+        if !(TICKS..=SURFACE).contains(&kind) {
             return Err(Refused::Kind(kind));
         }
         read_header(&mut from).ok_or(Refused::Malformed)
@@ -203,13 +237,21 @@ impl Message {
                 let basis = Box::new(Basis::from_bytes(std::mem::take(&mut from.0), key)?);
                 Self::Basis { key, basis }
             }
-            HELD => {
-                let mut keys = Vec::new();
-                from.list(8, &mut keys, BytesReader::u64)?;
-                Self::Held(keys)
+            WANTS => {
+                let mut held = Vec::new();
+                from.list(8, &mut held, BytesReader::u64)?;
+                let (friction, stiffness) = (Friction::read(from)?, Stiffness::times(from.f64()?)?);
+                let is_watched = from.u8().filter(|&byte| byte < 2)? == 1;
+                Self::Wants { held, friction, stiffness, is_watched }
             }
             PING => Self::Ping,
-            _ => Self::Pong { sent: Nanos(from.u64()?), received: Nanos(from.u64()?) },
+            PONG => Self::Pong { sent: Nanos(from.u64()?), received: Nanos(from.u64()?) },
+            _ => {
+                let (time, stiffness) = (Nanos(from.u64()?), Stiffness::times(from.f64()?)?);
+                let mut places = Vec::new();
+                from.list(PLACE, &mut places, read_place)?;
+                Self::Surface { time, stiffness, places }
+            }
         };
         Some((header, message))
     }
@@ -259,6 +301,12 @@ fn read_tick(from: &mut BytesReader<'_>) -> Option<(u64, Pose)> {
     Some((from.u64().filter(|&tick| tick <= LAST_TICK)?, read_pose(from)?))
 }
 
+/// A place in reach, in single precision.
+fn read_place(from: &mut BytesReader<'_>) -> Option<[f32; 3]> {
+    let place = [from.f32()?, from.f32()?, from.f32()?];
+    place.iter().all(|coordinate| f64::from(coordinate.abs()) <= FARTHEST).then_some(place)
+}
+
 /// A pose in reach, whose turn turns.
 pub(super) fn read_pose(from: &mut BytesReader<'_>) -> Option<Pose> {
     let position = from.vector().filter(|place| place.amax() <= FARTHEST)?;
@@ -288,11 +336,17 @@ mod tests {
         Shipment::of(&LocalModels::new(1, || template.departing()))
     }
 
-    fn some() -> [Message; 5] {
+    fn some() -> [Message; 6] {
         let ticks = (1..9).map(|tick| (tick, Pose::at(Vec3::new(tick as f64, -0.0, 1e-300)))).collect();
         [
             Message::Ticks { tool: 1, ticks },
-            Message::Held(vec![1, u64::MAX]),
+            Message::Wants {
+                held: vec![1, u64::MAX],
+                friction: f64::INFINITY.into(),
+                stiffness: Stiffness::times(0.7).unwrap(),
+                is_watched: true,
+            },
+            Message::Surface { time: Nanos(3), stiffness: Stiffness::default(), places: vec![[1.0, -0.0, 1e-30]; 3] },
             Message::Ping,
             Message::Pong { sent: Nanos(1), received: Nanos(2) },
             Message::Models(shipment()),
@@ -322,7 +376,7 @@ mod tests {
         assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Kind(99));
         bytes[4] = 1;
         assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Version(1));
-        assert!(Refused::Version(1).to_string().contains("version 1, this is version 3"));
+        assert!(Refused::Version(1).to_string().contains("version 1, this is version 4"));
     }
 
     #[test]
@@ -330,6 +384,11 @@ mod tests {
         for wrong in [f64::NAN, f64::INFINITY] {
             let ticks = vec![(1, Pose::at(Vec3::new(0.0, wrong, 0.0)))];
             assert_eq!(Message::read(&bytes_of(&Message::Ticks { tool: 0, ticks })).unwrap_err(), Refused::Malformed);
+        }
+        for wrong in [f32::NAN, f32::INFINITY, 1e9] {
+            let places = vec![[0.0, wrong, 0.0]];
+            let surface = Message::Surface { time: Nanos(3), stiffness: Stiffness::default(), places };
+            assert_eq!(Message::read(&bytes_of(&surface)).unwrap_err(), Refused::Malformed);
         }
         let turned = Pose { position: Vec3::zeros(), orientation: turn_of([0.5, 0.0, 0.0, 0.0]) };
         let far = Pose::at(Vec3::new(0.0, -1e200, 0.0));
@@ -341,7 +400,8 @@ mod tests {
 
     #[test]
     fn a_huge_count_asks_for_no_memory() {
-        let mut bytes = bytes_of(&Message::Held(Vec::new()));
+        let none = Message::Surface { time: Nanos(3), stiffness: Stiffness::default(), places: Vec::new() };
+        let mut bytes = bytes_of(&none);
         let count = bytes.len() - 4;
         bytes[count..].copy_from_slice(&u32::MAX.to_le_bytes());
         assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Malformed);
@@ -350,7 +410,7 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn any_bytes_are_refused_or_read(
-            kind in 0_u16..8,
+            kind in 0_u16..9,
             body in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..400),
             flips in proptest::collection::vec((0_usize..4000, 1_u8..), 0..4),
         ) {

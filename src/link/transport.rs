@@ -13,6 +13,18 @@ pub enum Lane {
     Models,
     /// Large and needed once: bases.
     Bulk,
+    /// The newest picture of the body, for somebody who looks: after everything else, and of those that wait only the last.
+    Pictures,
+}
+
+impl Lane {
+    /// So many lanes there are, the most urgent first.
+    pub const COUNT: usize = 4;
+
+    /// True if what waits is worth nothing once there is something newer.
+    pub fn keeps_the_newest(self) -> bool {
+        matches!(self, Self::Models | Self::Pictures)
+    }
 }
 
 /// Carries messages to another computer and back, at most once each, perhaps late, in another order or not at all.

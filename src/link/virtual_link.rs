@@ -112,7 +112,7 @@ struct Way {
     /// Numbers that have been drawn.
     drawn: u64,
     /// The most urgent first.
-    lanes: [VecDeque<Waiting>; 3],
+    lanes: [VecDeque<Waiting>; Lane::COUNT],
     /// When the line takes the next packet.
     free_at: Nanos,
     /// By time, and by number where times are equal.
@@ -124,7 +124,6 @@ struct Way {
 
 #[derive(Debug)]
 struct Waiting {
-    lane: Lane,
     message: Vec<u8>,
     since: Nanos,
     /// Bytes that have not gone yet.
@@ -143,20 +142,15 @@ impl Way {
     }
 
     fn wait(&mut self, lane: Lane, message: &[u8], now: Nanos) {
-        let place = match lane {
-            Lane::Urgent => 0,
-            Lane::Models => 1,
-            Lane::Bulk => 2,
-        };
-        let waiting = &mut self.lanes[place];
-        if let Lane::Models = lane {
+        let waiting = &mut self.lanes[lane as usize];
+        if lane.keeps_the_newest() {
             // One that has begun to go goes on.
-            waiting.retain(|other| other.lane != lane || other.left < other.message.len());
+            waiting.retain(|other| other.left < other.message.len());
         }
         if waiting.len() >= MOST_WAITING {
             waiting.pop_front();
         }
-        waiting.push_back(Waiting { lane, message: message.to_vec(), since: now, left: message.len() });
+        waiting.push_back(Waiting { message: message.to_vec(), since: now, left: message.len() });
     }
 
     /// Lets go what has its turn until `now`.

@@ -1,23 +1,16 @@
 //! What a program changes of a session while it runs.
 
 use super::prepare::ModelPlan;
-use crate::actors::Settings;
+use crate::actors::Tunable;
 use crate::error::{Error, ErrorKind};
-use crate::model::body::Stiffness;
-use crate::model::contact::{Equations, Friction};
+use crate::model::contact::Friction;
 use crate::model::local::Kind;
-use crate::runtime::Parameter;
-
-/// The largest coefficient of friction, but for an infinite one: no surface has more.
-const MOST_FRICTION: f64 = 10.0;
-/// How much softer a body may be made: a body next to nothing holds no tool.
-const SOFTEST: f64 = 0.01;
 
 /// Changes friction, stiffness and local model of a session that runs; its body goes on as it is.
 ///
 /// What is set is taken by the next release of the global model, and reaches the force with the local model that is built then, within a
 /// period or two of it; the resync's blend leads over. `full` takes friction and stiffness at its next tick. The log has what was taken
-/// and when, so that a replay repeats it.
+/// and when, so that a replay repeats it. Over a link friction and stiffness go to the global model on the other side.
 ///
 /// ```
 /// use palpate::model::local::Kind;
@@ -43,16 +36,13 @@ const SOFTEST: f64 = 0.01;
 /// Not for a tick: takes a lock that no tick takes.
 #[derive(Debug)]
 pub struct Controls {
-    settings: Parameter<Settings>,
+    settings: Tunable,
     models: Vec<Kind>,
-    stiffest: Stiffness,
-    equations: Equations,
 }
 
 impl Controls {
-    pub(super) fn new(settings: Parameter<Settings>, plan: &ModelPlan) -> Self {
-        let models = plan.kinds.iter().map(|(kind, _)| *kind).collect();
-        Self { settings, models, stiffest: plan.stiffest, equations: plan.equations }
+    pub(super) fn new(settings: Tunable, plan: &ModelPlan) -> Self {
+        Self { settings, models: plan.kinds.iter().map(|(kind, _)| *kind).collect() }
     }
 
     /// The friction that was set last, or that of the scene.
@@ -78,7 +68,7 @@ impl Controls {
 
     /// The largest stiffness that the session's explicit steps bear, in that of the scene, and the least that can be set.
     pub fn stiffness_limits(&self) -> std::ops::RangeInclusive<f64> {
-        SOFTEST..=self.stiffest.factor()
+        self.settings.stiffness_limits()
     }
 
     /// Sets the friction between the tools and the body.
@@ -86,20 +76,7 @@ impl Controls {
     /// # Errors
     /// [`ErrorKind::Usage`] if it is none that the equations of the scene's contact have.
     pub fn set_friction(&self, friction: Friction) -> Result<(), Error> {
-        let Friction { kinetic, breakaway, stribeck } = friction;
-        let is_coefficient = |mu: f64| (0.0..=MOST_FRICTION).contains(&mu) || mu == f64::INFINITY;
-        if !(is_coefficient(kinetic) && is_coefficient(breakaway) && stribeck >= 0.0 && stribeck.is_finite()) {
-            let words = format!(
-                "friction is {kinetic} and {breakaway} over {stribeck} m/s, must be 0 to {MOST_FRICTION} or unbounded, over 0 m/s or \
-                 more"
-            );
-            return Err(Error::new(ErrorKind::Usage, words));
-        }
-        if self.equations == Equations::Paper && friction.breaks_away() {
-            return Err(Error::new(ErrorKind::Usage, "the printed equations have one coefficient of friction"));
-        }
-        self.set(|settings| settings.friction = friction);
-        Ok(())
+        self.settings.set_friction(friction).map_err(|words| Error::new(ErrorKind::Usage, words))
     }
 
     /// Sets the stiffness of the whole body, `factor` times that of the scene: its springs or its elements, the damping with its root,
@@ -108,16 +85,7 @@ impl Controls {
     /// # Errors
     /// [`ErrorKind::Usage`] with the limits if the session's explicit steps do not bear it: more of them take another session.
     pub fn set_stiffness(&self, factor: f64) -> Result<(), Error> {
-        let limits = self.stiffness_limits();
-        let stiffness = Stiffness::times(factor).filter(|_| limits.contains(&factor)).ok_or_else(|| {
-            let (least, most) = (limits.start(), limits.end());
-            let words = format!(
-                "a stiffness of {factor:.3} times the scene's is not within {least} to {most:.3}, which its explicit steps bear"
-            );
-            Error::new(ErrorKind::Usage, words)
-        })?;
-        self.set(|settings| settings.stiffness = stiffness);
-        Ok(())
+        self.settings.set_stiffness(factor).map_err(|words| Error::new(ErrorKind::Usage, words))
     }
 
     /// Sets the local model: the next one that is built is of this kind.
@@ -130,13 +98,7 @@ impl Controls {
             let words = format!("{} cannot be set while this session runs, {} can", model.name(), names.join(", "));
             return Err(Error::new(ErrorKind::Usage, words));
         }
-        self.set(|settings| settings.model = model);
+        self.settings.set_model(model);
         Ok(())
-    }
-
-    fn set(&self, change: impl FnOnce(&mut Settings)) {
-        let mut settings = self.settings.value();
-        change(&mut settings);
-        self.settings.set(settings);
     }
 }

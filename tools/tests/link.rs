@@ -1,4 +1,4 @@
-//! `palpate serve`, `palpate run --global` and `palpate link keys`, as a user calls them.
+//! `palpate serve`, `palpate run --global` and `palpate link keys`, as a user calls them. What `palpate view --global` shows is for a browser.
 #![cfg(feature = "link")]
 
 mod support;
@@ -84,6 +84,8 @@ fn what_cannot_be_is_refused_in_one_line() {
         (&["run", "scene.toml", "--global", "tcp/big-machine:7447"], 2, "--insecure"),
         (&["run", "scene.toml", "--global", "tls/big-machine:7447"], 2, "palpate link keys"),
         (&["run", "scene.toml", "--global", "big-machine"], 2, "PROTOCOL/HOST:PORT"),
+        (&["view", "scene.toml", "--global", "tcp/big-machine:7447"], 2, "--insecure"),
+        (&["view", "scene.toml", "--global", &address, "--model", "full"], 2, "no global model"),
         (&["run", "scene.toml", "--global", &address, "--virtual"], 1, "simulate one"),
         (&["run", "scene.toml", "--global", &address, "--model", "full"], 2, "no global model"),
         (&["run", "scene.toml", "--global", &address, "--config", "none.toml"], 2, "none.toml"),

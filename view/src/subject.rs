@@ -1,10 +1,12 @@
 //! What is shown: a session that a program started, or a scene of which one session after the other is made.
 
+use std::fmt;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use palpate::log::Environment;
 use palpate::scene::{DeviceKind, DeviceSpec, ModelChoice, Scene};
-use palpate::session::{Running, Session};
+use palpate::session::{Running, Session, SessionBuilder};
 use palpate::{Device, Error, ErrorKind};
 use serde_json::{Value, json};
 
@@ -12,6 +14,16 @@ use crate::wish::Change;
 
 /// What opens a device that the engine does not know.
 pub(crate) type OpenHaply = fn(&palpate::scene::HaplySpec, f64) -> Result<Box<dyn Device>, Error>;
+
+/// Gives a session the way to a global model elsewhere.
+#[derive(Clone)]
+struct Connect(Arc<dyn Fn(SessionBuilder) -> Result<SessionBuilder, Error> + Send + Sync>);
+
+impl fmt::Debug for Connect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Connect")
+    }
+}
 
 /// A scene that visitors push, and how its sessions are made.
 ///
@@ -27,6 +39,7 @@ pub struct Pushed {
     scene: Scene,
     out: Option<PathBuf>,
     open_haply: Option<OpenHaply>,
+    connect: Option<Connect>,
     /// Sessions so far.
     count: u32,
 }
@@ -42,7 +55,7 @@ impl Pushed {
 
     /// A scene with its own devices, to be watched.
     pub fn as_it_is(scene: Scene) -> Self {
-        Self { scene, out: None, open_haply: None, count: 0 }
+        Self { scene, out: None, open_haply: None, connect: None, count: 0 }
     }
 
     /// Also writes a log of each session, with pictures: the first to `path`, each after it to a name with its number.
@@ -60,6 +73,17 @@ impl Pushed {
         self
     }
 
+    /// Takes the global model of each session from another process: `connect` gives its builder the way there by
+    /// [`SessionBuilder::global_over`]. All sessions then have the local model of the scene, as the other process does.
+    #[must_use]
+    pub fn connect(
+        mut self,
+        connect: impl Fn(SessionBuilder) -> Result<SessionBuilder, Error> + Send + Sync + 'static,
+    ) -> Self {
+        self.connect = Some(Connect(Arc::new(connect)));
+        self
+    }
+
     /// The scene as it will be run.
     pub fn scene(&self) -> &Scene {
         &self.scene
@@ -71,8 +95,10 @@ impl Pushed {
     /// If it cannot work.
     pub(crate) fn session(&mut self, change: &Change) -> Result<Session, Error> {
         let mut builder = Session::from_scene(changed(self.scene.clone(), change)?).endless().share_records();
-        // With one core there is none for a global model beside `full`.
-        if std::thread::available_parallelism().is_ok_and(|cores| cores.get() > 1) {
+        if let Some(Connect(connect)) = &self.connect {
+            builder = connect(builder)?;
+        } else if std::thread::available_parallelism().is_ok_and(|cores| cores.get() > 1) {
+            // With one core there is none for a global model beside `full`.
             builder = builder.switchable();
         }
         if let Some(open) = self.open_haply {
@@ -89,10 +115,12 @@ impl Pushed {
     /// What a visitor may change and what it is now, for the page.
     pub(crate) fn about(&self, change: &Change) -> Value {
         let asked = change.model.as_deref().unwrap_or(self.scene.local.model.name());
+        // The other side of a link has the scene's alone.
+        let models = if self.connect.is_some() { vec![asked] } else { ModelChoice::NAMES.to_vec() };
         let spring = self.scene.devices.first().filter(|device| device.kind == DeviceKind::Pointer);
         json!({
             "can_restart": true,
-            "models": ModelChoice::NAMES,
+            "models": models,
             "asked_model": asked,
             "spring_n_per_m": spring.map(|device| device.pointer.stiffness_n_per_m),
             "session": self.count,

@@ -5,10 +5,14 @@ use std::collections::BTreeMap;
 use super::super::messages::ToolTick;
 use super::post::Post;
 use super::{MOST_MESSAGES, key_of};
+use crate::actors::messages::SurfaceView;
+use crate::actors::tunable::Tunable;
 use crate::link::{Lane, Message, Transport};
 use crate::model::Pose;
+use crate::model::body::Stiffness;
+use crate::model::contact::Friction;
 use crate::model::local::{LocalModels, Parcel, Shipment};
-use crate::runtime::{Actor, ActorError, Nanos, Outcome, QueueWriter, Reader, TickContext};
+use crate::runtime::{Actor, ActorError, Nanos, Outcome, OutletReader, QueueWriter, Reader, TickContext};
 
 /// A basis that is not there after so long is sent again.
 const SENT_AGAIN: Nanos = Nanos(3_000_000_000);
@@ -29,6 +33,25 @@ pub struct GlobalBridge {
     /// The newest tick of each tool.
     newest: Vec<u64>,
     bases: SentBases,
+    settings: Tunable,
+    /// What the haptic side wants friction and stiffness to be, if it has said so.
+    wanted: Option<(Friction, Stiffness)>,
+    /// The body as it is to be seen on the other side, and the nodes that are.
+    surface: Option<(OutletReader<SurfaceView>, Vec<u32>)>,
+    is_watched: bool,
+}
+
+/// What the global actor and its bridge say to each other.
+#[derive(Debug)]
+pub struct GlobalBridgePorts {
+    /// The next local models: such as are [built elsewhere](crate::model::local::Template::departing).
+    pub models: Reader<LocalModels>,
+    /// Where the ticks of each tool go.
+    pub ticks: Vec<QueueWriter<ToolTick>>,
+    /// What the haptic side may change.
+    pub settings: Tunable,
+    /// The body as it is to be seen on the other side, and the nodes that are; `None` where that sees it anyway.
+    pub surface: Option<(OutletReader<SurfaceView>, Vec<u32>)>,
 }
 
 /// What the haptic side has.
@@ -40,11 +63,12 @@ struct SentBases {
 }
 
 impl GlobalBridge {
-    /// A bridge for the tools whose ticks go to `ticks`, and whose next local models come by `models`: such as are
-    /// [built elsewhere](crate::model::local::Template::departing).
-    pub fn new(transport: Box<dyn Transport>, models: Reader<LocalModels>, ticks: Vec<QueueWriter<ToolTick>>) -> Self {
-        let newest = vec![0; ticks.len()];
-        Self { post: Post::new(transport), models, ticks, newest, bases: SentBases::default() }
+    /// A bridge between the global actor behind `ports` and what is beyond `transport`.
+    pub fn new(transport: Box<dyn Transport>, ports: GlobalBridgePorts) -> Self {
+        let GlobalBridgePorts { models, ticks, settings, surface } = ports;
+        let (post, newest) = (Post::new(transport), vec![0; ticks.len()]);
+        let (bases, wanted, is_watched) = Default::default();
+        Self { post, models, ticks, newest, bases, settings, wanted, surface, is_watched }
     }
 
     fn send_models(&mut self, ctx: &TickContext) {
@@ -53,6 +77,29 @@ impl GlobalBridge {
             let shipment = Shipment::of(models.get());
             bases.send(post, shipment.parcels(), ctx.scheduled);
             post.send(Lane::Models, ctx.scheduled, &Message::Models(shipment));
+        }
+    }
+
+    fn send_surface(&mut self, now: Nanos) {
+        if let Some((surface, nodes)) = self.surface.as_mut().filter(|_| self.is_watched)
+            && surface.refresh()
+        {
+            let SurfaceView { time, positions, stiffness } = surface.get();
+            let place = |&node: &u32| positions[node as usize].data.0[0].map(|coordinate| coordinate as f32);
+            let places = nodes.iter().map(place).collect();
+            self.post.send(Lane::Pictures, now, &Message::Surface { time: *time, stiffness: *stiffness, places });
+        }
+    }
+
+    /// Sets friction and stiffness as the haptic side wants them, when it wants others than before.
+    fn tune(&mut self, wanted: (Friction, Stiffness)) {
+        if self.wanted.replace(wanted) == Some(wanted) {
+            return;
+        }
+        let (friction, stiffness) = wanted;
+        let set = [self.settings.set_friction(friction), self.settings.set_stiffness(stiffness.factor())];
+        for why in set.into_iter().filter_map(Result::err) {
+            tracing::warn!("the haptic side wants what cannot be: {why}");
         }
     }
 
@@ -66,13 +113,17 @@ impl GlobalBridge {
             }
             match message {
                 Message::Ticks { tool, ticks } => self.pass(ctx, tool.into(), ticks),
-                Message::Held(keys) => self.bases.held = keys,
+                Message::Wants { held, friction, stiffness, is_watched } => {
+                    self.bases.held = held;
+                    self.tune((friction, stiffness));
+                    self.is_watched = is_watched;
+                }
                 Message::Ping => {
                     let answer = Message::Pong { sent: header.sent, received: ctx.scheduled };
                     self.post.send(Lane::Urgent, ctx.scheduled, &answer);
                 }
                 // Of the other direction.
-                Message::Models(_) | Message::Basis { .. } | Message::Pong { .. } => {}
+                Message::Models(_) | Message::Basis { .. } | Message::Pong { .. } | Message::Surface { .. } => {}
             }
         }
     }
@@ -134,6 +185,7 @@ impl Actor for GlobalBridge {
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         self.send_models(ctx);
+        self.send_surface(ctx.scheduled);
         Outcome::Continue
     }
 
@@ -146,6 +198,13 @@ impl Actor for GlobalBridge {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::actors::settings::Settings;
+    use crate::link::{Conditions, VirtualLink};
+    use crate::model::body::Block;
+    use crate::model::contact::Equations;
+    use crate::model::local::{Kind, Template};
+    use crate::model::mesh::Face;
+    use crate::runtime::{Execution, Runtime};
 
     /// Whether each basis is sent, by a model that is published 30 times a second and knows so many; in which of a hundred periods.
     fn sent(bases: &mut SentBases, known: u64) -> Vec<(u64, u64)> {
@@ -164,6 +223,28 @@ mod tests {
         assert_eq!(sent(&mut SentBases::default(), 2), [(0, 0), (0, 1), (again, 0), (again, 1)]);
         let mut holding = SentBases { held: vec![0], ..SentBases::default() };
         assert_eq!(sent(&mut holding, 2), [(0, 1), (again, 1)]);
+    }
+
+    #[test]
+    fn the_haptic_side_sets_what_it_may_and_nothing_else() {
+        let mut graph = Runtime::builder(Execution::Virtual);
+        let first = Settings { friction: 0.5.into(), stiffness: Stiffness::default(), model: Kind::Hold };
+        let most = Stiffness::times(2.0).unwrap();
+        let settings = Tunable::new(graph.parameter(first), most, Equations::default());
+        let block = Block::builder([3; 3], [0.02; 3]).fix(Face::ZMin).build().unwrap();
+        let template = Template::new(Kind::Hold, [2; 3], &block).unwrap();
+        let (_, models) = graph.exchange(move || LocalModels::new(1, || template.departing()));
+        let ports = GlobalBridgePorts { models, ticks: Vec::new(), settings: settings.clone(), surface: None };
+        let [_, end] = VirtualLink::ends(Conditions::default());
+        let mut bridge = GlobalBridge::new(Box::new(end), ports);
+        let mut tuned = |friction: f64, factor: f64| {
+            bridge.tune((friction.into(), Stiffness::times(factor).unwrap()));
+            let Settings { friction, stiffness, .. } = settings.value();
+            (friction.kinetic, stiffness.factor())
+        };
+        assert_eq!(tuned(0.3, 1.5), (0.3, 1.5));
+        assert_eq!(tuned(0.2, 2.5), (0.2, 1.5), "stiffer than its steps bear");
+        assert_eq!(tuned(1e9, 1.1), (0.2, 1.1), "rougher than anything is");
     }
 
     #[test]

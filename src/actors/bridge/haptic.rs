@@ -3,17 +3,24 @@
 use std::collections::VecDeque;
 
 use super::super::cause::Cause;
-use super::super::messages::ToolTick;
+use super::super::messages::{SurfaceView, ToolTick};
+use super::super::settings::Settings;
 use super::post::Post;
 use super::{MOST_MESSAGES, SILENCE, key_of};
 use crate::link::{Clock, Lane, MOST_TICKS, Message, Transport};
 use crate::log::LinkSample;
+use crate::model::Vec3;
+use crate::model::body::Stiffness;
 use crate::model::local::{Image, LocalModels, Shipment};
 use crate::model::surroundings::{Bases, Basis};
-use crate::runtime::{Actor, ActorError, Nanos, Outcome, QueueReader, Recorder, TickContext, Writer};
+use crate::runtime::{
+    Actor, ActorError, Nanos, Outcome, OutletWriter, ParameterReader, QueueReader, Recorder, TickContext, Writer,
+};
 
 /// Ticks that a message has at least, if there are so many: those before the newest are repeated.
 const REPEATED: usize = 8;
+/// A surface that nobody has taken for so long is not asked for any more.
+const WATCHED_FOR: Nanos = Nanos(500_000_000);
 /// Between two questions for the time.
 const ASKS_EVERY: Nanos = Nanos(50_000_000);
 
@@ -39,7 +46,66 @@ pub struct HapticBridge {
     asked: Option<Nanos>,
     /// The number of the peer that the epoch is of.
     peer: u64,
+    settings: ParameterReader<Settings>,
+    surfaces: Surfaces,
     recorder: Recorder,
+}
+
+/// What the local actor and its bridge say to each other, and what a program does.
+#[derive(Debug)]
+pub struct HapticBridgePorts {
+    /// The ticks of each tool.
+    pub ticks: Vec<QueueReader<ToolTick>>,
+    /// The next local models.
+    pub models: Writer<LocalModels>,
+    /// What the program wants.
+    pub settings: ParameterReader<Settings>,
+    /// Where the body is seen; nowhere, if the global actor shows it there itself.
+    pub surfaces: Vec<OutletWriter<SurfaceView>>,
+    /// Where records go.
+    pub recorder: Recorder,
+}
+
+/// The body's surface as it comes over the link, for whoever looks.
+#[derive(Debug)]
+struct Surfaces {
+    writers: Vec<OutletWriter<SurfaceView>>,
+    /// Nodes that come.
+    nodes: Vec<u32>,
+    /// The time of the newest.
+    newest: Option<Nanos>,
+    /// When somebody was seen to look.
+    seen: Nanos,
+}
+
+impl Surfaces {
+    /// Looks whether anybody does.
+    fn look(&mut self, now: Nanos) {
+        if self.writers.iter().any(OutletWriter::is_taken) {
+            self.seen = now;
+        }
+    }
+
+    fn are_watched(&self, now: Nanos) -> bool {
+        !self.writers.is_empty() && now.saturating_sub(self.seen) < WATCHED_FOR
+    }
+
+    /// Shows the nodes of the surface at their `places`, if they are all there and not overtaken. The others stay where they began.
+    fn show(&mut self, ctx: &TickContext, time: Nanos, stiffness: Stiffness, places: &[[f32; 3]]) {
+        let is_new = self.newest.is_none_or(|newest| time > newest) && time <= ctx.scheduled;
+        if !is_new || places.len() != self.nodes.len() {
+            return;
+        }
+        self.newest = Some(time);
+        for writer in &mut self.writers {
+            let view = writer.buffer();
+            (view.time, view.stiffness) = (time, stiffness);
+            for (&node, place) in self.nodes.iter().zip(places) {
+                view.positions[node as usize] = Vec3::from(place.map(f64::from));
+            }
+            writer.publish(ctx);
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -50,19 +116,31 @@ struct Tool {
 }
 
 impl HapticBridge {
-    /// A bridge for the tools whose ticks come by `ticks`, which builds `models` by the `image` of the body over there.
-    pub fn new(
-        transport: Box<dyn Transport>,
-        ticks: Vec<QueueReader<ToolTick>>,
-        models: Writer<LocalModels>,
-        image: Image,
-        recorder: Recorder,
-    ) -> Self {
+    /// A bridge between what is behind `ports` and what is beyond `transport`; it builds local models by the `image` of the body over there.
+    pub fn new(transport: Box<dyn Transport>, image: Image, ports: HapticBridgePorts) -> Self {
+        let HapticBridgePorts { ticks, models, settings, surfaces, recorder } = ports;
+        let nodes = if surfaces.is_empty() { Vec::new() } else { image.surface_nodes() };
+        let surfaces = Surfaces { writers: surfaces, nodes, newest: None, seen: Nanos::ZERO };
         let tool = |ticks| Tool { ticks, recent: VecDeque::new() };
         let (newest, arrived, bases, clock, heard, asked) = Default::default();
         let (mut post, tools) = (Post::new(transport), ticks.into_iter().map(tool).collect());
         let peer = post.peer();
-        Self { post, tools, models, newest, arrived, image, bases, clock, heard, asked, peer, recorder }
+        Self {
+            post,
+            tools,
+            models,
+            newest,
+            arrived,
+            image,
+            bases,
+            clock,
+            heard,
+            asked,
+            peer,
+            settings,
+            surfaces,
+            recorder,
+        }
     }
 
     /// A connection that has fallen silent, or whose peer is another one now, is over: what still comes of it is dropped.
@@ -73,6 +151,7 @@ impl HapticBridge {
             self.post.begin_epoch(self.post.epoch + 1);
             self.heard = None;
             self.newest = None;
+            self.surfaces.newest = None;
         }
         self.heard.is_none()
     }
@@ -96,12 +175,17 @@ impl HapticBridge {
         }
     }
 
-    fn ask(&mut self, now: Nanos) {
+    fn ask(&mut self, ctx: &TickContext) {
+        let now = ctx.scheduled;
+        self.settings.refresh(ctx);
+        self.surfaces.look(now);
         if self.asked.is_none_or(|asked| now.saturating_sub(asked) >= ASKS_EVERY) {
             self.asked = Some(now);
             self.post.send(Lane::Urgent, now, &Message::Ping);
             let held = self.bases.iter().map(|basis| key_of(basis.patch())).collect();
-            self.post.send(Lane::Urgent, now, &Message::Held(held));
+            let Settings { friction, stiffness, .. } = self.settings.get();
+            let is_watched = self.surfaces.are_watched(now);
+            self.post.send(Lane::Urgent, now, &Message::Wants { held, friction, stiffness, is_watched });
             self.record(now);
         }
     }
@@ -121,7 +205,8 @@ impl HapticBridge {
     }
 
     /// Takes what has come; the newest models of all.
-    fn receive(&mut self, now: Nanos) {
+    fn receive(&mut self, ctx: &TickContext) {
+        let now = ctx.scheduled;
         for _ in 0..MOST_MESSAGES {
             let Some((header, message)) = self.post.receive(now, false) else { return };
             self.heard = Some(now);
@@ -137,11 +222,12 @@ impl HapticBridge {
                     }
                 }
                 Message::Basis { key, basis } => self.keep(key, *basis),
+                Message::Surface { time, stiffness, places } => self.surfaces.show(ctx, time, stiffness, &places),
                 Message::Pong { sent, received } => {
                     self.clock.push([sent.0, received.0, header.sent.0, now.0]);
                 }
                 // Of the other direction.
-                Message::Ticks { .. } | Message::Held(_) | Message::Ping => {}
+                Message::Ticks { .. } | Message::Wants { .. } | Message::Ping => {}
             }
         }
     }
@@ -168,7 +254,7 @@ impl Actor for HapticBridge {
     }
 
     fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
-        self.receive(ctx.scheduled);
+        self.receive(ctx);
         self.publish(ctx);
         self.post.begin();
         Ok(())
@@ -177,12 +263,12 @@ impl Actor for HapticBridge {
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         let is_silent = self.begin_epoch_after_silence(ctx.scheduled);
         self.send_ticks(ctx);
-        self.ask(ctx.scheduled);
+        self.ask(ctx);
         if is_silent { Outcome::Degraded(Cause::LinkSilent.code()) } else { Outcome::Continue }
     }
 
     fn commit(&mut self, ctx: &TickContext) -> Outcome {
-        self.receive(ctx.scheduled);
+        self.receive(ctx);
         self.publish(ctx);
         Outcome::Continue
     }

@@ -3,6 +3,8 @@
 //! ```text
 //! local --ToolTick--> haptic bridge ~~ticks~~> global bridge --ToolTick--> global
 //!       <--model-----               <~models~~               <--model-----
+//! program --Settings-->             ~~wants~~>               --Settings-->
+//!         <--SurfaceView--          <~~surface~~             <--SurfaceView--
 //! ```
 //!
 //! What they carry is made and taken here, off the real-time threads: the local actor has the same ports as without them and cannot tell
@@ -16,8 +18,8 @@ mod post;
 
 use crate::runtime::Nanos;
 
-pub use global::GlobalBridge;
-pub use haptic::HapticBridge;
+pub use global::{GlobalBridge, GlobalBridgePorts};
+pub use haptic::{HapticBridge, HapticBridgePorts};
 
 /// A haptic side that has heard nothing for so long takes the connection for gone: by default no force is left by then.
 pub const SILENCE: Nanos = Nanos(500_000_000);

@@ -2,6 +2,7 @@
 
 use super::ContactMode;
 use crate::Vec3;
+use crate::bytes::{BytesReader, BytesWriter};
 
 /// Rounds for the speed of sliding. They come down on it from above, so that fewer than it takes leave a speed that is a little
 /// too high and a friction that is a little too low, never one outside the cone.
@@ -65,6 +66,25 @@ impl Friction {
     /// The same with no coefficient above `most`.
     pub(super) fn at_most(&self, most: f64) -> Self {
         Self { kinetic: self.kinetic.min(most), breakaway: self.breakaway.min(most), ..*self }
+    }
+
+    /// Appends it to what crosses a link.
+    ///
+    /// # Real-time
+    /// Not for a tick: allocates.
+    pub fn write(&self, to: &mut BytesWriter<'_>) {
+        [self.kinetic, self.breakaway, self.stribeck].into_iter().for_each(|number| to.f64(number));
+    }
+
+    /// Takes what [`write`](Self::write) has appended; `None` if it is no friction.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn read(from: &mut BytesReader<'_>) -> Option<Self> {
+        // That of a contact that never slides is infinite.
+        let mut coefficient = || from.u64().map(f64::from_bits).filter(|&coefficient| coefficient >= 0.0);
+        let [kinetic, breakaway] = [coefficient()?, coefficient()?];
+        Some(Self { kinetic, breakaway, stribeck: from.f64().filter(|&speed| speed >= 0.0)? })
     }
 
     /// The coefficient of a contact that slides at `speed` (m/s).

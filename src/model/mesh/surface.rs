@@ -75,6 +75,17 @@ impl Surface {
         self.at_node.of(node)
     }
 
+    /// The nodes that are corners of triangles, in increasing order.
+    ///
+    /// # Real-time
+    /// Not real-time safe: allocates.
+    pub fn nodes(&self) -> Vec<u32> {
+        let mut nodes = self.triangles.as_flattened().to_vec();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
     /// True if `node` is a corner of some triangle.
     ///
     /// # Real-time
@@ -105,6 +116,8 @@ mod tests {
         for node in 0..lattice.len() as u32 {
             assert!(surface.at_node(node).iter().all(|&t| surface.triangles[t as usize].contains(&node)));
         }
+        assert_eq!(surface.nodes().len(), lattice.len() - 2 * 3);
+        assert!(surface.nodes().iter().all(|&node| surface.has_node(node)));
         let listed: usize = (0..lattice.len() as u32).map(|node| surface.at_node(node).len()).sum();
         assert_eq!(listed, 3 * surface.triangles.len());
     }

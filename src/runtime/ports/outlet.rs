@@ -65,6 +65,14 @@ impl<T> OutletWriter<T> {
         self.2.pass(ctx);
         version
     }
+
+    /// True if the outside thread has taken the newest value, or there is none yet: while it is false nobody has looked since.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn is_taken(&self) -> bool {
+        self.0.half().is_taken()
+    }
 }
 
 impl<T> OutletReader<T> {

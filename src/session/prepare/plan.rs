@@ -6,12 +6,13 @@ use std::sync::Arc;
 use super::body::Start;
 use super::situation::Situation;
 use super::timing::Timing;
-use crate::actors::Settings;
+use crate::actors::{Settings, Tunable};
 use crate::link::Conditions;
 use crate::model::body::Stiffness;
 use crate::model::contact::Equations;
 use crate::model::local::{Blend, Kind, Template};
 use crate::model::surroundings::{RestingBody, Size};
+use crate::runtime::RuntimeBuilder;
 use crate::scene::Scene;
 
 /// How local models are made, followed by one another and watched.
@@ -43,6 +44,11 @@ impl ModelPlan {
     /// True if there is a global model beside the local ones: always, but for `full` that stays what it is.
     pub(crate) fn is_multi_rate(&self) -> bool {
         self.template.kind != Kind::Full || self.kinds.len() > 1
+    }
+
+    /// What may be changed, with the end of an actor of `graph` that takes it.
+    pub(crate) fn tunable(&self, graph: &mut RuntimeBuilder) -> Tunable {
+        Tunable::new(graph.parameter(self.settings), self.stiffest, self.equations)
     }
 
     /// Of the windows that may have a basis: patch nodes along the surface, along it, into depth.

@@ -1,8 +1,8 @@
 //! Makes the global actor: once at the start, and again after a fault, from its last good state.
 
 use crate::actors::{
-    Checkpoint, GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, Settings, SurfaceView, SurroundingsPorts,
-    ToolPorts, ToolTick, Wishes,
+    Checkpoint, GlobalActor, GlobalPlan, GlobalPorts, GlobalSharedPorts, SurfaceView, SurroundingsPorts, ToolPorts,
+    ToolTick, Tunable, Wishes,
 };
 use crate::error::{Error, ErrorKind};
 use crate::model::Pose;
@@ -10,8 +10,8 @@ use crate::model::local::{LocalModels, PatchGeometry};
 use crate::model::simulation::Simulation;
 use crate::model::surroundings::Bases;
 use crate::runtime::{
-    Actor, ExchangePort, OutletPort, OutletReader, Parameter, QueuePort, RateGroup, RecorderPort, Restart,
-    RuntimeBuilder, Stopwatch,
+    Actor, ExchangePort, OutletPort, OutletReader, QueuePort, RateGroup, RecorderPort, Restart, RuntimeBuilder,
+    Stopwatch,
 };
 
 /// Between the local actor of a tool and the global one.
@@ -30,7 +30,7 @@ impl ToolLink {
 pub(super) struct GlobalSide {
     pub(super) tools: Vec<ToolLink>,
     pub(super) models: ExchangePort<LocalModels>,
-    pub(super) settings: Parameter<Settings>,
+    pub(super) settings: Tunable,
     pub(super) surroundings: Option<(ExchangePort<Wishes>, ExchangePort<Bases>)>,
     pub(super) surfaces: Vec<OutletPort<SurfaceView>>,
     pub(super) checkpoint: OutletPort<Checkpoint>,

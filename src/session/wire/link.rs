@@ -1,12 +1,19 @@
 //! The two bridges of a link, and what is between them and the actors beside them.
 
 use super::global::ToolLink;
-use crate::actors::{GlobalBridge, HapticBridge, LocalPorts, ModelMaker, ToolTick};
+use crate::actors::{
+    GlobalBridge, GlobalBridgePorts, HapticBridge, HapticBridgePorts, LocalPorts, ModelMaker, SurfaceView, ToolTick,
+    Tunable,
+};
 use crate::error::{Error, ErrorKind};
 use crate::link::{Conditions, Transport, VirtualLink};
 use crate::model::local::{Image, LocalModels};
 use crate::model::simulation::Simulation;
-use crate::runtime::{Actor, ExchangePort, QueueReader, QueueWriter, Reader, RuntimeBuilder, Writer};
+use crate::runtime::{
+    Actor, ExchangePort, OutletPort, OutletReader, OutletWriter, QueueReader, QueueWriter, Reader, RuntimeBuilder,
+    Writer,
+};
+use crate::session::prepare::ModelPlan;
 
 /// Records between two drains: one every 50 ms.
 const RECORDS: usize = 256;
@@ -24,6 +31,41 @@ pub(super) enum Ends {
 /// What a side that is here sends by.
 type Way = Option<Box<dyn Transport>>;
 
+/// What of a session that runs goes over the link besides ticks and models.
+pub(super) struct Outer {
+    /// What the program changes, and what the global actor takes: what crosses leads from one to the other.
+    settings: [Tunable; 2],
+    /// Where the body is seen, if it comes over the link.
+    shown: Vec<OutletWriter<SurfaceView>>,
+    /// The body that is to be seen on the other side.
+    seen: Option<OutletReader<SurfaceView>>,
+}
+
+impl Outer {
+    /// Between `ends`, with the `settings` that the program changes here, the body's `surfaces` as they are seen here, and as it is `seen` on
+    /// the other side.
+    pub(super) fn new(
+        graph: &mut RuntimeBuilder,
+        ends: &Ends,
+        plan: &ModelPlan,
+        settings: &Tunable,
+        surfaces: &[OutletPort<SurfaceView>],
+        seen: Option<OutletReader<SurfaceView>>,
+    ) -> Self {
+        let far = match ends {
+            // The global actor does not know what the program wants before it has come over the link.
+            Ends::Both(_) => plan.tunable(graph),
+            Ends::Haptic(_) | Ends::Global(_) => settings.clone(),
+        };
+        let shown = match ends {
+            Ends::Haptic(_) => surfaces.iter().map(OutletPort::writer).collect(),
+            // The global actor shows it itself.
+            Ends::Both(_) | Ends::Global(_) => Vec::new(),
+        };
+        Self { settings: [settings.clone(), far], shown, seen }
+    }
+}
+
 /// The link of a session that has one.
 pub(super) struct Linking {
     ends: Ends,
@@ -35,6 +77,9 @@ pub(super) struct Linking {
     /// From the bridge to the local actor, and from the global one to the bridge.
     arriving: Option<Writer<LocalModels>>,
     departing: Option<Reader<LocalModels>>,
+    outer: Outer,
+    /// Those that are seen.
+    surface_nodes: Vec<u32>,
 }
 
 impl Linking {
@@ -42,7 +87,7 @@ impl Linking {
     ///
     /// # Errors
     /// If the body cannot be copied.
-    pub(super) fn new(ends: Ends, simulation: &Simulation) -> Result<Self, Error> {
+    pub(super) fn new(ends: Ends, simulation: &Simulation, outer: Outer) -> Result<Self, Error> {
         let copy = || {
             let copy = simulation.duplicate();
             copy.ok_or_else(|| Error::new(ErrorKind::Runtime, "a link needs a body that can be copied"))
@@ -52,7 +97,13 @@ impl Linking {
             Ends::Both(_) | Ends::Haptic(_) => Some(Image::new(copy()?)),
         };
         let (haptic, global, arriving, departing) = Default::default();
-        Ok(Self { ends, image, haptic, global, arriving, departing })
+        let surface_nodes = simulation.body().surface().nodes();
+        Ok(Self { ends, image, haptic, global, arriving, departing, outer, surface_nodes })
+    }
+
+    /// What the global actor takes.
+    pub(super) fn global_settings(&self) -> &Tunable {
+        &self.outer.settings[1]
     }
 
     fn has_global(&self) -> bool {
@@ -102,7 +153,8 @@ impl Linking {
 
     /// The bridges in the order of their starts: what the global side tells at first is there when the haptic side begins.
     pub(super) fn bridges(self, graph: &mut RuntimeBuilder) -> Vec<Box<dyn Actor>> {
-        let Self { ends, image, haptic, global, arriving, departing } = self;
+        let Self { ends, image, haptic, global, arriving, departing, outer, surface_nodes } = self;
+        let Outer { settings: [settings, global_settings], shown, seen } = outer;
         let (here, there): (Way, Way) = match ends {
             Ends::Both(conditions) => {
                 let [haptic, global] = VirtualLink::ends(conditions);
@@ -111,12 +163,15 @@ impl Linking {
             Ends::Haptic(transport) => (Some(transport), None),
             Ends::Global(transport) => (None, Some(transport)),
         };
-        let global = there
-            .zip(departing)
-            .map(|(transport, models)| Box::new(GlobalBridge::new(transport, models, global)) as Box<dyn Actor>);
+        let global = there.zip(departing).map(|(transport, models)| {
+            let surface = seen.map(|seen| (seen, surface_nodes));
+            let ports = GlobalBridgePorts { models, ticks: global, settings: global_settings, surface };
+            Box::new(GlobalBridge::new(transport, ports)) as Box<dyn Actor>
+        });
         let haptic = here.zip(image).zip(arriving).map(|((transport, image), models)| {
-            let recorder = graph.recorder(RECORDS);
-            Box::new(HapticBridge::new(transport, haptic, models, image, recorder)) as Box<dyn Actor>
+            let (settings, recorder) = (settings.reader(), graph.recorder(RECORDS));
+            let ports = HapticBridgePorts { ticks: haptic, models, settings, surfaces: shown, recorder };
+            Box::new(HapticBridge::new(transport, image, ports)) as Box<dyn Actor>
         });
         global.into_iter().chain(haptic).collect()
     }

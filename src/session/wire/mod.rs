@@ -21,7 +21,7 @@ use crate::devices::DeviceState;
 use crate::error::{Error, ErrorKind};
 use crate::link::{Hello, Transport};
 use crate::model::{Pose, Vec3};
-use crate::runtime::{Actor, OutletPort, RecordDrain, Recording, Runtime, RuntimeBuilder, Stopwatch};
+use crate::runtime::{Actor, OutletPort, OutletReader, RecordDrain, Recording, Runtime, RuntimeBuilder, Stopwatch};
 use basis::BasisSide;
 use buffers::ticks_buffered;
 use haptic::ToolEnds;
@@ -94,24 +94,24 @@ fn start_at(mut prepared: Prepared, first: Vec<DeviceState>, rerun: Option<Rerun
     // Before the ports, so that they record what a replay needs. The order of the ports below numbers them in the log.
     let drain = graph.drain();
     let ticks = ticks_buffered(&prepared.plan);
-    let (surfaces, scene) = surfaces(&mut graph, &prepared);
+    let Surfaces { ports: surfaces, viewer, scene, seen } = surfaces(&mut graph, &prepared);
     let has_haptic = prepared.has_haptic();
     let with_devices = if has_haptic { places.as_slice() } else { &[] };
     let mut ends: Vec<ToolEnds> = with_devices.iter().map(|place| ToolEnds::new(&mut graph, place)).collect();
     let views = ends.iter_mut().filter_map(ToolEnds::take_view).collect();
     let disbelieved = ends.iter_mut().filter_map(ToolEnds::take_disbelieved).collect();
-    let viewer = Viewer::new(prepared.simulation.body().surface(), surfaces[0].reader(), views);
-    let viewer = match &records {
-        // Whoever watches that closely may want to see it.
-        Some(_) => viewer.with_stress(prepared.simulation.body_as_made()),
-        None => viewer,
+    let viewer = Viewer::new(prepared.simulation.body().surface(), viewer, views);
+    // Whoever watches that closely may want to see it. What comes over a link is the surface alone, and its stress takes what is below.
+    let viewer = match records.is_some() && prepared.side != Side::Haptic {
+        true => viewer.with_stress(prepared.simulation.body_as_made()),
+        false => viewer,
     };
     let bases = if prepared.reduces() { BasisSide::new(&mut graph, &prepared, &places)? } else { None };
     if let Some(bases) = &bases {
         environment.model_reason = bases.reason(environment.model_reason.take());
     }
     let reducing = bases.as_ref().map(|bases| (prepared.basis_group(), bases.actor()));
-    let settings = graph.parameter(prepared.plan.settings);
+    let settings = prepared.plan.tunable(&mut graph);
     let controls = Controls::new(settings.clone(), &prepared.plan);
     let logger_group = prepared.logger_group();
     let link_group = prepared.link_group();
@@ -123,7 +123,7 @@ fn start_at(mut prepared: Prepared, first: Vec<DeviceState>, rerun: Option<Rerun
         _ => plan.link.clone().map(Ends::Both),
     };
     let (models, maker, bridges) =
-        models::models(&mut graph, &plan, (simulation, &places), surfaces, bases, settings, link)?;
+        models::models(&mut graph, &plan, (simulation, &places), surfaces, bases, &settings, (link, seen))?;
     let tools = if has_haptic { tools } else { Vec::new() };
     let haptic = haptic::actors(&mut graph, &plan, tools, ends, &first, models, ticks);
 
@@ -178,19 +178,37 @@ fn near(state: &DeviceState, tool: &Tool, rest: &[Vec3]) -> Result<DeviceState, 
     Err(Error::new(ErrorKind::Device, message))
 }
 
-/// Where the body's surface is seen: by a program that draws, and by the log if it has the topic `/scene`.
-fn surfaces(graph: &mut RuntimeBuilder, prepared: &Prepared) -> (Vec<OutletPort<SurfaceView>>, Option<SceneWatch>) {
+/// Where the body's surface is seen.
+struct Surfaces {
+    /// All of them, for whoever shows it.
+    ports: Vec<OutletPort<SurfaceView>>,
+    /// By a program that draws.
+    viewer: OutletReader<SurfaceView>,
+    /// By the log, if it has the topic `/scene`.
+    scene: Option<SceneWatch>,
+    /// Beyond the link, if the devices are there.
+    seen: Option<OutletReader<SurfaceView>>,
+}
+
+fn surfaces(graph: &mut RuntimeBuilder, prepared: &Prepared) -> Surfaces {
     let positions = &prepared.simulation.state().positions;
     let mut outlet = || {
         let positions = positions.clone();
         graph.outlet_port(move || SurfaceView { positions: positions.clone(), ..SurfaceView::default() })
     };
     let mut ports = vec![outlet()];
+    let viewer = ports[0].reader();
     let scene = prepared.scene.log.scene.then(|| {
         let port = outlet();
         let watch = SceneWatch::new(port.reader(), &prepared.simulation.body().surface().triangles);
         ports.push(port);
         watch
     });
-    (ports, scene)
+    let seen = (prepared.side == Side::Global).then(|| {
+        let port = outlet();
+        let seen = port.reader();
+        ports.push(port);
+        seen
+    });
+    Surfaces { ports, viewer, scene, seen }
 }

@@ -3,13 +3,13 @@
 use super::basis::BasisSide;
 use super::buffers::ticks_buffered;
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
-use super::link::{Ends, Linking};
-use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, LocalSource, ModelMaker, Settings, SurfaceView};
+use super::link::{Ends, Linking, Outer};
+use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, LocalSource, ModelMaker, Settings, SurfaceView, Tunable};
 use crate::error::Error;
 use crate::model::Pose;
 use crate::model::local::{PatchGeometry, Succession};
 use crate::model::simulation::Simulation;
-use crate::runtime::{Actor, ExchangePort, OutletPort, OutletWriter, Parameter, ParameterReader, RuntimeBuilder};
+use crate::runtime::{Actor, ExchangePort, OutletPort, OutletReader, OutletWriter, ParameterReader, RuntimeBuilder};
 use crate::session::prepare::ModelPlan;
 
 /// What computes the forces at the haptic rate.
@@ -25,7 +25,7 @@ pub(super) enum Models {
 /// if there are any.
 pub(super) type Wired = (Models, Option<GlobalMaker>, Vec<Box<dyn Actor>>);
 
-/// Wires what computes the forces, with a link between `ends` if there is one.
+/// Wires what computes the forces, with a link between `ends` if there is one; over it the body is `seen` on the other side.
 ///
 /// # Errors
 /// If there is a link and the body cannot be copied.
@@ -35,8 +35,8 @@ pub(super) fn models(
     (simulation, places): (Simulation, &[Pose]),
     surfaces: Vec<OutletPort<SurfaceView>>,
     bases: Option<BasisSide>,
-    settings: Parameter<Settings>,
-    ends: Option<Ends>,
+    settings: &Tunable,
+    (ends, seen): (Option<Ends>, Option<OutletReader<SurfaceView>>),
 ) -> Result<Wired, Error> {
     if !plan.is_multi_rate() {
         let surfaces = surfaces.iter().map(OutletPort::writer).collect();
@@ -54,7 +54,13 @@ pub(super) fn models(
     let ticks = ticks_buffered(plan);
     // No patch holds more nodes than the body, and patches grow as the tool leaves a held face.
     let nodes = simulation.state().positions.len();
-    let mut linking = ends.map(|ends| Linking::new(ends, &simulation)).transpose()?;
+    let mut linking = match ends {
+        Some(ends) => {
+            let outer = Outer::new(graph, &ends, plan, settings, &surfaces, seen);
+            Some(Linking::new(ends, &simulation, outer)?)
+        }
+        None => None,
+    };
     let mut connected = |_| match &mut linking {
         Some(linking) => linking.connect(graph, ticks),
         None => {
@@ -77,6 +83,7 @@ pub(super) fn models(
         }
     };
     let linked = linking.is_some();
+    let settings = linking.as_ref().map_or(settings, Linking::global_settings).clone();
     let maker = next.map(|models| {
         let side = GlobalSide {
             tools: tools.into_iter().flatten().collect(),

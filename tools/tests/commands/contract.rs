@@ -437,6 +437,7 @@ fn without_the_link_its_commands_say_in_one_line_how_to_get_it() {
     for args in [
         &["serve", "scene.toml", "--listen", "tcp/127.0.0.1:7447"][..],
         &["run", "scene.toml", "--global", "tcp/127.0.0.1:7447"],
+        &["view", "scene.toml", "--global", "tcp/127.0.0.1:7447"],
         &["link", "keys", "keys"],
     ] {
         let called = folder.call(args);

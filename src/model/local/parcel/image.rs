@@ -78,6 +78,14 @@ impl Image {
         })
     }
 
+    /// The nodes of the body's surface, in increasing order.
+    ///
+    /// # Real-time
+    /// Not for a tick: allocates.
+    pub fn surface_nodes(&self) -> Vec<u32> {
+        self.simulation.body().surface().nodes()
+    }
+
     /// True if `basis` can be one of this body.
     pub fn has_room_for(&self, basis: &Basis) -> bool {
         self.is_patch(basis.patch()) && self.ring_of(basis.patch()).is_some_and(|ring| basis.answers.is_of(3 * ring))

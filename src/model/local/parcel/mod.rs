@@ -99,8 +99,8 @@ impl Parcel {
         to.list(&self.triangles, |to, &triangle| to.u32(triangle));
         to.u8(self.patch.is_some().into());
         to.list(self.patch.as_deref().unwrap_or_default(), |to, &node| to.u32(node));
-        let Friction { kinetic, breakaway, stribeck } = self.friction;
-        [kinetic, breakaway, stribeck, self.stiffness.factor()].into_iter().for_each(|number| to.f64(number));
+        self.friction.write(to);
+        to.f64(self.stiffness.factor());
         let State { positions, velocities } = &self.state;
         let nodes: Vec<_> = self.nodes.iter().zip(positions.iter().zip(velocities)).collect();
         to.list(&nodes, |to, &(&node, (x, v))| {
@@ -122,8 +122,7 @@ impl Parcel {
         let mut patch = Vec::new();
         from.list(NODE, &mut patch, BytesReader::u32)?;
         parcel.patch = has_patch.then_some(patch);
-        let [kinetic, breakaway] = [read_coefficient(from)?, read_coefficient(from)?];
-        parcel.friction = Friction { kinetic, breakaway, stribeck: from.f64().filter(|&speed| speed >= 0.0)? };
+        parcel.friction = Friction::read(from)?;
         parcel.stiffness = Stiffness::times(from.f64()?)?;
         let mut states = Vec::new();
         from.list(STATE, &mut states, |from| Some((from.u32()?, from.vector()?, from.vector()?)))?;
@@ -137,11 +136,6 @@ impl Parcel {
         parcel.ring = path::read(from, &mut parcel.path)?;
         Some(parcel)
     }
-}
-
-/// That of an unbounded friction is infinite.
-fn read_coefficient(from: &mut BytesReader<'_>) -> Option<f64> {
-    from.u64().map(f64::from_bits).filter(|&coefficient| coefficient >= 0.0)
 }
 
 fn write_pressing(to: &mut BytesWriter<'_>, tool: &Pressing) {
