@@ -35,13 +35,14 @@ fn main() -> Result<(), Error> {
     let mut numbers = std::env::args().skip(1).filter_map(|word| word.parse::<u64>().ok());
     let (pairs, seconds) = (numbers.next().unwrap_or(40), numbers.next().unwrap_or(1));
     lateness(pairs, Duration::from_secs(seconds))?;
-    for browsers in [1, BROWSERS] {
-        let segment = segment(mat()?, browsers, Duration::from_secs(5))?;
+    for (browsers, global_hz) in [(1, 30), (BROWSERS, 30), (1, 60)] {
+        let segment = segment(mat(global_hz)?, browsers, Duration::from_secs(5))?;
         let kb = 1e-3 * segment.bytes as f64 / segment.surfaces.max(1) as f64;
         let per_s = segment.surfaces as f64 / (segment.seconds * browsers as f64);
         let share = 100.0 * segment.cpu_s / segment.seconds;
         println!(
-            "20,000 triangles, {browsers} browsers: server {share:.2} % of a core, {kb:.0} kB with each of {per_s:.1} surfaces a second"
+            "20,000 triangles, {browsers} browsers, global model at {global_hz} Hz: server {share:.2} % of a core, {kb:.0} kB with each of \
+             {per_s:.1} surfaces a second"
         );
     }
     Ok(())
@@ -134,7 +135,7 @@ struct Segment {
 }
 
 /// A mat with 19,996 triangles, pressed by a sphere.
-fn mat() -> Result<Running, Error> {
+fn mat(global_hz: u32) -> Result<Running, Error> {
     let body = Block::builder([100, 50, 2], [0.2, 0.1, 0.004])
         .stiffness(5.0)
         .damping_ratio(0.3)
@@ -149,7 +150,7 @@ fn mat() -> Result<Running, Error> {
         .path(path)
         .tool(ToolShape::Sphere { radius: 0.008 })
         .model(palpate::model::local::Kind::Hold)
-        .global(RateGroup::hz(30))
+        .global(RateGroup::hz(global_hz))
         .local(RateGroup::hz(1000).realtime(80))
         .share_records()
         .build()?
