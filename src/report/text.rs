@@ -21,7 +21,9 @@ impl fmt::Display for RunReport {
         page.line(String::new());
         page.groups(self);
         page.line(String::new());
-        self.devices.iter().for_each(|device| page.haptics(self, device));
+        // The side of a link without devices has none of it.
+        let moved = self.devices.iter().filter(|device| device.force.ticks > 0);
+        moved.for_each(|device| page.haptics(self, device));
         page.events(self);
         f.write_str(&page.text)
     }

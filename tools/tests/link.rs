@@ -3,7 +3,7 @@
 
 mod support;
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 
 use support::Folder;
@@ -54,14 +54,18 @@ fn folder() -> Folder {
 #[test]
 fn two_commands_run_a_scene() {
     let (folder, address) = (folder(), free("tcp"));
-    let mut serving = Serving::start(&folder, &["scene.toml", "--listen", &address]);
+    let mut serving = Serving::start(&folder, &["scene.toml", "--listen", &address, "--out", "served.mcap"]);
     let report = folder.succeed(&["run", "scene.toml", "--global", &address, "--duration", "1", "--out", "felt.mcap"]);
     assert!(report.contains("log: felt.mcap"), "{report}");
     assert!(serving.line().contains("a haptic machine has come: 1 tool, round trip"));
     assert!(folder.succeed(&["log", "info", "felt.mcap"]).contains("/link"));
     let ended = Command::new("kill").args(["-INT", &serving.0.id().to_string()]).status().unwrap();
-    assert!(ended.success() && serving.line().contains("the session is over"));
+    let mut report = String::new();
+    serving.1.read_to_string(&mut report).unwrap();
+    assert!(ended.success() && report.ends_with("scene.toml: the session is over\n"), "{report}");
+    assert!(report.contains("\nglobal") && !report.contains("\nforce"), "what this side did, and nothing of a device: {report}");
     assert_eq!(serving.0.wait().unwrap().code(), Some(0));
+    assert!(folder.succeed(&["log", "info", "served.mcap"]).contains("/global"));
 }
 
 #[test]
@@ -81,6 +85,7 @@ fn what_cannot_be_is_refused_in_one_line() {
     folder.succeed(&keys);
     for (args, code, words) in [
         (&["serve", "scene.toml", "--listen", "tcp/0.0.0.0:7447"][..], 2, "--insecure"),
+        (&["serve", "scene.toml", "--listen", &address, "--out", "scene.toml"], 2, "scene.toml"),
         (&["run", "scene.toml", "--global", "tcp/big-machine:7447"], 2, "--insecure"),
         (&["run", "scene.toml", "--global", "tls/big-machine:7447"], 2, "palpate link keys"),
         (&["run", "scene.toml", "--global", "big-machine"], 2, "PROTOCOL/HOST:PORT"),

@@ -56,7 +56,7 @@ use palpate::session::Running;
 
 pub use options::Options;
 pub use server::Server;
-pub use subject::Pushed;
+pub use subject::{Pushed, numbered};
 
 use guard::Token;
 use hub::Hub;

@@ -128,8 +128,11 @@ impl Pushed {
     }
 }
 
-/// The name of the log of session `count`.
-fn numbered(path: &std::path::Path, count: u32) -> PathBuf {
+/// The name of the log of session number `count`: the first has `path`, each after it a name with its number.
+///
+/// # Real-time
+/// Not for a tick: allocates.
+pub fn numbered(path: &std::path::Path, count: u32) -> PathBuf {
     if count < 2 {
         return path.to_owned();
     }

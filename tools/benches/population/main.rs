@@ -5,7 +5,7 @@
 //! thirds of the cases that may be looked at while working, case by case, written nowhere; `--cases N` how many, `--from N` the first
 //! seed, or `--only A,B` which; `--pairs` those with two tools; `--patch A,B,C`, `--basis N`, `--basis-latency MS` and `--budget PERCENT` in place of the defaults;
 //! `--models A,B` in place of `predictive` and `patch`; `--link MS,SHARE` with the global model behind a link of so much delay one way
-//! and such a share of lost packets.
+//! and such a share of lost packets, which without `--seen` prints the document and writes nothing.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -37,7 +37,7 @@ fn document(is_quick: bool, settings: &Settings) -> Result<(), Error> {
     let single = run_all(&seeds(CASES), settings, |_| ())?;
     let pairs = run_all(&seeds(PAIRS), &of_pairs, |_| ())?;
     let document = words::document(&Populations { single, pairs });
-    if is_quick {
+    if is_quick || settings.link.is_some() {
         print!("{}", document.text);
         return Ok(());
     }

@@ -39,6 +39,9 @@ pub struct ServeArgs {
     /// Keep no reduced surroundings from run to run, and take none that were kept
     #[arg(long)]
     pub no_cache: bool,
+    /// Also write a log of each session: the first to this file, each after it to a name with its number; overwritten if it exists
+    #[arg(long, value_name = "LOG.mcap")]
+    pub out: Option<PathBuf>,
     #[command(flatten)]
     pub access: AccessArgs,
 }

@@ -4,7 +4,7 @@ use palpate::Error;
 use palpate::session::{Session, SessionBuilder};
 use palpate_link::{Access, Event, GlobalSide};
 
-use super::super::{progress, shared};
+use super::super::{files, progress, shared};
 use super::{AccessArgs, KeysArgs, ServeArgs};
 
 fn access(args: &AccessArgs) -> Result<Access, Error> {
@@ -30,9 +30,15 @@ pub fn serve(args: &ServeArgs) -> Result<(), Error> {
     if let Some(model) = args.model {
         scene = scene.with_model(model);
     }
+    if let Some(out) = &args.out {
+        files::keep_inputs(&files::inputs_of(&args.scene, &scene), out)?;
+    }
+    let mut sessions = 0;
     let make = || {
         let builder = Session::from_scene(scene.clone());
         let builder = if args.no_cache { builder.forget_bases() } else { builder };
+        sessions += 1;
+        let builder = args.out.iter().fold(builder, |builder, out| builder.log(palpate_view::numbered(out, sessions)));
         builder.build_global().map_err(|error| error.at(&name))
     };
     let access = access(&args.access)?;
@@ -51,10 +57,14 @@ fn show(name: &str, address: &str, event: &Event) {
             )
         }
         Event::Refused(error) => format!("a haptic machine is refused: {error}"),
-        Event::Ended(summary) => match &summary.runtime.fault {
-            Some(fault) => format!("the session is over: {fault}"),
-            None => "the session is over".to_owned(),
-        },
+        Event::Ended(summary) => {
+            let _ = shared::print(&summary.to_string());
+            match (&summary.runtime.fault, &summary.log_error) {
+                (Some(fault), _) => format!("the session is over: {fault}"),
+                (None, Some(error)) => format!("the session is over; the log is incomplete: {error}"),
+                (None, None) => "the session is over".to_owned(),
+            }
+        }
         _ => return,
     };
     // Whoever does not read this is none the worse for it.
