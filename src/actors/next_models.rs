@@ -141,8 +141,6 @@ impl NextModels {
             around.clone_from(&side.triangles);
             let others = unserved.iter().filter(|tool| side.held.contains(tool));
             around.extend(others.flat_map(|&tool| &tools[tool].triangles));
-            // The last model is the last that looks ahead.
-            simulation.record_ahead(!unserved.iter().all(|tool| side.held.contains(tool)));
             models.rebuild(ResyncView {
                 global: simulation,
                 tick: side.tool.tick,

@@ -224,15 +224,6 @@ impl Simulation {
         self.ahead.run(&mut self.moving, patch, ticks, motion, watch);
     }
 
-    /// Keeps what runs ahead for a local model from now on, if `records`: another one for the same tools at the same time looks at it again
-    /// in place of running ahead itself.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn record_ahead(&mut self, records: bool) {
-        self.ahead.records = records;
-    }
-
     /// The nodes that all tools but `tool` press, each with the force on it (N).
     ///
     /// # Real-time

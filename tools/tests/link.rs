@@ -63,7 +63,10 @@ fn two_commands_run_a_scene() {
     let mut report = String::new();
     serving.1.read_to_string(&mut report).unwrap();
     assert!(ended.success() && report.ends_with("scene.toml: the session is over\n"), "{report}");
-    assert!(report.contains("\nglobal") && !report.contains("\nforce"), "what this side did, and nothing of a device: {report}");
+    assert!(
+        report.contains("\nglobal") && !report.contains("\nforce"),
+        "what this side did, and nothing of a device: {report}"
+    );
     assert_eq!(serving.0.wait().unwrap().code(), Some(0));
     assert!(folder.succeed(&["log", "info", "served.mcap"]).contains("/global"));
 }

@@ -84,7 +84,8 @@ pub(super) struct Sinking {
 impl Sinking {
     /// The depth (m) under `force` (N); it grows with the force.
     pub(super) fn at(&self, force: f64) -> f64 {
-        self.lacking(force) * self.bend(force)
+        let lacking = self.lacking(force);
+        lacking * self.bend(lacking)
     }
 
     /// The largest depth (m).
@@ -101,8 +102,10 @@ impl Sinking {
         let force = force.max(1e-9 * self.turn);
         let root = force.cbrt();
         let crushed = 4.0 / 3.0 * CRUSHED * self.shown * (self.shown / self.hertz) * root;
-        let slope = self.share * (2.0 / 3.0 * self.hertz / root - self.shown - crushed) * self.bend(force).powi(9);
-        Sunk { offset: self.at(force) - slope * force, slope }
+        let lacking = self.lacking(force);
+        let bend = self.bend(lacking);
+        let slope = self.share * (2.0 / 3.0 * self.hertz / root - self.shown - crushed) * bend.powi(9);
+        Sunk { offset: lacking * bend - slope * force, slope }
     }
 
     /// What the elements lack (m) under `force` (N).
@@ -116,11 +119,11 @@ impl Sinking {
         if shown == 0.0 { whole } else { whole - shown - CRUSHED * shown * (shown / whole) }
     }
 
-    /// How much of that the tool sinks in: nearly all, but never as much as `most`. It comes near to that in a bend,
+    /// How much of what is `lacking` (m) the tool sinks in: nearly all, but never as much as `most`. It comes near to that in a bend,
     /// x / (1 + (x / most)^8)^(1/8): at a corner the surface, which the tool has left behind, would have to keep up with it from one
     /// step to the next, and its inertia would be felt as a jump.
-    fn bend(&self, force: f64) -> f64 {
-        (1.0 + (self.lacking(force) / self.most).powi(8)).sqrt().sqrt().sqrt().recip()
+    fn bend(&self, lacking: f64) -> f64 {
+        (1.0 + (lacking / self.most).powi(8)).sqrt().sqrt().sqrt().recip()
     }
 }
 

@@ -18,6 +18,8 @@ pub(super) struct Row {
     pub(super) normal: Vec3,
     /// How fast the tool moves there (m/s).
     pub(super) target: Vec3,
+    /// How fast it closes on the tool if nothing presses (m/s).
+    pub(super) closing: Vec3,
     /// At this velocity along the normal, against the tool's, the surface just touches the tool at the end of the step (m/s).
     pub(super) allowed: f64,
     /// How much the place gives way to an impulse at most, and along the normal (1/kg).

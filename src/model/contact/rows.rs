@@ -139,6 +139,7 @@ impl Rows {
         let first = self.nodes.len();
         self.nodes.extend(corners.iter().zip(weights).map(|(&node, w)| (node as u32, w)));
         let velocity = interpolate(&weights, &corners.map(|node| body.velocities[node]));
+        let target = velocity - closing;
         self.rows.push(Row {
             tool,
             triangle,
@@ -146,7 +147,8 @@ impl Rows {
             feature: [u32::MAX; 3],
             place: at,
             normal,
-            target: velocity - closing,
+            target,
+            closing: velocity - target,
             allowed: 0.0,
             compliance,
             along: compliance,
@@ -193,12 +195,14 @@ impl Rows {
         }
         let nodes = &self.nodes[first..];
         nodes.iter().for_each(|&(node, _)| self.listed[node as usize] = 0);
-        let mean =
-            |vectors: &[Vec3]| nodes.iter().fold(Vec3::zeros(), |sum, &(node, w)| sum + vectors[node as usize] * w);
-        let compliance: f64 = nodes.iter().map(|&(node, w)| w * w * body.inverse_masses[node as usize]).sum();
-        let (velocity, position) = (mean(body.velocities), mean(body.positions));
-        let movable: f64 =
-            nodes.iter().filter(|&&(node, _)| body.inverse_masses[node as usize] > 0.0).map(|&(_, w)| w).sum();
+        let (mut velocity, mut position, mut compliance, mut movable) = (Vec3::zeros(), Vec3::zeros(), 0.0, 0.0);
+        for &(node, w) in nodes {
+            let (node, inverse_mass) = (node as usize, body.inverse_masses[node as usize]);
+            velocity += body.velocities[node] * w;
+            position += body.positions[node] * w;
+            compliance += w * w * inverse_mass;
+            movable += if inverse_mass > 0.0 { w } else { 0.0 };
+        }
         let is_held = movable < HELD || compliance < IMMOVABLE;
         // The tool's own point that is nearest at the end: where it was, and how fast it moves.
         let at = |pose: &Pose| touch.shape.axis(pose)[0] * (1.0 - near.share) + touch.shape.axis(pose)[1] * near.share;
@@ -212,8 +216,8 @@ impl Rows {
         let grain = touch.skin.grain(corners, &near.weights, &nodes_at);
         let grain = grain.map(|grain| grain.stiffened(touch.stiffness));
         let sinking = grain.map(|grain| (grain.sinking(touch.shape.radius(), touch.steady), grain));
-        let sinking = sinking.filter(|(sinking, _)| sinking.most() > NEXT_TO_NOTHING);
         let sunk = sinking.map_or(0.0, |(sinking, _)| sinking.most());
+        let (sinking, sunk) = if sunk > NEXT_TO_NOTHING { (sinking, sunk) } else { (None, 0.0) };
         let gap = (before + sunk + RECOVERY * d).min(0.0);
         let mut feature = [u32::MAX; 3];
         for ((slot, node), weight) in feature.iter_mut().zip(corners).zip(near.weights) {
@@ -230,6 +234,7 @@ impl Rows {
             place: near.place,
             normal: near.normal,
             target,
+            closing: velocity - target,
             allowed: (velocity - target).dot(&near.normal) + (near.gap - gap) / d,
             compliance,
             along: compliance,

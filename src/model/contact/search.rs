@@ -55,10 +55,10 @@ impl Search {
     pub(super) fn find(&mut self, body: &Deformable<'_>, (tool, touch): (usize, &Touch), motion: ToolMotion, d: f64) {
         self.near.clear();
         let [mut wide, mut narrow] = std::mem::take(&mut self.vicinities[tool]);
-        if wide.update(body, touch, motion, d) {
-            narrow.forget();
-        }
         let is_narrow = narrow.is_narrow(body, touch, motion, d);
+        if !is_narrow {
+            wide.update(body, touch, motion, d);
+        }
         let vicinity = if is_narrow { &narrow } else { &wide };
         self.corners.clear();
         self.corners

@@ -40,14 +40,19 @@ impl Rows {
         let count = rows.len();
         shared.resize(count * count, 0.0);
         for (place, row) in rows.iter().enumerate() {
-            of(row).iter().for_each(|&(node, w)| at_nodes[node as usize] = w * body.inverse_masses[node as usize]);
-            for (other, row) in rows.iter().enumerate().skip(place) {
+            let weighted = |&(node, w): &(u32, f64)| w * body.inverse_masses[node as usize];
+            shared[place * count + place] = of(row).iter().map(|part| weighted(part) * part.1).sum();
+            if place + 1 == count {
+                break;
+            }
+            of(row).iter().for_each(|part| at_nodes[part.0 as usize] = weighted(part));
+            for (other, row) in rows.iter().enumerate().skip(place + 1) {
                 let answer = of(row).iter().map(|&(node, w)| at_nodes[node as usize] * w).sum();
                 (shared[place * count + other], shared[other * count + place]) = (answer, answer);
             }
             of(row).iter().for_each(|&(node, _)| at_nodes[node as usize] = 0.0);
         }
-        sweep_calmly(body, (rows, nodes), (nearness, exact), shared, [closing, before], law, d);
+        sweep_calmly(rows, (nearness, exact), shared, [closing, before], law, d);
         for row in rows.iter() {
             for &(node, w) in of(row) {
                 body.velocities[node as usize] -= row.impulse * (w * body.inverse_masses[node as usize]);
@@ -73,7 +78,7 @@ impl Rows {
                 (row.mode, row.impulse) = (ContactMode::Lost, Vec3::zeros());
             }
         }
-        sweep_calmly(body, (rows, nodes), (nearness, exact), coupling, [closing, before], law, system.step());
+        sweep_calmly(rows, (nearness, exact), coupling, [closing, before], law, system.step());
         for row in rows.iter() {
             system.push_all(body.velocities, of(row), row.impulse);
         }
@@ -82,8 +87,7 @@ impl Rows {
 
 /// Sweeps with the friction of `law`, and again with less while they run away.
 fn sweep_calmly<C: Copy + Mul<Vec3, Output = Vec3>>(
-    body: &Deformable<'_>,
-    (rows, nodes): (&mut [Row], &[(u32, f64)]),
+    rows: &mut [Row],
     (nearness, exact): (&mut Nearness, &mut Exact),
     coupling: &[C],
     [closing, before]: [&mut Vec<Vec3>; 2],
@@ -93,7 +97,7 @@ fn sweep_calmly<C: Copy + Mul<Vec3, Output = Vec3>>(
     let mut law = *law;
     let mut calmer = CALMER.iter();
     loop {
-        let fastest = find_closing(body, rows, nodes, closing);
+        let fastest = find_closing(rows, closing);
         sweep(rows, (nearness, exact), coupling, [closing, before], &law, d);
         if !has_run_away(rows, closing, fastest) {
             return;
@@ -103,13 +107,10 @@ fn sweep_calmly<C: Copy + Mul<Vec3, Output = Vec3>>(
     }
 }
 
-/// How fast each place closes on the tool if nothing presses; returns the fastest of what the sweeps are to end (m/s).
-fn find_closing(body: &Deformable<'_>, rows: &[Row], nodes: &[(u32, f64)], closing: &mut Vec<Vec3>) -> f64 {
+/// Puts how fast each place closes if nothing presses in place of `closing`; returns the fastest of what the sweeps are to end (m/s).
+fn find_closing(rows: &[Row], closing: &mut Vec<Vec3>) -> f64 {
     closing.clear();
-    closing.extend(rows.iter().map(|row| {
-        let nodes = nodes[row.nodes.0..row.nodes.1].iter();
-        nodes.fold(Vec3::zeros(), |sum, &(node, w)| sum + body.velocities[node as usize] * w) - row.target
-    }));
+    closing.extend(rows.iter().map(|row| row.closing));
     closing.iter().zip(rows).fold(0.0, |most: f64, (closing, row)| most.max(closing.norm()).max(row.allowed.abs()))
 }
 

@@ -29,6 +29,8 @@ pub(super) struct Vicinity {
     /// How fine the elements were.
     fineness: f64,
     is_known: bool,
+    /// How far things had moved by then since what this is a part of was made (m).
+    before: f64,
     /// By node of the body: its place in `nodes`, from one on; zero for all others.
     places: Vec<u32>,
     /// By node of the body: its place in `extents`, from one on. Working memory.
@@ -60,19 +62,19 @@ impl Vicinity {
         self.nodes.drain(..).for_each(|node| self.places[node as usize] = 0);
     }
 
-    /// Makes it what it says for a step of `d` seconds, of all candidates. True if it was made anew.
-    pub(super) fn update(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) -> bool {
-        let is_new = !self.is_known || self.moved(body, touch, motion, d) > MARGIN;
-        if is_new {
+    /// Makes it what it says for a step of `d` seconds, of all candidates.
+    pub(super) fn update(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) {
+        if !self.is_known || self.moved(body, touch, motion, d) > MARGIN {
             self.find(body, touch, motion, d);
         }
-        is_new
     }
 
     /// True if it is still what a [narrow](Self::narrow) one says, for a step of `d` seconds.
     pub(super) fn is_narrow(&self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) -> bool {
         // Corners move too while elements become finer.
-        self.is_known && self.fineness == touch.steady.fineness && self.moved(body, touch, motion, d) <= NARROW
+        self.is_known
+            && self.fineness == touch.steady.fineness
+            && self.moved(body, touch, motion, d) <= NARROW.min(MARGIN - self.before)
     }
 
     /// Becomes the part of `wide` whose triangles are, by their number there, within a reach (m) that is given for how much more than
@@ -87,6 +89,7 @@ impl Vicinity {
     ) {
         self.forget();
         self.begin(body, touch, motion);
+        self.before = wide.moved(body, touch, motion, d);
         let moved = self.moved(body, touch, motion, d);
         self.is_known = moved <= NARROW;
         if !self.is_known {

@@ -24,16 +24,14 @@ pub(super) struct Ahead {
     /// `None` if the neighbourhood of the patch is the whole body.
     part: Option<Part>,
     present: State,
-    /// What is seen is wanted again.
-    pub(super) records: bool,
-    /// What was seen for the model before.
+    /// Of several tools: what was seen for the one before.
     recorded: Recorded,
 }
 
 impl Default for Ahead {
     fn default() -> Self {
-        let (patch, part, present, records, recorded) = Default::default();
-        Self { most: Self::NODES, patch, part, present, records, recorded }
+        let (patch, part, present, recorded) = Default::default();
+        Self { most: Self::NODES, patch, part, present, recorded }
     }
 }
 
@@ -77,14 +75,13 @@ impl Ahead {
             from: motion(tool, tick).from,
             to: motion(tool, tick + stride - 1).to,
         };
-        let Self { part, present, records, recorded, .. } = self;
-        let records = *records;
+        let Self { part, present, recorded, .. } = self;
         if let Some(part) = part.as_mut() {
             part.begin(whole);
             part.drift(0);
         }
         let tools = whole.touches.len();
-        if records || !recorded.is_empty() {
+        if tools > 1 {
             let motions = steps.clone().flat_map(|tick| (0..tools).map(move |tool| (tool, tick)));
             let motions = motions.map(|(tool, tick)| motion(tool, tick)).collect();
             let now = part.as_ref().map_or(&whole.state, |part| &part.moving.state);
@@ -93,13 +90,10 @@ impl Ahead {
                 recorded.states().all(|state| watch(Glimpse { state, places }));
                 return;
             }
-            recorded.forget();
-            if records {
-                recorded.begin(motions, whole);
-            }
+            recorded.begin(motions, whole);
         }
         let mut record = |state: &State| {
-            if records {
+            if tools > 1 {
                 recorded.push(state);
             }
         };
@@ -349,7 +343,6 @@ mod tests {
             let with = |ticks: u32, friction: f64| {
                 let (simulation, patch) = simulation(12);
                 let mut simulation = simulation.with_tool(Contact::default()).looking_ahead_with(most);
-                simulation.record_ahead(true);
                 simulation.set_friction(friction.into());
                 for tick in 0..ticks {
                     let motion = motion(&simulation, tick);
@@ -378,13 +371,6 @@ mod tests {
             let motion = motion(&simulation, 30);
             simulation.tick_all(&[motion; 2]);
             assert!(seen(&mut simulation, &patch, 31) == anew(31, 0.5, 31));
-            // What is not wanted again is seen all the same where it is known, and else not kept.
-            let runs = simulation.ahead.recorded.begun;
-            simulation.record_ahead(false);
-            assert!(seen(&mut simulation, &patch, 31) == anew(31, 0.5, 31) && !simulation.ahead.recorded.is_empty());
-            assert!(seen(&mut simulation, &patch, 32) == anew(31, 0.5, 32) && simulation.ahead.recorded.is_empty());
-            assert_eq!(simulation.ahead.recorded.begun, runs);
-            simulation.record_ahead(true);
             // One that is cut off is no record.
             let mut shown = 0;
             let expected = |_, tick| self::motion(&with(0, 0.5).0, 32 + tick);

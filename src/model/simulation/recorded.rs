@@ -41,12 +41,7 @@ impl Recorded {
         self.count += 1;
     }
 
-    /// True if there is none.
-    pub(super) fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
-    /// The run came to no end, was one of another part of the body, or is not wanted any more.
+    /// The run came to no end, or was one of another part of the body.
     pub(super) fn forget(&mut self) {
         self.count = 0;
     }
