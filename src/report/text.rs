@@ -21,9 +21,8 @@ impl fmt::Display for RunReport {
         page.line(String::new());
         page.groups(self);
         page.line(String::new());
-        // The side of a link without devices has none of it.
-        let moved = self.devices.iter().filter(|device| device.force.ticks > 0);
-        moved.for_each(|device| page.haptics(self, device));
+        let devices = self.devices.iter().filter(|device| !device.is_empty());
+        devices.for_each(|device| page.haptics(self, device));
         page.events(self);
         f.write_str(&page.text)
     }

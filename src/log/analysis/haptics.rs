@@ -117,6 +117,14 @@ pub struct DeviceReport {
     pub limits: LimitReport,
 }
 
+impl DeviceReport {
+    /// True if nothing was told of it: it is elsewhere, beyond a link.
+    pub fn is_empty(&self) -> bool {
+        let ContactReport { free, stick, slip, lost } = self.contact;
+        [self.force.ticks, self.resyncs.jump_before_n.count, free, stick, slip, lost] == [0; 6]
+    }
+}
+
 /// Gathers the reports above.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HapticsCounter {
