@@ -506,6 +506,29 @@ def check_return(check, browser, palpate, shots):
         view.stop()
 
 
+def check_two_tools(check, browser, palpate, shots):
+    """Of two devices both are seen; numbers, strips and pushes are those of the one that is chosen."""
+    view = View(palpate, "scenes/two_hands.toml")
+    try:
+        start(browser, view)
+        wait(browser, lambda state: state["tool"] and state["frames"] > 5 and state["tick"], "the first picture of two tools")
+        names = browser.run("[...document.getElementById('device').options].map((option) => option.textContent)")
+        check.that(names == ["left", "right"], f"the tools are named {names}")
+        # The first is the visitor's and stays where it is; the second is the scene's, and presses within its two seconds.
+        still = [tuple(round(c) for c in browser.run(STATE)["tool"]) for _ in range(5)]
+        choose(browser, "device", "1")
+        before = browser.run(STATE)["time"]
+        browser.run("document.getElementById('reset').click()")
+        wait(browser, lambda state: state["time"] < before, "a reset")
+        pressed = wait(browser, lambda state: newtons(state["computed"]) > 0.05, "a force on the second tool")
+        check.that(pressed["contact"] in ("sticks", "slips"), f"there is a force, and the contact is {pressed['contact']}")
+        check.that(len(set(still)) == 1 and still[0] != tuple(round(c) for c in pressed["tool"]), f"the tools are at {still} and {pressed['tool']}")
+        layouts(check, browser, shots, "two")
+        check.faults += [f"two tools: {complaint}" for complaint in complaints(browser, view.url.split("#")[0])]
+    finally:
+        view.stop()
+
+
 def check_linked(check, browser, palpate, log, shots):
     """The body is in another process: the surface that is shown is that one's, and what a visitor changes reaches it."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
@@ -590,6 +613,7 @@ def main():
             check_linked(check, browser, args.palpate, log, args.shots)
         else:
             check_live(check, browser, args.palpate, log, args.shots)
+            check_two_tools(check, browser, args.palpate, args.shots)
             check_return(check, browser, args.palpate, args.shots)
             check_log(check, browser, args.palpate, log, args.shots)
             check_opening(check, args.palpate, args.folder)
