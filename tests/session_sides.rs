@@ -2,76 +2,17 @@
 
 mod session_support;
 
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use palpate::link::{Header, Hello, Lane, Message, Transport};
+use palpate::link::{Header, Hello, Message};
 use palpate::model::Vec3;
 use palpate::model::body::Body;
 use palpate::model::local::Kind;
 use palpate::runtime::Nanos;
 use palpate::scene::Scene;
-use palpate::session::{GlobalSession, Running, Session, SessionBuilder};
-use palpate::{Error, ErrorKind};
+use palpate::session::{Running, Session, SessionBuilder};
+use session_support::line::Line;
 use session_support::*;
-
-type Way = Arc<Mutex<VecDeque<Vec<u8>>>>;
-
-/// What carries messages at once, as far as it is not cut.
-#[derive(Clone, Debug, Default)]
-struct Line {
-    ways: [Way; 2],
-    is_cut: Arc<Mutex<bool>>,
-    /// What was said over it.
-    hello: Arc<Mutex<Option<Hello>>>,
-    peer: Arc<Mutex<u64>>,
-    /// Pictures of the body that were sent.
-    pictures: Arc<Mutex<usize>>,
-}
-
-#[derive(Clone, Debug)]
-struct End {
-    line: Line,
-    side: usize,
-}
-
-impl Line {
-    fn end(&self, side: usize) -> End {
-        End { line: self.clone(), side }
-    }
-}
-
-impl Transport for End {
-    fn send(&mut self, lane: Lane, message: &[u8], _: Nanos) {
-        *self.line.pictures.lock().unwrap() += usize::from(lane == Lane::Pictures);
-        if !*self.line.is_cut.lock().unwrap() {
-            self.line.ways[self.side].lock().unwrap().push_back(message.to_vec());
-        }
-    }
-
-    fn receive(&mut self, _: Nanos, message: &mut Vec<u8>) -> bool {
-        let Some(next) = self.line.ways[1 - self.side].lock().unwrap().pop_front() else { return false };
-        *message = next;
-        true
-    }
-
-    fn connect(&mut self, hello: &Hello) -> Result<(), Error> {
-        *self.line.hello.lock().unwrap() = Some(hello.clone());
-        let until = Instant::now() + Duration::from_secs(30);
-        while !self.line.ways[1].lock().unwrap().iter().any(|message| Message::has_models(message)) {
-            if Instant::now() > until {
-                return Err(Error::new(ErrorKind::Runtime, "nobody answers"));
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        Ok(())
-    }
-
-    fn peer(&mut self) -> u64 {
-        *self.line.peer.lock().unwrap()
-    }
-}
 
 fn session(model: Kind) -> SessionBuilder {
     Session::builder(block()).path(pressing()).model(model).friction(0.5)
@@ -81,21 +22,8 @@ fn session(model: Kind) -> SessionBuilder {
 fn start(line: &Line, model: Kind, seconds: f64) -> (Running, Running) {
     let haptic = session(model).keep_records().duration_s(seconds).global_over(line.end(0)).build().unwrap();
     let haptic = std::thread::spawn(move || haptic.start().unwrap());
-    let global = serve(line, session(model).build_global().unwrap());
+    let global = line.serve(session(model).build_global().unwrap());
     (haptic.join().unwrap(), global)
-}
-
-/// Starts the global side once the other one has said who it is.
-fn serve(line: &Line, global: GlobalSession) -> Running {
-    let hello = loop {
-        let hello = line.hello.lock().unwrap().clone();
-        if let Some(hello) = hello {
-            break hello;
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    };
-    assert_eq!(global.hello().difference(&hello), None);
-    global.start(line.end(1), &hello).unwrap()
 }
 
 fn largest(forces: impl Iterator<Item = [f64; 3]>) -> f64 {
@@ -136,9 +64,9 @@ fn a_global_side_that_dies_takes_the_force_away_and_another_one_gives_it_back() 
     haptic.wait_for(Duration::from_millis(800));
     line.ways.iter().for_each(|way| way.lock().unwrap().clear());
     *line.is_cut.lock().unwrap() = false;
-    *line.peer.lock().unwrap() += 1;
+    *line.peers[0].lock().unwrap() += 1;
     let returned = haptic.elapsed().as_secs_f64();
-    let global = serve(&line, session(Kind::Predictive).build_global().unwrap());
+    let global = line.serve(session(Kind::Predictive).build_global().unwrap());
     let back = haptic.elapsed().as_secs_f64();
     haptic.wait_for(Duration::from_millis(1500));
     global.stop();
@@ -155,11 +83,6 @@ fn a_global_side_that_dies_takes_the_force_away_and_another_one_gives_it_back() 
     assert!(felt(back, back + 1.5) > 0.1, "a force again, after {back} s");
 }
 
-/// Pictures that have been sent over a line so far.
-fn pictures(line: &Line) -> usize {
-    *line.pictures.lock().unwrap()
-}
-
 /// Check that whoever looks sees the surface where it is pressed, and how it swells beside, as the global model has it; that its nodes
 /// are there to single precision, and that nothing of it crosses while nobody looks.
 #[test]
@@ -171,10 +94,10 @@ fn the_surface_crosses_while_somebody_looks_at_it() {
     let first = viewer.surface().clone();
     assert_eq!((first.time, first.positions.as_slice()), (Nanos::ZERO, block().rest()));
     haptic.wait_for(Duration::from_millis(1200));
-    let unseen = pictures(&line);
+    let unseen = line.pictures();
     assert!((1..20).contains(&unseen), "the first half second, in which somebody might have looked: {unseen}");
     haptic.wait_for(Duration::from_millis(300));
-    assert_eq!(pictures(&line), unseen, "nobody looks");
+    assert_eq!(line.pictures(), unseen, "nobody looks");
     let (mut newest, mut shown) = (Nanos::ZERO, 0);
     for _ in 0..60 {
         haptic.wait_for(Duration::from_millis(10));
@@ -266,14 +189,14 @@ fn what_cannot_be_in_two_parts_is_refused_by_name() {
     assert_eq!(error.place(), "link", "{error}");
     let global = Session::from_scene(Scene::demo()).model(Kind::Predictive).build_global().unwrap();
     let far = Hello {
-        tools: vec![(String::new(), palpate::model::Pose::at(Vec3::new(9.0, 0.0, 0.0)))],
+        tools: vec![(String::new(), Some(palpate::model::Pose::at(Vec3::new(9.0, 0.0, 0.0))))],
         ..global.hello().clone()
     };
-    let error = global.start(Line::default().end(1), &far).map(|_| ()).unwrap_err();
+    let error = global.start(vec![(Box::new(Line::default().end(1)), far)]).map(|_| ()).unwrap_err();
     assert!(error.to_string().contains("m from the body"), "{error}");
     let global = Session::from_scene(Scene::demo()).model(Kind::Predictive).build_global().unwrap();
-    let error = global.start(Line::default().end(1), &Hello::default()).map(|_| ()).unwrap_err();
-    assert!(error.to_string().contains("0 over the link"), "{error}");
+    let error = global.start(vec![(Box::new(Line::default().end(1)), Hello::default())]).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("at one haptic machine"), "{error}");
 }
 
 #[test]
@@ -282,7 +205,7 @@ fn the_log_of_one_side_is_not_replayed() {
     let (line, log) = (Line::default(), folder.path().join("haptic.mcap"));
     let haptic = session(Kind::Hold).log(&log).duration_s(0.3).global_over(line.end(0)).build().unwrap();
     let haptic = std::thread::spawn(move || haptic.run().unwrap());
-    let global = serve(&line, session(Kind::Hold).build_global().unwrap());
+    let global = line.serve(session(Kind::Hold).build_global().unwrap());
     assert!(haptic.join().unwrap().log_error.is_none());
     global.stop();
     let error = session(Kind::Hold).replay(&log).map(|_| ()).unwrap_err();

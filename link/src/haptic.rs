@@ -20,6 +20,10 @@ use crate::unique;
 const FIRST_MODEL: Duration = Duration::from_secs(30);
 /// Another machine that has just gone is waited for so long.
 const OTHER_GONE: Duration = Duration::from_secs(3);
+/// The machines of the scene's other devices are waited for so long.
+const OTHERS_COME: Duration = Duration::from_secs(600);
+/// For so long the first model is looked for before it is asked again: a machine that asks is there.
+const LOOKS_FOR: Duration = Duration::from_millis(500);
 /// After so long a message is shown that nothing has come yet.
 const TELLS_AFTER: Duration = Duration::from_secs(1);
 
@@ -48,9 +52,11 @@ impl GlobalSide {
     }
 
     /// Says hello until it is welcome and the first models have come.
-    fn wait_for_models(&self, hello: &mut Hello, began: Instant) -> Result<Connection, Error> {
+    fn wait_for_models(&self, hello: &mut Hello) -> Result<Connection, Error> {
         let inbox = &self.shared.inbox;
         let (mut connection, mut is_told, mut is_welcome) = (None::<Connection>, false, false);
+        // While others are waited for, the time of the first model does not run.
+        let (mut began, mut others) = (Instant::now(), None::<Instant>);
         while began.elapsed() < FIRST_MODEL {
             if !is_told && began.elapsed() > TELLS_AFTER {
                 is_told = true;
@@ -71,15 +77,26 @@ impl GlobalSide {
                     is_welcome = true;
                     self.shared.kept().peer = peer;
                 }
-                Some(Answer::Busy) if began.elapsed() > OTHER_GONE => {
-                    return Err(self.error("works for another haptic machine, and takes one".to_owned()));
+                Some(Answer::WaitFor(devices)) => {
+                    if others.is_none() {
+                        tracing::warn!("waiting for the haptic machine with {}", palpate::printable(&devices));
+                    }
+                    let waited = others.get_or_insert_with(Instant::now).elapsed();
+                    if waited > OTHERS_COME {
+                        let minutes = OTHERS_COME.as_secs() / 60;
+                        return Err(self.error(format!("waits for {devices}, which did not come in {minutes} minutes")));
+                    }
+                    began = Instant::now();
                 }
-                Some(Answer::Wait | Answer::Busy) => {}
+                Some(Answer::Taken(device)) if began.elapsed() > OTHER_GONE => {
+                    return Err(self.error(format!("works for another haptic machine with {device}")));
+                }
+                Some(Answer::Wait | Answer::Taken(_)) => {}
                 Some(Answer::No(why)) => return Err(self.error(format!("refuses: {why}"))),
                 None => connection = None,
             }
             let looked = Instant::now();
-            while looked.elapsed() < ANSWERS_WITHIN {
+            while looked.elapsed() < LOOKS_FOR {
                 if is_welcome && inbox.models() > 0 {
                     return connection.ok_or_else(|| self.error("broke off".to_owned()));
                 }
@@ -114,7 +131,7 @@ impl Transport for GlobalSide {
 
     fn connect(&mut self, hello: &Hello) -> Result<(), Error> {
         let mut hello = Hello { machine: unique(), session: unique(), ..hello.clone() };
-        let connection = self.wait_for_models(&mut hello, Instant::now())?;
+        let connection = self.wait_for_models(&mut hello)?;
         self.shared.kept().connection = Some(connection);
         let keeper = Keeper::new(Arc::clone(&self.shared), self.config.clone(), self.places(), hello);
         let keeper = std::thread::Builder::new().name("link keeper".to_owned()).spawn(move || keeper.keep());

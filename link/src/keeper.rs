@@ -129,7 +129,7 @@ impl Keeper {
                     self.reopen();
                 }
             }
-            Answer::Wait | Answer::Busy => self.welcome_since = None,
+            Answer::Wait | Answer::WaitFor(_) | Answer::Taken(_) => self.welcome_since = None,
             Answer::No(why) => {
                 if !std::mem::replace(&mut self.is_refused, true) {
                     tracing::warn!(

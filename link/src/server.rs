@@ -1,16 +1,16 @@
-//! The global side: listens, and runs a session for the haptic machine that comes.
+//! The global side: listens, and runs a session for the haptic machines that come.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use palpate::link::{Hello, Lane, Transport};
+use palpate::link::{HapticMachine, Hello, Lane, Transport};
 use palpate::runtime::Nanos;
 use palpate::session::{GlobalSession, Running, Summary};
 use palpate::{Error, ErrorKind};
 use zenoh::Wait;
 
 use crate::access::Access;
-use crate::desk::Desk;
+use crate::desk::{Arrival, Desk, Guest};
 use crate::inbox::Inbox;
 use crate::line::{HELLO, Line, Way};
 
@@ -25,17 +25,18 @@ pub enum Event {
     Listening,
     /// A haptic machine has come, and the global model runs for it; what it says of itself.
     Came(Box<Hello>),
-    /// A haptic machine has come, and there is nothing for it; why.
+    /// Haptic machines have come, and there is nothing for them; why.
     Refused(Error),
-    /// The session is over: the machine has gone or begun anew, or the global model failed.
+    /// The session is over: its machines have gone or begun anew, or the global model failed.
     Ended(Box<Summary>),
 }
 
-/// Listens at `address` and runs the global model of a session, made by `make`, for the haptic machine that comes, one at a time; until
-/// `is_over`. What happens is told to `tell`, on this thread.
+/// Listens at `address` and runs the global model of a session, made by `make`, for the haptic machine that comes, or for those that have
+/// its devices between them; until `is_over`. What happens is told to `tell`, on this thread.
 ///
-/// A machine that comes again after a break of its link goes on with the session as it is. One that was started anew begins with another
-/// one, from the body as it was made.
+/// A session begins when all of its devices are there. A machine that comes again after a break of its link goes on with the session as
+/// it is. One that was started anew takes its place in the session of another one that goes on; without one, a session begins anew, from the
+/// body as it was made.
 ///
 /// # Errors
 /// If `access` does not allow the address, it is taken, or `make` fails.
@@ -58,47 +59,130 @@ pub fn serve(
     };
     let _queryable = zenoh.declare_queryable(HELLO).callback(answer).wait().map_err(refused)?;
     tell(Event::Listening);
-    let mut running: Option<Running> = None;
+    let mut serving: Option<Serving> = None;
     while !is_over() {
-        if let Some((hello, inbox)) = desk.wait_for_guest(LOOK) {
-            running.take().into_iter().for_each(|running| tell(Event::Ended(Box::new(running.stop()))));
-            let end = Line::new(&zenoh, hello.session, Way::Down, &inbox).map(|line| HapticSide { line, inbox });
-            match end.and_then(|end| ready.start(end, &hello)) {
-                Ok(started) => {
-                    running = Some(started);
-                    tell(Event::Came(Box::new(hello)));
+        match desk.wait_for_guests(LOOK) {
+            Some(Arrival::All(guests)) => {
+                serving.take().into_iter().for_each(|serving| serving.end(&mut tell));
+                match Serving::begin(&zenoh, ready, &guests) {
+                    Ok(begun) => {
+                        serving = Some(begun);
+                        guests.into_iter().for_each(|guest| tell(Event::Came(Box::new(guest.hello))));
+                    }
+                    Err(error) => {
+                        desk.refuse(&error.to_string());
+                        tell(Event::Refused(error));
+                    }
                 }
-                Err(error) => {
-                    desk.refuse(error.to_string());
-                    tell(Event::Refused(error));
+                ready = make()?;
+                desk.is_ready();
+            }
+            Some(Arrival::Again(guest)) => {
+                if let Some(serving) = &serving {
+                    match serving.seat(&zenoh, &guest) {
+                        Ok(()) => tell(Event::Came(Box::new(guest.hello))),
+                        Err(error) => tell(Event::Refused(error)),
+                    }
                 }
             }
-            ready = make()?;
-            desk.is_ready();
+            None => {}
         }
-        let has_failed = running.as_ref().is_some_and(Running::finished);
-        if has_failed || (running.is_some() && desk.is_alone()) {
+        let has_failed = serving.as_ref().is_some_and(|serving| serving.running.finished());
+        if has_failed || (serving.is_some() && desk.is_alone()) {
             desk.forget();
-            running.take().into_iter().for_each(|running| tell(Event::Ended(Box::new(running.stop()))));
+            serving.take().into_iter().for_each(|serving| serving.end(&mut tell));
         }
     }
-    running.into_iter().for_each(|running| tell(Event::Ended(Box::new(running.stop()))));
+    serving.into_iter().for_each(|serving| serving.end(&mut tell));
     Ok(())
 }
 
-/// The way to the haptic side, for the length of a session.
+/// A session that runs, and the places of its machines.
+struct Serving {
+    running: Running,
+    seats: Vec<(Vec<usize>, Seat)>,
+}
+
+impl Serving {
+    fn begin(zenoh: &zenoh::Session, session: GlobalSession, guests: &[Guest]) -> Result<Self, Error> {
+        let (mut seats, mut machines): (Vec<_>, Vec<HapticMachine>) = Default::default();
+        for guest in guests {
+            let seat = Seat::new(Seated { way: HapticSide::new(zenoh, guest)?, machines: 1 });
+            seats.push((guest.hello.own_tools().collect(), seat.clone()));
+            machines.push((Box::new(seat), guest.hello.clone()));
+        }
+        Ok(Self { running: session.start(machines)?, seats })
+    }
+
+    /// Lets a machine take the place of the one that had the same tools.
+    fn seat(&self, zenoh: &zenoh::Session, guest: &Guest) -> Result<(), Error> {
+        let way = HapticSide::new(zenoh, guest)?;
+        if let Some((_, seat)) = self.seats.iter().find(|(tools, _)| guest.hello.own_tools().eq(tools.iter().copied()))
+        {
+            seat.take(way);
+        }
+        Ok(())
+    }
+
+    fn end(self, tell: &mut impl FnMut(Event)) {
+        tell(Event::Ended(Box::new(self.running.stop())));
+    }
+}
+
+/// The place of a haptic machine in a session, for its length: another machine may take it.
+#[derive(Clone, Debug)]
+struct Seat(Arc<Mutex<Seated>>);
+
+#[derive(Debug)]
+struct Seated {
+    way: HapticSide,
+    /// How many have had the place.
+    machines: u64,
+}
+
+impl Seat {
+    fn new(seated: Seated) -> Self {
+        Self(Arc::new(Mutex::new(seated)))
+    }
+
+    fn seated(&self) -> MutexGuard<'_, Seated> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn take(&self, way: HapticSide) {
+        let mut seated = self.seated();
+        let before = std::mem::replace(&mut seated.way, way);
+        seated.machines += 1;
+        // Ending it asks the network.
+        drop(seated);
+        drop(before);
+    }
+}
+
+impl Transport for Seat {
+    fn send(&mut self, lane: Lane, message: &[u8], _: Nanos) {
+        self.seated().way.line.outbox.put(lane, message);
+    }
+
+    fn receive(&mut self, _: Nanos, message: &mut Vec<u8>) -> bool {
+        self.seated().way.inbox.take(message)
+    }
+
+    fn peer(&mut self) -> u64 {
+        self.seated().machines
+    }
+}
+
+/// The way to a haptic machine.
 #[derive(Debug)]
 struct HapticSide {
     line: Line,
     inbox: Arc<Inbox>,
 }
 
-impl Transport for HapticSide {
-    fn send(&mut self, lane: Lane, message: &[u8], _: Nanos) {
-        self.line.outbox.put(lane, message);
-    }
-
-    fn receive(&mut self, _: Nanos, message: &mut Vec<u8>) -> bool {
-        self.inbox.take(message)
+impl HapticSide {
+    fn new(zenoh: &zenoh::Session, guest: &Guest) -> Result<Self, Error> {
+        let inbox = Arc::clone(&guest.inbox);
+        Ok(Self { line: Line::new(zenoh, guest.hello.session, Way::Down, &inbox)?, inbox })
     }
 }

@@ -160,18 +160,25 @@ impl GlobalActor {
     fn take_samples(&mut self, newest: u64) -> bool {
         let Some(next) = self.next_tick().filter(|&next| next <= newest) else { return false };
         let most = self.plan.way_ticks();
-        for side in &mut self.tools {
+        let Self { tools, simulation, .. } = self;
+        for (index, side) in tools.iter_mut().enumerate() {
             let sample = side.waiting.front().copied().unwrap_or(side.tool);
             let is_between = sample.tick > next;
             side.is_between |= is_between;
             let before = side.tool;
             side.tool = if is_between {
-                let share = next.saturating_sub(side.tool.tick) as f64 / (sample.tick - side.tool.tick) as f64;
-                ToolTick { tick: next, pose: side.tool.pose.towards(&sample.pose, share) }
+                let share = next.saturating_sub(before.tick) as f64 / (sample.tick - before.tick) as f64;
+                let pose = if sample.is_put { before.pose } else { before.pose.towards(&sample.pose, share) };
+                ToolTick { tick: next, pose, is_put: false }
             } else {
                 side.waiting.pop_front();
                 sample
             };
+            if side.tool.is_put {
+                simulation.lift(index);
+                side.put();
+                continue;
+            }
             let way = ToolMotion { from: before.pose, to: side.tool.pose };
             let ticks = next.saturating_sub(before.tick).min(most);
             (1..=ticks).for_each(|i| side.history.push(way.at(i as f64 / ticks as f64)));

@@ -44,6 +44,12 @@ impl ToolSide {
         Self { ports, waiting, tool, from, is_between, history, windows, triangles, beside, held, patch }
     }
 
+    /// The tool rests where it is now, wherever it came from.
+    pub(super) fn put(&mut self) {
+        self.from = self.tool.pose;
+        self.history.restart(self.tool.pose);
+    }
+
     /// Takes the patch's geometry in place of the global model's own, if it belongs to the same tick.
     pub(super) fn take_feedback(&mut self, ctx: &TickContext, simulation: &mut Simulation, index: usize) {
         if let Some(reader) = &mut self.ports.geometry {

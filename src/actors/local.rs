@@ -47,7 +47,7 @@ impl LocalSide {
             }
         }
         // A full queue is counted; the global model sees the gap and interpolates over it.
-        self.ports.ticks.push(ctx, ToolTick { tick, pose: self.tool.pose() });
+        self.ports.ticks.push(ctx, ToolTick { tick, pose: self.tool.pose(), is_put: false });
     }
 
     /// Commands and records the force on the tool, of that `number`, after the last tick; false if it is not finite.

@@ -23,6 +23,8 @@ pub struct ToolTick {
     pub tick: u64,
     /// The tool.
     pub pose: Pose,
+    /// It was put there, and did not go: another one has taken its place, and touches nothing yet.
+    pub is_put: bool,
 }
 
 /// The newest force for the device, as the local model computed it. What is written is a

@@ -14,6 +14,7 @@
 mod capabilities;
 pub mod conformance;
 mod device;
+mod elsewhere;
 mod fault;
 mod faulty;
 mod hand;
@@ -26,6 +27,7 @@ mod tool_path;
 
 pub use capabilities::Capabilities;
 pub use device::Device;
+pub(crate) use elsewhere::{Elsewhere, ElsewhereHandle};
 pub use fault::{DeviceFault, SafetyStop};
 pub use faulty::{FaultKind, FaultSpec, Faulty};
 pub use hand::{Axis, Hand, HandSpec, PlantSpec};

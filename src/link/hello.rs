@@ -10,8 +10,8 @@ use crate::runtime::Nanos;
 
 /// Bytes that a text has at most.
 const MOST_TEXT: usize = 1 << 18;
-/// Bytes of a tool at least: the length of its name, and its pose.
-const TOOL: usize = 4 + 7 * 8;
+/// Bytes of a tool at least: the length of its name, and whether it is there.
+const TOOL: usize = 4 + 1;
 
 /// The haptic side's word of itself, which the global side holds against its own.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,8 +30,8 @@ pub struct Hello {
     pub scene: String,
     /// A fingerprint of the body's nodes, masses and surface: a mesh is in no text.
     pub body: u64,
-    /// The tools by name, and where each is at the start.
-    pub tools: Vec<(String, Pose)>,
+    /// The tools of the scene by name, and where each is at the start; `None` for one that is at another machine.
+    pub tools: Vec<(String, Option<Pose>)>,
 }
 
 impl Hello {
@@ -61,7 +61,8 @@ impl Hello {
         [&self.build, &self.instructions, &self.scene].into_iter().for_each(|text| write_text(to, text));
         to.list(&self.tools, |to, (name, pose)| {
             write_text(to, name);
-            message::write_pose(to, pose);
+            to.u8(pose.is_some().into());
+            pose.iter().for_each(|pose| message::write_pose(to, pose));
         });
     }
 
@@ -81,12 +82,26 @@ impl Hello {
         let [machine, session, round_trip, body] = [from.u64()?, from.u64()?, from.u64()?, from.u64()?];
         let [build, instructions, scene] = [read_text(from)?, read_text(from)?, read_text(from)?];
         let mut tools = Vec::new();
-        from.list(TOOL, &mut tools, |from| Some((read_text(from)?, message::read_pose(from)?)))?;
+        from.list(TOOL, &mut tools, |from| Some((read_text(from)?, read_place(from)?)))?;
         Some(Self { machine, session, round_trip: Nanos(round_trip), build, instructions, scene, body, tools })
+    }
+
+    /// The tools that are at the machine that speaks, by number.
+    pub fn own_tools(&self) -> impl Iterator<Item = usize> {
+        self.tools.iter().enumerate().filter(|(_, (_, pose))| pose.is_some()).map(|(tool, _)| tool)
     }
 
     /// The version of messages, and of what an answer to this says.
     pub const VERSION: u16 = VERSION;
+}
+
+/// Where a tool is, if it is there.
+fn read_place(from: &mut BytesReader<'_>) -> Option<Option<Pose>> {
+    match from.u8()? {
+        0 => Some(None),
+        1 => Some(Some(message::read_pose(from)?)),
+        _ => None,
+    }
 }
 
 fn write_text(to: &mut BytesWriter<'_>, text: &str) {
@@ -117,7 +132,7 @@ mod tests {
             instructions: "AVX2".to_owned(),
             scene: "[body]\nfriction = 0.5\n".to_owned(),
             body: 7,
-            tools: vec![("left".to_owned(), Pose::at(Vec3::new(0.1, -0.0, 3.0))), (String::new(), Pose::default())],
+            tools: vec![("left".to_owned(), Some(Pose::at(Vec3::new(0.1, -0.0, 3.0)))), (String::new(), None)],
         }
     }
 
@@ -126,6 +141,7 @@ mod tests {
         let (hello, mut bytes) = (hello(), Vec::new());
         hello.write(&mut bytes);
         assert_eq!(Hello::read(&bytes).unwrap(), hello);
+        assert_eq!(hello.own_tools().collect::<Vec<_>>(), [0]);
         assert!((0..bytes.len()).all(|cut| Hello::read(&bytes[..cut]).is_err()));
         assert_eq!(Hello::read(&[&bytes[..], &[0]].concat()), Err(Refused::Malformed));
         bytes[4] = VERSION as u8 + 1;
@@ -144,6 +160,8 @@ mod tests {
         assert!(named(Hello { scene: "[body]\n".to_owned(), ..hello() }).contains("`nothing more` there"));
         assert!(named(Hello { body: 8, ..hello() }).contains("nodes"));
         assert!(named(Hello { tools: Vec::new(), ..hello() }).contains("[] there"));
+        let elsewhere = hello().tools.into_iter().map(|(name, _)| (name, None)).collect();
+        assert_eq!(here.difference(&Hello { tools: elsewhere, ..hello() }), None, "whose they are is no difference");
     }
 
     proptest::proptest! {

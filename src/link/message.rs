@@ -21,7 +21,7 @@ use crate::runtime::Nanos;
 
 const MAGIC: [u8; 4] = *b"plnk";
 /// The version of the format: of another one nothing is read.
-pub const VERSION: u16 = 4;
+pub const VERSION: u16 = 5;
 /// No message is longer (bytes).
 pub const LARGEST: usize = 1 << 25;
 
@@ -55,7 +55,7 @@ pub struct Header {
 #[derive(Clone, Debug)]
 pub enum Message {
     /// To the global side: a tool at its last haptic ticks, oldest first. Each message repeats some of those before, so that one that is
-    /// lost need not be sent again.
+    /// lost need not be sent again. To a haptic side: likewise a tool that is at another one.
     Ticks {
         /// The tool.
         tool: u16,
@@ -180,6 +180,11 @@ impl Message {
         let to = &mut begin(header, BASIS, bytes);
         to.u64(key);
         to.0.extend_from_slice(&basis.to_bytes(key));
+    }
+
+    /// Writes the message of local models without a copy of what they are built from.
+    pub fn write_models(shipment: &Shipment, header: Header, bytes: &mut Vec<u8>) {
+        shipment.write(&mut begin(header, MODELS, bytes));
     }
 
     fn kind(&self) -> u16 {

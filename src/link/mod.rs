@@ -15,3 +15,6 @@ pub use hello::Hello;
 pub use message::{Header, LARGEST, MOST_TICKS, Message, Refused, VERSION};
 pub use transport::{Lane, Transport};
 pub use virtual_link::{Conditions, VirtualEnd, VirtualLink};
+
+/// A haptic machine, as the global side meets it: the way to it, and what it says of itself.
+pub type HapticMachine = (Box<dyn Transport>, Hello);

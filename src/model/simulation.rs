@@ -9,7 +9,9 @@ mod told;
 use std::sync::Arc;
 
 use crate::body::{Body, State, Stiffened, Stiffness};
-use crate::contact::{Coarseness, Contact, ContactPoint, Friction, Law, Rows, Skin, ToolMotion, ToolShape, Touch};
+use crate::contact::{
+    Coarseness, Contact, ContactPoint, Friction, Law, Rows, Skin, Steady, ToolMotion, ToolShape, Touch,
+};
 use crate::error::ModelError;
 use crate::{Pose, Vec3, Wrench};
 use ahead::{Ahead, Glimpse};
@@ -360,6 +362,18 @@ impl Simulation {
     /// Wait-free, real-time safe.
     pub fn restore_tool(&mut self, tool: usize, contact: Contact, force: Vec3) {
         (self.moving.touches[tool].contact, self.moving.means[tool]) = (contact, force.into());
+    }
+
+    /// Takes `tool` off the body, unless it is glued to it: what it touched is let go.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn lift(&mut self, tool: usize) {
+        let touch = &mut self.moving.touches[tool];
+        if !touch.contact.glued {
+            touch.go_on_from(Contact::default(), Steady::default(), &[]);
+            self.moving.means[tool] = Wrench::default();
+        }
     }
 
     /// The law by which contacts are resolved.

@@ -107,6 +107,14 @@ impl SessionBuilder {
         self
     }
 
+    /// Says which devices of a scene with several are at this machine, by name; may be called again. The others are at another one, which
+    /// [takes its global models](Self::global_over) from the same place: their tools are seen and met here, and felt there.
+    #[must_use]
+    pub fn device_here(mut self, name: impl Into<String>) -> Self {
+        self.parts.here.get_or_insert_default().push(name.into());
+        self
+    }
+
     /// Logs a node's position every tick, by id; may be called again.
     #[must_use]
     pub fn probe(mut self, node: u32) -> Self {

@@ -7,7 +7,7 @@ use super::wire;
 use super::{Choice, SessionBuilder};
 use crate::devices::{Device, DeviceState, Scripted, ToolPath};
 use crate::error::Error;
-use crate::link::{Hello, Transport};
+use crate::link::{HapticMachine, Hello};
 
 /// The global model of a session whose devices are in another process: ready to start when one says [`Hello`].
 ///
@@ -49,13 +49,13 @@ impl GlobalSession {
         self.prepared.choice.as_ref()
     }
 
-    /// Starts the global model, with the tools where `hello` says; local models go by `transport`, and tool ticks come by it. It runs until
-    /// it is stopped.
+    /// Starts the global model for the `machines` that have the tools, each of which is at one of them; local models go to all of them, and
+    /// tool ticks come from each. It runs until it is stopped.
     ///
     /// # Errors
-    /// If the tools are not those of the scene or far from the body, or a thread cannot be started.
-    pub fn start(self, transport: impl Transport + 'static, hello: &Hello) -> Result<Running, Error> {
-        wire::start_global(self.prepared, Box::new(transport), hello)
+    /// If a tool of the scene is at none of the machines or at two, or far from the body, or a thread cannot be started.
+    pub fn start(self, machines: Vec<HapticMachine>) -> Result<Running, Error> {
+        wire::start_global(self.prepared, machines)
     }
 }
 

@@ -31,6 +31,8 @@ pub(super) struct Parts {
     pub(super) side: Side,
     /// The way to the other side, of the haptic one.
     pub(super) transport: Option<Box<dyn Transport>>,
+    /// The devices that are at this machine, by name, if others are at another one.
+    pub(super) here: Option<Vec<String>>,
     pub(super) scene: Scene,
     /// The scene is no file's: a program says by calls what is in it.
     pub(super) is_of_program: bool,
@@ -57,6 +59,7 @@ impl Parts {
         Self {
             side: Side::default(),
             transport: None,
+            here: None,
             is_of_program: body.is_some(),
             endless: body.is_some(),
             scene,

@@ -3,6 +3,7 @@
 
 #[path = "../../examples/common/altered_block.rs"]
 mod altered_block;
+pub mod line;
 
 #[allow(unused_imports)]
 pub use altered_block::AlteredBlock;
@@ -37,6 +38,14 @@ pub fn pressing() -> ToolPath {
         [0.05 + 0.01 * (9.0 * t).sin(), 0.052, 0.101 - 0.009 * pressed - 0.002 * (23.0 * t).sin()]
     };
     sampled(position)
+}
+
+/// Likewise from the other end of the top, towards the first and back.
+pub fn meeting() -> ToolPath {
+    sampled(|t| {
+        let pressed = (t / 0.05).min(1.0);
+        [0.075 - 0.012 * (5.0 * t).sin().abs(), 0.05, 0.101 - 0.008 * pressed - 0.002 * (17.0 * t).sin()]
+    })
 }
 
 /// Moves the node [`top`] about like a hand.

@@ -36,6 +36,28 @@ impl Drop for Serving {
     }
 }
 
+/// `palpate run` in a folder; killed when dropped.
+struct Haptic(Child);
+
+impl Haptic {
+    fn start(folder: &Folder, args: &[String]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
+        command.args(args).current_dir(folder.path(".")).stdout(Stdio::null());
+        Self(command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR")).spawn().unwrap())
+    }
+
+    fn ends(mut self) {
+        assert!(self.0.wait().unwrap().success());
+    }
+}
+
+impl Drop for Haptic {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
 /// The address of a port that nobody listens at.
 fn free(protocol: &str) -> String {
     let socket = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
@@ -57,7 +79,7 @@ fn two_commands_run_a_scene() {
     let mut serving = Serving::start(&folder, &["scene.toml", "--listen", &address, "--out", "served.mcap"]);
     let report = folder.succeed(&["run", "scene.toml", "--global", &address, "--duration", "1", "--out", "felt.mcap"]);
     assert!(report.contains("log: felt.mcap"), "{report}");
-    assert!(serving.line().contains("a haptic machine has come: 1 tool, round trip"));
+    assert!(serving.line().contains("a haptic machine has come, round trip"));
     assert!(folder.succeed(&["log", "info", "felt.mcap"]).contains("/link"));
     let ended = Command::new("kill").args(["-INT", &serving.0.id().to_string()]).status().unwrap();
     let mut report = String::new();
@@ -69,6 +91,47 @@ fn two_commands_run_a_scene() {
     );
     assert_eq!(serving.0.wait().unwrap().code(), Some(0));
     assert!(folder.succeed(&["log", "info", "served.mcap"]).contains("/global"));
+}
+
+/// The largest force on `device` by a log, as it was commanded from a time on (N).
+fn felt(folder: &Folder, log: &str, device: &str, from: f64) -> f64 {
+    let table = folder.succeed(&["export", log, "--topic", &format!("/{device}/force_commanded")]);
+    let mut lines = table.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column =
+        |name: &str| names.iter().position(|other| *other == name).unwrap_or_else(|| panic!("{name}: {names:?}"));
+    let (time, axes) = (column("t_s"), ["fx_n", "fy_n", "fz_n"].map(column));
+    let rows = lines.map(|line| line.split(',').map(|number| number.parse().unwrap()).collect::<Vec<f64>>());
+    let norm = |row: Vec<f64>| axes.map(|axis| row[axis].powi(2)).iter().sum::<f64>().sqrt();
+    rows.filter(|row| row[time] >= from).map(norm).fold(0.0, f64::max)
+}
+
+/// Check that two haptic machines touch one body, that a third is refused by name, and that one that is killed leaves the other its force
+/// and takes its place again.
+#[test]
+fn two_haptic_machines_touch_one_body() {
+    let (folder, address) = (folder(), free("tcp"));
+    let mut serving = Serving::start(&folder, &["two_hands", "--listen", &address]);
+    let args = |device, seconds, log| {
+        ["run", "two_hands", "--global", &address, "--device", device, "--duration", seconds, "--out", log]
+            .map(str::to_owned)
+    };
+    let start = |args: [String; 10]| Haptic::start(&folder, &args);
+    let left = start(args("left", "7", "left.mcap"));
+    let right = start(args("right", "60", "killed.mcap"));
+    let came = [serving.line(), serving.line()].concat();
+    assert!(came.contains("\"left\"") && came.contains("\"right\""), "{came}");
+    let third = folder.call(&args("left", "1", "third.mcap").each_ref().map(String::as_str));
+    assert_eq!(third.code, Some(1), "{third:?}");
+    assert!(third.err.contains("works for another haptic machine with device \"left\""), "{third:?}");
+    drop(right);
+    let right = start(args("right", "2", "right.mcap"));
+    assert!(serving.line().contains("has come with \"right\""));
+    for haptic in [right, left] {
+        haptic.ends();
+    }
+    let felt = [felt(&folder, "left.mcap", "left", 0.5), felt(&folder, "right.mcap", "right", 0.5)];
+    assert!(felt.iter().all(|&force| force > 0.02), "{felt:?} N");
 }
 
 #[test]
@@ -95,6 +158,8 @@ fn what_cannot_be_is_refused_in_one_line() {
         (&["view", "scene.toml", "--global", "tcp/big-machine:7447"], 2, "--insecure"),
         (&["view", "scene.toml", "--global", &address, "--model", "full"], 2, "no global model"),
         (&["run", "scene.toml", "--global", &address, "--virtual"], 1, "simulate one"),
+        (&["run", "two_hands", "--global", &address, "--device", "middle"], 2, "the scene's devices are left, right"),
+        (&["run", "two_hands", "--device", "left"], 2, "--global"),
         (&["run", "scene.toml", "--global", &address, "--model", "full"], 2, "no global model"),
         (&["run", "scene.toml", "--global", &address, "--config", "none.toml"], 2, "none.toml"),
         (&["run", "scene.toml", "--global", &address, "--config", "scene.toml"], 2, "unknown field"),

@@ -6,19 +6,18 @@ use super::super::cause::Cause;
 use super::super::messages::{SurfaceView, ToolTick};
 use super::super::settings::Settings;
 use super::post::Post;
-use super::{MOST_MESSAGES, SILENCE, key_of};
+use super::{MOST_MESSAGES, REPEATED, SILENCE, key_of};
+use crate::devices::ElsewhereHandle;
 use crate::link::{Clock, Lane, MOST_TICKS, Message, Transport};
 use crate::log::LinkSample;
-use crate::model::Vec3;
 use crate::model::body::Stiffness;
 use crate::model::local::{Image, LocalModels, Shipment};
 use crate::model::surroundings::{Bases, Basis};
+use crate::model::{Pose, Vec3};
 use crate::runtime::{
     Actor, ActorError, Nanos, Outcome, OutletWriter, ParameterReader, QueueReader, Recorder, TickContext, Writer,
 };
 
-/// Ticks that a message has at least, if there are so many: those before the newest are repeated.
-const REPEATED: usize = 8;
 /// A surface that nobody has taken for so long is not asked for any more.
 const WATCHED_FOR: Nanos = Nanos(500_000_000);
 /// Between two questions for the time.
@@ -54,8 +53,8 @@ pub struct HapticBridge {
 /// What the local actor and its bridge say to each other, and what a program does.
 #[derive(Debug)]
 pub struct HapticBridgePorts {
-    /// The ticks of each tool.
-    pub ticks: Vec<QueueReader<ToolTick>>,
+    /// The ticks of each tool, and where the place of one goes whose device is at another machine.
+    pub tools: Vec<(QueueReader<ToolTick>, Option<ElsewhereHandle>)>,
     /// The next local models.
     pub models: Writer<LocalModels>,
     /// What the program wants.
@@ -111,19 +110,38 @@ impl Surfaces {
 #[derive(Debug)]
 struct Tool {
     ticks: QueueReader<ToolTick>,
-    /// Oldest first.
+    /// Oldest first; of one that is elsewhere those that came from there, the newest alone.
     recent: VecDeque<ToolTick>,
+    elsewhere: Option<ElsewhereHandle>,
+}
+
+impl Tool {
+    /// The newest tick.
+    fn newest(&self) -> u64 {
+        self.recent.back().map_or(0, |tick| tick.tick)
+    }
+
+    /// It is elsewhere, and was there at those ticks.
+    fn hear(&mut self, ticks: &[(u64, Pose)]) {
+        if let (Some(elsewhere), Some(&(tick, pose))) = (&mut self.elsewhere, ticks.last())
+            && self.recent.back().is_none_or(|newest| tick > newest.tick)
+        {
+            self.recent.clear();
+            self.recent.push_back(ToolTick { tick, pose, is_put: false });
+            elsewhere.put(pose);
+        }
+    }
 }
 
 impl HapticBridge {
     /// A bridge between what is behind `ports` and what is beyond `transport`; it builds local models by the `image` of the body over there.
     pub fn new(transport: Box<dyn Transport>, image: Image, ports: HapticBridgePorts) -> Self {
-        let HapticBridgePorts { ticks, models, settings, surfaces, recorder } = ports;
+        let HapticBridgePorts { tools, models, settings, surfaces, recorder } = ports;
         let nodes = if surfaces.is_empty() { Vec::new() } else { image.surface_nodes() };
         let surfaces = Surfaces { writers: surfaces, nodes, newest: None, seen: Nanos::ZERO };
-        let tool = |ticks| Tool { ticks, recent: VecDeque::new() };
+        let tool = |(ticks, elsewhere)| Tool { ticks, recent: VecDeque::new(), elsewhere };
         let (newest, arrived, bases, clock, heard, asked) = Default::default();
-        let (mut post, tools) = (Post::new(transport), ticks.into_iter().map(tool).collect());
+        let (mut post, tools) = (Post::new(transport), tools.into_iter().map(tool).collect());
         let peer = post.peer();
         Self {
             post,
@@ -151,6 +169,7 @@ impl HapticBridge {
             self.post.begin_epoch(self.post.epoch + 1);
             self.heard = None;
             self.newest = None;
+            self.tools.iter_mut().filter(|tool| tool.elsewhere.is_some()).for_each(|tool| tool.recent.clear());
             self.surfaces.newest = None;
         }
         self.heard.is_none()
@@ -160,6 +179,10 @@ impl HapticBridge {
         for (number, tool) in (0..).zip(&mut self.tools) {
             let mut new = 0;
             while let Some(tick) = tool.ticks.pop(ctx) {
+                if tool.elsewhere.is_some() {
+                    // It was heard of from there.
+                    continue;
+                }
                 if tool.recent.len() == MOST_TICKS {
                     tool.recent.pop_front();
                 }
@@ -214,8 +237,8 @@ impl HapticBridge {
                 Message::Models(shipment) => {
                     // One that was overtaken is outdated; one of a tick that has not been is none, and would never be old.
                     let tick = shipment.tick();
-                    let sent = |tool: &Tool| tool.recent.back().map_or(0, |tick| tick.tick);
-                    let has_been = self.tools.iter().map(sent).min().is_some_and(|sent| tick <= sent);
+                    let own = self.tools.iter().filter(|tool| tool.elsewhere.is_none());
+                    let has_been = own.map(Tool::newest).min().is_some_and(|sent| tick <= sent);
                     if has_been && self.newest.is_none_or(|newest| tick > newest) {
                         self.newest = Some(tick);
                         self.arrived = Some(shipment);
@@ -226,8 +249,23 @@ impl HapticBridge {
                 Message::Pong { sent, received } => {
                     self.clock.push([sent.0, received.0, header.sent.0, now.0]);
                 }
+                Message::Ticks { tool, ticks } => {
+                    if let Some(tool) = self.tools.get_mut(usize::from(tool)) {
+                        tool.hear(&ticks);
+                    }
+                }
                 // Of the other direction.
-                Message::Ticks { .. } | Message::Wants { .. } | Message::Ping => {}
+                Message::Wants { .. } | Message::Ping => {}
+            }
+        }
+    }
+
+    /// Puts the tools that are elsewhere where the first models say, unless something newer has come.
+    fn place_others(&mut self) {
+        let places = self.arrived.iter().flat_map(Shipment::places);
+        for (tool, place) in self.tools.iter_mut().zip(places) {
+            if let (Some(elsewhere), true) = (&mut tool.elsewhere, tool.recent.is_empty()) {
+                elsewhere.put(Pose::at(place));
             }
         }
     }
@@ -255,6 +293,7 @@ impl Actor for HapticBridge {
 
     fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
         self.receive(ctx);
+        self.place_others();
         self.publish(ctx);
         self.post.begin();
         Ok(())

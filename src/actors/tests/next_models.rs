@@ -29,7 +29,7 @@ fn scene<const TOOLS: usize>(places: [[f64; 2]; TOOLS]) -> (Simulation, Vec<Tool
         let (_, ticks) = graph.queue(1);
         let windows = Windows::new(&simulation, index, PATCH);
         let history = ToolHistory::new(pose, 1e-3, 33e-3);
-        ToolSide::new(ToolTick { tick: 0, pose }, windows, history, ToolPorts { ticks, geometry: None })
+        ToolSide::new(ToolTick { pose, ..ToolTick::default() }, windows, history, ToolPorts { ticks, geometry: None })
     };
     let sides = places.into_iter().enumerate().map(side).collect();
     (simulation, sides)

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use super::super::parts::OpenHaply;
 use crate::devices::{
-    Device, DeviceState, Faulty, Hand, Pointer, PointerHandle, Replayed, ReplayedSample, Scripted, ToolPath,
+    Device, DeviceState, Elsewhere, ElsewhereHandle, Faulty, Hand, Pointer, PointerHandle, Replayed, ReplayedSample,
+    Scripted, ToolPath,
 };
 use crate::error::{Error, ErrorKind};
 use crate::files;
 use crate::log::{LogEntry, LogReader, LogRecord, ToolSample};
-use crate::model::Vec3;
 use crate::model::contact::ToolShape;
+use crate::model::{Pose, Vec3};
 use crate::runtime::Execution;
 use crate::scene::{DeviceKind, DeviceSpec};
 
@@ -53,9 +54,9 @@ pub(super) fn device(
 /// Clear of a `body` that it starts above, in its largest extent.
 const CLEARANCE: f64 = 0.1;
 
-/// The tool behind a pointer, which starts at the node that it is glued to, or clear of the body, above its middle.
-fn pointer(spec: &DeviceSpec, glued_at: Option<Vec3>, body: &[Vec3]) -> Result<Made, Error> {
-    let home = glued_at.unwrap_or_else(|| {
+/// Clear of the body, above its middle: where the tool of `spec` is before anybody says otherwise, unless it is glued.
+fn home(spec: &DeviceSpec, glued_at: Option<Vec3>, body: &[Vec3]) -> Vec3 {
+    glued_at.unwrap_or_else(|| {
         let corner = |by: fn(&Vec3, &Vec3) -> Vec3| body.iter().copied().reduce(|a, b| by(&a, &b)).unwrap_or_default();
         let (low, high) = (corner(Vec3::inf), corner(Vec3::sup));
         let reach = match spec.tool.shape() {
@@ -65,11 +66,26 @@ fn pointer(spec: &DeviceSpec, glued_at: Option<Vec3>, body: &[Vec3]) -> Result<M
         };
         let middle = 0.5 * (low + high);
         Vec3::new(middle.x, middle.y, high.z + reach + CLEARANCE * (high - low).amax())
-    });
+    })
+}
+
+/// The tool behind a pointer, which starts at the node that it is glued to, or clear of the body, above its middle.
+fn pointer(spec: &DeviceSpec, glued_at: Option<Vec3>, body: &[Vec3]) -> Result<Made, Error> {
+    let home = home(spec, glued_at, body);
     let (tool, handle) = Pointer::new(spec.pointer.clone(), home.into(), spec.profile.capabilities())
         .map_err(|error| error.at("device.pointer"))?;
     check_start("device.pointer.start_m", handle.home().into(), glued_at)?;
     Ok((Box::new(tool), Some(handle)))
+}
+
+/// A tool whose device is at another machine, and what moves it.
+pub(super) fn elsewhere(
+    spec: &DeviceSpec,
+    glued_at: Option<Vec3>,
+    body: &[Vec3],
+) -> (Box<dyn Device>, ElsewhereHandle) {
+    let (device, handle) = Elsewhere::new(spec.profile.capabilities(), Pose::at(home(spec, glued_at, body)));
+    (Box::new(device), handle)
 }
 
 /// `device` with the faults of `spec`.

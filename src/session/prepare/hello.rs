@@ -1,6 +1,6 @@
 //! How one side of a link introduces itself to the other.
 
-use super::{Prepared, link};
+use super::{Prepared, Tool, link};
 use crate::devices::DeviceState;
 use crate::error::Error;
 use crate::link::Hello;
@@ -15,12 +15,14 @@ impl Prepared {
     /// If the scene cannot be written.
     pub(in crate::session) fn hello(&self, first: &[DeviceState]) -> Result<Hello, Error> {
         let named = self.scene.devices.iter().map(|device| device.name.clone().unwrap_or_default());
+        let place = |(tool, first): (&Tool, &DeviceState)| (!tool.is_elsewhere()).then(|| first.pose());
+        let places = self.tools.iter().zip(first).map(place);
         Ok(Hello {
             build: format!("palpate {} for {}", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH),
             instructions: Block::instruction_set().to_owned(),
             scene: shared(&self.scene).to_toml()?,
             body: self.fingerprint(),
-            tools: named.zip(first.iter().map(DeviceState::pose)).collect(),
+            tools: named.zip(places).collect(),
             ..Hello::default()
         })
     }

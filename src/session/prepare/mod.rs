@@ -28,7 +28,7 @@ pub(super) use tools::Tool;
 
 use super::parts::{Options, Parts, Side};
 use super::words::in_calls;
-use crate::actors::Settings;
+use crate::actors::{Beyond, Settings};
 use crate::error::{Error, ErrorKind};
 use crate::link::Transport;
 use crate::log::ModelReason;
@@ -65,6 +65,8 @@ pub(super) struct Prepared {
     pub(super) options: Options,
     pub(super) side: Side,
     pub(super) transport: Option<Box<dyn Transport>>,
+    /// The haptic machines, of the global side once they have come.
+    pub(super) machines: Vec<Beyond>,
 }
 
 impl Prepared {
@@ -138,7 +140,7 @@ impl Prepared {
 /// Whatever cannot work, naming the field and what would be right.
 pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let mut scene = described(&parts)?;
-    let Parts { side, transport, body, devices, attached, probes, .. } = parts;
+    let Parts { side, transport, here, body, devices, attached, probes, .. } = parts;
     let Parts { global, local, open_haply, endless, is_of_program, is_replay, options, .. } = parts;
     let execution = options.execution;
     let rates = timing::rates(&scene)?;
@@ -172,7 +174,9 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     scene.local.patch = Some(sized_patch.as_ref().map_or(scene.patch_size(), |choice| choice.size));
 
     let mut as_run = as_run(&scene, Some((&start.attached, &start.probes)));
-    let making = tools::Making { scene: &scene, start: &mut start, haptic: rates[0], execution, open_haply, is_replay };
+    let here = here.as_deref();
+    let making =
+        tools::Making { scene: &scene, start: &mut start, haptic: rates[0], execution, open_haply, is_replay, here };
     let tools;
     // The safety section with what it left to the device.
     (tools, as_run.safety) = tools::tools(devices, making)?;
@@ -227,6 +231,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         options,
         side,
         transport,
+        machines: Vec::new(),
     };
     Plan::check(execution, &prepared.groups())?;
     Ok(prepared)
@@ -245,6 +250,9 @@ fn described(parts: &Parts) -> Result<Scene, Error> {
         scene.link = Some(LinkSpec::default());
     }
     scene.validate()?;
+    if let Some(here) = &parts.here {
+        tools::check_here(here, &scene.devices, parts.side)?;
+    }
     for (field, group) in [("local", &parts.local), ("global", &parts.global)] {
         group.as_ref().map_or(Ok(()), |group| groups::check_group(field, group))?;
     }

@@ -1,11 +1,11 @@
 //! The tools of a session: each with its device, its contact, its limits.
 
-use super::super::parts::{OpenHaply, Parts};
+use super::super::parts::{OpenHaply, Parts, Side};
 use super::body::Start;
 use super::device;
 use super::limits::{self, check_capabilities, check_ramp};
 use crate::actors::Bounds;
-use crate::devices::{Device, PointerHandle};
+use crate::devices::{Device, ElsewhereHandle, PointerHandle};
 use crate::error::Error;
 use crate::model::body::Body;
 use crate::model::contact::{Contact, ToolShape};
@@ -24,6 +24,8 @@ pub(crate) struct Tool {
     pub(crate) device: Box<dyn Device>,
     /// What moves it, if it follows a pointer.
     pub(crate) pointer: Option<PointerHandle>,
+    /// What moves it, if its device is at another machine.
+    pub(crate) elsewhere: Option<ElsewhereHandle>,
     /// How it touches the body at the start.
     pub(crate) contact: Contact,
     pub(crate) shape: ToolShape,
@@ -34,6 +36,13 @@ pub(crate) struct Tool {
     pub(crate) coupling: Option<Design>,
 }
 
+impl Tool {
+    /// Its device is at another machine, which uses the same body.
+    pub(crate) fn is_elsewhere(&self) -> bool {
+        self.elsewhere.is_some()
+    }
+}
+
 /// What tools are made from.
 pub(super) struct Making<'a> {
     pub(super) scene: &'a Scene,
@@ -42,6 +51,8 @@ pub(super) struct Making<'a> {
     pub(super) execution: Execution,
     pub(super) open_haply: Option<OpenHaply>,
     pub(super) is_replay: bool,
+    /// The devices that are at this machine, if not all are.
+    pub(super) here: Option<&'a [String]>,
 }
 
 /// Fills in the scene's devices for those that a program brings, one each with a name if there are several, and the shapes of
@@ -69,7 +80,7 @@ pub(super) fn tools(
     brought: Vec<(Option<String>, Box<dyn Device>)>,
     making: Making<'_>,
 ) -> Result<(Vec<Tool>, SafetySpec), Error> {
-    let Making { scene, start, haptic, execution, open_haply, is_replay } = making;
+    let Making { scene, start, haptic, execution, open_haply, is_replay, here } = making;
     let (body, state, tick) = (&mut *start.body, &start.state, haptic.period_s());
     // Both ledgers begin with a share of what is stored: together they give out no more than all of it.
     let stored_j = limits::stored_energy(body, state) / scene.devices.len() as f64;
@@ -77,28 +88,37 @@ pub(super) fn tools(
     let (mut tools, mut all_resolved) = (Vec::new(), Vec::new());
     for (index, (spec, &node)) in scene.devices.iter().zip(&start.attached).enumerate() {
         let of_this = |error: Error| numbered(error, index, &scene.devices);
-        let (device, pointer) = match brought.next() {
-            Some((_, device)) => (device, None),
+        let glued_at = node.map(|node| state.positions[node as usize]);
+        let mine = brought.next();
+        let (device, pointer, elsewhere) = match mine {
+            _ if !is_here(spec, here) => {
+                let (device, handle) = device::elsewhere(spec, glued_at, &state.positions);
+                (device, None, Some(handle))
+            }
+            Some((_, device)) => (device, None, None),
             None => {
-                let glued_at = node.map(|node| state.positions[node as usize]);
-                device::device(spec, tick, glued_at, &state.positions, execution, open_haply).map_err(of_this)?
+                let (device, pointer) =
+                    device::device(spec, tick, glued_at, &state.positions, execution, open_haply).map_err(of_this)?;
+                (device, pointer, None)
             }
         };
+        let is_elsewhere = elsewhere.is_some();
         // What is executed again has met them already.
-        let device = if is_replay { device } else { device::with_faults(device, spec) };
+        let device = if is_replay || is_elsewhere { device } else { device::with_faults(device, spec) };
         let device_limits = limits::device_limits(&scene.safety, &device.capabilities());
         let resolved = limits::resolved(scene, &device_limits);
         let limits = limits::limits(&resolved, &device_limits, stored_j, tick);
         check_ramp(&limits).map_err(of_this)?;
         check_capabilities(device.capabilities(), &limits).map_err(of_this)?;
-        let coupling = match scene.local.coupling {
+        // One that is elsewhere is told where it is behind its coupling.
+        let coupling = match scene.local.coupling && !is_elsewhere {
             true => Some(limits::coupling(body, node, &device_limits, tick)?),
             false => None,
         };
         let contact = node.map_or_else(Contact::default, |node| glued(body, node));
         let reach_m = limits::reach_m(&device.capabilities(), body);
-        let bounds = match is_replay {
-            // It was looked at in the run that is executed again.
+        let bounds = match is_replay || is_elsewhere {
+            // It was looked at in the run that is executed again, or where it is.
             true => Bounds::NONE,
             false => {
                 device::check_path(spec, reach_m).map_err(of_this)?;
@@ -106,13 +126,46 @@ pub(super) fn tools(
             }
         };
         let name = spec.name.clone().filter(|_| scene.devices.len() > 1).unwrap_or_default();
-        tools.push(Tool { name, device, pointer, contact, shape: spec.tool.shape(), limits, bounds, coupling });
+        tools.push(Tool {
+            name,
+            device,
+            pointer,
+            elsewhere,
+            contact,
+            shape: spec.tool.shape(),
+            limits,
+            bounds,
+            coupling,
+        });
         all_resolved.push(resolved);
     }
     // What differs between devices stays theirs.
     let agreed = all_resolved.windows(2).all(|pair| pair[0] == pair[1]);
     let resolved = all_resolved.into_iter().next().filter(|_| agreed).unwrap_or_else(|| scene.safety.clone());
     Ok((tools, resolved))
+}
+
+/// Checks that the devices which are said to be `here` are some of those of a scene, and that there is another machine for the others.
+///
+/// # Errors
+/// If not, naming the device and what there is.
+pub(super) fn check_here(here: &[String], devices: &[DeviceSpec], side: Side) -> Result<(), Error> {
+    let names: Vec<&str> = devices.iter().filter_map(|device| device.name.as_deref()).collect();
+    if let Some(unknown) = here.iter().find(|name| !names.contains(&name.as_str())) {
+        let known = if names.is_empty() { "one without a name".to_owned() } else { names.join(", ") };
+        return Err(Error::scene("device", format!("has no {unknown:?}: the scene's devices are {known}")));
+    }
+    if side != Side::Haptic && here.len() < devices.len() {
+        let message =
+            "a device that is at another machine needs a global model that both take their models from, over a link";
+        return Err(Error::scene("device", message));
+    }
+    Ok(())
+}
+
+/// True if the device of `spec` is at this machine.
+fn is_here(spec: &DeviceSpec, here: Option<&[String]>) -> bool {
+    here.is_none_or(|here| spec.name.as_ref().is_some_and(|name| here.contains(name)))
 }
 
 /// The contact that glues the tool to `node`.

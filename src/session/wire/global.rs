@@ -75,7 +75,9 @@ impl GlobalMaker {
     /// With the tools at `tools`.
     pub(super) fn new(simulation: Simulation, tools: &[Pose], plan: GlobalPlan, side: GlobalSide) -> Self {
         let spare = simulation.duplicate();
-        let contact = |(tool, &pose)| (ToolTick { tick: 0, pose }, *simulation.contact(tool), simulation.force(tool));
+        let contact = |(tool, &pose)| {
+            (ToolTick { pose, ..ToolTick::default() }, *simulation.contact(tool), simulation.force(tool))
+        };
         let tools = tools.iter().enumerate().map(contact).collect();
         let last = Checkpoint { tools, state: simulation.state().clone() };
         let saved = side.checkpoint.reader();

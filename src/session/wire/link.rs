@@ -2,16 +2,18 @@
 
 use super::global::ToolLink;
 use crate::actors::{
-    GlobalBridge, GlobalBridgePorts, HapticBridge, HapticBridgePorts, LocalPorts, ModelMaker, SurfaceView, ToolTick,
-    Tunable,
+    Beyond, GlobalBridge, GlobalBridgePorts, HapticBridge, HapticBridgePorts, LocalPorts, ModelMaker, SurfaceView,
+    ToolTick, Tunable,
 };
+use crate::devices::ElsewhereHandle;
 use crate::error::{Error, ErrorKind};
 use crate::link::{Conditions, Transport, VirtualLink};
+use crate::model::Pose;
 use crate::model::local::{Image, LocalModels};
 use crate::model::simulation::Simulation;
 use crate::runtime::{
-    Actor, ExchangePort, OutletPort, OutletReader, OutletWriter, QueueReader, QueueWriter, Reader, RuntimeBuilder,
-    Writer,
+    Actor, ExchangePort, OutletPort, OutletReader, OutletWriter, QueueReader, QueueWriter, Rate, Reader,
+    RuntimeBuilder, Writer,
 };
 use crate::session::prepare::ModelPlan;
 
@@ -24,12 +26,9 @@ pub(super) enum Ends {
     Both(Conditions),
     /// The devices are here, and the way to the other side.
     Haptic(Box<dyn Transport>),
-    /// The global model is here, and the way to the other side.
-    Global(Box<dyn Transport>),
+    /// The global model is here, and the haptic machines are beyond.
+    Global(Vec<Beyond>),
 }
-
-/// What a side that is here sends by.
-type Way = Option<Box<dyn Transport>>;
 
 /// What of a session that runs goes over the link besides ticks and models.
 pub(super) struct Outer {
@@ -80,14 +79,25 @@ pub(super) struct Linking {
     outer: Outer,
     /// Those that are seen.
     surface_nodes: Vec<u32>,
+    haptic_rate: Rate,
+    /// Where each tool is at the start.
+    places: Vec<Pose>,
+    /// Where each goes whose device is at another machine.
+    elsewhere: Vec<Option<ElsewhereHandle>>,
 }
 
 impl Linking {
-    /// Between `ends`, with the body of `simulation` on both sides.
+    /// Between `ends`, with the body of `simulation` on both sides and tools that begin at `places`, of which some are `elsewhere`.
     ///
     /// # Errors
     /// If the body cannot be copied.
-    pub(super) fn new(ends: Ends, simulation: &Simulation, outer: Outer) -> Result<Self, Error> {
+    pub(super) fn new(
+        ends: Ends,
+        simulation: &Simulation,
+        (places, elsewhere): (&[Pose], Vec<Option<ElsewhereHandle>>),
+        haptic_rate: Rate,
+        outer: Outer,
+    ) -> Result<Self, Error> {
         let copy = || {
             let copy = simulation.duplicate();
             copy.ok_or_else(|| Error::new(ErrorKind::Runtime, "a link needs a body that can be copied"))
@@ -98,7 +108,20 @@ impl Linking {
         };
         let (haptic, global, arriving, departing) = Default::default();
         let surface_nodes = simulation.body().surface().nodes();
-        Ok(Self { ends, image, haptic, global, arriving, departing, outer, surface_nodes })
+        let places = places.to_vec();
+        Ok(Self {
+            ends,
+            image,
+            haptic,
+            global,
+            arriving,
+            departing,
+            outer,
+            surface_nodes,
+            haptic_rate,
+            places,
+            elsewhere,
+        })
     }
 
     /// What the global actor takes.
@@ -153,24 +176,31 @@ impl Linking {
 
     /// The bridges in the order of their starts: what the global side tells at first is there when the haptic side begins.
     pub(super) fn bridges(self, graph: &mut RuntimeBuilder) -> Vec<Box<dyn Actor>> {
-        let Self { ends, image, haptic, global, arriving, departing, outer, surface_nodes } = self;
+        let Self { ends, image, haptic, global, arriving, departing, outer, surface_nodes, .. } = self;
         let Outer { settings: [settings, global_settings], shown, seen } = outer;
-        let (here, there): (Way, Way) = match ends {
+        let all = (0..self.places.len()).collect();
+        let (here, there): (Option<Box<dyn Transport>>, Vec<Beyond>) = match ends {
             Ends::Both(conditions) => {
                 let [haptic, global] = VirtualLink::ends(conditions);
-                (Some(Box::new(haptic)), Some(Box::new(global)))
+                (Some(Box::new(haptic)), vec![(Box::new(global), all)])
             }
-            Ends::Haptic(transport) => (Some(transport), None),
-            Ends::Global(transport) => (None, Some(transport)),
+            Ends::Haptic(transport) => (Some(transport), Vec::new()),
+            Ends::Global(machines) => (None, machines),
         };
-        let global = there.zip(departing).map(|(transport, models)| {
-            let surface = seen.map(|seen| (seen, surface_nodes));
-            let ports = GlobalBridgePorts { models, ticks: global, settings: global_settings, surface };
-            Box::new(GlobalBridge::new(transport, ports)) as Box<dyn Actor>
+        let global = departing.map(|models| {
+            let ports = GlobalBridgePorts {
+                models,
+                tools: self.places.into_iter().zip(global).collect(),
+                settings: global_settings,
+                surface: seen.map(|seen| (seen, surface_nodes)),
+                haptic: self.haptic_rate,
+            };
+            Box::new(GlobalBridge::new(there, ports)) as Box<dyn Actor>
         });
         let haptic = here.zip(image).zip(arriving).map(|((transport, image), models)| {
             let (settings, recorder) = (settings.reader(), graph.recorder(RECORDS));
-            let ports = HapticBridgePorts { ticks: haptic, models, settings, surfaces: shown, recorder };
+            let tools = haptic.into_iter().zip(self.elsewhere).collect();
+            let ports = HapticBridgePorts { tools, models, settings, surfaces: shown, recorder };
             Box::new(HapticBridge::new(transport, image, ports)) as Box<dyn Actor>
         });
         global.into_iter().chain(haptic).collect()

@@ -19,7 +19,7 @@ use super::running::{Memory, Outside, Running, Viewer};
 use crate::actors::{LoggerActor, LoggerOutcome, SceneWatch, SurfaceView, first_state};
 use crate::devices::DeviceState;
 use crate::error::{Error, ErrorKind};
-use crate::link::{Hello, Transport};
+use crate::link::HapticMachine;
 use crate::model::{Pose, Vec3};
 use crate::runtime::{Actor, OutletPort, OutletReader, RecordDrain, Recording, Runtime, RuntimeBuilder, Stopwatch};
 use basis::BasisSide;
@@ -50,27 +50,26 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
     start_at(prepared, first, rerun)
 }
 
-/// Starts the global side alone, with the tools where `hello` says, and the other side behind `transport`.
+/// Starts the global side alone, with the tools where the `machines` say that have them, each behind its transport.
 ///
 /// # Errors
-/// If there are not as many tools, one of them is far from the body, or a thread cannot be started.
-pub(super) fn start_global(
-    mut prepared: Prepared,
-    transport: Box<dyn Transport>,
-    hello: &Hello,
-) -> Result<Running, Error> {
+/// If a tool is at none of them or at two, or far from the body, or a thread cannot be started.
+pub(super) fn start_global(mut prepared: Prepared, machines: Vec<HapticMachine>) -> Result<Running, Error> {
     let rest = prepared.simulation.body().rest();
-    if hello.tools.len() != prepared.tools.len() {
-        let [here, there] = [prepared.tools.len(), hello.tools.len()];
-        return Err(Error::new(ErrorKind::Runtime, format!("there are {here} tools here and {there} over the link")));
-    }
     let mut first = Vec::new();
-    for (tool, (_, pose)) in prepared.tools.iter().zip(&hello.tools) {
+    for (index, tool) in prepared.tools.iter().enumerate() {
+        let told = machines.iter().filter_map(|(_, hello)| hello.tools.get(index)?.1);
+        let [pose] = told.collect::<Vec<_>>()[..] else {
+            let message = format!("tool {:?} must be at one haptic machine", tool.name);
+            return Err(Error::new(ErrorKind::Runtime, message));
+        };
         let state = DeviceState { position: pose.position, orientation: pose.orientation, ..DeviceState::default() };
-        first.push(near(&state, tool, rest).map_err(|error| error.at("over the link"))?);
+        let place = if tool.name.is_empty() { "over the link" } else { &tool.name };
+        first.push(near(&state, tool, rest).map_err(|error| error.at(place))?);
     }
-    prepared.transport = Some(transport);
-    prepared.look_ahead(hello.round_trip);
+    let round_trip = machines.iter().map(|(_, hello)| hello.round_trip).max().unwrap_or_default();
+    prepared.look_ahead(round_trip);
+    prepared.machines = machines.into_iter().map(|(way, hello)| (way, hello.own_tools().collect())).collect();
     start_at(prepared, first, None)
 }
 
@@ -116,14 +115,15 @@ fn start_at(mut prepared: Prepared, first: Vec<DeviceState>, rerun: Option<Rerun
     let logger_group = prepared.logger_group();
     let link_group = prepared.link_group();
     let pointers = prepared.tools.iter_mut().map(|tool| tool.pointer.take()).collect();
-    let Prepared { simulation, tools, plan, local, global, until, side, transport, .. } = prepared;
+    let elsewhere = prepared.tools.iter_mut().map(|tool| tool.elsewhere.take()).collect();
+    let Prepared { simulation, tools, plan, local, global, until, side, transport, machines, .. } = prepared;
     let link = match (side, transport) {
         (Side::Haptic, Some(transport)) => Some(Ends::Haptic(transport)),
-        (Side::Global, Some(transport)) => Some(Ends::Global(transport)),
+        (Side::Global, _) => Some(Ends::Global(machines)),
         _ => plan.link.clone().map(Ends::Both),
     };
     let (models, maker, bridges) =
-        models::models(&mut graph, &plan, (simulation, &places), surfaces, bases, &settings, (link, seen))?;
+        models::models(&mut graph, &plan, (simulation, &places), surfaces, bases, &settings, (link, seen, elsewhere))?;
     let tools = if has_haptic { tools } else { Vec::new() };
     let haptic = haptic::actors(&mut graph, &plan, tools, ends, &first, models, ticks);
 
@@ -160,6 +160,10 @@ fn start_at(mut prepared: Prepared, first: Vec<DeviceState>, rerun: Option<Rerun
 /// `rest` (m), tells another unit or nothing true, and everything that it tells later is measured from there.
 fn first_of(tool: &mut Tool, rest: &[Vec3]) -> Result<DeviceState, Error> {
     let first = first_state(&mut *tool.device);
+    if tool.is_elsewhere() {
+        // Where that is, comes with the first models.
+        return first;
+    }
     let first = first.and_then(|state| {
         near(&state, tool, rest).map_err(|error| error.at(format!("device `{}`", tool.device.name())))
     });

@@ -5,6 +5,7 @@ use super::buffers::ticks_buffered;
 use super::global::{GlobalMaker, GlobalSide, ToolLink};
 use super::link::{Ends, Linking, Outer};
 use crate::actors::{Checkpoint, GlobalPlan, LocalPorts, LocalSource, ModelMaker, Settings, SurfaceView, Tunable};
+use crate::devices::ElsewhereHandle;
 use crate::error::Error;
 use crate::model::Pose;
 use crate::model::local::{PatchGeometry, Succession};
@@ -25,7 +26,8 @@ pub(super) enum Models {
 /// if there are any.
 pub(super) type Wired = (Models, Option<GlobalMaker>, Vec<Box<dyn Actor>>);
 
-/// Wires what computes the forces, with a link between `ends` if there is one; over it the body is `seen` on the other side.
+/// Wires what computes the forces, with a link between `ends` if there is one; over it the body is `seen` on the other side, and some tools are
+/// `elsewhere`.
 ///
 /// # Errors
 /// If there is a link and the body cannot be copied.
@@ -36,7 +38,7 @@ pub(super) fn models(
     surfaces: Vec<OutletPort<SurfaceView>>,
     bases: Option<BasisSide>,
     settings: &Tunable,
-    (ends, seen): (Option<Ends>, Option<OutletReader<SurfaceView>>),
+    (ends, seen, elsewhere): (Option<Ends>, Option<OutletReader<SurfaceView>>, Vec<Option<ElsewhereHandle>>),
 ) -> Result<Wired, Error> {
     if !plan.is_multi_rate() {
         let surfaces = surfaces.iter().map(OutletPort::writer).collect();
@@ -57,7 +59,7 @@ pub(super) fn models(
     let mut linking = match ends {
         Some(ends) => {
             let outer = Outer::new(graph, &ends, plan, settings, &surfaces, seen);
-            Some(Linking::new(ends, &simulation, outer)?)
+            Some(Linking::new(ends, &simulation, (places, elsewhere), plan.timing.haptic, outer)?)
         }
         None => None,
     };

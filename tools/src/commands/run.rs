@@ -7,7 +7,7 @@ use palpate::scene::{ModelChoice, Scene};
 use palpate::session::{Session, SessionBuilder};
 use palpate::{Error, ErrorKind};
 
-use super::link::{self, AccessArgs};
+use super::link::GlobalArgs;
 use super::{files, progress, shared};
 
 /// Where the log goes if nothing is said.
@@ -38,11 +38,8 @@ pub struct RunArgs {
     /// Print the schedule and what this system would refuse, and run nothing
     #[arg(long)]
     pub plan: bool,
-    /// Take the global models from `palpate serve` at this address, such as tls/big-machine:7447 or tcp/127.0.0.1:7447
-    #[arg(long, value_name = "ADDRESS")]
-    pub global: Option<String>,
     #[command(flatten)]
-    pub access: AccessArgs,
+    pub global: GlobalArgs,
     /// The log to write, overwritten if it exists; palpate-run.mcap if left out, palpate-virtual.mcap in virtual time
     #[arg(long, value_name = "LOG.mcap")]
     pub out: Option<PathBuf>,
@@ -81,9 +78,7 @@ pub fn run(args: &RunArgs) -> Result<(), Error> {
     if args.no_cache {
         builder = builder.forget_bases();
     }
-    if let Some(address) = &args.global {
-        builder = link::global_over(builder, address, &args.access)?;
-    }
+    builder = args.global.of(builder)?;
     if args.plan { plan(builder, &name) } else { execute(builder, out, &name) }
 }
 

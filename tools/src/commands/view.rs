@@ -11,7 +11,7 @@ use palpate::scene::{ModelChoice, Scene};
 use palpate::{Error, ErrorKind};
 use palpate_view::{Options, Pushed, Server};
 
-use super::link::{self, AccessArgs};
+use super::link::GlobalArgs;
 use super::{files, progress, shared};
 
 /// How often it is looked whether the user interrupted.
@@ -35,11 +35,8 @@ pub struct ViewArgs {
     /// Leave the scene its own device: watch what it does in place of pushing
     #[arg(long)]
     pub watch: bool,
-    /// Take the global model from `palpate serve` at this address, such as tls/big-machine:7447 or tcp/127.0.0.1:7447
-    #[arg(long, value_name = "ADDRESS")]
-    pub global: Option<String>,
     #[command(flatten)]
-    pub access: AccessArgs,
+    pub global: GlobalArgs,
     /// Let other machines in by this address of this one, such as 0.0.0.0; unencrypted
     #[arg(long, value_name = "ADDRESS")]
     pub listen: Option<IpAddr>,
@@ -64,17 +61,17 @@ pub fn run(args: &ViewArgs) -> Result<(), Error> {
         files::keep_inputs(&files::inputs_of(path, &scene), out)?;
     }
     // The demo shows the method; whoever pushes it is to feel the body itself, where that fits.
-    let of_demo = (args.scene.is_none() && args.global.is_none()).then_some(ModelChoice::Auto);
+    let of_demo = (args.scene.is_none() && args.global.global.is_none()).then_some(ModelChoice::Auto);
     if let Some(model) = args.model.or(of_demo) {
         scene = scene.with_model(model);
     }
     let pushed = if args.watch { Pushed::as_it_is(scene) } else { Pushed::new(scene) };
     let pushed = pushed.open_haply_with(palpate_haply::open);
     let pushed = args.out.iter().fold(pushed, |pushed, out| pushed.log(out));
-    let pushed = match &args.global {
-        Some(address) => {
-            let (address, access) = (address.clone(), args.access.clone());
-            pushed.connect(move |builder| link::global_over(builder, &address, &access))
+    let pushed = match args.global.global {
+        Some(_) => {
+            let global = args.global.clone();
+            pushed.connect(move |builder| global.of(builder))
         }
         None => pushed,
     };
@@ -96,7 +93,7 @@ fn show_log(log: &Path, args: &ViewArgs) -> Result<(), Error> {
         (args.model.is_some(), "--model"),
         (args.out.is_some(), "--out"),
         (args.watch, "--watch"),
-        (args.global.is_some(), "--global"),
+        (args.global.global.is_some(), "--global"),
     ] {
         if is_given {
             let message = format!("{option} is for scenes, and {} is a log: leave it out", shared::name_of(log));

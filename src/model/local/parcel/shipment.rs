@@ -1,6 +1,7 @@
 //! The parcels of one resync.
 
 use super::Parcel;
+use crate::Vec3;
 use crate::bytes::{BytesReader, BytesWriter};
 use crate::local::LocalModels;
 
@@ -62,6 +63,22 @@ impl Shipment {
     /// Wait-free, real-time safe.
     pub fn tick(&self) -> u64 {
         self.parcels.first().map_or(0, Parcel::tick)
+    }
+
+    /// Counts the tick of the states as `tick`, for whoever counts otherwise.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn set_tick(&mut self, tick: u64) {
+        self.parcels.iter_mut().for_each(|parcel| parcel.tick = tick);
+    }
+
+    /// Where each tool is (m).
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn places(&self) -> impl Iterator<Item = Vec3> {
+        self.parcels.first().into_iter().flat_map(|parcel| parcel.tools.iter().map(|tool| tool.place))
     }
 
     /// One for each model that serves somebody.

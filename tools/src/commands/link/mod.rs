@@ -4,7 +4,9 @@
 
 use std::path::PathBuf;
 
+use palpate::Error;
 use palpate::scene::ModelChoice;
+use palpate::session::SessionBuilder;
 
 use super::shared;
 
@@ -12,7 +14,7 @@ use super::shared;
 #[cfg_attr(not(feature = "link"), path = "without.rs")]
 mod ways;
 
-pub use ways::{global_over, keys, serve};
+pub use ways::{keys, serve};
 
 /// Who may speak with whom.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -23,6 +25,30 @@ pub struct AccessArgs {
     /// Allow plain TCP to another machine: whoever is on the way can read and steer
     #[arg(long)]
     pub insecure: bool,
+}
+
+/// Where the global models come from, if they are not made here.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct GlobalArgs {
+    /// Take the global models from `palpate serve` at this address, such as tls/big-machine:7447 or tcp/127.0.0.1:7447
+    #[arg(long, value_name = "ADDRESS")]
+    pub global: Option<String>,
+    /// The scene's device of this name is at this machine, and those that are not named at another one; may be given again
+    #[arg(long, value_name = "NAME", requires = "global")]
+    pub device: Vec<String>,
+    #[command(flatten)]
+    pub access: AccessArgs,
+}
+
+impl GlobalArgs {
+    /// Lets a session take its global models from there, if they are not made here.
+    ///
+    /// # Errors
+    /// If the address is none, or not allowed.
+    pub fn of(&self, builder: SessionBuilder) -> Result<SessionBuilder, Error> {
+        let Some(address) = &self.global else { return Ok(builder) };
+        ways::global_over(self.device.iter().fold(builder, SessionBuilder::device_here), address, &self.access)
+    }
 }
 
 /// The arguments of `palpate serve`.

@@ -50,11 +50,10 @@ fn show(name: &str, address: &str, event: &Event) {
     let line = match event {
         Event::Listening => format!("listens at {address}; Ctrl-C ends it"),
         Event::Came(hello) => {
-            let (tools, ms) = (hello.tools.len(), 1e3 * hello.round_trip.as_secs_f64());
-            format!(
-                "a haptic machine has come: {tools} tool{}, round trip {ms:.1} ms",
-                if tools == 1 { "" } else { "s" }
-            )
+            let (ms, own) = (1e3 * hello.round_trip.as_secs_f64(), hello.own_tools().map(|tool| &hello.tools[tool].0));
+            let named: Vec<String> = own.filter(|name| !name.is_empty()).map(|name| format!(" {name:?}")).collect();
+            let with = if named.is_empty() { "" } else { " with" };
+            format!("a haptic machine has come{with}{}, round trip {ms:.1} ms", named.join(" and"))
         }
         Event::Refused(error) => format!("a haptic machine is refused: {error}"),
         Event::Ended(summary) => {
