@@ -10,7 +10,7 @@ use palpate::link::HapticMachine;
 use palpate::log::CommandSample;
 use palpate::model::Vec3;
 use palpate::model::local::Kind;
-use palpate::session::{Running, Session, SessionBuilder, Summary};
+use palpate::session::{Running, Session, SessionBuilder};
 use session_support::line::Line;
 use session_support::*;
 
@@ -50,12 +50,6 @@ fn largest(commands: &[CommandSample], device: u16, [from, until]: [f64; 2]) -> 
     commands.iter().filter(within).map(|command| norm(command.force_n)).fold(0.0, f64::max)
 }
 
-/// Of one of the devices, from its tick of that number on (N).
-fn felt(summary: &Summary, device: u16, first: usize) -> Vec<Vec3> {
-    let of_device = forces(summary).into_iter().filter(|force| force.device == device);
-    of_device.skip(first).map(|force| Vec3::from(force.force_n)).collect()
-}
-
 #[test]
 fn two_machines_feel_what_two_devices_at_one_do() {
     let ([left, right], global) = start(&Default::default(), 2.0);
@@ -75,10 +69,7 @@ fn two_machines_feel_what_two_devices_at_one_do() {
     let here = session_of([late(pressing(), left_ms), late(meeting(), right_ms)]);
     let here = here.duration_s(2.0).virtual_time().build().unwrap().run().unwrap();
     for (device, (summary, ms)) in (0..).zip(there.iter().zip([left_ms, right_ms])) {
-        let (there, here) = (felt(summary, device, 0), felt(&here, device, ms as usize));
-        let peak = here.iter().map(|force| force.norm()).fold(0.0, f64::max);
-        let apart = there.iter().zip(&here).map(|(a, b)| (a - b).norm_squared());
-        let rms = (apart.sum::<f64>() / here.len() as f64).sqrt() / peak;
+        let Apart { rms, peak } = apart([summary, &here], device, ms as usize);
         println!("device {device}, {ms} ms later: {:.2} % of {peak:.2} N apart", 100.0 * rms);
         // In real time, on a machine that others use too: that the same body and the same other tool are felt, and not how well.
         assert!(peak > 0.2 && rms < 0.1, "device {device}: {rms}");

@@ -82,6 +82,33 @@ pick!(global_ticks, Global, GlobalTick);
 pick!(resyncs, Resync, Resync);
 pick!(timings, Tick, TickTiming);
 
+/// How far two runs are apart.
+pub struct Apart {
+    /// Root mean square of the difference of their forces, as a share of the peak.
+    pub rms: f64,
+    /// The largest force of the second (N).
+    pub peak: f64,
+}
+
+/// How far a run is apart from another one, which began so many ticks of 1 ms earlier, in the force on one of the devices. Periods that were
+/// skipped are left out.
+pub fn apart(runs: [&Summary; 2], device: u16, earlier: usize) -> Apart {
+    let [there, here] =
+        runs.map(|run| forces(run).into_iter().filter(|force| force.device == device).collect::<Vec<_>>());
+    let tick = |force: &ForceSample| (1e3 * force.time.as_secs_f64()).round() as usize;
+    let mut apart = Vec::new();
+    let mut later = here.iter().peekable();
+    for force in &there {
+        while later.next_if(|other| tick(other) < tick(force) + earlier).is_some() {}
+        if let Some(other) = later.next_if(|other| tick(other) == tick(force) + earlier) {
+            apart.push((Vec3::from(force.force_n) - Vec3::from(other.force_n)).norm_squared());
+        }
+    }
+    let peak = here.iter().map(|force| norm(force.force_n)).fold(0.0, f64::max);
+    assert!(2 * apart.len() > here.len(), "{} of {} ticks", apart.len(), here.len());
+    Apart { rms: (apart.iter().sum::<f64>() / apart.len() as f64).sqrt() / peak, peak }
+}
+
 /// The forces on the tool, tick by tick (N).
 pub fn force_vectors(summary: &Summary) -> Vec<Vec3> {
     forces(summary).iter().map(|sample| sample.force_n.into()).collect()

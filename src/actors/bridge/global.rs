@@ -30,6 +30,8 @@ pub struct GlobalBridge {
     /// The body as it is to be seen on the other side, and the nodes that are.
     surface: Option<(OutletReader<SurfaceView>, Vec<u32>)>,
     haptic: Rate,
+    /// What is received in this release is not received later than it begins.
+    is_prompt: bool,
 }
 
 /// What the global actor and its bridge say to each other.
@@ -98,11 +100,13 @@ impl GlobalBridge {
         let is_alone = machines.len() == 1;
         let machine = |(transport, tools)| Machine::new(transport, tools, is_alone, &settings);
         let machines = machines.into_iter().map(machine).collect();
-        Self { machines, models, tools: tools.into_iter().map(Onward::new).collect(), settings, surface, haptic }
+        let tools = tools.into_iter().map(Onward::new).collect();
+        Self { machines, models, tools, settings, surface, haptic, is_prompt: false }
     }
 
     fn send_models(&mut self, ctx: &TickContext) {
-        if self.models.refresh(ctx) {
+        self.is_prompt = !self.models.refresh(ctx);
+        if !self.is_prompt {
             let mut shipment = Shipment::of(self.models.get());
             let tick = shipment.tick();
             for machine in &mut self.machines {
@@ -133,7 +137,7 @@ impl GlobalBridge {
 
     fn receive(&mut self, ctx: &TickContext) {
         let Self { machines, tools, settings, haptic, .. } = self;
-        let (now, second) = (haptic.last_release(ctx.scheduled), haptic.as_hz() as u64);
+        let (now, second) = (haptic.last_release(ctx.now), haptic.as_hz() as u64);
         for machine in machines {
             if machine.is_another() {
                 machine.tools.iter().for_each(|&tool| tools[tool].is_put = true);
@@ -145,7 +149,9 @@ impl GlobalBridge {
                         let tool = usize::from(tool);
                         if let (true, Some(&(newest, _))) = (machine.tools.contains(&tool), ticks.last()) {
                             machine.heard = ctx.scheduled;
-                            machine.numbering.hear(newest, now, second);
+                            if self.is_prompt || machine.numbering.is_new() {
+                                machine.numbering.hear(newest, now, second);
+                            }
                             for (tick, pose) in ticks {
                                 tools[tool].take(ctx, machine.numbering.here(tick), pose);
                             }

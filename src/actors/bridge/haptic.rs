@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use super::super::cause::Cause;
 use super::super::messages::{SurfaceView, ToolTick};
 use super::super::settings::Settings;
+use super::other_tool::OtherTool;
 use super::post::Post;
 use super::{MOST_MESSAGES, REPEATED, SILENCE, key_of};
 use crate::devices::ElsewhereHandle;
@@ -15,7 +16,7 @@ use crate::model::local::{Image, LocalModels, Shipment};
 use crate::model::surroundings::{Bases, Basis};
 use crate::model::{Pose, Vec3};
 use crate::runtime::{
-    Actor, ActorError, Nanos, Outcome, OutletWriter, ParameterReader, QueueReader, Recorder, TickContext, Writer,
+    Actor, ActorError, Nanos, Outcome, OutletWriter, ParameterReader, QueueReader, Rate, Recorder, TickContext, Writer,
 };
 
 /// A surface that nobody has taken for so long is not asked for any more.
@@ -55,6 +56,8 @@ pub struct HapticBridge {
 pub struct HapticBridgePorts {
     /// The ticks of each tool, and where the place of one goes whose device is at another machine.
     pub tools: Vec<(QueueReader<ToolTick>, Option<ElsewhereHandle>)>,
+    /// The rate of the ticks.
+    pub haptic: Rate,
     /// The next local models.
     pub models: Writer<LocalModels>,
     /// What the program wants.
@@ -110,9 +113,10 @@ impl Surfaces {
 #[derive(Debug)]
 struct Tool {
     ticks: QueueReader<ToolTick>,
-    /// Oldest first; of one that is elsewhere those that came from there, the newest alone.
+    /// Oldest first.
     recent: VecDeque<ToolTick>,
-    elsewhere: Option<ElsewhereHandle>,
+    /// What is heard of one whose device is at another machine.
+    elsewhere: Option<OtherTool>,
 }
 
 impl Tool {
@@ -120,26 +124,18 @@ impl Tool {
     fn newest(&self) -> u64 {
         self.recent.back().map_or(0, |tick| tick.tick)
     }
-
-    /// It is elsewhere, and was there at those ticks.
-    fn hear(&mut self, ticks: &[(u64, Pose)]) {
-        if let (Some(elsewhere), Some(&(tick, pose))) = (&mut self.elsewhere, ticks.last())
-            && self.recent.back().is_none_or(|newest| tick > newest.tick)
-        {
-            self.recent.clear();
-            self.recent.push_back(ToolTick { tick, pose, is_put: false });
-            elsewhere.put(pose);
-        }
-    }
 }
 
 impl HapticBridge {
     /// A bridge between what is behind `ports` and what is beyond `transport`; it builds local models by the `image` of the body over there.
     pub fn new(transport: Box<dyn Transport>, image: Image, ports: HapticBridgePorts) -> Self {
-        let HapticBridgePorts { tools, models, settings, surfaces, recorder } = ports;
+        let HapticBridgePorts { tools, haptic, models, settings, surfaces, recorder } = ports;
         let nodes = if surfaces.is_empty() { Vec::new() } else { image.surface_nodes() };
         let surfaces = Surfaces { writers: surfaces, nodes, newest: None, seen: Nanos::ZERO };
-        let tool = |(ticks, elsewhere)| Tool { ticks, recent: VecDeque::new(), elsewhere };
+        let tool = |(ticks, elsewhere): (_, Option<ElsewhereHandle>)| {
+            let elsewhere = elsewhere.map(|handle| OtherTool::new(handle, haptic));
+            Tool { ticks, recent: VecDeque::new(), elsewhere }
+        };
         let (newest, arrived, bases, clock, heard, asked) = Default::default();
         let (mut post, tools) = (Post::new(transport), tools.into_iter().map(tool).collect());
         let peer = post.peer();
@@ -169,7 +165,7 @@ impl HapticBridge {
             self.post.begin_epoch(self.post.epoch + 1);
             self.heard = None;
             self.newest = None;
-            self.tools.iter_mut().filter(|tool| tool.elsewhere.is_some()).for_each(|tool| tool.recent.clear());
+            self.others().for_each(|(_, other)| other.begin_anew());
             self.surfaces.newest = None;
         }
         self.heard.is_none()
@@ -250,8 +246,9 @@ impl HapticBridge {
                     self.clock.push([sent.0, received.0, header.sent.0, now.0]);
                 }
                 Message::Ticks { tool, ticks } => {
-                    if let Some(tool) = self.tools.get_mut(usize::from(tool)) {
-                        tool.hear(&ticks);
+                    let elsewhere = self.tools.get_mut(usize::from(tool)).and_then(|tool| tool.elsewhere.as_mut());
+                    if let Some(other) = elsewhere {
+                        other.hear(&ticks);
                     }
                 }
                 // Of the other direction.
@@ -260,14 +257,22 @@ impl HapticBridge {
         }
     }
 
+    /// The tools that are elsewhere, with their numbers.
+    fn others(&mut self) -> impl Iterator<Item = (usize, &mut OtherTool)> {
+        self.tools.iter_mut().enumerate().filter_map(|(number, tool)| Some((number, tool.elsewhere.as_mut()?)))
+    }
+
     /// Puts the tools that are elsewhere where the first models say, unless something newer has come.
     fn place_others(&mut self) {
-        let places = self.arrived.iter().flat_map(Shipment::places);
-        for (tool, place) in self.tools.iter_mut().zip(places) {
-            if let (Some(elsewhere), true) = (&mut tool.elsewhere, tool.recent.is_empty()) {
-                elsewhere.put(Pose::at(place));
-            }
+        let places: Vec<Vec3> = self.arrived.iter().flat_map(Shipment::places).collect();
+        for (number, other) in self.others().filter(|(_, other)| other.is_new()) {
+            places.get(number).iter().for_each(|&&place| other.put(Pose::at(place)));
         }
+    }
+
+    /// Shows the tools that are elsewhere where they are in the next tick.
+    fn show_others(&mut self, ctx: &TickContext) {
+        self.others().for_each(|(_, other)| other.show(ctx.tick + 1));
     }
 
     fn keep(&mut self, key: u64, basis: Basis) {
@@ -308,6 +313,7 @@ impl Actor for HapticBridge {
 
     fn commit(&mut self, ctx: &TickContext) -> Outcome {
         self.receive(ctx);
+        self.show_others(ctx);
         self.publish(ctx);
         Outcome::Continue
     }

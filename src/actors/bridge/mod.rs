@@ -17,6 +17,7 @@ mod global;
 mod haptic;
 mod machine;
 mod numbering;
+mod other_tool;
 mod post;
 mod sent_bases;
 

@@ -1,7 +1,7 @@
 //! How the ticks of a haptic machine are counted on the global side.
 
 /// A sample that is so many ticks late, and no later, is in step.
-const IN_STEP: i64 = 2;
+const IN_STEP: i64 = 0;
 
 /// How the ticks of a haptic machine are counted on the global side.
 ///
@@ -21,6 +21,11 @@ impl Numbering {
     /// Of a machine that is alone or not.
     pub(super) fn new(is_alone: bool) -> Self {
         Self { is_alone, ahead: is_alone.then_some(0), least_late: i64::MAX, since: 0 }
+    }
+
+    /// True if nothing has come.
+    pub(super) fn is_new(&self) -> bool {
+        self.ahead.is_none()
     }
 
     /// A sample of the tick `there` has come `now`, a tick of the clock here; a second has so many ticks.

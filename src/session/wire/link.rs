@@ -200,7 +200,8 @@ impl Linking {
         let haptic = here.zip(image).zip(arriving).map(|((transport, image), models)| {
             let (settings, recorder) = (settings.reader(), graph.recorder(RECORDS));
             let tools = haptic.into_iter().zip(self.elsewhere).collect();
-            let ports = HapticBridgePorts { tools, models, settings, surfaces: shown, recorder };
+            let ports =
+                HapticBridgePorts { tools, haptic: self.haptic_rate, models, settings, surfaces: shown, recorder };
             Box::new(HapticBridge::new(transport, image, ports)) as Box<dyn Actor>
         });
         global.into_iter().chain(haptic).collect()
