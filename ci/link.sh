@@ -2,8 +2,8 @@
 # The link over zenoh: two processes over loopback, who may not come in, and the command's own options. Zenoh takes ten minutes to build.
 #
 #     bash ci/link.sh
-#     bash ci/link.sh lab   also two network namespaces with delay and loss between them, against the virtual link, and with cables that are
-#                           pulled (root, iproute2)
+#     bash ci/link.sh lab   also two network namespaces with delay and loss between them, against the virtual link, with cables that are
+#                           pulled, and with two haptic machines (root, iproute2)
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
 need_component clippy clippy
 # One selection of packages for all: another one would build zenoh again.
@@ -21,4 +21,5 @@ if [ "${1:-}" = lab ]; then
     command -v ip >/dev/null || install_packages "network namespaces" iproute2
     python3 ci/link_lab.py "$CARGO_TARGET_DIR/debug/palpate" "$CARGO_TARGET_DIR/tmp/lab" --scenes drag_friction --delays 0 14 --losses 0 1
     python3 ci/link_trials.py "$CARGO_TARGET_DIR/debug/palpate" "$CARGO_TARGET_DIR/tmp/lab" cable
+    python3 ci/link_trials.py "$CARGO_TARGET_DIR/debug/palpate" "$CARGO_TARGET_DIR/tmp/lab" machines --delays 0
 fi

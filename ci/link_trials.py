@@ -4,6 +4,7 @@
     link_trials.py PALPATE OUT [--protocol tcp|tls] cable [--turns N] [--most S]   the cable of either side is out, for as long as chance will
     link_trials.py PALPATE OUT soak [--seconds S] [--delay MS] [--loss PCT]   memory of both sides, minute by minute
     link_trials.py PALPATE OUT cost [--rounds N] [--seconds S]           runs with and without the link in turn
+    link_trials.py PALPATE OUT machines [--delays MS...] [--nodes N]     two haptic machines, against `full` along the ways that their tools went
 
 PALPATE is the command with the feature `link`. The two sides are in two network namespaces with a relay between them, as in link_lab.py,
 on a scene that presses and strokes a block of 12^3 nodes all the time. Each prints a table in Markdown; `cable` and `soak` fail where the
@@ -11,6 +12,7 @@ force or a record is not what it has to be. OUT is a folder for logs.
 """
 
 import argparse
+import csv
 import json
 import math
 import os
@@ -22,7 +24,7 @@ import sys
 import time
 from pathlib import Path
 
-from link_lab import PROTOCOLS, ROOT, Lab, commanded, run
+from link_lab import PROTOCOLS, ROOT, Lab, commanded, error, run
 
 MODEL = "predictive"
 # The force has come in after the start-up ramp, and the first bases are there.
@@ -202,6 +204,78 @@ def cost(lab, palpate, out, args):
     return True
 
 
+HANDS = ("left", "right")
+
+
+def strokes(out, name, rows):
+    """A path of rows of (t, x, y, z), in s and m."""
+    text = "\n".join(["t_s,x_m,y_m,z_m", *(",".join(f"{number:.7f}" for number in row) for row in rows)])
+    (out / f"{name}.csv").write_text(text + "\n")
+
+
+def two_hands(out, name, nodes):
+    """A scene of two tools that follow the paths of that name, on so many nodes per axis."""
+    text = (ROOT / "scenes" / "drag_friction.toml").read_text().replace("[12, 12, 12]", str([nodes] * 3))
+    device = '[device]\nkind = "scripted"\npath_csv = "paths/drag.csv"\n'
+    devices = (f'[[device]]\nname = "{hand}"\nkind = "scripted"\npath_csv = "{name}-{hand}.csv"\n' for hand in HANDS)
+    path = out / f"{name}.toml"
+    path.write_text(text.replace(device, "\n".join(devices)))
+    return path
+
+
+def table(palpate, log, topic, columns):
+    """Tick -> the values of these columns."""
+    csv_file = log.with_suffix(".csv")
+    run(palpate, "export", log, "--topic", topic, "--out", csv_file)
+    with csv_file.open() as lines:
+        return {round(1e3 * float(row["t_s"])): tuple(float(row[column]) for column in columns) for row in csv.DictReader(lines)}
+
+
+def machines(lab, palpate, out, args):
+    ways = {"left": (0.035, 0.008, 3.0), "right": (0.068, -0.007, 2.2)}
+    for hand, (middle, reach, rate) in ways.items():
+        depth = lambda t: 0.008 * min(max((t - 0.5) / 0.5, 0.0), 1.0) + 0.001 * math.sin(7 * t)
+        times = (n / 200 for n in range(int(200 * args.seconds) + 200))
+        strokes(out, f"ways-{hand}", ((t, middle + reach * math.sin(rate * t), 0.0512, 0.101 - depth(t)) for t in times))
+    path = two_hands(out, "ways", args.nodes)
+    place, force = [f"{axis}_m" for axis in "xyz"], [f"f{axis}_n" for axis in "xyz"]
+    print("| one way (ms) | tool | force off (rms, %) | largest jump (%) | the other tool off (rms, mm) | model as it comes, p50 (ms) |")
+    print("| ---: | --- | ---: | ---: | ---: | ---: |")
+    for delay in args.delays:
+        lab.delay_s = 0.0
+        serve = lab.serve(path, MODEL)
+        lab.delay_s = delay / 1e3
+        logs = {hand: out / f"machines-{hand}-{delay:g}.mcap" for hand in HANDS}
+        run_it = ["run", path, "--model", MODEL, "--duration", args.seconds]
+        sides = [lab.haptic(*run_it, "--device", hand, "--out", log) for hand, log in logs.items()]
+        for side in sides:
+            _, said = side.communicate(timeout=120)
+            if side.returncode != 0:
+                sys.exit(said)
+        serve.send_signal(signal.SIGINT)
+        serve.communicate(timeout=60)
+        reports = {hand: timing(palpate, log) for hand, log in logs.items()}
+        # Both know how far the clock of the global side is ahead of theirs.
+        ahead = {hand: statistics.median(row[0] for row in table(palpate, log, "/link", ["clock_ahead_s"]).values()) for hand, log in logs.items()}
+        later = {hand: round(1e3 * (at - min(ahead.values()))) for hand, at in ahead.items()}
+        went = {hand: table(palpate, log, f"/{hand}/tool", place) for hand, log in logs.items()}
+        for hand, way in went.items():
+            first = way[min(way)]
+            strokes(out, f"went-{hand}", [(0.0, *first), *((1e-3 * (tick + later[hand]), *at) for tick, at in way.items() if tick + later[hand] > 0)])
+        truth = out / "went.mcap"
+        run(palpate, "run", two_hands(out, "went", args.nodes), "--virtual", "--model", "full", "--duration", str(args.seconds), "--out", truth)
+        for hand, other in zip(HANDS, reversed(HANDS)):
+            felt = table(palpate, logs[hand], f"/{hand}/force", force)
+            is_full = table(palpate, truth, f"/{hand}/force", force)
+            rms, jump = error({tick + later[hand]: value for tick, value in felt.items()}, is_full)
+            seen = {tick + later[hand] - later[other]: at for tick, at in table(palpate, logs[hand], f"/{other}/tool", place).items()}
+            off = [math.dist(at, went[other][tick]) for tick, at in seen.items() if tick > 500 and tick in went[other]]
+            off_mm = 1e3 * math.sqrt(sum(away * away for away in off) / len(off))
+            age = reports[hand]["figures"][f"{hand}.resync.age.p50"] / 1e6
+            print(f"| {delay:g} | {hand} | {rms:.2f} | {jump:.2f} | {off_mm:.3f} | {age:.0f} |", flush=True)
+    return True
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("palpate", type=Path)
@@ -221,6 +295,11 @@ def main():
     of.add_argument("--rounds", type=int, default=5)
     of.add_argument("--seconds", type=float, default=15)
     of.set_defaults(run=cost)
+    of = trials.add_parser("machines")
+    of.add_argument("--delays", type=float, nargs="+", default=[0, 5, 14])
+    of.add_argument("--nodes", type=int, default=8)
+    of.add_argument("--seconds", type=float, default=8)
+    of.set_defaults(run=machines)
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     palpate, out = args.palpate.resolve(), args.out.resolve()

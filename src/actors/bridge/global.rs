@@ -193,7 +193,9 @@ impl GlobalBridge {
         let Self { machines, tools, .. } = self;
         for (number, onward) in tools.iter_mut().enumerate() {
             if std::mem::take(&mut onward.is_new) {
-                for machine in machines.iter_mut().filter(|machine| !machine.tools.contains(&number)) {
+                // One that has said nothing yet has no ticks to count by.
+                let others = machines.iter_mut().filter(|machine| !machine.tools.contains(&number));
+                for machine in others.filter(|machine| !machine.numbering.is_new()) {
                     let ticks = onward.recent.iter().map(|tick| (machine.numbering.there(tick.tick), tick.pose));
                     let message = Message::Ticks { tool: number as u16, ticks: ticks.collect() };
                     machine.post.send(Lane::Urgent, now, &message);
