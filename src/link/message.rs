@@ -182,11 +182,6 @@ impl Message {
         to.0.extend_from_slice(&basis.to_bytes(key));
     }
 
-    /// Writes the message of local models without a copy of what they are built from.
-    pub fn write_models(shipment: &Shipment, header: Header, bytes: &mut Vec<u8>) {
-        shipment.write(&mut begin(header, MODELS, bytes));
-    }
-
     fn kind(&self) -> u16 {
         match self {
             Self::Ticks { .. } => TICKS,

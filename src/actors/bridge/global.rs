@@ -107,10 +107,13 @@ impl GlobalBridge {
     fn send_models(&mut self, ctx: &TickContext) {
         self.is_prompt = !self.models.refresh(ctx);
         if !self.is_prompt {
-            let mut shipment = Shipment::of(self.models.get());
-            let tick = shipment.tick();
-            for machine in &mut self.machines {
-                machine.send_models(&mut shipment, tick, ctx.scheduled);
+            let all = Shipment::of(self.models.get());
+            if let [alone] = &mut self.machines[..] {
+                alone.send_models(all, ctx.scheduled);
+            } else {
+                for machine in &mut self.machines {
+                    machine.send_models(all.of_tools(&machine.tools), ctx.scheduled);
+                }
             }
         }
     }

@@ -66,11 +66,11 @@ impl Machine {
         Some((header.sent, message))
     }
 
-    /// Sends what local models are built from, and the bases that it lacks for them.
-    pub(super) fn send_models(&mut self, shipment: &mut Shipment, tick: u64, now: Nanos) {
+    /// Sends what local models of its tools are built from, and the bases that it lacks for them.
+    pub(super) fn send_models(&mut self, mut shipment: Shipment, now: Nanos) {
         self.bases.send(&mut self.post, shipment.parcels(), now);
-        shipment.set_tick(self.numbering.there(tick));
-        self.post.send_with(Lane::Models, now, |header, bytes| Message::write_models(shipment, header, bytes));
+        shipment.set_tick(self.numbering.there(shipment.tick()));
+        self.post.send(Lane::Models, now, &Message::Models(shipment));
     }
 
     /// Sets friction and stiffness as the machine wants them, when it wants others than before.

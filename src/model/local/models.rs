@@ -50,6 +50,15 @@ impl LocalModels {
         is_resolved
     }
 
+    /// Sets tool number `tool` aside, whose force nobody needs here: no model is there for it, and the one of tool `host` gives it what it
+    /// has, which is nothing if it does not resolve it.
+    ///
+    /// # Real-time
+    /// Wait-free, real-time safe.
+    pub fn set_aside(&mut self, tool: usize, host: usize) {
+        self.by[tool] = host;
+    }
+
     /// The model that serves tool number `tool`.
     ///
     /// # Real-time

@@ -102,9 +102,10 @@ impl Linking {
             let copy = simulation.duplicate();
             copy.ok_or_else(|| Error::new(ErrorKind::Runtime, "a link needs a body that can be copied"))
         };
+        let others = (0..).zip(&elsewhere).filter(|(_, handle)| handle.is_some()).map(|(tool, _)| tool).collect();
         let image = match ends {
             Ends::Global(_) => None,
-            Ends::Both(_) | Ends::Haptic(_) => Some(Image::new(copy()?)),
+            Ends::Both(_) | Ends::Haptic(_) => Some(Image::new(copy()?).without(others)),
         };
         let (haptic, global, arriving, departing) = Default::default();
         let surface_nodes = simulation.body().surface().nodes();

@@ -17,6 +17,8 @@ const MOST_TRIANGLES: usize = 1 << 16;
 #[derive(Debug)]
 pub struct Image {
     simulation: Simulation,
+    /// The tools that are felt elsewhere.
+    elsewhere: Vec<usize>,
     /// Working memory.
     tools: Vec<ToolForecast>,
 }
@@ -25,7 +27,14 @@ impl Image {
     /// Of a simulation of the body and the tools that `simulation` has.
     pub fn new(simulation: Simulation) -> Self {
         let tools = vec![ToolForecast::default(); simulation.tools()];
-        Self { simulation, tools }
+        Self { simulation, elsewhere: Vec::new(), tools }
+    }
+
+    /// The same where the force on some `tools` is not needed: they are [set aside](LocalModels::set_aside) unless a model of others holds
+    /// them.
+    #[must_use]
+    pub fn without(self, tools: Vec<usize>) -> Self {
+        Self { elsewhere: tools, ..self }
     }
 
     /// Builds `models` as they would have been built where `shipment` comes from, with what there is of the `bases` here. False if it is one
@@ -43,7 +52,13 @@ impl Image {
                 None => return false,
             }
         }
-        shipment.hosts().enumerate().all(|(tool, host)| models.share(host, tool))
+        shipment.hosts().enumerate().all(|(tool, host)| {
+            let is_served = models.share(host, tool);
+            if !is_served {
+                models.set_aside(tool, host);
+            }
+            is_served || self.elsewhere.contains(&tool)
+        })
     }
 
     /// What `parcel` tells; `None` if it does not fit.

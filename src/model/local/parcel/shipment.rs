@@ -30,6 +30,19 @@ impl Shipment {
         Self { parcels: models.parcels().cloned().collect(), hosts }
     }
 
+    /// What of it serves some of the `tools`, for a computer that has no others; those are set aside.
+    ///
+    /// # Real-time
+    /// Not for a tick: allocates.
+    ///
+    /// # Panics
+    /// If there are no tools, or fewer than one of them says.
+    pub fn of_tools(&self, tools: &[usize]) -> Self {
+        let serves = |host: u16| tools.iter().any(|&tool| self.hosts[tool] == host);
+        let hosts = self.hosts.iter().map(|&host| if serves(host) { host } else { self.hosts[tools[0]] }).collect();
+        Self { parcels: self.parcels.iter().filter(|parcel| serves(parcel.tool)).cloned().collect(), hosts }
+    }
+
     /// Appends all of it but the bases.
     ///
     /// # Real-time

@@ -145,6 +145,38 @@ fn models_that_are_built_over_there_are_those_that_would_be_built_here() {
     assert!(shared.iter().all(|&count| count >= 6), "models for both tools, and one for each: {shared:?}");
 }
 
+/// Check that a computer where one tool is felt gets the model of that alone, feels in it what it would with all, and that one where the
+/// other tool is felt too takes no shipment that lacks it.
+#[test]
+fn a_tool_that_is_felt_elsewhere_has_no_model_here() {
+    for (beside, is_held) in [(0.052, false), (0.041, true)] {
+        let (mut simulation, tools) = pressed(ToolShape::Point, beside);
+        let (patch, bases) = patch_and_bases(&simulation);
+        let template = Template::new(Kind::Predictive, [4, 4, 2], simulation.body()).unwrap();
+        let (all, _) = sent(&template, (&mut simulation, &tools), (&patch, &bases));
+        assert_eq!((all.parcels().len(), all.of_tools(&[0]).parcels().len()), (if is_held { 1 } else { 2 }, 1));
+        let [all, of_first] = [all.clone(), all.of_tools(&[0])].map(|shipment| {
+            let mut bytes = Vec::new();
+            shipment.write(&mut BytesWriter(&mut bytes));
+            Shipment::read(&mut BytesReader(&bytes)).unwrap()
+        });
+        let [mut with_all, mut alone] = [empty(&template), empty(&template)];
+        assert!(Image::new(at_rest(ToolShape::Point)).rebuild(&all, &bases, &mut with_all));
+        let image = || Image::new(at_rest(ToolShape::Point));
+        assert_eq!(
+            image().rebuild(&of_first, &bases, &mut empty(&template)),
+            is_held,
+            "nothing serves the second tool"
+        );
+        assert!(image().without(vec![1]).rebuild(&of_first, &bases, &mut alone));
+        let [with_all, alone] = [&mut with_all, &mut alone].map(|models| drag(models, tools));
+        for (all, one) in with_all.iter().zip(&alone) {
+            assert_eq!(one[0], all[0]);
+            assert_eq!(one[1], if is_held { all[1] } else { Vec3::zeros() });
+        }
+    }
+}
+
 #[test]
 fn a_parcel_of_another_body_is_refused_and_a_path_of_another_ring_is_not_gone() {
     let (mut simulation, tools) = pressed(ToolShape::Point, 0.052);
