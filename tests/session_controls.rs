@@ -191,9 +191,12 @@ fn over_a_link_friction_and_stiffness_change_when_they_have_crossed_it() {
         let changed = over(&[change]);
         let first = as_made.iter().zip(&changed).position(|(a, b)| a.force_n != b.force_n).unwrap();
         assert!((1240..1400).contains(&first), "{model:?}: {first} ms");
-        let normal = |forces: &[ForceSample]| forces.last().unwrap().force_n[2];
-        let ratio = normal(&changed) / normal(&as_made);
+        let last = |forces: &[ForceSample]| forces.last().unwrap().force_n;
+        let [before, after] = [last(&as_made), last(&changed)];
+        let ratio = after[2] / before[2];
         assert!((1.2..1.6).contains(&ratio), "{model:?}: {ratio} times as hard");
+        let [before, after] = [before, after].map(|force| force[0].hypot(force[1]) / force[2].abs());
+        assert!(after < before - 0.15, "{model:?}: {before} and {after} of the normal force drags");
     }
 }
 

@@ -14,7 +14,7 @@ use crate::access::Access;
 use crate::connection::{ANSWERS_WITHIN, Connection, say};
 use crate::desk::Answer;
 use crate::keeper::{Keeper, LOOK, Shared};
-use crate::unique;
+use crate::{machine, unique};
 
 /// How long the first model is waited for.
 const FIRST_MODEL: Duration = Duration::from_secs(30);
@@ -130,7 +130,7 @@ impl Transport for GlobalSide {
     }
 
     fn connect(&mut self, hello: &Hello) -> Result<(), Error> {
-        let mut hello = Hello { machine: unique(), session: unique(), ..hello.clone() };
+        let mut hello = Hello { machine: machine(), session: unique(), ..hello.clone() };
         let connection = self.wait_for_models(&mut hello)?;
         self.shared.kept().connection = Some(connection);
         let keeper = Keeper::new(Arc::clone(&self.shared), self.config.clone(), self.places(), hello);

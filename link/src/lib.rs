@@ -35,6 +35,12 @@ pub use haptic::GlobalSide;
 pub use keys::make_keys;
 pub use server::{Event, serve};
 
+/// Names this process, as long as it runs.
+fn machine() -> u64 {
+    static MACHINE: std::sync::OnceLock<u64> = std::sync::OnceLock::new();
+    *MACHINE.get_or_init(unique)
+}
+
 /// A name that nobody else has by chance; it is no secret.
 fn unique() -> u64 {
     use std::hash::{BuildHasher, Hasher, RandomState};

@@ -23,7 +23,9 @@ const LOOK: Duration = Duration::from_millis(50);
 pub enum Event {
     /// It listens, and a session is ready.
     Listening,
-    /// A haptic machine has come, and the global model runs for it; what it says of itself.
+    /// A session has begun: the global model runs for these haptic machines; what they say of themselves.
+    Began(Vec<Hello>),
+    /// A haptic machine has taken its place in the session that runs.
     Came(Box<Hello>),
     /// Haptic machines have come, and there is nothing for them; why.
     Refused(Error),
@@ -67,7 +69,7 @@ pub fn serve(
                 match Serving::begin(&zenoh, ready, &guests) {
                     Ok(begun) => {
                         serving = Some(begun);
-                        guests.into_iter().for_each(|guest| tell(Event::Came(Box::new(guest.hello))));
+                        tell(Event::Began(guests.into_iter().map(|guest| guest.hello).collect()));
                     }
                     Err(error) => {
                         desk.refuse(&error.to_string());

@@ -79,7 +79,7 @@ pub struct ToolView {
 pub struct SurfaceView {
     /// The time that it belongs to.
     pub time: Nanos,
-    /// Position of every node (m); the triangles are those of the body's surface.
+    /// Position of every node (m); the triangles are those of the body's surface. Behind a link nodes below it stay where they began.
     pub positions: Vec<Vec3>,
     /// How stiff the body is, in that which it was made with.
     pub stiffness: Stiffness,

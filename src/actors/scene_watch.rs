@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::messages::SurfaceView;
 use crate::log::{Environment, LogRecord, SceneFrame, SceneTool, WaitingPoints};
+use crate::model::mesh::Surface;
 use crate::model::{Vec3, wxyz};
 use crate::runtime::Nanos;
 use crate::runtime::{OutletReader, TickContext};
@@ -34,13 +35,11 @@ pub struct SceneWatch {
 }
 
 impl SceneWatch {
-    /// Watches `surface`, whose triangles have these nodes.
-    pub(crate) fn new(surface: OutletReader<SurfaceView>, triangles: &[[u32; 3]]) -> Self {
-        let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
-        nodes.sort_unstable();
-        nodes.dedup();
+    /// Watches the newest `surface` of a body that has this one.
+    pub(crate) fn new(surface: OutletReader<SurfaceView>, of: &Surface) -> Self {
+        let nodes = of.nodes();
         let point = |node: u32| nodes.binary_search(&node).map_or(0, |point| point as u32);
-        let triangles = triangles.iter().map(|triangle| triangle.map(point)).collect();
+        let triangles = of.triangles.iter().map(|triangle| triangle.map(point)).collect();
         let tool_size_m = TOOL_SIZE * largest_extent(&surface.get().positions);
         Self {
             surface,

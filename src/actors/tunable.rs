@@ -61,6 +61,9 @@ impl Tunable {
     /// Not for a real-time tick: takes a lock.
     pub fn set_friction(&self, friction: Friction) -> Result<(), String> {
         let Friction { kinetic, breakaway, stribeck } = friction;
+        if friction == self.value().friction {
+            return Ok(());
+        }
         let is_coefficient = |mu: f64| (0.0..=MOST_FRICTION).contains(&mu) || mu == f64::INFINITY;
         if !(is_coefficient(kinetic) && is_coefficient(breakaway) && stribeck >= 0.0 && stribeck.is_finite()) {
             return Err(format!(
@@ -71,7 +74,7 @@ impl Tunable {
         if self.equations == Equations::Paper && friction.breaks_away() {
             return Err("the printed equations have one coefficient of friction".to_owned());
         }
-        self.set(|settings| settings.friction = friction);
+        self.settings.update(|settings| settings.friction = friction);
         Ok(())
     }
 
@@ -90,7 +93,7 @@ impl Tunable {
                 "a stiffness of {factor:.3} times the scene's is not within {least} to {most:.3}, which its explicit steps bear"
             )
         })?;
-        self.set(|settings| settings.stiffness = stiffness);
+        self.settings.update(|settings| settings.stiffness = stiffness);
         Ok(())
     }
 
@@ -99,12 +102,6 @@ impl Tunable {
     /// # Real-time
     /// Not for a real-time tick: takes a lock.
     pub fn set_model(&self, model: Kind) {
-        self.set(|settings| settings.model = model);
-    }
-
-    fn set(&self, change: impl FnOnce(&mut Settings)) {
-        let mut settings = self.settings.value();
-        change(&mut settings);
-        self.settings.set(settings);
+        self.settings.update(|settings| settings.model = model);
     }
 }

@@ -229,6 +229,9 @@ impl Message {
             TICKS => {
                 let (tool, mut ticks) = (from.u16()?, Vec::new());
                 from.list(TICK, &mut ticks, read_tick)?;
+                if ticks.len() > MOST_TICKS {
+                    return None;
+                }
                 Self::Ticks { tool, ticks }
             }
             MODELS => Self::Models(Shipment::read(from)?),
@@ -240,6 +243,9 @@ impl Message {
             WANTS => {
                 let mut held = Vec::new();
                 from.list(8, &mut held, BytesReader::u64)?;
+                if held.len() > MOST_HELD {
+                    return None;
+                }
                 let (friction, stiffness) = (Friction::read(from)?, Stiffness::times(from.f64()?)?);
                 let is_watched = from.u8().filter(|&byte| byte < 2)? == 1;
                 Self::Wants { held, friction, stiffness, is_watched }
@@ -376,7 +382,7 @@ mod tests {
         assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Kind(99));
         bytes[4] = 1;
         assert_eq!(Message::read(&bytes).unwrap_err(), Refused::Version(1));
-        assert!(Refused::Version(1).to_string().contains("version 1, this is version 4"));
+        assert!(Refused::Version(1).to_string().contains(&format!("version 1, this is version {VERSION}")));
     }
 
     #[test]

@@ -200,8 +200,8 @@ impl Viewer {
         self
     }
 
-    /// True if it can tell the stress of the body: if the session [shares its records](super::SessionBuilder::share_records), and the body
-    /// is none of a program's own that does not know it.
+    /// True if it can tell the stress of the body: if the session [shares its records](super::SessionBuilder::share_records), the body is
+    /// none of a program's own that does not know it, and the global model is not behind a link.
     pub fn knows_stress(&self) -> bool {
         self.body.is_some()
     }
@@ -226,7 +226,8 @@ impl Viewer {
         Arc::clone(&self.triangles)
     }
 
-    /// The newest positions of all nodes, at the rate of the global model.
+    /// The newest positions of all nodes, at the rate of the global model. From behind a link come those of the surface, and the others stay
+    /// where they began.
     ///
     /// # Real-time
     /// Wait-free, for this side and for the writer.

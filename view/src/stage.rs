@@ -115,13 +115,18 @@ impl Stage {
         self.hub.say(&note("The body starts anew ..."));
         let result = self.replace(change);
         // What is shown goes on, or, if that has ended, starts anew as it was.
-        if result.is_err() && self.live.is_none() && self.replace(&self.change.clone()).is_err() {
-            self.hub.say(&note("There is no session now: reset, or start the command again."));
+        if result.is_err() && self.live.is_none() {
+            let before = self.change.clone();
+            let is_tried = *change == before || self.hub.is_over();
+            if is_tried || self.replace(&before).is_err() {
+                self.hub.say(&note("There is no session now: reset, or start the command again."));
+            }
         }
         result
     }
 
-    /// Ends the session and starts one with this `change`. The one that is shown is ended only for one that is sure to work.
+    /// Ends the session and starts one with this `change`. The one that is shown is ended only for one that works by all that is here; what
+    /// is over a link is asked when it starts.
     fn replace(&mut self, change: &Change) -> Result<(), Error> {
         let Some(subject) = &mut self.subject else { return Ok(()) };
         let session = subject.session(change)?;

@@ -43,7 +43,7 @@ pub fn child() {
     if words[0] == "serve" {
         let tell = |event: Event| match event {
             Event::Listening => say("listening"),
-            Event::Came(_) => say("came"),
+            Event::Began(_) => say("came"),
             Event::Refused(error) => say(&format!("refused {error}")),
             Event::Ended(summary) => say(&format!("ended {:?}", summary.runtime.fault)),
             _ => {}

@@ -146,7 +146,7 @@ impl GlobalBridge {
                 machine.tools.iter().for_each(|&tool| tools[tool].is_put = true);
             }
             for _ in 0..MOST_MESSAGES {
-                let Some((sent, message)) = machine.receive(ctx.scheduled) else { break };
+                let Some((header, message)) = machine.receive(ctx.scheduled) else { break };
                 match message {
                     Message::Ticks { tool, ticks } => {
                         let tool = usize::from(tool);
@@ -161,12 +161,14 @@ impl GlobalBridge {
                         }
                     }
                     Message::Wants { held, friction, stiffness, is_watched } => {
-                        machine.bases.held = held;
-                        machine.tune(settings, (friction, stiffness));
-                        machine.is_watched = is_watched;
+                        if machine.is_newest_said(header.number) {
+                            machine.bases.held = held;
+                            machine.tune(settings, (friction, stiffness));
+                            machine.is_watched = is_watched;
+                        }
                     }
                     Message::Ping => {
-                        let answer = Message::Pong { sent, received: ctx.scheduled };
+                        let answer = Message::Pong { sent: header.sent, received: ctx.scheduled };
                         machine.post.send(Lane::Urgent, ctx.scheduled, &answer);
                     }
                     // Of the other direction.

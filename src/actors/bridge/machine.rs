@@ -6,7 +6,7 @@ use super::post::Post;
 use super::sent_bases::SentBases;
 use crate::actors::settings::Settings;
 use crate::actors::tunable::Tunable;
-use crate::link::{Lane, Message, Transport};
+use crate::link::{Header, Lane, Message, Transport};
 use crate::model::body::Stiffness;
 use crate::model::contact::Friction;
 use crate::model::local::Shipment;
@@ -23,6 +23,10 @@ pub(super) struct Machine {
     /// What it wants friction and stiffness to be, and what one that has changed nothing wants.
     wanted: (Friction, Stiffness),
     unchanged: (Friction, Stiffness),
+    /// The number of the message by which it said so last: another one that comes later may have been overtaken.
+    said: u64,
+    /// It was told that it wants what cannot be.
+    is_warned: bool,
     /// Somebody looks at the surface there.
     pub(super) is_watched: bool,
     /// When a sample of a tool came last.
@@ -38,9 +42,22 @@ impl Machine {
         let mut post = Post::new(transport);
         let Settings { friction, stiffness, .. } = settings.value();
         let (peer, wanted) = (post.peer(), (friction, stiffness));
-        let (bases, is_watched, heard) = Default::default();
+        let (bases, said, is_warned, is_watched, heard) = Default::default();
         let numbering = Numbering::new(is_alone);
-        Self { post, tools, numbering, bases, wanted, unchanged: wanted, is_watched, heard, peer, is_alone }
+        Self {
+            post,
+            tools,
+            numbering,
+            bases,
+            wanted,
+            unchanged: wanted,
+            said,
+            is_warned,
+            is_watched,
+            heard,
+            peer,
+            is_alone,
+        }
     }
 
     /// True if another one has taken its place: it counts and knows nothing of what the one before did.
@@ -50,20 +67,20 @@ impl Machine {
         if is_another {
             self.post.begin_epoch(FIRST_EPOCH);
             (self.bases, self.numbering) = (SentBases::default(), Numbering::new(self.is_alone));
-            (self.wanted, self.is_watched) = (self.unchanged, false);
+            (self.wanted, self.said, self.is_watched) = (self.unchanged, 0, false);
         }
         is_another
     }
 
     /// The next message of it, which may be the first of a newer epoch.
-    pub(super) fn receive(&mut self, now: Nanos) -> Option<(Nanos, Message)> {
+    pub(super) fn receive(&mut self, now: Nanos) -> Option<(Header, Message)> {
         let epoch = self.post.epoch;
         let (header, message) = self.post.receive(now, true)?;
         if self.post.epoch != epoch {
             // It has begun anew: what it has is not known.
-            self.bases = SentBases::default();
+            (self.bases, self.said) = (SentBases::default(), 0);
         }
-        Some((header.sent, message))
+        Some((header, message))
     }
 
     /// Sends what local models of its tools are built from, and the bases that it lacks for them.
@@ -73,7 +90,14 @@ impl Machine {
         self.post.send(Lane::Models, now, &Message::Models(shipment));
     }
 
-    /// Sets friction and stiffness as the machine wants them, when it wants others than before.
+    /// True if nothing has been said since that has a higher `number`.
+    pub(super) fn is_newest_said(&mut self, number: u64) -> bool {
+        let is_newest = number > self.said;
+        self.said = self.said.max(number);
+        is_newest
+    }
+
+    /// Sets friction and stiffness as the machine wants them, when it wants others than before. What cannot be is told once.
     pub(super) fn tune(&mut self, settings: &Tunable, wanted: (Friction, Stiffness)) {
         if std::mem::replace(&mut self.wanted, wanted) == wanted {
             return;
@@ -81,7 +105,9 @@ impl Machine {
         let (friction, stiffness) = wanted;
         let set = [settings.set_friction(friction), settings.set_stiffness(stiffness.factor())];
         for why in set.into_iter().filter_map(Result::err) {
-            tracing::warn!("the haptic side wants what cannot be: {why}");
+            if !std::mem::replace(&mut self.is_warned, true) {
+                tracing::warn!("the haptic side wants what cannot be: {why}; more like it is not told");
+            }
         }
     }
 }
@@ -94,12 +120,16 @@ mod tests {
     use crate::model::local::Kind;
     use crate::runtime::{Execution, Runtime};
 
+    /// Of a body that may become twice as stiff.
+    fn settings() -> Tunable {
+        let first = Settings { friction: 0.5.into(), stiffness: Stiffness::default(), model: Kind::Hold };
+        let parameter = Runtime::builder(Execution::Virtual).parameter(first);
+        Tunable::new(parameter, Stiffness::times(2.0).unwrap(), Equations::default())
+    }
+
     #[test]
     fn it_sets_what_it_may_and_nothing_else() {
-        let mut graph = Runtime::builder(Execution::Virtual);
-        let first = Settings { friction: 0.5.into(), stiffness: Stiffness::default(), model: Kind::Hold };
-        let most = Stiffness::times(2.0).unwrap();
-        let settings = Tunable::new(graph.parameter(first), most, Equations::default());
+        let settings = settings();
         let [_, end] = VirtualLink::ends(Conditions::default());
         let mut machine = Machine::new(Box::new(end), vec![0], true, &settings);
         let mut tuned = |friction: f64, factor: f64| {
@@ -113,10 +143,18 @@ mod tests {
     }
 
     #[test]
+    fn what_was_overtaken_is_not_heard_and_another_machine_begins_to_count_anew() {
+        let settings = settings();
+        let [_, end] = VirtualLink::ends(Conditions::default());
+        let mut machine = Machine::new(Box::new(end), vec![0], true, &settings);
+        assert_eq!([3, 2, 3, 7].map(|number| machine.is_newest_said(number)), [true, false, false, true]);
+        machine.peer += 1;
+        assert!(machine.is_another() && machine.is_newest_said(1));
+    }
+
+    #[test]
     fn one_that_changes_nothing_leaves_what_another_has_changed() {
-        let mut graph = Runtime::builder(Execution::Virtual);
-        let first = Settings { friction: 0.5.into(), stiffness: Stiffness::default(), model: Kind::Hold };
-        let settings = Tunable::new(graph.parameter(first), Stiffness::times(2.0).unwrap(), Equations::default());
+        let settings = settings();
         let [here, there] = VirtualLink::ends(Conditions::default());
         let mut machines =
             [(here, 0), (there, 1)].map(|(end, tool)| Machine::new(Box::new(end), vec![tool], false, &settings));

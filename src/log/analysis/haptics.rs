@@ -121,7 +121,7 @@ impl DeviceReport {
     /// True if nothing was told of it: it is elsewhere, beyond a link.
     pub fn is_empty(&self) -> bool {
         let ContactReport { free, stick, slip, lost } = self.contact;
-        [self.force.ticks, self.resyncs.jump_before_n.count, free, stick, slip, lost] == [0; 6]
+        [self.force.ticks, self.limits.ticks, self.resyncs.jump_before_n.count, free, stick, slip, lost] == [0; 7]
     }
 }
 

@@ -168,8 +168,16 @@ impl<T: InputValue> Parameter<T> {
     /// # Real-time
     /// Takes a lock: from outside of ticks.
     pub fn set(&self, value: T) {
+        self.update(|old| *old = value);
+    }
+
+    /// Changes the value that was set last, whoever sets it meanwhile: the next release of the actor that looks takes the result.
+    ///
+    /// # Real-time
+    /// Takes a lock: from outside of ticks.
+    pub fn update(&self, change: impl FnOnce(&mut T)) {
         let state = &mut *lock(&self.0);
-        state.value = value;
+        change(&mut state.value);
         state.publish();
         state.sent.pass_outside();
     }

@@ -204,7 +204,7 @@ fn surfaces(graph: &mut RuntimeBuilder, prepared: &Prepared) -> Surfaces {
     let viewer = ports[0].reader();
     let scene = prepared.scene.log.scene.then(|| {
         let port = outlet();
-        let watch = SceneWatch::new(port.reader(), &prepared.simulation.body().surface().triangles);
+        let watch = SceneWatch::new(port.reader(), prepared.simulation.body().surface());
         ports.push(port);
         watch
     });

@@ -94,6 +94,8 @@ fn show_log(log: &Path, args: &ViewArgs) -> Result<(), Error> {
         (args.out.is_some(), "--out"),
         (args.watch, "--watch"),
         (args.global.global.is_some(), "--global"),
+        (args.global.access.config.is_some(), "--config"),
+        (args.global.access.insecure, "--insecure"),
     ] {
         if is_given {
             let message = format!("{option} is for scenes, and {} is a log: leave it out", shared::name_of(log));

@@ -1,6 +1,9 @@
 //! The link's commands, over zenoh.
 
+use std::cell::Cell;
+
 use palpate::Error;
+use palpate::link::Hello;
 use palpate::session::{Session, SessionBuilder};
 use palpate_link::{Access, Event, GlobalSide};
 
@@ -33,41 +36,47 @@ pub fn serve(args: &ServeArgs) -> Result<(), Error> {
     if let Some(out) = &args.out {
         files::keep_inputs(&files::inputs_of(&args.scene, &scene), out)?;
     }
-    let mut sessions = 0;
+    // One that is made is begun or refused before the next one is made.
+    let begun = Cell::new(0);
     let make = || {
         let builder = Session::from_scene(scene.clone());
         let builder = if args.no_cache { builder.forget_bases() } else { builder };
-        sessions += 1;
-        let builder = args.out.iter().fold(builder, |builder, out| builder.log(palpate_view::numbered(out, sessions)));
-        builder.build_global().map_err(|error| error.at(&name))
+        let log = args.out.iter().map(|out| palpate_view::numbered(out, begun.get() + 1));
+        log.fold(builder, SessionBuilder::log).build_global().map_err(|error| error.at(&name))
     };
     let access = access(&args.access)?;
     let interrupt = shared::waits()?;
-    palpate_link::serve(make, &args.listen, &access, || interrupt.came(), |event| show(&name, &args.listen, &event))
+    let tell = |event| {
+        begun.set(begun.get() + u32::from(matches!(event, Event::Began(_))));
+        show(&name, &args.listen, event);
+    };
+    palpate_link::serve(make, &args.listen, &access, || interrupt.came(), tell)
 }
 
-fn show(name: &str, address: &str, event: &Event) {
-    let line = match event {
-        Event::Listening => format!("listens at {address}; Ctrl-C ends it"),
-        Event::Came(hello) => {
-            let (ms, own) = (1e3 * hello.round_trip.as_secs_f64(), hello.own_tools().map(|tool| &hello.tools[tool].0));
-            let named: Vec<String> = own.filter(|name| !name.is_empty()).map(|name| format!(" {name:?}")).collect();
-            let with = if named.is_empty() { "" } else { " with" };
-            format!("a haptic machine has come{with}{}, round trip {ms:.1} ms", named.join(" and"))
-        }
-        Event::Refused(error) => format!("a haptic machine is refused: {error}"),
+fn show(name: &str, address: &str, event: Event) {
+    let lines = match event {
+        Event::Listening => vec![format!("listens at {address}; Ctrl-C ends it")],
+        Event::Began(machines) => machines.iter().map(come).collect(),
+        Event::Came(machine) => vec![come(&machine)],
+        Event::Refused(error) => vec![format!("a haptic machine is refused: {error}")],
         Event::Ended(summary) => {
             let _ = shared::print(&summary.to_string());
-            match (&summary.runtime.fault, &summary.log_error) {
-                (Some(fault), _) => format!("the session is over: {fault}"),
-                (None, Some(error)) => format!("the session is over; the log is incomplete: {error}"),
-                (None, None) => "the session is over".to_owned(),
-            }
+            vec!["the session is over".to_owned()]
         }
         _ => return,
     };
-    // Whoever does not read this is none the worse for it.
-    let _ = shared::print(&format!("{name}: {}\n", palpate::printable(&line)));
+    for line in lines {
+        // Whoever does not read this is none the worse for it.
+        let _ = shared::print(&format!("{name}: {}\n", palpate::printable(&line)));
+    }
+}
+
+/// Who has come, in words.
+fn come(machine: &Hello) -> String {
+    let (ms, own) = (1e3 * machine.round_trip.as_secs_f64(), machine.own_tools().map(|tool| &machine.tools[tool].0));
+    let named: Vec<String> = own.filter(|name| !name.is_empty()).map(|name| format!(" {name:?}")).collect();
+    let with = if named.is_empty() { "" } else { " with" };
+    format!("a haptic machine has come{with}{}, round trip {ms:.1} ms", named.join(" and"))
 }
 
 /// Makes keys for both machines.

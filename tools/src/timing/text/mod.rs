@@ -20,7 +20,7 @@ pub fn timing_to_text(report: &TimingReport) -> String {
     page.groups(run);
     cores(&mut page, &report.cores);
     page.line(String::new());
-    for device in run.devices.iter().filter(|device| device.force.ticks > 0) {
+    for device in run.devices.iter().filter(|device| !device.is_empty()) {
         page.haptics(run, device);
     }
     page.events(run);
