@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """What a real line does to both sides of the link: a cable that is pulled, minutes of loss, and what the link costs.
 
-    link_trials.py PALPATE OUT [--protocol tcp|tls] cable [--turns N] [--most S]   the cable of either side is out, for as long as chance will
+    link_trials.py PALPATE OUT [--protocol tcp|tls] cable [--turns N] [--least S] [--most S] [--sides haptic global]   the cable of a side is out, for as long
+                                                                         as chance will
     link_trials.py PALPATE OUT soak [--seconds S] [--delay MS] [--loss PCT]   memory of both sides, minute by minute
     link_trials.py PALPATE OUT cost [--rounds N] [--seconds S]           runs with and without the link in turn
     link_trials.py PALPATE OUT machines [--delays MS...] [--nodes N]     two haptic machines, against `full` along the ways that their tools went
 
 PALPATE is the command with the feature `link`. The two sides are in two network namespaces with a relay between them, as in link_lab.py,
-on a scene that presses and strokes a block of 12^3 nodes all the time. Each prints a table in Markdown; `cable` and `soak` fail where the
+on a scene that presses and strokes a block of 12^3 nodes all the time. Each prints a table in Markdown; all but `cost` fail where the
 force or a record is not what it has to be. OUT is a folder for logs.
 """
 
@@ -34,8 +35,6 @@ AGE_LIMIT_S = 0.3
 BACK_WITHIN_S = 1.0
 # The clock of this program and that of a log are so far apart at most.
 CLOCKS_APART_S = 0.05
-# Longer than the force lasts.
-LEAST_OUT_S = 0.4
 
 
 def scene(out, seconds):
@@ -88,9 +87,9 @@ def cable(lab, palpate, out, args):
     print("| --- | ---: | ---: | ---: | ---: | ---: |")
     is_good, chance = True, random.Random(1)
     for turn in range(args.turns):
-        for side in ("haptic", "global"):
+        for side in args.sides:
             out_at = SETTLED_S + chance.random()
-            back_at = out_at + chance.uniform(LEAST_OUT_S, args.most)
+            back_at = out_at + chance.uniform(args.least, args.most)
             log = out / f"cable-{side}-{turn}.mcap"
             sides = Sides(lab, palpate, path, log, back_at + 3)
             sides.wait_until(out_at)
@@ -239,6 +238,7 @@ def machines(lab, palpate, out, args):
         strokes(out, f"ways-{hand}", ((t, middle + reach * math.sin(rate * t), 0.0512, 0.101 - depth(t)) for t in times))
     path = two_hands(out, "ways", args.nodes)
     place, force = [f"{axis}_m" for axis in "xyz"], [f"f{axis}_n" for axis in "xyz"]
+    is_good = True
     print("| one way (ms) | tool | force off (rms, %) | largest jump (%) | the other tool off (rms, mm) | model as it comes, p50 (ms) |")
     print("| ---: | --- | ---: | ---: | ---: | ---: |")
     for delay in args.delays:
@@ -272,8 +272,9 @@ def machines(lab, palpate, out, args):
             off = [math.dist(at, went[other][tick]) for tick, at in seen.items() if tick > 500 and tick in went[other]]
             off_mm = 1e3 * math.sqrt(sum(away * away for away in off) / len(off))
             age = reports[hand]["figures"][f"{hand}.resync.age.p50"] / 1e6
+            is_good &= delay > 0 or (rms < 3 and off_mm < 0.3)
             print(f"| {delay:g} | {hand} | {rms:.2f} | {jump:.2f} | {off_mm:.3f} | {age:.0f} |", flush=True)
-    return True
+    return is_good
 
 
 def main():
@@ -284,7 +285,10 @@ def main():
     trials = parser.add_subparsers(dest="trial", required=True)
     of = trials.add_parser("cable")
     of.add_argument("--turns", type=int, default=3)
+    # Longer than the force lasts.
+    of.add_argument("--least", type=float, default=0.4)
     of.add_argument("--most", type=float, default=10)
+    of.add_argument("--sides", nargs="+", choices=("haptic", "global"), default=("haptic", "global"))
     of.set_defaults(run=cable)
     of = trials.add_parser("soak")
     of.add_argument("--seconds", type=float, default=600)

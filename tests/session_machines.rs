@@ -34,6 +34,11 @@ fn machine(session: SessionBuilder, line: &Line, device: &str, seconds: f64) -> 
 
 /// Both machines at work for so many seconds, with the global side.
 fn start(lines: &[Line; 2], seconds: f64) -> ([Running; 2], Running) {
+    start_with(session, lines, seconds)
+}
+
+/// Likewise with other sessions.
+fn start_with(session: fn() -> SessionBuilder, lines: &[Line; 2], seconds: f64) -> ([Running; 2], Running) {
     let [left, right] =
         [(&lines[0], "left"), (&lines[1], "right")].map(|(line, device)| machine(session(), line, device, seconds));
     let global = session().build_global().unwrap();
@@ -108,6 +113,41 @@ fn a_machine_that_dies_harms_no_other_and_another_one_takes_its_place() {
     assert!(left.iter().chain([&right]).all(|&force| force > 0.1), "both feel the body");
 }
 
+/// Check that a machine of which nothing came for a while goes on, and that its tool is not torn to where it is meanwhile: the other one feels
+/// no more than before.
+#[test]
+fn a_machine_that_was_silent_comes_back_without_a_blow() {
+    // The right one strokes to and fro past the left one, 6 cm in a quarter of a second.
+    let session = || {
+        let at = |t: f64| [0.05 + 0.03 * (12.6 * t).cos(), 0.03, 0.101 - 0.008 * (t / 0.2).min(1.0)];
+        let (times, places) = (0..4000).map(|n| f64::from(n) * 1e-3).map(|t| (t, at(t))).unzip();
+        session_of([pressing(), ToolPath::new(times, places).unwrap()])
+    };
+    let lines: [Line; 2] = Default::default();
+    let ([left, right], global) = start_with(session, &lines, 60.0);
+    left.wait_for(Duration::from_millis(900));
+    let mut spans = Vec::new();
+    for _ in 0..4 {
+        *lines[1].is_cut.lock().unwrap() = true;
+        left.wait_for(Duration::from_millis(250));
+        *lines[1].is_cut.lock().unwrap() = false;
+        let back = left.elapsed().as_secs_f64();
+        spans.push([back, back + 0.4]);
+        left.wait_for(Duration::from_millis(400));
+    }
+    let (left, right, served) = (left.stop(), right.stop(), global.stop());
+    assert_eq!([&left, &right, &served].map(|summary| &summary.runtime.fault), [&None; 3]);
+    let (felt, other) = (commands(&left), commands(&right));
+    let after = spans.iter().map(|&span| largest(&felt, 0, span)).fold(0.0, f64::max);
+    let alone = session().duration_s(4.0).virtual_time().build().unwrap().run().unwrap();
+    let most = largest(&commands(&alone), 0, [0.0, 4.0]);
+    println!(
+        "{after:.3} N after a silence, {most:.3} N without one, the other {:.3} N",
+        largest(&other, 1, [1.0, 4.0])
+    );
+    assert!((0.1..1.15 * most).contains(&after), "{after} N after a silence, {most} N without one");
+}
+
 /// Check that the tool of a machine that takes another's place is put where it is: on a straight way from where the one before pressed, it
 /// would have torn the body along to the side of it.
 #[test]
@@ -124,15 +164,16 @@ fn the_tool_of_another_machine_is_not_dragged_from_where_that_of_the_one_before_
 #[test]
 fn each_machine_knows_where_the_tool_of_the_other_is() {
     let ([mut left, right], global) = start(&Default::default(), 60.0);
+    let later_s = left.elapsed().as_secs_f64() - right.elapsed().as_secs_f64();
     let mut viewer = left.take_viewer().unwrap();
     left.wait_for(Duration::from_millis(600));
     for _ in 0..20 {
         left.wait_for(Duration::from_millis(20));
         let (time, place) = (left.elapsed().as_secs_f64(), viewer.tools().nth(1).unwrap().position);
-        // The machines began within half a second of each other, as threads do on a machine with two cores.
-        let near = (-500..500).map(|ms| (Vec3::from(meeting().at(time + f64::from(ms) * 1e-3)) - place).norm());
+        // On a machine that others use too, a thread may look some milliseconds late.
+        let near = (-15..15).map(|ms| (Vec3::from(meeting().at(time - later_s + f64::from(ms) * 1e-3)) - place).norm());
         let away = near.fold(f64::INFINITY, f64::min);
-        assert!(away < 1e-3, "{away} m from its path after {time} s");
+        assert!(away < 5e-4, "{away} m from its path after {time} s");
     }
     for running in [left, right, global] {
         assert_eq!(running.stop().runtime.fault, None);

@@ -253,9 +253,9 @@ impl Desk {
         self.state().guests.clear();
     }
 
-    /// True if all have been silent for long.
+    /// True if all that are of the session that runs have been silent for long.
     pub(crate) fn is_alone(&self) -> bool {
-        self.state().guests.iter().all(|guest| guest.silent_for() >= ENDS_AFTER)
+        self.state().guests.iter().filter(|guest| guest.is_seated).all(|guest| guest.silent_for() >= ENDS_AFTER)
     }
 }
 

@@ -15,9 +15,11 @@ use crate::unique;
 /// A link that has been silent for so long is asked whether somebody is there: there may be another process by now.
 const ASKS_AFTER: Duration = Duration::from_millis(250);
 /// One from which nothing has come for so long is taken for broken, and another one is opened beside it.
-const REOPENS_AFTER: Duration = Duration::from_millis(1000);
-/// Whoever is not reached in this time is not there: no force outlives a longer round trip.
+const REOPENS_AFTER: Duration = Duration::from_millis(700);
+/// Whoever is not reached in this time is not there: no force outlives a longer round trip. On a quick line it is less.
 const REACHED_WITHIN: Duration = Duration::from_millis(300);
+/// What the two computers may take besides the round trip.
+const THINKS_FOR: Duration = Duration::from_millis(100);
 /// Another connection is waited for so long before yet another one is tried.
 const OPENS_WITHIN: Duration = Duration::from_millis(1000);
 /// A session that is welcome and yet silent for so long begins anew, under another number.
@@ -69,6 +71,8 @@ pub(crate) struct Keeper {
     /// Where the global side may be reached, looked up while the network was there.
     places: Vec<SocketAddr>,
     hello: Hello,
+    /// An answer takes no longer if somebody is there.
+    reached_within: Duration,
     /// When another connection was opened and welcome, which gets as long as the first to say something.
     reopened: Option<Instant>,
     /// It is silent, and yet welcome.
@@ -78,7 +82,8 @@ pub(crate) struct Keeper {
 
 impl Keeper {
     pub(crate) fn new(shared: Arc<Shared>, config: Config, places: Vec<SocketAddr>, hello: Hello) -> Self {
-        Self { shared, config, places, hello, reopened: None, welcome_since: None, is_refused: false }
+        let reached_within = REACHED_WITHIN.min(3 * hello.round_trip.to_duration() + THINKS_FOR);
+        Self { shared, config, places, hello, reached_within, reopened: None, welcome_since: None, is_refused: false }
     }
 
     /// Until the session is over.
@@ -96,7 +101,9 @@ impl Keeper {
                 continue;
             }
             let session = self.shared.kept().connection.as_ref().map(|connection| connection.zenoh.clone());
-            let within = if may_be_broken { REACHED_WITHIN } else { ANSWERS_WITHIN };
+            // One that is only silent has until then to answer.
+            let left = if may_be_broken { Duration::ZERO } else { REOPENS_AFTER.saturating_sub(silent_for) };
+            let within = left.max(self.reached_within);
             match session.and_then(|session| say(&session, &self.hello, within)) {
                 Some(answer) => self.take(answer),
                 None => {
@@ -114,7 +121,7 @@ impl Keeper {
 
     fn is_reachable(&self) -> bool {
         self.places.is_empty()
-            || self.places.iter().any(|place| TcpStream::connect_timeout(place, REACHED_WITHIN).is_ok())
+            || self.places.iter().any(|place| TcpStream::connect_timeout(place, self.reached_within).is_ok())
     }
 
     fn take(&mut self, answer: Answer) {

@@ -109,7 +109,7 @@ impl Serving {
     fn begin(zenoh: &zenoh::Session, session: GlobalSession, guests: &[Guest]) -> Result<Self, Error> {
         let (mut seats, mut machines): (Vec<_>, Vec<HapticMachine>) = Default::default();
         for guest in guests {
-            let seat = Seat::new(Seated { way: HapticSide::new(zenoh, guest)?, machines: 1 });
+            let seat = Seat::new(HapticSide::new(zenoh, guest)?);
             seats.push((guest.hello.own_tools().collect(), seat.clone()));
             machines.push((Box::new(seat), guest.hello.clone()));
         }
@@ -138,13 +138,17 @@ struct Seat(Arc<Mutex<Seated>>);
 #[derive(Debug)]
 struct Seated {
     way: HapticSide,
+    /// The machine that takes the place when the bridge next asks who is there, so that none hears what is said to the one before.
+    next: Option<HapticSide>,
+    /// The way to the one before: ending it asks the network, which is not the bridge's to wait for.
+    before: Option<HapticSide>,
     /// How many have had the place.
     machines: u64,
 }
 
 impl Seat {
-    fn new(seated: Seated) -> Self {
-        Self(Arc::new(Mutex::new(seated)))
+    fn new(way: HapticSide) -> Self {
+        Self(Arc::new(Mutex::new(Seated { way, next: None, before: None, machines: 1 })))
     }
 
     fn seated(&self) -> MutexGuard<'_, Seated> {
@@ -153,11 +157,9 @@ impl Seat {
 
     fn take(&self, way: HapticSide) {
         let mut seated = self.seated();
-        let before = std::mem::replace(&mut seated.way, way);
-        seated.machines += 1;
-        // Ending it asks the network.
+        let gone = [seated.next.replace(way), seated.before.take()];
         drop(seated);
-        drop(before);
+        drop(gone);
     }
 }
 
@@ -171,7 +173,12 @@ impl Transport for Seat {
     }
 
     fn peer(&mut self) -> u64 {
-        self.seated().machines
+        let seated = &mut *self.seated();
+        if let Some(next) = seated.next.take() {
+            seated.before = Some(std::mem::replace(&mut seated.way, next));
+            seated.machines += 1;
+        }
+        seated.machines
     }
 }
 

@@ -10,7 +10,9 @@ use super::log_sink::{LogSink, Loss};
 use super::scene_watch::SceneWatch;
 use super::throttle::Throttle;
 use crate::error::{Error, ErrorKind};
-use crate::log::{Analysis, Environment, JoinedRecords, Level, LogRecord, RunReport, StatsCounter, TextEvent};
+use crate::log::{
+    Analysis, Environment, JoinedRecords, Level, LogRecord, LoggedExecution, RunReport, StatsCounter, TextEvent,
+};
 use crate::runtime::Nanos;
 use crate::runtime::{
     Actor, GrantHandle, GroupGrant, Outcome, OutletReader, Record, RecordDrain, RecordGap, SystemGrant, TickContext,
@@ -53,6 +55,7 @@ pub struct LoggerActor {
     environment: Environment,
     grants: GrantHandle,
     grants_known: bool,
+    start_known: bool,
     analysis: Analysis,
     stats: Vec<StatsCounter>,
     outcome: LoggerOutcome,
@@ -96,6 +99,7 @@ impl LoggerActor {
             environment,
             grants,
             grants_known: false,
+            start_known: false,
             analysis,
             stats,
             outcome,
@@ -264,14 +268,20 @@ impl LoggerActor {
         self.drain.lost() + self.lost_by_sink
     }
 
-    fn learn_grants(&mut self) {
-        if self.grants_known {
-            return;
+    /// Takes what is known only once it runs: when time zero was, before anything is written by it, and what the system has granted.
+    fn learn(&mut self, now: Nanos) {
+        let mut is_more = false;
+        if !std::mem::replace(&mut self.start_known, true) && self.environment.execution != LoggedExecution::Virtual {
+            self.environment.execution = LoggedExecution::began(now);
+            is_more = true;
         }
-        if let Some(grant) = self.grants.get() {
+        if let Some(grant) = self.grants.get().filter(|_| !self.grants_known) {
             self.grants_known = true;
             self.environment.granted = granted(&grant);
             self.environment.pin_groups(&grant.groups);
+            is_more = true;
+        }
+        if is_more {
             self.analysis.set_environment(&self.environment);
             let environment = self.environment.clone();
             if !self.sink_failed {
@@ -293,7 +303,7 @@ impl Actor for LoggerActor {
         if let Some(scene) = &mut self.scene {
             scene.take(ctx);
         }
-        self.learn_grants();
+        self.learn(ctx.now);
         self.take_records(ctx, false);
         let log_time = self.log_time;
         if !self.sink_failed {
@@ -303,7 +313,7 @@ impl Actor for LoggerActor {
     }
 
     fn stop(&mut self, ctx: &TickContext) {
-        self.learn_grants();
+        self.learn(ctx.now);
         self.take_records(ctx, true);
         for counter in std::mem::take(&mut self.stats) {
             let stats = counter.finish(self.log_time);

@@ -10,6 +10,8 @@ use crate::runtime::Nanos;
 
 /// Bytes that a text has at most.
 const MOST_TEXT: usize = 1 << 18;
+/// Tools that a scene has at most: more are nobody's.
+const MOST_TOOLS: u32 = 64;
 /// Bytes of a tool at least: the length of its name, and whether it is there.
 const TOOL: usize = 4 + 1;
 
@@ -82,6 +84,9 @@ impl Hello {
         let [machine, session, round_trip, body] = [from.u64()?, from.u64()?, from.u64()?, from.u64()?];
         let [build, instructions, scene] = [read_text(from)?, read_text(from)?, read_text(from)?];
         let mut tools = Vec::new();
+        // Before there is room for them.
+        let mut ahead = *from;
+        ahead.u32().filter(|&count| count <= MOST_TOOLS)?;
         from.list(TOOL, &mut tools, |from| Some((read_text(from)?, read_place(from)?)))?;
         Some(Self { machine, session, round_trip: Nanos(round_trip), build, instructions, scene, body, tools })
     }

@@ -229,7 +229,7 @@ impl Message {
             TICKS => {
                 let (tool, mut ticks) = (from.u16()?, Vec::new());
                 from.list(TICK, &mut ticks, read_tick)?;
-                if ticks.len() > MOST_TICKS {
+                if ticks.len() > MOST_TICKS || !ticks.is_sorted_by(|(a, _), (b, _)| a < b) {
                     return None;
                 }
                 Self::Ticks { tool, ticks }

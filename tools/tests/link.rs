@@ -46,8 +46,12 @@ impl Haptic {
         Self(command.env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR")).spawn().unwrap())
     }
 
-    fn ends(mut self) {
-        assert!(self.0.wait().unwrap().success());
+    fn interrupt(&self) {
+        assert!(Command::new("kill").args(["-INT", &self.0.id().to_string()]).status().unwrap().success());
+    }
+
+    fn ends(mut self, code: i32) {
+        assert_eq!(self.0.wait().unwrap().code(), Some(code));
     }
 }
 
@@ -111,13 +115,21 @@ fn felt(folder: &Folder, log: &str, device: &str, from: f64) -> f64 {
 #[test]
 fn two_haptic_machines_touch_one_body() {
     let (folder, address) = (folder(), free("tcp"));
-    let mut serving = Serving::start(&folder, &["two_hands", "--listen", &address]);
+    // Both press and hold.
+    for (hand, x) in [("left", 0.035), ("right", 0.065)] {
+        let path = format!("t_s,x_m,y_m,z_m\n0,{x},0.051,0.101\n0.5,{x},0.051,0.093\n");
+        folder.write(&format!("{hand}.csv"), path);
+    }
+    let scene = include_str!("../../scenes/two_hands.toml").replace("paths/drag", "left");
+    folder.write("hands.toml", scene.replace("paths/hold_right", "right"));
+    let mut serving = Serving::start(&folder, &["hands.toml", "--listen", &address]);
     let args = |device, seconds, log| {
-        ["run", "two_hands", "--global", &address, "--device", device, "--duration", seconds, "--out", log]
+        ["run", "hands.toml", "--global", &address, "--device", device, "--duration", seconds, "--out", log]
             .map(str::to_owned)
     };
     let start = |args: [String; 10]| Haptic::start(&folder, &args);
-    let left = start(args("left", "7", "left.mcap"));
+    let left = start(args("left", "60", "left.mcap"));
+    let began = std::time::Instant::now();
     let right = start(args("right", "60", "killed.mcap"));
     let came = [serving.line(), serving.line()].concat();
     assert!(came.contains("\"left\"") && came.contains("\"right\""), "{came}");
@@ -125,12 +137,13 @@ fn two_haptic_machines_touch_one_body() {
     assert_eq!(third.code, Some(1), "{third:?}");
     assert!(third.err.contains("works for another haptic machine with device \"left\""), "{third:?}");
     drop(right);
+    let killed = began.elapsed().as_secs_f64();
     let right = start(args("right", "2", "right.mcap"));
     assert!(serving.line().contains("has come with \"right\""));
-    for haptic in [right, left] {
-        haptic.ends();
-    }
-    let felt = [felt(&folder, "left.mcap", "left", 0.5), felt(&folder, "right.mcap", "right", 0.5)];
+    right.ends(0);
+    left.interrupt();
+    left.ends(130);
+    let felt = [felt(&folder, "left.mcap", "left", killed), felt(&folder, "right.mcap", "right", 0.5)];
     assert!(felt.iter().all(|&force| force > 0.02), "{felt:?} N");
 }
 

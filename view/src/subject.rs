@@ -40,22 +40,34 @@ pub struct Pushed {
     out: Option<PathBuf>,
     open_haply: Option<OpenHaply>,
     connect: Option<Connect>,
+    /// The number of the device that is pushed.
+    device: usize,
     /// Sessions so far.
     count: u32,
 }
 
 impl Pushed {
     /// A scene whose first device is replaced by a pointer that begins where the device did; the other devices stay what they are.
-    pub fn new(mut scene: Scene) -> Self {
-        if let Some(first) = scene.devices.first_mut() {
-            point(first);
+    pub fn new(scene: Scene) -> Self {
+        Self::by(scene, 0)
+    }
+
+    /// Likewise the device of that name, or the first one if there is none.
+    pub fn by_device(scene: Scene, name: &str) -> Self {
+        let device = scene.devices.iter().position(|device| device.name.as_deref() == Some(name));
+        Self::by(scene, device.unwrap_or_default())
+    }
+
+    fn by(mut scene: Scene, device: usize) -> Self {
+        if let Some(pushed) = scene.devices.get_mut(device) {
+            point(pushed);
         }
-        Self::as_it_is(scene)
+        Self { device, ..Self::as_it_is(scene) }
     }
 
     /// A scene with its own devices, to be watched.
     pub fn as_it_is(scene: Scene) -> Self {
-        Self { scene, out: None, open_haply: None, connect: None, count: 0 }
+        Self { scene, out: None, open_haply: None, connect: None, device: 0, count: 0 }
     }
 
     /// Also writes a log of each session, with pictures: the first to `path`, each after it to a name with its number.
@@ -117,7 +129,7 @@ impl Pushed {
         let asked = change.model.as_deref().unwrap_or(self.scene.local.model.name());
         // The other side of a link has the scene's alone.
         let models = if self.connect.is_some() { vec![asked] } else { ModelChoice::NAMES.to_vec() };
-        let spring = self.scene.devices.first().filter(|device| device.kind == DeviceKind::Pointer);
+        let spring = self.scene.devices.get(self.device).filter(|device| device.kind == DeviceKind::Pointer);
         json!({
             "can_restart": true,
             "models": models,
@@ -200,6 +212,17 @@ mod tests {
             let change = Change { model: Some((*name).into()), ..Change::default() };
             assert!(Pushed::new(Scene::demo()).session(&change).is_ok(), "{name}");
         }
+    }
+
+    #[test]
+    fn the_device_of_a_name_is_pushed_and_the_others_stay_what_they_are() {
+        let scene = palpate::scene::BuiltIn::named("two_hands").unwrap().load();
+        let kinds = |pushed: &Pushed| pushed.scene().devices.iter().map(|device| device.kind).collect::<Vec<_>>();
+        let pushed = Pushed::by_device(scene.clone(), "right");
+        assert_eq!(kinds(&pushed)[1], DeviceKind::Pointer);
+        assert_eq!(kinds(&pushed)[0], scene.devices[0].kind);
+        assert!(pushed.about(&Change::default())["spring_n_per_m"].is_number());
+        assert_eq!(kinds(&Pushed::new(scene))[0], DeviceKind::Pointer);
     }
 
     #[test]

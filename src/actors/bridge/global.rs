@@ -14,6 +14,10 @@ use crate::runtime::{Actor, ActorError, Nanos, Outcome, OutletReader, QueueWrite
 
 /// The tools of a machine from which nothing has come for so long rest where they are, while those of others go on.
 const RESTS_AFTER: Nanos = Nanos(50_000_000);
+/// One that has rested goes to where it is meanwhile in so long.
+const RETURNS_IN: Nanos = Nanos(16_000_000);
+/// A sample that is counted so much later than it comes is none.
+const AHEAD_AT_MOST: Nanos = Nanos(100_000_000);
 
 /// Carries local models to the haptic machines, the tool ticks that come from there to the global actor, and those of the tools of one
 /// machine to the others.
@@ -64,32 +68,47 @@ struct Onward {
     is_new: bool,
     /// The next one is of another machine, whose tool never went from where this one is.
     is_put: bool,
+    /// Its machine has fallen silent.
+    is_resting: bool,
 }
 
 impl Onward {
     fn new((pose, ticks): (Pose, QueueWriter<ToolTick>)) -> Self {
         let newest = ToolTick { pose, ..ToolTick::default() };
-        Self { ticks, newest, recent: VecDeque::new(), is_new: false, is_put: false }
+        let (recent, is_new, is_put, is_resting) = Default::default();
+        Self { ticks, newest, recent, is_new, is_put, is_resting }
     }
 
     /// Passes `tick` on. A full queue is counted; the global model sees the gap and interpolates over it.
     fn pass(&mut self, ctx: &TickContext, tick: ToolTick) {
         self.newest = tick;
         self.ticks.push(ctx, tick);
-    }
-
-    /// Passes on what has come, unless it is older than what was passed on: most of it came before.
-    fn take(&mut self, ctx: &TickContext, tick: u64, pose: Pose) {
-        if tick <= self.newest.tick {
-            return;
-        }
-        let came = ToolTick { tick, pose, is_put: std::mem::take(&mut self.is_put) };
-        self.pass(ctx, came);
         if self.recent.len() == REPEATED {
             self.recent.pop_front();
         }
-        self.recent.push_back(came);
+        self.recent.push_back(tick);
         self.is_new = true;
+    }
+
+    /// Passes on what has come, unless it is older than what was passed on: most of it came before. After a rest of its tool a way of some
+    /// ticks is left to it: nobody goes there in one.
+    fn take(&mut self, ctx: &TickContext, tick: u64, pose: Pose, haptic: Rate) {
+        let returns = self.is_resting && !self.is_put;
+        let way = if returns { haptic.last_release(RETURNS_IN).max(1) } else { 1 };
+        if tick < self.newest.tick + way {
+            return;
+        }
+        self.is_resting = false;
+        let is_put = std::mem::take(&mut self.is_put);
+        self.pass(ctx, ToolTick { tick, pose, is_put });
+    }
+
+    /// Lets it rest where it is until `tick`.
+    fn rest(&mut self, ctx: &TickContext, tick: u64) {
+        self.is_resting = true;
+        if tick > self.newest.tick {
+            self.pass(ctx, ToolTick { tick, is_put: false, ..self.newest });
+        }
     }
 }
 
@@ -141,6 +160,7 @@ impl GlobalBridge {
     fn receive(&mut self, ctx: &TickContext) {
         let Self { machines, tools, settings, haptic, .. } = self;
         let (now, second) = (haptic.last_release(ctx.now), haptic.as_hz() as u64);
+        let (is_alone, latest) = (machines.len() == 1, haptic.last_release(ctx.now + AHEAD_AT_MOST));
         for machine in machines {
             if machine.is_another() {
                 machine.tools.iter().for_each(|&tool| tools[tool].is_put = true);
@@ -155,8 +175,10 @@ impl GlobalBridge {
                             if self.is_prompt || machine.numbering.is_new() {
                                 machine.numbering.hear(newest, now, second);
                             }
-                            for (tick, pose) in ticks {
-                                tools[tool].take(ctx, machine.numbering.here(tick), pose);
+                            machine.newest = machine.newest.max(newest);
+                            let counted = ticks.into_iter().map(|(tick, pose)| (machine.numbering.here(tick), pose));
+                            for (tick, pose) in counted.filter(|(tick, _)| is_alone || *tick <= latest) {
+                                tools[tool].take(ctx, tick, pose, *haptic);
                             }
                         }
                     }
@@ -185,10 +207,7 @@ impl GlobalBridge {
         let is_silent = |machine: &&Machine| ctx.scheduled.saturating_sub(machine.heard) >= RESTS_AFTER;
         if machines.len() > 1 {
             for &tool in machines.iter().filter(is_silent).flat_map(|machine| &machine.tools) {
-                let resting = ToolTick { tick: newest, is_put: false, ..tools[tool].newest };
-                if newest > tools[tool].newest.tick {
-                    tools[tool].pass(ctx, resting);
-                }
+                tools[tool].rest(ctx, newest);
             }
         }
     }
@@ -202,7 +221,9 @@ impl GlobalBridge {
                 let others = machines.iter_mut().filter(|machine| !machine.tools.contains(&number));
                 for machine in others.filter(|machine| !machine.numbering.is_new()) {
                     let ticks = onward.recent.iter().map(|tick| (machine.numbering.there(tick.tick), tick.pose));
-                    let message = Message::Ticks { tool: number as u16, ticks: ticks.collect() };
+                    // Of before its first tick nothing is told.
+                    let ticks = ticks.filter(|&(tick, _)| tick > 0).collect();
+                    let message = Message::Ticks { tool: number as u16, ticks };
                     machine.post.send(Lane::Urgent, now, &message);
                 }
             }

@@ -29,8 +29,9 @@ pub(super) struct Machine {
     is_warned: bool,
     /// Somebody looks at the surface there.
     pub(super) is_watched: bool,
-    /// When a sample of a tool came last.
+    /// When a sample of a tool came last, and the newest tick of any, as it is counted there.
     pub(super) heard: Nanos,
+    pub(super) newest: u64,
     /// The number of the peer behind the transport.
     peer: u64,
     is_alone: bool,
@@ -42,7 +43,7 @@ impl Machine {
         let mut post = Post::new(transport);
         let Settings { friction, stiffness, .. } = settings.value();
         let (peer, wanted) = (post.peer(), (friction, stiffness));
-        let (bases, said, is_warned, is_watched, heard) = Default::default();
+        let (bases, said, is_warned, is_watched, heard, newest) = Default::default();
         let numbering = Numbering::new(is_alone);
         Self {
             post,
@@ -55,6 +56,7 @@ impl Machine {
             is_warned,
             is_watched,
             heard,
+            newest,
             peer,
             is_alone,
         }
@@ -67,7 +69,7 @@ impl Machine {
         if is_another {
             self.post.begin_epoch(FIRST_EPOCH);
             (self.bases, self.numbering) = (SentBases::default(), Numbering::new(self.is_alone));
-            (self.wanted, self.said, self.is_watched) = (self.unchanged, 0, false);
+            (self.wanted, self.said, self.is_watched, self.newest) = (self.unchanged, 0, false, 0);
         }
         is_another
     }
@@ -83,10 +85,11 @@ impl Machine {
         Some((header, message))
     }
 
-    /// Sends what local models of its tools are built from, and the bases that it lacks for them.
+    /// Sends what local models of its tools are built from, and the bases that it lacks for them. Models in which its tools rest because nothing
+    /// comes from it are as old there as its last sample.
     pub(super) fn send_models(&mut self, mut shipment: Shipment, now: Nanos) {
         self.bases.send(&mut self.post, shipment.parcels(), now);
-        shipment.set_tick(self.numbering.there(shipment.tick()));
+        shipment.set_tick(self.numbering.there(shipment.tick()).min(self.newest));
         self.post.send(Lane::Models, now, &Message::Models(shipment));
     }
 

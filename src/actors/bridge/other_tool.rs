@@ -4,12 +4,13 @@ use crate::devices::ElsewhereHandle;
 use crate::model::Pose;
 use crate::model::local::ToolHistory;
 use crate::runtime::Rate;
-use crate::safety::FASTEST_HAND_M_S;
 
 /// Nobody looks farther ahead than this (s): a tool of which nothing has come for longer rests.
 const LOOKS_AHEAD_S: f64 = 0.05;
-/// More samples than this that are missing are no way that it went.
+/// More samples than this that are missing are no way that it went, nor is one that is faster (m/s): it was put there, or came back from a
+/// rest.
 const MOST_MISSING: u64 = 64;
+const FASTEST_M_S: f64 = 2.0;
 
 /// Follows the samples of a tool that come late, and shows where it is by now.
 #[derive(Debug)]
@@ -62,7 +63,7 @@ impl OtherTool {
     /// True if it can have gone from one place to another in so many ticks, and was not put there.
     fn went(&self, ticks: u64, before: &Pose, pose: &Pose) -> bool {
         let way = (pose.position - before.position).norm();
-        ticks <= MOST_MISSING && way <= FASTEST_HAND_M_S * ticks as f64 * self.period_s
+        ticks <= MOST_MISSING && way <= FASTEST_M_S * ticks as f64 * self.period_s
     }
 
     /// Shows it where it is expected at `tick`.

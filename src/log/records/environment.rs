@@ -22,6 +22,15 @@ pub enum LoggedExecution {
     },
 }
 
+impl LoggedExecution {
+    /// On real threads, which have run since this time by now.
+    pub(crate) fn began(ago: Nanos) -> Self {
+        let since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+        let now = u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX);
+        Self::Threaded { start_unix_ns: now.saturating_sub(ago.0) }
+    }
+}
+
 /// A rate group, in the order that [`TickTiming::group`](crate::runtime::TickTiming::group) counts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GroupInfo {

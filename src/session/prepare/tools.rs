@@ -155,7 +155,7 @@ pub(super) fn check_here(here: &[String], devices: &[DeviceSpec], side: Side) ->
         let known = if names.is_empty() { "one without a name".to_owned() } else { names.join(", ") };
         return Err(Error::scene("device", format!("has no {unknown:?}: the scene's devices are {known}")));
     }
-    if side != Side::Haptic && here.len() < devices.len() {
+    if side != Side::Haptic && !devices.iter().all(|device| is_here(device, Some(here))) {
         let message =
             "a device that is at another machine needs a global model that both take their models from, over a link";
         return Err(Error::scene("device", message));

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::log::{Environment, GroupInfo, LoggedExecution, ToolSample};
 use crate::model::body::Block;
 use crate::model::contact::ToolShape;
-use crate::runtime::{Execution, Rate};
+use crate::runtime::{Execution, Nanos, Rate};
 use crate::safety::Actions;
 use crate::scene::{BodySpec, TetrahedraSpec};
 use crate::session::prepare::{BASIS, LINK, Prepared, Tool};
@@ -22,7 +22,8 @@ pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<
         instruction_set: Block::instruction_set().to_owned(),
         execution: match prepared.options.execution {
             Execution::Virtual => LoggedExecution::Virtual,
-            Execution::Threaded => LoggedExecution::Threaded { start_unix_ns: unix_now_ns() },
+            // The logger knows better once it runs.
+            Execution::Threaded => LoggedExecution::began(Nanos::ZERO),
         },
         model: prepared.plan.template.kind.name().to_owned(),
         model_reason: prepared.model_reason(),
@@ -141,9 +142,4 @@ fn couplings(tools: &[Tool]) -> Option<String> {
     };
     let all: Vec<String> = tools.iter().filter_map(named).collect();
     (!all.is_empty()).then(|| all.join("; "))
-}
-
-fn unix_now_ns() -> u64 {
-    let since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
-    u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -56,6 +56,12 @@ pub(super) fn start(mut prepared: Prepared, rerun: Option<Rerun>) -> Result<Runn
 /// If a tool is at none of them or at two, or far from the body, or a thread cannot be started.
 pub(super) fn start_global(mut prepared: Prepared, machines: Vec<HapticMachine>) -> Result<Running, Error> {
     let rest = prepared.simulation.body().rest();
+    let is_whole =
+        |(_, hello): &HapticMachine| hello.tools.len() == prepared.tools.len() && hello.own_tools().next().is_some();
+    if !machines.iter().all(is_whole) {
+        let message = format!("a haptic machine must have some of the {} tools of the scene", prepared.tools.len());
+        return Err(Error::new(ErrorKind::Runtime, message));
+    }
     let mut first = Vec::new();
     for (index, tool) in prepared.tools.iter().enumerate() {
         let told = machines.iter().filter_map(|(_, hello)| hello.tools.get(index)?.1);

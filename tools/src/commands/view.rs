@@ -65,7 +65,12 @@ pub fn run(args: &ViewArgs) -> Result<(), Error> {
     if let Some(model) = args.model.or(of_demo) {
         scene = scene.with_model(model);
     }
-    let pushed = if args.watch { Pushed::as_it_is(scene) } else { Pushed::new(scene) };
+    let pushed = match args.global.device.first() {
+        _ if args.watch => Pushed::as_it_is(scene),
+        // The first that is at this machine.
+        Some(device) => Pushed::by_device(scene, device),
+        None => Pushed::new(scene),
+    };
     let pushed = pushed.open_haply_with(palpate_haply::open);
     let pushed = args.out.iter().fold(pushed, |pushed, out| pushed.log(out));
     let pushed = match args.global.global {
