@@ -62,9 +62,9 @@ struct Onward {
     ticks: QueueWriter<ToolTick>,
     /// The last that was passed on.
     newest: ToolTick,
-    /// The last that came, oldest first.
+    /// The last that were passed on, oldest first.
     recent: VecDeque<ToolTick>,
-    /// Some came in this release.
+    /// Some were in this release.
     is_new: bool,
     /// The next one is of another machine, whose tool never went from where this one is.
     is_put: bool,

@@ -59,7 +59,7 @@ pub(super) fn start_global(mut prepared: Prepared, machines: Vec<HapticMachine>)
     let is_whole =
         |(_, hello): &HapticMachine| hello.tools.len() == prepared.tools.len() && hello.own_tools().next().is_some();
     if !machines.iter().all(is_whole) {
-        let message = format!("a haptic machine must have some of the {} tools of the scene", prepared.tools.len());
+        let message = format!("a haptic machine must have some of the scene's tools, {} in all", prepared.tools.len());
         return Err(Error::new(ErrorKind::Runtime, message));
     }
     let mut first = Vec::new();
