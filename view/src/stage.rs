@@ -115,12 +115,9 @@ impl Stage {
         self.hub.say(&note("The body starts anew ..."));
         let result = self.replace(change);
         // What is shown goes on, or, if that has ended, starts anew as it was.
-        if result.is_err() && self.live.is_none() {
-            let before = self.change.clone();
-            let is_tried = *change == before || self.hub.is_over();
-            if is_tried || self.replace(&before).is_err() {
-                self.hub.say(&note("There is no session now: reset, or start the command again."));
-            }
+        let has_ended = result.is_err() && self.live.is_none() && !self.hub.is_over();
+        if has_ended && self.replace(&self.change.clone()).is_err() {
+            self.hub.say(&note("There is no session now: reset, or start the command again."));
         }
         result
     }
