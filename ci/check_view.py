@@ -393,6 +393,11 @@ def start(browser, view):
     browser.open(view.url)
 
 
+def leave(browser):
+    """Leaves the page while its server is there: one that still tries to come back would complain in the check after this."""
+    browser.open("about:blank")
+
+
 def check_live(check, browser, palpate, log, shots):
     view = View(palpate, "--model", "patch", "--out", str(log))
     try:
@@ -418,10 +423,10 @@ def check_live(check, browser, palpate, log, shots):
         browser.run("document.getElementById('reset').click()")
         wait(browser, lambda state: state["time"] < before, "a reset")
         found = complaints(browser, view.url.split("#")[0])
+        leave(browser)
     finally:
         view.stop()
     check_forces(check, seen, commanded(palpate, log), "live")
-    # What a closed server costs is no fault of the page.
     check.faults += [f"live: {complaint}" for complaint in found]
 
 
@@ -499,8 +504,7 @@ def check_return(check, browser, palpate, shots):
         check.that(browser.run(STATE)["away"] == refused["away"], "it tries a token again that was refused")
         browser.run(f"location.hash = '{view.url.partition('#')[2]}'")
         wait(browser, lambda state: not state["away"] and "you hold the tool" in state["status"], "another address in the same tab")
-        # Left while the server is there: one that still tries to come back would complain in the check after this.
-        browser.open("about:blank")
+        leave(browser)
     finally:
         relay.close()
         view.stop()
@@ -512,8 +516,6 @@ def check_two_tools(check, browser, palpate, shots):
     try:
         start(browser, view)
         wait(browser, lambda state: state["tool"] and state["frames"] > 5 and state["tick"], "the first picture of two tools")
-        # What the page of the check before said of its server, which has ended, is none of this one's affair.
-        browser.events.clear()
         names = browser.run("[...document.getElementById('device').options].map((option) => option.textContent)")
         check.that(names == ["left", "right"], f"the tools are named {names}")
         # The first is the visitor's and stays where it is; the second is the scene's, and presses within its two seconds.
@@ -527,6 +529,7 @@ def check_two_tools(check, browser, palpate, shots):
         check.that(len(set(still)) == 1 and still[0] != tuple(round(c) for c in pressed["tool"]), f"the tools are at {still} and {pressed['tool']}")
         layouts(check, browser, shots, "two")
         check.faults += [f"two tools: {complaint}" for complaint in complaints(browser, view.url.split("#")[0])]
+        leave(browser)
     finally:
         view.stop()
 
