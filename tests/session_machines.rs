@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use palpate::devices::{Scripted, ToolPath};
 use palpate::link::HapticMachine;
-use palpate::log::CommandSample;
 use palpate::model::Vec3;
 use palpate::model::local::Kind;
 use palpate::session::{Running, Session, SessionBuilder};
@@ -45,14 +44,6 @@ fn start_with(session: fn() -> SessionBuilder, lines: &[Line; 2], seconds: f64) 
     let beyond = lines.iter().map(|line| -> HapticMachine { (Box::new(line.end(1)), line.hello()) });
     let global = global.start(beyond.collect()).unwrap();
     ([left, right].map(|running| running.join().unwrap()), global)
-}
-
-fn largest(commands: &[CommandSample], device: u16, [from, until]: [f64; 2]) -> f64 {
-    let within = |command: &&CommandSample| {
-        let time = command.time.as_secs_f64();
-        command.device == device && (from..until).contains(&time)
-    };
-    commands.iter().filter(within).map(|command| norm(command.force_n)).fold(0.0, f64::max)
 }
 
 #[test]
@@ -102,7 +93,7 @@ fn felt_when_one_dies(again: ToolPath) -> ([f64; 3], f64) {
     assert_eq!([&left, &right, &served].map(|summary| &summary.runtime.fault), [&None; 3]);
     let [left, right] = [commands(&left), commands(&right)];
     let spans = [[dead - 0.4, dead], [dead, back], [back, back + 1.5]];
-    let felt = (spans.map(|span| largest(&left, 0, span)), largest(&right, 1, [0.0, 1.5]));
+    let felt = (spans.map(|span| largest_command(&left, 0, span)), largest_command(&right, 1, [0.0, 1.5]));
     println!("left {:.3?} N, right {:.3} N", felt.0, felt.1);
     felt
 }
@@ -138,12 +129,12 @@ fn a_machine_that_was_silent_comes_back_without_a_blow() {
     let (left, right, served) = (left.stop(), right.stop(), global.stop());
     assert_eq!([&left, &right, &served].map(|summary| &summary.runtime.fault), [&None; 3]);
     let (felt, other) = (commands(&left), commands(&right));
-    let after = spans.iter().map(|&span| largest(&felt, 0, span)).fold(0.0, f64::max);
+    let after = spans.iter().map(|&span| largest_command(&felt, 0, span)).fold(0.0, f64::max);
     let alone = session().duration_s(4.0).virtual_time().build().unwrap().run().unwrap();
-    let most = largest(&commands(&alone), 0, [0.0, 4.0]);
+    let most = largest_command(&commands(&alone), 0, [0.0, 4.0]);
     println!(
         "{after:.3} N after a silence, {most:.3} N without one, the other {:.3} N",
-        largest(&other, 1, [1.0, 4.0])
+        largest_command(&other, 1, [1.0, 4.0])
     );
     assert!((0.1..1.15 * most).contains(&after), "{after} N after a silence, {most} N without one");
 }
@@ -156,7 +147,7 @@ fn the_tool_of_another_machine_is_not_dragged_from_where_that_of_the_one_before_
     assert_eq!(right, 0.0, "it is clear of the body");
     let alone = Session::builder(block()).path(pressing()).model(Kind::Full).friction(0.5).keep_records();
     let alone = alone.duration_s(4.0).virtual_time().build().unwrap().run().unwrap();
-    let most = largest(&commands(&alone), 0, [0.0, 4.0]);
+    let most = largest_command(&commands(&alone), 0, [0.0, 4.0]);
     assert!((0.1..1.1 * most).contains(&left[2]), "{left:?}, alone {most}");
 }
 

@@ -26,10 +26,6 @@ fn start(line: &Line, model: Kind, seconds: f64) -> (Running, Running) {
     (haptic.join().unwrap(), global)
 }
 
-fn largest(forces: impl Iterator<Item = [f64; 3]>) -> f64 {
-    forces.map(norm).fold(0.0, f64::max)
-}
-
 #[test]
 fn two_sides_make_the_force_of_one() {
     for model in [Kind::Hold, Kind::Patch, Kind::Predictive] {
@@ -69,11 +65,7 @@ fn a_global_side_that_dies_takes_the_force_away_and_another_one_gives_it_back() 
     let summary = haptic.stop();
     assert_eq!((&summary.runtime.fault, summary.runtime.lost_records), (&None, 0));
     let commands = commands(&summary);
-    let felt = |from: f64, until: f64| {
-        let within =
-            commands.iter().filter(|c| c.time >= Nanos::from_secs_f64(from) && c.time < Nanos::from_secs_f64(until));
-        largest(within.map(|command| command.force_n))
-    };
+    let felt = |from: f64, until: f64| largest_command(&commands, 0, [from, until]);
     assert!(felt(cut - 0.4, cut) > 0.1, "a force before");
     assert_eq!(felt(cut + 0.4, returned), 0.0, "none without a model");
     assert!(felt(back, back + 1.5) > 0.1, "a force again, after {back} s");
@@ -184,7 +176,7 @@ fn a_model_from_the_future_is_not_believed() {
     let summary = haptic.stop();
     assert_eq!(summary.runtime.fault, None);
     let last = commands(&summary).into_iter().rev().take(100);
-    assert_eq!(largest(last.map(|command| command.force_n)), 0.0, "its age takes the force away");
+    assert_eq!(last.map(|command| norm(command.force_n)).fold(0.0, f64::max), 0.0, "its age takes the force away");
 }
 
 #[test]

@@ -184,15 +184,12 @@ impl Desk {
 
     /// Takes a machine in; those that had its devices before are gone. True if it takes the place of one of them.
     fn admit(&self, state: &mut State, hello: Hello) -> bool {
-        let (inbox, asked) = (Arc::default(), Instant::now());
-        let mut guest = Guest { hello, inbox, asked, is_seated: false, refused: None };
-        let before = state.guests.extract_if(.., |other| guest.hello.own_tools().any(|tool| other.has(tool)));
+        let before = state.guests.extract_if(.., |other| hello.own_tools().any(|tool| other.has(tool)));
         let before: Vec<Guest> = before.collect();
-        let own: Vec<usize> = guest.hello.own_tools().collect();
-        let takes_its_place = |other: &Guest| other.is_seated && other.hello.own_tools().eq(own.iter().copied());
         let goes_on = state.guests.iter().any(|other| other.is_seated && other.is_present());
-        guest.is_seated = goes_on && before.len() == 1 && before.iter().all(takes_its_place);
-        let is_seated = guest.is_seated;
+        let has_the_same = matches!(&before[..], [one] if one.is_seated && one.hello.own_tools().eq(hello.own_tools()));
+        let (is_seated, inbox, asked) = (goes_on && has_the_same, Arc::default(), Instant::now());
+        let guest = Guest { hello, inbox, asked, is_seated, refused: None };
         if is_seated {
             state.arrivals.push_back(Arrival::Again(guest.clone()));
             self.changed.notify_all();

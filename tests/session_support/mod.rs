@@ -109,6 +109,13 @@ pub fn apart(runs: [&Summary; 2], device: u16, earlier: usize) -> Apart {
     Apart { rms: (apart.iter().sum::<f64>() / apart.len() as f64).sqrt() / peak, peak }
 }
 
+/// The largest force that one of the devices was commanded in a span of time (s; N).
+pub fn largest_command(commands: &[CommandSample], device: u16, [from, until]: [f64; 2]) -> f64 {
+    let within =
+        |command: &&CommandSample| command.device == device && (from..until).contains(&command.time.as_secs_f64());
+    commands.iter().filter(within).map(|command| norm(command.force_n)).fold(0.0, f64::max)
+}
+
 /// The forces on the tool, tick by tick (N).
 pub fn force_vectors(summary: &Summary) -> Vec<Vec3> {
     forces(summary).iter().map(|sample| sample.force_n.into()).collect()

@@ -92,10 +92,9 @@ impl Onward {
 
     /// Passes on what has come, unless it is older than what was passed on: most of it came before. After a rest of its tool a way of some
     /// ticks is left to it: nobody goes there in one.
-    fn take(&mut self, ctx: &TickContext, tick: u64, pose: Pose, haptic: Rate) {
+    fn take(&mut self, ctx: &TickContext, tick: u64, pose: Pose, return_ticks: u64) {
         let returns = self.is_resting && !self.is_put;
-        let way = if returns { haptic.last_release(RETURNS_IN).max(1) } else { 1 };
-        if tick < self.newest.tick + way {
+        if tick < self.newest.tick + if returns { return_ticks } else { 1 } {
             return;
         }
         self.is_resting = false;
@@ -112,6 +111,34 @@ impl Onward {
     }
 }
 
+/// When samples are received, in ticks of the clock here.
+struct Reception {
+    now: u64,
+    /// So many ticks a second has.
+    second: u64,
+    /// A sample that is counted later is none.
+    latest: u64,
+    /// In so many a tool that has rested goes to where it is.
+    return_ticks: u64,
+    is_prompt: bool,
+}
+
+impl Reception {
+    /// Takes the samples of a tool that have come from its machine.
+    fn take(&self, ctx: &TickContext, machine: &mut Machine, tool: &mut Onward, ticks: Vec<(u64, Pose)>) {
+        let Some(&(newest, _)) = ticks.last() else { return };
+        machine.heard = ctx.scheduled;
+        if self.is_prompt || machine.numbering.is_new() {
+            machine.numbering.hear(newest, self.now, self.second);
+        }
+        machine.newest = machine.newest.max(newest);
+        let counted = ticks.into_iter().map(|(tick, pose)| (machine.numbering.here(tick), pose));
+        for (tick, pose) in counted.filter(|(tick, _)| *tick <= self.latest) {
+            tool.take(ctx, tick, pose, self.return_ticks);
+        }
+    }
+}
+
 impl GlobalBridge {
     /// A bridge between the global actor behind `ports` and the `machines` whose tools it has, each of which is at one of them.
     pub fn new(machines: Vec<Beyond>, ports: GlobalBridgePorts) -> Self {
@@ -124,15 +151,11 @@ impl GlobalBridge {
     }
 
     fn send_models(&mut self, ctx: &TickContext) {
-        self.is_prompt = !self.models.refresh(ctx);
+        let Self { machines, models, .. } = self;
+        self.is_prompt = !models.refresh(ctx);
         if !self.is_prompt {
-            let all = Shipment::of(self.models.get());
-            if let [alone] = &mut self.machines[..] {
-                alone.send_models(all, ctx.scheduled);
-            } else {
-                for machine in &mut self.machines {
-                    machine.send_models(all.of_tools(&machine.tools), ctx.scheduled);
-                }
+            for machine in machines {
+                machine.send_models(Shipment::of_tools(models.get(), &machine.tools), ctx.scheduled);
             }
         }
     }
@@ -158,9 +181,15 @@ impl GlobalBridge {
     }
 
     fn receive(&mut self, ctx: &TickContext) {
-        let Self { machines, tools, settings, haptic, .. } = self;
-        let (now, second) = (haptic.last_release(ctx.now), haptic.as_hz() as u64);
-        let (is_alone, latest) = (machines.len() == 1, haptic.last_release(ctx.now + AHEAD_AT_MOST));
+        let haptic = self.haptic;
+        let clock = Reception {
+            now: haptic.last_release(ctx.now),
+            second: haptic.as_hz() as u64,
+            latest: if self.machines.len() == 1 { u64::MAX } else { haptic.last_release(ctx.now + AHEAD_AT_MOST) },
+            return_ticks: haptic.last_release(RETURNS_IN).max(1),
+            is_prompt: self.is_prompt,
+        };
+        let Self { machines, tools, settings, .. } = self;
         for machine in machines {
             if machine.is_another() {
                 machine.tools.iter().for_each(|&tool| tools[tool].is_put = true);
@@ -168,19 +197,8 @@ impl GlobalBridge {
             for _ in 0..MOST_MESSAGES {
                 let Some((header, message)) = machine.receive(ctx.scheduled) else { break };
                 match message {
-                    Message::Ticks { tool, ticks } => {
-                        let tool = usize::from(tool);
-                        if let (true, Some(&(newest, _))) = (machine.tools.contains(&tool), ticks.last()) {
-                            machine.heard = ctx.scheduled;
-                            if self.is_prompt || machine.numbering.is_new() {
-                                machine.numbering.hear(newest, now, second);
-                            }
-                            machine.newest = machine.newest.max(newest);
-                            let counted = ticks.into_iter().map(|(tick, pose)| (machine.numbering.here(tick), pose));
-                            for (tick, pose) in counted.filter(|(tick, _)| is_alone || *tick <= latest) {
-                                tools[tool].take(ctx, tick, pose, *haptic);
-                            }
-                        }
+                    Message::Ticks { tool, ticks } if machine.tools.contains(&tool.into()) => {
+                        clock.take(ctx, machine, &mut tools[usize::from(tool)], ticks);
                     }
                     Message::Wants { held, friction, stiffness, is_watched } => {
                         if machine.is_newest_said(header.number) {
@@ -193,8 +211,12 @@ impl GlobalBridge {
                         let answer = Message::Pong { sent: header.sent, received: ctx.scheduled };
                         machine.post.send(Lane::Urgent, ctx.scheduled, &answer);
                     }
-                    // Of the other direction.
-                    Message::Models(_) | Message::Basis { .. } | Message::Pong { .. } | Message::Surface { .. } => {}
+                    // Of the other direction, or of a tool that it has not.
+                    Message::Ticks { .. }
+                    | Message::Models(_)
+                    | Message::Basis { .. }
+                    | Message::Pong { .. }
+                    | Message::Surface { .. } => {}
                 }
             }
         }
@@ -203,12 +225,13 @@ impl GlobalBridge {
     /// Lets the tools of machines that have fallen silent rest where they are, if others go on.
     fn rest(&mut self, ctx: &TickContext) {
         let Self { machines, tools, .. } = self;
+        if machines.len() == 1 {
+            return;
+        }
         let newest = tools.iter().map(|tool| tool.newest.tick).max().unwrap_or_default();
         let is_silent = |machine: &&Machine| ctx.scheduled.saturating_sub(machine.heard) >= RESTS_AFTER;
-        if machines.len() > 1 {
-            for &tool in machines.iter().filter(is_silent).flat_map(|machine| &machine.tools) {
-                tools[tool].rest(ctx, newest);
-            }
+        for &tool in machines.iter().filter(is_silent).flat_map(|machine| &machine.tools) {
+            tools[tool].rest(ctx, newest);
         }
     }
 

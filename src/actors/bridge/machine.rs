@@ -34,7 +34,6 @@ pub(super) struct Machine {
     pub(super) newest: u64,
     /// The number of the peer behind the transport.
     peer: u64,
-    is_alone: bool,
 }
 
 impl Machine {
@@ -58,7 +57,6 @@ impl Machine {
             heard,
             newest,
             peer,
-            is_alone,
         }
     }
 
@@ -68,7 +66,8 @@ impl Machine {
         let is_another = std::mem::replace(&mut self.peer, peer) != peer;
         if is_another {
             self.post.begin_epoch(FIRST_EPOCH);
-            (self.bases, self.numbering) = (SentBases::default(), Numbering::new(self.is_alone));
+            self.numbering.begin_anew();
+            self.bases = SentBases::default();
             (self.wanted, self.said, self.is_watched, self.newest) = (self.unchanged, 0, false, 0);
         }
         is_another

@@ -35,6 +35,11 @@ impl Numbering {
         }
     }
 
+    /// Another machine counts from now on.
+    pub(super) fn begin_anew(&mut self) {
+        *self = Self::new(self.is_alone);
+    }
+
     /// True if nothing has come.
     pub(super) fn is_new(&self) -> bool {
         self.ahead.is_none()

@@ -102,23 +102,22 @@ pub(super) fn tools(
                 (device, pointer, None)
             }
         };
-        let is_elsewhere = elsewhere.is_some();
-        // What is executed again has met them already.
-        let device = if is_replay || is_elsewhere { device } else { device::with_faults(device, spec) };
+        // In the run that is executed again, or at the machine where it is, it has met its faults and was looked at.
+        let was_met = is_replay || elsewhere.is_some();
+        let device = if was_met { device } else { device::with_faults(device, spec) };
         let device_limits = limits::device_limits(&scene.safety, &device.capabilities());
         let resolved = limits::resolved(scene, &device_limits);
         let limits = limits::limits(&resolved, &device_limits, stored_j, tick);
         check_ramp(&limits).map_err(of_this)?;
         check_capabilities(device.capabilities(), &limits).map_err(of_this)?;
         // One that is elsewhere is told where it is behind its coupling.
-        let coupling = match scene.local.coupling && !is_elsewhere {
+        let coupling = match scene.local.coupling && elsewhere.is_none() {
             true => Some(limits::coupling(body, node, &device_limits, tick)?),
             false => None,
         };
         let contact = node.map_or_else(Contact::default, |node| glued(body, node));
         let reach_m = limits::reach_m(&device.capabilities(), body);
-        let bounds = match is_replay || is_elsewhere {
-            // It was looked at in the run that is executed again, or where it is.
+        let bounds = match was_met {
             true => Bounds::NONE,
             false => {
                 device::check_path(spec, reach_m).map_err(of_this)?;

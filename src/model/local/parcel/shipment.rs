@@ -26,21 +26,21 @@ impl Shipment {
     /// # Real-time
     /// Not for a tick: allocates.
     pub fn of(models: &LocalModels) -> Self {
-        let hosts = models.hosts().iter().map(|&host| host as u16).collect();
-        Self { parcels: models.parcels().cloned().collect(), hosts }
+        Self::of_tools(models, &(0..models.hosts().len()).collect::<Vec<_>>())
     }
 
-    /// What of it serves some of the `tools`, for a computer that has no others; those are set aside.
+    /// Likewise those of them that serve some of the `tools`, for a computer that has no others; those are set aside.
     ///
     /// # Real-time
     /// Not for a tick: allocates.
     ///
     /// # Panics
     /// If there are no tools, or fewer than one of them says.
-    pub fn of_tools(&self, tools: &[usize]) -> Self {
-        let serves = |host: u16| tools.iter().any(|&tool| self.hosts[tool] == host);
-        let hosts = self.hosts.iter().map(|&host| if serves(host) { host } else { self.hosts[tools[0]] }).collect();
-        Self { parcels: self.parcels.iter().filter(|parcel| serves(parcel.tool)).cloned().collect(), hosts }
+    pub fn of_tools(models: &LocalModels, tools: &[usize]) -> Self {
+        let all = models.hosts();
+        let serves = |host: usize| tools.iter().any(|&tool| all[tool] == host);
+        let hosts = all.iter().map(|&host| if serves(host) { host } else { all[tools[0]] } as u16).collect();
+        Self { parcels: models.parcels().filter(|parcel| serves(parcel.tool())).cloned().collect(), hosts }
     }
 
     /// Appends all of it but the bases.

@@ -153,9 +153,11 @@ fn a_tool_that_is_felt_elsewhere_has_no_model_here() {
         let (mut simulation, tools) = pressed(ToolShape::Point, beside);
         let (patch, bases) = patch_and_bases(&simulation);
         let template = Template::new(Kind::Predictive, [4, 4, 2], simulation.body()).unwrap();
-        let (all, _) = sent(&template, (&mut simulation, &tools), (&patch, &bases));
-        assert_eq!((all.parcels().len(), all.of_tools(&[0]).parcels().len()), (if is_held { 1 } else { 2 }, 1));
-        let [all, of_first] = [all.clone(), all.of_tools(&[0])].map(|shipment| {
+        let mut departing = LocalModels::new(2, || template.departing());
+        build(&mut departing, (&mut simulation, &tools), &patch, &bases);
+        let [all, of_first] = [Shipment::of(&departing), Shipment::of_tools(&departing, &[0])];
+        assert_eq!((all.parcels().len(), of_first.parcels().len()), (if is_held { 1 } else { 2 }, 1));
+        let [all, of_first] = [all, of_first].map(|shipment| {
             let mut bytes = Vec::new();
             shipment.write(&mut BytesWriter(&mut bytes));
             Shipment::read(&mut BytesReader(&bytes)).unwrap()
