@@ -5,7 +5,8 @@
                                                                          as chance will
     link_trials.py PALPATE OUT soak [--seconds S] [--delay MS] [--loss PCT]   memory of both sides, minute by minute
     link_trials.py PALPATE OUT cost [--rounds N] [--seconds S]           runs with and without the link in turn
-    link_trials.py PALPATE OUT machines [--delays MS...] [--nodes N]     two haptic machines, against `full` along the ways that their tools went
+    link_trials.py PALPATE OUT machines [--delays MS...] [--seeds N...] [--nodes N]   two haptic machines, against `full` along the ways that
+                                                                         their tools went, which a seed makes
 
 PALPATE is the command with the feature `link`. The two sides are in two network namespaces with a relay between them, as in link_lab.py,
 on a scene that presses and strokes a block of 12^3 nodes all the time. Each prints a table in Markdown; all but `cost` fail where the
@@ -14,6 +15,7 @@ force or a record is not what it has to be. OUT is a folder for logs.
 
 import argparse
 import csv
+import itertools
 import json
 import math
 import os
@@ -230,18 +232,25 @@ def table(palpate, log, topic, columns):
         return {round(1e3 * float(row["t_s"])): tuple(float(row[column]) for column in columns) for row in csv.DictReader(lines)}
 
 
+def random_ways(out, seed, seconds):
+    """Paths of two tools that press into the top and stroke it, each at its own pace."""
+    chance = random.Random(seed)
+    for hand, middles in zip(HANDS, ((0.03, 0.045), (0.06, 0.075))):
+        middle, reach, pace = chance.uniform(*middles), chance.uniform(0.003, 0.009), chance.uniform(1, 6)
+        deep, bounce, beat = chance.uniform(0.004, 0.009), chance.uniform(0, 0.002), chance.uniform(3, 12)
+        depth = lambda t: deep * min(max((t - 0.5) / 0.5, 0.0), 1.0) + bounce * math.sin(beat * t)
+        times = (n / 200 for n in range(int(200 * seconds) + 200))
+        strokes(out, f"ways-{hand}", ((t, middle + reach * math.sin(pace * t), 0.0512, 0.102 - depth(t)) for t in times))
+
+
 def machines(lab, palpate, out, args):
-    ways = {"left": (0.035, 0.008, 3.0), "right": (0.068, -0.007, 2.2)}
-    for hand, (middle, reach, rate) in ways.items():
-        depth = lambda t: 0.008 * min(max((t - 0.5) / 0.5, 0.0), 1.0) + 0.001 * math.sin(7 * t)
-        times = (n / 200 for n in range(int(200 * args.seconds) + 200))
-        strokes(out, f"ways-{hand}", ((t, middle + reach * math.sin(rate * t), 0.0512, 0.101 - depth(t)) for t in times))
     path = two_hands(out, "ways", args.nodes)
     place, force = [f"{axis}_m" for axis in "xyz"], [f"f{axis}_n" for axis in "xyz"]
     is_good = True
-    print("| one way (ms) | tool | force off (rms, %) | largest jump (%) | the other tool off (rms, mm) | model as it comes, p50 (ms) |")
-    print("| ---: | --- | ---: | ---: | ---: | ---: |")
-    for delay in args.delays:
+    print("| seed | one way (ms) | tool | force off (rms, %) | largest jump (%) | the other tool off (rms, mm) | model as it comes, p50 (ms) |")
+    print("| ---: | ---: | --- | ---: | ---: | ---: | ---: |")
+    for seed, delay in itertools.product(args.seeds, args.delays):
+        random_ways(out, seed, args.seconds)
         lab.delay_s = 0.0
         serve = lab.serve(path, MODEL)
         lab.delay_s = delay / 1e3
@@ -273,7 +282,7 @@ def machines(lab, palpate, out, args):
             off_mm = 1e3 * math.sqrt(sum(away * away for away in off) / len(off))
             age = reports[hand]["figures"][f"{hand}.resync.age.p50"] / 1e6
             is_good &= delay > 0 or (rms < 3 and off_mm < 0.3)
-            print(f"| {delay:g} | {hand} | {rms:.2f} | {jump:.2f} | {off_mm:.3f} | {age:.0f} |", flush=True)
+            print(f"| {seed} | {delay:g} | {hand} | {rms:.2f} | {jump:.2f} | {off_mm:.3f} | {age:.0f} |", flush=True)
     return is_good
 
 
@@ -301,6 +310,7 @@ def main():
     of.set_defaults(run=cost)
     of = trials.add_parser("machines")
     of.add_argument("--delays", type=float, nargs="+", default=[0, 5, 14])
+    of.add_argument("--seeds", type=int, nargs="+", default=[1])
     of.add_argument("--nodes", type=int, default=8)
     of.add_argument("--seconds", type=float, default=8)
     of.set_defaults(run=machines)
