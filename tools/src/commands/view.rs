@@ -61,7 +61,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Error> {
         files::keep_inputs(&files::inputs_of(path, &scene), out)?;
     }
     // The demo shows the method; whoever pushes it is to feel the body itself, where that fits.
-    let of_demo = (args.scene.is_none() && args.global.global.is_none()).then_some(ModelChoice::Auto);
+    let of_demo = (args.scene.is_none() && args.global.address.is_none()).then_some(ModelChoice::Auto);
     if let Some(model) = args.model.or(of_demo) {
         scene = scene.with_model(model);
     }
@@ -73,7 +73,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Error> {
     };
     let pushed = pushed.open_haply_with(palpate_haply::open);
     let pushed = args.out.iter().fold(pushed, |pushed, out| pushed.log(out));
-    let pushed = match args.global.global {
+    let pushed = match args.global.address {
         Some(_) => {
             let global = args.global.clone();
             pushed.connect(move |builder| global.of(builder))
@@ -98,7 +98,7 @@ fn show_log(log: &Path, args: &ViewArgs) -> Result<(), Error> {
         (args.model.is_some(), "--model"),
         (args.out.is_some(), "--out"),
         (args.watch, "--watch"),
-        (args.global.global.is_some(), "--global"),
+        (args.global.address.is_some(), "--global"),
         (args.global.access.config.is_some(), "--config"),
         (args.global.access.insecure, "--insecure"),
     ] {

@@ -31,10 +31,10 @@ pub struct AccessArgs {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct GlobalArgs {
     /// Take the global models from `palpate serve` at this address, such as tls/big-machine:7447 or tcp/127.0.0.1:7447
-    #[arg(long, value_name = "ADDRESS")]
-    pub global: Option<String>,
+    #[arg(long = "global", value_name = "ADDRESS")]
+    pub address: Option<String>,
     /// The scene's device of this name is at this machine, and those that are not named at another one; may be given again
-    #[arg(long, value_name = "NAME", requires = "global")]
+    #[arg(long, value_name = "NAME", requires = "address")]
     pub device: Vec<String>,
     #[command(flatten)]
     pub access: AccessArgs,
@@ -46,7 +46,7 @@ impl GlobalArgs {
     /// # Errors
     /// If the address is none, or not allowed.
     pub fn of(&self, builder: SessionBuilder) -> Result<SessionBuilder, Error> {
-        let Some(address) = &self.global else { return Ok(builder) };
+        let Some(address) = &self.address else { return Ok(builder) };
         ways::global_over(self.device.iter().fold(builder, SessionBuilder::device_here), address, &self.access)
     }
 }
