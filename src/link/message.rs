@@ -21,7 +21,7 @@ use crate::runtime::Nanos;
 
 const MAGIC: [u8; 4] = *b"plnk";
 /// The version of the format: of another one nothing is read.
-pub const VERSION: u16 = 5;
+pub const VERSION: u16 = 6;
 /// No message is longer (bytes).
 pub const LARGEST: usize = 1 << 25;
 

@@ -6,6 +6,7 @@
 
 mod departing;
 mod image;
+mod knots;
 mod path;
 mod shipment;
 

@@ -1,134 +1,165 @@
 //! The predicted motion of a ring as bytes.
 //!
-//! Each of its three quantities is rounded to a 16-bit share of the largest there is: 1.5e-5 of it, where what a forecast gets wrong is
-//! per cents. Numbers of a motion hardly leave the line through the two before, so that what is left of them fits in a byte as
-//! a rule.
+//! A motion is smooth but where something happens, so that few of its samples tell the others: as many are sent as bring all of them
+//! back within [`CLOSE`], a thousandth of the largest of its quantity, where what a forecast gets wrong is per cents. What is sent is
+//! rounded to [`STEPS`], and hardly leaves the curve through what was sent before, so that what is left of a number fits in a byte as a rule.
 
+use super::knots::Knots;
 use crate::bytes::{BytesReader, BytesWriter};
 
 /// Quantities: positions, velocities, forces.
 const QUANTITIES: usize = 3;
 /// Steps from zero to the largest number.
-const STEPS: f64 = 32767.0;
+const STEPS: f64 = 8191.0;
 /// Numbers of one path at most: a ring of 2,000 nodes for 2,000 steps.
 const MOST_NUMBERS: usize = 36_000_000;
+/// How far a number may come back from what it was, in steps.
+const CLOSE: f64 = 8.0;
 
 /// Appends `samples`, each of [`QUANTITIES`] times `numbers` numbers; positions are told from those of the first.
 pub(super) fn write(to: &mut BytesWriter<'_>, numbers: usize, samples: &[f64]) {
     let size = QUANTITIES * numbers;
-    let (first, count) = match samples.get(..numbers) {
-        Some(first) if numbers > 0 && size * (samples.len() / size) <= MOST_NUMBERS => (first, samples.len() / size),
-        _ => (&[][..], 0),
+    let (first, samples) = match samples.get(..numbers) {
+        Some(first) if numbers > 0 && (size..=MOST_NUMBERS).contains(&samples.len()) => (first, samples),
+        _ => (&[][..], &[][..]),
     };
     to.list(first, |to, &number| to.f64(number));
-    to.u32(count as u32);
-    if count == 0 {
+    if first.is_empty() {
         return;
     }
-    let told = |sample: &[f64], at: usize| if at < numbers { sample[at] - first[at] } else { sample[at] };
-    let largest = |quantity: usize| {
-        let of = |sample| (quantity * numbers..(quantity + 1) * numbers).map(move |at| told(sample, at).abs());
-        samples.chunks_exact(size).flat_map(of).fold(0.0, f64::max)
-    };
-    let steps: [f64; QUANTITIES] = std::array::from_fn(|quantity| f64::from((largest(quantity) / STEPS) as f32));
-    steps.iter().for_each(|&step| to.f32(step as f32));
-    let mut lines = Lines::new(size);
-    for sample in samples.chunks_exact(size) {
-        for at in 0..size {
-            let step = steps[at / numbers];
-            let rounded = if step > 0.0 { (told(sample, at) / step).round() as i32 } else { 0 };
-            to.varint(lines.leave(at, rounded));
+    let (told, steps) = round(samples, first);
+    // What is rounded is half a step off already.
+    let knots = Knots::of(&told, size, CLOSE - 0.5);
+    to.list(&knots.gaps(), |to, &gap| to.u8(gap));
+    steps.iter().for_each(|&step| to.f32(step));
+    let mut expected = vec![0.0; size];
+    for (number, sample) in knots.samples().iter().enumerate() {
+        knots.expected(number).write(&told, &mut expected);
+        for (number, expected) in told[sample * size..].iter().zip(&expected) {
+            let beside = (number - expected.round()) as i32;
+            // Small ones of either sign are small numbers.
+            to.varint(((beside << 1) ^ (beside >> 31)).cast_unsigned());
         }
     }
+}
+
+/// What is told of `samples`, in whole steps, and the step of each quantity.
+fn round(samples: &[f64], first: &[f64]) -> (Vec<f64>, [f32; QUANTITIES]) {
+    let (numbers, size) = (first.len(), QUANTITIES * first.len());
+    let (mut told, mut largest) = (samples.to_vec(), [0.0; QUANTITIES]);
+    for sample in told.chunks_exact_mut(size) {
+        sample.iter_mut().zip(first).for_each(|(number, first)| *number -= first);
+        for (largest, numbers) in largest.iter_mut().zip(sample.chunks_exact(numbers)) {
+            *largest = numbers.iter().fold(*largest, |largest: f64, number| largest.max(number.abs()));
+        }
+    }
+    // A quantity that is nothing in single precision is not told.
+    let steps =
+        largest.map(|largest| Some((largest / STEPS) as f32).filter(|step| *step >= f32::MIN_POSITIVE).unwrap_or(0.0));
+    for sample in told.chunks_exact_mut(size) {
+        for (&step, numbers) in steps.iter().zip(sample.chunks_exact_mut(numbers)) {
+            let share = if step > 0.0 { 1.0 / f64::from(step) } else { 0.0 };
+            numbers.iter_mut().for_each(|number| *number = (*number * share).round());
+        }
+    }
+    (told, steps)
 }
 
 /// Takes what [`write`] has appended: the samples in place of `samples`, and how many numbers a quantity has.
 pub(super) fn read(from: &mut BytesReader<'_>, samples: &mut Vec<f64>) -> Option<usize> {
     samples.clear();
-    let mut first = Vec::new();
+    let (mut first, mut gaps) = (Vec::new(), Vec::new());
     from.list(size_of::<f64>(), &mut first, BytesReader::f64)?;
-    let (numbers, count) = (first.len(), from.u32()? as usize);
-    if numbers == 0 || count == 0 {
-        return (numbers == 0 && count == 0).then_some(0);
+    let numbers = first.len();
+    if numbers == 0 {
+        return Some(0);
     }
+    from.list(1, &mut gaps, BytesReader::u8)?;
+    let knots = Knots::apart(&gaps)?;
     let steps = [from.f32()?, from.f32()?, from.f32()?].map(f64::from);
     let size = QUANTITIES * numbers;
-    let total = size.checked_mul(count)?;
+    let total = (knots.samples().last()? + 1).checked_mul(size)?;
     // Each number is a byte at least.
-    if total > MOST_NUMBERS || total > from.0.len() || steps.iter().any(|&step| step < 0.0) {
+    if total > MOST_NUMBERS || knots.samples().len() * size > from.0.len() || steps.iter().any(|&step| step < 0.0) {
         return None;
     }
-    samples.reserve(total);
-    let mut lines = Lines::new(size);
-    for _ in 0..count {
-        for at in 0..size {
-            let told = f64::from(lines.follow(at, from.varint()?)) * steps[at / numbers];
-            samples.push(if at < numbers { first[at] + told } else { told });
+    samples.resize(total, 0.0);
+    let mut expected = vec![0.0; size];
+    for (number, sample) in knots.samples().iter().enumerate() {
+        knots.expected(number).write(samples, &mut expected);
+        for (number, expected) in samples[sample * size..].iter_mut().zip(&expected) {
+            let beside = from.varint()?;
+            let beside = (beside >> 1).cast_signed() ^ -(beside & 1).cast_signed();
+            *number = Some(f64::from(beside) + expected.round()).filter(|rounded| rounded.abs() <= STEPS + 1.0)?;
         }
     }
+    for (sample, curve) in knots.others() {
+        curve.write(samples, &mut expected);
+        samples[sample * size..][..size].copy_from_slice(&expected);
+    }
+    for sample in samples.chunks_exact_mut(size) {
+        for (step, numbers) in steps.iter().zip(sample.chunks_exact_mut(numbers)) {
+            numbers.iter_mut().for_each(|number| *number *= step);
+        }
+        sample.iter_mut().zip(&first).for_each(|(number, first)| *number += first);
+    }
     Some(numbers)
-}
-
-/// The last two of each number, which the next one is on a line with.
-struct Lines(Vec<[i32; 2]>);
-
-impl Lines {
-    fn new(size: usize) -> Self {
-        Self(vec![[0; 2]; size])
-    }
-
-    /// What `number` is beside the line.
-    fn leave(&mut self, at: usize, number: i32) -> u32 {
-        let beside = number.wrapping_sub(self.next(at));
-        self.push(at, number);
-        // Small ones of either sign are small numbers.
-        ((beside << 1) ^ (beside >> 31)).cast_unsigned()
-    }
-
-    /// The number that is so far beside the line.
-    fn follow(&mut self, at: usize, beside: u32) -> i32 {
-        let beside = (beside >> 1).cast_signed() ^ -(beside & 1).cast_signed();
-        let number = self.next(at).wrapping_add(beside);
-        self.push(at, number);
-        number
-    }
-
-    fn next(&self, at: usize) -> i32 {
-        let [before, last] = self.0[at];
-        last.wrapping_add(last.wrapping_sub(before))
-    }
-
-    fn push(&mut self, at: usize, number: i32) {
-        self.0[at] = [self.0[at][1], number];
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Two nodes on their way.
-    fn samples(count: usize) -> Vec<f64> {
+    /// Two nodes on their way: quantities of different sizes, and a jolt of what is `jolt` times as large.
+    fn samples(count: usize, jolt: f64) -> Vec<f64> {
         let at = |n: usize| {
             let t = n as f64 * 1e-2;
-            (0..18).map(move |i| f64::from(i) * 0.1 + (3.0 * t + f64::from(i)).sin() * 10.0_f64.powi(i / 6 - 3))
+            let jolted = if n == 40 { 1.0 + jolt } else { 1.0 };
+            (0..18)
+                .map(move |i| f64::from(i) * 0.1 + (3.0 * t + f64::from(i)).sin() * 10.0_f64.powi(i / 6 - 3) * jolted)
         };
         (0..count).flat_map(at).collect()
     }
 
-    #[test]
-    fn a_path_comes_back_as_exact_as_was_said_and_in_little_more_than_a_byte_for_each_number() {
-        let sent = samples(100);
+    fn sent(samples: &[f64]) -> Vec<u8> {
         let mut bytes = Vec::new();
-        write(&mut BytesWriter(&mut bytes), 6, &sent);
-        assert!(bytes.len() < sent.len() * 3 / 2, "{} bytes for {} numbers", bytes.len(), sent.len());
-        let (mut read_back, mut from) = (vec![7.0], BytesReader(&bytes));
-        assert_eq!(read(&mut from, &mut read_back), Some(6));
-        assert!(from.0.is_empty() && read_back.len() == sent.len());
-        for (at, (a, b)) in sent.iter().zip(&read_back).enumerate() {
-            assert!((a - b).abs() <= 0.51 / STEPS * 4.0, "{at}: {a} {b}");
+        write(&mut BytesWriter(&mut bytes), 6, samples);
+        bytes
+    }
+
+    #[test]
+    fn a_path_comes_back_as_exact_as_was_said_and_in_a_byte_for_several_numbers() {
+        for (jolt, most_bytes) in [(0.0, 0.25), (0.5, 0.5)] {
+            let samples = samples(200, jolt);
+            let bytes = sent(&samples);
+            assert!(
+                (bytes.len() as f64) < most_bytes * samples.len() as f64,
+                "{} bytes for {}",
+                bytes.len(),
+                samples.len()
+            );
+            let (mut came, mut from) = (vec![7.0], BytesReader(&bytes));
+            assert_eq!(read(&mut from, &mut came), Some(6));
+            assert!(from.0.is_empty() && came.len() == samples.len());
+            let told = |at: usize| samples[at] - if at % 18 < 6 { samples[at % 18] } else { 0.0 };
+            for quantity in 0..QUANTITIES {
+                let numbers = || (0..samples.len()).filter(|at| at % 18 / 6 == quantity);
+                let largest = numbers().map(|at| told(at).abs()).fold(0.0, f64::max);
+                let apart = numbers().map(|at| (samples[at] - came[at]).abs()).fold(0.0, f64::max);
+                assert!(apart <= 1.001 * CLOSE / STEPS * largest, "quantity {quantity}: {apart} of {largest}");
+            }
+            assert_eq!(came[..6], samples[..6], "the first positions to the last bit");
         }
-        assert_eq!(read_back[..6], sent[..6], "the first positions to the last bit");
+    }
+
+    #[test]
+    fn a_path_that_rests_or_is_short_comes_back() {
+        for (count, rest) in (1..6).flat_map(|count| [1.5, 1.7e-41].map(|rest| (count, rest))) {
+            let samples = [rest; 18].repeat(count);
+            let mut came = Vec::new();
+            assert_eq!(read(&mut BytesReader(&sent(&samples)), &mut came), Some(6));
+            assert!(came.len() == samples.len() && came.iter().all(|number| (number - rest).abs() < 1e-6));
+        }
     }
 
     #[test]
@@ -136,5 +167,21 @@ mod tests {
         let mut bytes = Vec::new();
         write(&mut BytesWriter(&mut bytes), 0, &[]);
         assert_eq!(read(&mut BytesReader(&bytes), &mut Vec::new()), Some(0));
+    }
+
+    #[test]
+    fn numbers_that_nobody_writes_are_refused() {
+        let bytes = sent(&samples(200, 0.0));
+        // One that leaves the curve for good ends the numbers before it ends the finite ones.
+        let gaps = 4 + 6 * 8;
+        let numbers = gaps + 4 + usize::from(bytes[gaps]) + 3 * 4;
+        let mut wild = bytes.clone();
+        wild.splice(numbers..=numbers, [0xfe, 0xff, 0xff, 0xff, 0x0f]);
+        assert_eq!(read(&mut BytesReader(&wild), &mut Vec::new()), None);
+        for gap in [0, 200] {
+            let mut apart = bytes.clone();
+            apart[gaps + 4] = gap;
+            assert_eq!(read(&mut BytesReader(&apart), &mut Vec::new()), None);
+        }
     }
 }
