@@ -72,7 +72,7 @@ impl GlobalSide {
                 std::thread::sleep(LOOK);
                 continue;
             };
-            match say(&open.zenoh, hello, ANSWERS_WITHIN) {
+            match say(open.zenoh(), hello, ANSWERS_WITHIN) {
                 Some(Answer::Welcome(peer)) => {
                     is_welcome = true;
                     self.shared.kept().peer = peer;
@@ -120,8 +120,8 @@ impl GlobalSide {
 
 impl Transport for GlobalSide {
     fn send(&mut self, lane: Lane, message: &[u8], _: Nanos) {
-        if let Some(connection) = &self.shared.kept().connection {
-            connection.line.outbox.put(lane, message);
+        if let Some(connection) = &mut self.shared.kept().connection {
+            connection.lines.put(lane, message);
         }
     }
 

@@ -100,7 +100,7 @@ impl Keeper {
             if may_be_broken && !self.is_reachable() {
                 continue;
             }
-            let session = self.shared.kept().connection.as_ref().map(|connection| connection.zenoh.clone());
+            let session = self.shared.kept().connection.as_ref().map(|connection| connection.zenoh().clone());
             // One that is only silent has until then to answer.
             let left = if may_be_broken { Duration::ZERO } else { REOPENS_AFTER.saturating_sub(silent_for) };
             let within = left.max(self.reached_within);
@@ -155,7 +155,7 @@ impl Keeper {
             in_background("link closing", move || drop(connection));
             return;
         }
-        let session = connection.zenoh.clone();
+        let session = connection.zenoh().clone();
         let old = self.shared.kept().connection.replace(connection);
         // Closing may wait for a peer that is not there.
         in_background("link closing", move || drop(old));

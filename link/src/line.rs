@@ -1,13 +1,23 @@
-//! One connection of a session: names, what goes out under them and what comes in.
+//! The lines of a session: names, what goes out under them and what comes in.
+//!
+//! Over TCP whatever comes after a lost packet waits for it to come again, for a round trip and more. So there are several lines, each over
+//! a connection of its own. Local models, of which hardly one is without a loss, go by all of them, and the first to arrive is taken. Of
+//! the rest each message goes by one line, and those that go by the others do not wait for it; tool ticks, which repeat the last ones, are
+//! there in time whichever line is held up.
 
 use std::sync::Arc;
 
+use palpate::link::Lane;
+use palpate::random::uniform;
 use palpate::{Error, ErrorKind};
 use zenoh::Wait;
 use zenoh::pubsub::Subscriber;
 
 use crate::inbox::Inbox;
 use crate::outbox::Outbox;
+
+/// Lines of a session: with two, 1 % of lost packets costs twice as much in force (docs/link.md).
+pub(crate) const LINES: usize = 3;
 
 /// What the haptic side says hello to.
 pub(crate) const HELLO: &str = "palpate/hello";
@@ -22,10 +32,10 @@ pub(crate) enum Way {
 }
 
 impl Way {
-    /// The names of messages that go this way in a session.
-    fn prefix(self, session: u64) -> String {
+    /// The names of messages that go this way by a line of a session.
+    fn prefix(self, session: u64, line: usize) -> String {
         let way = if self == Self::Up { "up" } else { "down" };
-        format!("palpate/session/{session:016x}/{way}")
+        format!("palpate/session/{session:016x}/{line}/{way}")
     }
 
     fn back(self) -> Self {
@@ -33,19 +43,51 @@ impl Way {
     }
 }
 
-/// A session's messages over zenoh: gone when it is dropped.
+/// A session's messages over zenoh: gone when they are dropped.
 #[derive(Debug)]
-pub(crate) struct Line {
-    pub(crate) outbox: Outbox,
+pub(crate) struct Lines {
+    lines: Vec<Line>,
+    /// Messages that were sent.
+    sent: u64,
+}
+
+impl Lines {
+    /// Sends what goes `way` in the `session` of that number, a line over each of `zenoh`, and puts what comes back into `inbox`.
+    ///
+    /// # Errors
+    /// If zenoh or the system refuses.
+    pub(crate) fn new<'a>(
+        zenoh: impl Iterator<Item = &'a zenoh::Session>,
+        session: u64,
+        way: Way,
+        inbox: &Arc<Inbox>,
+    ) -> Result<Self, Error> {
+        let line = |(line, zenoh)| Line::new(zenoh, [way, way.back()].map(|way| way.prefix(session, line)), inbox);
+        Ok(Self { lines: zenoh.enumerate().map(line).collect::<Result<_, _>>()?, sent: 0 })
+    }
+
+    /// Hands over a message; never waits for the network.
+    pub(crate) fn put(&mut self, lane: Lane, message: &[u8]) {
+        if lane == Lane::Models {
+            self.lines.iter().for_each(|line| line.outbox.put(lane, message));
+            return;
+        }
+        // By chance: in turn, those of one of three tools would all go by the same line.
+        self.sent += 1;
+        self.lines[(uniform(0, self.sent) * self.lines.len() as f64) as usize].outbox.put(lane, message);
+    }
+}
+
+/// One of them.
+#[derive(Debug)]
+struct Line {
+    outbox: Outbox,
     _subscriber: Subscriber<()>,
 }
 
 impl Line {
-    /// Sends what goes `way` in the `session` of that number, and puts what comes back into `inbox`.
-    ///
-    /// # Errors
-    /// If zenoh or the system refuses.
-    pub(crate) fn new(zenoh: &zenoh::Session, session: u64, way: Way, inbox: &Arc<Inbox>) -> Result<Self, Error> {
+    /// Sends under the first of the names and hears under the second.
+    fn new(zenoh: &zenoh::Session, [out, back]: [String; 2], inbox: &Arc<Inbox>) -> Result<Self, Error> {
         let inbox = Arc::clone(inbox);
         let keep = move |sample: zenoh::sample::Sample| {
             let payload = sample.payload();
@@ -53,8 +95,8 @@ impl Line {
                 inbox.put(&payload.to_bytes());
             }
         };
-        let coming = zenoh.declare_subscriber(format!("{}/*", way.back().prefix(session))).callback(keep).wait();
+        let coming = zenoh.declare_subscriber(format!("{back}/*")).callback(keep).wait();
         let subscriber = coming.map_err(|error| Error::new(ErrorKind::Runtime, format!("zenoh: {error}")))?;
-        Ok(Self { outbox: Outbox::new(zenoh, &way.prefix(session))?, _subscriber: subscriber })
+        Ok(Self { outbox: Outbox::new(zenoh, &out)?, _subscriber: subscriber })
     }
 }

@@ -12,7 +12,7 @@ use zenoh::Wait;
 use crate::access::Access;
 use crate::desk::{Arrival, Desk, Guest};
 use crate::inbox::Inbox;
-use crate::line::{HELLO, Line, Way};
+use crate::line::{HELLO, LINES, Lines, Way};
 
 /// Between two looks whether somebody has come, or whoever serves wants to end.
 const LOOK: Duration = Duration::from_millis(50);
@@ -165,7 +165,7 @@ impl Seat {
 
 impl Transport for Seat {
     fn send(&mut self, lane: Lane, message: &[u8], _: Nanos) {
-        self.seated().way.line.outbox.put(lane, message);
+        self.seated().way.lines.put(lane, message);
     }
 
     fn receive(&mut self, _: Nanos, message: &mut Vec<u8>) -> bool {
@@ -185,13 +185,14 @@ impl Transport for Seat {
 /// The way to a haptic machine.
 #[derive(Debug)]
 struct HapticSide {
-    line: Line,
+    lines: Lines,
     inbox: Arc<Inbox>,
 }
 
 impl HapticSide {
     fn new(zenoh: &zenoh::Session, guest: &Guest) -> Result<Self, Error> {
         let inbox = Arc::clone(&guest.inbox);
-        Ok(Self { line: Line::new(zenoh, guest.hello.session, Way::Down, &inbox)?, inbox })
+        let zenoh = std::iter::repeat_n(zenoh, LINES);
+        Ok(Self { lines: Lines::new(zenoh, guest.hello.session, Way::Down, &inbox)?, inbox })
     }
 }

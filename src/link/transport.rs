@@ -27,7 +27,7 @@ impl Lane {
     }
 }
 
-/// Carries messages to another computer and back, at most once each, perhaps late, in another order or not at all.
+/// Carries messages to another computer and back, perhaps late, more than once, in another order or not at all.
 ///
 /// Times are those of the session on this side; only a simulated transport looks at them.
 pub trait Transport: Send + std::fmt::Debug {

@@ -14,25 +14,33 @@ struct Seen {
 }
 
 impl Seen {
+    /// True if `number` has come before, or is so old that nobody knows.
+    fn has(&self, number: u64) -> bool {
+        let Some([_, highest]) = self.span.filter(|[_, highest]| number <= *highest) else { return false };
+        let bit = Self::bit(highest - number);
+        bit == 0 || self.last & bit != 0
+    }
+
     /// True if `number` has not come before, and is not so old that nobody knows.
     fn accept(&mut self, number: u64) -> bool {
-        let Some([first, highest]) = self.span else {
-            *self = Self { span: Some([number; 2]), last: 1, unique: 1 };
-            return true;
-        };
+        if self.has(number) {
+            return false;
+        }
+        let [first, highest] = self.span.unwrap_or([number; 2]);
         if number > highest {
             let newer = u32::try_from(number - highest).unwrap_or(u32::MAX);
-            self.last = self.last.checked_shl(newer).unwrap_or(0) | 1;
-        } else {
-            let bit = u32::try_from(highest - number).ok().and_then(|older| 1_u128.checked_shl(older)).unwrap_or(0);
-            if bit == 0 || self.last & bit != 0 {
-                return false;
-            }
-            self.last |= bit;
+            self.last = self.last.checked_shl(newer).unwrap_or(0);
         }
-        self.span = Some([first.min(number), highest.max(number)]);
+        let span = [first.min(number), highest.max(number)];
+        self.last |= Self::bit(span[1] - number);
+        self.span = Some(span);
         self.unique += 1;
         true
+    }
+
+    /// That of a number so much below the highest; none if it is too far below.
+    fn bit(below: u64) -> u128 {
+        u32::try_from(below).ok().and_then(|below| 1_u128.checked_shl(below)).unwrap_or(0)
     }
 
     fn missing(&self) -> u64 {
@@ -73,6 +81,12 @@ impl Post {
     /// no message is counted and told once; what came before is dropped.
     pub(super) fn receive(&mut self, now: Nanos, follows: bool) -> Option<(Header, Message)> {
         while self.transport.receive(now, &mut self.bytes) {
+            // A model that came by another line is not built again to be dropped.
+            if Message::glance(&self.bytes)
+                .is_ok_and(|header| header.epoch == self.epoch && self.seen.has(header.number))
+            {
+                continue;
+            }
             let (header, message) = match Message::read(&self.bytes) {
                 Ok(read) => read,
                 Err(refused) => {
