@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs both sides of the link in two network namespaces, with delay and loss between them, and compares the force.
 
-    link_lab.py PALPATE OUT [--protocol tcp|tls] [--scenes NAME...] [--models NAME...] [--delays MS...] [--losses PCT...] [--seconds S]
+    link_lab.py PALPATE OUT [--protocol tcp|tls] [--scenes NAME...] [--models NAME...] [--delays MS...] [--losses PCT...] [--seconds S] [--seed N]
 
 PALPATE is the command with the feature `link`. Needs root, iproute2 and /dev/net/tun. What is between the namespaces is a relay of IP
 packets in this program: netem is not in every kernel, and here chance has a seed. For each condition it prints the error of the force (rms,
@@ -58,7 +58,7 @@ class Lab:
             run(palpate, "link", "keys", keys, "--host", NAMES["global"])
             self.access = {side: ["--config", keys / side / "link.toml"] for side in NAMES}
         self.delay_s, self.loss, self.is_over = 0.0, 0.0, False
-        self.chance = random.Random(1)
+        self.seed, self.chance = 1, random.Random(1)
         self.counts = [0, 0]
         self.bytes = [0, 0]
         self.devices = []
@@ -120,7 +120,7 @@ class Lab:
         """The log of a run of a scene over a link of this delay (ms) and loss (%); None where it failed."""
         self.delay_s, self.loss = 0.0, 0.0
         serve = self.serve(path, model)
-        self.delay_s, self.loss, self.chance = link[0] / 1e3, link[1] / 100, random.Random(1)
+        self.delay_s, self.loss, self.chance = link[0] / 1e3, link[1] / 100, random.Random(self.seed)
         log = out / f"{path.stem}-{model}-{link[0]:g}-{link[1]:g}.mcap"
         haptic = self.haptic("run", path, "--model", model, "--duration", seconds, "--out", log)
         _, said = haptic.communicate(timeout=120)
@@ -182,7 +182,7 @@ def error(found, truth):
     return 100 * math.sqrt(squares) / peak, max(0.0, 100 * (steps(found) - steps(truth)) / peak)
 
 
-def scene_of(name, out, link=None, latency_ms=0):
+def scene_of(name, out, link=None, latency_ms=0, seed=1):
     """The scene with paths that hold elsewhere, and with a simulated link and results that are so late without one."""
     text = (ROOT / "scenes" / f"{name}.toml").read_text()
     text = text.replace('"paths/', f'"{ROOT}/scenes/paths/').replace('"meshes/', f'"{ROOT}/scenes/meshes/')
@@ -191,7 +191,7 @@ def scene_of(name, out, link=None, latency_ms=0):
     if link:
         place = next(place for place, line in enumerate(lines) if line.startswith("[global]"))
         lines.insert(place + 1, f"compute_latency_ms = {latency_ms}")
-        lines += ["[link]", f"delay_ms = {link[0]}", f"loss = {link[1] / 100}", "in_order = true", "seed = 1"]
+        lines += ["[link]", f"delay_ms = {link[0]}", f"loss = {link[1] / 100}", "in_order = true", f"seed = {seed}"]
     path = out / f"{name}{'-link' if link else ''}.toml"
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -211,10 +211,12 @@ def main():
     parser.add_argument("--delays", nargs="*", type=float, default=[0, 1, 5, 14, 33, 100])
     parser.add_argument("--losses", nargs="*", type=float, default=[0, 1, 5])
     parser.add_argument("--seconds", type=float, default=1.5)
+    parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     palpate, out, seconds = args.palpate.resolve(), args.out.resolve(), str(args.seconds)
     lab = Lab(palpate, out, args.protocol)
+    lab.seed = args.seed
     try:
         for scene in args.scenes:
             path = scene_of(scene, out)
@@ -235,7 +237,7 @@ def main():
                     for model in args.models:
                         log = lab.record(path, model, (delay, loss), seconds, out)
                         simulated = out / "virtual.mcap"
-                        with_link = scene_of(scene, out, (delay, loss), takes_ms[model])
+                        with_link = scene_of(scene, out, (delay, loss), takes_ms[model], args.seed)
                         run(palpate, "run", with_link, "--virtual", "--model", model, "--duration", seconds, "--out", simulated)
                         there = error(forces(palpate, simulated), truth)
                         here = error(forces(palpate, log), truth) if log else None

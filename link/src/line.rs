@@ -16,7 +16,7 @@ use zenoh::pubsub::Subscriber;
 use crate::inbox::Inbox;
 use crate::outbox::Outbox;
 
-/// Lines of a session: with two, 1 % of lost packets costs twice as much in force (docs/link.md).
+/// Lines of a session. What they save is in docs/link.md.
 pub(crate) const LINES: usize = 3;
 
 /// What the haptic side says hello to.
