@@ -11,6 +11,7 @@ use palpate::link::Lane;
 use palpate::random::uniform;
 use palpate::{Error, ErrorKind};
 use zenoh::Wait;
+use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Subscriber;
 
 use crate::inbox::Inbox;
@@ -68,8 +69,9 @@ impl Lines {
 
     /// Hands over a message; never waits for the network.
     pub(crate) fn put(&mut self, lane: Lane, message: &[u8]) {
+        let message = ZBytes::from(message);
         if lane == Lane::Models {
-            self.lines.iter().for_each(|line| line.outbox.put(lane, message));
+            self.lines.iter().for_each(|line| line.outbox.put(lane, message.clone()));
             return;
         }
         // By chance: in turn, those of one of three tools would all go by the same line.

@@ -6,6 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use palpate::link::Lane;
 use palpate::{Error, ErrorKind};
 use zenoh::Wait;
+use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 
@@ -38,7 +39,7 @@ struct Queue {
 
 #[derive(Debug, Default)]
 struct Waiting {
-    messages: VecDeque<Vec<u8>>,
+    messages: VecDeque<ZBytes>,
     is_over: bool,
 }
 
@@ -62,7 +63,7 @@ impl Outbox {
     }
 
     /// Hands over a message; never waits for the network.
-    pub(crate) fn put(&self, lane: Lane, message: &[u8]) {
+    pub(crate) fn put(&self, lane: Lane, message: ZBytes) {
         self.lanes[lane as usize].put(lane, message);
     }
 }
@@ -81,7 +82,7 @@ impl Queue {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn put(&self, lane: Lane, message: &[u8]) {
+    fn put(&self, lane: Lane, message: ZBytes) {
         let mut waiting = self.waiting();
         if lane.keeps_the_newest() {
             waiting.messages.clear();
@@ -89,13 +90,13 @@ impl Queue {
         if waiting.messages.len() >= MOST_WAITING {
             waiting.messages.pop_front();
         }
-        waiting.messages.push_back(message.to_vec());
+        waiting.messages.push_back(message);
         drop(waiting);
         self.changed.notify_one();
     }
 
     /// Waits for the next message; `None` when it is over.
-    fn next(&self) -> Option<Vec<u8>> {
+    fn next(&self) -> Option<ZBytes> {
         let mut waiting = self.waiting();
         loop {
             if waiting.is_over {
@@ -123,9 +124,9 @@ mod tests {
     #[test]
     fn of_waiting_models_only_the_newest_go_and_of_ticks_the_newest_ones() {
         let queue = Queue::default();
-        (0..5).for_each(|n| queue.put(Lane::Models, &[n]));
-        assert_eq!(queue.next(), Some(vec![4]));
-        (0..MOST_WAITING + 3).for_each(|n| queue.put(Lane::Urgent, &n.to_le_bytes()));
+        (0..5_u8).for_each(|n| queue.put(Lane::Models, vec![n].into()));
+        assert_eq!(queue.next(), Some(vec![4].into()));
+        (0..MOST_WAITING + 3).for_each(|n| queue.put(Lane::Urgent, n.to_le_bytes().into()));
         assert_eq!(queue.next(), Some(3_usize.to_le_bytes().into()));
         queue.waiting().is_over = true;
         assert_eq!(queue.next(), None);
