@@ -11,7 +11,7 @@ use palpate::model::local::Kind;
 use palpate::runtime::Nanos;
 use palpate::scene::Scene;
 use palpate::session::{Running, Session, SessionBuilder};
-use session_support::line::Line;
+use session_support::line::{Line, has_models};
 use session_support::*;
 
 fn session(model: Kind) -> SessionBuilder {
@@ -155,13 +155,13 @@ fn a_model_from_the_future_is_not_believed() {
     let mut forged = {
         let mut wait = None;
         while wait.is_none() {
-            wait = line.ways[1].lock().unwrap().iter().find(|message| Message::has_models(message)).cloned();
+            wait = line.ways[1].lock().unwrap().iter().find(|message| has_models(message)).cloned();
         }
         wait.unwrap()
     };
     *line.is_cut.lock().unwrap() = true;
     global.stop();
-    let header = Message::glance(&forged).unwrap();
+    let (_, header) = Message::glance(&forged).unwrap();
     let Header { number, .. } = header;
     forged[16..24].copy_from_slice(&(number + 1_000).to_le_bytes());
     // After the header the host of the one tool, and its parcel, which begins with the tick.

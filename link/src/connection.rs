@@ -1,6 +1,7 @@
 //! The opened connections of a session to the global side, and what is asked over them.
 
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use palpate::link::Hello;
@@ -16,12 +17,13 @@ use crate::line::{HELLO, LINES, Lines, Way};
 pub(crate) const ANSWERS_WITHIN: Duration = Duration::from_millis(700);
 /// Round trips of which the quickest counts.
 const ROUND_TRIPS: usize = 5;
+/// The other connections are waited for as long again as the first one took, and so much more.
+const LAGS: Duration = Duration::from_millis(50);
 
-/// In the order in which it ends.
 #[derive(Debug)]
 pub(crate) struct Connection {
     pub(crate) lines: Lines,
-    /// One for each line.
+    /// One for each line, as a rule.
     zenoh: Vec<zenoh::Session>,
 }
 
@@ -32,16 +34,9 @@ impl Connection {
     /// # Errors
     /// If nobody is there, or zenoh or the system refuses.
     pub(crate) fn open(config: &Config, session: u64, inbox: &Arc<Inbox>) -> Result<Self, Error> {
-        let failed = |why: String| Error::new(ErrorKind::Runtime, format!("zenoh: {why}"));
-        let open = || zenoh::open(config.clone()).wait().map_err(|error| failed(error.to_string()));
-        // All at once: each takes some round trips.
-        let zenoh: Result<Vec<_>, _> = std::thread::scope(|scope| {
-            let opening = [(); LINES].map(|()| scope.spawn(open));
-            let opened = opening.map(|opening| opening.join().unwrap_or_else(|_| Err(failed("failed".to_owned()))));
-            opened.into_iter().collect()
-        });
-        let zenoh = zenoh?;
-        Ok(Self { lines: Lines::new(zenoh.iter(), session, Way::Up, inbox)?, zenoh })
+        let zenoh = open_several(config)?;
+        // A line whose own connection did not come in time goes by another's.
+        Ok(Self { lines: Lines::new(zenoh.iter().cycle().take(LINES), session, Way::Up, inbox)?, zenoh })
     }
 
     /// What is asked goes by the first of them.
@@ -58,6 +53,46 @@ impl Connection {
         let quickest = (0..ROUND_TRIPS).filter_map(trip).min().unwrap_or_default();
         Nanos(u64::try_from(quickest.as_nanos()).unwrap_or(u64::MAX))
     }
+}
+
+impl Drop for Connection {
+    /// Closes all at once: each may wait for a peer that is not there.
+    fn drop(&mut self) {
+        self.lines = Lines::default();
+        let closing = self.zenoh.drain(..).map(|zenoh| in_background("link closing", move || drop(zenoh)));
+        let closing: Vec<_> = closing.collect();
+        closing.into_iter().flatten().for_each(|closing| drop(closing.join()));
+    }
+}
+
+/// As many connections as there are lines, or those of them that are there soon after the first.
+fn open_several(config: &Config) -> Result<Vec<zenoh::Session>, Error> {
+    let (began, (send, opened)) = (Instant::now(), mpsc::channel());
+    for _ in 0..LINES {
+        let (send, config) = (send.clone(), config.clone());
+        // One that comes too late has nowhere to go, and is closed.
+        in_background("link opening", move || drop(send.send(zenoh::open(config).wait())));
+    }
+    drop(send);
+    let (mut zenoh, mut until, mut why) = (Vec::new(), None, "no thread to connect".to_owned());
+    loop {
+        let next = match until {
+            None => opened.recv().ok(),
+            Some(until) => opened.recv_timeout(Instant::saturating_duration_since(&until, Instant::now())).ok(),
+        };
+        match next {
+            Some(Ok(session)) => zenoh.push(session),
+            Some(Err(error)) => why = error.to_string(),
+            None => break,
+        }
+        until = until.or_else(|| (!zenoh.is_empty()).then(|| Instant::now() + began.elapsed() + LAGS));
+    }
+    if zenoh.is_empty() { Err(Error::new(ErrorKind::Runtime, format!("zenoh: {why}"))) } else { Ok(zenoh) }
+}
+
+/// Does it on a thread of its own. Where the system gives none, what `work` holds is dropped at once.
+pub(crate) fn in_background(name: &str, work: impl FnOnce() + Send + 'static) -> Option<JoinHandle<()>> {
+    std::thread::Builder::new().name(name.to_owned()).spawn(work).ok()
 }
 
 /// Says hello; `None` if nobody answers within that time.

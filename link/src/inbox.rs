@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use palpate::link::{LARGEST, Message};
+use palpate::link::{LARGEST, Lane, Message};
 
 /// Messages that wait at most, and their bytes: of a flood, the newest are lost.
 const MOST_MESSAGES: usize = 4096;
@@ -33,16 +33,19 @@ impl Inbox {
     pub(crate) fn put(&self, message: &[u8]) {
         let glance = Message::glance(message);
         let mut held = self.held();
-        if let Err(refused) = glance {
-            held.refused += 1;
-            if held.refused == 1 {
-                tracing::warn!("over the link came {refused}; more like it are counted and not told");
+        let lane = match glance {
+            Ok((lane, _)) => lane,
+            Err(refused) => {
+                held.refused += 1;
+                if held.refused == 1 {
+                    tracing::warn!("over the link came {refused}; more like it are counted and not told");
+                }
+                return;
             }
-            return;
-        }
+        };
         held.heard = Some(Instant::now());
         if held.messages.len() < MOST_MESSAGES && held.bytes + message.len() <= MOST_BYTES {
-            held.models += usize::from(Message::has_models(message));
+            held.models += usize::from(lane == Lane::Models);
             held.bytes += message.len();
             held.messages.push_back(message.to_vec());
         }

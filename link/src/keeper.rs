@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use palpate::link::Hello;
 use zenoh::Config;
 
-use crate::connection::{ANSWERS_WITHIN, Connection, say};
+use crate::connection::{ANSWERS_WITHIN, Connection, in_background, say};
 use crate::desk::Answer;
 use crate::inbox::Inbox;
 use crate::unique;
@@ -176,9 +176,4 @@ impl Keeper {
         });
         opened.recv_timeout(OPENS_WITHIN).ok()
     }
-}
-
-/// Does it on a thread of its own. Where the system gives none, what `work` holds is dropped at once.
-fn in_background(name: &str, work: impl FnOnce() + Send + 'static) {
-    let _ = std::thread::Builder::new().name(name.to_owned()).spawn(work);
 }

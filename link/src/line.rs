@@ -45,10 +45,10 @@ impl Way {
 }
 
 /// A session's messages over zenoh: gone when they are dropped.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Lines {
     lines: Vec<Line>,
-    /// Messages that were sent.
+    /// Messages that went by one line each.
     sent: u64,
 }
 

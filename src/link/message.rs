@@ -11,6 +11,7 @@
 
 use std::fmt;
 
+use super::Lane;
 use crate::model::body::Stiffness;
 use crate::model::bytes::{BytesReader, BytesWriter};
 use crate::model::contact::Friction;
@@ -45,7 +46,7 @@ const UPRIGHT: f64 = 1e-6;
 pub struct Header {
     /// The connection that it belongs to, by number: what belongs to an older one is dropped.
     pub epoch: u64,
-    /// Counts the messages of one side.
+    /// Counts the messages of one side in one lane.
     pub number: u64,
     /// When it was sent, by the sender's clock.
     pub sent: Nanos,
@@ -206,21 +207,20 @@ impl Message {
         Self::read_body(kind, &mut from).filter(|_| from.0.is_empty()).ok_or(Refused::Malformed)
     }
 
-    /// What the beginning alone tells: that bytes are no message, or one of another version, before they are kept for anybody.
+    /// What the beginning alone tells: how a message goes and its header, or that bytes are none, before they are kept for anybody.
     ///
     /// # Errors
     /// If [`read`](Self::read) would refuse them for that.
-    pub fn glance(bytes: &[u8]) -> Result<Header, Refused> {
+    pub fn glance(bytes: &[u8]) -> Result<(Lane, Header), Refused> {
         let (kind, mut from) = read_kind(bytes)?;
-        if !(TICKS..=SURFACE).contains(&kind) {
-            return Err(Refused::Kind(kind));
-        }
-        read_header(&mut from).ok_or(Refused::Malformed)
-    }
-
-    /// True for the message of local models, by its beginning.
-    pub fn has_models(bytes: &[u8]) -> bool {
-        read_kind(bytes).is_ok_and(|(kind, _)| kind == MODELS)
+        let lane = match kind {
+            TICKS | WANTS | PING | PONG => Lane::Urgent,
+            MODELS => Lane::Models,
+            BASIS => Lane::Bulk,
+            SURFACE => Lane::Pictures,
+            _ => return Err(Refused::Kind(kind)),
+        };
+        Ok((lane, read_header(&mut from).ok_or(Refused::Malformed)?))
     }
 
     fn read_body(kind: u16, from: &mut BytesReader<'_>) -> Option<(Header, Self)> {

@@ -9,6 +9,11 @@ use palpate::runtime::Nanos;
 use palpate::session::{GlobalSession, Running};
 use palpate::{Error, ErrorKind};
 
+/// True for the message of local models.
+pub fn has_models(message: &[u8]) -> bool {
+    matches!(Message::glance(message), Ok((Lane::Models, _)))
+}
+
 pub type Way = Arc<Mutex<VecDeque<Vec<u8>>>>;
 
 /// What carries messages at once, as far as it is not cut.
@@ -78,7 +83,7 @@ impl Transport for End {
     fn connect(&mut self, hello: &Hello) -> Result<(), Error> {
         *self.line.hello.lock().unwrap() = Some(hello.clone());
         let until = Instant::now() + Duration::from_secs(30);
-        while !self.line.ways[1].lock().unwrap().iter().any(|message| Message::has_models(message)) {
+        while !self.line.ways[1].lock().unwrap().iter().any(|message| has_models(message)) {
             if Instant::now() > until {
                 return Err(Error::new(ErrorKind::Runtime, "nobody answers"));
             }

@@ -53,8 +53,9 @@ impl Seen {
 pub(super) struct Post {
     transport: Box<dyn Transport>,
     pub(super) epoch: u64,
-    number: u64,
-    seen: Seen,
+    /// Of each lane, so that none is too old for what has overtaken it in another one.
+    numbers: [u64; Lane::COUNT],
+    seen: [Seen; Lane::COUNT],
     /// What was not believed, by how often.
     refused: u64,
     /// Working memory.
@@ -63,13 +64,15 @@ pub(super) struct Post {
 
 impl Post {
     pub(super) fn new(transport: Box<dyn Transport>) -> Self {
-        Self { transport, epoch: super::FIRST_EPOCH, number: 0, seen: Seen::default(), refused: 0, bytes: Vec::new() }
+        let (numbers, seen) = Default::default();
+        Self { transport, epoch: super::FIRST_EPOCH, numbers, seen, refused: 0, bytes: Vec::new() }
     }
 
     /// Sends what `write` makes of a header and a buffer.
     pub(super) fn send_with(&mut self, lane: Lane, now: Nanos, write: impl FnOnce(Header, &mut Vec<u8>)) {
-        self.number += 1;
-        write(Header { epoch: self.epoch, number: self.number, sent: now }, &mut self.bytes);
+        let number = &mut self.numbers[lane as usize];
+        *number += 1;
+        write(Header { epoch: self.epoch, number: *number, sent: now }, &mut self.bytes);
         self.transport.send(lane, &self.bytes, now);
     }
 
@@ -81,13 +84,13 @@ impl Post {
     /// no message is counted and told once; what came before is dropped.
     pub(super) fn receive(&mut self, now: Nanos, follows: bool) -> Option<(Header, Message)> {
         while self.transport.receive(now, &mut self.bytes) {
-            // A model that came by another line is not built again to be dropped.
-            if Message::glance(&self.bytes)
-                .is_ok_and(|header| header.epoch == self.epoch && self.seen.has(header.number))
-            {
-                continue;
-            }
-            let (header, message) = match Message::read(&self.bytes) {
+            let read = match Message::glance(&self.bytes) {
+                // A model is not read again for having come by another line too.
+                Ok((lane, header)) if self.has(lane, header) => continue,
+                Ok((lane, _)) => Message::read(&self.bytes).map(|(header, message)| (lane, header, message)),
+                Err(refused) => Err(refused),
+            };
+            let (lane, header, message) = match read {
                 Ok(read) => read,
                 Err(refused) => {
                     self.refuse(refused);
@@ -97,21 +100,27 @@ impl Post {
             if follows && header.epoch > self.epoch {
                 self.begin_epoch(header.epoch);
             }
-            if header.epoch == self.epoch && self.seen.accept(header.number) {
+            if header.epoch == self.epoch && self.seen[lane as usize].accept(header.number) {
                 return Some((header, message));
             }
         }
         None
     }
 
+    /// True if it has come before, or belongs to what is over.
+    fn has(&self, lane: Lane, header: Header) -> bool {
+        header.epoch < self.epoch || (header.epoch == self.epoch && self.seen[lane as usize].has(header.number))
+    }
+
     /// From now on messages belong to `epoch`.
     pub(super) fn begin_epoch(&mut self, epoch: u64) {
-        (self.epoch, self.seen) = (epoch, Seen::default());
+        (self.epoch, self.seen) = (epoch, Default::default());
     }
 
     /// How many messages were sent; of this epoch, how many came and how many have not.
     pub(super) fn counts(&self) -> [u64; 3] {
-        [self.number, self.seen.unique, self.seen.missing()]
+        let of = |count: fn(&Seen) -> u64| self.seen.iter().map(count).sum();
+        [self.numbers.iter().sum(), of(|seen| seen.unique), of(Seen::missing)]
     }
 
     fn refuse(&mut self, refused: Refused) {
@@ -136,6 +145,7 @@ impl Post {
 mod tests {
     use super::*;
     use crate::link::{Conditions, VirtualLink};
+    use crate::model::body::Stiffness;
 
     #[test]
     fn no_number_is_accepted_twice_and_what_has_not_come_is_counted() {
@@ -160,5 +170,30 @@ mod tests {
         let came = std::iter::from_fn(|| post.receive(Nanos::ZERO, true));
         assert_eq!(came.map(|(header, _)| (header.epoch, header.number)).collect::<Vec<_>>(), [(1, 1), (3, 7)]);
         assert_eq!((post.epoch, post.refused), (3, 6));
+        // A repeat is dropped by its beginning: what follows is not even looked at.
+        let mut repeat = Vec::new();
+        Message::Ping.write(Header { epoch: 3, number: 7, sent: Nanos::ZERO }, &mut repeat);
+        stranger.send(Lane::Urgent, &[&repeat[..], &[0]].concat(), Nanos::ZERO);
+        assert!(post.receive(Nanos::ZERO, true).is_none());
+        assert_eq!(post.refused, 6);
+    }
+
+    #[test]
+    fn what_is_large_is_taken_however_many_small_ones_overtake_it() {
+        let [here, mut there] = VirtualLink::ends(Conditions::default());
+        let mut post = Post::new(Box::new(here));
+        let send = |there: &mut dyn Transport, message: &Message, number| {
+            let mut bytes = Vec::new();
+            message.write(Header { epoch: 1, number, sent: Nanos::ZERO }, &mut bytes);
+            there.send(Lane::Urgent, &bytes, Nanos::ZERO);
+        };
+        (2..=1_001).for_each(|number| send(&mut there, &Message::Ping, number));
+        let surface = Message::Surface { time: Nanos::ZERO, stiffness: Stiffness::default(), places: vec![[0.0; 3]] };
+        send(&mut there, &surface, 1);
+        send(&mut there, &Message::Ping, 1);
+        let came: Vec<_> = std::iter::from_fn(|| post.receive(Nanos::ZERO, true)).collect();
+        assert_eq!(came.len(), 1_001, "the last of the small ones is too old");
+        assert!(matches!(came[1_000].1, Message::Surface { .. }));
+        assert_eq!(post.counts(), [0, 1_001, 0]);
     }
 }

@@ -200,7 +200,7 @@ record! {
         sent: u64 = 6,
         /// Messages of this connection that came.
         received: u64 = 7,
-        /// Messages of this connection that have not come, of those that were sent before the newest one that did.
+        /// Messages of this connection that have not come yet, of those that were sent before the newest one that did.
         lost: u64 = 8,
     }
 }

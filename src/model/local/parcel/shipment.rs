@@ -7,6 +7,8 @@ use crate::local::LocalModels;
 
 /// A parcel is larger in memory than its least bytes: more tools than this are nobody's.
 const MOST_TOOLS: usize = 64;
+/// Numbers of all paths at most: four of the longest.
+const MOST_NUMBERS: usize = 36_000_000;
 
 /// The ingredients of the local models of all tools, to be built on another computer: they cross a link together, as they serve together.
 ///
@@ -64,8 +66,15 @@ impl Shipment {
             return None;
         }
         let models = shipment.hosts().enumerate().filter(|(tool, host)| tool == host).count();
+        let mut numbers = 0;
         for _ in 0..models {
-            shipment.parcels.push(Parcel::read(from)?);
+            let parcel = Parcel::read(from)?;
+            numbers += parcel.path.len();
+            // A path is larger in memory than its bytes too.
+            if numbers > MOST_NUMBERS {
+                return None;
+            }
+            shipment.parcels.push(parcel);
         }
         shipment.is_sound().then_some(shipment)
     }
