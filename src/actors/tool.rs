@@ -3,6 +3,7 @@
 
 use super::messages::{ComputedForce, DeviceSample};
 use super::touched::{self, single};
+use crate::devices::FASTEST_M_S;
 use crate::log::{ContactSample, ForceSample, LogRecord, ProbeSample, Resync, ServedBy};
 use crate::model::contact::{Contact, ContactMode, ContactPoint, ToolMotion};
 use crate::model::local::{Kind, Served};
@@ -56,6 +57,8 @@ pub struct LocalTool {
     number: u16,
     /// Where it is at the end of the last tick.
     pose: Pose,
+    /// Its device is at another machine.
+    is_elsewhere: bool,
     /// Energy that it has given to the simulation (J).
     energy: f64,
     /// Of the ticks of this release.
@@ -74,8 +77,15 @@ impl LocalTool {
         coupled: Option<CoupledTool>,
         ports: LocalToolPorts,
     ) -> Self {
-        let (pose, energy, served, dissipated_j) = Default::default();
-        Self { ports, haptic, probes, coupled, number, pose, energy, served, dissipated_j }
+        let (pose, is_elsewhere, energy, served, dissipated_j) = Default::default();
+        Self { ports, haptic, probes, coupled, number, pose, is_elsewhere, energy, served, dissipated_j }
+    }
+
+    /// Its device is at another machine, so that it may be put where it never went to.
+    #[must_use]
+    pub fn elsewhere(mut self) -> Self {
+        self.is_elsewhere = true;
+        self
     }
 
     /// Takes the device's newest state: a release begins.
@@ -105,7 +115,12 @@ impl LocalTool {
 
     /// Goes the way of one tick of `dt` (s), the first of those that are `left` until the tool is where its device has it.
     pub fn go(&mut self, left: u64, dt: f64) -> ToolMotion {
-        let (from, target) = (self.pose, self.target());
+        let target = self.target();
+        let way = (target.position - self.pose.position).norm();
+        if self.is_elsewhere && way > FASTEST_M_S * left as f64 * dt {
+            self.begin();
+        }
+        let from = self.pose;
         // The tool is interpolated over all periods that are owed.
         self.pose = match &mut self.coupled {
             None => from.towards_in(&target, left),

@@ -6,6 +6,9 @@ use crate::model::Pose;
 use crate::runtime::Nanos;
 use crate::runtime::exchange::{ExchangeReader, ExchangeWriter, exchange};
 
+/// No tool is faster (m/s): one that is was put where it is, as when another machine takes the place of one, or comes back from a silence.
+pub(crate) const FASTEST_M_S: f64 = 2.0;
+
 /// A tool that another machine's device moves; the force on it is felt there.
 ///
 /// While nothing comes, it stays where it is.

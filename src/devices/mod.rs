@@ -27,7 +27,7 @@ mod tool_path;
 
 pub use capabilities::Capabilities;
 pub use device::Device;
-pub(crate) use elsewhere::{Elsewhere, ElsewhereHandle};
+pub(crate) use elsewhere::{Elsewhere, ElsewhereHandle, FASTEST_M_S};
 pub use fault::{DeviceFault, SafetyStop};
 pub use faulty::{FaultKind, FaultSpec, Faulty};
 pub use hand::{Axis, Hand, HandSpec, PlantSpec};

@@ -1,16 +1,14 @@
 //! A tool whose device is at another haptic machine, as this one knows it.
 
-use crate::devices::ElsewhereHandle;
+use crate::devices::{ElsewhereHandle, FASTEST_M_S};
 use crate::model::Pose;
 use crate::model::local::ToolHistory;
 use crate::runtime::Rate;
 
 /// Nobody looks farther ahead than this (s): a tool of which nothing has come for longer rests.
 const LOOKS_AHEAD_S: f64 = 0.05;
-/// More samples than this that are missing are no way that it went, nor is one that is faster (m/s): it was put there, or came back from a
-/// rest.
+/// More samples than this that are missing are no way that it went: it was put there, or came back from a rest.
 const MOST_MISSING: u64 = 64;
-const FASTEST_M_S: f64 = 2.0;
 
 /// Follows the samples of a tool that come late, and shows where it is by now.
 #[derive(Debug)]

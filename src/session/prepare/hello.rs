@@ -15,7 +15,7 @@ impl Prepared {
     /// If the scene cannot be written.
     pub(in crate::session) fn hello(&self, first: &[DeviceState]) -> Result<Hello, Error> {
         let named = self.scene.devices.iter().map(|device| device.name.clone().unwrap_or_default());
-        let place = |(tool, first): (&Tool, &DeviceState)| (!tool.is_elsewhere()).then(|| first.pose());
+        let place = |(tool, first): (&Tool, &DeviceState)| (!tool.is_elsewhere).then(|| first.pose());
         let places = self.tools.iter().zip(first).map(place);
         Ok(Hello {
             build: format!("palpate {} for {}", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH),

@@ -24,7 +24,9 @@ pub(crate) struct Tool {
     pub(crate) device: Box<dyn Device>,
     /// What moves it, if it follows a pointer.
     pub(crate) pointer: Option<PointerHandle>,
-    /// What moves it, if its device is at another machine.
+    /// Its device is at another machine, which uses the same body.
+    pub(crate) is_elsewhere: bool,
+    /// What moves it then.
     pub(crate) elsewhere: Option<ElsewhereHandle>,
     /// How it touches the body at the start.
     pub(crate) contact: Contact,
@@ -34,13 +36,6 @@ pub(crate) struct Tool {
     pub(crate) bounds: Bounds,
     /// Between device and simulated tool.
     pub(crate) coupling: Option<Design>,
-}
-
-impl Tool {
-    /// Its device is at another machine, which uses the same body.
-    pub(crate) fn is_elsewhere(&self) -> bool {
-        self.elsewhere.is_some()
-    }
 }
 
 /// What tools are made from.
@@ -129,6 +124,7 @@ pub(super) fn tools(
             name,
             device,
             pointer,
+            is_elsewhere: elsewhere.is_some(),
             elsewhere,
             contact,
             shape: spec.tool.shape(),

@@ -70,6 +70,7 @@ pub(super) fn actors(
 ) -> Vec<Box<dyn Actor>> {
     let (mut devices, mut simulated): (Vec<Box<dyn Actor>>, Vec<LocalTool>) = Default::default();
     for (number, ((tool, ends), state)) in (0..).zip(tools.into_iter().zip(ends).zip(first)) {
+        let is_elsewhere = tool.is_elsewhere;
         let safety = Pipeline::new(tool.limits);
         let ports = DevicePorts {
             samples: ends.sample_writer,
@@ -86,7 +87,8 @@ pub(super) fn actors(
             recorder: graph.recorder((ticks * (RECORDS_PER_TICK + places + plan.probes.len())).min(MOST_RECORDS)),
         };
         let coupled = tool.coupling.as_ref().map(CoupledTool::new);
-        simulated.push(LocalTool::new(number, plan.timing.haptic, plan.probes.clone(), coupled, ports));
+        let local = LocalTool::new(number, plan.timing.haptic, plan.probes.clone(), coupled, ports);
+        simulated.push(if is_elsewhere { local.elsewhere() } else { local });
         devices.push(Box::new(device.numbered(number)));
     }
     let rates = [plan.timing.haptic, plan.timing.global];

@@ -166,7 +166,7 @@ fn start_at(mut prepared: Prepared, first: Vec<DeviceState>, rerun: Option<Rerun
 /// `rest` (m), tells another unit or nothing true, and everything that it tells later is measured from there.
 fn first_of(tool: &mut Tool, rest: &[Vec3]) -> Result<DeviceState, Error> {
     let first = first_state(&mut *tool.device);
-    if tool.is_elsewhere() {
+    if tool.is_elsewhere {
         // Where that is, comes with the first models.
         return first;
     }

@@ -133,7 +133,7 @@ impl LocalModel for LinearPatch {
             return self.patch.feel(ends, 1);
         }
         let (stepping, mut t) = (self.patch.stepping, 0.0);
-        self.patch.tools.begin();
+        self.patch.tools.begin(tools);
         for [from, to] in stepping.parts() {
             self.step(|tool| tools[tool].part(from, to), t, stepping.step());
             t += stepping.step();

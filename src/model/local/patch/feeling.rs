@@ -5,6 +5,9 @@ use crate::contact::{Friction, Normals, Touch, contact_normal, interpolate};
 use crate::mesh::Surface;
 use crate::{Vec3, Wrench};
 
+/// No forecast errs by so much (m): a tool that begins a tick farther from where it ended the last one was put there.
+const PUT: f64 = 0.02;
+
 /// What a tool feels.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Feeling {
@@ -15,6 +18,8 @@ pub(super) struct Feeling {
     /// The normal of the surface at rest where it has come to press, in this tick, on nodes that give way in the body, but not here.
     strayed: Option<Vec3>,
     beyond: Beyond,
+    /// Where the tool was at the end of the last tick (m).
+    at: Vec3,
 }
 
 impl Feeling {
@@ -22,7 +27,7 @@ impl Feeling {
     ///
     /// Nothing that a patch knew before: which one is built anew hangs on the threads, and a replay is to be the same.
     pub(super) fn new(wrench: Wrench, at: Vec3, touch: &Touch, surface: (&Surface, &[Vec3])) -> Self {
-        let mut feeling = Self { felt: wrench, ..Self::default() };
+        let mut feeling = Self { felt: wrench, at, ..Self::default() };
         feeling.learn(at, touch, surface);
         feeling
     }
@@ -42,9 +47,10 @@ impl Feeling {
         self.beyond.has_left()
     }
 
-    /// A tick begins.
-    pub(super) fn begin(&mut self) {
+    /// A tick begins, with the tool at `from` (m). True if it was put there: it is not to be dragged there.
+    pub(super) fn begin(&mut self, from: Vec3) -> bool {
         self.sum = Wrench::default();
+        (from - self.at).norm() > PUT
     }
 
     /// A step is over in which it felt `wrench`.
@@ -59,6 +65,7 @@ impl Feeling {
 
     /// A tick of `steps` steps is over, with the tool at `at` (m).
     pub(super) fn end(&mut self, at: Vec3, steps: u32, touch: &Touch, surface: (&Surface, &[Vec3])) {
+        self.at = at;
         match self.strayed.take() {
             Some(normal) => self.beyond.leave(normal, at, self.felt),
             None => {

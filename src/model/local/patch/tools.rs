@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::ResyncView;
 use super::feeling::Feeling;
 use super::window::Window;
-use crate::contact::{Contact, Friction, Rows, Touch};
+use crate::contact::{Contact, Friction, Rows, Steady, ToolMotion, Touch};
 use crate::{Pose, Vec3};
 
 /// The tools that are resolved together on a patch, and what those exert that are not.
@@ -113,10 +113,17 @@ impl Tools {
         }
     }
 
-    /// A tick begins.
-    pub(in crate::local) fn begin(&mut self) {
-        self.touches[..self.present].iter_mut().for_each(Touch::begin);
-        self.feelings.iter_mut().for_each(Feeling::begin);
+    /// A tick begins in which each tool goes the way of its number. One that was put elsewhere touches nothing until it meets something.
+    pub(in crate::local) fn begin(&mut self, ways: &[ToolMotion]) {
+        for (place, (feeling, &number)) in self.feelings.iter_mut().zip(&self.numbers).enumerate() {
+            let is_put = feeling.begin(ways[number].from.position);
+            if let Some(touch) = self.touches[..self.present].get_mut(place) {
+                touch.begin();
+                if is_put && !touch.contact.glued {
+                    touch.go_on_from(Contact::default(), Steady::default(), &[]);
+                }
+            }
+        }
     }
 
     /// A step is over. Those that press on nodes that give way in the body, but not here, go on as they pressed last.

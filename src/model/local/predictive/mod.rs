@@ -226,7 +226,7 @@ impl LocalModel for Predictive {
         let stepping = self.patch.stepping;
         let divided = stepping.divided(self.near.stable_share());
         let substeps = f64::from(stepping.substeps);
-        self.patch.tools.begin();
+        self.patch.tools.begin(tools);
         for [from, to] in divided.parts() {
             let on_path = [from * substeps, to * substeps];
             self.step(|tool| tools[tool].part(from, to), divided.step(), on_path);
