@@ -179,6 +179,30 @@ fn a_tool_that_is_felt_elsewhere_has_no_model_here() {
     }
 }
 
+/// Check that a tool which another machine puts to the other side of the first one is not dragged there past that one, and feels nothing.
+#[test]
+fn a_tool_that_is_put_elsewhere_tears_nothing_along() {
+    for kind in [Kind::Patch, Kind::Predictive] {
+        let (mut simulation, tools) = pressed(ToolShape::Sphere { radius: 6e-3 }, 0.041);
+        let (patch, bases) = patch_and_bases(&simulation);
+        let bases = if kind == Kind::Predictive { bases } else { Bases::default() };
+        let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
+        let mut models = empty(&template);
+        build(&mut models, (&mut simulation, &tools), &patch, &bases);
+        let rests = |place: Vec3| ToolMotion::straight(place, place);
+        models.tick(&tools.map(rests));
+        let before = models.wrench(0).force;
+        assert!(before.norm() > 0.1 && models.wrench(1).force.norm() > 0.1, "{kind:?}: both press");
+        for _ in 0..20 {
+            models.tick(&[rests(tools[0]), rests(Vec3::new(-0.03, 0.0362, 0.03))]);
+            let apart = (models.wrench(0).force - before).norm();
+            // What the second one pressed down comes up to the first.
+            assert!(apart < before.norm(), "{kind:?}: {apart} of {}", before.norm());
+            assert_eq!(models.wrench(1).force, Vec3::zeros(), "{kind:?}");
+        }
+    }
+}
+
 #[test]
 fn a_parcel_of_another_body_is_refused_and_a_path_of_another_ring_is_not_gone() {
     let (mut simulation, tools) = pressed(ToolShape::Point, 0.052);
