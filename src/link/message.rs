@@ -11,7 +11,7 @@
 
 use std::fmt;
 
-use super::Lane;
+use super::lane::Lane;
 use crate::model::body::Stiffness;
 use crate::model::bytes::{BytesReader, BytesWriter};
 use crate::model::contact::Friction;

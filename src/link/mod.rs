@@ -6,14 +6,16 @@
 
 mod clock;
 mod hello;
+mod lane;
 mod message;
 mod transport;
 mod virtual_link;
 
 pub use clock::Clock;
 pub use hello::Hello;
+pub use lane::Lane;
 pub use message::{Header, LARGEST, MOST_TICKS, Message, Refused, VERSION};
-pub use transport::{Lane, Transport};
+pub use transport::Transport;
 pub use virtual_link::{Conditions, VirtualEnd, VirtualLink};
 
 /// A haptic machine, as the global side meets it: the way to it, and what it says of itself.
