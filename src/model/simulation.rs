@@ -9,9 +9,7 @@ mod told;
 use std::sync::Arc;
 
 use crate::body::{Body, State, Stiffened, Stiffness};
-use crate::contact::{
-    Coarseness, Contact, ContactPoint, Friction, Law, Rows, Skin, Steady, ToolMotion, ToolShape, Touch,
-};
+use crate::contact::{Coarseness, Contact, ContactPoint, Friction, Law, Rows, Skin, ToolMotion, ToolShape, Touch};
 use crate::error::ModelError;
 use crate::{Pose, Vec3, Wrench};
 use ahead::{Ahead, Glimpse};
@@ -369,9 +367,7 @@ impl Simulation {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn lift(&mut self, tool: usize) {
-        let touch = &mut self.moving.touches[tool];
-        if !touch.contact.glued {
-            touch.go_on_from(Contact::default(), Steady::default(), &[]);
+        if self.moving.touches[tool].lift() {
             self.moving.means[tool] = Wrench::default();
         }
     }

@@ -131,6 +131,15 @@ impl Touch {
         self.end(1, |triangle| triangle);
     }
 
+    /// Lets the tool touch nothing until it meets something, unless it is glued; whether it does.
+    pub(crate) fn lift(&mut self) -> bool {
+        let is_free = !self.contact.glued;
+        if is_free {
+            self.go_on_from(Contact::default(), Steady::default(), &[]);
+        }
+        is_free
+    }
+
     /// Appends the triangles of a surface with nodes at `positions` (m) that the tool touches, or may touch soon, at `pose`, or if
     /// its radius were larger by `margin` (m).
     pub(crate) fn footprint(

@@ -12,7 +12,7 @@ const QUANTITIES: usize = 3;
 /// Steps from zero to the largest number.
 const STEPS: f64 = 8191.0;
 /// Numbers of one path at most: a ring of 1,000 nodes for 1,000 steps.
-const MOST_NUMBERS: usize = 9_000_000;
+pub(super) const MOST_NUMBERS: usize = 9_000_000;
 /// How far a number may come back from what it was, in steps.
 const CLOSE: f64 = 8.0;
 

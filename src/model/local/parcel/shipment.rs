@@ -1,6 +1,6 @@
 //! The parcels of one resync.
 
-use super::Parcel;
+use super::{Parcel, path};
 use crate::Vec3;
 use crate::bytes::{BytesReader, BytesWriter};
 use crate::local::LocalModels;
@@ -8,7 +8,7 @@ use crate::local::LocalModels;
 /// A parcel is larger in memory than its least bytes: more tools than this are nobody's.
 const MOST_TOOLS: usize = 64;
 /// Numbers of all paths at most: four of the longest.
-const MOST_NUMBERS: usize = 36_000_000;
+const MOST_NUMBERS: usize = 4 * path::MOST_NUMBERS;
 
 /// The ingredients of the local models of all tools, to be built on another computer: they cross a link together, as they serve together.
 ///

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::ResyncView;
 use super::feeling::Feeling;
 use super::window::Window;
-use crate::contact::{Contact, Friction, Rows, Steady, ToolMotion, Touch};
+use crate::contact::{Contact, Friction, Rows, ToolMotion, Touch};
 use crate::{Pose, Vec3};
 
 /// The tools that are resolved together on a patch, and what those exert that are not.
@@ -119,8 +119,8 @@ impl Tools {
             let is_put = feeling.begin(ways[number].from.position);
             if let Some(touch) = self.touches[..self.present].get_mut(place) {
                 touch.begin();
-                if is_put && !touch.contact.glued {
-                    touch.go_on_from(Contact::default(), Steady::default(), &[]);
+                if is_put {
+                    touch.lift();
                 }
             }
         }
