@@ -182,9 +182,10 @@ fn has_gone(written: Result<(), Error>) -> Option<bool> {
     }
 }
 
-/// True if there was nothing to read, or no room to write, for the moment.
+/// True if there was nothing to read, or no room to write, for the moment; a process that was stopped and goes on is interrupted in it.
 fn is_wait(error: &Error) -> bool {
-    matches!(error, Error::Io(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut))
+    let Error::Io(error) = error else { return false };
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
 }
 
 /// Says why, and goes, whether it is heard or not.

@@ -286,8 +286,12 @@ fn a_thread_that_never_returns_is_left_behind_with_its_ports() {
     assert!(seen.len() > released_before && seen.windows(2).all(|pair| pair[0] <= pair[1]), "{seen:?}");
     let mut records = Vec::new();
     drain.drain(&mut records);
-    let codes: Vec<_> = records.iter().filter_map(Event::from_record).map(|event| event.code).collect();
-    assert_eq!(codes, [Event::ABANDONED, Event::RESTARTED]);
+    let codes = records.iter().filter_map(Event::from_record).map(|event| event.code);
+    // Before that it may be taken for one that gets no processor, on a machine that does not give it any.
+    assert_eq!(
+        codes.skip_while(|&code| code == Event::STARVED).collect::<Vec<_>>(),
+        [Event::ABANDONED, Event::RESTARTED]
+    );
     let ticks: Vec<u64> = records
         .iter()
         .filter_map(palpate_runtime::TickTiming::from_record)

@@ -255,7 +255,7 @@ fn a_subscriber_may_ask_the_run_in_both_executions_and_threads_are_told_of_by_on
             let mut graph = Runtime::builder(execution);
             graph.group(
                 RateGroup::hz(200).name("worker"),
-                vec![actor_fn("actor", |ctx| if ctx.tick == 40 { Outcome::Fault(7) } else { Outcome::Continue })],
+                vec![actor_fn("actor", |ctx| if ctx.tick >= 40 { Outcome::Fault(7) } else { Outcome::Continue })],
             );
             let running = Arc::new(graph.build().unwrap().start().unwrap());
             *slot.lock().unwrap() = Some(Arc::clone(&running));

@@ -1,7 +1,7 @@
 //! A visitor without a browser: asks for the page, opens the socket, reads what is shown.
 #![allow(dead_code, reason = "not every test needs all of it")]
 
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
@@ -81,7 +81,7 @@ pub fn find<T>(socket: &mut WebSocket<TcpStream>, mut wanted: impl FnMut(&Messag
                 }
             }
             Err(Error::Io(error))
-                if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {}
+                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
             Err(_) => return None,
         }
     }
@@ -101,7 +101,7 @@ pub fn farewell_with_code(socket: &mut WebSocket<TcpStream>) -> Option<(u16, Str
             Ok(Message::Close(frame)) => return frame.map(|frame| (frame.code.into(), frame.reason.to_string())),
             Ok(_) => {}
             Err(Error::Io(error))
-                if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {}
+                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
             Err(_) => return None,
         }
     }
