@@ -128,11 +128,12 @@ fn show(server: Server, args: &ViewArgs, name: &str) -> Result<(), Error> {
         );
     }
     let url = server.url();
+    // Before anybody is told that Ctrl-C ends it.
+    let interrupt = shared::waits()?;
     shared::print(&format!("{name}: {url}\nCtrl-C ends it\n"))?;
     if !args.no_browser {
         open(&url);
     }
-    let interrupt = shared::waits()?;
     while !interrupt.came() && !server.wait_for(LOOK) {}
     let Some(summary) = server.stop() else { return Ok(()) };
     shared::print(&summary.to_string())?;

@@ -35,14 +35,16 @@ pub fn ask(address: SocketAddr, head: &str) -> String {
 /// Opens the socket as a page of `origin` would.
 pub fn open(address: SocketAddr, origin: Option<&str>) -> Result<WebSocket<TcpStream>, String> {
     let stream = TcpStream::connect(address).map_err(|error| error.to_string())?;
-    stream.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
-    stream.set_write_timeout(Some(PATIENCE)).unwrap();
     let mut request = format!("ws://{address}/socket").into_client_request().unwrap();
     if let Some(origin) = origin {
         request.headers_mut().insert("Origin", origin.parse().unwrap());
     }
     match tungstenite::client(request, stream) {
-        Ok((socket, _)) => Ok(socket),
+        Ok((socket, _)) => {
+            socket.get_ref().set_read_timeout(Some(Duration::from_millis(200))).unwrap();
+            socket.get_ref().set_write_timeout(Some(PATIENCE)).unwrap();
+            Ok(socket)
+        }
         Err(HandshakeError::Failure(Error::Http(answer))) => Err(answer.status().as_u16().to_string()),
         Err(error) => Err(error.to_string()),
     }
