@@ -1,6 +1,6 @@
 //! The opened connections of a session to the global side, and what is asked over them.
 
-use std::sync::{Arc, mpsc};
+use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -11,32 +11,46 @@ use zenoh::{Config, Wait};
 
 use crate::desk::Answer;
 use crate::inbox::Inbox;
-use crate::line::{HELLO, LINES, Lines, Way};
+use crate::line::{HELLO, LINES, Line, Lines, Way};
 
 /// An answer to hello is waited for so long.
 pub(crate) const ANSWERS_WITHIN: Duration = Duration::from_millis(700);
 /// Round trips of which the quickest counts.
 const ROUND_TRIPS: usize = 5;
-/// The other connections are waited for as long again as the first one took, and so much more.
-const LAGS: Duration = Duration::from_millis(50);
-
 #[derive(Debug)]
 pub(crate) struct Connection {
     pub(crate) lines: Lines,
-    /// One for each line, as a rule.
+    /// Of each line, from the first on; one without goes by the first.
     zenoh: Vec<zenoh::Session>,
 }
 
 impl Connection {
-    /// Connects for the `session` of that number, whose messages come into `inbox`. If the path breaks meanwhile, zenoh may take ten seconds to
-    /// give up, whatever its timeouts say.
+    /// Connects for the `session` of that number, whose messages come into `inbox`: all lines go by one connection at first. If the path
+    /// breaks meanwhile, zenoh may take ten seconds to give up, whatever its timeouts say.
     ///
     /// # Errors
     /// If nobody is there, or zenoh or the system refuses.
     pub(crate) fn open(config: &Config, session: u64, inbox: &Arc<Inbox>) -> Result<Self, Error> {
-        let zenoh = open_several(config)?;
-        // A line whose own connection did not come in time goes by another's.
-        Ok(Self { lines: Lines::new(zenoh.iter().cycle().take(LINES), session, Way::Up, inbox)?, zenoh })
+        let zenoh = open(config)?;
+        Ok(Self { lines: Lines::new(&zenoh, session, Way::Up, inbox)?, zenoh: vec![zenoh] })
+    }
+
+    /// Those of its lines that have one, from the first on.
+    pub(crate) fn own(&self) -> Vec<zenoh::Session> {
+        self.zenoh.clone()
+    }
+
+    /// Lets a line go over a connection of its own. What it went by before is returned: messages may still be on their way there.
+    pub(crate) fn take(&mut self, OwnLine { number, line, zenoh }: OwnLine) -> Replaced {
+        let old = self.lines.replace(number, line);
+        let broken = match self.zenoh.get_mut(number) {
+            Some(broken) => Some(std::mem::replace(broken, zenoh)),
+            None => {
+                self.zenoh.push(zenoh);
+                None
+            }
+        };
+        Replaced { _line: old, _zenoh: broken }
     }
 
     /// What is asked goes by the first of them.
@@ -58,36 +72,55 @@ impl Connection {
 impl Drop for Connection {
     /// Closes all at once: each may wait for a peer that is not there.
     fn drop(&mut self) {
-        self.lines = Lines::default();
+        self.lines.end();
         let closing = self.zenoh.drain(..).map(|zenoh| in_background("link closing", move || drop(zenoh)));
         let closing: Vec<_> = closing.collect();
         closing.into_iter().flatten().for_each(|closing| drop(closing.join()));
     }
 }
 
-/// As many connections as there are lines, or those of them that are there soon after the first.
-fn open_several(config: &Config) -> Result<Vec<zenoh::Session>, Error> {
-    let (began, (send, opened)) = (Instant::now(), mpsc::channel());
-    for _ in 0..LINES {
-        let (send, config) = (send.clone(), config.clone());
-        // One that comes too late has nowhere to go, and is closed.
-        in_background("link opening", move || drop(send.send(zenoh::open(config).wait())));
+/// A line with a connection of its own.
+#[derive(Debug)]
+pub(crate) struct OwnLine {
+    number: usize,
+    line: Line,
+    zenoh: zenoh::Session,
+}
+
+impl OwnLine {
+    /// Opens it for the `session` of that number, whose messages come into `inbox`.
+    ///
+    /// # Errors
+    /// If nobody is there, or zenoh or the system refuses.
+    pub(crate) fn open(config: &Config, session: u64, number: usize, inbox: &Arc<Inbox>) -> Result<Self, Error> {
+        let zenoh = open(config)?;
+        Ok(Self { number, line: Line::new(&zenoh, session, number, Way::Up, inbox)?, zenoh })
     }
-    drop(send);
-    let (mut zenoh, mut until, mut why) = (Vec::new(), None, "no thread to connect".to_owned());
-    loop {
-        let next = match until {
-            None => opened.recv().ok(),
-            Some(until) => opened.recv_timeout(Instant::saturating_duration_since(&until, Instant::now())).ok(),
-        };
-        match next {
-            Some(Ok(session)) => zenoh.push(session),
-            Some(Err(error)) => why = error.to_string(),
-            None => break,
-        }
-        until = until.or_else(|| (!zenoh.is_empty()).then(|| Instant::now() + began.elapsed() + LAGS));
-    }
-    if zenoh.is_empty() { Err(Error::new(ErrorKind::Runtime, format!("zenoh: {why}"))) } else { Ok(zenoh) }
+}
+
+/// What a line went by until it got another connection, in the order in which it ends. That may wait for a peer that is not there.
+#[derive(Debug)]
+pub(crate) struct Replaced {
+    _line: Line,
+    _zenoh: Option<zenoh::Session>,
+}
+
+/// The first line that has no connection in `own`, or one at whose other end nobody is.
+pub(crate) fn lacking(own: &[zenoh::Session]) -> Option<usize> {
+    let is_broken = |zenoh: &zenoh::Session| {
+        let info = zenoh.info();
+        info.routers_zid().wait().next().is_none() && info.peers_zid().wait().next().is_none()
+    };
+    (0..LINES).find(|&line| own.get(line).is_none_or(is_broken))
+}
+
+/// One connection.
+///
+/// # Errors
+/// If nobody is there, or zenoh refuses.
+fn open(config: &Config) -> Result<zenoh::Session, Error> {
+    let failed = |error| Error::new(ErrorKind::Runtime, format!("zenoh: {error}"));
+    zenoh::open(config.clone()).wait().map_err(failed)
 }
 
 /// Does it on a thread of its own. Where the system gives none, what `work` holds is dropped at once.
@@ -109,5 +142,80 @@ fn ask(zenoh: &zenoh::Session, question: Vec<u8>, within: Duration) -> Option<An
     match reply.result() {
         Ok(sample) => Answer::read(&sample.payload().to_bytes()),
         Err(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::net::TcpListener;
+
+    use palpate::link::{Header, Lane, Message};
+
+    use super::*;
+    use crate::access::Access;
+
+    const SESSION: u64 = 7;
+
+    fn put_pings(lines: &mut Lines, numbers: std::ops::Range<u64>) {
+        for number in numbers {
+            let mut ping = Vec::new();
+            Message::Ping.write(Header { number, ..Header::default() }, &mut ping);
+            // Of the lanes, the one of which nothing is dropped.
+            lines.put(Lane::Bulk, &ping);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn pings(inbox: &Inbox, within: Duration, count: usize) -> BTreeSet<u64> {
+        let (began, mut message, mut numbers) = (Instant::now(), Vec::new(), BTreeSet::new());
+        while began.elapsed() < within && numbers.len() < count {
+            while inbox.take(&mut message) {
+                numbers.insert(Message::glance(&message).unwrap().1.number);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        numbers
+    }
+
+    /// Check that lines get connections of their own while messages go both ways, that none is lost by it, and that one that breaks is found.
+    #[test]
+    fn lines_move_to_connections_of_their_own_and_lose_nothing() {
+        let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let (address, access) = (format!("tcp/{free}"), Access::default());
+        let there = zenoh::open(access.listening(&address).unwrap()).wait().unwrap();
+        let [inbox_there, inbox] = [0; 2].map(|_| Arc::new(Inbox::default()));
+        let mut lines = Lines::new(&there, SESSION, Way::Down, &inbox_there).unwrap();
+        let config = access.connecting(&address).unwrap();
+        let mut connection = Connection::open(&config, SESSION, &inbox).unwrap();
+        // Until each side knows what the other one hears.
+        let (mut begun, mut number) = (false, 0);
+        while !begun {
+            put_pings(&mut connection.lines, number..number + 9);
+            put_pings(&mut lines, number..number + 9);
+            number += 9;
+            begun = [&inbox_there, &inbox].iter().all(|inbox| pings(inbox, Duration::from_millis(50), 9).len() == 9);
+            assert!(number < 1000, "no message comes");
+        }
+        let sent = number..number + 400;
+        let mut replaced = Vec::new();
+        std::thread::scope(|scope| {
+            scope.spawn(|| put_pings(&mut lines, sent.clone()));
+            for (hundred, expected) in [Some(1), Some(2), None, None].into_iter().enumerate() {
+                let from = sent.start + 100 * hundred as u64;
+                put_pings(&mut connection.lines, from..from + 100);
+                let lacking = lacking(&connection.own());
+                assert_eq!(lacking, expected);
+                if let Some(line) = lacking {
+                    replaced.push(connection.take(OwnLine::open(&config, SESSION, line, &inbox).unwrap()));
+                }
+            }
+        });
+        for inbox in [&inbox_there, &inbox] {
+            let come = pings(inbox, Duration::from_secs(5), 400);
+            assert!(sent.clone().all(|number| come.contains(&number)), "{} of 400 have come", come.len());
+        }
+        connection.own()[1].close().wait().unwrap();
+        assert_eq!(lacking(&connection.own()), Some(1));
     }
 }

@@ -1,13 +1,15 @@
-//! Looks after the connection of a running session: asks where it is silent, and opens another one where it is broken.
+//! Looks after the connection of a running session: gives each of its lines one of its own, asks where it is silent, and opens another one where
+//! it is broken.
 
 use std::net::{SocketAddr, TcpStream};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, mpsc};
+use std::sync::mpsc::{self, Receiver, TryRecvError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use palpate::link::Hello;
 use zenoh::Config;
 
-use crate::connection::{ANSWERS_WITHIN, Connection, in_background, say};
+use crate::connection::{ANSWERS_WITHIN, Connection, OwnLine, in_background, lacking, say};
 use crate::desk::Answer;
 use crate::inbox::Inbox;
 use crate::unique;
@@ -24,6 +26,11 @@ const THINKS_FOR: Duration = Duration::from_millis(100);
 const OPENS_WITHIN: Duration = Duration::from_millis(1000);
 /// A session that is welcome and yet silent for so long begins anew, under another number.
 const RENEWS_AFTER: Duration = Duration::from_secs(5);
+/// Lines get connections of their own so long after each other: such as begin at one moment may pause at one moment, as TCP with BBR does for
+/// 0.2 s about every ten seconds after it began.
+const APART: Duration = Duration::from_millis(700);
+/// What was sent before a line got another connection has come after so long.
+const ON_ITS_WAY: Duration = Duration::from_secs(2);
 /// Between two looks.
 pub(crate) const LOOK: Duration = Duration::from_millis(50);
 
@@ -73,6 +80,8 @@ pub(crate) struct Keeper {
     hello: Hello,
     /// An answer takes no longer if somebody is there.
     reached_within: Duration,
+    /// The next line that gets a connection of its own, since then.
+    opening: (Option<Receiver<OwnLine>>, Instant),
     /// When another connection was opened and welcome, which gets as long as the first to say something.
     reopened: Option<Instant>,
     /// It is silent, and yet welcome.
@@ -83,7 +92,18 @@ pub(crate) struct Keeper {
 impl Keeper {
     pub(crate) fn new(shared: Arc<Shared>, config: Config, places: Vec<SocketAddr>, hello: Hello) -> Self {
         let reached_within = REACHED_WITHIN.min(3 * hello.round_trip.to_duration() + THINKS_FOR);
-        Self { shared, config, places, hello, reached_within, reopened: None, welcome_since: None, is_refused: false }
+        let opening = (None, Instant::now());
+        Self {
+            shared,
+            config,
+            places,
+            hello,
+            reached_within,
+            opening,
+            reopened: None,
+            welcome_since: None,
+            is_refused: false,
+        }
     }
 
     /// Until the session is over.
@@ -92,6 +112,7 @@ impl Keeper {
             let silent_for = self.shared.silent_for();
             if silent_for < ASKS_AFTER {
                 self.welcome_since = None;
+                self.complete();
                 continue;
             }
             let open_for = self.reopened.map_or(Duration::MAX, |at| at.elapsed());
@@ -117,6 +138,40 @@ impl Keeper {
         // Outside of the lock: a bridge may still look.
         let connection = self.shared.kept().connection.take();
         drop(connection);
+    }
+
+    /// Gives lines that have none a connection of their own, one after the other.
+    fn complete(&mut self) {
+        match self.opening.0.as_ref().map(Receiver::try_recv) {
+            Some(Ok(line)) => {
+                let replaced = self.shared.kept().connection.as_mut().map(|connection| connection.take(line));
+                in_background("link closing", move || {
+                    std::thread::sleep(ON_ITS_WAY);
+                    drop(replaced);
+                });
+                self.opening = (None, Instant::now());
+            }
+            Some(Err(TryRecvError::Disconnected)) => self.opening = (None, Instant::now()),
+            Some(Err(TryRecvError::Empty)) => {}
+            None if self.opening.1.elapsed() < APART => {}
+            None => {
+                let own = self.shared.kept().connection.as_ref().map(Connection::own);
+                let lacking = own.and_then(|own| lacking(&own));
+                self.opening = (lacking.map(|number| self.open_line(number)), Instant::now());
+            }
+        }
+    }
+
+    /// A line with a connection of its own, once it is there; none if that fails.
+    fn open_line(&self, number: usize) -> Receiver<OwnLine> {
+        let (send, opened) = mpsc::channel();
+        let (config, session, inbox) = (self.config.clone(), self.hello.session, Arc::clone(&self.shared.inbox));
+        in_background("link opening", move || {
+            if let Ok(line) = OwnLine::open(&config, session, number, &inbox) {
+                let _ = send.send(line);
+            }
+        });
+        opened
     }
 
     fn is_reachable(&self) -> bool {
@@ -155,6 +210,8 @@ impl Keeper {
             in_background("link closing", move || drop(connection));
             return;
         }
+        // What is opened for a line of the old one has nowhere to go.
+        self.opening = (None, Instant::now());
         let session = connection.zenoh().clone();
         let old = self.shared.kept().connection.replace(connection);
         // Closing may wait for a peer that is not there.

@@ -1,7 +1,7 @@
 //! The lines of a session: names, what goes out under them and what comes in.
 //!
 //! Over TCP whatever comes after a lost packet waits for it to come again, for a round trip and more. So there are several lines, each over
-//! a connection of its own. Local models, of which hardly one is without a loss, go by all of them, and the first to arrive is taken. Of
+//! a connection of its own as soon as that is there. Local models, of which hardly one is without a loss, go by all of them, and the first to arrive is taken. Of
 //! the rest each message goes by one line, and those that go by the others do not wait for it; tool ticks, which repeat the last ones, are
 //! there in time whichever line is held up.
 
@@ -45,7 +45,7 @@ impl Way {
 }
 
 /// A session's messages over zenoh: gone when they are dropped.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Lines {
     lines: Vec<Line>,
     /// Messages that went by one line each.
@@ -53,18 +53,23 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    /// Sends what goes `way` in the `session` of that number, a line over each of `zenoh`, and puts what comes back into `inbox`.
+    /// Sends what goes `way` in the `session` of that number, and puts what comes back into `inbox`: all lines go over `zenoh`.
     ///
     /// # Errors
     /// If zenoh or the system refuses.
-    pub(crate) fn new<'a>(
-        zenoh: impl Iterator<Item = &'a zenoh::Session>,
-        session: u64,
-        way: Way,
-        inbox: &Arc<Inbox>,
-    ) -> Result<Self, Error> {
-        let line = |(line, zenoh)| Line::new(zenoh, [way, way.back()].map(|way| way.prefix(session, line)), inbox);
-        Ok(Self { lines: zenoh.enumerate().map(line).collect::<Result<_, _>>()?, sent: 0 })
+    pub(crate) fn new(zenoh: &zenoh::Session, session: u64, way: Way, inbox: &Arc<Inbox>) -> Result<Self, Error> {
+        let lines = (0..LINES).map(|number| Line::new(zenoh, session, number, way, inbox));
+        Ok(Self { lines: lines.collect::<Result<_, _>>()?, sent: 0 })
+    }
+
+    /// Lets another one stand for the line of that number. The old one still hears and sends what waits until it is dropped.
+    pub(crate) fn replace(&mut self, number: usize, line: Line) -> Line {
+        std::mem::replace(&mut self.lines[number], line)
+    }
+
+    /// Nothing goes and comes any more.
+    pub(crate) fn end(&mut self) {
+        self.lines.clear();
     }
 
     /// Hands over a message; never waits for the network.
@@ -82,14 +87,24 @@ impl Lines {
 
 /// One of them.
 #[derive(Debug)]
-struct Line {
+pub(crate) struct Line {
     outbox: Outbox,
     _subscriber: Subscriber<()>,
 }
 
 impl Line {
-    /// Sends under the first of the names and hears under the second.
-    fn new(zenoh: &zenoh::Session, [out, back]: [String; 2], inbox: &Arc<Inbox>) -> Result<Self, Error> {
+    /// The line of that number of the `session`: sends what goes `way` over `zenoh`, and puts what comes back into `inbox`.
+    ///
+    /// # Errors
+    /// If zenoh or the system refuses.
+    pub(crate) fn new(
+        zenoh: &zenoh::Session,
+        session: u64,
+        number: usize,
+        way: Way,
+        inbox: &Arc<Inbox>,
+    ) -> Result<Self, Error> {
+        let [out, back] = [way, way.back()].map(|way| way.prefix(session, number));
         let inbox = Arc::clone(inbox);
         let keep = move |sample: zenoh::sample::Sample| {
             let payload = sample.payload();

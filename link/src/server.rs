@@ -12,7 +12,7 @@ use zenoh::Wait;
 use crate::access::Access;
 use crate::desk::{Arrival, Desk, Guest};
 use crate::inbox::Inbox;
-use crate::line::{HELLO, LINES, Lines, Way};
+use crate::line::{HELLO, Lines, Way};
 
 /// Between two looks whether somebody has come, or whoever serves wants to end.
 const LOOK: Duration = Duration::from_millis(50);
@@ -192,7 +192,6 @@ struct HapticSide {
 impl HapticSide {
     fn new(zenoh: &zenoh::Session, guest: &Guest) -> Result<Self, Error> {
         let inbox = Arc::clone(&guest.inbox);
-        let zenoh = std::iter::repeat_n(zenoh, LINES);
         Ok(Self { lines: Lines::new(zenoh, guest.hello.session, Way::Down, &inbox)?, inbox })
     }
 }
