@@ -20,7 +20,7 @@ const ROUND_TRIPS: usize = 5;
 #[derive(Debug)]
 pub(crate) struct Connection {
     pub(crate) lines: Lines,
-    /// Of each line, from the first on; one without goes by the first.
+    /// That of each line; one that has none of its own goes by that of the first.
     zenoh: Vec<zenoh::Session>,
 }
 
@@ -32,25 +32,18 @@ impl Connection {
     /// If nobody is there, or zenoh or the system refuses.
     pub(crate) fn open(config: &Config, session: u64, inbox: &Arc<Inbox>) -> Result<Self, Error> {
         let zenoh = open(config)?;
-        Ok(Self { lines: Lines::new(&zenoh, session, Way::Up, inbox)?, zenoh: vec![zenoh] })
+        Ok(Self { lines: Lines::new(&zenoh, session, Way::Up, inbox)?, zenoh: vec![zenoh; LINES] })
     }
 
-    /// Those of its lines that have one, from the first on.
-    pub(crate) fn own(&self) -> Vec<zenoh::Session> {
+    /// Those by which its lines go.
+    pub(crate) fn by_line(&self) -> Vec<zenoh::Session> {
         self.zenoh.clone()
     }
 
     /// Lets a line go over a connection of its own. What it went by before is returned: messages may still be on their way there.
     pub(crate) fn take(&mut self, OwnLine { number, line, zenoh }: OwnLine) -> Replaced {
         let old = self.lines.replace(number, line);
-        let broken = match self.zenoh.get_mut(number) {
-            Some(broken) => Some(std::mem::replace(broken, zenoh)),
-            None => {
-                self.zenoh.push(zenoh);
-                None
-            }
-        };
-        Replaced { _line: old, _zenoh: broken }
+        Replaced { _line: old, _zenoh: std::mem::replace(&mut self.zenoh[number], zenoh) }
     }
 
     /// What is asked goes by the first of them.
@@ -102,16 +95,17 @@ impl OwnLine {
 #[derive(Debug)]
 pub(crate) struct Replaced {
     _line: Line,
-    _zenoh: Option<zenoh::Session>,
+    _zenoh: zenoh::Session,
 }
 
-/// The first line that has no connection in `own`, or one at whose other end nobody is.
-pub(crate) fn lacking(own: &[zenoh::Session]) -> Option<usize> {
+/// The lines that have no connection of their own [among](Connection::by_line) these, or one at whose other end nobody is.
+pub(crate) fn lacking(by_line: &[zenoh::Session]) -> Vec<usize> {
     let is_broken = |zenoh: &zenoh::Session| {
         let info = zenoh.info();
         info.routers_zid().wait().next().is_none() && info.peers_zid().wait().next().is_none()
     };
-    (0..LINES).find(|&line| own.get(line).is_none_or(is_broken))
+    let is_own = |line: usize| line == 0 || by_line[line].zid() != by_line[0].zid();
+    (0..by_line.len()).filter(|&line| !is_own(line) || is_broken(&by_line[line])).collect()
 }
 
 /// One connection.
@@ -201,12 +195,12 @@ mod tests {
         let mut replaced = Vec::new();
         std::thread::scope(|scope| {
             scope.spawn(|| put_pings(&mut lines, sent.clone()));
-            for (hundred, expected) in [Some(1), Some(2), None, None].into_iter().enumerate() {
+            for (hundred, expected) in [&[1, 2][..], &[1], &[], &[]].into_iter().enumerate() {
                 let from = sent.start + 100 * hundred as u64;
                 put_pings(&mut connection.lines, from..from + 100);
-                let lacking = lacking(&connection.own());
+                let lacking = lacking(&connection.by_line());
                 assert_eq!(lacking, expected);
-                if let Some(line) = lacking {
+                if let Some(&line) = lacking.last() {
                     replaced.push(connection.take(OwnLine::open(&config, SESSION, line, &inbox).unwrap()));
                 }
             }
@@ -215,7 +209,7 @@ mod tests {
             let come = pings(inbox, Duration::from_secs(5), 400);
             assert!(sent.clone().all(|number| come.contains(&number)), "{} of 400 have come", come.len());
         }
-        connection.own()[1].close().wait().unwrap();
-        assert_eq!(lacking(&connection.own()), Some(1));
+        connection.by_line()[1].close().wait().unwrap();
+        assert_eq!(lacking(&connection.by_line()), [1]);
     }
 }

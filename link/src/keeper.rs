@@ -12,6 +12,7 @@ use zenoh::Config;
 use crate::connection::{ANSWERS_WITHIN, Connection, OwnLine, in_background, lacking, say};
 use crate::desk::Answer;
 use crate::inbox::Inbox;
+use crate::line::LINES;
 use crate::unique;
 
 /// A link that has been silent for so long is asked whether somebody is there: there may be another process by now.
@@ -28,7 +29,7 @@ const OPENS_WITHIN: Duration = Duration::from_millis(1000);
 const RENEWS_AFTER: Duration = Duration::from_secs(5);
 /// Lines get connections of their own so long after each other: such as begin at one moment may pause at one moment, as TCP with BBR does for
 /// 0.2 s about every ten seconds after it began.
-const APART: Duration = Duration::from_millis(700);
+const APART: Duration = Duration::from_millis(300);
 /// What was sent before a line got another connection has come after so long.
 const ON_ITS_WAY: Duration = Duration::from_secs(2);
 /// Between two looks.
@@ -80,8 +81,10 @@ pub(crate) struct Keeper {
     hello: Hello,
     /// An answer takes no longer if somebody is there.
     reached_within: Duration,
-    /// The next line that gets a connection of its own, since then.
-    opening: (Option<Receiver<OwnLine>>, Instant),
+    /// Lines for which a connection of their own is being opened.
+    opening: [Option<Receiver<OwnLine>>; LINES],
+    /// When it was last looked which lines lack one.
+    completed: Option<Instant>,
     /// When another connection was opened and welcome, which gets as long as the first to say something.
     reopened: Option<Instant>,
     /// It is silent, and yet welcome.
@@ -92,7 +95,7 @@ pub(crate) struct Keeper {
 impl Keeper {
     pub(crate) fn new(shared: Arc<Shared>, config: Config, places: Vec<SocketAddr>, hello: Hello) -> Self {
         let reached_within = REACHED_WITHIN.min(3 * hello.round_trip.to_duration() + THINKS_FOR);
-        let opening = (None, Instant::now());
+        let opening = Default::default();
         Self {
             shared,
             config,
@@ -100,6 +103,7 @@ impl Keeper {
             hello,
             reached_within,
             opening,
+            completed: None,
             reopened: None,
             welcome_since: None,
             is_refused: false,
@@ -140,25 +144,30 @@ impl Keeper {
         drop(connection);
     }
 
-    /// Gives lines that have none a connection of their own, one after the other.
+    /// Gives lines that have none, or a broken one, a connection of their own.
     fn complete(&mut self) {
-        match self.opening.0.as_ref().map(Receiver::try_recv) {
-            Some(Ok(line)) => {
-                let replaced = self.shared.kept().connection.as_mut().map(|connection| connection.take(line));
-                in_background("link closing", move || {
-                    std::thread::sleep(ON_ITS_WAY);
-                    drop(replaced);
-                });
-                self.opening = (None, Instant::now());
+        for opening in &mut self.opening {
+            match opening.as_ref().map(Receiver::try_recv) {
+                Some(Ok(line)) => {
+                    let replaced = self.shared.kept().connection.as_mut().map(|connection| connection.take(line));
+                    in_background("link closing", move || {
+                        std::thread::sleep(ON_ITS_WAY);
+                        drop(replaced);
+                    });
+                    *opening = None;
+                }
+                Some(Err(TryRecvError::Disconnected)) => *opening = None,
+                Some(Err(TryRecvError::Empty)) | None => {}
             }
-            Some(Err(TryRecvError::Disconnected)) => self.opening = (None, Instant::now()),
-            Some(Err(TryRecvError::Empty)) => {}
-            None if self.opening.1.elapsed() < APART => {}
-            None => {
-                let own = self.shared.kept().connection.as_ref().map(Connection::own);
-                let lacking = own.and_then(|own| lacking(&own));
-                self.opening = (lacking.map(|number| self.open_line(number)), Instant::now());
-            }
+        }
+        if self.completed.is_some_and(|at| at.elapsed() < APART) {
+            return;
+        }
+        self.completed = Some(Instant::now());
+        let by_line = self.shared.kept().connection.as_ref().map(Connection::by_line);
+        let mut lacking = by_line.iter().flat_map(|by_line| lacking(by_line));
+        if let Some(number) = lacking.find(|&number| self.opening[number].is_none()) {
+            self.opening[number] = Some(self.open_line(number));
         }
     }
 
@@ -210,8 +219,8 @@ impl Keeper {
             in_background("link closing", move || drop(connection));
             return;
         }
-        // What is opened for a line of the old one has nowhere to go.
-        self.opening = (None, Instant::now());
+        // What is being opened for the lines of the old one has nowhere to go.
+        (self.opening, self.completed) = Default::default();
         let session = connection.zenoh().clone();
         let old = self.shared.kept().connection.replace(connection);
         // Closing may wait for a peer that is not there.
