@@ -58,12 +58,15 @@ class Sides:
 
     def __init__(self, lab, palpate, path, log, seconds):
         run_it = ["run", path, "--model", MODEL, "--duration", seconds, "--out", log]
-        self.serve, self.log, self.palpate = lab.serve(path, MODEL), log, palpate
+        self.serve, self.log, self.palpate, self.seconds = lab.serve(path, MODEL), log, palpate, seconds
         self.haptic = lab.haptic(*run_it)
         self.began = time.monotonic()
 
     def wait_until(self, seconds):
         time.sleep(max(0.0, self.began + seconds - time.monotonic()))
+        for side, process in (("haptic", self.haptic), ("global", self.serve)):
+            if time.monotonic() < self.began + self.seconds and process.poll() is not None:
+                sys.exit(f"the {side} side ended with {process.returncode}: {''.join(process.communicate())}")
 
     def end(self):
         """What `palpate timing` says of the log."""

@@ -10,6 +10,9 @@ use zenoh::bytes::ZBytes;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 
+/// Stack of a thread that sends. The usual 2 MB would be locked in memory with the rest of a haptic process, for each line and lane.
+const STACK: usize = 512 << 10;
+
 /// Messages of a lane that wait at most: of more, the oldest is dropped.
 const MOST_WAITING: usize = 256;
 
@@ -55,7 +58,7 @@ impl Outbox {
             let publisher = publisher.priority(priority).congestion_control(congestion).express(true).wait();
             let publisher = publisher.map_err(|error| Error::new(ErrorKind::Runtime, format!("zenoh: {error}")))?;
             let queue = Arc::clone(queue);
-            let thread = std::thread::Builder::new().name(format!("link {name}"));
+            let thread = std::thread::Builder::new().name(format!("link {name}")).stack_size(STACK);
             let started = thread.spawn(move || queue.send(&publisher));
             started.map_err(|error| Error::new(ErrorKind::Runtime, format!("no thread for the link: {error}")))?;
         }
