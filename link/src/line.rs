@@ -5,7 +5,7 @@
 //! the rest each message goes by one line, and those that go by the others do not wait for it; tool ticks, which repeat the last ones, are
 //! there in time whichever line is held up.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use palpate::link::Lane;
 use palpate::random::uniform;
@@ -53,13 +53,12 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    /// Sends what goes `way` in the `session` of that number, and puts what comes back into `inbox`, all over `zenoh`: by the first line, and by
-    /// each other one from which something has come.
+    /// Sends what goes `way` in the `session` of that number, and puts what comes back into `inbox`: all lines go over `zenoh`.
     ///
     /// # Errors
     /// If zenoh or the system refuses.
     pub(crate) fn new(zenoh: &zenoh::Session, session: u64, way: Way, inbox: &Arc<Inbox>) -> Result<Self, Error> {
-        let lines = (0..LINES).map(|number| Line::new(zenoh, session, number, way, inbox, number == 0));
+        let lines = (0..LINES).map(|number| Line::new(zenoh, session, number, way, inbox));
         Ok(Self { lines: lines.collect::<Result<_, _>>()?, sent: 0 })
     }
 
@@ -77,19 +76,12 @@ impl Lines {
     pub(crate) fn put(&mut self, lane: Lane, message: &[u8]) {
         let message = ZBytes::from(message);
         if lane == Lane::Models {
-            self.in_use().for_each(|line| line.outbox.put(lane, message.clone()));
+            self.lines.iter().for_each(|line| line.outbox.put(lane, message.clone()));
             return;
         }
         // By chance: in turn, those of one of three tools would all go by the same line.
         self.sent += 1;
-        let chosen = (uniform(0, self.sent) * self.in_use().count() as f64) as usize;
-        if let Some(line) = self.in_use().nth(chosen) {
-            line.outbox.put(lane, message);
-        }
-    }
-
-    pub(crate) fn in_use(&self) -> impl Iterator<Item = &Line> {
-        self.lines.iter().filter(|line| line.in_use.get().is_some())
+        self.lines[(uniform(0, self.sent) * self.lines.len() as f64) as usize].outbox.put(lane, message);
     }
 }
 
@@ -97,14 +89,11 @@ impl Lines {
 #[derive(Debug)]
 pub(crate) struct Line {
     outbox: Outbox,
-    /// Set once it is: two that go by one connection would only fill it with the same models.
-    in_use: Arc<OnceLock<()>>,
     _subscriber: Subscriber<()>,
 }
 
 impl Line {
-    /// The line of that number of the `session`: sends what goes `way` over `zenoh`, and puts what comes back into `inbox`. It is used at once,
-    /// or from when something came by it.
+    /// The line of that number of the `session`: sends what goes `way` over `zenoh`, and puts what comes back into `inbox`.
     ///
     /// # Errors
     /// If zenoh or the system refuses.
@@ -114,22 +103,17 @@ impl Line {
         number: usize,
         way: Way,
         inbox: &Arc<Inbox>,
-        at_once: bool,
     ) -> Result<Self, Error> {
         let [out, back] = [way, way.back()].map(|way| way.prefix(session, number));
-        let (inbox, in_use) = (Arc::clone(inbox), Arc::new(OnceLock::new()));
-        if at_once {
-            let _ = in_use.set(());
-        }
-        let used = Arc::clone(&in_use);
+        let inbox = Arc::clone(inbox);
         let keep = move |sample: zenoh::sample::Sample| {
             let payload = sample.payload();
-            if payload.len() <= palpate::link::LARGEST && inbox.put(&payload.to_bytes()) {
-                let _ = used.set(());
+            if payload.len() <= palpate::link::LARGEST {
+                inbox.put(&payload.to_bytes());
             }
         };
         let coming = zenoh.declare_subscriber(format!("{back}/*")).callback(keep).wait();
         let subscriber = coming.map_err(|error| Error::new(ErrorKind::Runtime, format!("zenoh: {error}")))?;
-        Ok(Self { outbox: Outbox::new(zenoh, &out)?, in_use, _subscriber: subscriber })
+        Ok(Self { outbox: Outbox::new(zenoh, &out)?, _subscriber: subscriber })
     }
 }
