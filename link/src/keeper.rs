@@ -6,6 +6,7 @@ use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use palpate::Error;
 use palpate::link::Hello;
 use zenoh::Config;
 
@@ -173,14 +174,8 @@ impl Keeper {
 
     /// A line with a connection of its own, once it is there; none if that fails.
     fn open_line(&self, number: usize) -> Receiver<OwnLine> {
-        let (send, opened) = mpsc::channel();
         let (config, session, inbox) = (self.config.clone(), self.hello.session, Arc::clone(&self.shared.inbox));
-        in_background("link opening", move || {
-            if let Ok(line) = OwnLine::open(&config, session, number, &inbox) {
-                let _ = send.send(line);
-            }
-        });
-        opened
+        opening(move || OwnLine::open(&config, session, number, &inbox))
     }
 
     fn is_reachable(&self) -> bool {
@@ -233,13 +228,18 @@ impl Keeper {
 
     /// Another connection, if there is one in time; one that comes later is closed.
     fn open(&self) -> Option<Connection> {
-        let (send, opened) = mpsc::sync_channel(0);
         let (config, session, inbox) = (self.config.clone(), self.hello.session, Arc::clone(&self.shared.inbox));
-        in_background("link opening", move || {
-            if let Ok(connection) = Connection::open(&config, session, &inbox) {
-                let _ = send.send(connection);
-            }
-        });
-        opened.recv_timeout(OPENS_WITHIN).ok()
+        opening(move || Connection::open(&config, session, &inbox)).recv_timeout(OPENS_WITHIN).ok()
     }
+}
+
+/// What `open` opens in the background, once it is there; none if that fails. One that nobody waits for any more is closed there too.
+fn opening<T: Send + 'static>(open: impl FnOnce() -> Result<T, Error> + Send + 'static) -> Receiver<T> {
+    let (send, opened) = mpsc::sync_channel(0);
+    in_background("link opening", move || {
+        if let Ok(one) = open() {
+            let _ = send.send(one);
+        }
+    });
+    opened
 }

@@ -1,9 +1,9 @@
 //! The lines of a session: names, what goes out under them and what comes in.
 //!
 //! Over TCP whatever comes after a lost packet waits for it to come again, for a round trip and more. So there are several lines, each over
-//! a connection of its own as soon as that is there. Local models, of which hardly one is without a loss, go by all of them, and the first to arrive is taken. Of
-//! the rest each message goes by one line, and those that go by the others do not wait for it; tool ticks, which repeat the last ones, are
-//! there in time whichever line is held up.
+//! a connection of its own as soon as that is there. Local models, of which hardly one is without a loss, go by all of them, and the first to
+//! arrive is taken. Of the rest each message goes by one line, and those that go by the others do not wait for it; tool ticks, which repeat the
+//! last ones, are there in time whichever line is held up.
 
 use std::sync::Arc;
 
