@@ -188,10 +188,11 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let resting = plan::resting(&scene, &template, &kinds, &start);
 
     let local = groups::local_group(local, rates[0], &tools, &scene.devices, execution);
-    let evaluation = || measured.unwrap_or_else(|| budget::force_evaluation(&mut *start.body, &start.state));
+    let measure = || budget::force_evaluation(&mut *start.body, &start.state);
+    let nodes = start.state.positions.len();
     let [local, global] = match execution {
         Execution::Virtual => [local, global],
-        Execution::Threaded => budget::declare(evaluation, start.state.positions.len(), timing, kind, [local, global])?,
+        Execution::Threaded => budget::declare(measured, measure, (nodes, timing, kind), [local, global])?,
     };
     let blend = Blend::new(scene.local.blend.kind, blend_ticks);
     let (probes, in_real_time) = (std::mem::take(&mut start.probes), options.in_real_time);
