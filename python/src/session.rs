@@ -36,8 +36,8 @@ const STEP: Duration = Duration::from_millis(10);
 /// tool: Point(), Sphere(radius_m) or Capsule(radius_m, length_m). path: a file (t_s,x_m,y_m,z_m), one place (x, y, z), or rows of (t_s,
 /// x_m, y_m, z_m), with (qw, qx, qy, qz) behind them for a tool that turns; linear in between. attach_node: the surface node that the tool
 /// is glued to, (i, j, k) of a block or its number. model: "auto", "full", "hold", "patch", "predictive" and so on. friction: Coulomb's
-/// coefficient, "stick" for a tool that sticks. error_pct: the largest expected error (rms, % of the peak force). patch: nodes along the
-/// surface, along it, into depth. basis: states of the reduced surroundings. crossfade_ms: resyncs are blended over so long. probes: nodes
+/// coefficient, "stick" for a tool that sticks. error_pct: what 19 of 20 random scenes are to keep (rms, % of the peak force). patch: nodes
+/// along the surface, along it, into depth. basis: states of the reduced surroundings. crossfade_ms: resyncs are blended over so long. probes: nodes
 /// whose position is logged, numbers or (i, j, k). duration_s: simulated time; without, that of the path, or of the scene. rate_hz,
 /// global_rate_hz: of the local and the global model. settings: any tables of a scene file, such as {"safety": {...}}.
 ///

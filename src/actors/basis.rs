@@ -84,7 +84,7 @@ impl BasisActor {
 
     /// Makes the basis of `patch`, or begins it; with the time that this takes, if that is none of the machine's.
     fn make(&mut self, patch: &[u32]) -> (Nanos, Option<Made>) {
-        let Some(reduction) = Reduction::new(&self.resting, patch, self.store.size()) else {
+        let Some(reduction) = Reduction::new(&self.resting, patch, self.store.states()) else {
             return (Nanos::ZERO, Some((patch.to_vec(), Ok(None))));
         };
         let cost = match self.pace {

@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 use crate::error::Error;
 use crate::files;
 use crate::model::body::InstructionSet;
-use crate::model::surroundings::{Basis, Reduction, RestingBody, Size};
+use crate::model::surroundings::{Basis, Reduction, RestingBody};
 
 /// The largest file that may be a basis (bytes).
 const MOST_BYTES: u64 = 1 << 28;
@@ -25,8 +25,8 @@ const NAMES: u32 = 100;
 /// Makes the bases of one body, or reads those that it has made before.
 #[derive(Clone, Debug)]
 pub struct BasisStore {
-    /// How large a basis is to be.
-    size: Size,
+    /// Of a basis.
+    states: usize,
     /// Bases are kept in this folder, if there is one.
     folder: Option<PathBuf>,
     most_kept: u64,
@@ -35,14 +35,14 @@ pub struct BasisStore {
 }
 
 impl BasisStore {
-    /// A store of bases of that `size`, kept in `folder` if there is one.
-    pub(crate) fn new(size: Size, folder: Option<PathBuf>) -> Self {
-        Self { size, folder, most_kept: MOST_KEPT, has_complained: false }
+    /// A store of bases of so many states, kept in `folder` if there is one.
+    pub(crate) fn new(states: usize, folder: Option<PathBuf>) -> Self {
+        Self { states, folder, most_kept: MOST_KEPT, has_complained: false }
     }
 
-    /// How large a basis is to be.
-    pub(crate) fn size(&self) -> Size {
-        self.size
+    /// Of a basis.
+    pub(crate) fn states(&self) -> usize {
+        self.states
     }
 
     /// The basis of `patch` (node ids in increasing order); `None` if nothing around the patch can move. A file that is
@@ -51,7 +51,7 @@ impl BasisStore {
     /// # Errors
     /// If nothing holds the surroundings together.
     pub(crate) fn get(&mut self, resting: &RestingBody, patch: &[u32]) -> Result<Option<Basis>, Error> {
-        let Some(mut reduction) = Reduction::new(resting, patch, self.size) else { return Ok(None) };
+        let Some(mut reduction) = Reduction::new(resting, patch, self.states) else { return Ok(None) };
         if let Some(kept) = self.kept(resting, &reduction) {
             return Ok(Some(kept));
         }
@@ -116,17 +116,13 @@ impl BasisStore {
         self.folder.as_ref().map(|folder| folder.join(format!("{key:016x}")).with_extension(BASIS))
     }
 
-    /// Of body, patch and size, and of what the same numbers come from: another version, or instruction set, rounds otherwise, and a
+    /// Of body, patch and number of states, and of what the same numbers come from: another version, or instruction set, rounds otherwise, and a
     /// run would not be repeated bit for bit.
     fn key(&self, resting: &RestingBody, patch: &[u32]) -> u64 {
         let mix = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31);
-        let (kind, size) = match self.size {
-            Size::States(states) => (0, states as u64),
-            Size::ErrorPct(error_pct) => (1, error_pct.to_bits()),
-        };
         let by = [env!("CARGO_PKG_VERSION"), InstructionSet::detect().name()];
         let made_by = by.into_iter().flat_map(str::bytes).map(u64::from).chain([u64::from(cfg!(debug_assertions))]);
-        let of_size = mix(mix(made_by.fold(resting.digest(), mix), size), kind);
+        let of_size = mix(made_by.fold(resting.digest(), mix), self.states as u64);
         patch.iter().fold(of_size, |hash, &node| mix(hash, node.into()))
     }
 }

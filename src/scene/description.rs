@@ -153,14 +153,18 @@ impl Scene {
     }
 
     /// The patch window that was asked for, or the usual one: 6 x 6 x 3 for `predictive` and `predicted`, 4 x 4 x 3 if the body is of
-    /// tetrahedra, whose nodes have more neighbours, as far as a block has room for it; 4 x 4 x 2, the paper's, for the other models.
+    /// tetrahedra, whose nodes have more neighbours, or what does for the error budget of `predictive`, as far as a block has room for
+    /// it; 4 x 4 x 2, the paper's, for the other models.
     pub fn patch_size(&self) -> [usize; 3] {
-        let looks_ahead = matches!(self.local.model.named(), Some(Kind::Predicted | Kind::Predictive));
+        let kind = self.local.model.named();
+        let looks_ahead = matches!(kind, Some(Kind::Predicted | Kind::Predictive));
+        let budget = self.local.budget().filter(|_| kind == Some(Kind::Predictive));
+        let of_budget = budget.and_then(|(_, sizes)| sizes.patch);
         self.local.patch.unwrap_or_else(|| match &self.body {
             _ if !looks_ahead => [4, 4, 2],
-            Some(BodySpec::MassSpring(spec)) => fitting_patch([6, 6, 3], &spec.block),
-            Some(BodySpec::Tetrahedra(_)) => [4, 4, 3],
-            None => [6, 6, 3],
+            Some(BodySpec::MassSpring(spec)) => fitting_patch(of_budget.unwrap_or([6, 6, 3]), &spec.block),
+            Some(BodySpec::Tetrahedra(_)) => of_budget.unwrap_or([4, 4, 3]),
+            None => of_budget.unwrap_or([6, 6, 3]),
         })
     }
 

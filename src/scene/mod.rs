@@ -24,6 +24,7 @@ mod node;
 mod nodes;
 mod patch;
 mod safety;
+mod sizes;
 mod tool;
 mod validate;
 
@@ -41,7 +42,7 @@ pub use link::LinkSpec;
 pub use models::{BlendSpec, GlobalSpec, LocalSpec, ModelChoice, StepKind};
 pub use node::NodeSpec;
 pub(crate) use nodes::Nodes;
-pub(crate) use patch::patch_fits;
 pub use safety::{SafetySpec, SafetyStage};
+pub(crate) use sizes::Sizes;
 pub use tool::ToolSpec;
 pub(crate) use validate::MAX_DEVICES;

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use super::sizes::Sizes;
 use crate::model::local::{BlendKind, Feedback, Kind};
 use crate::model::simulation::Simulation;
-use crate::model::surroundings::Size;
 
 /// The global model of a scene: the slow, detailed simulation.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
@@ -51,14 +51,14 @@ pub struct LocalSpec {
     pub rate_hz: f64,
     /// Name of the local model, or `auto`.
     pub model: ModelChoice,
-    /// The largest expected error (rms, % of the peak force, see DESIGN.md): of a model that `auto` may choose, 1 if absent;
-    /// and of `predictive`, whose `patch` and `basis` become that large if they are absent. It sizes no other model.
+    /// The error (rms, % of the peak force) that 19 of 20 random scenes are to be within: of a model that `auto` may choose, 1 if
+    /// absent; and of `predictive`, which becomes smaller if that does and neither `patch` nor `basis` is given.
     pub error_pct: Option<f64>,
-    /// Patch window: nodes along the surface, along it, into depth. If absent, what `error_pct` needs with `predictive`, or what
+    /// Patch window: nodes along the surface, along it, into depth. If absent, what
     /// [`Scene::patch_size`](super::Scene::patch_size) says.
     pub patch: Option<[usize; 3]>,
-    /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted. If absent, what
-    /// `error_pct` needs, or 250 without that.
+    /// States of the reduced surroundings (`predictive`); 0 for a ring that only moves as predicted. If absent, 250, or
+    /// fewer if they do for `error_pct`.
     pub basis: Option<usize>,
     /// Folder in which bases are kept from run to run; relative to the current one. If absent, it is the user's cache for a scene
     /// that was read from a file and runs in real time, and none for others.
@@ -99,23 +99,15 @@ impl LocalSpec {
         self.error_pct.unwrap_or(1.0)
     }
 
-    /// Names the model that `auto` chose: a budget below what `predictive` keeps was met with a warning, and what it keeps is
-    /// asked of it.
-    pub(crate) fn name_chosen(&mut self, kind: Kind) {
-        self.model = kind.into();
-        if kind == Kind::Predictive {
-            self.error_pct = self.error_pct.map(|error_pct| error_pct.max(Size::LEAST_PCT));
-        }
+    /// The budget that sizes `predictive`, and the sizes; `None` where a number is given.
+    pub(crate) fn budget(&self) -> Option<(f64, Sizes)> {
+        let error_pct = self.error_pct.filter(|_| self.patch.is_none() && self.basis.is_none())?;
+        Some((error_pct, Sizes::within(error_pct)))
     }
 
-    /// The size that a basis is to have: a number of states that is given counts, then the budget, then 250 states.
-    pub fn basis_size(&self) -> Size {
-        match (self.basis, self.error_pct) {
-            (Some(states), _) => Size::States(states),
-            // `auto` may choose a model that does not meet less, and says so.
-            (None, Some(error_pct)) => Size::ErrorPct(error_pct.max(Size::LEAST_PCT)),
-            (None, None) => Size::States(Size::DEFAULT_STATES),
-        }
+    /// The number of states that the reduced surroundings of `predictive` are to have.
+    pub fn basis_states(&self) -> usize {
+        self.basis.unwrap_or_else(|| self.budget().map_or(Sizes::USUAL, |(_, sizes)| sizes).states)
     }
 }
 

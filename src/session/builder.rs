@@ -154,26 +154,24 @@ impl SessionBuilder {
         self
     }
 
-    /// Sets the largest expected error (rms, % of the peak force): of a model that may be chosen, 1 without; and of
-    /// `predictive`, whose patch and basis become as large as it needs, unless [`patch`](Self::patch) and
-    /// [`basis`](Self::basis) say how large. Sizing a patch takes a few factorisations of the body when the session is
-    /// built.
+    /// Sets the error (rms, % of the peak force) that 19 of 20 random scenes are to be within: of a model that may be chosen, 1 without;
+    /// and of `predictive`, which becomes smaller if that does, unless [`patch`](Self::patch) or [`basis`](Self::basis) says how large it is.
     #[must_use]
     pub fn error_pct(mut self, error_pct: f64) -> Self {
         self.parts.scene.local.error_pct = Some(error_pct);
         self
     }
 
-    /// Sets the number of states of the reduced surroundings of `predictive`; without, what the
-    /// [`error_pct`](Self::error_pct) needs or 50.
+    /// Sets the number of states of the reduced surroundings of `predictive`; without, 250, or fewer if they do for the
+    /// [`error_pct`](Self::error_pct).
     #[must_use]
     pub fn basis(mut self, states: usize) -> Self {
         self.parts.scene.local.basis = Some(states);
         self
     }
 
-    /// Sets the nodes of a patch: along the surface, along it, into depth; without, what the
-    /// [`error_pct`](Self::error_pct) needs with `predictive`, or 4 x 4 x 2.
+    /// Sets the nodes of a patch: along the surface, along it, into depth; without, what
+    /// [`Scene::patch_size`](crate::scene::Scene::patch_size) says.
     #[must_use]
     pub fn patch(mut self, size: [usize; 3]) -> Self {
         self.parts.scene.local.patch = Some(size);

@@ -207,8 +207,6 @@ const CASES: &[Case] = &[
     case("model = \"patch\"", "model = \"auto\"", "scene.toml:22: local.feedback: ", &["\"geometry\" needs", "\"patch\" or \"linear_boundary\"", "is \"auto\""]),
     case("model = \"patch\"\npatch = [4, 4, 2]\nfeedback = \"geometry\"", "step = \"implicit\"", "scene.toml:20: local.step: ", &["linear patch", "\"auto\""]),
     case("model = \"patch\"", "error_pct = 0\nmodel = \"patch\"", "scene.toml:20: local.error_pct: ", &["is 0", "above 0"]),
-    case("model = \"patch\"\npatch = [4, 4, 2]\nfeedback = \"geometry\"", "error_pct = 0.2\nmodel = \"predictive\"", "scene.toml:20: local.error_pct: ", &["is 0.2", "keeps 0.4 % at best", "local.patch and local.basis", "full"]),
-    case("model = \"patch\"\npatch = [4, 4, 2]\nfeedback = \"geometry\"", "basis = 50\nerror_pct = 0.2\nmodel = \"predictive\"", "scene.toml:21: local.error_pct: ", &["is 0.2", "keeps 0.4 % at best"]),
     case("kind = \"crossfade\", ms = 10", "kind = \"offset\"", "scene.toml:23: local.blend.ms: ", &["missing", "an offset"]),
     case("ms = 10", "ms = 0", "scene.toml:23: local.blend.ms: ", &["above 0"]),
     case(", ms = 10", "", "scene.toml:23: local.blend.ms: ", &["missing", "above 0"]),

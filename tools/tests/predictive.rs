@@ -157,31 +157,6 @@ fn without_a_basis_the_prediction_alone_serves() {
     assert!(with.rms < 0.5 * without.rms && without.rms < 20.0, "{with:?} against {without:?}");
 }
 
-/// Check that the error stays within the budget that chose the basis, that less of it takes more states, and that the report
-/// says how many.
-#[test]
-fn an_error_budget_is_kept_with_as_many_states_as_it_needs() {
-    let case = Case::new("hand");
-    let states = [0.5, 2.0].map(|budget| {
-        let ask = |scene: &mut Scene| (scene.local.basis, scene.local.error_pct) = (None, Some(budget));
-        let (error, _) = case.error(ONE_PERIOD_MS, ask);
-        assert!(error.rms <= budget, "{budget}: {error:?}");
-        let mut scene = case.scene.clone().with_model(LocalModelKind::Predictive);
-        ask(&mut scene);
-        scene.run.duration_s = 0.1;
-        let run = || {
-            let session = Session::from_scene(scene.clone()).virtual_time().keep_records().build().unwrap();
-            session.run().unwrap()
-        };
-        let (first, again) = (run(), run());
-        assert_eq!(first.records, again.records, "the same bits every time");
-        let reason = first.report.environment.unwrap().model_reason.unwrap();
-        assert!(reason.why.contains(&format!("error_pct = {budget} takes")) && reason.warning.is_none(), "{reason:?}");
-        reason.why.split(" states").next().unwrap().rsplit(' ').next().unwrap().parse::<usize>().unwrap()
-    });
-    assert!(states[0] > states[1], "{states:?}");
-}
-
 /// Bases that come late are a normal event: the first windows serve as long as they hold where the tool goes.
 #[test]
 fn late_bases_leave_the_first_windows_to_serve() {

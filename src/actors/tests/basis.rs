@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use super::*;
 use crate::model::body::{Block, Body};
 use crate::model::mesh::Face;
-use crate::model::surroundings::Size;
 use crate::runtime::{Execution, Rate, Runtime};
 
 const RATE: Rate = Rate::hz(50);
@@ -31,7 +30,7 @@ fn there(pace: Pace, folder: Option<PathBuf>, releases: u64) -> Vec<usize> {
     let (mut wishes, wished) = graph.exchange(Wishes::default);
     let (bases, mut there) = graph.exchange(Bases::default);
     let resting = Arc::new(RestingBody::new(&block()).unwrap());
-    let store = BasisStore::new(Size::States(10), folder);
+    let store = BasisStore::new(10, folder);
     let ports = BasisPorts { wishes: wished, bases };
     let mut actor = BasisActor::new(resting, store, Bases::default(), (pace, RATE.period()), ports);
     let mut release = |n| {
@@ -68,6 +67,6 @@ fn what_was_kept_takes_no_less() {
         assert_eq!((cold, with(pace)), (without.clone(), without), "{pace:?}");
     }
     let quick = RestingBody::new(&block()).unwrap();
-    let nominal = Reduction::new(&quick, &patches()[0], Size::States(10)).unwrap().nominal();
+    let nominal = Reduction::new(&quick, &patches()[0], 10).unwrap().nominal();
     assert!((1e-4..0.1).contains(&nominal), "{nominal}: it takes time");
 }

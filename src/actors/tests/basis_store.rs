@@ -22,7 +22,7 @@ fn what_was_computed_is_read_again_and_damage_is_computed_again() {
     let (resting, patch) = body();
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path().join("bases");
-    let mut store = BasisStore::new(Size::States(10), Some(folder.clone()));
+    let mut store = BasisStore::new(10, Some(folder.clone()));
     let first = store.get(&resting, &patch).unwrap();
     assert_eq!(files(&folder).len(), 1);
     assert_eq!(store.read(&resting, &patch), first);
@@ -39,8 +39,8 @@ fn what_was_computed_is_read_again_and_damage_is_computed_again() {
         std::os::unix::fs::symlink("/dev/zero", &file).unwrap();
     }
     assert_eq!(store.get(&resting, &patch).unwrap(), first);
-    for (count, size) in [Size::States(11), Size::ErrorPct(1.0), Size::ErrorPct(2.0)].into_iter().enumerate() {
-        let mut other = BasisStore { size, ..store.clone() };
+    for (count, states) in [9, 11].into_iter().enumerate() {
+        let mut other = BasisStore { states, ..store.clone() };
         assert_ne!(other.get(&resting, &patch).unwrap(), first);
         assert_eq!(files(&folder).len(), count + 2, "another size, another file");
     }
@@ -50,7 +50,7 @@ fn what_was_computed_is_read_again_and_damage_is_computed_again() {
 fn many_writers_leave_one_whole_file() {
     let (resting, patch) = body();
     let folder = tempfile::tempdir().unwrap();
-    let store = BasisStore::new(Size::States(10), Some(folder.path().to_owned()));
+    let store = BasisStore::new(10, Some(folder.path().to_owned()));
     let basis = store.clone().get(&resting, &patch).unwrap().unwrap();
     std::thread::scope(|scope| {
         for _ in 0..4 {
@@ -95,7 +95,7 @@ fn a_folder_that_cannot_be_is_complained_of_once() {
     let (resting, patch) = body();
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("file"), b"").unwrap();
-    let mut store = BasisStore::new(Size::States(10), Some(folder.path().join("file/bases")));
+    let mut store = BasisStore::new(10, Some(folder.path().join("file/bases")));
     assert!(store.get(&resting, &patch).unwrap().is_some() && store.has_complained);
 }
 
@@ -113,9 +113,9 @@ fn what_was_kept_stands_for_what_is_like_it_as_if_it_had_been_made() {
     let folder = tempfile::tempdir().unwrap();
     let in_order = |order: [usize; 2], folder: Option<&Path>| {
         let resting = RestingBody::new(&block).unwrap();
-        let mut store = BasisStore::new(Size::States(8), folder.map(Path::to_owned));
+        let mut store = BasisStore::new(8, folder.map(Path::to_owned));
         order.map(|place| {
-            let is_known = Reduction::new(&resting, &patches[place], Size::States(8)).unwrap().is_known();
+            let is_known = Reduction::new(&resting, &patches[place], 8).unwrap().is_known();
             (is_known, store.get(&resting, &patches[place]).unwrap())
         })
     };

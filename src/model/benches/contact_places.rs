@@ -11,7 +11,7 @@ use palpate_model::contact::{Contact, Law, ToolMotion, ToolShape};
 use palpate_model::local::{Kind, ResyncView, Template, ToolForecast};
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
-use palpate_model::surroundings::{Bases, Basis, RestingBody, Size};
+use palpate_model::surroundings::{Bases, Basis, RestingBody};
 use palpate_model::{Pose, Vec3};
 
 const TICKS: usize = 4_000;
@@ -52,7 +52,7 @@ fn row([radius, depth]: [f64; 2]) {
     sim.patch(0, &triangles, size, &mut patch);
     let resting = RestingBody::new(sim.body()).expect("a body that can be taken apart");
     let mut bases = Bases::default();
-    let basis = Basis::compute(&resting, &patch, Size::States(STATES)).expect("held").expect("there are surroundings");
+    let basis = Basis::compute(&resting, &patch, STATES).expect("held").expect("there are surroundings");
     bases.insert(Arc::new(basis));
     let mut model = Template::new(Kind::Predictive, size, sim.body()).expect("it fits").empty();
     model.rebuild(ResyncView {

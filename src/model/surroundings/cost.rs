@@ -1,7 +1,5 @@
 //! What a basis costs, before it is made.
 
-use super::accuracy::Size;
-use super::estimate::FREQUENCIES;
 use super::reduction::{MOMENTS, Reduction};
 
 /// Finding what is far from a patch, for each coupled pair of nodes (s).
@@ -12,8 +10,6 @@ const FACTORISE_S: f64 = 3.5e-10;
 const SPAN_S: f64 = 1.25e-9;
 /// Projecting, for each coupled pair of nodes and each state (s).
 const PROJECT_S: f64 = 6e-8;
-/// What finding the number of states for a budget makes of it.
-const COMPARED: f64 = 1.9;
 
 impl Reduction {
     /// The number of times that [`advance`](Self::advance) is called until the basis is there.
@@ -24,8 +20,7 @@ impl Reduction {
         if self.is_known() {
             return 1;
         }
-        let compared = if let Size::ErrorPct(_) = self.size { FREQUENCIES.len() } else { 0 };
-        1 + MOMENTS + compared + 1
+        1 + MOMENTS + 1
     }
 
     /// What the whole of it takes (s) on no machine in particular, for runs that must be the same on all of them: within a quarter of
@@ -34,17 +29,11 @@ impl Reduction {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn nominal(&self) -> f64 {
-        let (unknowns, pairs) = (self.far.unknowns() as f64, self.far.pairs() as f64);
-        let (states, factor) = match self.size {
-            Size::States(states) => (states as f64, 1.0),
-            Size::ErrorPct(_) => (Size::MOST_STATES as f64, COMPARED),
-        };
+        let (unknowns, pairs, states) = (self.far.unknowns() as f64, self.far.pairs() as f64, self.states as f64);
         let prepare = PREPARE_S * pairs;
         if self.is_known() {
             return prepare;
         }
-        prepare
-            + factor
-                * (FACTORISE_S * pairs * unknowns + SPAN_S * unknowns * states * states + PROJECT_S * pairs * states)
+        prepare + FACTORISE_S * pairs * unknowns + SPAN_S * unknowns * states * states + PROJECT_S * pairs * states
     }
 }

@@ -1,12 +1,11 @@
 //! What lies around a patch: the part of the body that depends on it, the ring of nodes that this part reaches, and a reduced model of
 //! everything beyond.
 
-mod accuracy;
 mod basis;
 mod condense;
 mod cost;
-mod estimate;
 mod far;
+mod force_errors;
 mod near;
 mod products;
 mod reduced;
@@ -19,7 +18,6 @@ mod stored;
 #[cfg(test)]
 mod uneven;
 
-pub use accuracy::{Estimate, Size};
 pub use basis::{Bases, Basis};
 pub use condense::Condensation;
 pub(crate) use reduced::ReducedMotion;

@@ -1,9 +1,8 @@
 //! The computation of a basis, in parts that end in time.
 
-use super::accuracy::{Estimate, Size, states_within};
 use super::basis::Basis;
-use super::estimate::Contacts;
 use super::far::Far;
+use super::force_errors::Contacts;
 use super::products::Columns;
 use super::reduced::{Damping, Reduced};
 use super::resting::RestingBody;
@@ -32,11 +31,10 @@ pub struct Reduction {
     /// What that looks like.
     likeness: Option<u64>,
     ring: Vec<u32>,
-    pub(super) size: Size,
+    pub(super) states: usize,
     pub(super) far: Far,
     restriction: Restriction,
     stage: Stage,
-    errors: Option<Vec<f64>>,
 }
 
 #[derive(Debug)]
@@ -51,41 +49,34 @@ enum Stage {
         last: Matrix,
         all: Matrix,
     },
-    /// How many are enough?
-    Compare {
-        wide: Matrix,
-        contacts: Box<Contacts>,
-    },
     Project {
-        /// Columns that span what the states are taken from, the most important first.
-        wide: Matrix,
+        /// Columns that span the states, the most important first.
+        columns: Matrix,
     },
     Done,
 }
 
 impl Reduction {
-    /// Begins the basis of the surroundings of `patch` (ids in increasing order), with at most so many states or as many as an
-    /// error budget needs; `None` if nothing around the patch can move.
+    /// Begins the basis of the surroundings of `patch` (ids in increasing order), with at most so many states; `None` if nothing around
+    /// the patch can move.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
-    pub fn new(whole: &RestingBody, patch: &[u32], size: impl Into<Size>) -> Option<Self> {
-        let size = size.into();
+    pub fn new(whole: &RestingBody, patch: &[u32], states: usize) -> Option<Self> {
         let (around, local) = whole.around(patch).unzip();
         let (body, local) = (around.as_ref().unwrap_or(whole), local.as_deref().unwrap_or(patch));
         let restriction = body.restriction(local)?;
         let ring: Vec<u32> = restriction.ring(patch.len()).to_vec();
-        let can_move = !ring.is_empty() && size != Size::States(0);
+        let can_move = !ring.is_empty() && states > 0;
         if !can_move {
             return None;
         }
-        let likeness = around.as_ref().map(|around| around.likeness(local, size));
+        let likeness = around.as_ref().map(|around| around.likeness(local, states));
         let known = likeness.and_then(|likeness| whole.alike(likeness));
         Some(Self {
             patch: patch.to_vec(),
             ring,
-            size,
-            errors: None,
+            states,
             far: Far::new(body, local, &restriction),
             stage: known.map_or(Stage::Factorise, |basis| Stage::Known(basis.moved_to(patch))),
             restriction,
@@ -145,20 +136,13 @@ impl Reduction {
             Stage::Moments { factor, count, last, mut all } => {
                 let last = append_moment(far, factor.solve(last), &mut all, count);
                 self.stage = match count + 1 {
-                    MOMENTS => self.span(body, &all),
+                    MOMENTS => Stage::Project { columns: leading_left_singular_vectors(&all, self.states) },
                     count => Stage::Moments { factor, count, last, all },
                 };
             }
-            Stage::Compare { wide, mut contacts } => {
-                self.stage = if contacts.advance(body).ok_or_else(indefinite)? {
-                    self.errors = Some(contacts.errors());
-                    Stage::Project { wide }
-                } else {
-                    Stage::Compare { wide, contacts }
-                };
-            }
-            Stage::Project { wide } => {
-                let basis = self.project(&wide)?;
+            Stage::Project { columns } => {
+                let answers = reduced(far, ring, &columns).ok_or_else(indefinite)?;
+                let basis = Basis { patch: self.patch.clone(), answers };
                 self.learn(whole, &basis);
                 return Ok(Some(basis));
             }
@@ -166,41 +150,6 @@ impl Reduction {
             Stage::Done => {}
         }
         Ok(None)
-    }
-
-    /// The relative errors by the number of states, from 1 on, once they are there.
-    pub(super) fn errors(&self) -> Option<&[f64]> {
-        self.errors.as_deref()
-    }
-
-    /// The states, the most important first.
-    fn span(&self, body: &RestingBody, moments: &Matrix) -> Stage {
-        let Self { far, restriction, patch, size, .. } = self;
-        let most = match size {
-            Size::States(states) => *states,
-            Size::ErrorPct(_) => Size::MOST_STATES,
-        };
-        let wide = leading_left_singular_vectors(moments, most);
-        match size {
-            Size::States(_) => Stage::Project { wide },
-            Size::ErrorPct(_) => {
-                let contacts = Box::new(Contacts::new(body, (restriction, patch.len()), far, &wide));
-                Stage::Compare { wide, contacts }
-            }
-        }
-    }
-
-    fn project(&self, wide: &Matrix) -> Result<Basis, ModelError> {
-        let Self { far, ring, size, errors, .. } = self;
-        let states = match *size {
-            Size::States(states) => states,
-            Size::ErrorPct(budget) => states_within(budget, errors.as_deref().unwrap_or_default()),
-        };
-        let linear = errors.as_ref().and_then(|errors| errors.get(states.checked_sub(1)?));
-        let estimate = linear.map(|error| Estimate { linear_pct: 100.0 * error });
-        let columns = wide.columns(0, states.min(wide.ncols())).into_owned();
-        let answers = reduced(far, ring, &columns).ok_or_else(indefinite)?;
-        Ok(Basis { patch: self.patch.clone(), answers, estimate })
     }
 }
 
@@ -249,7 +198,8 @@ fn append(matrix: &mut Matrix, more: &Matrix) {
 }
 
 impl Basis {
-    /// The basis of the surroundings of `patch` (ids in increasing order), of the given size. `None` if nothing around the patch can move.
+    /// The basis of the surroundings of `patch` (ids in increasing order), with at most so many states. `None` if nothing around the patch
+    /// can move.
     ///
     /// # Errors
     /// If nothing holds the surroundings together, so that they have no finite answer.
@@ -257,8 +207,8 @@ impl Basis {
     /// # Real-time
     /// Not real-time safe: factorises a matrix of the whole body's size, seconds of work for a large one. [`Reduction`] does
     /// the same in parts.
-    pub fn compute(body: &RestingBody, patch: &[u32], size: impl Into<Size>) -> Result<Option<Self>, ModelError> {
-        let Some(mut reduction) = Reduction::new(body, patch, size) else { return Ok(None) };
+    pub fn compute(body: &RestingBody, patch: &[u32], states: usize) -> Result<Option<Self>, ModelError> {
+        let Some(mut reduction) = Reduction::new(body, patch, states) else { return Ok(None) };
         loop {
             if let Some(basis) = reduction.advance(body)? {
                 return Ok(Some(basis));
@@ -268,25 +218,27 @@ impl Basis {
 }
 
 impl Reduction {
-    /// The estimate for every number of states of the surroundings of `patch` (ids in increasing order), from 1 on, in one pass.
-    /// Empty if nothing around the patch can move.
+    /// The relative error of the linear contact force by the number of states of the surroundings of `patch` (ids in increasing order),
+    /// from one on up to `most`, in one pass: against an imposed motion of a touched node at rest, root mean square over four real
+    /// frequencies, the worst of the nodes in the middle of the patch. Empty if nothing around the patch can move.
     ///
     /// # Errors
     /// If nothing holds the surroundings together.
     ///
     /// # Real-time
     /// Not real-time safe: factorises the body several times.
-    pub fn errors_by_states(body: &RestingBody, patch: &[u32]) -> Result<Vec<(usize, Estimate)>, ModelError> {
-        // No number of states keeps this budget, so that all are looked at.
-        let Some(mut reduction) = Self::new(body, patch, Size::ErrorPct(0.0)) else { return Ok(Vec::new()) };
+    pub fn force_errors(body: &RestingBody, patch: &[u32], most: usize) -> Result<Vec<f64>, ModelError> {
+        let Some(mut reduction) = Self::new(body, patch, most) else { return Ok(Vec::new()) };
+        // Also of surroundings that look like others.
+        reduction.stage = Stage::Factorise;
         loop {
-            if let Some(errors) = reduction.errors() {
-                let estimate = |(index, &error): (usize, &f64)| (index + 1, Estimate { linear_pct: 100.0 * error });
-                return Ok(errors.iter().enumerate().map(estimate).collect());
+            if let Self { stage: Stage::Project { columns }, far, restriction, around, .. } = &reduction {
+                let body = around.as_ref().unwrap_or(body);
+                return Contacts::new(body, (restriction, patch.len()), far, columns)
+                    .errors(body)
+                    .ok_or_else(indefinite);
             }
-            if reduction.advance(body)?.is_some() {
-                return Ok(Vec::new());
-            }
+            reduction.advance(body)?;
         }
     }
 }

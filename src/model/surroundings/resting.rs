@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use super::accuracy::Size;
 use super::basis::Basis;
 use crate::body::{Body, Cutout, Restriction, State, neighbourhood};
 use crate::{Mat3, Vec3};
@@ -137,9 +136,9 @@ impl RestingBody {
         self.alike.lock().unwrap_or_else(PoisonError::into_inner).insert(likeness, basis);
     }
 
-    /// A number that is the same for a basis of `size` of `patch` (ids in increasing order) in bodies that are the same but for
+    /// A number that is the same for a basis of so many states of `patch` (ids in increasing order) in bodies that are the same but for
     /// where they are and for rounding.
-    pub(super) fn likeness(&self, patch: &[u32], size: Size) -> u64 {
+    pub(super) fn likeness(&self, patch: &[u32], states: usize) -> u64 {
         let (rest, couplings) = (self.rest(), self.couplings());
         let origin = rest[patch.first().map_or(0, |&node| node as usize)];
         let extent = rest.iter().fold(0.0, |most: f64, x| most.max((x - origin).amax()));
@@ -147,11 +146,7 @@ impl RestingBody {
         let mut words: Vec<u64> = patch.iter().map(|&node| node.into()).collect();
         let places = rest.iter().flat_map(|x| (0..3).map(|i| alike((x[i] - origin[i]) / extent)));
         words.extend(places.chain(self.inverse_masses().iter().map(|&w| single(w))));
-        words.extend([single(extent), single(stiffest)]);
-        words.extend(match size {
-            Size::States(states) => [0, states as u64],
-            Size::ErrorPct(budget) => [1, budget.to_bits()],
-        });
+        words.extend([single(extent), single(stiffest), states as u64]);
         for ((row, column), Coupling { stiffness, damping }) in couplings {
             words.push(u64::from(*row) << 32 | u64::from(*column));
             words.extend(stiffness.iter().chain(damping).map(|x| alike(x / stiffest)));

@@ -1,6 +1,5 @@
 //! A basis as bytes, to be kept from run to run.
 
-use super::accuracy::Estimate;
 use super::basis::Basis;
 use super::products::Columns;
 use super::reduced::{Damping, Reduced};
@@ -10,7 +9,7 @@ use crate::bytes::{BytesReader, BytesWriter};
 use crate::linear_algebra::Matrix;
 
 /// What the bytes begin with; its number changes with what follows.
-const MAGIC: &[u8; 16] = b"palpate-basis-6\n";
+const MAGIC: &[u8; 16] = b"palpate-basis-7\n";
 const SUM: usize = size_of::<u64>();
 
 impl Basis {
@@ -24,7 +23,6 @@ impl Basis {
         to.u64(key);
         to.list(&self.patch, |to, &id| to.u32(id));
         write(&self.answers, &mut to);
-        write_numbers(&mut to, self.estimate.map(|estimate| estimate.linear_pct).as_slice());
         let sum = digest(to.0);
         to.u64(sum);
         bytes
@@ -47,8 +45,7 @@ impl Basis {
         let mut patch = Vec::new();
         from.list(size_of::<u32>(), &mut patch, BytesReader::u32)?;
         let answers = read(&mut from)?;
-        let estimate = read_numbers(&mut from)?.first().map(|&linear_pct| Estimate { linear_pct });
-        from.0.is_empty().then_some(Self { patch, answers, estimate })
+        from.0.is_empty().then_some(Self { patch, answers })
     }
 }
 
@@ -107,7 +104,7 @@ fn read_numbers(from: &mut BytesReader<'_>) -> Option<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{RestingBody, Size};
+    use super::super::RestingBody;
     use super::*;
     use crate::body::{Block, Body};
     use crate::mesh::Face;
@@ -118,8 +115,7 @@ mod tests {
         let resting = RestingBody::new(&block).unwrap();
         let mut patch = Vec::new();
         block.patch(&[block.surface().triangles.len() as u32 - 5], [2, 2, 1], &mut patch);
-        let basis = Basis::compute(&resting, &patch, Size::ErrorPct(2.0)).unwrap().unwrap();
-        assert!(basis.estimate().is_some());
+        let basis = Basis::compute(&resting, &patch, 20).unwrap().unwrap();
         let bytes = basis.to_bytes(7);
         assert_eq!(Basis::from_bytes(&bytes, 7).as_ref(), Some(&basis));
         assert_eq!(Basis::from_bytes(&bytes, 8), None, "another key");

@@ -23,7 +23,6 @@ use crate::model::contact::Equations;
 use crate::model::local::BlendKind;
 use crate::model::local::{Feedback, Kind};
 use crate::model::mesh::Face;
-use crate::model::surroundings::Size;
 use crate::runtime::Rate;
 use check::{at_most_ms, inside, lengths_within, movable, not_negative, on_surface, positive};
 
@@ -254,7 +253,9 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
             format!("\"implicit\" needs a linear patch and the model is {:?}, leave it out", local.model.name());
         return Err(Error::scene("local.step", message));
     }
-    error_budget(local)?;
+    if let Some(error_pct) = local.error_pct {
+        positive("local.error_pct", error_pct)?;
+    }
     if let Some(basis) = local.basis.filter(|&basis| basis > MAX_BASIS) {
         let message = format!("is {basis}, must be at most {MAX_BASIS}: more cost time and add nothing");
         return Err(Error::scene("local.basis", message));
@@ -267,22 +268,6 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
     };
     if local.blend.ms == 0.0 {
         return Err(Error::scene("local.blend.ms", format!("is 0 or missing, {name} needs a time above 0 such as 10")));
-    }
-    Ok(())
-}
-
-fn error_budget(local: &LocalSpec) -> Result<(), Error> {
-    let Some(error_pct) = local.error_pct else { return Ok(()) };
-    positive("local.error_pct", error_pct)?;
-    // Without a basis there is nothing to size a patch by.
-    let sizes = local.basis.is_none() || local.patch.is_none() && local.basis != Some(0);
-    let least = Size::LEAST_PCT;
-    if sizes && local.model.named() == Some(Kind::Predictive) && error_pct < least {
-        let message = format!(
-            "is {error_pct}, and \"predictive\" keeps {least} % at best: use that or more, numbers (local.patch and \
-             local.basis), or model = \"full\""
-        );
-        return Err(Error::scene("local.error_pct", message));
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use super::timing::Timing;
 use crate::log::ModelReason;
 use crate::model::local::Kind;
 use crate::runtime::{Execution, Nanos};
-use crate::scene::{ModelChoice, Scene};
+use crate::scene::{ModelChoice, Scene, Sizes};
 
 /// A local model that was chosen, and why.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +37,14 @@ pub(crate) fn extended(reason: Option<ModelReason>, why: String, missed: Option<
     }
 }
 
+/// What is said of a budget that more than one scene of twenty is expected to break.
+pub(super) fn unsure(error_pct: f64, kind: Kind, kept_pct: f64) -> String {
+    format!(
+        "error_pct = {error_pct} is not sure, {} may be {kept_pct} % off (1 of 20 random scenes: more)",
+        kind.name()
+    )
+}
+
 /// What is to be expected of a model one global period late: force error rms in % of the peak, which 19 of 20 of the scenes seen in
 /// docs/population.md were within.
 fn expected_error_pct(kind: Kind) -> f64 {
@@ -47,7 +55,7 @@ fn expected_error_pct(kind: Kind) -> f64 {
         Kind::ScaledBoundary => 74.0,
         Kind::Condensed => 42.0,
         Kind::Predicted => 28.0,
-        Kind::Predictive => 2.7,
+        Kind::Predictive => Sizes::USUAL.kept_pct,
         Kind::Full => 0.0,
     }
 }
@@ -65,8 +73,7 @@ pub(super) fn model(
         ModelChoice::Auto => {
             let situation = Situation::of(scene, &mut *start.body, &start.state, timing, execution);
             let choice = choose(&situation);
-            // The log's scene names the model and what was asked of it.
-            scene.local.name_chosen(choice.model);
+            scene.local.model = choice.model.into();
             (choice.model, Some(choice), Some(situation.evaluation))
         }
     }
@@ -111,9 +118,7 @@ fn choose(situation: &Situation) -> Choice {
             _ => format!("{full}; {name} is the best that fits this body"),
         };
         let expected = expected_error_pct(model);
-        let warning = Some(format!(
-            "error_pct = {error} is not sure, {name} may be {expected} % off (1 of 20 random scenes: more)"
-        ));
+        let warning = Some(unsure(error, model, expected));
         return Choice { model, reason: ModelReason { why, warning } };
     }
     let by_load = |a: &Kind, b: &Kind| situation.load(*a).total_cmp(&situation.load(*b));

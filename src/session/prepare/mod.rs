@@ -11,15 +11,15 @@ mod hello;
 mod kept;
 mod limits;
 mod link;
-mod patch;
 mod plan;
 mod situation;
+mod sizes;
 mod timing;
 mod tools;
 mod unused;
 
 pub use choice::Choice;
-pub(super) use choice::extended;
+use choice::extended;
 pub(super) use groups::BASIS;
 pub(super) use link::LINK;
 pub(super) use plan::ModelPlan;
@@ -40,7 +40,6 @@ use crate::model::simulation::{Simulation, Stepping};
 use crate::runtime::{Execution, Nanos, Plan, RateGroup};
 use crate::scene::{BodySpec, LinkSpec, NodeSpec, ProbeSpec, Scene, StepKind, Volume};
 use body::Start;
-use patch::PatchChoice;
 use situation::Situation;
 
 /// Everything that a session's actors are made of.
@@ -55,10 +54,8 @@ pub(super) struct Prepared {
     pub(super) plan: ModelPlan,
     /// Why its model, if none was named.
     pub(super) choice: Option<Choice>,
-    /// Settings that a model has no use for which was named: one that was chosen says so itself.
-    pub(super) unused: Option<String>,
-    /// The patch, if an error budget chose it.
-    pub(super) sized_patch: Option<PatchChoice>,
+    /// Why model and sizes are what they are, if that was left to the session, and which settings the model has no use for.
+    pub(super) reason: Option<ModelReason>,
     pub(super) local: RateGroup,
     pub(super) global: RateGroup,
     pub(super) until: Option<Nanos>,
@@ -98,19 +95,6 @@ impl Prepared {
     /// The group of the bridges of a link.
     pub(super) fn link_group(&self) -> RateGroup {
         link::group(self.plan.timing.haptic)
-    }
-
-    /// Why model and patch are what they are, if that was left to the session, and which settings the model has no use for.
-    pub(super) fn model_reason(&self) -> Option<ModelReason> {
-        let of_model = self.choice.as_ref().map(|choice| choice.reason.clone());
-        let reason = match &self.sized_patch {
-            Some(patch) => Some(patch.reason(of_model)),
-            None => of_model,
-        };
-        match &self.unused {
-            Some(words) => Some(extended(reason, words.clone(), None)),
-            None => reason,
-        }
     }
 
     /// The rate groups, in graph order.
@@ -169,11 +153,18 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         Some(words) => Choice { model, reason: extended(Some(reason), words, None) },
         None => Choice { model, reason },
     });
-    let sized_patch = patch::choose(&scene, &*start.body, &start.attached);
-    // Named in the log's scene, so that a replay does not choose again.
-    scene.local.patch = Some(sized_patch.as_ref().map_or(scene.patch_size(), |choice| choice.size));
+    let reason = sizes::reason(choice.as_ref().map(|choice| choice.reason.clone()), &scene, kind);
+    let reason = match unused {
+        Some(words) => Some(extended(reason, words, None)),
+        None => reason,
+    };
 
     let mut as_run = as_run(&scene, Some((&start.attached, &start.probes)));
+    // Named in the log's scene: another version may take other sizes.
+    as_run.local.patch = Some(scene.patch_size());
+    if kind == Kind::Predictive || scene.run.switchable {
+        as_run.local.basis = Some(scene.local.basis_states());
+    }
     let here = here.as_deref();
     let making =
         tools::Making { scene: &scene, start: &mut start, haptic: rates[0], execution, open_haply, is_replay, here };
@@ -224,8 +215,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         tools,
         plan,
         choice,
-        unused,
-        sized_patch,
+        reason,
         local,
         global,
         until,

@@ -11,7 +11,7 @@ use crate::link::Conditions;
 use crate::model::body::Stiffness;
 use crate::model::contact::Equations;
 use crate::model::local::{Blend, Kind, Template};
-use crate::model::surroundings::{RestingBody, Size};
+use crate::model::surroundings::RestingBody;
 use crate::runtime::RuntimeBuilder;
 use crate::scene::Scene;
 
@@ -87,7 +87,7 @@ pub(super) fn resting(
     start: &Start,
 ) -> Option<Arc<RestingBody>> {
     let reduces = kinds.iter().any(|(kind, _)| *kind == Kind::Predictive);
-    if !reduces || scene.local.basis_size() == Size::States(0) {
+    if !reduces || scene.local.basis_states() == 0 {
         return None;
     }
     template.resting.clone().or_else(|| RestingBody::new(&*start.body).map(Arc::new))

@@ -4,7 +4,7 @@ use super::budget::force_evaluation;
 use super::timing::Timing;
 use crate::model::body::{Body, State};
 use crate::model::local::Kind;
-use crate::model::surroundings::{RestingBody, Size};
+use crate::model::surroundings::RestingBody;
 use crate::runtime::{Execution, Nanos};
 use crate::scene::Scene;
 
@@ -79,11 +79,9 @@ impl Situation {
                 Kind::Full | Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
                 Kind::Condensed => is_restrictable && is_held,
                 Kind::Predicted => is_restrictable,
-                Kind::Predictive => is_restrictable && scene.local.basis_size() != Size::States(0),
+                Kind::Predictive => is_restrictable && scene.local.basis_states() > 0,
             };
-            let mut named = scene.clone().with_model(*kind);
-            named.local.name_chosen(*kind);
-            suits_body && named.validate().is_ok()
+            suits_body && scene.clone().with_model(*kind).validate().is_ok()
         };
         let possible = Kind::ALL.into_iter().filter(is_possible).collect();
         let (evaluation, origin, cores) = match execution {
@@ -106,10 +104,7 @@ impl Situation {
             ahead_share: (AHEAD_RIM * scene.global.ahead_nodes as f64 / state.positions.len() as f64).min(1.0),
             cores,
             error_pct: scene.local.chosen_within_pct(),
-            states: match scene.local.basis_size() {
-                Size::States(states) => states,
-                Size::ErrorPct(_) => Size::MOST_STATES,
-            },
+            states: scene.local.basis_states(),
             devices: scene.devices.len(),
             possible,
         }

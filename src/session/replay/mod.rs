@@ -70,11 +70,7 @@ impl Replay {
         safety.device_delay_ms = logged_safety.device_delay_ms;
         // What the machine of the log chose, and not what this one would.
         if parts.scene.local.model == ModelChoice::Auto {
-            logged.scene.local.model.named().into_iter().for_each(|kind| parts.scene.local.name_chosen(kind));
-        }
-        // The same of a patch that an error budget chose.
-        if parts.scene.local.error_pct.is_some() {
-            parts.scene.local.patch = parts.scene.local.patch.or(logged.scene.local.patch);
+            parts.scene.local.model = logged.scene.local.model;
         }
         let device = |(spec, (first, samples)): (&DeviceSpec, (DeviceState, Vec<ReplayedSample>))| {
             let known = capabilities(spec);

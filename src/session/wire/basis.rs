@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
-use crate::log::ModelReason;
 use crate::model::Pose;
 use crate::model::local::{Aim, Beside, Kind, ToolForecast, Windows};
-use crate::model::surroundings::{Bases, RestingBody, Size};
+use crate::model::surroundings::{Bases, RestingBody};
 use crate::runtime::{Actor, ExchangePort, Nanos, RuntimeBuilder};
-use crate::session::prepare::{Prepared, extended};
+use crate::session::prepare::Prepared;
 
 /// The basis actor's side of a session.
 pub(super) struct BasisSide {
@@ -34,7 +33,7 @@ impl BasisSide {
             return Ok(None);
         };
         let folder = prepared.plan.basis_folder.clone();
-        let mut store = BasisStore::new(prepared.scene.local.basis_size(), folder);
+        let mut store = BasisStore::new(prepared.scene.local.basis_states(), folder);
         let given = prepared.scene.global.basis_latency_ms.map(|ms| Nanos::from_secs_f64(ms * 1e-3));
         let pace = match given {
             _ if prepared.plan.in_real_time => BasisPace::Measured,
@@ -54,20 +53,6 @@ impl BasisSide {
             pace,
             period: prepared.plan.timing.global.period(),
         }))
-    }
-
-    /// The reason for the model, with what the first basis came to if its states were chosen by a budget.
-    pub(super) fn reason(&self, of_model: Option<ModelReason>) -> Option<ModelReason> {
-        let Size::ErrorPct(budget) = self.store.size() else { return of_model };
-        let Some(basis) = self.known.iter().max_by_key(|basis| basis.states()) else { return of_model };
-        let (states, Some(estimate)) = (basis.states(), basis.estimate()) else { return of_model };
-        let (linear, expected) = (estimate.linear_pct, estimate.expected_pct());
-        let sized = format!(
-            "error_pct = {budget} takes {states} states at the start, {expected:.2} % expected (linear force {linear:.2} %)"
-        );
-        let missed =
-            (expected > budget).then(|| format!("error_pct = {budget} is not met, {expected:.2} % is expected"));
-        Some(extended(of_model, sized, missed))
     }
 
     pub(super) fn actor(&self) -> Box<dyn Actor> {

@@ -26,7 +26,7 @@ pub(super) fn environment(prepared: &Prepared, first: &[DeviceState]) -> Result<
             Execution::Threaded => LoggedExecution::began(Nanos::ZERO),
         },
         model: prepared.plan.template.kind.name().to_owned(),
-        model_reason: prepared.model_reason(),
+        model_reason: prepared.reason.clone(),
         body: tetrahedra.map(|spec| body(prepared, spec)),
         tools: tools(prepared),
         haptic_hz: timing.haptic.as_hz(),

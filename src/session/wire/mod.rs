@@ -81,7 +81,7 @@ pub(super) fn start_global(mut prepared: Prepared, machines: Vec<HapticMachine>)
 
 fn start_at(mut prepared: Prepared, first: Vec<DeviceState>, rerun: Option<Rerun>) -> Result<Running, Error> {
     let places: Vec<Pose> = first.iter().map(DeviceState::pose).collect();
-    let mut environment = environment::environment(&prepared, &first)?;
+    let environment = environment::environment(&prepared, &first)?;
     let memory = prepared.options.keep_records.then(Memory::default);
     let (sender, records) = prepared.options.shares_records.then(RecordSender::new).unzip();
     let sinks = Sinks::new(memory.clone(), sender, prepared.options.log.as_deref(), &environment)?;
@@ -112,9 +112,6 @@ fn start_at(mut prepared: Prepared, first: Vec<DeviceState>, rerun: Option<Rerun
         false => viewer,
     };
     let bases = if prepared.reduces() { BasisSide::new(&mut graph, &prepared, &places)? } else { None };
-    if let Some(bases) = &bases {
-        environment.model_reason = bases.reason(environment.model_reason.take());
-    }
     let reducing = bases.as_ref().map(|bases| (prepared.basis_group(), bases.actor()));
     let settings = prepared.plan.tunable(&mut graph);
     let controls = Controls::new(settings.clone(), &prepared.plan);

@@ -2,10 +2,11 @@
 //! late. Writes docs/population.md and its pictures.
 //!
 //! `cargo bench --bench population`; with `-- --quick` a short form that prints and writes nothing; with `-- --seen` the two
-//! thirds of the cases that may be looked at while working, case by case, written nowhere; `--cases N` how many, `--from N` the first
-//! seed, or `--only A,B` which; `--pairs` those with two tools; `--patch A,B,C`, `--basis N`, `--basis-latency MS` and `--budget PERCENT` in place of the defaults;
-//! `--models A,B` in place of `predictive` and `patch`; `--link MS,SHARE` with the global model behind a link of so much delay one way
-//! and such a share of lost packets, which without `--seen` prints the document and writes nothing.
+//! thirds of the cases that may be looked at while working, case by case, written nowhere; with `-- --unseen` the distributions of the
+//! rest; `--cases N` how many, `--from N` the first seed, or `--only A,B` which; `--pairs` those with two tools; `--patch A,B,C`,
+//! `--basis N`, `--basis-latency MS` and `--budget PERCENT` in place of the defaults; `--models A,B` in place of
+//! `predictive` and `patch`; `--link MS,SHARE` with the global model behind a link of so much delay one way and such a share of lost
+//! packets, which alone prints the document and writes nothing.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -24,7 +25,7 @@ use palpate::model::local::Kind;
 use palpate::scene::LinkSpec;
 
 use cases::is_unseen;
-use runs::{Settings, run_all};
+use runs::{CaseResult, Settings, run_all};
 use words::Populations;
 
 /// Cases of the document, with one tool and with two.
@@ -47,12 +48,18 @@ fn document(is_quick: bool, settings: &Settings) -> Result<(), Error> {
     common::write("docs/population.md", &document.text)
 }
 
-/// What may be looked at while working.
-fn seen(settings: &Settings, from: u64, count: usize) -> Result<(), Error> {
+/// What may be looked at while working, or the distributions of what may not.
+fn print(settings: &Settings, unseen: bool, from: u64, count: usize) -> Result<(), Error> {
     let listed = std::env::args().skip_while(|argument| argument != "--only").nth(1);
     let listed = listed.map(|list| list.split(',').filter_map(|seed| seed.parse().ok()).collect());
-    let seeds: Vec<u64> = listed.unwrap_or_else(|| (from..).filter(|&seed| !is_unseen(seed)).take(count).collect());
-    let results = run_all(&seeds, settings, |result| println!("{result}"))?;
+    let seeds: Vec<u64> =
+        listed.unwrap_or_else(|| (from..).filter(|&seed| is_unseen(seed) == unseen).take(count).collect());
+    let told = |result: &CaseResult| {
+        if !unseen {
+            println!("{result}")
+        }
+    };
+    let results = run_all(&seeds, settings, told)?;
     print!("{}", words::distributions(&results.iter().collect::<Vec<_>>(), true));
     Ok(())
 }
@@ -82,10 +89,11 @@ fn main() -> ExitCode {
             LinkSpec { delay_ms: next(), loss: next(), seed: 1, ..LinkSpec::default() }
         }),
     };
-    let is_seen = std::env::args().any(|argument| argument == "--seen");
-    let done = match is_seen {
-        true => seen(&settings, number("--from").unwrap_or(0) as u64, number("--cases").unwrap_or(60)),
-        false => document(arguments.is_quick, &settings),
+    let [seen, unseen] = ["--seen", "--unseen"].map(|flag| std::env::args().any(|argument| argument == flag));
+    let done = if seen || unseen {
+        print(&settings, unseen, number("--from").unwrap_or(0) as u64, number("--cases").unwrap_or(60))
+    } else {
+        document(arguments.is_quick, &settings)
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -255,7 +255,7 @@ pub struct PatchError {
 pub struct BasisError {
     /// States r.
     pub states: usize,
-    /// Estimated error of the force response, %.
+    /// Error of the linear contact force against an imposed motion, %.
     #[serde(rename = "error_percent")]
     pub error_pct: f64,
 }

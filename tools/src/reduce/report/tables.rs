@@ -246,7 +246,7 @@ pub(super) fn sizes(locality: &Locality) -> Table {
 pub(super) fn bases(locality: &Locality) -> Table {
     Table {
         title: "Reduced surroundings (predictive) at the contact".to_owned(),
-        columns: columns(&[("states", "states r"), ("estimated error\n%", "of the force response")]),
+        columns: columns(&[("states", "states r"), ("error\n%", "of the linear contact force")]),
         rows: locality.bases.iter().map(|basis| vec![basis.states.to_string(), figure(basis.error_pct)]).collect(),
     }
 }

@@ -138,7 +138,7 @@ pub(super) fn budget(locality: &Locality) -> Option<String> {
         None => "no number of states of reduced surroundings (`predictive`)".to_owned(),
     };
     Some(format!(
-        "An error of {} between resyncs is met by {patch}; as the expected error of a run, by {states} around the scene's patch.",
+        "An error of {} between resyncs is met by {patch}, and by {states} around the scene's patch.",
         percent(budget.error_pct)
     ))
 }

@@ -34,7 +34,9 @@ const SHARE_LIMIT: f64 = 0.1;
 /// Patches that are tried, along, along and into depth.
 const SIZES: [[usize; 3]; 7] = [[2, 2, 2], [4, 4, 2], [4, 4, 4], [6, 6, 3], [8, 8, 4], [10, 10, 6], [12, 12, 8]];
 /// Numbers of states of reduced surroundings that are shown.
-const SHOWN_STATES: [usize; 9] = [2, 5, 10, 20, 35, 50, 75, 100, 150];
+const SHOWN_STATES: [usize; 9] = [2, 5, 10, 20, 35, 50, 75, 100, MOST_STATES];
+/// The largest number that is tried.
+const MOST_STATES: usize = 150;
 /// Frequencies that the body is reduced at for balancing.
 const SHIFTS: usize = 24;
 /// Moments and place of the one-shift model of the whole body.
@@ -237,11 +239,12 @@ impl Study<'_> {
         Ok(figure.done())
     }
 
-    /// The expected error of `predictive` by the states of its reduced surroundings.
+    /// The error of the linear contact force of `predictive` by the states of its reduced surroundings.
     fn bases(&self, node: u32) -> Result<Vec<BasisError>, Error> {
         let Some(resting) = RestingBody::new(self.body) else { return Ok(Vec::new()) };
-        let errors = Reduction::errors_by_states(&resting, &self.patch_nodes(node, self.patch))?.into_iter();
-        Ok(errors.map(|(states, estimate)| BasisError { states, error_pct: estimate.expected_pct() }).collect())
+        let errors = Reduction::force_errors(&resting, &self.patch_nodes(node, self.patch), MOST_STATES)?;
+        let by_states = |(index, error): (usize, &f64)| BasisError { states: index + 1, error_pct: 100.0 * error };
+        Ok(errors.iter().enumerate().map(by_states).collect())
     }
 
     /// The body balanced for the displacement of the contact's node, the paper's way, through a Krylov space.

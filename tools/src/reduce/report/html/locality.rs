@@ -178,7 +178,7 @@ pub(super) fn sizes(locality: &Locality) -> String {
     }
     if !locality.bases.is_empty() {
         let points = locality.bases.iter().map(|basis| (basis.states as f64, basis.error_pct));
-        let curves = [Curve::new("estimated", "c3", points)];
+        let curves = [Curve::new("contact", "c3", points)];
         let x = Axis::decades("states r", locality.bases.iter().map(|basis| basis.states as f64));
         draw("Reduced surroundings", x, &curves, "The same patch between reduced surroundings: `predictive`.");
     }

@@ -1,5 +1,5 @@
-//! How far the force at a contact is off when the surroundings of a patch answer in few states: an estimate for every
-//! number of states, in one pass.
+//! How far the linear force at a contact is off when the surroundings of a patch answer in few states: for every number of states,
+//! in one pass.
 
 use super::far::Far;
 use super::near::Near;
@@ -11,7 +11,7 @@ use crate::linear_algebra::{Matrix, eliminate};
 /// Real frequencies (1/s) at which the force is compared, evenly on a logarithmic scale. What the tool does differently from
 /// its forecast grows from nothing within one to three periods of the global model, as e^(s t) does at the first; at the last
 /// the masses of the patch alone resist, and nothing around it matters.
-pub(super) const FREQUENCIES: [f64; 4] = [60.0, 129.3, 278.5, 600.0];
+const FREQUENCIES: [f64; 4] = [60.0, 129.3, 278.5, 600.0];
 
 /// The linear body at rest: the patch with its near springs, and surroundings in nested spaces of states.
 ///
@@ -29,9 +29,6 @@ pub(super) struct Contacts {
     damping: Matrix,
     stiffness: Matrix,
     states: usize,
-    /// Of each pressed node by states: the sum of squares of relative errors so far.
-    squares: Vec<Vec<f64>>,
-    done: usize,
 }
 
 impl Contacts {
@@ -52,33 +49,27 @@ impl Contacts {
             damping: near.beside(&near.damping, &on_ring, &c, -1.0),
             stiffness: near.beside(&near.stiffness, &on_ring, &k, -1.0),
             states: count,
-            squares: vec![vec![0.0; count]; near.pressed.len()],
-            done: 0,
             body: Far::whole(body),
             near,
         }
     }
 
-    /// Compares at the next frequency; true after the last. `None` if the numbers do not allow it.
-    pub(super) fn advance(&mut self, body: &RestingBody) -> Option<bool> {
-        let s = FREQUENCIES[self.done];
-        let exact = self.exact(body, s)?;
-        let compliances = self.compliances(s)?;
-        for ((squares, of_node), exact) in self.squares.iter_mut().zip(compliances).zip(exact) {
-            let exact = exact.try_inverse()?;
-            for (square, compliance) in squares.iter_mut().zip(of_node) {
-                *square += ((compliance.try_inverse()? - exact).norm() / exact.norm()).powi(2);
+    /// The relative error of Z by the number of states, from 1 on: the root of its mean square over the frequencies, at the
+    /// worst of the pressed nodes. `None` if the numbers do not allow it.
+    pub(super) fn errors(&self, body: &RestingBody) -> Option<Vec<f64>> {
+        // Of each pressed node by states.
+        let mut squares = vec![vec![0.0; self.states]; self.near.pressed.len()];
+        for s in FREQUENCIES {
+            let exact = self.exact(body, s)?;
+            for ((squares, of_node), exact) in squares.iter_mut().zip(self.compliances(s)?).zip(exact) {
+                let exact = exact.try_inverse()?;
+                for (square, compliance) in squares.iter_mut().zip(of_node) {
+                    *square += ((compliance.try_inverse()? - exact).norm() / exact.norm()).powi(2);
+                }
             }
         }
-        self.done += 1;
-        Some(self.done == FREQUENCIES.len())
-    }
-
-    /// The relative error of Z by the number of states, from 1 on: the root of its mean square over the frequencies, at the
-    /// worst of the pressed nodes.
-    pub(super) fn errors(&self) -> Vec<f64> {
-        let worst = |r: usize| self.squares.iter().map(|squares| squares[r]).fold(0.0, f64::max);
-        (0..self.states).map(|r| (worst(r) / self.done.max(1) as f64).sqrt()).collect()
+        let worst = |r: usize| squares.iter().map(|squares| squares[r]).fold(0.0, f64::max);
+        Some((0..self.states).map(|r| (worst(r) / FREQUENCIES.len() as f64).sqrt()).collect())
     }
 
     /// G D(s)^-1 G^T of the body itself, for each pressed node.
@@ -124,7 +115,7 @@ mod tests {
     use nalgebra::{DMatrix, Matrix3};
 
     use super::super::uneven::uneven;
-    use super::super::{Basis, Estimate, Reduction, RestingBody, Size};
+    use super::super::{Basis, Reduction, RestingBody};
     use super::FREQUENCIES;
     use crate::Vec3;
     use crate::body::{Body, SpringNetwork};
@@ -198,42 +189,22 @@ mod tests {
     }
 
     #[test]
-    fn the_estimate_is_the_error_that_dense_matrices_give_for_uneven_bodies() {
+    fn the_errors_are_those_that_dense_matrices_give_for_uneven_bodies_and_fall_with_the_states() {
         let mut seed = 7;
         for _ in 0..3 {
             let (body, patch) = uneven(&mut seed);
             let resting = RestingBody::new(&body).unwrap();
-            let estimates = Reduction::errors_by_states(&resting, &patch).unwrap();
+            let by_states = Reduction::force_errors(&resting, &patch, 50).unwrap();
+            assert!(by_states.windows(2).all(|pair| pair[0] >= pair[1] * (1.0 - 1e-6)), "{by_states:?}");
             for states in [3, 10, 25] {
                 let basis = Basis::compute(&resting, &patch, states).unwrap().unwrap();
                 let pressed = super::Near::new(&body.restriction(&patch).unwrap(), patch.len()).pressed;
                 let errors = pressed.iter().map(|pressed| dense_error(&body, &patch, &basis, pressed.node));
                 let worst = errors.fold(0.0, f64::max);
-                let estimate = 0.01 * estimates[states - 1].1.linear_pct;
-                // The estimate is that of the shapes before they are rounded to 16 bits, which changes forces by less than 0.005 %.
-                assert!((estimate - worst).abs() < 1e-4 * worst + 5e-5, "{states} states: {estimate} against {worst}");
+                let error = by_states[states - 1];
+                // It is that of the shapes before they are rounded to 16 bits, which changes forces by less than 0.005 %.
+                assert!((error - worst).abs() < 1e-4 * worst + 5e-5, "{states} states: {error} against {worst}");
             }
         }
-    }
-
-    #[test]
-    fn a_smaller_budget_takes_more_states_and_is_kept() {
-        let mut seed = 3;
-        let (body, patch) = uneven(&mut seed);
-        let resting = RestingBody::new(&body).unwrap();
-        let estimates = Reduction::errors_by_states(&resting, &patch).unwrap();
-        assert!(estimates.windows(2).all(|pair| pair[0].1.linear_pct >= pair[1].1.linear_pct * (1.0 - 1e-6)));
-        let mut last = 0;
-        for budget in [5.0, 2.0, 1.0, 0.5] {
-            let basis = Basis::compute(&resting, &patch, Size::ErrorPct(budget)).unwrap().unwrap();
-            let estimate = basis.estimate().unwrap();
-            assert!(basis.states() > last && estimate.expected_pct() <= budget, "{budget}: {estimate:?}");
-            assert_eq!(estimate, estimates[basis.states() - 1].1);
-            assert!(estimates[basis.states() - 2].1.expected_pct() > budget, "one state less would do");
-            last = basis.states();
-        }
-        // What cannot be kept takes all there are, and says what that comes to.
-        let all = Basis::compute(&resting, &patch, Size::ErrorPct(0.1)).unwrap().unwrap();
-        assert!(all.states() >= last && all.estimate().unwrap().expected_pct() >= Estimate::FLOOR_PCT);
     }
 }
