@@ -45,6 +45,11 @@ impl BasisStore {
         self.states
     }
 
+    /// What the basis of `patch` takes to be made (s) on no machine in particular; zero if nothing around the patch can move.
+    pub(crate) fn nominal_s(&self, resting: &RestingBody, patch: &[u32]) -> f64 {
+        Reduction::new(resting, patch, self.states).map_or(0.0, |reduction| reduction.nominal())
+    }
+
     /// The basis of `patch` (node ids in increasing order); `None` if nothing around the patch can move. A file that is
     /// damaged or cannot be written is as good as none: the basis is computed.
     ///

@@ -9,8 +9,6 @@ use crate::model::surroundings::Bases;
 
 /// Times at which a tool is looked for ahead: by then a basis may be ready (s).
 const PREFETCH_S: [f64; 3] = [0.15, 0.3, 0.6];
-/// Windows around a tool that are made ready before it comes there.
-const NEIGHBOURS: usize = 7;
 
 /// The simulation with its tools.
 type Scene<'a> = (&'a Simulation, &'a [ToolSide]);
@@ -93,7 +91,7 @@ impl NextModels {
                 side.windows.choose(at, ahead, &side.beside, |_| true, patch);
                 wish(patch);
             }
-            side.windows.around(side.triangles[0], NEIGHBOURS).for_each(&mut wish);
+            side.windows.around(side.triangles[0]).for_each(&mut wish);
         }
     }
 

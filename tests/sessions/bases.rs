@@ -83,3 +83,20 @@ fn bases_cost_time_in_virtual_time() {
     assert!(at_once != nominal && nominal != slow);
     assert!(with(None) == nominal, "the same bits every time");
 }
+
+/// The first windows reach 25 mm, and the stroke goes on for 120: those beside them are there before it begins.
+#[test]
+fn a_stroke_that_begins_with_the_session_is_served_though_no_basis_is_made_in_time() {
+    let with = |latency_ms| {
+        let mut scene = scene(None);
+        scene.global.basis_latency_ms = Some(latency_ms);
+        let summary = Session::from_scene(scene).virtual_time().keep_records().build().unwrap().run().unwrap();
+        forces(&summary).iter().map(|force| force.force_n).collect::<Vec<_>>()
+    };
+    let [at_once, never] = [0.0, 60_000.0].map(with);
+    let norm = |force: [f64; 3]| force.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let peak = at_once.iter().copied().map(norm).fold(0.0, f64::max);
+    let apart = |(a, b): (&[f64; 3], &[f64; 3])| norm(std::array::from_fn(|i| a[i] - b[i])) / peak;
+    let worst = at_once.iter().zip(&never).map(apart).fold(0.0, f64::max);
+    assert!(worst < 0.05, "{worst}");
+}

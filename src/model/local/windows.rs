@@ -12,6 +12,9 @@ const HEIGHT: f64 = 0.7;
 /// Triangles under the tool that a window is to hold: there, ahead, behind and where it was. Those that a shape touches follow.
 const WAYS: usize = 3 * LOOKS + 1;
 
+/// Windows around a tool that are made ready before it comes there.
+const NEIGHBOURS: usize = 7;
+
 /// Windows whose normals have this cosine between them look the same way.
 const ALIKE: f64 = 0.5;
 
@@ -184,18 +187,31 @@ impl Windows {
         best.map(|(window, _)| window)
     }
 
-    /// The patches of the `count` windows nearest to `triangle`, the nearest first.
+    /// The patches of the seven least windows nearest to `triangle`, the nearest first.
     ///
     /// # Real-time
     /// For the global actor: looks at all windows, allocates.
-    pub fn around(&self, triangle: u32, count: usize) -> impl Iterator<Item = &[u32]> {
+    pub fn around(&self, triangle: u32) -> impl Iterator<Item = &[u32]> {
+        self.nearest(triangle, 0).take(NEIGHBOURS).map(|window| &window.patch[..])
+    }
+
+    /// The patches of the largest windows that look the way of the one at `triangle`, the nearest first: a tool may go anywhere.
+    ///
+    /// # Real-time
+    /// For the global actor: looks at all windows, allocates.
+    pub fn widest_around(&self, triangle: u32) -> impl Iterator<Item = &[u32]> {
+        let mut all = self.nearest(triangle, self.windows.last().map_or(0, |window| window.layer)).peekable();
+        let normal = all.peek().map(|first| first.normal).unwrap_or_default();
+        all.filter(move |window| window.normal.dot(&normal) > ALIKE).map(|window| &window.patch[..])
+    }
+
+    fn nearest(&self, triangle: u32, layer: usize) -> impl Iterator<Item = &Window> {
         let at = self.triangles[triangle as usize];
         let far = |window: &Window| (window.middle - at).norm_squared();
-        let mut all: Vec<(f64, &Window)> =
-            self.windows.iter().take_while(|window| window.layer == 0).map(|window| (far(window), window)).collect();
+        let of_layer = self.windows.iter().filter(|window| window.layer == layer);
+        let mut all: Vec<(f64, &Window)> = of_layer.map(|window| (far(window), window)).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        all.truncate(count);
-        all.into_iter().map(|(_, window)| &window.patch[..])
+        all.into_iter().map(|(_, window)| window)
     }
 }
 
@@ -279,6 +295,9 @@ mod tests {
             !windows.choose((&simulation, 0), &[triangle], &Beside::default(), |_| false, &mut ready),
             "none is ready"
         );
-        assert!(windows.around(triangle, 7).count() == 7 && windows.around(triangle, 1).next().is_some());
+        assert!(windows.around(triangle).any(|patch| patch == best));
+        let largest: Vec<&[u32]> = windows.widest_around(triangle).collect();
+        assert!(!largest.is_empty() && largest.iter().all(|patch| patch.len() > best.len()));
+        assert!(largest.contains(&windows.widest(triangle, &best).unwrap()));
     }
 }

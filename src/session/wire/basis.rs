@@ -62,7 +62,11 @@ impl BasisSide {
     }
 }
 
-/// The bases of the window that each tool is over, of one that holds the others too, and of the widest there.
+/// What bases of windows beside the first ones may take before a session begins (s, nominally), for each tool.
+const BESIDE_S: f64 = 0.5;
+
+/// The bases of the window that each tool is over, of one that holds the others too, and of the widest there and beside it: a fast
+/// tool leaves its first window before another basis is made.
 fn first_bases(
     prepared: &Prepared,
     resting: &RestingBody,
@@ -78,6 +82,21 @@ fn first_bases(
         triangles
     };
     let of_tools: Vec<Vec<u32>> = tools.iter().enumerate().map(triangles).collect();
+    // False if no time is left for it.
+    let mut make = |patch: &[u32], left: &mut f64| {
+        if bases.get(patch).is_some() {
+            return true;
+        }
+        *left -= store.nominal_s(resting, patch);
+        if *left < 0.0 {
+            return false;
+        }
+        // What cannot be reduced is told by the actor, when it is wanted.
+        if let Ok(Some(basis)) = store.get(resting, patch) {
+            bases.insert(Arc::new(basis));
+        }
+        true
+    };
     for (index, triangles) in of_tools.iter().enumerate() {
         let windows = Windows::new(simulation, index, prepared.plan.template.patch);
         simulation.pressed_beside(index, |other| &of_tools[other], &mut beside.soon);
@@ -86,15 +105,17 @@ fn first_bases(
         let [mut patch, mut shared] = [Vec::new(), Vec::new()];
         windows.choose((simulation, index), triangles, &Beside::default(), |_| true, &mut patch);
         windows.choose((simulation, index), triangles, &beside, |_| true, &mut shared);
-        let widest = windows.widest(triangles[0], &patch).filter(|_| !simulation.contact(index).glued);
-        for patch in [&patch[..], &shared[..]].into_iter().chain(widest) {
-            // What cannot be reduced is told by the actor, when it is wanted.
-            if bases.get(patch).is_none()
-                && let Ok(Some(basis)) = store.get(resting, patch)
-            {
-                bases.insert(Arc::new(basis));
-            }
+        let mut needed = f64::INFINITY;
+        make(&patch, &mut needed);
+        make(&shared, &mut needed);
+        if simulation.contact(index).glued {
+            continue;
         }
+        if let Some(widest) = windows.widest(triangles[0], &patch) {
+            make(widest, &mut needed);
+        }
+        let mut left = BESIDE_S;
+        let _ = windows.widest_around(triangles[0]).all(|patch| make(patch, &mut left));
     }
     Ok(bases)
 }
