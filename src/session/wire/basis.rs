@@ -64,6 +64,8 @@ impl BasisSide {
 
 /// What bases of windows beside the first ones may take before a session begins (s, nominally), for each tool.
 const BESIDE_S: f64 = 0.5;
+/// So many at most: on a large body, windows that look the same take next to no time, and memory all the same.
+const BESIDE: usize = 25;
 
 /// The bases of the window that each tool is over, of one that holds the others too, and of the widest there and beside it: a fast
 /// tool leaves its first window before another basis is made.
@@ -115,7 +117,7 @@ fn first_bases(
             make(widest, &mut needed);
         }
         let mut left = BESIDE_S;
-        let _ = windows.widest_around(triangles[0]).all(|patch| make(patch, &mut left));
+        let _ = windows.widest_around(triangles[0]).take(BESIDE).all(|patch| make(patch, &mut left));
     }
     Ok(bases)
 }
