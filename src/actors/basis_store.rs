@@ -45,24 +45,17 @@ impl BasisStore {
         self.states
     }
 
-    /// What the basis of `patch` takes to be made (s) on no machine in particular; zero if nothing around the patch can move.
-    pub(crate) fn nominal_s(&self, resting: &RestingBody, patch: &[u32]) -> f64 {
-        Reduction::new(resting, patch, self.states).map_or(0.0, |reduction| reduction.nominal())
-    }
-
-    /// The basis of `patch` (node ids in increasing order); `None` if nothing around the patch can move. A file that is
-    /// damaged or cannot be written is as good as none: the basis is computed.
+    /// The basis that `reduction` begins. A file that is damaged or cannot be written is as good as none: the basis is computed.
     ///
     /// # Errors
     /// If nothing holds the surroundings together.
-    pub(crate) fn get(&mut self, resting: &RestingBody, patch: &[u32]) -> Result<Option<Basis>, Error> {
-        let Some(mut reduction) = Reduction::new(resting, patch, self.states) else { return Ok(None) };
+    pub(crate) fn get(&mut self, resting: &RestingBody, mut reduction: Reduction) -> Result<Basis, Error> {
         if let Some(kept) = self.kept(resting, &reduction) {
-            return Ok(Some(kept));
+            return Ok(kept);
         }
         loop {
             if let Some(basis) = self.advance(resting, &mut reduction)? {
-                return Ok(Some(basis));
+                return Ok(basis);
             }
         }
     }

@@ -4,7 +4,7 @@ use super::BlockSpec;
 use crate::model::mesh::Face;
 
 /// The window is clamped at thin faces, so it has to fit one of the faces that can be touched: those that are not fixed.
-pub(crate) fn patch_fits(patch: [usize; 3], block: &BlockSpec) -> bool {
+pub(super) fn patch_fits(patch: [usize; 3], block: &BlockSpec) -> bool {
     free_faces(block).any(|(_, limits)| (0..3).all(|part| (2..=limits[part]).contains(&patch[part])))
 }
 

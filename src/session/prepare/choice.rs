@@ -28,7 +28,7 @@ impl fmt::Display for Choice {
 }
 
 /// `reason` with what else was decided, and what that misses.
-pub(crate) fn extended(reason: Option<ModelReason>, why: String, missed: Option<String>) -> ModelReason {
+pub(super) fn extended(reason: Option<ModelReason>, why: String, missed: Option<String>) -> ModelReason {
     match reason {
         Some(ModelReason { why: first, warning }) => {
             ModelReason { why: format!("{first}; {why}"), warning: warning.or(missed) }

@@ -6,7 +6,7 @@ use crate::actors::{BasisActor, BasisPace, BasisPorts, BasisStore, Wishes};
 use crate::error::Error;
 use crate::model::Pose;
 use crate::model::local::{Aim, Beside, Kind, ToolForecast, Windows};
-use crate::model::surroundings::{Bases, RestingBody};
+use crate::model::surroundings::{Bases, Reduction, RestingBody};
 use crate::runtime::{Actor, ExchangePort, Nanos, RuntimeBuilder};
 use crate::session::prepare::Prepared;
 
@@ -89,12 +89,13 @@ fn first_bases(
         if bases.get(patch).is_some() {
             return true;
         }
-        *left -= store.nominal_s(resting, patch);
+        let Some(reduction) = Reduction::new(resting, patch, store.states()) else { return true };
+        *left -= reduction.nominal();
         if *left < 0.0 {
             return false;
         }
         // What cannot be reduced is told by the actor, when it is wanted.
-        if let Ok(Some(basis)) = store.get(resting, patch) {
+        if let Ok(basis) = store.get(resting, reduction) {
             bases.insert(Arc::new(basis));
         }
         true
