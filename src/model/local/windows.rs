@@ -2,6 +2,7 @@
 //! tool comes there.
 
 use super::forecast::LOOKS;
+use crate::body::Body;
 use crate::contact::ToolShape;
 use crate::simulation::Simulation;
 use crate::{Pose, Vec3};
@@ -11,6 +12,8 @@ const HEIGHT: f64 = 0.7;
 
 /// Triangles under the tool that a window is to hold: there, ahead, behind and where it was. Those that a shape touches follow.
 const WAYS: usize = 3 * LOOKS + 1;
+/// Those of them that it must hold: there and ahead.
+const AHEAD: usize = LOOKS + 1;
 
 /// Windows around a tool that are made ready before it comes there.
 const NEIGHBOURS: usize = 7;
@@ -53,6 +56,8 @@ struct Window {
     normal: Vec3,
     /// Node ids in increasing order.
     patch: Vec<u32>,
+    /// Those of them from which the surface leads to no node out of the patch.
+    inside: Vec<u32>,
     /// Of the first window of its size.
     layer: usize,
 }
@@ -81,6 +86,7 @@ impl Windows {
         let triangles: Vec<Vec3> = corners.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
         let edges = corners.iter().map(|[a, b, c]| (b - a).norm() + (c - b).norm() + (a - c).norm());
         let edge = edges.sum::<f64>() / (3.0 * corners.len().max(1) as f64);
+        let joints = Joints::new(body);
         let mut windows: Vec<Window> = Vec::new();
         let mut around = Vec::new();
         for Layer { spacing, more, way } in LAYERS {
@@ -108,16 +114,21 @@ impl Windows {
                 }
                 let mut patch = Vec::new();
                 simulation.patch(tool, &around, size, &mut patch);
-                windows.push(Window { middle: *middle, normal, patch, layer: first });
+                let inside = joints.inside(&patch);
+                windows.push(Window { middle: *middle, normal, patch, inside, layer: first });
             }
         }
         Self { size, triangles, windows }
     }
 
-    /// Puts the patch for tool number `tool` over `triangles` in place of `nodes`: of the windows that are `usable` and hold all that
-    /// it presses there the one in whose middle they lie best, or one of its own if there is none. One that holds what others will press
-    /// `beside` too comes before one that holds what they press now, and that before others; in its middle is then what lies between all
-    /// of them. A tool that is glued, and goes nowhere, always has its own. True if it is a usable one.
+    /// Puts the patch for tool number `tool` over `triangles` in place of `nodes`. True if it is a usable one.
+    ///
+    /// It is that of the least `usable` window that holds all that the tool presses there well inside: at the edge of a window it is
+    /// next to a ring that moves as predicted. If there is none, as much of the way as one holds well inside; then all of the way
+    /// ahead, be it at the edge. Else the tool has a patch of its own, as always one that is glued and goes nowhere.
+    ///
+    /// Of several windows the one is taken in whose middle all that lies best. One that holds what others will press `beside` too comes
+    /// before one that holds what they press now, and that before others; in its middle is then what lies between all of them.
     ///
     /// # Real-time
     /// For the global actor: looks at all windows; `nodes` may grow.
@@ -131,15 +142,18 @@ impl Windows {
     ) -> bool {
         if !simulation.contact(tool).glued {
             // All of a fast tool's way may be in none: then as much of it as one holds.
-            let mut window = (1..=WAYS + 1).rev().filter_map(|count| {
-                let first = if count > WAYS { triangles } else { &triangles[..count.min(triangles.len())] };
-                simulation.pressed_at(tool, first, nodes);
-                let shared = [&beside.soon, &beside.now].into_iter().filter(|nodes| !nodes.is_empty());
-                let together = || first.iter().chain(&beside.triangles);
-                let mut shared = shared.filter_map(|also| self.best(together(), [nodes, also], &usable));
-                shared.next().or_else(|| self.best(first.iter(), [nodes, &[]], &usable))
-            });
-            if let Some(window) = window.next() {
+            let mut on_way = |least: usize, well_inside: bool| {
+                (least..=WAYS + 1).rev().find_map(|count| {
+                    let first = if count > WAYS { triangles } else { &triangles[..count.min(triangles.len())] };
+                    simulation.pressed_at(tool, first, nodes);
+                    let inside: &[u32] = if well_inside { nodes } else { &[] };
+                    let shared = [&beside.soon, &beside.now].into_iter().filter(|nodes| !nodes.is_empty());
+                    let together = || first.iter().chain(&beside.triangles);
+                    let mut shared = shared.filter_map(|also| self.best(together(), [nodes, also], inside, &usable));
+                    shared.next().or_else(|| self.best(first.iter(), [nodes, &[]], inside, &usable))
+                })
+            };
+            if let Some(window) = on_way(1, true).or_else(|| on_way(AHEAD, false)) {
                 window.patch.clone_into(nodes);
                 return true;
             }
@@ -165,14 +179,19 @@ impl Windows {
         best.map(|(_, window)| &window.patch[..])
     }
 
-    /// The least of the usable windows that hold what is `pressed`, and of these the one in whose middle `triangles` lie best.
+    /// The least of the usable windows that hold what is `pressed`, and well `inside` what is to be there; of these the one in whose
+    /// middle `triangles` lie best.
     fn best<'a>(
         &self,
         triangles: impl Iterator<Item = &'a u32> + Clone,
         pressed: [&[u32]; 2],
+        inside: &[u32],
         usable: impl Fn(&[u32]) -> bool,
     ) -> Option<&Window> {
-        let holds = |patch: &[u32]| pressed.into_iter().flatten().all(|node| patch.binary_search(node).is_ok());
+        let holds = |window: &Window| {
+            inside.iter().all(|node| window.inside.binary_search(node).is_ok())
+                && pressed.into_iter().flatten().all(|node| window.patch.binary_search(node).is_ok())
+        };
         let mut best: Option<(&Window, f64)> = None;
         for window in &self.windows {
             if best.is_some_and(|(best, _)| best.layer != window.layer) {
@@ -180,7 +199,7 @@ impl Windows {
             }
             let far = |&triangle: &u32| (self.triangles[triangle as usize] - window.middle).norm_squared();
             let farthest = triangles.clone().map(far).fold(0.0, f64::max);
-            if best.is_none_or(|(_, least)| farthest < least) && holds(&window.patch) && usable(&window.patch) {
+            if best.is_none_or(|(_, least)| farthest < least) && holds(window) && usable(&window.patch) {
                 best = Some((window, farthest));
             }
         }
@@ -215,10 +234,35 @@ impl Windows {
     }
 }
 
+/// Which nodes each node of the surface shares a triangle with.
+struct Joints {
+    /// Those that can move.
+    neighbours: Vec<Vec<u32>>,
+}
+
+impl Joints {
+    fn new(body: &dyn Body) -> Self {
+        let mut neighbours = vec![Vec::new(); body.rest().len()];
+        for triangle in &body.surface().triangles {
+            for &node in triangle {
+                let can_move = |other: &&u32| body.inverse_masses()[**other as usize] > 0.0;
+                neighbours[node as usize].extend(triangle.iter().filter(can_move));
+            }
+        }
+        Self { neighbours }
+    }
+
+    /// Those of the `patch` from which the surface leads to no node out of it.
+    fn inside(&self, patch: &[u32]) -> Vec<u32> {
+        let holds = |node: &u32| patch.binary_search(node).is_ok();
+        patch.iter().copied().filter(|&node| self.neighbours[node as usize].iter().all(holds)).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{Block, Body, State};
+    use crate::body::{Block, State};
     use crate::contact::{Contact, Law};
     use crate::mesh::Face;
     use crate::simulation::Stepping;
@@ -272,7 +316,7 @@ mod tests {
         };
         let resting = chosen(&[at(0.041)]);
         assert_eq!(resting.len(), SIZE.iter().product::<usize>());
-        let fast = chosen(&[at(0.021), at(0.031), at(0.041), at(0.061)]);
+        let fast = chosen(&[at(0.021), at(0.031), at(0.041), at(0.041)]);
         assert!(fast.len() > resting.len());
         assert!(windows.widest(at(0.041), &resting).unwrap().len() > fast.len());
         // From edge to edge is more than any window holds: it holds the first half.
@@ -280,6 +324,37 @@ mod tests {
         let too_far = chosen(&[edge, middle, at(0.061), at(0.079)]);
         let corners = |triangle: u32| simulation.body().surface().triangles[triangle as usize];
         assert!([edge, middle].into_iter().flat_map(corners).all(|node| too_far.contains(&node)));
+    }
+
+    #[test]
+    fn a_tool_at_the_edge_of_a_window_takes_a_larger_one_or_its_own_before_it_leaves() {
+        let simulation = simulation(ToolShape::Point);
+        let windows = Windows::new(&simulation, 0, SIZE);
+        let all = &windows.windows;
+        let largest = all.last().unwrap().layer;
+        let mut pressed = Vec::new();
+        let mut holds = |triangle: u32, nodes: &[u32]| {
+            simulation.pressed_at(0, &[triangle], &mut pressed);
+            pressed.iter().all(|node| nodes.contains(node))
+        };
+        let choose = |way: &[u32], usable: &[&Window]| {
+            let usable = |patch: &[u32]| usable.iter().any(|window| window.patch == patch);
+            let mut patch = Vec::new();
+            let is_usable = windows.choose((&simulation, 0), way, &Beside::default(), usable, &mut patch);
+            is_usable.then_some(patch)
+        };
+        let (top, mut found) = (top(&simulation), 0);
+        for &triangle in &top {
+            let at_its_edge = |small: &&Window| holds(triangle, &small.patch) && !holds(triangle, &small.inside);
+            let Some(small) = all.iter().find(at_its_edge) else { continue };
+            let outside = *top.iter().find(|&&other| !holds(other, &small.patch)).unwrap();
+            let well = all[largest..].iter().find(|large| holds(triangle, &large.inside)).unwrap();
+            assert_eq!(choose(&[triangle], &[small, well]).unwrap(), well.patch);
+            assert_eq!(choose(&[triangle], &[small]).unwrap(), small.patch, "it stays in it");
+            assert_eq!(choose(&[triangle, outside], &[small]), None);
+            found += 1;
+        }
+        assert!(found > 0);
     }
 
     #[test]

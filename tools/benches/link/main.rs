@@ -1,5 +1,5 @@
 //! The global model behind a link: error and jump of `hold`, `patch` and `predictive` against one-way delay and loss, in virtual time.
-//! Writes the tables of docs/link.md, between its marks, and a picture.
+//! Writes the table of docs/link.md, between its marks, and a picture.
 //!
 //! `cargo bench --bench link`; with `-- --quick` a short form that prints and writes nothing; `-- --print` prints all of it and writes
 //! nothing.
@@ -7,7 +7,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-use std::fmt::Write;
 use std::process::ExitCode;
 
 use palpate::Error;
@@ -65,19 +64,25 @@ fn measure(name: &str, delays: &[f64], losses: &[f64], duration_s: f64) -> Resul
     Ok(grid)
 }
 
-fn rows(grid: &Grid) -> String {
-    let cell = |found: &Option<Found>| {
-        found.map_or_else(|| ["-".to_owned(), "-".to_owned()], |Found { rms, jump }| [rms, jump].map(figure))
+/// One row for each delay, with all losses in a cell.
+fn rows(name: &str, grid: &Grid) -> Vec<Vec<String>> {
+    let row = |(number, group): (usize, &[(f64, f64, [Option<Found>; MODELS.len()])])| {
+        let cell = |model: usize, of: fn(Found) -> f64| {
+            let figures =
+                group.iter().map(|(_, _, found)| found[model].map_or_else(|| "-".to_owned(), |it| figure(of(it))));
+            figures.collect::<Vec<_>>().join(" / ")
+        };
+        let scene = if number == 0 { format!("`{name}`") } else { String::new() };
+        let first = [scene, group[0].0.to_string()].into_iter();
+        first.chain((0..MODELS.len()).map(|model| cell(model, |it| it.rms))).chain([cell(0, |it| it.jump)]).collect()
     };
-    let row = |(delay, loss, found): &(f64, f64, [Option<Found>; MODELS.len()])| {
-        let first = [format!("{delay}"), figure(100.0 * loss)];
-        first.into_iter().chain(found.iter().flat_map(cell)).collect()
-    };
-    let heads = ["delay ms", "loss %"].map(str::to_owned).into_iter();
-    let heads: Vec<String> = heads
-        .chain(MODELS.iter().flat_map(|kind| ["rms %", "jump %"].map(|of| format!("`{}` {of}", kind.name()))))
-        .collect();
-    table(&heads.iter().map(String::as_str).collect::<Vec<_>>(), 0, &grid.iter().map(row).collect::<Vec<_>>())
+    grid.chunk_by(|(a, ..), (b, ..)| a == b).enumerate().map(row).collect()
+}
+
+fn heads() -> Vec<String> {
+    let models = MODELS.iter().map(|kind| format!("`{}` rms", kind.name()));
+    let jump = format!("`{}` jump", MODELS[0].name());
+    ["scene", "delay ms"].map(str::to_owned).into_iter().chain(models).chain([jump]).collect()
 }
 
 fn picture(found: &[(&str, Grid)], loss: f64) -> Picture {
@@ -115,7 +120,7 @@ fn document(is_quick: bool, only_prints: bool) -> Result<(), Error> {
         true => (&SCENES[..1], &DELAYS_MS[3..4], &LOSSES[1..2], 0.2),
         false => (&SCENES[..], &DELAYS_MS[..], &LOSSES[..], DURATION_S),
     };
-    let mut text = String::new();
+    let mut table_rows = Vec::new();
     let mut all = Vec::new();
     let grids: Vec<Result<Grid, Error>> = std::thread::scope(|scope| {
         let start = |name: &&'static str| {
@@ -127,9 +132,11 @@ fn document(is_quick: bool, only_prints: bool) -> Result<(), Error> {
     });
     for (name, grid) in names.iter().zip(grids) {
         let grid = grid?;
-        let _ = write!(text, "### `{name}`\n\n{}\n", rows(&grid));
+        table_rows.extend(rows(name, &grid));
         all.push((*name, grid));
     }
+    let heads = heads();
+    let text = table(&heads.iter().map(String::as_str).collect::<Vec<_>>(), 1, &table_rows);
     if is_quick || only_prints {
         print!("{text}");
         return Ok(());
@@ -141,7 +148,7 @@ fn document(is_quick: bool, only_prints: bool) -> Result<(), Error> {
     let Some((before, after)) = parts else {
         return Err(Error::io(&path, std::io::Error::other("has lost its marks")));
     };
-    common::write(DOCUMENT, &format!("{before}{BEGIN}\n{text}{END}{after}"))
+    common::write(DOCUMENT, &format!("{before}{BEGIN}\n{text}\n{END}{after}"))
 }
 
 fn main() -> ExitCode {
