@@ -15,6 +15,10 @@ const WAYS: usize = 3 * LOOKS + 1;
 /// Those of them that it must hold: there and ahead.
 const AHEAD: usize = LOOKS + 1;
 
+/// Windows of so many nodes along the surface have all nodes around a tool well inside. In smaller ones, as on tissue, next to none
+/// would have, and the states of a basis would be spread over a larger ring: there it is the nodes beyond the three edges alone.
+const ROOMY: usize = 5;
+
 /// Windows around a tool that are made ready before it comes there.
 const NEIGHBOURS: usize = 7;
 
@@ -45,6 +49,8 @@ pub struct Windows {
     size: [usize; 3],
     /// The middle of each surface triangle at rest (m).
     triangles: Vec<Vec3>,
+    /// The nodes around each triangle that a window has to hold too, to have it well inside.
+    around: Vec<Vec<u32>>,
     windows: Vec<Window>,
 }
 
@@ -56,8 +62,6 @@ struct Window {
     normal: Vec3,
     /// Node ids in increasing order.
     patch: Vec<u32>,
-    /// Those of them from which the surface leads to no node out of the patch.
-    inside: Vec<u32>,
     /// Of the first window of its size.
     layer: usize,
 }
@@ -86,7 +90,6 @@ impl Windows {
         let triangles: Vec<Vec3> = corners.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
         let edges = corners.iter().map(|[a, b, c]| (b - a).norm() + (c - b).norm() + (a - c).norm());
         let edge = edges.sum::<f64>() / (3.0 * corners.len().max(1) as f64);
-        let joints = Joints::new(body);
         let mut windows: Vec<Window> = Vec::new();
         let mut around = Vec::new();
         for Layer { spacing, more, way } in LAYERS {
@@ -114,11 +117,11 @@ impl Windows {
                 }
                 let mut patch = Vec::new();
                 simulation.patch(tool, &around, size, &mut patch);
-                let inside = joints.inside(&patch);
-                windows.push(Window { middle: *middle, normal, patch, inside, layer: first });
+                windows.push(Window { middle: *middle, normal, patch, layer: first });
             }
         }
-        Self { size, triangles, windows }
+        let corners = if size[0].min(size[1]) < ROOMY { 2 } else { 1 };
+        Self { size, triangles, around: nodes_around(body, corners), windows }
     }
 
     /// Puts the patch for tool number `tool` over `triangles` in place of `nodes`. True if it is a usable one.
@@ -146,11 +149,12 @@ impl Windows {
                 (least..=WAYS + 1).rev().find_map(|count| {
                     let first = if count > WAYS { triangles } else { &triangles[..count.min(triangles.len())] };
                     simulation.pressed_at(tool, first, nodes);
-                    let inside: &[u32] = if well_inside { nodes } else { &[] };
+                    let around = first.iter().flat_map(|&triangle| &self.around[triangle as usize]);
+                    nodes.extend(around.filter(|_| well_inside));
                     let shared = [&beside.soon, &beside.now].into_iter().filter(|nodes| !nodes.is_empty());
                     let together = || first.iter().chain(&beside.triangles);
-                    let mut shared = shared.filter_map(|also| self.best(together(), [nodes, also], inside, &usable));
-                    shared.next().or_else(|| self.best(first.iter(), [nodes, &[]], inside, &usable))
+                    let mut shared = shared.filter_map(|also| self.best(together(), [nodes, also], &usable));
+                    shared.next().or_else(|| self.best(first.iter(), [nodes, &[]], &usable))
                 })
             };
             if let Some(window) = on_way(1, true).or_else(|| on_way(AHEAD, false)) {
@@ -179,19 +183,14 @@ impl Windows {
         best.map(|(_, window)| &window.patch[..])
     }
 
-    /// The least of the usable windows that hold what is `pressed`, and well `inside` what is to be there; of these the one in whose
-    /// middle `triangles` lie best.
+    /// The least of the usable windows that hold what is `pressed`, and of these the one in whose middle `triangles` lie best.
     fn best<'a>(
         &self,
         triangles: impl Iterator<Item = &'a u32> + Clone,
         pressed: [&[u32]; 2],
-        inside: &[u32],
         usable: impl Fn(&[u32]) -> bool,
     ) -> Option<&Window> {
-        let holds = |window: &Window| {
-            inside.iter().all(|node| window.inside.binary_search(node).is_ok())
-                && pressed.into_iter().flatten().all(|node| window.patch.binary_search(node).is_ok())
-        };
+        let holds = |patch: &[u32]| pressed.into_iter().flatten().all(|node| patch.binary_search(node).is_ok());
         let mut best: Option<(&Window, f64)> = None;
         for window in &self.windows {
             if best.is_some_and(|(best, _)| best.layer != window.layer) {
@@ -199,7 +198,7 @@ impl Windows {
             }
             let far = |&triangle: &u32| (self.triangles[triangle as usize] - window.middle).norm_squared();
             let farthest = triangles.clone().map(far).fold(0.0, f64::max);
-            if best.is_none_or(|(_, least)| farthest < least) && holds(window) && usable(&window.patch) {
+            if best.is_none_or(|(_, least)| farthest < least) && holds(&window.patch) && usable(&window.patch) {
                 best = Some((window, farthest));
             }
         }
@@ -234,29 +233,26 @@ impl Windows {
     }
 }
 
-/// Which nodes each node of the surface shares a triangle with.
-struct Joints {
-    /// Those that can move.
-    neighbours: Vec<Vec<u32>>,
-}
-
-impl Joints {
-    fn new(body: &dyn Body) -> Self {
-        let mut neighbours = vec![Vec::new(); body.rest().len()];
-        for triangle in &body.surface().triangles {
-            for &node in triangle {
-                let can_move = |other: &&u32| body.inverse_masses()[**other as usize] > 0.0;
-                neighbours[node as usize].extend(triangle.iter().filter(can_move));
-            }
-        }
-        Self { neighbours }
+/// For each triangle of the surface the nodes around it that can move: the neighbours of at least so many of its `corners`.
+fn nodes_around(body: &dyn Body, corners: usize) -> Vec<Vec<u32>> {
+    let triangles = &body.surface().triangles;
+    let mut neighbours = vec![Vec::new(); body.rest().len()];
+    for triangle in triangles {
+        triangle.iter().for_each(|&node| neighbours[node as usize].extend(triangle));
     }
-
-    /// Those of the `patch` from which the surface leads to no node out of it.
-    fn inside(&self, patch: &[u32]) -> Vec<u32> {
-        let holds = |node: &u32| patch.binary_search(node).is_ok();
-        patch.iter().copied().filter(|&node| self.neighbours[node as usize].iter().all(holds)).collect()
+    for nodes in &mut neighbours {
+        nodes.sort_unstable();
+        nodes.dedup();
     }
+    let can_move = |node: &u32| body.inverse_masses()[*node as usize] > 0.0;
+    let around = |triangle: &[u32; 3]| {
+        let all = triangle.iter().flat_map(|&node| &neighbours[node as usize]).copied();
+        let mut all: Vec<u32> = all.filter(|node| !triangle.contains(node)).filter(can_move).collect();
+        all.sort_unstable();
+        let often = all.chunk_by(|a, b| a == b).filter(|same| same.len() >= corners);
+        often.map(|same| same[0]).collect()
+    };
+    triangles.iter().map(around).collect()
 }
 
 #[cfg(test)]
@@ -332,10 +328,13 @@ mod tests {
         let windows = Windows::new(&simulation, 0, SIZE);
         let all = &windows.windows;
         let largest = all.last().unwrap().layer;
-        let mut pressed = Vec::new();
-        let mut holds = |triangle: u32, nodes: &[u32]| {
-            simulation.pressed_at(0, &[triangle], &mut pressed);
-            pressed.iter().all(|node| nodes.contains(node))
+        let holds = |triangle: u32, window: &Window| {
+            let corners = &simulation.body().surface().triangles[triangle as usize];
+            corners.iter().all(|node| window.patch.contains(node))
+        };
+        let has_inside = |triangle: u32, window: &Window| {
+            let around = &windows.around[triangle as usize];
+            holds(triangle, window) && around.iter().all(|node| window.patch.contains(node))
         };
         let choose = |way: &[u32], usable: &[&Window]| {
             let usable = |patch: &[u32]| usable.iter().any(|window| window.patch == patch);
@@ -345,10 +344,10 @@ mod tests {
         };
         let (top, mut found) = (top(&simulation), 0);
         for &triangle in &top {
-            let at_its_edge = |small: &&Window| holds(triangle, &small.patch) && !holds(triangle, &small.inside);
+            let at_its_edge = |small: &&Window| holds(triangle, small) && !has_inside(triangle, small);
             let Some(small) = all.iter().find(at_its_edge) else { continue };
-            let outside = *top.iter().find(|&&other| !holds(other, &small.patch)).unwrap();
-            let well = all[largest..].iter().find(|large| holds(triangle, &large.inside)).unwrap();
+            let outside = *top.iter().find(|&&other| !holds(other, small)).unwrap();
+            let well = all[largest..].iter().find(|large| has_inside(triangle, large)).unwrap();
             assert_eq!(choose(&[triangle], &[small, well]).unwrap(), well.patch);
             assert_eq!(choose(&[triangle], &[small]).unwrap(), small.patch, "it stays in it");
             assert_eq!(choose(&[triangle, outside], &[small]), None);

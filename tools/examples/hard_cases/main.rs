@@ -15,9 +15,14 @@ use std::path::Path;
 use cases::{Case, KINDS, Run, Setup};
 use measure::{Measured, Traced};
 use palpate::Error;
+use palpate::model::local::Kind as LocalModelKind;
 
-/// What the tables in the docs begin after.
+/// What the table in the docs begins after.
 const MARK: &str = "<!-- made by `cargo run --release --example hard_cases -- --docs` -->\n";
+
+/// The models that the docs have, in this order.
+const DOCUMENTED: [LocalModelKind; 3] =
+    [LocalModelKind::Patch, LocalModelKind::LinearBoundary, LocalModelKind::Predictive];
 
 /// Cases that take a second or two.
 const QUICK: [&str; 4] = ["impact", "teleport", "half", "vertex"];
@@ -32,50 +37,44 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let bases = tempfile::tempdir()?;
     let all = docs || asked("--all");
-    let mut scenes = String::from("| case | scene | what is hard |\n| --- | --- | --- |\n");
-    let mut table = String::from(
-        "| case | model | late | rms | max | jump | energy | peak | verdict |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-    );
+    let mut document = String::from("| case | what is hard |");
+    DOCUMENTED.iter().for_each(|model| document += &format!(" `{}` |", model.name()));
+    document += "\n| --- | --- | --- | --- | --- |\n";
     if !only_bounds {
-        print!("{table}");
+        println!("| case | model | late | rms | max | jump | energy | peak | verdict |");
+        println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     }
     for case in KINDS.into_iter().flatten().filter(|case| all || names.iter().any(|name| case.name.starts_with(name))) {
-        let rows = if only_bounds { bounds(case, bases.path())? } else { rows(case, bases.path())? };
-        print!("{rows}");
-        let scene = match case.body {
-            Setup::Scene(name) => format!("`{name}`"),
-            Setup::UnequalMasses => "(own body)".to_owned(),
-        };
-        writeln!(scenes, "| {} | {scene} | {} |", case.name, case.hard)?;
-        table += &rows;
+        if only_bounds {
+            print!("{}", bounds(case, bases.path())?);
+            continue;
+        }
+        let runs = cells_of(case, bases.path())?;
+        print!("{}", rows(case, &runs));
+        document += &documented(case, &runs);
     }
     if docs {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/hard_cases.md");
         let text = std::fs::read_to_string(&path)?;
         let head = text.find(MARK).ok_or("docs/hard_cases.md: no mark to write the tables after")? + MARK.len();
-        std::fs::write(&path, format!("{}\n{scenes}\n{}", &text[..head], for_docs(&table)))?;
+        std::fs::write(&path, format!("{}\n{document}", &text[..head]))?;
     }
     Ok(())
 }
 
-/// What the docs have of a table of rows: not the largest error, the jump and the error of energy, which the command prints.
-fn for_docs(table: &str) -> String {
-    let kept = |line: &str| {
-        let cells = line.split('|').enumerate().filter(|(place, _)| !(5..=7).contains(place)).map(|(_, cell)| cell);
-        format!("{}\n", cells.collect::<Vec<_>>().join("|"))
-    };
-    table.lines().map(kept).collect()
+/// Lateness, errors, peak and verdict of each run of a case.
+fn cells_of(case: &Case, bases: &Path) -> Result<Vec<[String; 7]>, Error> {
+    let full = measure::full(case)?;
+    Ok(case.runs.iter().map(|run| cells(run, measure::run(case, run, bases), &full)).collect())
 }
 
 /// The rows of one case: one for each model, whose cells have a figure for each of its runs.
-fn rows(case: &Case, bases: &Path) -> Result<String, Box<dyn std::error::Error>> {
-    let full = measure::full(case)?;
+fn rows(case: &Case, cells: &[[String; 7]]) -> String {
     let mut rows = String::new();
+    let mut cells = cells.iter();
     // The runs of one model follow each other.
     for runs in case.runs.chunk_by(|one, next| one.model == next.model) {
-        let cells: Vec<[String; 7]> =
-            runs.iter().map(|run| cells(run, measure::run(case, run, bases), &full)).collect();
+        let cells: Vec<&[String; 7]> = cells.by_ref().take(runs.len()).collect();
         // A verdict may have a comma of its own.
         let joint = |place| if place == 6 { "; " } else { ", " };
         let column = |place: usize| {
@@ -83,9 +82,27 @@ fn rows(case: &Case, bases: &Path) -> Result<String, Box<dyn std::error::Error>>
             figures.join(joint(place))
         };
         let columns: Vec<String> = (0..7).map(column).collect();
-        writeln!(rows, "| {} | `{}` | {} |", case.name, runs[0].model.name(), columns.join(" | "))?;
+        rows += &format!("| {} | `{}` | {} |\n", case.name, runs[0].model.name(), columns.join(" | "));
     }
-    Ok(rows)
+    rows
+}
+
+/// The row of one case in the docs: what is hard about it, and rms and peak of each model, the late ones with their lateness.
+fn documented(case: &Case, cells: &[[String; 7]]) -> String {
+    let scene = match case.body {
+        Setup::Scene(name) => format!(", `{name}`"),
+        Setup::UnequalMasses => String::new(),
+    };
+    let of_model = |model: &LocalModelKind| {
+        let runs = case.runs.iter().zip(cells).filter(|(run, _)| run.model == *model);
+        let told = runs.map(|(run, [late, rms, _, _, _, peak, verdict])| {
+            let late = if run.late > 0.0 { format!("{late} late: ") } else { String::new() };
+            if rms.is_empty() { format!("{late}{verdict}") } else { format!("{late}{rms}, {peak}") }
+        });
+        told.collect::<Vec<_>>().join("; ")
+    };
+    let columns = DOCUMENTED.map(|model| of_model(&model)).join(" | ");
+    format!("| {} | {}{scene} | {columns} |\n", case.name, case.hard)
 }
 
 /// Lateness, errors, peak and verdict of a run.

@@ -15,14 +15,14 @@ pub const CASES: &[Case] = &[
             run(LinearBoundary, 1.5, [43.0, 105.0, 7.6, 312.0]),
             run(LinearBoundary, 2.0, [52.0, 113.0, 9.2, 290.0]),
             run(Predictive, 1.5, [0.22, 0.6, 2.4, 0.32]),
-            run(Predictive, 2.0, [0.35, 1.2, 2.4, 0.52]),
+            run(Predictive, 2.0, [0.34, 1.2, 2.4, 0.39]),
         ],
     ),
     case(
         "late drag",
         "hard/drag_100",
         "results 1.5 and 2 periods late",
-        &[run(Predictive, 1.5, [0.37, 6.0, 15.0, 0.62]), run(Predictive, 2.0, [0.67, 9.6, 15.0, 1.1])],
+        &[run(Predictive, 1.5, [0.25, 0.63, 15.0, 0.54]), run(Predictive, 2.0, [0.37, 4.3, 15.0, 0.72])],
     )
     .ends_free(),
     case(
@@ -40,7 +40,7 @@ pub const CASES: &[Case] = &[
         "lost drag 0.1 m/s",
         "hard/drag_100",
         "every second resync is lost",
-        &[run(Predictive, 1.0, [1.6, 13.0, 15.0, 0.42])],
+        &[run(Predictive, 1.0, [0.49, 5.0, 15.0, 0.42])],
     )
     .ends_free()
     .upset(Upset::EverySecondLost),
@@ -59,7 +59,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 1.0, [37.0, 113.0, 7.4, 340.0]),
             run(LinearBoundary, 1.0, [32.0, 83.0, 7.2, 273.0]),
-            run(Predictive, 1.0, [5.6, 19.0, 5.7, 1.3]),
+            run(Predictive, 1.0, [4.8, 19.0, 5.7, 1.3]),
         ],
     )
     .upset(Upset::Stall(0.5)),
@@ -67,7 +67,7 @@ pub const CASES: &[Case] = &[
         "stalled drag",
         "hard/drag_long",
         "the global model stands still for 1 s",
-        &[run(LinearBoundary, 1.0, [44.0, 130.0, 19.0, 66.0]), run(Predictive, 1.0, [15.0, 47.0, 9.9, 5.2])],
+        &[run(LinearBoundary, 1.0, [44.0, 130.0, 11.0, 66.0]), run(Predictive, 1.0, [2.0, 19.0, 15.0, 2.1])],
     )
     .ends_free()
     .upset(Upset::Stall(0.4)),

@@ -58,8 +58,8 @@ pub const CASES: &[Case] = &[
             &[
                 run(Patch, 0.0, [13.0, 29.0, 4.0, 26.0]),
                 run(LinearBoundary, 0.0, [6.5, 21.0, 2.5, 12.0]),
-                run(Predictive, 0.0, [0.19, 0.36, 1.8, 0.49]),
-                run(Predictive, 1.0, [0.56, 1.5, 1.8, 1.3]),
+                run(Predictive, 0.0, [0.14, 0.22, 1.8, 0.37]),
+                run(Predictive, 1.0, [0.38, 1.1, 1.8, 0.78]),
             ],
         )
     },
@@ -70,8 +70,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [25.0, 94.0, 40.0, 8.1]),
             run(LinearBoundary, 0.0, [17.0, 91.0, 89.0, 18.0]),
-            run(Predictive, 0.0, [1.8, 32.0, 112.0, 0.5]),
-            run(Predictive, 1.0, [9.9, 121.0, 52.0, 9.1]),
+            run(Predictive, 0.0, [1.8, 32.0, 112.0, 0.35]),
+            run(Predictive, 1.0, [7.1, 92.0, 52.0, 9.1]),
         ],
     ), // The ribbon bends away: at the end the tool hangs under its edge.
     case(

@@ -24,7 +24,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [19.0, 113.0, 122.0, 42.0]),
             run(LinearBoundary, 0.0, [13.0, 108.0, 122.0, 41.0]),
             run(Predictive, 0.0, [0.14, 0.42, 121.0, 0.38]),
-            run(Predictive, 1.0, [0.22, 0.82, 121.0, 0.4]),
+            run(Predictive, 1.0, [0.19, 0.82, 121.0, 0.38]),
         ],
     ),
     case(
@@ -47,7 +47,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [20.0, 76.0, 20.0, 89.0]),
             run(LinearBoundary, 0.0, [11.0, 45.0, 7.7, 39.0]),
             run(Predictive, 0.0, [0.71, 4.4, 7.5, 1.1]),
-            run(Predictive, 1.0, [2.3, 8.8, 7.5, 5.4]),
+            run(Predictive, 1.0, [1.7, 7.4, 7.5, 3.4]),
         ],
     )
     .ends_free(),
@@ -58,8 +58,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [13.0, 37.0, 11.0, 85.0]),
             run(LinearBoundary, 0.0, [13.0, 59.0, 9.9, 52.0]),
-            run(Predictive, 0.0, [0.16, 1.3, 11.0, 0.37]),
-            run(Predictive, 1.0, [0.21, 0.8, 11.0, 0.73]),
+            run(Predictive, 0.0, [0.12, 0.16, 11.0, 0.35]),
+            run(Predictive, 1.0, [0.16, 0.44, 11.0, 0.64]),
         ],
     )
     .ends_free(),
@@ -70,8 +70,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [19.0, 67.0, 15.0, 46.0]),
             run(LinearBoundary, 0.0, [14.0, 70.0, 15.0, 29.0]),
-            run(Predictive, 0.0, [0.15, 1.1, 15.0, 0.33]),
-            run(Predictive, 1.0, [0.59, 8.5, 15.0, 0.57]),
+            run(Predictive, 0.0, [0.12, 0.25, 15.0, 0.33]),
+            run(Predictive, 1.0, [0.31, 5.0, 15.0, 0.45]),
         ],
     )
     .ends_free(),
@@ -83,7 +83,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [21.0, 97.0, 21.0, 65.0]),
             run(LinearBoundary, 0.0, [19.0, 78.0, 20.0, 45.0]),
             run(Predictive, 0.0, [0.13, 0.23, 32.0, 0.34]),
-            run(Predictive, 1.0, [0.24, 1.2, 32.0, 0.56]),
+            run(Predictive, 1.0, [0.23, 0.96, 32.0, 0.55]),
         ],
     )
     .ends_free(),
@@ -112,7 +112,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [17.0, 75.0, 75.0, 43.0]),
             run(LinearBoundary, 0.0, [14.0, 75.0, 50.0, 11.0]),
-            run(Predictive, 1.0, [4.3, 54.0, 53.0, 0.7]),
+            run(Predictive, 1.0, [3.3, 54.0, 35.0, 0.51]),
         ],
     ),
     case(
@@ -123,7 +123,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [16.0, 45.0, 37.0, 24.0]),
             run(LinearBoundary, 0.0, [5.0, 34.0, 32.0, 4.3]),
             run(Predictive, 0.0, [0.12, 0.21, 37.0, 0.33]),
-            run(Predictive, 1.0, [0.15, 0.45, 37.0, 0.42]),
+            run(Predictive, 1.0, [0.14, 0.37, 37.0, 0.42]),
         ],
     )
     .ends_free(),
@@ -135,7 +135,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [16.0, 52.0, 35.0, 20.0]),
             run(LinearBoundary, 0.0, [7.5, 36.0, 35.0, 3.0]),
             run(Predictive, 0.0, [0.14, 1.4, 19.0, 0.33]),
-            run(Predictive, 1.0, [0.3, 6.0, 19.0, 0.41]),
+            run(Predictive, 1.0, [0.23, 3.4, 19.0, 0.41]),
         ],
     )
     .ends_free(),

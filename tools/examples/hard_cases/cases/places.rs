@@ -13,7 +13,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [8.0, 29.0, 14.0, 36.0]),
             run(LinearBoundary, 0.0, [6.5, 29.0, 14.0, 26.0]),
             run(Predictive, 0.0, [0.11, 0.14, 14.0, 0.34]),
-            run(Predictive, 1.0, [0.15, 0.26, 14.0, 0.47]),
+            run(Predictive, 1.0, [0.14, 0.23, 14.0, 0.45]),
         ],
     )
     .ends_free(),
@@ -25,7 +25,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [9.1, 28.0, 17.0, 42.0]),
             run(LinearBoundary, 0.0, [6.3, 29.0, 17.0, 25.0]),
             run(Predictive, 0.0, [0.13, 0.21, 17.0, 0.39]),
-            run(Predictive, 1.0, [0.2, 0.52, 17.0, 0.71]),
+            run(Predictive, 1.0, [0.19, 0.44, 17.0, 0.68]),
         ],
     )
     .ends_free(),
@@ -37,7 +37,7 @@ pub const CASES: &[Case] = &[
             run(Patch, 0.0, [3.0, 11.0, 121.0, 5.6]),
             run(LinearBoundary, 0.0, [2.7, 12.0, 121.0, 4.6]),
             run(Predictive, 0.0, [0.13, 0.27, 121.0, 0.39]),
-            run(Predictive, 1.0, [0.16, 0.35, 121.0, 0.41]),
+            run(Predictive, 1.0, [0.14, 0.31, 121.0, 0.37]),
         ],
     )
     .ends_free(),
@@ -48,7 +48,7 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [3.0, 13.0, 121.0, 6.2]),
             run(LinearBoundary, 0.0, [1.4, 6.1, 121.0, 3.1]),
-            run(Predictive, 1.0, [0.14, 0.33, 121.0, 0.44]),
+            run(Predictive, 1.0, [0.14, 0.25, 121.0, 0.44]),
         ],
     )
     .ends_free(),
@@ -59,8 +59,8 @@ pub const CASES: &[Case] = &[
         &[
             run(Patch, 0.0, [9.4, 28.0, 14.0, 24.0]),
             run(LinearBoundary, 0.0, [7.8, 32.0, 14.0, 14.0]),
-            run(Predictive, 0.0, [0.13, 0.28, 15.0, 0.34]),
-            run(Predictive, 1.0, [0.22, 0.69, 15.0, 0.49]),
+            run(Predictive, 0.0, [0.12, 0.16, 15.0, 0.33]),
+            run(Predictive, 1.0, [0.16, 0.31, 15.0, 0.43]),
         ],
     )
     .ends_free(),
