@@ -37,8 +37,10 @@ struct Found {
     jump: f64,
 }
 
-/// For each delay and loss the models in order; `None` for what did not run.
-type Grid = Vec<(f64, f64, [Option<Found>; MODELS.len()])>;
+/// At one delay and loss, the models in order; `None` for what did not run.
+type Row = (f64, f64, [Option<Found>; MODELS.len()]);
+/// For each delay all losses.
+type Grid = Vec<Row>;
 
 fn measure(name: &str, delays: &[f64], losses: &[f64], duration_s: f64) -> Result<Grid, Error> {
     let mut grid = Vec::new();
@@ -66,7 +68,7 @@ fn measure(name: &str, delays: &[f64], losses: &[f64], duration_s: f64) -> Resul
 
 /// One row for each delay, with all losses in a cell.
 fn rows(name: &str, grid: &Grid) -> Vec<Vec<String>> {
-    let row = |(number, group): (usize, &[(f64, f64, [Option<Found>; MODELS.len()])])| {
+    let row = |(number, group): (usize, &[Row])| {
         let cell = |model: usize, of: fn(Found) -> f64| {
             let figures =
                 group.iter().map(|(_, _, found)| found[model].map_or_else(|| "-".to_owned(), |it| figure(of(it))));
