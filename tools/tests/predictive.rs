@@ -115,8 +115,8 @@ fn a_frictionless_drag() {
 fn a_drag_over_tissue() {
     let case = Case::of(scene("tests/reference/tissue/t1_drag.toml"));
     let (late, own_jump) = case.error(ONE_PERIOD_MS, |_| ());
-    // Larger windows with the 100 states that the scene names: 0.41 and 3.4; 0.39 when a window served at its edge too, which made random
-    // scenes twice as far off, and 0.28 and 2.1 when it did not hold the way back.
+    // Larger windows with the 100 states that the scene names: 0.41 and 3.4; 0.39 when a window served at its edge too, and 0.28 and 2.1
+    // when it did not hold the way back.
     assert!(late.rms <= 0.42 && late.max <= 3.5 && late.jump <= own_jump + 1.0, "{late:?}");
     let (in_time, _) = case.error(IN_TIME, |_| ());
     assert!(in_time.rms <= 0.1 && in_time.max <= 1.3, "{in_time:?}");

@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if docs {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/hard_cases.md");
         let text = std::fs::read_to_string(&path)?;
-        let head = text.find(MARK).ok_or("docs/hard_cases.md: no mark to write the tables after")? + MARK.len();
+        let head = text.find(MARK).ok_or("docs/hard_cases.md: no mark to write the table after")? + MARK.len();
         std::fs::write(&path, format!("{}\n{document}", &text[..head]))?;
     }
     Ok(())
