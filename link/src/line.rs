@@ -17,7 +17,7 @@ use zenoh::pubsub::Subscriber;
 use crate::inbox::Inbox;
 use crate::outbox::Outbox;
 
-/// Lines of a session. What they save is in docs/link.md.
+/// Lines of a session: over TCP all that comes later waits for a lost packet, on another line it does not.
 pub(crate) const LINES: usize = 3;
 
 /// What the haptic side says hello to.

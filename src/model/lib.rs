@@ -1,7 +1,7 @@
 //! Physics and numerics: bodies, contact, local models. No threads (but those of a body's forces, with the feature
 //! `parallel`), clocks, channels or logging.
 //!
-//! The equations are those of the paper (Jacobs, Moore, Cavusoglu, IJRR 2010) with the corrections that DESIGN.md
+//! The equations are those of the paper (Jacobs, Moore, Cavusoglu, IJRR 2010) with the corrections that docs/contact.md
 //! lists. One step of any model, whole body or patch, is [`contact::step`].
 
 pub mod body;

@@ -49,9 +49,17 @@ pub struct Windows {
     size: [usize; 3],
     /// The middle of each surface triangle at rest (m).
     triangles: Vec<Vec3>,
-    /// The nodes around each triangle that a window has to hold too, to have it well inside.
-    around: Vec<Vec<u32>>,
+    around: Around,
     windows: Vec<Window>,
+}
+
+/// The nodes that a window has to hold too, to have a tool well inside.
+#[derive(Clone, Debug)]
+enum Around {
+    /// Those around each node that the tool presses.
+    Nodes(Vec<Vec<u32>>),
+    /// Those beyond the three edges of each triangle that it touches.
+    Triangles(Vec<Vec<u32>>),
 }
 
 #[derive(Clone, Debug)]
@@ -120,8 +128,7 @@ impl Windows {
                 windows.push(Window { middle: *middle, normal, patch, layer: first });
             }
         }
-        let corners = if size[0].min(size[1]) < ROOMY { 2 } else { 1 };
-        Self { size, triangles, around: nodes_around(body, corners), windows }
+        Self { size, triangles, around: Around::new(body, size[0].min(size[1]) >= ROOMY), windows }
     }
 
     /// Puts the patch for tool number `tool` over `triangles` in place of `nodes`. True if it is a usable one.
@@ -149,8 +156,9 @@ impl Windows {
                 (least..=WAYS + 1).rev().find_map(|count| {
                     let first = if count > WAYS { triangles } else { &triangles[..count.min(triangles.len())] };
                     simulation.pressed_at(tool, first, nodes);
-                    let around = first.iter().flat_map(|&triangle| &self.around[triangle as usize]);
-                    nodes.extend(around.filter(|_| well_inside));
+                    if well_inside {
+                        self.around.add(first, nodes);
+                    }
                     let shared = [&beside.soon, &beside.now].into_iter().filter(|nodes| !nodes.is_empty());
                     let together = || first.iter().chain(&beside.triangles);
                     let mut shared = shared.filter_map(|also| self.best(together(), [nodes, also], &usable));
@@ -233,26 +241,48 @@ impl Windows {
     }
 }
 
-/// For each triangle of the surface the nodes around it that can move: the neighbours of at least so many of its `corners`.
-fn nodes_around(body: &dyn Body, corners: usize) -> Vec<Vec<u32>> {
-    let triangles = &body.surface().triangles;
-    let mut neighbours = vec![Vec::new(); body.rest().len()];
-    for triangle in triangles {
-        triangle.iter().for_each(|&node| neighbours[node as usize].extend(triangle));
+impl Default for Around {
+    fn default() -> Self {
+        Self::Nodes(Vec::new())
     }
-    for nodes in &mut neighbours {
-        nodes.sort_unstable();
-        nodes.dedup();
+}
+
+impl Around {
+    fn new(body: &dyn Body, is_roomy: bool) -> Self {
+        let triangles = &body.surface().triangles;
+        let mut neighbours = vec![Vec::new(); body.rest().len()];
+        for triangle in triangles {
+            triangle.iter().for_each(|&node| neighbours[node as usize].extend(triangle));
+        }
+        let can_move = |node: &u32| body.inverse_masses()[*node as usize] > 0.0;
+        for nodes in &mut neighbours {
+            nodes.retain(can_move);
+            nodes.sort_unstable();
+            nodes.dedup();
+        }
+        if is_roomy {
+            return Self::Nodes(neighbours);
+        }
+        let beyond_edges = |triangle: &[u32; 3]| {
+            let mut all = triangle.map(|node| &neighbours[node as usize][..]).concat();
+            all.sort_unstable();
+            let of_two = all.chunk_by(|a, b| a == b).filter(|same| same.len() >= 2);
+            of_two.map(|same| same[0]).collect()
+        };
+        Self::Triangles(triangles.iter().map(beyond_edges).collect())
     }
-    let can_move = |node: &u32| body.inverse_masses()[*node as usize] > 0.0;
-    let around = |triangle: &[u32; 3]| {
-        let all = triangle.iter().flat_map(|&node| &neighbours[node as usize]).copied();
-        let mut all: Vec<u32> = all.filter(|node| !triangle.contains(node)).filter(can_move).collect();
-        all.sort_unstable();
-        let often = all.chunk_by(|a, b| a == b).filter(|same| same.len() >= corners);
-        often.map(|same| same[0]).collect()
-    };
-    triangles.iter().map(around).collect()
+
+    /// Adds those of a tool that touches `triangles` to the nodes that it presses.
+    fn add(&self, triangles: &[u32], pressed: &mut Vec<u32>) {
+        match self {
+            Self::Nodes(around) => (0..pressed.len()).for_each(|n| pressed.extend(&around[pressed[n] as usize])),
+            Self::Triangles(around) => {
+                triangles.iter().for_each(|&triangle| pressed.extend(&around[triangle as usize]));
+            }
+        }
+        pressed.sort_unstable();
+        pressed.dedup();
+    }
 }
 
 #[cfg(test)]
@@ -333,8 +363,9 @@ mod tests {
             corners.iter().all(|node| window.patch.contains(node))
         };
         let has_inside = |triangle: u32, window: &Window| {
-            let around = &windows.around[triangle as usize];
-            holds(triangle, window) && around.iter().all(|node| window.patch.contains(node))
+            let mut around = simulation.body().surface().triangles[triangle as usize].to_vec();
+            windows.around.add(&[triangle], &mut around);
+            around.iter().all(|node| window.patch.contains(node))
         };
         let choose = |way: &[u32], usable: &[&Window]| {
             let usable = |patch: &[u32]| usable.iter().any(|window| window.patch == patch);
@@ -354,6 +385,20 @@ mod tests {
             found += 1;
         }
         assert!(found > 0);
+    }
+
+    #[test]
+    fn a_roomy_window_holds_all_around_what_a_sphere_presses() {
+        let simulation = simulation(ToolShape::Sphere { radius: 8e-3 });
+        let windows = Windows::new(&simulation, 0, [6, 6, 3]);
+        let triangles = &simulation.body().surface().triangles;
+        let (mut patch, mut pressed) = (Vec::new(), Vec::new());
+        for triangle in top(&simulation) {
+            assert!(windows.choose((&simulation, 0), &[triangle], &Beside::default(), |_| true, &mut patch));
+            simulation.pressed_at(0, &[triangle], &mut pressed);
+            let touches = |triangle: &&[u32; 3]| triangle.iter().any(|node| pressed.contains(node));
+            assert!(triangles.iter().filter(touches).flatten().all(|node| patch.contains(node)), "{triangle}");
+        }
     }
 
     #[test]

@@ -60,7 +60,7 @@ fn print(settings: &Settings, unseen: bool, from: u64, count: usize) -> Result<(
         }
     };
     let results = run_all(&seeds, settings, told)?;
-    print!("{}", words::distributions(&results.iter().collect::<Vec<_>>(), true));
+    print!("{}", words::distributions(&results.iter().collect::<Vec<_>>()));
     Ok(())
 }
 

@@ -1,7 +1,5 @@
 //! What the runs say, as distributions.
 
-use std::fmt::Write;
-
 use palpate::model::local::Kind;
 use palpate_cli::drawing::{Colour, Picture, Series, Sign};
 
@@ -29,23 +27,24 @@ cargo bench -p palpate-cli --bench population               # writes this page a
 cargo bench -p palpate-cli --bench population -- --seen     # prints the scenes that may be looked at while working, one by one
 ```
 
-Each scene is made from its seed: cubes, bricks, slabs, pillars and sheets of springs (10 to 300 N/m, damping ratio 0.05 to 1; plain, in
-layers or with a nodule), beams, a prostate and a liver of tetrahedra (3 to 15 kPa, Poisson's ratio 0.4 to 0.47), friction 0 to 1.5, points and
-spheres, haptic rates of 0.5 to 4 kHz, a global model at 20 to 50 Hz. A hand kneads at 1 to 5 Hz, taps, draws spirals, scribbles, drags and
-stops at once, or strokes at 0.2 to 0.5 m/s, always with tremor. A third of the scenes, those whose seed leaves 2 when divided by 3, is *unseen*:
-nothing was chosen by what they say.
+The scenes are random: cubes, bricks, slabs, pillars and sheets of springs (10 to 300 N/m, damping ratio 0.05 to 1; plain, in layers or with a
+nodule); beams, a prostate and a liver of tetrahedra (3 to 15 kPa, Poisson's ratio 0.4 to 0.47). Friction is 0 to 1.5, the tool a point or a
+sphere, the haptic rate 0.5 to 4 kHz, the global one 20 to 50 Hz. A hand kneads at 1 to 5 Hz (*sine*), taps, draws spirals, scribbles, drags and
+stops at once, or strokes at 0.2 to 0.5 m/s, always with tremor. A third of the scenes, those whose seed leaves
+2 when divided by 3, is *unseen*: nothing was chosen by what they say.
 
-Each runs for 1.2 s in virtual time with the models' defaults, with results of the global model at once (*in time*) or one period late. *rms* is the error of
-the force in % of the largest force of `full`; *jump* the largest change of the force in one tick beyond that of `full`, in the same; *peak* the
-largest force over that of `full`. *Tick* is the CPU time of a haptic tick, the median over scenes of p50 and p99 (with catching up); *periods*
-what the global model works, in periods of simulation. A basis takes its nominal time. *2x steps* is `full` itself in twice as many steps: how far
-off the reference is.
+*Pairs* are scenes with a second tool that does something of its own at most five cells from the first. Errors are those of the tool that is
+farther off; a tick is that of both. `-- --seen --pairs` prints the seen ones.
 
-The table after it has what `auto` chooses with nominal costs, how far that is off one period late, and how often it was more than the usual
-`error_pct` of 1 % off without a word of it.
+Each scene runs for 1.2 s in virtual time with the defaults, with results of the global model at once (*in time*) or one period *late*; a basis
+takes its nominal time. Percentiles are over scenes:
 
-*Two tools* are scenes made in the same way with a second tool, a point or a sphere, that does something of its own at most five cells from the
-first: they press the same nodes, cross and part. Errors are those of the tool that is farther off; a tick is that of both.
+- *rms*: error of the force, in % of the largest force of `full`
+- *jump*: largest change of the force in one tick beyond that of `full`, in the same
+- *peak*: largest force over that of `full`
+- *tick*: CPU time of a haptic tick, with catching up: the medians of its p50 and p99
+- *periods*: work of the global model, in periods of simulation
+- *2x steps*: `full` in twice as many steps, which is how far off the reference itself is
 ";
 
 /// The cases with one tool and with two.
@@ -54,22 +53,57 @@ pub struct Populations {
     pub pairs: Vec<CaseResult>,
 }
 
+/// Before the table of `auto`.
+const AUTO: &str = "\
+## What `auto` chooses, unseen
+
+Costs are nominal, results one period late. `auto` breaks its word where it is more than the usual `error_pct` of 1 % off without a warning.
+";
+
+/// The columns of the table of models.
+const OF_MODELS: [&str; 14] = [
+    "scenes",
+    "model",
+    "results",
+    "ran",
+    "rms % p50",
+    "p90",
+    "p95",
+    "worst",
+    "jump % p90",
+    "worst",
+    "peak worst",
+    "tick us",
+    "p99",
+    "periods",
+];
+
+/// The columns of the table of classes and motions.
+const OF_KINDS: [&str; 10] =
+    ["kind", "scenes", "in time: rms % p50", "p90", "worst", "late: rms % p50", "p90", "worst", "late: tick us", "p99"];
+
 pub fn document(Populations { single, pairs }: &Populations) -> Document {
-    let mut text = format!("{HEAD}\n{}\n", measured_on("cargo bench --bench population"));
-    let parts = [
-        ("Unseen", single, true, true),
-        ("Seen", single, false, false),
-        ("Two tools, unseen", pairs, true, false),
-        ("Two tools, seen", pairs, false, false),
-    ];
-    for (name, results, of_unseen, is_by_kind) in parts {
-        let of: Vec<&CaseResult> = results.iter().filter(|result| is_unseen(result.seed) == of_unseen).collect();
-        let _ = write!(text, "\n## {name} ({} scenes)\n\n{}", of.len(), distributions(&of, is_by_kind));
-    }
-    text.push_str("\n![Share of scenes above an error](img/population_error.svg)\n\n![Error against cost](img/population_cost.svg)\n");
+    let parts = [("unseen", single, true), ("seen", single, false), ("pairs, unseen", pairs, true)];
+    let models: Vec<Vec<String>> =
+        parts.into_iter().flat_map(|(name, results, unseen)| of_models(name, &part(results, unseen))).collect();
+    let unseen = part(single, true);
+    let text = format!(
+        "{HEAD}\n{}\n\n## All scenes\n\n{}\n## `predictive` by body and by motion, unseen\n\n{}\n{AUTO}\n{}\n\
+         ![Share of scenes above an error](img/population_error.svg)\n\n\
+         ![Error against cost](img/population_cost.svg)\n",
+        measured_on("cargo bench --bench population"),
+        table(&OF_MODELS, 3, &models),
+        table(&OF_KINDS, 1, &of_kinds(&unseen)),
+        chosen(&unseen),
+    );
     let pictures = vec![("population_error", errors(single, pairs)), ("population_cost", costs(single))];
     let pictures = pictures.into_iter().map(|(name, picture)| (name.to_owned(), picture.to_svg())).collect();
     Document { text, pictures }
+}
+
+/// The unseen ones of `results`, or the others.
+fn part(results: &[CaseResult], unseen: bool) -> Vec<&CaseResult> {
+    results.iter().filter(|result| is_unseen(result.seed) == unseen).collect()
 }
 
 /// The value below which that share of `values` lies.
@@ -77,6 +111,11 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let place = share * values.len().saturating_sub(1) as f64;
     values.get(place.round() as usize).copied().unwrap_or(f64::NAN)
+}
+
+/// The same of a figure of `runs`, to print.
+fn quantile_of(runs: &[&Run], of: fn(&Run) -> f64, share: f64) -> String {
+    figure(quantile(runs.iter().map(|run| of(run)).collect(), share))
 }
 
 /// The runs of a model in time, or late, that came to their end.
@@ -109,57 +148,58 @@ fn chosen(results: &[&CaseResult]) -> String {
     };
     let rows: Vec<Vec<String>> = Kind::ALL.into_iter().filter_map(row).collect();
     let head = ["`auto` chooses", "scenes", "rms % p50", "p90", "worst", "says it is unsure", "breaks its word"];
-    format!("{}\n", table(&head, 1, &rows))
+    table(&head, 1, &rows)
 }
 
-/// Of all models in time and late; if `is_by_kind`, of `predictive` by class and by motion too, then of `auto`.
-pub fn distributions(results: &[&CaseResult], is_by_kind: bool) -> String {
-    let mut rows = Vec::new();
-    let row = |name: &str, word: &str, runs: &[&Run], scenes: usize| {
-        let q = |of: fn(&Run) -> f64, share| figure(quantile(runs.iter().map(|run| of(run)).collect(), share));
-        let (rms, jump) = (|run: &Run| run.rms, |run: &Run| run.jump);
-        let errors =
-            [q(rms, 0.5), q(rms, 0.9), q(rms, 0.95), q(rms, 1.0), q(jump, 0.9), q(jump, 1.0), q(|run| run.peak, 1.0)];
+/// Of each model, of `predictive` by class and motion, and of `auto`.
+pub fn distributions(results: &[&CaseResult]) -> String {
+    let models = table(&OF_MODELS, 3, &of_models("all", results));
+    format!("{models}\n{}\n{}", table(&OF_KINDS, 1, &of_kinds(results)), chosen(results))
+}
+
+/// A row for each model in time and late, and one for `full` in twice as many steps.
+fn of_models(name: &str, results: &[&CaseResult]) -> Vec<Vec<String>> {
+    let row = |model: &str, word: &str, runs: &[&Run]| -> Vec<String> {
+        let q = |of: fn(&Run) -> f64, share| quantile_of(runs, of, share);
+        let rms = |run: &Run| run.rms;
+        let first = [name, model, word].map(str::to_owned);
+        let ran = format!("{}/{}", runs.len(), results.len());
+        let errors = [q(rms, 0.5), q(rms, 0.9), q(rms, 0.95), q(rms, 1.0)];
+        let jump = |run: &Run| run.jump;
+        let largest = [q(jump, 0.9), q(jump, 1.0), q(|run| run.peak, 1.0)];
         let costs = [q(|run| run.tick_us[0], 0.5), q(|run| run.tick_us[1], 0.5), q(|run| run.periods, 0.5)];
-        let first = [name.to_owned(), word.to_owned(), format!("{}/{scenes}", runs.len())];
-        first.into_iter().chain(errors).chain(costs).collect::<Vec<_>>()
+        first.into_iter().chain([ran]).chain(errors).chain(largest).chain(costs).collect()
     };
-    let of = |name: &str, kind: Kind, of: &dyn Fn(&CaseResult) -> bool| -> Vec<Vec<String>> {
-        let those: Vec<&CaseResult> = results.iter().copied().filter(|result| of(result)).collect();
-        let in_time_or_late = [(false, "in time"), (true, "late")].into_iter();
-        let runs = in_time_or_late.map(|(late, word)| (word, runs(&those, kind, late)));
-        runs.filter(|(_, runs)| !runs.is_empty()).map(|(word, runs)| row(name, word, &runs, those.len())).collect()
-    };
+    let mut rows = Vec::new();
     for kind in Kind::ALL {
-        rows.extend(of(&format!("all, `{}`", kind.name()), kind, &|_| true));
+        for (late, word) in [(false, "in time"), (true, "late")] {
+            let of_kind = runs(results, kind, late);
+            if !of_kind.is_empty() {
+                rows.push(row(&format!("`{}`", kind.name()), word, &of_kind));
+            }
+        }
     }
     let finer: Vec<&Run> = results.iter().filter_map(|result| result.finer.as_ref()).collect();
-    let mut itself = row("all, `full` in 2x steps", "itself", &finer, results.len());
-    itself.splice(10.., ["-"; 3].map(str::to_owned));
+    let mut itself = row("`full`", "2x steps", &finer);
+    itself.splice(11.., ["-"; 3].map(str::to_owned));
     rows.push(itself);
-    for class in Class::ALL.into_iter().filter(|_| is_by_kind) {
-        rows.extend(of(class.name(), Kind::Predictive, &|result| result.class == class));
-    }
-    for motion in Motion::ALL.into_iter().filter(|_| is_by_kind) {
-        rows.extend(of(motion.name(), Kind::Predictive, &|result| result.motion == motion));
-    }
-    let head = [
-        "scenes",
-        "results",
-        "ran",
-        "rms % p50",
-        "p90",
-        "p95",
-        "worst",
-        "jump % p90",
-        "worst",
-        "peak, worst",
-        "tick us",
-        "p99",
-        "periods",
-    ];
-    let chosen = if is_by_kind { chosen(results) } else { String::new() };
-    format!("{}\n{chosen}", table(&head, 2, &rows))
+    rows
+}
+
+/// A row of `predictive` for each class and for each motion; ticks are those with late results.
+fn of_kinds(results: &[&CaseResult]) -> Vec<Vec<String>> {
+    let row = |name: &str, is_of: &dyn Fn(&CaseResult) -> bool| -> Option<Vec<String>> {
+        let those: Vec<&CaseResult> = results.iter().copied().filter(|result| is_of(result)).collect();
+        let [in_time, late] = [false, true].map(|late| runs(&those, Kind::Predictive, late));
+        let rms = |runs: &[&Run]| [0.5, 0.9, 1.0].map(|share| quantile_of(runs, |run| run.rms, share));
+        let tick = [quantile_of(&late, |run| run.tick_us[0], 0.5), quantile_of(&late, |run| run.tick_us[1], 0.5)];
+        let first = [name.to_owned(), those.len().to_string()];
+        let cells = first.into_iter().chain(rms(&in_time)).chain(rms(&late)).chain(tick);
+        (!late.is_empty()).then(|| cells.collect())
+    };
+    let classes = Class::ALL.into_iter().filter_map(|class| row(class.name(), &|result| result.class == class));
+    let motions = Motion::ALL.into_iter().filter_map(|motion| row(motion.name(), &|result| result.motion == motion));
+    classes.chain(motions).collect()
 }
 
 /// The share of scenes above an error, by class and of two tools, one period late.
