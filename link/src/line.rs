@@ -17,7 +17,8 @@ use zenoh::pubsub::Subscriber;
 use crate::inbox::Inbox;
 use crate::outbox::Outbox;
 
-/// Lines of a session: over TCP all that comes later waits for a lost packet, on another line it does not.
+/// Lines of a session. With 14 ms and 1 % lost the middle of eight runs was 0.60 (`hand`) and 2.8 % (`drag_friction`) off with three, 1.1 and
+/// 3.0 with two.
 pub(crate) const LINES: usize = 3;
 
 /// What the haptic side says hello to.

@@ -16,7 +16,8 @@ const WAYS: usize = 3 * LOOKS + 1;
 const AHEAD: usize = LOOKS + 1;
 
 /// Windows of so many nodes along the surface have all nodes around a tool well inside. In smaller ones, as on tissue, next to none
-/// would have, and the states of a basis would be spread over a larger ring: there it is the nodes beyond the three edges alone.
+/// would have, and the states of a basis would be spread over a larger ring: there it is the nodes beyond the three edges alone. Of what
+/// a shape presses there these are mostly a part already.
 const ROOMY: usize = 5;
 
 /// Windows around a tool that are made ready before it comes there.
@@ -58,7 +59,7 @@ pub struct Windows {
 enum Around {
     /// Those around each node that the tool presses.
     Nodes(Vec<Vec<u32>>),
-    /// Those beyond the three edges of each triangle that it touches.
+    /// Those of each triangle of its way, and beyond its three edges.
     Triangles(Vec<Vec<u32>>),
 }
 
@@ -155,9 +156,15 @@ impl Windows {
             let mut on_way = |least: usize, well_inside: bool| {
                 (least..=WAYS + 1).rev().find_map(|count| {
                     let first = if count > WAYS { triangles } else { &triangles[..count.min(triangles.len())] };
+                    let longer = if count < WAYS { count + 1 } else { triangles.len() };
+                    let left_out = triangles.get(count..longer).unwrap_or_default();
+                    if count <= WAYS && left_out.iter().all(|triangle| first.contains(triangle)) {
+                        // The same triangles as those of the longer way, which no window holds.
+                        return None;
+                    }
                     simulation.pressed_at(tool, first, nodes);
                     if well_inside {
-                        self.around.add(first, nodes);
+                        self.around.add_around(first, nodes);
                     }
                     let shared = [&beside.soon, &beside.now].into_iter().filter(|nodes| !nodes.is_empty());
                     let together = || first.iter().chain(&beside.triangles);
@@ -204,9 +211,13 @@ impl Windows {
             if best.is_some_and(|(best, _)| best.layer != window.layer) {
                 break;
             }
+            // Of most windows the first node is missing.
+            if !holds(&window.patch) {
+                continue;
+            }
             let far = |&triangle: &u32| (self.triangles[triangle as usize] - window.middle).norm_squared();
             let farthest = triangles.clone().map(far).fold(0.0, f64::max);
-            if best.is_none_or(|(_, least)| farthest < least) && holds(&window.patch) && usable(&window.patch) {
+            if best.is_none_or(|(_, least)| farthest < least) && usable(&window.patch) {
                 best = Some((window, farthest));
             }
         }
@@ -272,8 +283,8 @@ impl Around {
         Self::Triangles(triangles.iter().map(beyond_edges).collect())
     }
 
-    /// Adds those of a tool that touches `triangles` to the nodes that it presses.
-    fn add(&self, triangles: &[u32], pressed: &mut Vec<u32>) {
+    /// Adds to the nodes that are `pressed` at `triangles` those that a window has to hold too; in increasing order, each once.
+    fn add_around(&self, triangles: &[u32], pressed: &mut Vec<u32>) {
         match self {
             Self::Nodes(around) => (0..pressed.len()).for_each(|n| pressed.extend(&around[pressed[n] as usize])),
             Self::Triangles(around) => {
@@ -295,8 +306,10 @@ mod tests {
 
     const SIZE: [usize; 3] = [4, 4, 2];
 
-    fn simulation(shape: ToolShape) -> Simulation {
-        let block = Block::builder([9; 3], [0.08; 3]).fix(Face::ZMin).build().unwrap();
+    /// A block with cells of 10 mm.
+    fn simulation(nodes: [usize; 3], shape: ToolShape) -> Simulation {
+        let size = nodes.map(|count| 0.01 * (count - 1) as f64);
+        let block = Block::builder(nodes, size).fix(Face::ZMin).build().unwrap();
         let (state, stepping) = (State::at_rest(block.rest()), Stepping { tick: 1e-3, substeps: 4 });
         let sim = Simulation::new(Box::new(block), state, Contact::default(), Law::default(), stepping).unwrap();
         sim.with_shape(0, shape)
@@ -305,20 +318,22 @@ mod tests {
     /// The triangles of the top.
     fn top(simulation: &Simulation) -> Vec<u32> {
         let (rest, triangles) = (simulation.body().rest(), &simulation.body().surface().triangles);
-        let is_on_top = |triangle: &[u32; 3]| triangle.iter().all(|&node| rest[node as usize].z > 0.0799);
+        let highest = rest.iter().map(|place| place.z).fold(0.0, f64::max);
+        let is_on_top = |triangle: &[u32; 3]| triangle.iter().all(|&node| rest[node as usize].z > highest - 1e-4);
         (0..triangles.len() as u32).filter(|&t| is_on_top(&triangles[t as usize])).collect()
     }
 
     #[test]
     fn every_place_is_well_inside_one_of_few_windows() {
         for shape in [ToolShape::Point, ToolShape::Sphere { radius: 8e-3 }] {
-            let simulation = simulation(shape);
+            let simulation = simulation([9; 3], shape);
             let windows = Windows::new(&simulation, 0, SIZE);
             let (mut pressed, mut patch, mut used) = (Vec::new(), Vec::new(), Vec::new());
             let top = top(&simulation);
             for &triangle in &top {
                 assert!(windows.choose((&simulation, 0), &[triangle], &Beside::default(), |_| true, &mut patch));
                 simulation.pressed_at(0, &[triangle], &mut pressed);
+                windows.around.add_around(&[triangle], &mut pressed);
                 assert!(pressed.iter().all(|node| patch.contains(node)), "{shape:?}: triangle {triangle}");
                 assert!(patch.is_sorted());
                 used.push(patch.clone());
@@ -331,7 +346,7 @@ mod tests {
 
     #[test]
     fn a_way_takes_the_least_window_that_holds_it_or_most_of_it() {
-        let simulation = simulation(ToolShape::Point);
+        let simulation = simulation([9; 3], ToolShape::Point);
         let windows = Windows::new(&simulation, 0, SIZE);
         let nearest = crate::mesh::NearestTriangle::new(simulation.body().surface(), simulation.body().rest()).unwrap();
         let at = |x: f64| nearest.find(&Vec3::new(x, 0.041, 0.08));
@@ -354,7 +369,7 @@ mod tests {
 
     #[test]
     fn a_tool_at_the_edge_of_a_window_takes_a_larger_one_or_its_own_before_it_leaves() {
-        let simulation = simulation(ToolShape::Point);
+        let simulation = simulation([9; 3], ToolShape::Point);
         let windows = Windows::new(&simulation, 0, SIZE);
         let all = &windows.windows;
         let largest = all.last().unwrap().layer;
@@ -364,7 +379,7 @@ mod tests {
         };
         let has_inside = |triangle: u32, window: &Window| {
             let mut around = simulation.body().surface().triangles[triangle as usize].to_vec();
-            windows.around.add(&[triangle], &mut around);
+            windows.around.add_around(&[triangle], &mut around);
             around.iter().all(|node| window.patch.contains(node))
         };
         let choose = |way: &[u32], usable: &[&Window]| {
@@ -389,21 +404,26 @@ mod tests {
 
     #[test]
     fn a_roomy_window_holds_all_around_what_a_sphere_presses() {
-        let simulation = simulation(ToolShape::Sphere { radius: 8e-3 });
-        let windows = Windows::new(&simulation, 0, [6, 6, 3]);
+        let simulation = simulation([20, 20, 4], ToolShape::Sphere { radius: 8e-3 });
+        let roomy = Windows::new(&simulation, 0, [6, 6, 3]);
+        let edges = Windows { around: Around::new(simulation.body(), false), ..roomy.clone() };
         let triangles = &simulation.body().surface().triangles;
         let (mut patch, mut pressed) = (Vec::new(), Vec::new());
-        for triangle in top(&simulation) {
-            assert!(windows.choose((&simulation, 0), &[triangle], &Beside::default(), |_| true, &mut patch));
-            simulation.pressed_at(0, &[triangle], &mut pressed);
+        let mut holds_all = |windows: &Windows, way: &[u32]| {
+            assert!(windows.choose((&simulation, 0), way, &Beside::default(), |_| true, &mut patch));
+            simulation.pressed_at(0, way, &mut pressed);
             let touches = |triangle: &&[u32; 3]| triangle.iter().any(|node| pressed.contains(node));
-            assert!(triangles.iter().filter(touches).flatten().all(|node| patch.contains(node)), "{triangle}");
-        }
+            triangles.iter().filter(touches).flatten().all(|node| patch.binary_search(node).is_ok())
+        };
+        let top = top(&simulation);
+        let ways: Vec<[u32; 2]> = top.iter().zip(&top[2..]).map(|(&one, &next)| [one, next]).collect();
+        assert!(ways.iter().all(|way| holds_all(&roomy, way)));
+        assert!(!ways.iter().all(|way| holds_all(&edges, way)), "those beyond the edges are fewer");
     }
 
     #[test]
     fn a_window_that_is_ready_comes_before_a_better_one_that_is_not() {
-        let simulation = simulation(ToolShape::Point);
+        let simulation = simulation([9; 3], ToolShape::Point);
         let windows = Windows::new(&simulation, 0, SIZE);
         let triangle = top(&simulation)[40];
         let (mut best, mut ready) = (Vec::new(), Vec::new());

@@ -45,9 +45,9 @@ pub fn measured_on(command: &str) -> String {
         if version.is_empty() { std::env::consts::OS.to_owned() } else { format!("Linux {}", version.join(".")) };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     format!(
-        "Written by `{command}` on {}; palpate {}, {cores} cores, {system}, {}. Costs are CPU\n\
-         time of the thread. With the caches that others empty, p50 differs by some 10 % from run to run, and p99 by more. Errors are\n\
-         the same every time.",
+        "Written by `{command}` on {}; palpate {}, {cores} cores, {system}, {}.\n\
+         Costs are CPU time of the thread. The caches that other programs empty make up to a quarter of them; errors are the same\n\
+         every time.",
         today(),
         env!("CARGO_PKG_VERSION"),
         InstructionSet::detect().name(),

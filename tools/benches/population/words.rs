@@ -80,7 +80,7 @@ const OF_MODELS: [&str; 14] = [
 
 /// The columns of the table of classes and motions.
 const OF_KINDS: [&str; 10] =
-    ["kind", "scenes", "in time: rms % p50", "p90", "worst", "late: rms % p50", "p90", "worst", "late: tick us", "p99"];
+    ["kind", "ran", "in time: rms % p50", "p90", "worst", "late: rms % p50", "p90", "worst", "late: tick us", "p99"];
 
 pub fn document(Populations { single, pairs }: &Populations) -> Document {
     let parts = [("unseen", single, true), ("seen", single, false), ("pairs, unseen", pairs, true)];
@@ -113,7 +113,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.get(place.round() as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// The same of a figure of `runs`, to print.
+/// That quantile of a figure of `runs`, to print.
 fn quantile_of(runs: &[&Run], of: fn(&Run) -> f64, share: f64) -> String {
     figure(quantile(runs.iter().map(|run| of(run)).collect(), share))
 }
@@ -181,7 +181,7 @@ fn of_models(name: &str, results: &[&CaseResult]) -> Vec<Vec<String>> {
     }
     let finer: Vec<&Run> = results.iter().filter_map(|result| result.finer.as_ref()).collect();
     let mut itself = row("`full`", "2x steps", &finer);
-    itself.splice(11.., ["-"; 3].map(str::to_owned));
+    itself.splice(OF_MODELS.len() - 3.., ["-"; 3].map(str::to_owned));
     rows.push(itself);
     rows
 }
@@ -193,7 +193,7 @@ fn of_kinds(results: &[&CaseResult]) -> Vec<Vec<String>> {
         let [in_time, late] = [false, true].map(|late| runs(&those, Kind::Predictive, late));
         let rms = |runs: &[&Run]| [0.5, 0.9, 1.0].map(|share| quantile_of(runs, |run| run.rms, share));
         let tick = [quantile_of(&late, |run| run.tick_us[0], 0.5), quantile_of(&late, |run| run.tick_us[1], 0.5)];
-        let first = [name.to_owned(), those.len().to_string()];
+        let first = [name.to_owned(), format!("{}/{}", late.len(), those.len())];
         let cells = first.into_iter().chain(rms(&in_time)).chain(rms(&late)).chain(tick);
         (!late.is_empty()).then(|| cells.collect())
     };
@@ -202,10 +202,10 @@ fn of_kinds(results: &[&CaseResult]) -> Vec<Vec<String>> {
     classes.chain(motions).collect()
 }
 
-/// The share of scenes above an error, by class and of two tools, one period late.
+/// The share of scenes above an error, by class and of pairs, one period late.
 fn errors(single: &[CaseResult], pairs: &[CaseResult]) -> Picture {
     let of_class = |class: Class| (class.name(), single.iter().filter(|result| result.class == class).collect());
-    let of = Class::ALL.into_iter().map(of_class).chain([("two tools", pairs.iter().collect())]);
+    let of = Class::ALL.into_iter().map(of_class).chain([("pairs", pairs.iter().collect())]);
     let series = |(number, (name, of)): (usize, (&str, Vec<&CaseResult>))| {
         let mut errors: Vec<f64> = runs(&of, Kind::Predictive, true).into_iter().map(|run| run.rms).collect();
         errors.sort_by(f64::total_cmp);
@@ -222,7 +222,7 @@ fn errors(single: &[CaseResult], pairs: &[CaseResult]) -> Picture {
         }
     };
     Picture {
-        title: "predictive, one period late: share of scenes with at least that error".to_owned(),
+        title: "predictive, one period late: share of all scenes, seen or not, with at least that error".to_owned(),
         x: "rms error (% of peak)".to_owned(),
         y: "share of scenes".to_owned(),
         marks: Vec::new(),
@@ -246,7 +246,8 @@ fn costs(results: &[CaseResult]) -> Picture {
             .collect(),
     };
     Picture {
-        title: "predictive: error against cost; discs in time, circles one period late".to_owned(),
+        title: "predictive, all scenes, seen or not: error against cost; discs in time, circles one period late"
+            .to_owned(),
         x: "CPU per haptic tick, p50 (us)".to_owned(),
         y: "rms error (% of peak)".to_owned(),
         marks: Vec::new(),

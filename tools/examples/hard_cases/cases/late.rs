@@ -63,7 +63,7 @@ pub const CASES: &[Case] = &[
         ],
     )
     .upset(Upset::Stall(0.5)),
-    // `full` itself jumps by 11.7 % as the tool leaves the body.
+    // `full` itself jumps by 11.7 % as the tool is lifted.
     case(
         "stalled drag",
         "hard/drag_long",
