@@ -403,22 +403,22 @@ mod tests {
     }
 
     #[test]
-    fn a_roomy_window_holds_all_around_what_a_sphere_presses() {
-        let simulation = simulation([20, 20, 4], ToolShape::Sphere { radius: 8e-3 });
-        let roomy = Windows::new(&simulation, 0, [6, 6, 3]);
-        let edges = Windows { around: Around::new(simulation.body(), false), ..roomy.clone() };
-        let triangles = &simulation.body().surface().triangles;
-        let (mut patch, mut pressed) = (Vec::new(), Vec::new());
-        let mut holds_all = |windows: &Windows, way: &[u32]| {
-            assert!(windows.choose((&simulation, 0), way, &Beside::default(), |_| true, &mut patch));
-            simulation.pressed_at(0, way, &mut pressed);
-            let touches = |triangle: &&[u32; 3]| triangle.iter().any(|node| pressed.contains(node));
-            triangles.iter().filter(touches).flatten().all(|node| patch.binary_search(node).is_ok())
-        };
-        let top = top(&simulation);
-        let ways: Vec<[u32; 2]> = top.iter().zip(&top[2..]).map(|(&one, &next)| [one, next]).collect();
-        assert!(ways.iter().all(|way| holds_all(&roomy, way)));
-        assert!(!ways.iter().all(|way| holds_all(&edges, way)), "those beyond the edges are fewer");
+    fn around_a_sphere_are_all_neighbours_of_what_it_presses_and_in_small_windows_what_is_beyond_the_edges() {
+        let simulation = simulation([9; 3], ToolShape::Sphere { radius: 8e-3 });
+        let [roomy, small] = [true, false].map(|is_roomy| Around::new(simulation.body(), is_roomy));
+        let (triangles, triangle) = (&simulation.body().surface().triangles, top(&simulation)[40]);
+        let mut pressed = Vec::new();
+        simulation.pressed_at(0, &[triangle], &mut pressed);
+        assert!(pressed.len() > 3, "more than the triangle's corners");
+        let touches = |triangle: &&[u32; 3]| triangle.iter().any(|node| pressed.contains(node));
+        let mut neighbours: Vec<u32> = triangles.iter().filter(touches).flatten().copied().collect();
+        neighbours.sort_unstable();
+        neighbours.dedup();
+        roomy.add_around(&[triangle], &mut pressed);
+        assert_eq!(pressed, neighbours);
+        let mut corners = triangles[triangle as usize].to_vec();
+        small.add_around(&[triangle], &mut corners);
+        assert_eq!(corners.len(), 3 + 3);
     }
 
     #[test]
