@@ -17,8 +17,7 @@ use zenoh::pubsub::Subscriber;
 use crate::inbox::Inbox;
 use crate::outbox::Outbox;
 
-/// Lines of a session. With 14 ms and 1 % lost the middle of eight runs was 0.60 (`hand`) and 2.8 % (`drag_friction`) off with three, 1.1 and
-/// 3.0 with two.
+/// Lines of a session.
 pub(crate) const LINES: usize = 3;
 
 /// What the haptic side says hello to.

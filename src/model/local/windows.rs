@@ -4,6 +4,7 @@
 use super::forecast::LOOKS;
 use crate::body::Body;
 use crate::contact::ToolShape;
+use crate::mesh::Surface;
 use crate::simulation::Simulation;
 use crate::{Pose, Vec3};
 
@@ -50,17 +51,9 @@ pub struct Windows {
     size: [usize; 3],
     /// The middle of each surface triangle at rest (m).
     triangles: Vec<Vec3>,
-    around: Around,
+    /// They are wide enough for all nodes around a tool.
+    is_roomy: bool,
     windows: Vec<Window>,
-}
-
-/// The nodes that a window has to hold too, to have a tool well inside.
-#[derive(Clone, Debug)]
-enum Around {
-    /// Those around each node that the tool presses.
-    Nodes(Vec<Vec<u32>>),
-    /// Those of each triangle of its way, and beyond its three edges.
-    Triangles(Vec<Vec<u32>>),
 }
 
 #[derive(Clone, Debug)]
@@ -129,7 +122,7 @@ impl Windows {
                 windows.push(Window { middle: *middle, normal, patch, layer: first });
             }
         }
-        Self { size, triangles, around: Around::new(body, size[0].min(size[1]) >= ROOMY), windows }
+        Self { size, triangles, is_roomy: size[0].min(size[1]) >= ROOMY, windows }
     }
 
     /// Puts the patch for tool number `tool` over `triangles` in place of `nodes`. True if it is a usable one.
@@ -164,7 +157,7 @@ impl Windows {
                     }
                     simulation.pressed_at(tool, first, nodes);
                     if well_inside {
-                        self.around.add_around(first, nodes);
+                        self.add_around(simulation.body(), first, nodes);
                     }
                     let shared = [&beside.soon, &beside.now].into_iter().filter(|nodes| !nodes.is_empty());
                     let together = || first.iter().chain(&beside.triangles);
@@ -196,6 +189,26 @@ impl Windows {
         let ranked = self.windows[layer..].iter().map(|window| (rank(window), window));
         let best = ranked.min_by(|((a, near), _), ((b, far), _)| a.cmp(b).then(near.total_cmp(far)));
         best.map(|(_, window)| &window.patch[..])
+    }
+
+    /// Adds to the nodes that are `pressed` at `triangles` those that a window has to hold too, to have a tool well inside: those around
+    /// each of them, or in small windows those beyond the edges of the triangles. In increasing order, each once.
+    fn add_around(&self, body: &dyn Body, triangles: &[u32], pressed: &mut Vec<u32>) {
+        let surface = body.surface();
+        let add = |triangle: u32, pressed: &mut Vec<u32>| {
+            let corners = surface.triangles[triangle as usize].into_iter();
+            pressed.extend(corners.filter(|&node| body.inverse_masses()[node as usize] > 0.0));
+        };
+        if self.is_roomy {
+            for n in 0..pressed.len() {
+                surface.at_node(pressed[n]).iter().for_each(|&triangle| add(triangle, pressed));
+            }
+        } else {
+            let beyond = triangles.iter().flat_map(|&triangle| surface.neighbours[triangle as usize]);
+            beyond.filter(|&triangle| triangle != Surface::NONE).for_each(|triangle| add(triangle, pressed));
+        }
+        pressed.sort_unstable();
+        pressed.dedup();
     }
 
     /// The least of the usable windows that hold what is `pressed`, and of these the one in whose middle `triangles` lie best.
@@ -252,50 +265,6 @@ impl Windows {
     }
 }
 
-impl Default for Around {
-    fn default() -> Self {
-        Self::Nodes(Vec::new())
-    }
-}
-
-impl Around {
-    fn new(body: &dyn Body, is_roomy: bool) -> Self {
-        let triangles = &body.surface().triangles;
-        let mut neighbours = vec![Vec::new(); body.rest().len()];
-        for triangle in triangles {
-            triangle.iter().for_each(|&node| neighbours[node as usize].extend(triangle));
-        }
-        let can_move = |node: &u32| body.inverse_masses()[*node as usize] > 0.0;
-        for nodes in &mut neighbours {
-            nodes.retain(can_move);
-            nodes.sort_unstable();
-            nodes.dedup();
-        }
-        if is_roomy {
-            return Self::Nodes(neighbours);
-        }
-        let beyond_edges = |triangle: &[u32; 3]| {
-            let mut all = triangle.map(|node| &neighbours[node as usize][..]).concat();
-            all.sort_unstable();
-            let of_two = all.chunk_by(|a, b| a == b).filter(|same| same.len() >= 2);
-            of_two.map(|same| same[0]).collect()
-        };
-        Self::Triangles(triangles.iter().map(beyond_edges).collect())
-    }
-
-    /// Adds to the nodes that are `pressed` at `triangles` those that a window has to hold too; in increasing order, each once.
-    fn add_around(&self, triangles: &[u32], pressed: &mut Vec<u32>) {
-        match self {
-            Self::Nodes(around) => (0..pressed.len()).for_each(|n| pressed.extend(&around[pressed[n] as usize])),
-            Self::Triangles(around) => {
-                triangles.iter().for_each(|&triangle| pressed.extend(&around[triangle as usize]));
-            }
-        }
-        pressed.sort_unstable();
-        pressed.dedup();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -333,7 +302,7 @@ mod tests {
             for &triangle in &top {
                 assert!(windows.choose((&simulation, 0), &[triangle], &Beside::default(), |_| true, &mut patch));
                 simulation.pressed_at(0, &[triangle], &mut pressed);
-                windows.around.add_around(&[triangle], &mut pressed);
+                windows.add_around(simulation.body(), &[triangle], &mut pressed);
                 assert!(pressed.iter().all(|node| patch.contains(node)), "{shape:?}: triangle {triangle}");
                 assert!(patch.is_sorted());
                 used.push(patch.clone());
@@ -379,7 +348,7 @@ mod tests {
         };
         let has_inside = |triangle: u32, window: &Window| {
             let mut around = simulation.body().surface().triangles[triangle as usize].to_vec();
-            windows.around.add_around(&[triangle], &mut around);
+            windows.add_around(simulation.body(), &[triangle], &mut around);
             around.iter().all(|node| window.patch.contains(node))
         };
         let choose = |way: &[u32], usable: &[&Window]| {
@@ -405,7 +374,7 @@ mod tests {
     #[test]
     fn around_a_sphere_are_all_neighbours_of_what_it_presses_and_in_small_windows_what_is_beyond_the_edges() {
         let simulation = simulation([9; 3], ToolShape::Sphere { radius: 8e-3 });
-        let [roomy, small] = [true, false].map(|is_roomy| Around::new(simulation.body(), is_roomy));
+        let [roomy, small] = [true, false].map(|is_roomy| Windows { is_roomy, ..Windows::default() });
         let (triangles, triangle) = (&simulation.body().surface().triangles, top(&simulation)[40]);
         let mut pressed = Vec::new();
         simulation.pressed_at(0, &[triangle], &mut pressed);
@@ -414,10 +383,10 @@ mod tests {
         let mut neighbours: Vec<u32> = triangles.iter().filter(touches).flatten().copied().collect();
         neighbours.sort_unstable();
         neighbours.dedup();
-        roomy.add_around(&[triangle], &mut pressed);
+        roomy.add_around(simulation.body(), &[triangle], &mut pressed);
         assert_eq!(pressed, neighbours);
         let mut corners = triangles[triangle as usize].to_vec();
-        small.add_around(&[triangle], &mut corners);
+        small.add_around(simulation.body(), &[triangle], &mut corners);
         assert_eq!(corners.len(), 3 + 3);
     }
 
