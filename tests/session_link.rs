@@ -4,10 +4,11 @@ mod session_support;
 
 use std::time::Duration;
 
-use palpate::log::ForceSample;
+use palpate::log::{ForceSample, ServedBy};
 use palpate::model::Vec3;
-use palpate::model::body::Body;
+use palpate::model::body::{Block, Body};
 use palpate::model::local::{Feedback, Kind};
+use palpate::model::mesh::Face;
 use palpate::runtime::{Nanos, RateGroup};
 use palpate::scene::{LinkSpec, Scene};
 use palpate::session::{Session, SessionBuilder, Summary};
@@ -101,6 +102,25 @@ fn predictive_keeps_its_force_over_a_bad_link_where_the_others_lose_it() {
     let [hold, patch, predictive] = [Kind::Hold, Kind::Patch, Kind::Predictive].map(of);
     println!("hold {hold:.2} %, patch {patch:.2} %, predictive {predictive:.3} %");
     assert!(predictive < 2.0 && hold > 5.0 * predictive && patch > 5.0 * predictive, "{hold} {patch} {predictive}");
+}
+
+/// A basis is larger than the models that need it, and where packets are lost it comes later than they do.
+#[test]
+fn no_model_comes_without_the_basis_that_it_was_made_for() {
+    let sheet = Block::builder([14, 14, 3], [0.13, 0.13, 0.02]).node_mass(0.8e-3).stiffness(200.0).damping_ratio(0.4);
+    let sheet = sheet.fix(Face::XMin).fix(Face::XMax).build().unwrap();
+    let across = |t: f64| [0.065 + 0.04 * (3.0 * t).sin(), 0.065 + 0.03 * (2.0 * t).sin(), 0.019];
+    let session = || {
+        let session = Session::builder(sheet.clone()).path(sampled(across)).model(Kind::Predictive);
+        session.virtual_time().keep_records()
+    };
+    let without = |summary: &Summary| {
+        let served = forces(summary);
+        served.iter().filter(|force| force.served_by == ServedBy::Predicted).count()
+    };
+    let link = LinkSpec { delay_ms: 14.0, loss: 0.03, seed: 3, ..LinkSpec::default() };
+    let [here, linked] = [run(session(), 1.5), run(session().link(link), 1.5)].map(|summary| without(&summary));
+    assert_eq!([here, linked], [0, 0]);
 }
 
 /// Check that the force fades with the age of the model, is gone when that is too old, and comes back with the link: in a new

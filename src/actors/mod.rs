@@ -44,7 +44,7 @@ mod whole;
 pub(crate) use basis::{BasisActor, BasisPorts, Pace as BasisPace, Wishes};
 pub(crate) use basis_store::BasisStore;
 pub(crate) use believed::{Bounds, Disbelieved};
-pub(crate) use bridge::{Beyond, GlobalBridge, GlobalBridgePorts, HapticBridge, HapticBridgePorts};
+pub(crate) use bridge::{BasesPorts, Beyond, GlobalBridge, GlobalBridgePorts, HapticBridge, HapticBridgePorts};
 pub(crate) use device::{DeviceActor, DevicePorts, GAP_S, first_state};
 pub(crate) use global::{GlobalActor, GlobalPlan};
 pub(crate) use global_ports::{GlobalPorts, GlobalSharedPorts, SurroundingsPorts, ToolPorts};

@@ -56,7 +56,7 @@ pub fn wiggling() -> ToolPath {
     })
 }
 
-fn sampled(position: impl Fn(f64) -> [f64; 3]) -> ToolPath {
+pub fn sampled(position: impl Fn(f64) -> [f64; 3]) -> ToolPath {
     let times: Vec<f64> = (0..4000).map(|n| f64::from(n) * 1e-3).collect();
     let positions = times.iter().map(|&t| position(t)).collect();
     ToolPath::new(times, positions).unwrap()

@@ -4,6 +4,8 @@ use std::collections::VecDeque;
 
 use super::super::messages::ToolTick;
 use super::machine::Machine;
+use super::passed_bases::{BasesPorts, PassedBases};
+use super::sent_bases::MOST_ON_THE_WAY;
 use super::{MOST_MESSAGES, REPEATED};
 use crate::actors::messages::SurfaceView;
 use crate::actors::tunable::Tunable;
@@ -29,6 +31,10 @@ pub struct GlobalBridge {
     machines: Vec<Machine>,
     /// The next local models: such as are [built elsewhere](crate::model::local::Template::departing).
     models: Reader<LocalModels>,
+    /// None where local models take no bases.
+    bases: Option<PassedBases>,
+    /// A machine may lack others than before.
+    are_bases_due: bool,
     tools: Vec<Onward>,
     settings: Tunable,
     /// The body as it is to be seen on the other side, and the nodes that are.
@@ -43,6 +49,8 @@ pub struct GlobalBridge {
 pub struct GlobalBridgePorts {
     /// The next local models: such as are [built elsewhere](crate::model::local::Template::departing).
     pub models: Reader<LocalModels>,
+    /// The way of the bases, if local models take any.
+    pub bases: Option<BasesPorts>,
     /// Where each tool is at the start, and where its ticks go.
     pub tools: Vec<(Pose, QueueWriter<ToolTick>)>,
     /// What the haptic side may change.
@@ -142,18 +150,33 @@ impl Reception {
 impl GlobalBridge {
     /// A bridge between the global actor behind `ports` and the `machines` whose tools it has, each of which is at one of them.
     pub fn new(machines: Vec<Beyond>, ports: GlobalBridgePorts) -> Self {
-        let GlobalBridgePorts { models, tools, settings, surface, haptic } = ports;
+        let GlobalBridgePorts { models, bases, tools, settings, surface, haptic } = ports;
+        let bases = bases.map(PassedBases::new);
         let is_alone = machines.len() == 1;
         let machine = |(transport, tools)| Machine::new(transport, tools, is_alone, &settings);
         let machines = machines.into_iter().map(machine).collect();
         let tools = tools.into_iter().map(Onward::new).collect();
-        Self { machines, models, tools, settings, surface, haptic, is_prompt: false }
+        Self { machines, models, bases, are_bases_due: true, tools, settings, surface, haptic, is_prompt: false }
+    }
+
+    /// Sends the bases that the machines lack, with `most` on their way at a time, and passes on what they have.
+    fn send_bases(&mut self, ctx: &TickContext, most: usize) {
+        let Self { machines, models, bases, are_bases_due, .. } = self;
+        let Some(bases) = bases else { return };
+        let are_told = bases.take(ctx);
+        if std::mem::take(are_bases_due) || are_told {
+            for machine in machines.iter_mut() {
+                machine.send_bases(models.get(), &bases.made, most, ctx.scheduled);
+            }
+            bases.pass(ctx, machines, are_told);
+        }
     }
 
     fn send_models(&mut self, ctx: &TickContext) {
-        let Self { machines, models, .. } = self;
+        let Self { machines, models, are_bases_due, .. } = self;
         self.is_prompt = !models.refresh(ctx);
         if !self.is_prompt {
+            *are_bases_due = true;
             for machine in machines {
                 machine.send_models(Shipment::of_tools(models.get(), &machine.tools), ctx.scheduled);
             }
@@ -189,7 +212,7 @@ impl GlobalBridge {
             return_ticks: haptic.last_release(RETURNS_IN).max(1),
             is_prompt: self.is_prompt,
         };
-        let Self { machines, tools, settings, .. } = self;
+        let Self { machines, tools, settings, are_bases_due, .. } = self;
         for machine in machines {
             if machine.is_another() {
                 machine.tools.iter().for_each(|&tool| tools[tool].is_put = true);
@@ -202,7 +225,7 @@ impl GlobalBridge {
                     }
                     Message::Wants { held, friction, stiffness, is_watched } => {
                         if machine.is_newest_said(header.number) {
-                            machine.bases.held = held;
+                            *are_bases_due |= machine.bases.arrived(held, ctx.scheduled);
                             machine.tune(settings, (friction, stiffness));
                             machine.is_watched = is_watched;
                         }
@@ -261,11 +284,14 @@ impl Actor for GlobalBridge {
 
     fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
         self.send_models(ctx);
+        // There is time: the session has not begun.
+        self.send_bases(ctx, usize::MAX);
         Ok(())
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         self.send_models(ctx);
+        self.send_bases(ctx, MOST_ON_THE_WAY);
         self.send_surface(ctx.scheduled);
         Outcome::Continue
     }

@@ -40,6 +40,9 @@ pub struct HapticBridge {
     arrived: Option<Shipment>,
     image: Image,
     bases: Bases,
+    /// Their keys, the oldest first, and whether the newest have been told.
+    held: Vec<u64>,
+    is_held_told: bool,
     clock: Clock,
     /// When something of this epoch came last; `None` before.
     heard: Option<Nanos>,
@@ -136,7 +139,7 @@ impl HapticBridge {
             let elsewhere = elsewhere.map(|handle| OtherTool::new(handle, haptic));
             Tool { ticks, recent: VecDeque::new(), elsewhere }
         };
-        let (newest, arrived, bases, clock, heard, asked) = Default::default();
+        let (newest, arrived, bases, held, clock, heard, asked) = Default::default();
         let (mut post, tools) = (Post::new(transport), tools.into_iter().map(tool).collect());
         let peer = post.peer();
         Self {
@@ -147,6 +150,8 @@ impl HapticBridge {
             arrived,
             image,
             bases,
+            held,
+            is_held_told: true,
             clock,
             heard,
             asked,
@@ -198,13 +203,16 @@ impl HapticBridge {
         let now = ctx.scheduled;
         self.settings.refresh(ctx);
         self.surfaces.look(now);
-        if self.asked.is_none_or(|asked| now.saturating_sub(asked) >= ASKS_EVERY) {
-            self.asked = Some(now);
-            self.post.send(Lane::Urgent, now, &Message::Ping);
-            let held = self.bases.iter().map(|basis| key_of(basis.patch())).collect();
+        let is_due = self.asked.is_none_or(|asked| now.saturating_sub(asked) >= ASKS_EVERY);
+        if is_due || !std::mem::replace(&mut self.is_held_told, true) {
+            let held = self.held.iter().rev().copied().collect();
             let Settings { friction, stiffness, .. } = self.settings.get();
             let is_watched = self.surfaces.are_watched(now);
             self.post.send(Lane::Urgent, now, &Message::Wants { held, friction, stiffness, is_watched });
+        }
+        if is_due {
+            self.asked = Some(now);
+            self.post.send(Lane::Urgent, now, &Message::Ping);
             self.record(now);
         }
     }
@@ -279,6 +287,8 @@ impl HapticBridge {
         let is_new = self.bases.get(basis.patch()).is_none();
         if is_new && key == key_of(basis.patch()) && self.image.has_room_for(&basis) {
             self.bases.insert(basis.into());
+            self.held.push(key);
+            self.is_held_told = false;
         }
     }
 

@@ -1,15 +1,16 @@
 //! A haptic machine, as the global side knows it.
 
-use super::FIRST_EPOCH;
 use super::numbering::Numbering;
 use super::post::Post;
 use super::sent_bases::SentBases;
+use super::{FIRST_EPOCH, SILENCE};
 use crate::actors::settings::Settings;
 use crate::actors::tunable::Tunable;
 use crate::link::{Header, Lane, Message, Transport};
 use crate::model::body::Stiffness;
 use crate::model::contact::Friction;
-use crate::model::local::Shipment;
+use crate::model::local::{LocalModels, Parcel, Shipment};
+use crate::model::surroundings::Bases;
 use crate::runtime::Nanos;
 
 /// A haptic machine and the tools whose devices are there.
@@ -20,6 +21,8 @@ pub(super) struct Machine {
     pub(super) tools: Vec<usize>,
     pub(super) numbering: Numbering,
     pub(super) bases: SentBases,
+    /// There is no other machine.
+    is_alone: bool,
     /// What it wants friction and stiffness to be, and what one that has changed nothing wants.
     wanted: (Friction, Stiffness),
     unchanged: (Friction, Stiffness),
@@ -49,6 +52,7 @@ impl Machine {
             tools,
             numbering,
             bases,
+            is_alone,
             wanted,
             unchanged: wanted,
             said,
@@ -84,10 +88,21 @@ impl Machine {
         Some((header, message))
     }
 
-    /// Sends what local models of its tools are built from, and the bases that it lacks for them. Models in which its tools rest because nothing
-    /// comes from it are as old there as its last sample.
+    /// Sends what it lacks of the bases that were `made`, those first that local models of its tools need; `most` are on their way at a time.
+    pub(super) fn send_bases(&mut self, models: &LocalModels, made: &Bases, most: usize, now: Nanos) {
+        let serves_it = |parcel: &&Parcel| self.tools.iter().any(|&tool| models.hosts()[tool] == parcel.tool());
+        self.bases.send(&mut self.post, models.parcels().filter(serves_it), made, most, now);
+    }
+
+    /// True if it lacks the basis of that name. One that has fallen silent lacks nothing, unless it is the only one.
+    pub(super) fn lacks(&self, key: u64, now: Nanos) -> bool {
+        let is_there = self.is_alone || now.saturating_sub(self.heard) < SILENCE;
+        is_there && !self.bases.has(key)
+    }
+
+    /// Sends what local models of its tools are built from. Models in which its tools rest because nothing comes from it are as old there as
+    /// its last sample.
     pub(super) fn send_models(&mut self, mut shipment: Shipment, now: Nanos) {
-        self.bases.send(&mut self.post, shipment.parcels(), now);
         shipment.set_tick(self.numbering.there(shipment.tick()).min(self.newest));
         self.post.send(Lane::Models, now, &Message::Models(shipment));
     }

@@ -3,6 +3,8 @@
 //! ```text
 //! local --ToolTick--> haptic bridge ~~ticks~~> global bridge --ToolTick--> global
 //!       <--model-----               <~models~~               <--model-----
+//!                                   <~bases~~~               <--bases----- basis
+//!                                   ~~wants~~>               ---bases-----> global
 //! program --Settings-->             ~~wants~~>               --Settings-->
 //!         <--SurfaceView--          <~~surface~~             <--SurfaceView--
 //! ```
@@ -18,6 +20,7 @@ mod haptic;
 mod machine;
 mod numbering;
 mod other_tool;
+mod passed_bases;
 mod post;
 mod sent_bases;
 
@@ -25,6 +28,7 @@ use crate::runtime::Nanos;
 
 pub use global::{Beyond, GlobalBridge, GlobalBridgePorts};
 pub use haptic::{HapticBridge, HapticBridgePorts};
+pub use passed_bases::BasesPorts;
 
 /// A haptic side that has heard nothing for so long takes the connection for gone: by default no force is left by then.
 pub const SILENCE: Nanos = Nanos(500_000_000);

@@ -1,52 +1,76 @@
 //! Which bases a haptic machine has, and which are on their way to it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::key_of;
 use super::post::Post;
 use crate::link::{Lane, Message};
 use crate::model::local::Parcel;
+use crate::model::surroundings::Bases;
 use crate::runtime::Nanos;
 
-/// A basis that is not there after so long is sent again.
+/// A basis that is not there after so long in which no other came is sent again: a slow line is no reason to send more.
 const SENT_AGAIN: Nanos = Nanos(3_000_000_000);
-/// Bases that are on their way at the same time: more would wait for one another, and the first ones are wanted first.
-const MOST_ON_THE_WAY: usize = 4;
+/// Bases that are on their way at the same time while a session runs: more would wait for one another, and the first ones are wanted first.
+pub(super) const MOST_ON_THE_WAY: usize = 4;
 
 /// What a haptic machine has.
 #[derive(Debug, Default)]
 pub(super) struct SentBases {
     /// When each was sent.
     on_the_way: BTreeMap<u64, Nanos>,
-    /// What it says that it has, by key.
-    pub(super) held: Vec<u64>,
+    /// When it said so of the last.
+    last: Nanos,
+    /// What it has said that it has, by key.
+    held: BTreeSet<u64>,
 }
 
 impl SentBases {
-    /// Sends what the machine lacks of the bases that `parcels` know, those that they need themselves first.
-    pub(super) fn send(&mut self, post: &mut Post, parcels: &[Parcel], now: Nanos) {
+    /// Sends what the machine lacks of the bases that were `made`, those first that `parcels` need; `most` are on their way at a time.
+    pub(super) fn send<'a>(
+        &mut self,
+        post: &mut Post,
+        parcels: impl Iterator<Item = &'a Parcel>,
+        made: &Bases,
+        most: usize,
+        now: Nanos,
+    ) {
         self.give_up_late(now);
-        let needed = parcels.iter().filter_map(|parcel| parcel.bases().get(parcel.patch()?)).map(|basis| &**basis);
-        // They all know the same.
-        let known = parcels.iter().take(1).flat_map(|parcel| parcel.bases().iter());
-        for basis in needed.chain(known) {
+        let needed = parcels.filter_map(|parcel| parcel.bases().get(parcel.patch()?));
+        for basis in needed.chain(made.iter()) {
             let key = key_of(basis.patch());
-            if self.begin(key, now) {
+            if self.begin(key, most, now) {
                 post.send_with(Lane::Bulk, now, |header, bytes| Message::write_basis(key, basis, header, bytes));
             }
         }
     }
 
-    /// What has arrived is on its way no longer, nor what has not for so long that it must be lost.
-    fn give_up_late(&mut self, now: Nanos) {
-        let Self { on_the_way, held } = self;
-        on_the_way.retain(|key, sent| !held.contains(key) && now.saturating_sub(*sent) < SENT_AGAIN);
+    /// The machine says that it has the bases of these `keys`; true if it has not said so of all of them before.
+    pub(super) fn arrived(&mut self, keys: impl IntoIterator<Item = u64>, now: Nanos) -> bool {
+        let before = self.held.len();
+        self.held.extend(keys);
+        let is_news = self.held.len() > before;
+        if is_news {
+            self.last = now;
+        }
+        is_news
     }
 
-    /// True if the basis of that name is to be sent now: from then on it is on its way.
-    fn begin(&mut self, key: u64, now: Nanos) -> bool {
-        let Self { on_the_way, held } = self;
-        let begins = on_the_way.len() < MOST_ON_THE_WAY && !on_the_way.contains_key(&key) && !held.contains(&key);
+    /// True if the machine has said that it has the basis of that name.
+    pub(super) fn has(&self, key: u64) -> bool {
+        self.held.contains(&key)
+    }
+
+    /// What has arrived is on its way no longer, nor what has not for so long that it must be lost.
+    fn give_up_late(&mut self, now: Nanos) {
+        let Self { on_the_way, last, held } = self;
+        on_the_way.retain(|key, sent| !held.contains(key) && now.saturating_sub(*last.max(sent)) < SENT_AGAIN);
+    }
+
+    /// True if the basis of that name is to be sent now, with `most` on their way: from then on it is.
+    fn begin(&mut self, key: u64, most: usize, now: Nanos) -> bool {
+        let Self { on_the_way, held, .. } = self;
+        let begins = on_the_way.len() < most && !on_the_way.contains_key(&key) && !held.contains(&key);
         if begins {
             on_the_way.insert(key, now);
         }
@@ -58,13 +82,26 @@ impl SentBases {
 mod tests {
     use super::*;
 
+    #[test]
+    fn a_slow_line_on_which_others_come_is_no_reason_to_send_one_again() {
+        let seconds = |s: u64| Nanos(s * 1_000_000_000);
+        let mut bases = SentBases::default();
+        assert!(bases.begin(0, MOST_ON_THE_WAY, Nanos::ZERO) && bases.arrived([7], seconds(2)));
+        let mut sent_again = |at: Nanos| {
+            bases.give_up_late(at);
+            bases.begin(0, MOST_ON_THE_WAY, at)
+        };
+        assert_eq!([4, 5].map(|s| sent_again(seconds(s))), [false, true]);
+        assert!(!bases.arrived([7], seconds(6)), "that is no news");
+    }
+
     /// Whether each basis is sent, by a model that is published 30 times a second and knows so many; in which of a hundred periods.
     fn sent(bases: &mut SentBases, known: u64) -> Vec<(u64, u64)> {
         let mut sent = Vec::new();
         for period in 0..100 {
             let now = Nanos(period * 33_333_333);
             bases.give_up_late(now);
-            sent.extend((0..known).filter(|&key| bases.begin(key, now)).map(|key| (period, key)));
+            sent.extend((0..known).filter(|&key| bases.begin(key, MOST_ON_THE_WAY, now)).map(|key| (period, key)));
         }
         sent
     }
@@ -73,16 +110,18 @@ mod tests {
     fn a_basis_that_is_lost_is_sent_again_and_no_other() {
         let again = 91; // the first period 3 s after the first
         assert_eq!(sent(&mut SentBases::default(), 2), [(0, 0), (0, 1), (again, 0), (again, 1)]);
-        let mut holding = SentBases { held: vec![0], ..SentBases::default() };
+        let mut holding = SentBases { held: [0].into(), ..SentBases::default() };
         assert_eq!(sent(&mut holding, 2), [(0, 1), (again, 1)]);
     }
 
     #[test]
     fn few_are_on_their_way_at_a_time() {
         let mut bases = SentBases::default();
-        let begun = |bases: &mut SentBases| (0..9).filter(|&key| bases.begin(key, Nanos::ZERO)).collect::<Vec<_>>();
+        let begun = |bases: &mut SentBases| {
+            (0..9).filter(|&key| bases.begin(key, MOST_ON_THE_WAY, Nanos::ZERO)).collect::<Vec<_>>()
+        };
         assert_eq!(begun(&mut bases), [0, 1, 2, 3]);
-        bases.held = vec![1, 2];
+        bases.arrived([1, 2], Nanos(1));
         bases.give_up_late(Nanos(1));
         assert_eq!(begun(&mut bases), [4, 5]);
     }

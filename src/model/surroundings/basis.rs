@@ -63,8 +63,8 @@ impl Bases {
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn iter(&self) -> impl Iterator<Item = &Basis> {
-        self.of.values().map(|basis| &**basis)
+    pub fn iter(&self) -> impl Iterator<Item = &Arc<Basis>> {
+        self.of.values()
     }
 
     /// Adds a basis, in place of one for the same patch.

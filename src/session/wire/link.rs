@@ -2,8 +2,8 @@
 
 use super::global::ToolLink;
 use crate::actors::{
-    Beyond, GlobalBridge, GlobalBridgePorts, HapticBridge, HapticBridgePorts, LocalPorts, ModelMaker, SurfaceView,
-    ToolTick, Tunable,
+    BasesPorts, Beyond, GlobalBridge, GlobalBridgePorts, HapticBridge, HapticBridgePorts, LocalPorts, ModelMaker,
+    SurfaceView, ToolTick, Tunable,
 };
 use crate::devices::ElsewhereHandle;
 use crate::error::{Error, ErrorKind};
@@ -11,6 +11,7 @@ use crate::link::{Conditions, Transport, VirtualLink};
 use crate::model::Pose;
 use crate::model::local::{Image, LocalModels};
 use crate::model::simulation::Simulation;
+use crate::model::surroundings::Bases;
 use crate::runtime::{
     Actor, ExchangePort, OutletPort, OutletReader, OutletWriter, QueueReader, QueueWriter, Rate, Reader,
     RuntimeBuilder, Writer,
@@ -76,6 +77,8 @@ pub(super) struct Linking {
     /// From the bridge to the local actor, and from the global one to the bridge.
     arriving: Option<Writer<LocalModels>>,
     departing: Option<Reader<LocalModels>>,
+    /// From the basis actor to the bridge, and from there to the global actor.
+    bases: Option<BasesPorts>,
     outer: Outer,
     /// Those that are seen.
     surface_nodes: Vec<u32>,
@@ -107,7 +110,7 @@ impl Linking {
             Ends::Global(_) => None,
             Ends::Both(_) | Ends::Haptic(_) => Some(Image::new(copy()?).without(others)),
         };
-        let (haptic, global, arriving, departing) = Default::default();
+        let (haptic, global, arriving, departing, bases) = Default::default();
         let surface_nodes = simulation.body().surface().nodes();
         let places = places.to_vec();
         Ok(Self {
@@ -117,6 +120,7 @@ impl Linking {
             global,
             arriving,
             departing,
+            bases,
             outer,
             surface_nodes,
             haptic_rate,
@@ -175,9 +179,21 @@ impl Linking {
         (global, local)
     }
 
+    /// Likewise for the bases that are `made`, of which some are `known` before the start: where the global actor gets them.
+    pub(super) fn connect_bases(
+        &mut self,
+        graph: &mut RuntimeBuilder,
+        made: &ExchangePort<Bases>,
+        known: &Bases,
+    ) -> ExchangePort<Bases> {
+        let port = graph.exchange_port(Bases::default);
+        self.bases = Some(BasesPorts { made: made.reader(), passed: port.writer(), known: known.clone() });
+        port
+    }
+
     /// The bridges in the order of their starts: what the global side tells at first is there when the haptic side begins.
     pub(super) fn bridges(self, graph: &mut RuntimeBuilder) -> Vec<Box<dyn Actor>> {
-        let Self { ends, image, haptic, global, arriving, departing, outer, surface_nodes, .. } = self;
+        let Self { ends, image, haptic, global, arriving, departing, bases, outer, surface_nodes, .. } = self;
         let Outer { settings: [settings, global_settings], shown, seen } = outer;
         let all = (0..self.places.len()).collect();
         let (here, there): (Option<Box<dyn Transport>>, Vec<Beyond>) = match ends {
@@ -191,6 +207,7 @@ impl Linking {
         let global = departing.map(|models| {
             let ports = GlobalBridgePorts {
                 models,
+                bases,
                 tools: self.places.into_iter().zip(global).collect(),
                 settings: global_settings,
                 surface: seen.map(|seen| (seen, surface_nodes)),

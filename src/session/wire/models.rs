@@ -84,6 +84,10 @@ pub(super) fn models(
             (Some(next), Some(arrivals))
         }
     };
+    let surroundings = surroundings.map(|(wishes, made)| match &mut linking {
+        Some(linking) => (wishes, linking.connect_bases(graph, &made, &known)),
+        None => (wishes, made),
+    });
     let linked = linking.is_some();
     let settings = linking.as_ref().map_or(settings, Linking::global_settings).clone();
     let maker = next.map(|models| {

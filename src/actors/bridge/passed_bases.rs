@@ -1,0 +1,60 @@
+//! The bases on their way from the basis actor to the global one: what the haptic machines lack is not there yet.
+
+use super::key_of;
+use super::machine::Machine;
+use crate::model::surroundings::Bases;
+use crate::runtime::{Reader, TickContext, Writer};
+
+/// The way of the bases from their maker to the global actor.
+#[derive(Debug)]
+pub struct BasesPorts {
+    /// All that are made.
+    pub made: Reader<Bases>,
+    /// Those that local models may be built with.
+    pub passed: Writer<Bases>,
+    /// Those that are there before the start, on this side.
+    pub known: Bases,
+}
+
+/// Passes a basis on to the global actor when the machines have it. A model in a window whose basis is not there yet would serve without:
+/// a basis takes longer over the link than the model that needs it, and longer still where packets are lost.
+#[derive(Debug)]
+pub(super) struct PassedBases {
+    ports: BasesPorts,
+    /// All that there are.
+    pub(super) made: Bases,
+    passed: Bases,
+}
+
+impl PassedBases {
+    pub(super) fn new(ports: BasesPorts) -> Self {
+        // The first ones are sent before the session begins, and the global actor has them.
+        let (made, passed) = (ports.known.clone(), ports.known.clone());
+        Self { ports, made, passed }
+    }
+
+    /// Takes what has been made; true if something has, or if it is to be told again.
+    pub(super) fn take(&mut self, ctx: &TickContext) -> bool {
+        let has_news = self.ports.made.refresh(ctx);
+        if has_news {
+            self.ports.made.get().iter().for_each(|basis| self.made.insert(basis.clone()));
+        }
+        has_news
+    }
+
+    /// Passes on what none of the `machines` lacks by now, and all of it again if it is to be `told` again.
+    pub(super) fn pass(&mut self, ctx: &TickContext, machines: &[Machine], told: bool) {
+        let Self { ports, made, passed } = self;
+        let before = passed.len();
+        for basis in made.iter() {
+            let is_there = || machines.iter().all(|machine| !machine.lacks(key_of(basis.patch()), ctx.scheduled));
+            if passed.get(basis.patch()).is_none() && is_there() {
+                passed.insert(basis.clone());
+            }
+        }
+        if told || passed.len() > before {
+            ports.passed.buffer().clone_from(passed);
+            ports.passed.publish(ctx);
+        }
+    }
+}
