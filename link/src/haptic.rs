@@ -18,6 +18,8 @@ use crate::{machine, unique};
 
 /// How long the first model is waited for.
 const FIRST_MODEL: Duration = Duration::from_secs(30);
+/// Once a model has come, the bases that the session begins with are waited for so long: without them it can begin all the same.
+const FIRST_BASES: Duration = Duration::from_secs(10);
 /// Another machine that has just gone is waited for so long.
 const OTHER_GONE: Duration = Duration::from_secs(3);
 /// The machines of the scene's other devices are waited for so long.
@@ -51,12 +53,12 @@ impl GlobalSide {
         Ok(Self { address: address.to_owned(), config, shared: Arc::default(), keeper: None })
     }
 
-    /// Says hello until it is welcome and the first models have come.
+    /// Says hello until it is welcome and the first models have come, with their bases.
     fn wait_for_models(&self, hello: &mut Hello) -> Result<Connection, Error> {
         let inbox = &self.shared.inbox;
         let (mut connection, mut is_told, mut is_welcome) = (None::<Connection>, false, false);
         // While others are waited for, the time of the first model does not run.
-        let (mut began, mut others) = (Instant::now(), None::<Instant>);
+        let (mut began, mut others, mut first) = (Instant::now(), None::<Instant>, None::<Instant>);
         while began.elapsed() < FIRST_MODEL {
             if !is_told && began.elapsed() > TELLS_AFTER {
                 is_told = true;
@@ -97,7 +99,8 @@ impl GlobalSide {
             }
             let looked = Instant::now();
             while looked.elapsed() < LOOKS_FOR {
-                if is_welcome && inbox.models() > 0 {
+                let has_models = is_welcome && inbox.models() > 0;
+                if has_models && (inbox.is_ready() || first.get_or_insert_with(Instant::now).elapsed() > FIRST_BASES) {
                     return connection.ok_or_else(|| self.error("broke off".to_owned()));
                 }
                 std::thread::sleep(Duration::from_millis(2));

@@ -21,6 +21,8 @@ struct Held {
     heard: Option<Instant>,
     /// Local models that have come.
     models: usize,
+    /// The bases have come that the session begins with.
+    is_ready: bool,
     refused: u64,
 }
 
@@ -44,6 +46,7 @@ impl Inbox {
             }
         };
         held.heard = Some(Instant::now());
+        held.is_ready |= Message::is_ready(message);
         if held.messages.len() < MOST_MESSAGES && held.bytes + message.len() <= MOST_BYTES {
             held.models += usize::from(lane == Lane::Models);
             held.bytes += message.len();
@@ -63,6 +66,11 @@ impl Inbox {
     /// Local models that have come.
     pub(crate) fn models(&self) -> usize {
         self.held().models
+    }
+
+    /// True if the bases have come that the session begins with.
+    pub(crate) fn is_ready(&self) -> bool {
+        self.held().is_ready
     }
 
     /// How long ago the last message came; `None` before the first.

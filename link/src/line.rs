@@ -2,8 +2,8 @@
 //!
 //! Over TCP whatever comes after a lost packet waits for it to come again, for a round trip and more. So there are several lines, each over
 //! a connection of its own as soon as that is there. Local models, of which hardly one is without a loss, go by all of them, and the first to
-//! arrive is taken. Of the rest each message goes by one line, and those that go by the others do not wait for it; tool ticks, which repeat the
-//! last ones, are there in time whichever line is held up.
+//! arrive is taken. Of the rest each message goes by one line, and those that go by the others do not wait for it: bases, which are long, all by the
+//! last one. Tool ticks, which repeat the last ones, are there in time whichever line is held up.
 
 use std::sync::Arc;
 
@@ -79,9 +79,15 @@ impl Lines {
             self.lines.iter().for_each(|line| line.outbox.put(lane, message.clone()));
             return;
         }
-        // By chance: in turn, those of one of three tools would all go by the same line.
-        self.sent += 1;
-        self.lines[(uniform(0, self.sent) * self.lines.len() as f64) as usize].outbox.put(lane, message);
+        let line = if lane == Lane::Bulk {
+            // By one: a model waits behind what is long.
+            self.lines.last()
+        } else {
+            // By chance: in turn, those of one of three tools would all go by the same line.
+            self.sent += 1;
+            self.lines.get((uniform(0, self.sent) * self.lines.len() as f64) as usize)
+        };
+        line.into_iter().for_each(|line| line.outbox.put(lane, message.clone()));
     }
 }
 

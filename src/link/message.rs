@@ -22,7 +22,7 @@ use crate::runtime::Nanos;
 
 const MAGIC: [u8; 4] = *b"plnk";
 /// The version of the format: of another one nothing is read.
-pub const VERSION: u16 = 6;
+pub const VERSION: u16 = 7;
 /// No message is longer (bytes).
 pub const LARGEST: usize = 1 << 25;
 
@@ -72,6 +72,8 @@ pub enum Message {
         /// The surroundings.
         basis: Box<Basis>,
     },
+    /// To the haptic side, after the bases that it begins with: they are all there.
+    Ready,
     /// To the global side, again and again: what is there and what is wanted.
     Wants {
         /// The bases that are there, by their keys.
@@ -110,8 +112,9 @@ const WANTS: u16 = 4;
 const PING: u16 = 5;
 const PONG: u16 = 6;
 const SURFACE: u16 = 7;
+const READY: u16 = 8;
 /// A [`Hello`](super::Hello), which is none of the messages of a session.
-pub(super) const HELLO: u16 = 8;
+pub(super) const HELLO: u16 = 9;
 
 /// Why a message is not believed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,7 +171,7 @@ impl Message {
                 to.f64(stiffness.factor());
                 to.list(places, |to, place| place.iter().for_each(|&coordinate| to.f32(coordinate)));
             }
-            Self::Ping => {}
+            Self::Ping | Self::Ready => {}
             Self::Pong { sent, received } => {
                 to.u64(sent.0);
                 to.u64(received.0);
@@ -190,6 +193,7 @@ impl Message {
             Self::Basis { .. } => BASIS,
             Self::Wants { .. } => WANTS,
             Self::Surface { .. } => SURFACE,
+            Self::Ready => READY,
             Self::Ping => PING,
             Self::Pong { .. } => PONG,
         }
@@ -201,7 +205,7 @@ impl Message {
     /// If it is none of this version, to the last byte.
     pub fn read(bytes: &[u8]) -> Result<(Header, Self), Refused> {
         let (kind, mut from) = read_kind(bytes)?;
-        if !(TICKS..=SURFACE).contains(&kind) {
+        if !(TICKS..=READY).contains(&kind) {
             return Err(Refused::Kind(kind));
         }
         Self::read_body(kind, &mut from).filter(|_| from.0.is_empty()).ok_or(Refused::Malformed)
@@ -216,11 +220,16 @@ impl Message {
         let lane = match kind {
             TICKS | WANTS | PING | PONG => Lane::Urgent,
             MODELS => Lane::Models,
-            BASIS => Lane::Bulk,
+            BASIS | READY => Lane::Bulk,
             SURFACE => Lane::Pictures,
             _ => return Err(Refused::Kind(kind)),
         };
         Ok((lane, read_header(&mut from).ok_or(Refused::Malformed)?))
+    }
+
+    /// True if bytes that are not damaged are the message that the bases are there which a session begins with.
+    pub fn is_ready(bytes: &[u8]) -> bool {
+        read_kind(bytes).is_ok_and(|(kind, _)| kind == READY)
     }
 
     fn read_body(kind: u16, from: &mut BytesReader<'_>) -> Option<(Header, Self)> {
@@ -251,6 +260,7 @@ impl Message {
                 Self::Wants { held, friction, stiffness, is_watched }
             }
             PING => Self::Ping,
+            READY => Self::Ready,
             PONG => Self::Pong { sent: Nanos(from.u64()?), received: Nanos(from.u64()?) },
             _ => {
                 let (time, stiffness) = (Nanos(from.u64()?), Stiffness::times(from.f64()?)?);
@@ -342,7 +352,7 @@ mod tests {
         Shipment::of(&LocalModels::new(1, || template.departing()))
     }
 
-    fn some() -> [Message; 6] {
+    fn some() -> [Message; 7] {
         let ticks = (1..9).map(|tick| (tick, Pose::at(Vec3::new(tick as f64, -0.0, 1e-300)))).collect();
         [
             Message::Ticks { tool: 1, ticks },
@@ -354,6 +364,7 @@ mod tests {
             },
             Message::Surface { time: Nanos(3), stiffness: Stiffness::default(), places: vec![[1.0, -0.0, 1e-30]; 3] },
             Message::Ping,
+            Message::Ready,
             Message::Pong { sent: Nanos(1), received: Nanos(2) },
             Message::Models(shipment()),
         ]

@@ -162,14 +162,16 @@ impl GlobalBridge {
     /// Sends the bases that the machines lack, with `most` on their way at a time, and passes on what they have.
     fn send_bases(&mut self, ctx: &TickContext, most: usize) {
         let Self { machines, models, bases, are_bases_due, .. } = self;
-        let Some(bases) = bases else { return };
-        let are_told = bases.take(ctx);
-        if std::mem::take(are_bases_due) || are_told {
-            for machine in machines.iter_mut() {
-                machine.send_bases(models.get(), &bases.made, most, ctx.scheduled);
+        if let Some(bases) = bases {
+            let are_told = bases.take(ctx);
+            if std::mem::take(are_bases_due) || are_told {
+                for machine in machines.iter_mut() {
+                    machine.send_bases(models.get(), &bases.made, most, ctx.scheduled);
+                }
+                bases.pass(ctx, machines, are_told);
             }
-            bases.pass(ctx, machines, are_told);
         }
+        machines.iter_mut().for_each(|machine| machine.say_ready(ctx.scheduled));
     }
 
     fn send_models(&mut self, ctx: &TickContext) {
@@ -215,6 +217,7 @@ impl GlobalBridge {
         let Self { machines, tools, settings, are_bases_due, .. } = self;
         for machine in machines {
             if machine.is_another() {
+                *are_bases_due = true;
                 machine.tools.iter().for_each(|&tool| tools[tool].is_put = true);
             }
             for _ in 0..MOST_MESSAGES {
@@ -238,6 +241,7 @@ impl GlobalBridge {
                     Message::Ticks { .. }
                     | Message::Models(_)
                     | Message::Basis { .. }
+                    | Message::Ready
                     | Message::Pong { .. }
                     | Message::Surface { .. } => {}
                 }

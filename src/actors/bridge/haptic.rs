@@ -259,8 +259,8 @@ impl HapticBridge {
                         other.hear(&ticks);
                     }
                 }
-                // Of the other direction.
-                Message::Wants { .. } | Message::Ping => {}
+                // Heard before the session began, or of the other direction.
+                Message::Ready | Message::Wants { .. } | Message::Ping => {}
             }
         }
     }

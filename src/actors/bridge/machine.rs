@@ -21,6 +21,8 @@ pub(super) struct Machine {
     pub(super) tools: Vec<usize>,
     pub(super) numbering: Numbering,
     pub(super) bases: SentBases,
+    /// It was told that the bases are there that it begins with.
+    is_ready: bool,
     /// There is no other machine.
     is_alone: bool,
     /// What it wants friction and stiffness to be, and what one that has changed nothing wants.
@@ -45,13 +47,14 @@ impl Machine {
         let mut post = Post::new(transport);
         let Settings { friction, stiffness, .. } = settings.value();
         let (peer, wanted) = (post.peer(), (friction, stiffness));
-        let (bases, said, is_warned, is_watched, heard, newest) = Default::default();
+        let (bases, is_ready, said, is_warned, is_watched, heard, newest) = Default::default();
         let numbering = Numbering::new(is_alone);
         Self {
             post,
             tools,
             numbering,
             bases,
+            is_ready,
             is_alone,
             wanted,
             unchanged: wanted,
@@ -71,7 +74,7 @@ impl Machine {
         if is_another {
             self.post.begin_epoch(FIRST_EPOCH);
             self.numbering.begin_anew();
-            self.bases = SentBases::default();
+            (self.bases, self.is_ready) = (SentBases::default(), false);
             (self.wanted, self.said, self.is_watched, self.newest) = (self.unchanged, 0, false, 0);
         }
         is_another
@@ -92,6 +95,13 @@ impl Machine {
     pub(super) fn send_bases(&mut self, models: &LocalModels, made: &Bases, most: usize, now: Nanos) {
         let serves_it = |parcel: &&Parcel| self.tools.iter().any(|&tool| models.hosts()[tool] == parcel.tool());
         self.bases.send(&mut self.post, models.parcels().filter(serves_it), made, most, now);
+    }
+
+    /// Tells it once that the bases are there that were sent so far: its session begins then.
+    pub(super) fn say_ready(&mut self, now: Nanos) {
+        if !std::mem::replace(&mut self.is_ready, true) {
+            self.post.send(Lane::Bulk, now, &Message::Ready);
+        }
     }
 
     /// True if it lacks the basis of that name. One that has fallen silent lacks nothing, unless it is the only one.

@@ -30,7 +30,7 @@ impl Prepared {
     /// Local models look ahead for results that are `round_trip` later than without a link.
     pub(in crate::session) fn look_ahead(&mut self, round_trip: Nanos) {
         let timing = &mut self.plan.timing;
-        let ticks = link::real_lateness(round_trip).as_secs_f64() * timing.haptic.as_hz();
+        let ticks = link::real_lateness(round_trip, timing.global).as_secs_f64() * timing.haptic.as_hz();
         timing.horizon = timing.horizon.saturating_add(ticks.ceil() as u32);
     }
 

@@ -29,19 +29,24 @@ pub(super) fn conditions(spec: &LinkSpec) -> Conditions {
 }
 
 /// How late the results are that come over it, beside what makes them late without: the tool's samples take one way, the models the
-/// other, and a bridge passes on at its next tick what comes between two. Where packets are lost, a model of many of them comes a
-/// round trip later as a rule, and the one before has to serve for so long.
-pub(super) fn lateness(spec: Option<&LinkSpec>, haptic: Rate, own: Nanos) -> Nanos {
+/// other, and a bridge passes on at its next tick what comes between two.
+pub(super) fn lateness(spec: Option<&LinkSpec>, [haptic, global]: [Rate; 2], own: Nanos) -> Nanos {
     let Some(spec) = spec else { return own };
-    let round_trips = if spec.loss > 0.0 { 2.0 } else { 1.0 };
-    let ways = Nanos::from_secs_f64(1e-3 * (round_trips * 2.0 * spec.delay_ms + spec.jitter_ms));
-    (own + ways + haptic.period()).min(OLDEST.max(own))
+    let round_trip = Nanos::from_secs_f64(1e-3 * 2.0 * spec.delay_ms);
+    let repeats = if spec.loss > 0.0 { repeats(round_trip, global) } else { Nanos::ZERO };
+    let jitter = Nanos::from_secs_f64(1e-3 * spec.jitter_ms);
+    (own + round_trip + jitter + repeats + haptic.period()).min(OLDEST.max(own))
 }
 
-/// How late results are over a real link, beside what makes them late without: what is lost on the way comes a round trip later, and
-/// nobody knows beforehand whether something will be.
-pub(super) fn real_lateness(round_trip: Nanos) -> Nanos {
-    Nanos(round_trip.0.saturating_mul(2)).min(OLDEST)
+/// How late results are over a real link, beside what makes them late without: nobody knows beforehand whether something will be lost.
+pub(super) fn real_lateness(round_trip: Nanos, global: Rate) -> Nanos {
+    (round_trip + repeats(round_trip, global)).min(OLDEST)
+}
+
+/// How much later they are where packets are lost: a model of many of them comes a round trip later as a rule, and some so late that the
+/// one before has to serve for another period.
+fn repeats(round_trip: Nanos, global: Rate) -> Nanos {
+    round_trip + global.period()
 }
 
 /// The group of the bridges: they pass on every tick, and nobody waits for them.

@@ -135,7 +135,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let steps = f64::from(start.substeps) / f64::from(scene.global.ticks_per_step);
     let work = Nanos::from_secs_f64(start.body.nominal_evaluation() * steps);
     let lateness = timing::lateness(&global, rates[0], work, options.in_real_time);
-    let lateness = link::lateness(scene.link.as_ref(), rates[0], lateness);
+    let lateness = link::lateness(scene.link.as_ref(), rates, lateness);
     link::check(scene.link.as_ref(), &*start.body)?;
     let timing = Timing::new(rates, [start.substeps, scene.global.ticks_per_step], lateness, blend_ticks);
 
