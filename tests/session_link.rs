@@ -6,9 +6,8 @@ use std::time::Duration;
 
 use palpate::log::{ForceSample, ServedBy};
 use palpate::model::Vec3;
-use palpate::model::body::{Block, Body};
+use palpate::model::body::Body;
 use palpate::model::local::{Feedback, Kind};
-use palpate::model::mesh::Face;
 use palpate::runtime::{Nanos, RateGroup};
 use palpate::scene::{LinkSpec, Scene};
 use palpate::session::{Session, SessionBuilder, Summary};
@@ -107,11 +106,9 @@ fn predictive_keeps_its_force_over_a_bad_link_where_the_others_lose_it() {
 /// A basis is larger than the models that need it, and where packets are lost it comes later than they do.
 #[test]
 fn no_model_comes_without_the_basis_that_it_was_made_for() {
-    let sheet = Block::builder([14, 14, 3], [0.13, 0.13, 0.02]).node_mass(0.8e-3).stiffness(200.0).damping_ratio(0.4);
-    let sheet = sheet.fix(Face::XMin).fix(Face::XMax).build().unwrap();
     let across = |t: f64| [0.065 + 0.04 * (3.0 * t).sin(), 0.065 + 0.03 * (2.0 * t).sin(), 0.019];
     let session = || {
-        let session = Session::builder(sheet.clone()).path(sampled(across)).model(Kind::Predictive);
+        let session = Session::builder(sheet()).path(sampled(across)).model(Kind::Predictive);
         session.virtual_time().keep_records()
     };
     let without = |summary: &Summary| {

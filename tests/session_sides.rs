@@ -44,6 +44,26 @@ fn two_sides_make_the_force_of_one() {
     }
 }
 
+/// Check that a haptic side that waits for it begins with models and their bases.
+#[test]
+fn a_session_is_said_to_be_ready_once_after_its_first_models_and_bases() {
+    for (model, has_bases) in [(Kind::Predictive, true), (Kind::Hold, false)] {
+        let (line, global) = (Line::default(), session(model).build_global().unwrap());
+        let start = pressing().pose_at(0.0);
+        let hello = Hello { tools: vec![(String::new(), Some(start))], ..global.hello().clone() };
+        let global = global.start(vec![(Box::new(line.end(1)), hello)]).unwrap();
+        global.wait_for(Duration::from_millis(200));
+        global.stop();
+        let sent = line.ways[1].lock().unwrap();
+        let sent: Vec<Message> = sent.iter().map(|bytes| Message::read(bytes).unwrap().1).collect();
+        let ready = sent.iter().position(|message| matches!(message, Message::Ready)).expect("it is said");
+        assert_eq!(sent.iter().filter(|message| matches!(message, Message::Ready)).count(), 1, "{model:?}");
+        assert!(sent[..ready].iter().any(|message| matches!(message, Message::Models(_))), "{model:?}");
+        let knows_bases = sent[..ready].iter().any(|message| matches!(message, Message::Basis { .. }));
+        assert_eq!(knows_bases, has_bases, "{model:?}");
+    }
+}
+
 /// Check that the force is gone when the global side is, and comes back with another process that begins from the body at rest.
 #[test]
 fn a_global_side_that_dies_takes_the_force_away_and_another_one_gives_it_back() {

@@ -227,7 +227,7 @@ impl Message {
         Ok((lane, read_header(&mut from).ok_or(Refused::Malformed)?))
     }
 
-    /// True if bytes that are not damaged are the message that the bases are there which a session begins with.
+    /// True if these bytes are the message [`Ready`](Self::Ready), as far as their beginning tells.
     pub fn is_ready(bytes: &[u8]) -> bool {
         read_kind(bytes).is_ok_and(|(kind, _)| kind == READY)
     }

@@ -26,6 +26,18 @@ pub fn block() -> Block {
         .unwrap()
 }
 
+/// A slender one, with room for many windows.
+pub fn sheet() -> Block {
+    Block::builder([14, 14, 3], [0.13, 0.13, 0.02])
+        .node_mass(0.8e-3)
+        .stiffness(200.0)
+        .damping_ratio(0.4)
+        .fix(Face::XMin)
+        .fix(Face::XMax)
+        .build()
+        .unwrap()
+}
+
 /// A node in the middle of the top.
 pub fn top() -> u32 {
     block().lattice().id([3, 3, 5])

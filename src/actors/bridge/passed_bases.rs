@@ -37,7 +37,7 @@ impl PassedBases {
     pub(super) fn take(&mut self, ctx: &TickContext) -> bool {
         let has_news = self.ports.made.refresh(ctx);
         if has_news {
-            self.ports.made.get().iter().for_each(|basis| self.made.insert(basis.clone()));
+            self.made.clone_from(self.ports.made.get());
         }
         has_news
     }
@@ -47,7 +47,10 @@ impl PassedBases {
         let Self { ports, made, passed } = self;
         let before = passed.len();
         for basis in made.iter() {
-            let is_there = || machines.iter().all(|machine| !machine.lacks(key_of(basis.patch()), ctx.scheduled));
+            let is_there = || {
+                let key = key_of(basis.patch());
+                !machines.iter().any(|machine| machine.lacks(key, ctx.scheduled))
+            };
             if passed.get(basis.patch()).is_none() && is_there() {
                 passed.insert(basis.clone());
             }
