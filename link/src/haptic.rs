@@ -59,7 +59,7 @@ impl GlobalSide {
         let (mut connection, mut is_told, mut is_welcome) = (None::<Connection>, false, false);
         // While others are waited for, the time of the first model does not run.
         let (mut began, mut others, mut first) = (Instant::now(), None::<Instant>, None::<Instant>);
-        while first.map_or(began.elapsed() < FIRST_MODEL, |first| first.elapsed() < 2 * FIRST_BASES) {
+        while first.unwrap_or(began).elapsed() < FIRST_MODEL {
             if !is_told && began.elapsed() > TELLS_AFTER {
                 is_told = true;
                 tracing::warn!("waiting for the global side at {}, up to {} s", self.address, FIRST_MODEL.as_secs());
@@ -95,6 +95,8 @@ impl GlobalSide {
                 }
                 Some(Answer::Wait | Answer::Taken(_)) => {}
                 Some(Answer::No(why)) => return Err(self.error(format!("refuses: {why}"))),
+                // What is on its way behind a lot else is waited for.
+                None if inbox.models() > 0 => {}
                 None => connection = None,
             }
             let looked = Instant::now();

@@ -80,7 +80,7 @@ impl Lines {
             return;
         }
         let line = if lane == Lane::Bulk {
-            // By one: a model waits behind what is long.
+            // All by one: what is long holds up the models behind it.
             self.lines.last()
         } else {
             // By chance: in turn, those of one of three tools would all go by the same line.

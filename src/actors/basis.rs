@@ -129,7 +129,7 @@ impl BasisActor {
         for patch in self.ports.wishes.get().patches.clone() {
             let is_made = self.made.iter().any(|(_, (made, _))| *made == patch);
             let is_there = self.bases.get(&patch).is_some();
-            // A global model that was started again wants what is there already.
+            // A global model that was started again wants what is there already, and so does one that gets it over a bridge later.
             has_forgotten |= is_there;
             if is_made || is_there || self.hopeless.contains(&patch) {
                 continue;

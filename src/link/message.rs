@@ -72,7 +72,7 @@ pub enum Message {
         /// The surroundings.
         basis: Box<Basis>,
     },
-    /// To the haptic side, after the bases that it begins with: they are all there.
+    /// To the haptic side, behind the bases that were made before the session: unless one was lost they are there, and it may begin.
     Ready,
     /// To the global side, again and again: what is there and what is wanted.
     Wants {

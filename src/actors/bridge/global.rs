@@ -33,7 +33,7 @@ pub struct GlobalBridge {
     models: Reader<LocalModels>,
     /// None where local models take no bases.
     bases: Option<PassedBases>,
-    /// A machine may lack others than before.
+    /// What is sent and passed on is to be looked at again: a machine may lack others than before.
     are_bases_due: bool,
     tools: Vec<Onward>,
     settings: Tunable,

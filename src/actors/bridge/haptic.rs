@@ -40,8 +40,9 @@ pub struct HapticBridge {
     arrived: Option<Shipment>,
     image: Image,
     bases: Bases,
-    /// Their keys, the oldest first, and whether the newest have been told.
+    /// Their keys, those that came last at the end.
     held: Vec<u64>,
+    /// The global side has been told of the last.
     is_held_told: bool,
     clock: Clock,
     /// When something of this epoch came last; `None` before.
@@ -199,21 +200,23 @@ impl HapticBridge {
         }
     }
 
+    /// Says what is there and what is wanted, at once if that is news, and asks for the time.
     fn ask(&mut self, ctx: &TickContext) {
         let now = ctx.scheduled;
-        self.settings.refresh(ctx);
+        let has_changed = self.settings.refresh(ctx);
+        let has_arrived = !std::mem::replace(&mut self.is_held_told, true);
         self.surfaces.look(now);
         let is_due = self.asked.is_none_or(|asked| now.saturating_sub(asked) >= ASKS_EVERY);
-        if is_due || !std::mem::replace(&mut self.is_held_told, true) {
-            let held = self.held.iter().rev().copied().collect();
-            let Settings { friction, stiffness, .. } = self.settings.get();
-            let is_watched = self.surfaces.are_watched(now);
-            self.post.send(Lane::Urgent, now, &Message::Wants { held, friction, stiffness, is_watched });
-        }
         if is_due {
             self.asked = Some(now);
             self.post.send(Lane::Urgent, now, &Message::Ping);
             self.record(now);
+        }
+        if is_due || has_changed || has_arrived {
+            let held = self.held.iter().rev().copied().collect();
+            let Settings { friction, stiffness, .. } = self.settings.get();
+            let is_watched = self.surfaces.are_watched(now);
+            self.post.send(Lane::Urgent, now, &Message::Wants { held, friction, stiffness, is_watched });
         }
     }
 
@@ -283,12 +286,16 @@ impl HapticBridge {
         self.others().for_each(|(_, other)| other.show(ctx.tick + 1));
     }
 
+    /// Keeps a basis. One that comes again was not known to be here: it is told again.
     fn keep(&mut self, key: u64, basis: Basis) {
-        let is_new = self.bases.get(basis.patch()).is_none();
-        if is_new && key == key_of(basis.patch()) && self.image.has_room_for(&basis) {
+        if key != key_of(basis.patch()) || !self.image.has_room_for(&basis) {
+            return;
+        }
+        self.held.retain(|held| *held != key);
+        self.held.push(key);
+        self.is_held_told = false;
+        if self.bases.get(basis.patch()).is_none() {
             self.bases.insert(basis.into());
-            self.held.push(key);
-            self.is_held_told = false;
         }
     }
 

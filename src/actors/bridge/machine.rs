@@ -1,5 +1,7 @@
 //! A haptic machine, as the global side knows it.
 
+use std::sync::Arc;
+
 use super::numbering::Numbering;
 use super::post::Post;
 use super::sent_bases::SentBases;
@@ -10,7 +12,7 @@ use crate::link::{Header, Lane, Message, Transport};
 use crate::model::body::Stiffness;
 use crate::model::contact::Friction;
 use crate::model::local::{LocalModels, Parcel, Shipment};
-use crate::model::surroundings::Bases;
+use crate::model::surroundings::Basis;
 use crate::runtime::Nanos;
 
 /// A haptic machine and the tools whose devices are there.
@@ -92,12 +94,12 @@ impl Machine {
     }
 
     /// Sends what it lacks of the bases that were `made`, those first that local models of its tools need; `most` are on their way at a time.
-    pub(super) fn send_bases(&mut self, models: &LocalModels, made: &Bases, most: usize, now: Nanos) {
+    pub(super) fn send_bases(&mut self, models: &LocalModels, made: &[Arc<Basis>], most: usize, now: Nanos) {
         let serves_it = |parcel: &&Parcel| self.tools.iter().any(|&tool| models.hosts()[tool] == parcel.tool());
         self.bases.send(&mut self.post, models.parcels().filter(serves_it), made, most, now);
     }
 
-    /// Tells it once that the bases are there that were sent so far: its session begins then.
+    /// Tells it once, behind the bases that were sent so far, that its session may begin.
     pub(super) fn say_ready(&mut self, now: Nanos) {
         if !std::mem::replace(&mut self.is_ready, true) {
             self.post.send(Lane::Bulk, now, &Message::Ready);

@@ -4,16 +4,18 @@
 //! local --ToolTick--> haptic bridge ~~ticks~~> global bridge --ToolTick--> global
 //!       <--model-----               <~models~~               <--model-----
 //!                                   <~bases~~~               <--bases----- basis
-//!                                   ~~wants~~>               ---bases-----> global
+//!                                   ~~wants~~>               --bases-----> global
 //! program --Settings-->             ~~wants~~>               --Settings-->
 //!         <--SurfaceView--          <~~surface~~             <--SurfaceView--
 //! ```
 //!
 //! There may be several haptic bridges, each at a machine with some of the devices: the global bridge tells each of them where the tools of
 //! the others are. What they carry is made and taken here, off the real-time threads: the local actor has the same ports as without them and
-//! cannot tell the difference. Each connection is an *epoch*. Its number stands in every message; the haptic side begins a new one when it
-//! has heard nothing for [`SILENCE`], which by default is longer than a force lasts without a model, and the global side follows. What belongs
-//! to an older epoch is dropped, on both sides.
+//! cannot tell the difference. A basis comes to the global actor when the haptic machines have it.
+//!
+//! Each connection is an *epoch*. Its number stands in every message; the haptic side begins a new one when it has heard nothing for
+//! [`SILENCE`], which by default is longer than a force lasts without a model, and the global side follows. What belongs to an older epoch is
+//! dropped, on both sides.
 
 mod global;
 mod haptic;

@@ -1,8 +1,10 @@
 //! The bases on their way from the basis actor to the global one: what the haptic machines lack is not there yet.
 
+use std::sync::Arc;
+
 use super::key_of;
 use super::machine::Machine;
-use crate::model::surroundings::Bases;
+use crate::model::surroundings::{Bases, Basis};
 use crate::runtime::{Reader, TickContext, Writer};
 
 /// The way of the bases from their maker to the global actor.
@@ -12,7 +14,7 @@ pub struct BasesPorts {
     pub made: Reader<Bases>,
     /// Those that local models may be built with.
     pub passed: Writer<Bases>,
-    /// Those that are there before the start, on this side.
+    /// Those that are there before the start.
     pub known: Bases,
 }
 
@@ -21,23 +23,25 @@ pub struct BasesPorts {
 #[derive(Debug)]
 pub(super) struct PassedBases {
     ports: BasesPorts,
-    /// All that there are.
-    pub(super) made: Bases,
+    /// All that there are, in the order in which they came: the first were wanted first.
+    pub(super) made: Vec<Arc<Basis>>,
     passed: Bases,
 }
 
 impl PassedBases {
     pub(super) fn new(ports: BasesPorts) -> Self {
         // The first ones are sent before the session begins, and the global actor has them.
-        let (made, passed) = (ports.known.clone(), ports.known.clone());
+        let (made, passed) = (ports.known.iter().cloned().collect(), ports.known.clone());
         Self { ports, made, passed }
     }
 
-    /// Takes what has been made; true if something has, or if it is to be told again.
+    /// Takes what has been made; true if something has, or if the same has been published again.
     pub(super) fn take(&mut self, ctx: &TickContext) -> bool {
         let has_news = self.ports.made.refresh(ctx);
         if has_news {
-            self.made.clone_from(self.ports.made.get());
+            let is_new = |basis: &&Arc<Basis>| !self.made.iter().any(|known| Arc::ptr_eq(known, basis));
+            let new: Vec<_> = self.ports.made.get().iter().filter(is_new).cloned().collect();
+            self.made.extend(new);
         }
         has_news
     }

@@ -1,12 +1,13 @@
 //! Which bases a haptic machine has, and which are on their way to it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::key_of;
 use super::post::Post;
 use crate::link::{Lane, Message};
 use crate::model::local::Parcel;
-use crate::model::surroundings::Bases;
+use crate::model::surroundings::Basis;
 use crate::runtime::Nanos;
 
 /// A basis that is not there after so long in which no other came is sent again: a slow line is no reason to send more.
@@ -14,30 +15,34 @@ const SENT_AGAIN: Nanos = Nanos(3_000_000_000);
 /// Bases that are on their way at the same time while a session runs: more would wait for one another, and the first ones are wanted first.
 pub(super) const MOST_ON_THE_WAY: usize = 4;
 
+/// A machine that says that it has more is not believed.
+const MOST_HELD: usize = 1 << 16;
+
 /// What a haptic machine has.
 #[derive(Debug, Default)]
 pub(super) struct SentBases {
     /// When each was sent.
     on_the_way: BTreeMap<u64, Nanos>,
-    /// When it said so of the last.
-    last: Nanos,
+    /// When it last told of a new one; none before it has told anything.
+    told: Option<Nanos>,
     /// What it has said that it has, by key.
     held: BTreeSet<u64>,
 }
 
 impl SentBases {
-    /// Sends what the machine lacks of the bases that were `made`, those first that `parcels` need; `most` are on their way at a time.
+    /// Sends what the machine lacks of the bases that were `made`, in that order, but those first that `parcels` need; `most` are on their
+    /// way at a time.
     pub(super) fn send<'a>(
         &mut self,
         post: &mut Post,
         parcels: impl Iterator<Item = &'a Parcel>,
-        made: &Bases,
+        made: &[Arc<Basis>],
         most: usize,
         now: Nanos,
     ) {
         self.give_up_late(now);
         let needed = parcels.filter_map(|parcel| parcel.bases().get(parcel.patch()?));
-        for basis in needed.chain(made.iter()) {
+        for basis in needed.chain(made) {
             let key = key_of(basis.patch());
             if self.begin(key, most, now) {
                 post.send_with(Lane::Bulk, now, |header, bytes| Message::write_basis(key, basis, header, bytes));
@@ -48,10 +53,11 @@ impl SentBases {
     /// The machine says that it has the bases of these `keys`; true if it has not said so of all of them before.
     pub(super) fn arrived(&mut self, keys: impl IntoIterator<Item = u64>, now: Nanos) -> bool {
         let before = self.held.len();
-        self.held.extend(keys);
+        let room = MOST_HELD.saturating_sub(before);
+        self.held.extend(keys.into_iter().take(room));
         let is_news = self.held.len() > before;
-        if is_news {
-            self.last = now;
+        if is_news || self.told.is_none() {
+            self.told = Some(now);
         }
         is_news
     }
@@ -63,8 +69,9 @@ impl SentBases {
 
     /// What has arrived is on its way no longer, nor what has not for so long that it must be lost.
     fn give_up_late(&mut self, now: Nanos) {
-        let Self { on_the_way, last, held } = self;
-        on_the_way.retain(|key, sent| !held.contains(key) && now.saturating_sub(*last.max(sent)) < SENT_AGAIN);
+        let Self { on_the_way, told, held } = self;
+        let is_late = |sent: Nanos| told.is_some_and(|told| now.saturating_sub(told.max(sent)) >= SENT_AGAIN);
+        on_the_way.retain(|key, sent| !held.contains(key) && !is_late(*sent));
     }
 
     /// True if the basis of that name is to be sent now, with `most` on their way: from then on it is.
@@ -109,9 +116,18 @@ mod tests {
     #[test]
     fn a_basis_that_is_lost_is_sent_again_and_no_other() {
         let again = 91; // the first period 3 s after the first
-        assert_eq!(sent(&mut SentBases::default(), 2), [(0, 0), (0, 1), (again, 0), (again, 1)]);
-        let mut holding = SentBases { held: [0].into(), ..SentBases::default() };
-        assert_eq!(sent(&mut holding, 2), [(0, 1), (again, 1)]);
+        let holding = |held: &[u64]| {
+            let mut bases = SentBases::default();
+            bases.arrived(held.iter().copied(), Nanos::ZERO);
+            bases
+        };
+        assert_eq!(sent(&mut holding(&[]), 2), [(0, 0), (0, 1), (again, 0), (again, 1)]);
+        assert_eq!(sent(&mut holding(&[0]), 2), [(0, 1), (again, 1)]);
+        assert_eq!(
+            sent(&mut SentBases::default(), 2),
+            [(0, 0), (0, 1)],
+            "one that has told nothing does not listen yet"
+        );
     }
 
     #[test]
