@@ -87,7 +87,9 @@ impl Lines {
             self.sent += 1;
             self.lines.get((uniform(0, self.sent) * self.lines.len() as f64) as usize)
         };
-        line.into_iter().for_each(|line| line.outbox.put(lane, message.clone()));
+        if let Some(line) = line {
+            line.outbox.put(lane, message);
+        }
     }
 }
 

@@ -16,7 +16,7 @@ const SENT_AGAIN: Nanos = Nanos(3_000_000_000);
 pub(super) const MOST_ON_THE_WAY: usize = 4;
 
 /// A machine that says that it has more is not believed.
-const MOST_HELD: usize = 1 << 16;
+const MOST_BELIEVED: usize = 1 << 16;
 
 /// What a haptic machine has.
 #[derive(Debug, Default)]
@@ -53,7 +53,7 @@ impl SentBases {
     /// The machine says that it has the bases of these `keys`; true if it has not said so of all of them before.
     pub(super) fn arrived(&mut self, keys: impl IntoIterator<Item = u64>, now: Nanos) -> bool {
         let before = self.held.len();
-        let room = MOST_HELD.saturating_sub(before);
+        let room = MOST_BELIEVED.saturating_sub(before);
         self.held.extend(keys.into_iter().take(room));
         let is_news = self.held.len() > before;
         if is_news || self.told.is_none() {
