@@ -6,7 +6,7 @@ use std::path::Path;
 use palpate::Session;
 use palpate::devices::ToolPath;
 use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::{Scene, ToolSpec};
+use palpate::scene::{BodySpec, Scene, ToolSpec};
 use palpate_cli::compare::{ForceDeviation, ForceTrace};
 
 const IN_TIME: f64 = 0.0;
@@ -156,6 +156,20 @@ fn without_a_basis_the_prediction_alone_serves() {
     let (without, _) = case.error(ONE_PERIOD_MS, |scene| scene.local.basis = Some(0));
     println!("{with:?} with, {without:?} without");
     assert!(with.rms < 0.5 * without.rms && without.rms < 20.0, "{with:?} against {without:?}");
+}
+
+/// A window that holds all of a small body has nothing around it to foretell or to reduce: it is as good as `full`, however late.
+#[test]
+fn a_body_that_fits_in_a_window_is_exact() {
+    let mut scene = scene("scenes/drag_friction.toml");
+    let Some(BodySpec::MassSpring(body)) = &mut scene.body else { panic!("a lattice") };
+    body.block.nodes = [6; 3];
+    scene.run.duration_s = 1.0;
+    let case = Case::of(scene);
+    for periods in [1.0, 2.0] {
+        let (late, _) = case.error(periods * ONE_PERIOD_MS, |_| ());
+        assert!(late.max <= 0.01, "{periods} periods: {late:?}");
+    }
 }
 
 /// Bases that come late are a normal event: the first windows serve as long as they hold where the tool goes.

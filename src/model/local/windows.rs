@@ -27,6 +27,10 @@ const NEIGHBOURS: usize = 7;
 /// Windows whose normals have this cosine between them look the same way.
 const ALIKE: f64 = 0.5;
 
+/// A window takes all of a body that has at most so many nodes more, as a share of its own: nothing is around it then that would have to be
+/// foretold or reduced, which costs a tick as much as those nodes do.
+const REMAINDER: f64 = 2.0;
+
 /// Windows of one size. Lengths in mean edges of the surface.
 struct Layer {
     /// The distance of the middles of neighbours.
@@ -92,6 +96,7 @@ impl Windows {
         let triangles: Vec<Vec3> = corners.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
         let edges = corners.iter().map(|[a, b, c]| (b - a).norm() + (c - b).norm() + (a - c).norm());
         let edge = edges.sum::<f64>() / (3.0 * corners.len().max(1) as f64);
+        let all: Vec<u32> = (0..).zip(body.inverse_masses()).filter(|&(_, &w)| w > 0.0).map(|(node, _)| node).collect();
         let mut windows: Vec<Window> = Vec::new();
         let mut around = Vec::new();
         for Layer { spacing, more, way } in LAYERS {
@@ -119,6 +124,9 @@ impl Windows {
                 }
                 let mut patch = Vec::new();
                 simulation.patch(tool, &around, size, &mut patch);
+                if (all.len() - patch.len()) as f64 <= REMAINDER * patch.len() as f64 {
+                    all.clone_into(&mut patch);
+                }
                 windows.push(Window { middle: *middle, normal, patch, layer: first });
             }
         }
@@ -334,6 +342,20 @@ mod tests {
         let too_far = chosen(&[edge, middle, at(0.061), at(0.079)]);
         let corners = |triangle: u32| simulation.body().surface().triangles[triangle as usize];
         assert!([edge, middle].into_iter().flat_map(corners).all(|node| too_far.contains(&node)));
+    }
+
+    #[test]
+    fn a_window_that_leaves_little_of_the_body_takes_all_of_it() {
+        for (nodes, takes_all) in [([5; 3], true), ([9; 3], false)] {
+            let simulation = simulation(nodes, ToolShape::Point);
+            let movable = simulation.body().inverse_masses().iter().filter(|&&w| w > 0.0).count();
+            let windows = Windows::new(&simulation, 0, SIZE);
+            let widest = windows.widest(top(&simulation)[0], &[]).unwrap().len();
+            assert_eq!(widest == movable, takes_all, "{widest} of {movable}");
+            let left = |window: &Window| movable - window.patch.len();
+            let leaves_much = |window: &Window| left(window) as f64 > REMAINDER * window.patch.len() as f64;
+            assert!(windows.windows.iter().all(|window| left(window) == 0 || leaves_much(window)));
+        }
     }
 
     #[test]

@@ -29,6 +29,11 @@ impl Basis {
         &self.patch
     }
 
+    /// Of a `patch` around which nothing can move.
+    pub(super) fn of_nothing(patch: &[u32]) -> Self {
+        Self { patch: patch.to_vec(), answers: Reduced::of_nothing() }
+    }
+
     /// The same for another `patch` (ids in increasing order) whose surroundings look the same.
     pub(super) fn moved_to(&self, patch: &[u32]) -> Self {
         Self { patch: patch.to_vec(), ..self.clone() }

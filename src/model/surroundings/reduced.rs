@@ -3,6 +3,7 @@
 use super::products::{Columns, Scratch};
 use super::square::{Square, SquareScratch};
 use crate::body::Stiffness;
+use crate::linear_algebra::Matrix;
 
 /// What the velocities do to the states' accelerations.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,9 +17,9 @@ pub(super) enum Damping {
 impl Damping {
     /// Row by row, with the zeros of a diagonal one.
     #[cfg(test)]
-    pub(super) fn to_matrix(&self) -> crate::linear_algebra::Matrix {
+    pub(super) fn to_matrix(&self) -> Matrix {
         match self {
-            Self::Diagonal(damping) => crate::linear_algebra::Matrix::from_diagonal(&damping.clone().into()),
+            Self::Diagonal(damping) => Matrix::from_diagonal(&damping.clone().into()),
             Self::Full(damping) => damping.to_matrix(),
         }
     }
@@ -43,6 +44,12 @@ pub(crate) struct Reduced {
 }
 
 impl Reduced {
+    /// Of a ring without nodes.
+    pub(super) fn of_nothing() -> Self {
+        let shapes = Columns::new(&Matrix::zeros(0, 0));
+        Self { states: 0, shapes, stiffness: Vec::new(), damping: Damping::Diagonal(Vec::new()) }
+    }
+
     pub(crate) fn states(&self) -> usize {
         self.states
     }

@@ -39,7 +39,7 @@ pub struct Reduction {
 
 #[derive(Debug)]
 enum Stage {
-    /// A window that looks the same has had its basis made.
+    /// Nothing is around the window, or another that looks the same has had its basis made.
     Known(Basis),
     Factorise,
     /// So many moments are there; `last` is the right-hand side of the next.
@@ -57,8 +57,8 @@ enum Stage {
 }
 
 impl Reduction {
-    /// Begins the basis of the surroundings of `patch` (ids in increasing order), with at most so many states; `None` if nothing around
-    /// the patch can move.
+    /// Begins the basis of the surroundings of `patch` (ids in increasing order), with at most so many states; `None` if that is none, or
+    /// the body has no restriction. A patch around which nothing can move has a basis that is there at once, of no states.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -67,18 +67,22 @@ impl Reduction {
         let (body, local) = (around.as_ref().unwrap_or(whole), local.as_deref().unwrap_or(patch));
         let restriction = body.restriction(local)?;
         let ring: Vec<u32> = restriction.ring(patch.len()).to_vec();
-        let can_move = !ring.is_empty() && states > 0;
-        if !can_move {
+        if states == 0 {
             return None;
         }
         let likeness = around.as_ref().map(|around| around.likeness(local, states));
         let known = likeness.and_then(|likeness| whole.alike(likeness));
+        let stage = match known {
+            _ if ring.is_empty() => Stage::Known(Basis::of_nothing(patch)),
+            Some(basis) => Stage::Known(basis.moved_to(patch)),
+            None => Stage::Factorise,
+        };
         Some(Self {
             patch: patch.to_vec(),
             ring,
             states,
             far: Far::new(body, local, &restriction),
-            stage: known.map_or(Stage::Factorise, |basis| Stage::Known(basis.moved_to(patch))),
+            stage,
             restriction,
             likeness,
             around,
@@ -101,7 +105,8 @@ impl Reduction {
         self.far.unknowns() > LARGE
     }
 
-    /// True for surroundings like others whose basis was [made](Self::advance) or [learnt](Self::learn) before: theirs is that of these.
+    /// True where there is nothing to make: for surroundings like others whose basis was [made](Self::advance) or [learnt](Self::learn)
+    /// before, and where nothing can move.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
@@ -198,8 +203,8 @@ fn append(matrix: &mut Matrix, more: &Matrix) {
 }
 
 impl Basis {
-    /// The basis of the surroundings of `patch` (ids in increasing order), with at most so many states. `None` if nothing around the patch
-    /// can move.
+    /// The basis of the surroundings of `patch` (ids in increasing order), with at most so many states. `None` if that is none, or the body
+    /// has no restriction.
     ///
     /// # Errors
     /// If nothing holds the surroundings together, so that they have no finite answer.
@@ -228,7 +233,9 @@ impl Reduction {
     /// # Real-time
     /// Not real-time safe: factorises the body several times.
     pub fn force_errors(body: &RestingBody, patch: &[u32], most: usize) -> Result<Vec<f64>, ModelError> {
-        let Some(mut reduction) = Self::new(body, patch, most) else { return Ok(Vec::new()) };
+        let Some(mut reduction) = Self::new(body, patch, most).filter(|reduction| !reduction.ring.is_empty()) else {
+            return Ok(Vec::new());
+        };
         // Also of surroundings that look like others.
         reduction.stage = Stage::Factorise;
         loop {
@@ -290,6 +297,21 @@ mod tests {
             // Check that there is more than the ring
             assert!(reduction.far.nodes.len() > 2 * ring, "{size:?}: {} of {ring}", reduction.far.nodes.len());
         }
+    }
+
+    #[test]
+    fn a_patch_around_which_nothing_can_move_has_a_basis_of_no_states_at_once() {
+        let block = Block::builder([3; 3], [0.02; 3]).fix(Face::ZMin).build().unwrap();
+        let patch: Vec<u32> =
+            (0..).zip(block.inverse_masses()).filter(|&(_, &w)| w > 0.0).map(|(node, _)| node).collect();
+        let resting = RestingBody::new(&block).unwrap();
+        assert!(Reduction::new(&resting, &patch, 20).unwrap().is_known());
+        let basis = Basis::compute(&resting, &patch, 20).unwrap().unwrap();
+        assert_eq!((basis.patch(), basis.states()), (&patch[..], 0));
+        assert!(basis.answers.is_of(0) && !basis.answers.is_of(3));
+        assert_eq!(Basis::from_bytes(&basis.to_bytes(1), 1), Some(basis));
+        assert!(Reduction::force_errors(&resting, &patch, 20).unwrap().is_empty());
+        assert!(Reduction::new(&resting, &patch, 0).is_none(), "no states are asked for");
     }
 
     // Check a small body whose patch is all that can move but a corner: what is left hangs on the patch alone.

@@ -69,10 +69,12 @@ fn write(model: &Reduced, to: &mut BytesWriter<'_>) {
 
 fn read(from: &mut BytesReader<'_>) -> Option<Reduced> {
     let (rows, shapes) = (from.u32()? as usize, read_singles(from)?);
-    if rows == 0 || !shapes.len().is_multiple_of(rows) {
+    // Without a ring there are none.
+    if !shapes.len().is_multiple_of(rows) {
         return None;
     }
-    let shapes = Columns::new(&Matrix::from_vec(rows, shapes.len() / rows, shapes));
+    let states = shapes.len().checked_div(rows).unwrap_or(0);
+    let shapes = Columns::new(&Matrix::from_vec(rows, states, shapes));
     let stiffness = read_numbers(from)?;
     let damping = match from.u8()? {
         0 => Damping::Diagonal(read_numbers(from)?),

@@ -103,6 +103,10 @@ impl Predictive {
         let stride = resync.global.stride();
         let steps = resync.horizon.div_ceil(stride) * stepping.substeps + 1;
         path.clear(window.ring, (stepping.step(), stride as usize), steps as usize);
+        if ring.is_empty() {
+            // The patch is all that can move.
+            return;
+        }
         if let Some(told) = resync.global.told() {
             if !path.take(&told.path) {
                 // Another path than this body's. From the next model on the ring moves again.
