@@ -6,8 +6,8 @@
 PALPATE is the command with the feature `link`. Needs root, iproute2 and /dev/net/tun. What is between the namespaces is a relay of IP
 packets in this program: netem is not in every kernel, and here chance has a seed. For each condition it prints the error of the force (rms,
 % of the peak of `full` in virtual time) and the largest change of the force in one tick beyond that of `full`, over the real link and over
-the virtual one, as a row of a table in Markdown. Over the virtual link the global model takes as long as it did over the real one without
-loss: the age of its models as they came, less two delays. OUT is a folder for logs.
+the virtual one, as a row of a table in Markdown. Over the virtual link the global model takes so long that its models are as old as they come
+as over the real one without loss. OUT is a folder for logs.
 """
 
 import argparse
@@ -197,6 +197,23 @@ def scene_of(name, out, link=None, latency_ms=0, seed=1):
     return path
 
 
+def simulate(palpate, out, scene, model, link, latency_ms, seed, seconds):
+    """The log of a run over a virtual link."""
+    log = out / "virtual.mcap"
+    path = scene_of(scene, out, link, latency_ms, seed)
+    run(palpate, "run", path, "--virtual", "--model", model, "--duration", seconds, "--out", log)
+    return log
+
+
+def global_takes_ms(palpate, out, scene, model, delay, log, seconds):
+    """How long the global model takes over the virtual link, for models as old as those of `log`, which came over the real one."""
+    real_ms = age_ms(palpate, log)
+    takes_ms = max(0.0, real_ms - 2 * delay)
+    # A model also has to catch up before it serves, and a bridge passes on at its next tick what comes between two.
+    virtual_ms = age_ms(palpate, simulate(palpate, out, scene, model, (delay, 0), takes_ms, 1, seconds))
+    return max(0.0, takes_ms + real_ms - virtual_ms)
+
+
 def figure(value):
     return "0" if value == 0 else f"{value:.2g}" if value < 1 else f"{value:.3g}"
 
@@ -231,14 +248,12 @@ def main():
                 takes_ms = {}
                 for model in args.models:
                     log = lab.record(path, model, (delay, 0), seconds, out)
-                    takes_ms[model] = max(0.0, age_ms(palpate, log) - 2 * delay) if log else 0.0
+                    takes_ms[model] = global_takes_ms(palpate, out, scene, model, delay, log, seconds) if log else 0.0
                 for loss in args.losses:
                     cells = [f"{delay:g}", f"{loss:g}"]
                     for model in args.models:
                         log = lab.record(path, model, (delay, loss), seconds, out)
-                        simulated = out / "virtual.mcap"
-                        with_link = scene_of(scene, out, (delay, loss), takes_ms[model], args.seed)
-                        run(palpate, "run", with_link, "--virtual", "--model", model, "--duration", seconds, "--out", simulated)
+                        simulated = simulate(palpate, out, scene, model, (delay, loss), takes_ms[model], args.seed, seconds)
                         there = error(forces(palpate, simulated), truth)
                         here = error(forces(palpate, log), truth) if log else None
                         for place in (0, 1):

@@ -16,7 +16,7 @@ pub(crate) struct Sizes {
 
 impl Sizes {
     /// Without a budget.
-    pub(crate) const USUAL: Self = Self { patch: None, states: Basis::DEFAULT_STATES, kept_pct: 2.7 };
+    pub(crate) const USUAL: Self = Self { patch: None, states: Basis::DEFAULT_STATES, kept_pct: 1.2 };
 
     /// What a loose budget takes: docs/predictive.md has what it saves, and what still smaller ones would break.
     const SMALL: Self = Self { patch: Some([4, 4, 2]), states: 150, kept_pct: 5.5 };
