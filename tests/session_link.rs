@@ -60,8 +60,8 @@ fn a_link_that_does_nothing_changes_nothing() {
             forces.iter().map(|f| (f.model_version, f.served_by, f.model_age_s.to_bits())).collect()
         };
         assert_eq!(served(&linked), served(&late), "{model:?}");
-        if matches!(model, Kind::Predicted | Kind::Predictive) {
-            // The ring's path is rounded.
+        if model == Kind::Predicted {
+            // The ring's path is rounded. Windows of `predictive` hold all of this body and have no ring.
             let apart = error_pct(&linked, &late);
             assert!(apart > 0.0 && apart < 1e-3, "{model:?}: {apart} %");
         } else {
