@@ -45,8 +45,11 @@ fn every_window_is_stable_in_the_steps_that_the_body_is_stable_in() {
                 (number(0, triangles) as u32, [number(2, 4), number(2, 4), number(2, 4)], number(1, 60));
             let mut patch = Vec::new();
             body.patch(&[triangle], size, &mut patch);
-            // What cannot be reduced does not serve.
+            // What cannot be reduced does not serve, and a patch with nothing around it is the body itself.
             let Ok(Some(basis)) = Basis::compute(&resting, &patch, states) else { continue };
+            if basis.states() == 0 {
+                continue;
+            }
             windows += 1;
             least = least.min(margin(&body, &patch, &basis, step));
         }
