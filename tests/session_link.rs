@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use palpate::log::{ForceSample, ServedBy};
 use palpate::model::Vec3;
-use palpate::model::body::Body;
+use palpate::model::body::{Block, Body};
 use palpate::model::local::{Feedback, Kind};
 use palpate::runtime::{Nanos, RateGroup};
 use palpate::scene::{LinkSpec, Scene};
@@ -14,7 +14,11 @@ use palpate::session::{Session, SessionBuilder, Summary};
 use session_support::*;
 
 fn session(model: Kind) -> SessionBuilder {
-    Session::builder(block()).path(pressing()).model(model).friction(0.5).virtual_time().keep_records()
+    session_of(block(), model)
+}
+
+fn session_of(body: Block, model: Kind) -> SessionBuilder {
+    Session::builder(body).path(pressing()).model(model).friction(0.5).virtual_time().keep_records()
 }
 
 fn run(builder: SessionBuilder, seconds: f64) -> Summary {
@@ -52,16 +56,18 @@ fn error_pct(forces: &[ForceSample], truth: &[ForceSample]) -> f64 {
 #[test]
 fn a_link_that_does_nothing_changes_nothing() {
     for model in Kind::ALL.into_iter().filter(|&kind| kind != Kind::Full) {
-        let late = session(model).feedback(Feedback::Trajectory).global(RateGroup::hz(31).latency(Nanos(1_000_000)));
-        let linked = session(model).global(RateGroup::hz(31)).link(delayed(0.0));
+        let has_ring = matches!(model, Kind::Predicted | Kind::Predictive);
+        let session = || session_of(if has_ring { wide_block() } else { block() }, model);
+        let late = session().feedback(Feedback::Trajectory).global(RateGroup::hz(31).latency(Nanos(1_000_000)));
+        let linked = session().global(RateGroup::hz(31)).link(delayed(0.0));
         let (late, linked) = (forces(&run(late, 0.9)), forces(&run(linked, 0.9)));
         assert!(late.iter().any(|force| norm(force.force_n) > 0.2));
         let served = |forces: &[ForceSample]| -> Vec<_> {
             forces.iter().map(|f| (f.model_version, f.served_by, f.model_age_s.to_bits())).collect()
         };
         assert_eq!(served(&linked), served(&late), "{model:?}");
-        if model == Kind::Predicted {
-            // The ring's path is rounded. Windows of `predictive` hold all of this body and have no ring.
+        if has_ring {
+            // The ring's path is rounded.
             let apart = error_pct(&linked, &late);
             assert!(apart > 0.0 && apart < 1e-3, "{model:?}: {apart} %");
         } else {
@@ -97,7 +103,9 @@ fn the_age_of_a_model_counts_both_ways() {
 
 #[test]
 fn predictive_keeps_its_force_over_a_bad_link_where_the_others_lose_it() {
-    let of = |model| error_pct(&forces(&run(session(model).link(bad()), 1.5)), &forces(&run(session(Kind::Full), 1.5)));
+    let session = |model| session_of(wide_block(), model);
+    let truth = forces(&run(session(Kind::Full), 1.5));
+    let of = |model| error_pct(&forces(&run(session(model).link(bad()), 1.5)), &truth);
     let [hold, patch, predictive] = [Kind::Hold, Kind::Patch, Kind::Predictive].map(of);
     println!("hold {hold:.2} %, patch {patch:.2} %, predictive {predictive:.3} %");
     assert!(predictive < 2.0 && hold > 5.0 * predictive && patch > 5.0 * predictive, "{hold} {patch} {predictive}");
@@ -186,7 +194,7 @@ fn two_tools_share_a_link() {
     let session = |linked: bool| {
         let first = palpate::devices::Scripted::new(pressing());
         let second = palpate::devices::Scripted::new(away.clone());
-        let session = Session::builder(block()).named_device("left", first).named_device("right", second);
+        let session = Session::builder(wide_block()).named_device("left", first).named_device("right", second);
         let session = session.model(Kind::Predictive).friction(0.5).virtual_time().keep_records();
         let session = session.feedback(Feedback::Trajectory);
         match linked {

@@ -17,7 +17,16 @@ use palpate::session::Summary;
 
 /// A block of 6^3 nodes, 2 cm apart, held at the bottom.
 pub fn block() -> Block {
-    Block::builder([6; 3], [0.1; 3])
+    block_of([6; 3])
+}
+
+/// One whose surroundings are too large to be a part of the windows that [`pressing`] needs.
+pub fn wide_block() -> Block {
+    block_of([10, 10, 6])
+}
+
+fn block_of(nodes: [usize; 3]) -> Block {
+    Block::builder(nodes, nodes.map(|count| 0.02 * (count - 1) as f64))
         .node_mass(0.5e-3)
         .stiffness(30.0)
         .damping_ratio(0.3)

@@ -37,7 +37,7 @@ impl Default for Ahead {
 
 impl Ahead {
     /// Nodes around a patch that run ahead, if nothing else is said.
-    pub(super) const NODES: usize = 4096;
+    pub(super) const NODES: usize = 8192;
 
     /// At most about so many.
     pub(super) fn with(nodes: usize) -> Self {
@@ -284,7 +284,8 @@ mod tests {
         let mut patch = Vec::new();
         block.patch(&[nearest.find(&Vec3::new(0.5 * size, 0.5 * size, size))], [6, 6, 3], &mut patch);
         let (state, stepping) = (State::at_rest(block.rest()), Stepping { tick: 1e-3, substeps: 4 });
-        (Simulation::new(Box::new(block), state, Contact::default(), Law::default(), stepping).unwrap(), patch)
+        let simulation = Simulation::new(Box::new(block), state, Contact::default(), Law::default(), stepping).unwrap();
+        (simulation.looking_ahead_with(4096), patch)
     }
 
     /// The tool presses into the middle of the top.

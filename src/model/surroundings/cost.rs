@@ -23,8 +23,8 @@ impl Reduction {
         1 + MOMENTS + 1
     }
 
-    /// What the whole of it takes (s) on no machine in particular, for runs that must be the same on all of them: within a quarter of
-    /// what `cargo bench -p palpate-model --bench reduced_basis` measured on springs and tetrahedra of 8^3 to 20^3 nodes.
+    /// What the whole of it takes (s) on no machine in particular, for runs that must be the same on all of them: 0.55 to 1.1
+    /// times that is what `cargo bench -p palpate-model --bench reduced_basis` measured on springs and tetrahedra of 8^3 to 24^3 nodes.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.

@@ -8,15 +8,16 @@ use crate::{Mat3, Vec3};
 /// Damping over stiffness may differ by this much from node to node and still count as proportional.
 const PROPORTIONAL: f64 = 1e-9;
 
-/// The movable nodes outside a patch, and what couples them.
+/// The movable nodes outside a patch, then the corners that a larger body follows beyond them, and what couples all of these.
 #[derive(Debug)]
 pub(super) struct Far {
-    /// Ids, in increasing order.
-    pub(super) nodes: Vec<u32>,
+    /// At rest (m).
+    points: Vec<Vec3>,
     /// Their masses (kg).
-    pub(super) masses: Vec<f64>,
+    masses: Vec<f64>,
+    /// Of each node of the body among them.
     place: Vec<Option<u32>>,
-    /// Between places in `nodes`, the higher one first.
+    /// Between places, the higher one first.
     couplings: Vec<((u32, u32), Coupling)>,
 }
 
@@ -33,22 +34,29 @@ impl Far {
 
     fn of(body: &RestingBody, patch: &[u32], mut couplings: Vec<((u32, u32), Coupling)>) -> Self {
         let mut place = vec![None; body.rest().len()];
-        let mut nodes = Vec::new();
+        let (mut points, mut masses) = (Vec::new(), Vec::new());
         for (node, &w) in body.inverse_masses().iter().enumerate() {
             if w > 0.0 && patch.binary_search(&(node as u32)).is_err() {
-                place[node] = Some(nodes.len() as u32);
-                nodes.push(node as u32);
+                place[node] = Some(points.len() as u32);
+                points.push(body.rest()[node]);
+                masses.push(1.0 / w);
             }
         }
-        let masses = nodes.iter().map(|&node| 1.0 / body.inverse_masses()[node as usize]).collect();
         let at = |node: u32| place[node as usize].expect("it is far and can move");
         couplings.iter_mut().for_each(|((row, column), _)| (*row, *column) = (at(*row), at(*column)));
-        Self { nodes, masses, place, couplings }
+        if let Some(beyond) = body.beyond() {
+            let corner = |corner: u32| points.len() as u32 + corner;
+            couplings.extend(beyond.between.iter().map(|&((row, column), of)| ((corner(row), corner(column)), of)));
+            couplings.extend(beyond.to_part.iter().map(|&((row, node), of)| ((corner(row), at(node)), of)));
+            points.extend(&beyond.corners);
+            masses.extend(&beyond.masses);
+        }
+        Self { points, masses, place, couplings }
     }
 
-    /// Three unknowns per node.
+    /// Three for each node or corner.
     pub(super) fn unknowns(&self) -> usize {
-        3 * self.nodes.len()
+        3 * self.points.len()
     }
 
     /// Pairs of nodes that answer to each other, and nodes to themselves.
@@ -82,12 +90,11 @@ impl Far {
     }
 
     /// s^2 M + s C + K, factorised. `None` if nothing holds the body.
-    pub(super) fn factorised(&self, body: &RestingBody, s: f64) -> Option<SparseFactor> {
+    pub(super) fn factorised(&self, s: f64) -> Option<SparseFactor> {
         // In an order of elimination with little fill, if the places of the nodes give one.
-        let points: Vec<Vec3> = self.nodes.iter().map(|&node| body.rest()[node as usize]).collect();
         let pairs =
             self.couplings.iter().map(|&((row, column), _)| [row, column]).filter(|[row, column]| row != column);
-        SparseFactor::new(self.unknowns(), &self.shifted(s), dissection(&points, pairs).as_deref())
+        SparseFactor::new(self.unknowns(), &self.shifted(s), dissection(&self.points, pairs).as_deref())
     }
 
     /// Multiplies each column of `columns` by M.

@@ -56,11 +56,11 @@ impl Contacts {
 
     /// The relative error of Z by the number of states, from 1 on: the root of its mean square over the frequencies, at the
     /// worst of the pressed nodes. `None` if the numbers do not allow it.
-    pub(super) fn errors(&self, body: &RestingBody) -> Option<Vec<f64>> {
+    pub(super) fn errors(&self) -> Option<Vec<f64>> {
         // Of each pressed node by states.
         let mut squares = vec![vec![0.0; self.states]; self.near.pressed.len()];
         for s in FREQUENCIES {
-            let exact = self.exact(body, s)?;
+            let exact = self.exact(s)?;
             for ((squares, of_node), exact) in squares.iter_mut().zip(self.compliances(s)?).zip(exact) {
                 let exact = exact.try_inverse()?;
                 for (square, compliance) in squares.iter_mut().zip(of_node) {
@@ -73,9 +73,9 @@ impl Contacts {
     }
 
     /// G D(s)^-1 G^T of the body itself, for each pressed node.
-    fn exact(&self, body: &RestingBody, s: f64) -> Option<Vec<Mat3>> {
+    fn exact(&self, s: f64) -> Option<Vec<Mat3>> {
         let nodes: Vec<u32> = self.near.pressed.iter().map(|pressed| pressed.node).collect();
-        let answers = self.body.factorised(body, s)?.solve(self.body.unit_forces(&nodes));
+        let answers = self.body.factorised(s)?.solve(self.body.unit_forces(&nodes));
         let rows = self.body.unknowns_of(&nodes);
         let entry = |node: usize, row: usize, column: usize| answers[(rows[3 * node + row], 3 * node + column)];
         Some((0..nodes.len()).map(|node| Mat3::from_fn(|row, column| entry(node, row, column))).collect())

@@ -2,6 +2,7 @@
 //! everything beyond.
 
 mod basis;
+mod beyond;
 mod condense;
 mod cost;
 mod far;

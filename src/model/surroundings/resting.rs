@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::basis::Basis;
+use super::beyond::Beyond;
 use crate::body::{Body, Cutout, Restriction, State, neighbourhood};
 use crate::{Mat3, Vec3};
 
@@ -20,6 +21,12 @@ pub(super) struct Coupling {
 }
 
 impl Coupling {
+    /// Adds `share` of `other`.
+    pub(super) fn add(&mut self, other: &Self, share: f64) {
+        self.stiffness += other.stiffness * share;
+        self.damping += other.damping * share;
+    }
+
     /// This less `other`, with nothing where the two cancel but for rounding.
     fn less(&self, other: &Self) -> Self {
         let without = |a: Mat3, b: Mat3| if (a - b).amax() <= CANCELLED * a.amax() { Mat3::zeros() } else { a - b };
@@ -43,42 +50,81 @@ impl Coupling {
     }
 }
 
+/// A symmetric matrix of couplings in the making. Where a law has no energy, half of each side is taken.
+#[derive(Debug, Default)]
+pub(super) struct LowerTriangle {
+    of: HashMap<(u32, u32), [Coupling; 2]>,
+}
+
+impl LowerTriangle {
+    /// Adds `share` of `coupling`, by which `row` answers to `column`.
+    pub(super) fn add(&mut self, (row, column): (u32, u32), coupling: &Coupling, share: f64) {
+        let pair = (row.max(column), row.min(column));
+        self.of.entry(pair).or_default()[usize::from(row < column)].add(coupling, share);
+    }
+
+    /// Each pair once, the higher one first, in increasing order.
+    pub(super) fn symmetrised(self) -> Vec<((u32, u32), Coupling)> {
+        let whole = |(pair, [below, above]): ((u32, u32), [Coupling; 2])| {
+            let (row, column) = pair;
+            (pair, below.symmetrised(if row == column { &below } else { &above }))
+        };
+        let mut all: Vec<_> = self.of.into_iter().map(whole).collect();
+        all.sort_unstable_by_key(|&(pair, _)| pair);
+        all
+    }
+}
+
 /// The lower triangle of the stiffness and damping of a body at rest: for pairs of nodes that can move, the higher one
-/// first, each once and in increasing order. Symmetric: where a law has no energy, half of each side is taken.
+/// first, each once and in increasing order.
 pub(super) fn couplings(body: &dyn Body) -> Vec<((u32, u32), Coupling)> {
     let is_movable = |node: u32| body.inverse_masses()[node as usize] > 0.0;
     let rows: Vec<u32> = (0..body.rest().len() as u32).filter(|&node| is_movable(node)).collect();
-    let mut all: HashMap<(u32, u32), [Coupling; 2]> = HashMap::new();
+    let mut all = LowerTriangle::default();
     body.tangent(&State::at_rest(body.rest()), &rows, false, &mut |block| {
         if is_movable(block.column) {
-            let pair = (block.row.max(block.column), block.row.min(block.column));
-            let side = &mut all.entry(pair).or_default()[usize::from(block.row < block.column)];
-            side.stiffness -= block.position;
-            side.damping -= block.velocity;
+            let coupling = Coupling { stiffness: -block.position, damping: -block.velocity };
+            all.add((block.row, block.column), &coupling, 1.0);
         }
     });
-    let whole = |(pair, [below, above]): ((u32, u32), [Coupling; 2])| {
-        let (row, column) = pair;
-        (pair, below.symmetrised(if row == column { &below } else { &above }))
-    };
-    let mut all: Vec<_> = all.into_iter().map(whole).collect();
-    all.sort_unstable_by_key(|&(pair, _)| pair);
-    all
+    all.symmetrised()
 }
 
 /// A body around its rest state: sparse stiffness, damping and masses, and the body itself for its restrictions.
 #[derive(Debug)]
 pub struct RestingBody {
     body: Box<dyn Body>,
+    /// Of a part of a larger one: the rest of that, once somebody needs it.
+    beyond: Option<Beyond>,
     /// Once somebody asks for them: of a large body mostly nobody does.
     couplings: OnceLock<Vec<((u32, u32), Coupling)>>,
     digest: OnceLock<u64>,
     /// Bases of windows around which a large body looks the same in many places.
     alike: Mutex<HashMap<u64, Arc<Basis>>>,
+    /// Nodes around a patch that answer each for itself.
+    neighbours: usize,
 }
 
-/// Nodes around a patch that its surroundings are limited to: beyond them a larger body is held.
+/// Nodes around a patch that answer each for itself. Beyond them a larger body is coarse.
 const NEIGHBOURS: usize = 2048;
+
+/// What of a large body is around a patch.
+#[derive(Debug)]
+pub(super) struct Around {
+    /// The nodes around the patch, between nodes that are held.
+    pub(super) body: RestingBody,
+    /// The patch in its numbering.
+    pub(super) patch: Vec<u32>,
+    /// The place there of each node that can move.
+    places: HashMap<u32, u32>,
+}
+
+impl Around {
+    /// Adds what of `whole` is beyond, coarsely: those that were held follow it.
+    pub(super) fn look_beyond(&mut self, whole: &RestingBody) {
+        self.body.beyond = Some(Beyond::new(&*whole.body, &self.places));
+    }
+}
 
 impl RestingBody {
     /// Of `body`; `None` if it has no duplicate or no restriction.
@@ -86,26 +132,34 @@ impl RestingBody {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn new(body: &dyn Body) -> Option<Self> {
-        Self::is_of(body).then(|| body.duplicate()).flatten().map(Self::alone)
+        Self::is_of(body).then(|| body.duplicate()).flatten().map(Self::of)
     }
 
-    fn alone(body: Box<dyn Body>) -> Self {
-        Self { body, couplings: OnceLock::new(), digest: OnceLock::new(), alike: Mutex::default() }
+    fn of(body: Box<dyn Body>) -> Self {
+        let (beyond, couplings, digest, alike) = Default::default();
+        Self { body, beyond, couplings, digest, alike, neighbours: NEIGHBOURS }
     }
 
-    /// What of a large body is around `patch` (ids in increasing order), between nodes that are held, and the patch in its
-    /// numbering. `None` if that is all of it. All that depends on the patch can move there as it does here.
-    pub(super) fn around(&self, patch: &[u32]) -> Option<(Self, Vec<u32>)> {
+    /// With so many nodes around a patch that answer each for itself.
+    #[cfg(test)]
+    pub(super) fn with_neighbours(self, neighbours: usize) -> Self {
+        Self { neighbours, ..self }
+    }
+
+    /// What of a large body is around `patch` (ids in increasing order). `None` if that is all of it. All that depends on the patch can
+    /// move there as it does here.
+    pub(super) fn around(&self, patch: &[u32]) -> Option<Around> {
         let near = self.restriction(patch)?;
-        let (mut count, mut around) = (NEIGHBOURS, neighbourhood(&*self.body, patch, NEIGHBOURS)?);
+        let (mut count, mut around) = (self.neighbours, neighbourhood(&*self.body, patch, self.neighbours)?);
         while near.ring(patch.len()).iter().any(|node| around.binary_search(node).is_err()) {
             count *= 2;
             around = neighbourhood(&*self.body, patch, count)?;
         }
         let Cutout { nodes, body, .. } = self.body.cutout(&around)?;
-        let place: HashMap<u32, u32> = nodes.iter().copied().zip(0..).collect();
-        let patch: Vec<u32> = patch.iter().filter_map(|node| place.get(node).copied()).collect();
-        Some((Self::alone(body), patch))
+        let is_movable = |&(_, place): &(u32, u32)| body.inverse_masses()[place as usize] > 0.0;
+        let places: HashMap<u32, u32> = nodes.into_iter().zip(0..).filter(is_movable).collect();
+        let patch = patch.iter().filter_map(|node| places.get(node).copied()).collect();
+        Some(Around { body: Self::of(body), patch, places })
     }
 
     /// True if `body` has what is needed: a duplicate, and a restriction.
@@ -137,7 +191,7 @@ impl RestingBody {
     }
 
     /// A number that is the same for a basis of so many states of `patch` (ids in increasing order) in bodies that are the same but for
-    /// where they are and for rounding.
+    /// where they are, for rounding, and for what is beyond.
     pub(super) fn likeness(&self, patch: &[u32], states: usize) -> u64 {
         let (rest, couplings) = (self.rest(), self.couplings());
         let origin = rest[patch.first().map_or(0, |&node| node as usize)];
@@ -152,6 +206,11 @@ impl RestingBody {
             words.extend(stiffness.iter().chain(damping).map(|x| alike(x / stiffest)));
         }
         digest(&words.into_iter().flat_map(u64::to_le_bytes).collect::<Vec<u8>>())
+    }
+
+    /// What is beyond it, coarsely, where it is a part of a larger body.
+    pub(super) fn beyond(&self) -> Option<&Beyond> {
+        self.beyond.as_ref()
     }
 
     /// Rest positions (m).
