@@ -21,6 +21,9 @@ use super::random::Random;
 /// Simulated time (s).
 pub const DURATION_S: f64 = 1.2;
 
+/// How many times as many nodes those scenes have along each edge of a block that are called larger.
+pub const LONGER: f64 = 1.7;
+
 /// A third of the cases is for judging: nothing was chosen by what they say.
 pub fn is_unseen(seed: u64) -> bool {
     seed % 3 == 2
@@ -72,8 +75,8 @@ impl fmt::Display for Case {
 }
 
 impl Case {
-    /// The scene of `seed`, with one tool or a pair.
-    pub fn new(seed: u64, is_pair: bool) -> Result<Self, Error> {
+    /// The scene of `seed`, with one tool or a pair. Blocks are `larger` times as long each way around the same motion.
+    pub fn new(seed: u64, is_pair: bool, larger: f64) -> Result<Self, Error> {
         // Not by the remainder that says what is unseen.
         let random = &mut Random(0x70a1_9a7e ^ (seed << 20));
         let class = random.one_of(&[
@@ -90,7 +93,7 @@ impl Case {
         let mut scene = Scene::of_program().with_model(Kind::Predictive);
         let (body, inside, ground) = match class {
             Class::Tissue => organ(random)?,
-            _ => springs(class, random),
+            _ => springs(class, larger, random),
         };
         scene.body = Some(body);
         let motion = random.one_of(&Motion::ALL);
@@ -135,8 +138,8 @@ impl Case {
     }
 }
 
-/// A block of springs, with the ground that a tool finds on its top.
-fn springs(class: Class, random: &mut Random) -> (BodySpec, &'static str, Ground) {
+/// A block of springs, with the ground that a tool finds on its top, which is that of the block before it is made `larger`.
+fn springs(class: Class, larger: f64, random: &mut Random) -> (BodySpec, &'static str, Ground) {
     let mut between = |low: usize, high: usize| low + (random.next() * (high - low + 1) as f64) as usize;
     let nodes = match class {
         Class::Cube | Class::Tissue => [between(8, 13); 3],
@@ -146,7 +149,10 @@ fn springs(class: Class, random: &mut Random) -> (BodySpec, &'static str, Ground
         Class::Sheet => [between(12, 18), between(10, 14), between(2, 3)],
     };
     let cell_m = random.within(6e-3, 11e-3);
-    let size_m = nodes.map(|count| (count - 1) as f64 * cell_m);
+    let size = |nodes: [usize; 3]| nodes.map(|count| (count - 1) as f64 * cell_m);
+    let ground_m = size(nodes);
+    let nodes = nodes.map(|count| (count as f64 * larger).round() as usize);
+    let size_m = size(nodes);
     // What hangs between two clamps, or lies on a table.
     let fixed = if class == Class::Sheet { vec![Face::XMin, Face::XMax] } else { vec![Face::ZMin] };
     let stiffness_n_per_m = random.sized(10.0, 300.0);
@@ -182,8 +188,8 @@ fn springs(class: Class, random: &mut Random) -> (BodySpec, &'static str, Ground
     };
     let ground = Ground {
         centre_m: [0, 1].map(|axis| size_m[axis] * random.within(0.42, 0.58)),
-        room_m: [0, 1].map(|axis| (0.42 * size_m[axis] - 1.2 * cell_m).max(0.5 * cell_m)),
-        depth_m: (0.2 * size_m[2]).min(random.within(2.5e-3, 8e-3)).max(2e-3),
+        room_m: [0, 1].map(|axis| (0.42 * ground_m[axis] - 1.2 * cell_m).max(0.5 * cell_m)),
+        depth_m: (0.2 * ground_m[2]).min(random.within(2.5e-3, 8e-3)).max(2e-3),
         cell_m,
         surface: Box::new(move |_| size_m[2]),
     };

@@ -3,7 +3,8 @@
 //!
 //! `cargo bench --bench population`; with `-- --quick` a short form that prints and writes nothing; with `-- --seen` the two
 //! thirds of the cases that may be looked at while working, case by case, written nowhere; with `-- --unseen` the distributions of the
-//! rest; `--cases N` how many, `--from N` the first seed, or `--only A,B` which; `--pairs` those with two tools; `--patch A,B,C`,
+//! rest; `--cases N` how many, `--from N` the first seed, or `--only A,B` which; `--pairs` those with two tools, `--larger
+//! FACTOR` with blocks so many times as long each way; `--patch A,B,C`,
 //! `--basis N`, `--basis-latency MS` and `--budget PERCENT` in place of the defaults; `--models A,B` in place of
 //! `predictive` and `patch`; `--link MS,SHARE` with the global model behind a link of so much delay one way and such a share of lost
 //! packets, which alone prints the document and writes nothing.
@@ -24,20 +25,25 @@ use palpate::Error;
 use palpate::model::local::Kind;
 use palpate::scene::LinkSpec;
 
-use cases::is_unseen;
+use cases::{Class, LONGER, is_unseen};
 use runs::{CaseResult, Settings, run_all};
 use words::Populations;
 
-/// Cases of the document, with one tool and with two.
+/// Cases of the document: with one tool, with two, and those whose blocks are made larger.
 const CASES: u64 = 180;
 const PAIRS: u64 = 90;
+const LARGER: u64 = 117;
 
 fn document(is_quick: bool, settings: &Settings) -> Result<(), Error> {
     let seeds = |count: u64| -> Vec<u64> { if is_quick { vec![0, 5] } else { (0..count).collect() } };
     let of_pairs = Settings { pairs: true, ..settings.clone() };
+    let of_larger = Settings { larger: LONGER, ..settings.clone() };
     let single = run_all(&seeds(CASES), settings, |_| ())?;
     let pairs = run_all(&seeds(PAIRS), &of_pairs, |_| ())?;
-    let document = words::document(&Populations { single, pairs });
+    let is_block = |seed: &u64| single.iter().any(|result| result.seed == *seed && result.class != Class::Tissue);
+    let blocks: Vec<u64> = seeds(LARGER).into_iter().filter(|seed| is_unseen(*seed) && is_block(seed)).collect();
+    let larger = run_all(&blocks, &of_larger, |_| ())?;
+    let document = words::document(&Populations { single, pairs, larger });
     if is_quick || settings.link.is_some() {
         print!("{}", document.text);
         return Ok(());
@@ -83,6 +89,7 @@ fn main() -> ExitCode {
         basis: number("--basis"),
         latency_ms: value("--basis-latency").and_then(|value| value.parse().ok()),
         pairs: std::env::args().any(|argument| argument == "--pairs"),
+        larger: value("--larger").and_then(|value| value.parse().ok()).unwrap_or(1.0),
         link: value("--link").map(|conditions| {
             let mut numbers = conditions.split(',').map(|number| number.parse().expect("--link takes MS,SHARE"));
             let mut next = || numbers.next().expect("--link takes MS,SHARE");

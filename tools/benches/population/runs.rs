@@ -25,6 +25,8 @@ pub struct Settings {
     pub latency_ms: Option<f64>,
     /// Two tools in place of one.
     pub pairs: bool,
+    /// How many times as long blocks are each way.
+    pub larger: f64,
     /// What is between local and global model.
     pub link: Option<LinkSpec>,
 }
@@ -163,7 +165,7 @@ pub fn run_all(
 
 fn run(seed: u64, settings: &Settings) -> Result<CaseResult, Error> {
     let begun = Instant::now();
-    let mut case = Case::new(seed, settings.pairs)?;
+    let mut case = Case::new(seed, settings.pairs, settings.larger)?;
     settings.apply(&mut case.scene);
     let session = Session::from_scene(case.scene.clone().with_model(ModelChoice::Auto)).virtual_time().build()?;
     let choice = session.choice().expect("auto chooses");

@@ -3,7 +3,7 @@
 use palpate::model::local::Kind;
 use palpate_cli::drawing::{Colour, Picture, Series, Sign};
 
-use super::cases::{Class, is_unseen};
+use super::cases::{Class, LONGER, is_unseen};
 use super::common::{figure, measured_on, table};
 use super::paths::Motion;
 use super::runs::{CaseResult, Run};
@@ -17,43 +17,16 @@ pub struct Document {
 /// The error that `auto` is asked for where a scene says nothing (%).
 const ASKED_PCT: f64 = 1.0;
 
-/// An error that is none (%).
+/// An error that is none (%). Pictures draw what is less as this much.
 const NOTHING_PCT: f64 = 1e-3;
+/// The axis of errors.
+const ERROR_AXIS: &str = "rms error (% of peak; 0.001 or less at the border)";
 
-const HEAD: &str = "\
-# How far off on scenes that nobody tuned
-
-See what to expect of `predictive` on a scene like yours, by kind of body and of motion; `palpate compare SCENE` measures yours itself.
-
-```text
-cargo bench -p palpate-cli --bench population               # writes this page and its pictures
-cargo bench -p palpate-cli --bench population -- --seen     # prints the scenes that may be looked at while working, one by one
-```
-
-The scenes are random: cubes, bricks, slabs, pillars and sheets of springs (10 to 300 N/m, damping ratio 0.05 to 1; plain, in layers or with a
-nodule); beams, a prostate and a liver of tetrahedra (3 to 15 kPa, Poisson's ratio 0.4 to 0.47). Friction is 0 to 1.5, the tool a point or a
-sphere, the haptic rate 0.5 to 4 kHz, the global one 20 to 50 Hz. A hand kneads at 1 to 5 Hz (*sine*), taps, draws spirals, scribbles, drags and
-stops at once, or strokes at 0.2 to 0.5 m/s, always with tremor. A third of the scenes, those whose seed leaves
-2 when divided by 3, is *unseen*: nothing was chosen by what they say.
-
-*Pairs* are scenes with a second tool that does something of its own at most five cells from the first. Errors are those of the tool that is
-farther off; a tick is that of both. `-- --seen --pairs` prints the seen ones.
-
-Each scene runs for 1.2 s in virtual time with the defaults, with results of the global model at once (*in time*) or one period *late*; a basis
-takes its nominal time. Percentiles are over scenes:
-
-- *rms*: error of the force, in % of the largest force of `full`
-- *jump*: largest change of the force in one tick beyond that of `full`, in the same
-- *peak*: largest force over that of `full`
-- *tick*: CPU time of a haptic tick, with catching up: the medians of its p50 and p99
-- *periods*: work of the global model, in periods of simulation
-- *2x steps*: `full` in twice as many steps, which is how far off the reference itself is
-";
-
-/// The cases with one tool and with two.
+/// The cases with one tool, with two, and with larger blocks.
 pub struct Populations {
     pub single: Vec<CaseResult>,
     pub pairs: Vec<CaseResult>,
+    pub larger: Vec<CaseResult>,
 }
 
 /// Before the table of `auto`.
@@ -85,15 +58,59 @@ const OF_MODELS: [&str; 14] = [
 const OF_KINDS: [&str; 10] =
     ["kind", "ran", "in time: rms % p50", "p90", "worst", "late: rms % p50", "p90", "worst", "late: tick us", "p99"];
 
-pub fn document(Populations { single, pairs }: &Populations) -> Document {
-    let parts = [("unseen", single, true), ("seen", single, false), ("pairs, unseen", pairs, true)];
+/// What the page is about.
+fn head() -> String {
+    format!(
+        "\
+# How far off on scenes that nobody tuned
+
+See what to expect of `predictive` on a scene like yours, by kind of body and of motion; `palpate compare SCENE` measures yours itself.
+
+```text
+cargo bench -p palpate-cli --bench population               # writes this page and its pictures
+cargo bench -p palpate-cli --bench population -- --seen     # prints the scenes that may be looked at while working, one by one
+```
+
+The scenes are random: cubes, bricks, slabs, pillars and sheets of springs (10 to 300 N/m, damping ratio 0.05 to 1; plain, in layers or with a
+nodule); beams, a prostate and a liver of tetrahedra (3 to 15 kPa, Poisson's ratio 0.4 to 0.47). Friction is 0 to 1.5, the tool a point or a
+sphere, the haptic rate 0.5 to 4 kHz, the global one 20 to 50 Hz. A hand kneads at 1 to 5 Hz (*sine*), taps, draws spirals, scribbles, drags and
+stops at once, or strokes at 0.2 to 0.5 m/s, always with tremor. A third of the scenes, those whose seed leaves
+2 when divided by 3, is *unseen*: nothing was chosen by what they say.
+
+*Pairs* are scenes with a second tool that does something of its own at most five cells from the first. Errors are those of the tool that is
+farther off; a tick is that of both. `-- --seen --pairs` prints the seen ones.
+
+*Larger* are scenes whose blocks have {LONGER} times as many nodes along each edge, up to 22^3 and 27 x 27 x 10, around the same motion: no
+window takes all of most of them. `-- --seen --larger {LONGER}` prints the seen ones.
+
+Each scene runs for 1.2 s in virtual time with the defaults, with results of the global model at once (*in time*) or one period *late*; a basis
+takes its nominal time. Percentiles are over scenes:
+
+- *rms*: error of the force, in % of the largest force of `full`
+- *jump*: largest change of the force in one tick beyond that of `full`, in the same
+- *peak*: largest force over that of `full`
+- *tick*: CPU time of a haptic tick, with catching up: the medians of its p50 and p99
+- *periods*: work of the global model, in periods of simulation
+- *2x steps*: `full` in twice as many steps, which is how far off the reference itself is
+"
+    )
+}
+
+pub fn document(Populations { single, pairs, larger }: &Populations) -> Document {
+    let parts = [
+        ("unseen", single, true),
+        ("seen", single, false),
+        ("pairs, unseen", pairs, true),
+        ("larger, unseen", larger, true),
+    ];
     let models: Vec<Vec<String>> =
         parts.into_iter().flat_map(|(name, results, unseen)| of_models(name, &part(results, unseen))).collect();
     let unseen = part(single, true);
     let text = format!(
-        "{HEAD}\n{}\n\n## All scenes\n\n{}\n{}\n## `predictive` by body and by motion, unseen\n\n{}\n{AUTO}\n{}\n\
+        "{}\n{}\n\n## All scenes\n\n{}\n{}\n## `predictive` by body and by motion, unseen\n\n{}\n{AUTO}\n{}\n\
          ![Share of scenes above an error](img/population_error.svg)\n\n\
          ![Error against cost](img/population_cost.svg)\n",
+        head(),
         measured_on("cargo bench --bench population"),
         table(&OF_MODELS, 3, &models),
         without_small_bodies("unseen", &unseen),
@@ -220,12 +237,17 @@ fn of_kinds(results: &[&CaseResult]) -> Vec<Vec<String>> {
     classes.chain(motions).collect()
 }
 
+/// The error of a run as pictures draw it (%).
+fn drawn(run: &Run) -> f64 {
+    run.rms.max(NOTHING_PCT)
+}
+
 /// The share of scenes above an error, by class and of pairs, one period late.
 fn errors(single: &[CaseResult], pairs: &[CaseResult]) -> Picture {
     let of_class = |class: Class| (class.name(), single.iter().filter(|result| result.class == class).collect());
     let of = Class::ALL.into_iter().map(of_class).chain([("pairs", pairs.iter().collect())]);
     let series = |(number, (name, of)): (usize, (&str, Vec<&CaseResult>))| {
-        let mut errors: Vec<f64> = runs(&of, Kind::Predictive, true).into_iter().map(|run| run.rms).collect();
+        let mut errors: Vec<f64> = runs(&of, Kind::Predictive, true).into_iter().map(drawn).collect();
         errors.sort_by(f64::total_cmp);
         let count = errors.len();
         let label = |place: usize| if place + 1 == count { name.to_owned() } else { String::new() };
@@ -241,7 +263,7 @@ fn errors(single: &[CaseResult], pairs: &[CaseResult]) -> Picture {
     };
     Picture {
         title: "predictive, one period late: share of all scenes, seen or not, with at least that error".to_owned(),
-        x: "rms error (% of peak)".to_owned(),
+        x: ERROR_AXIS.to_owned(),
         y: "share of scenes".to_owned(),
         marks: Vec::new(),
         levels: vec![(0.5, "half".to_owned()), (0.1, "a tenth".to_owned())],
@@ -260,14 +282,14 @@ fn costs(results: &[CaseResult]) -> Picture {
         is_hollow: late,
         points: runs(&all, Kind::Predictive, late)
             .into_iter()
-            .map(|run| (run.tick_us[0], run.rms, String::new()))
+            .map(|run| (run.tick_us[0], drawn(run), String::new()))
             .collect(),
     };
     Picture {
         title: "predictive, all scenes, seen or not: error against cost; discs in time, circles one period late"
             .to_owned(),
         x: "CPU per haptic tick, p50 (us)".to_owned(),
-        y: "rms error (% of peak)".to_owned(),
+        y: ERROR_AXIS.to_owned(),
         marks: Vec::new(),
         levels: Vec::new(),
         series: [(false, "in time"), (true, "late")].into_iter().map(series).collect(),
