@@ -4,6 +4,8 @@ use super::reduction::{MOMENTS, Reduction};
 
 /// Finding what is far from a patch, for each coupled pair of nodes (s).
 const PREPARE_S: f64 = 1.5e-7;
+/// Following a coarse grid, for each node that is beyond (s).
+const BEYOND_S: f64 = 2e-5;
 /// Factorising and solving, for each coupled pair of nodes and each unknown (s).
 const FACTORISE_S: f64 = 3.5e-10;
 /// Singular vectors and modes, for each unknown and each pair of states (s).
@@ -34,6 +36,11 @@ impl Reduction {
         if self.is_known() {
             return prepare;
         }
-        prepare + FACTORISE_S * pairs * unknowns + SPAN_S * unknowns * states * states + PROJECT_S * pairs * states
+        let beyond = BEYOND_S * self.beyond() as f64;
+        prepare
+            + beyond
+            + FACTORISE_S * pairs * unknowns
+            + SPAN_S * unknowns * states * states
+            + PROJECT_S * pairs * states
     }
 }

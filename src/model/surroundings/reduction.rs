@@ -22,7 +22,8 @@ const LEADING: usize = 110;
 /// More unknowns than this take longer than a stop waits for.
 const LARGE: usize = 20_000;
 
-/// A [`Basis`] in the making. Each part costs at most what the factorisation of the surroundings costs.
+/// A [`Basis`] in the making. Each part costs at most what the factorisation of the surroundings costs, and to begin it a look at all of the
+/// body.
 #[derive(Debug)]
 pub struct Reduction {
     patch: Vec<u32>,
@@ -57,8 +58,9 @@ enum Stage {
 }
 
 impl Reduction {
-    /// Begins the basis of the surroundings of `patch` (ids in increasing order), with at most so many states; `None` if that is none, or
-    /// the body has no restriction. A patch around which nothing can move has a basis that is there at once, of no states.
+    /// Begins the basis of the surroundings of `patch` (ids in increasing order, all of which can move), with at most so many states;
+    /// `None` if that is none, or the body has no restriction. A patch around which nothing can move has a basis that is there at once,
+    /// of no states.
     ///
     /// # Real-time
     /// Not real-time safe: allocates.
@@ -71,11 +73,11 @@ impl Reduction {
         let mut around = whole.around(patch);
         let (body, local) = around.as_ref().map_or((whole, patch), |around| (&around.body, &around.patch));
         let restriction = body.restriction(local)?;
-        let ring: Vec<u32> = restriction.ring(patch.len()).to_vec();
+        let ring: Vec<u32> = restriction.ring(local.len()).to_vec();
         if states == 0 {
             return None;
         }
-        let likeness = around.as_ref().filter(|_| shares).map(|around| around.body.likeness(&around.patch, states));
+        let likeness = around.as_ref().filter(|_| shares).map(|around| around.likeness(whole, states));
         let known = likeness.and_then(|likeness| whole.alike(likeness));
         let stage = match known {
             _ if ring.is_empty() => Stage::Known(Basis::of_nothing(patch)),
@@ -96,6 +98,11 @@ impl Reduction {
     /// Wait-free, real-time safe.
     pub fn patch(&self) -> &[u32] {
         &self.patch
+    }
+
+    /// Nodes that follow a coarse grid.
+    pub(super) fn beyond(&self) -> usize {
+        self.around.as_ref().and_then(|around| around.body.beyond()).map_or(0, |beyond| beyond.nodes)
     }
 
     /// True for a body so large that the parts should not be done in one go.
@@ -280,6 +287,27 @@ mod tests {
         let off = |(a, b): (&f64, &f64)| (a - b).abs() / b.abs();
         let worst = alone.answers.stiffness.iter().zip(&shared.answers.stiffness).map(off).fold(0.0, f64::max);
         assert!(worst < 0.01, "{worst}");
+    }
+
+    #[test]
+    fn windows_whose_neighbourhoods_look_the_same_share_no_basis_where_the_body_beyond_does_not() {
+        // Held at one side face: there the layer beyond a neighbourhood is held, elsewhere it gives way.
+        let block = Block::builder([40, 20, 14], [0.39, 0.19, 0.13]).fix(Face::ZMin).fix(Face::XMin).build().unwrap();
+        let resting = RestingBody::new(&block).unwrap();
+        let nearest = crate::mesh::NearestTriangle::new(block.surface(), block.rest()).unwrap();
+        let patch = |cell: u32| {
+            let (mut patch, x) = (Vec::new(), 0.01 * f64::from(cell) + 0.004);
+            block.patch(&[nearest.find(&crate::Vec3::new(x, 0.093, 0.13))], [4, 4, 2], &mut patch);
+            patch
+        };
+        let middle = patch(20);
+        Basis::compute(&resting, &middle, 20).unwrap();
+        let own = |cell: u32| resting.around(&patch(cell)).unwrap();
+        let looks = |cell: u32| own(cell).body.inverse_masses().to_vec() == own(20).body.inverse_masses();
+        let is_known = |cell: u32| Reduction::new(&resting, &patch(cell), 20).unwrap().is_known();
+        let nearest_to_the_side = (4..20).find(|&cell| looks(cell)).unwrap();
+        assert!(!is_known(nearest_to_the_side));
+        assert!(is_known(21));
     }
 
     #[test]

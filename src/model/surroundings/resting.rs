@@ -101,12 +101,15 @@ pub struct RestingBody {
     digest: OnceLock<u64>,
     /// Bases of windows around which a large body looks the same in many places.
     alike: Mutex<HashMap<u64, Arc<Basis>>>,
-    /// Nodes around a patch that answer each for itself.
+    /// Nodes around a patch that are unknowns of their own.
     neighbours: usize,
 }
 
-/// Nodes around a patch that answer each for itself. Beyond them a larger body is coarse.
+/// Nodes around a patch that are unknowns of their own. Beyond them a larger body is coarse.
 const NEIGHBOURS: usize = 2048;
+
+/// Steps in which it is told how far a body goes on beyond a part of it, in extents of the part.
+const FARTHER: f64 = 0.25;
 
 /// What of a large body is around a patch.
 #[derive(Debug)]
@@ -115,14 +118,31 @@ pub(super) struct Around {
     pub(super) body: RestingBody,
     /// The patch in its numbering.
     pub(super) patch: Vec<u32>,
-    /// The place there of each node that can move.
-    places: HashMap<u32, u32>,
+    /// The id of each of its nodes in the whole body.
+    nodes: Vec<u32>,
 }
 
 impl Around {
     /// Adds what of `whole` is beyond, coarsely: those that were held follow it.
     pub(super) fn look_beyond(&mut self, whole: &RestingBody) {
-        self.body.beyond = Some(Beyond::new(&*whole.body, &self.places));
+        let is_movable = |&(_, place): &(u32, u32)| self.body.inverse_masses()[place as usize] > 0.0;
+        let places = self.nodes.iter().copied().zip(0..).filter(is_movable).collect();
+        self.body.beyond = Some(Beyond::new(&*whole.body, &places));
+    }
+
+    /// A number that is the same for a basis of so many states in bodies that are the same but for where they are and for rounding, and
+    /// that go on beyond nearly as far: to steps of a quarter of what is around the patch, up to all of it.
+    pub(super) fn likeness(&self, whole: &RestingBody, states: usize) -> u64 {
+        let gives_way = self.nodes.iter().map(|&node| u64::from(whole.inverse_masses()[node as usize] > 0.0));
+        let [[low, high], [least, most]] = [self.body.rest(), whole.rest()].map(|rest| {
+            let corner =
+                |of: fn(&Vec3, &Vec3) -> Vec3| rest.iter().copied().reduce(|a, b| of(&a, &b)).unwrap_or_default();
+            [corner(Vec3::inf), corner(Vec3::sup)]
+        });
+        let extent = (high - low).max();
+        let beyond = (low - least).iter().chain(&(most - high)).map(|far| far.clamp(0.0, extent)).collect::<Vec<_>>();
+        let steps = beyond.into_iter().map(|far| (far / (FARTHER * extent)).round() as u64);
+        self.body.likeness(&self.patch, states, gives_way.chain(steps))
     }
 }
 
@@ -140,7 +160,7 @@ impl RestingBody {
         Self { body, beyond, couplings, digest, alike, neighbours: NEIGHBOURS }
     }
 
-    /// With so many nodes around a patch that answer each for itself.
+    /// With so many nodes around a patch that are unknowns of their own.
     #[cfg(test)]
     pub(super) fn with_neighbours(self, neighbours: usize) -> Self {
         Self { neighbours, ..self }
@@ -156,10 +176,9 @@ impl RestingBody {
             around = neighbourhood(&*self.body, patch, count)?;
         }
         let Cutout { nodes, body, .. } = self.body.cutout(&around)?;
-        let is_movable = |&(_, place): &(u32, u32)| body.inverse_masses()[place as usize] > 0.0;
-        let places: HashMap<u32, u32> = nodes.into_iter().zip(0..).filter(is_movable).collect();
-        let patch = patch.iter().filter_map(|node| places.get(node).copied()).collect();
-        Some(Around { body: Self::of(body), patch, places })
+        let place: HashMap<u32, u32> = nodes.iter().copied().zip(0..).collect();
+        let patch = patch.iter().filter_map(|node| place.get(node).copied()).collect();
+        Some(Around { body: Self::of(body), patch, nodes })
     }
 
     /// True if `body` has what is needed: a duplicate, and a restriction.
@@ -179,20 +198,20 @@ impl RestingBody {
         *self.digest.get_or_init(|| digest_of(&*self.body))
     }
 
-    /// The basis that was made for surroundings of this [`likeness`](Self::likeness).
+    /// The basis that was made for surroundings of this [`likeness`](Around::likeness).
     pub(super) fn alike(&self, likeness: u64) -> Option<Arc<Basis>> {
         self.alike.lock().unwrap_or_else(PoisonError::into_inner).get(&likeness).cloned()
     }
 
-    /// Keeps `basis` for other windows of this [`likeness`](Self::likeness).
+    /// Keeps `basis` for other windows of this [`likeness`](Around::likeness).
     pub(super) fn keep_alike(&self, likeness: u64, basis: &Basis) {
         let basis = Arc::new(basis.clone());
         self.alike.lock().unwrap_or_else(PoisonError::into_inner).insert(likeness, basis);
     }
 
-    /// A number that is the same for a basis of so many states of `patch` (ids in increasing order) in bodies that are the same but for
-    /// where they are, for rounding, and for what is beyond.
-    pub(super) fn likeness(&self, patch: &[u32], states: usize) -> u64 {
+    /// A number that differs for bases of so many states of `patch` (ids in increasing order) in bodies that differ by more than where they
+    /// are and rounding, and for `more` of them.
+    fn likeness(&self, patch: &[u32], states: usize, more: impl Iterator<Item = u64>) -> u64 {
         let (rest, couplings) = (self.rest(), self.couplings());
         let origin = rest[patch.first().map_or(0, |&node| node as usize)];
         let extent = rest.iter().fold(0.0, |most: f64, x| most.max((x - origin).amax()));
@@ -201,6 +220,7 @@ impl RestingBody {
         let places = rest.iter().flat_map(|x| (0..3).map(|i| alike((x[i] - origin[i]) / extent)));
         words.extend(places.chain(self.inverse_masses().iter().map(|&w| single(w))));
         words.extend([single(extent), single(stiffest), states as u64]);
+        words.extend(more);
         for ((row, column), Coupling { stiffness, damping }) in couplings {
             words.push(u64::from(*row) << 32 | u64::from(*column));
             words.extend(stiffness.iter().chain(damping).map(|x| alike(x / stiffest)));

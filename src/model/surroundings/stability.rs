@@ -3,7 +3,7 @@
 //! An explicit step d of M x'' + C x' + K x = 0 is stable if 4 M - 2 d C - d^2 K is positive definite. Patch, near part and reduced
 //! surroundings together are the body in a subspace: the patch's coordinates and the shapes of the states. On a subspace
 //! a positive definite matrix stays one, whatever patch, shapes and number of states. What is far off in a large body is in a subspace
-//! too, with masses that are only larger for being divided among corners. So the step that was taken for the body, with
+//! too, with masses that are at least what they would be there (`beyond.rs`). So the step that was taken for the body, with
 //! its margin of 1.3, holds for every window that can be made of it, and no window is looked at again before it serves.
 
 use nalgebra::DMatrix;
