@@ -12,7 +12,7 @@ use super::{Guard, Offence, allocator, kernel};
 /// Reads before the thread is armed: the first is made before the start, the others see a dozen resyncs.
 pub const WARM_UP: u64 = 600;
 /// Ticks under guard.
-pub const GUARDED: u64 = 1500;
+pub const GUARDED: u64 = 1000;
 /// When a control commits its offence.
 const OFFENDS_AT: u64 = WARM_UP + 100;
 
