@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::resting::{Coupling, LowerTriangle};
+use super::coupling::{Coupling, LowerTriangle};
 use crate::Vec3;
 use crate::body::{Body, State, TangentBlock};
 
@@ -193,8 +193,9 @@ impl Grid {
 
 #[cfg(test)]
 mod tests {
+    use super::super::coupling::couplings;
     use super::super::far::Far;
-    use super::super::resting::{RestingBody, couplings};
+    use super::super::resting::RestingBody;
     use super::*;
     use crate::body::{Block, BlockBuilder, Shape, Tetrahedra, Tissue, Where};
     use crate::linear_algebra::Matrix;

@@ -1,6 +1,7 @@
 //! The part of a body that does not depend on a patch, linear around its rest state.
 
-use super::resting::{Coupling, RestingBody};
+use super::coupling::Coupling;
+use super::resting::RestingBody;
 use crate::body::Restriction;
 use crate::linear_algebra::{Matrix, SparseFactor, dissection, product_t, push_block};
 use crate::{Mat3, Vec3};

@@ -5,6 +5,7 @@ mod basis;
 mod beyond;
 mod condense;
 mod cost;
+mod coupling;
 mod far;
 mod force_errors;
 mod near;

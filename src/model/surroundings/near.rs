@@ -1,6 +1,6 @@
 //! A patch and what of the body depends on it, linear around rest.
 
-use super::resting::couplings;
+use super::coupling::couplings;
 use crate::body::Restriction;
 use crate::linear_algebra::Matrix;
 

@@ -1,4 +1,0 @@
-#!/usr/bin/env bash
-# The tests compile.
-source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
-cargo test --locked --no-run
