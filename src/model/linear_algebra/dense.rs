@@ -16,6 +16,8 @@ const NUMERICAL_RANK: f64 = 1e-7;
 const DEPENDENT: f64 = 1e-9;
 /// Columns that are eliminated at once.
 const BLOCK: usize = 32;
+/// So many times their root sum of squares eigenvalues are shifted by while they are looked for.
+const SHIFT: f64 = 1.5;
 
 fn view(matrix: &Matrix) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
@@ -77,8 +79,16 @@ pub fn symmetric_eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
     if matrix.is_empty() {
         return Some((Vec::new(), Matrix::zeros(0, 0)));
     }
-    let eigen = SelfAdjointEigen::new(view(matrix), Side::Lower).ok()?;
-    Some((eigen.S().column_vector().iter().copied().collect(), owned(eigen.U())))
+    // Faer 0.24 measures what couples two eigenvalues by these two alone: next to a large one, small ones never come to rest. None is
+    // small once all are shifted.
+    let lower = (0..matrix.ncols()).flat_map(|column| (column..matrix.nrows()).map(move |row| (row, column)));
+    let square: f64 =
+        lower.map(|(row, column)| matrix[(row, column)].powi(2) * if row == column { 1.0 } else { 2.0 }).sum();
+    let shift = SHIFT * square.sqrt();
+    let mut shifted = matrix.clone();
+    (0..matrix.ncols()).for_each(|n| shifted[(n, n)] += shift);
+    let eigen = SelfAdjointEigen::new(view(&shifted), Side::Lower).ok()?;
+    Some((eigen.S().column_vector().iter().map(|value| value - shift).collect(), owned(eigen.U())))
 }
 
 /// U, the singular values in decreasing order and V of A = U S V^T, thin; `None` if a number is not finite.
