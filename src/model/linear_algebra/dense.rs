@@ -73,12 +73,6 @@ fn gram(a: &Matrix) -> Matrix {
 /// # Real-time
 /// Not real-time safe: allocates.
 pub fn symmetric_eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
-    if !is_finite(matrix) {
-        return None;
-    }
-    if matrix.is_empty() {
-        return Some((Vec::new(), Matrix::zeros(0, 0)));
-    }
     // Faer 0.24 measures what couples two eigenvalues by these two alone: next to a large one, small ones never come to rest. None is
     // small once all are shifted.
     let lower = (0..matrix.ncols()).flat_map(|column| (column..matrix.nrows()).map(move |row| (row, column)));
@@ -87,8 +81,22 @@ pub fn symmetric_eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
     let shift = SHIFT * square.sqrt();
     let mut shifted = matrix.clone();
     (0..matrix.ncols()).for_each(|n| shifted[(n, n)] += shift);
-    let eigen = SelfAdjointEigen::new(view(&shifted), Side::Lower).ok()?;
-    Some((eigen.S().column_vector().iter().map(|value| value - shift).collect(), owned(eigen.U())))
+    let (mut values, vectors) = eigen(&shifted)?;
+    values.iter_mut().for_each(|value| *value -= shift);
+    Some((values, vectors))
+}
+
+/// The same without a shift. With it forces by a basis, whose shapes are kept in 16 bits, were up to 0.0055 % off those by what was
+/// rounded, in place of less than 0.005.
+fn eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
+    if !is_finite(matrix) {
+        return None;
+    }
+    if matrix.is_empty() {
+        return Some((Vec::new(), Matrix::zeros(0, 0)));
+    }
+    let eigen = SelfAdjointEigen::new(view(matrix), Side::Lower).ok()?;
+    Some((eigen.S().column_vector().iter().copied().collect(), owned(eigen.U())))
 }
 
 /// U, the singular values in decreasing order and V of A = U S V^T, thin; `None` if a number is not finite.
@@ -144,7 +152,7 @@ pub fn lower_factor(z: &Matrix) -> Matrix {
 /// The left singular vectors of the largest singular values of `matrix`, at most `count`, as columns.
 pub(crate) fn leading_left_singular_vectors(matrix: &Matrix, count: usize) -> Matrix {
     let columns = matrix.ncols();
-    let Some((values, vectors)) = symmetric_eigen(&gram(matrix)) else { return Matrix::zeros(matrix.nrows(), 0) };
+    let Some((values, vectors)) = eigen(&gram(matrix)) else { return Matrix::zeros(matrix.nrows(), 0) };
     let sigma = |n: usize| values[columns - 1 - n].max(0.0).sqrt();
     let count = (0..count.min(columns)).take_while(|&n| sigma(n) > NUMERICAL_RANK * sigma(0)).count();
     product(matrix, &Matrix::from_fn(columns, count, |row, n| vectors[(row, columns - 1 - n)] / sigma(n)))
@@ -154,21 +162,21 @@ pub(crate) fn leading_left_singular_vectors(matrix: &Matrix, count: usize) -> Ma
 /// is the smallest part that `count` columns can leave out.
 pub(crate) fn leading_combinations(matrix: Matrix, count: usize) -> Matrix {
     let count = count.min(matrix.ncols());
-    let Some((_, vectors)) = symmetric_eigen(&gram(&matrix)) else { return matrix };
+    let Some((_, vectors)) = eigen(&gram(&matrix)) else { return matrix };
     product(&matrix, &vectors.columns(matrix.ncols() - count, count).into_owned())
 }
 
 /// The modes of the symmetric pencil (`stiffness`, `mass`) in the directions that `mass` can tell apart: T with
 /// T^T M T = I and T^T K T diagonal, and the diagonal. `None` if a number is not finite.
 pub(crate) fn modes(mass: &Matrix, stiffness: &Matrix) -> Option<(Matrix, Vec<f64>)> {
-    let (values, mut white) = symmetric_eigen(mass)?;
+    let (values, mut white) = eigen(mass)?;
     let largest = values.last().copied().unwrap_or(0.0);
     let dependent = values.iter().take_while(|&&value| value <= DEPENDENT * largest).count();
     white = white.remove_columns(0, dependent);
     for (mut vector, value) in white.column_iter_mut().zip(&values[dependent..]) {
         vector /= value.sqrt();
     }
-    let (values, vectors) = symmetric_eigen(&product_t(&white, &product(stiffness, &white)))?;
+    let (values, vectors) = eigen(&product_t(&white, &product(stiffness, &white)))?;
     Some((product(&white, &vectors), values))
 }
 
