@@ -18,7 +18,7 @@ mod tetrahedra;
 pub use block::{Block, BlockBuilder};
 pub use cutout::Cutout;
 pub use kernel::InstructionSet;
-pub(crate) use neighbourhood::neighbourhood;
+pub(crate) use neighbourhood::{bounds, neighbourhood};
 pub use network::{SpringNetwork, SpringNetworkBuilder};
 pub use region::Region;
 pub use restriction::Restriction;

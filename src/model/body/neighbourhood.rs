@@ -6,6 +6,15 @@ use crate::Vec3;
 /// Of a wide patch the neighbourhood has so many times its nodes at least: else it would be little more than the patch.
 const SPREAD: usize = 4;
 
+/// The least and the greatest corner of the box around `points`, both at 0 if there are none.
+///
+/// # Real-time
+/// Bounded, by the points; does not allocate.
+pub(crate) fn bounds<'a>(points: impl Iterator<Item = &'a Vec3> + Clone) -> [Vec3; 2] {
+    let corner = |of: fn(&Vec3, &Vec3) -> Vec3| points.clone().copied().reduce(|a, b| of(&a, &b)).unwrap_or_default();
+    [corner(Vec3::inf), corner(Vec3::sup)]
+}
+
 /// The nodes of `body` that can move and are nearest to `patch` at rest, at most about `count` or four times as many as the patch has,
 /// in increasing order: those in a box that reaches equally far beyond the patch on all sides. `None` if those are all that can move.
 ///
@@ -18,10 +27,7 @@ pub(crate) fn neighbourhood(body: &dyn Body, patch: &[u32], count: usize) -> Opt
     if all <= count {
         return None;
     }
-    let corner = |of: fn(&Vec3, &Vec3) -> Vec3| {
-        patch.iter().map(|&node| rest[node as usize]).reduce(|a, b| of(&a, &b)).unwrap_or_default()
-    };
-    let (low, high) = (corner(Vec3::inf), corner(Vec3::sup));
+    let [low, high] = bounds(patch.iter().map(|&node| &rest[node as usize]));
     let beyond = |x: &Vec3| (low - x).max().max((x - high).max()).max(0.0);
     let mut distances: Vec<f64> = movable().map(|node| beyond(&rest[node])).collect();
     let (_, &mut reach, _) = distances.select_nth_unstable_by(count, f64::total_cmp);

@@ -16,7 +16,8 @@ const NUMERICAL_RANK: f64 = 1e-7;
 const DEPENDENT: f64 = 1e-9;
 /// Columns that are eliminated at once.
 const BLOCK: usize = 32;
-/// So many times their root sum of squares eigenvalues are shifted by while they are looked for.
+/// So many times a matrix's norm its eigenvalues are shifted by while they are looked for: more than the least is below 0, also where
+/// one triangle alone was written.
 const SHIFT: f64 = 1.5;
 
 fn view(matrix: &Matrix) -> MatRef<'_, f64> {
@@ -75,10 +76,7 @@ fn gram(a: &Matrix) -> Matrix {
 pub fn symmetric_eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
     // Faer 0.24 measures what couples two eigenvalues by these two alone: next to a large one, small ones never come to rest. None is
     // small once all are shifted.
-    let lower = (0..matrix.ncols()).flat_map(|column| (column..matrix.nrows()).map(move |row| (row, column)));
-    let square: f64 =
-        lower.map(|(row, column)| matrix[(row, column)].powi(2) * if row == column { 1.0 } else { 2.0 }).sum();
-    let shift = SHIFT * square.sqrt();
+    let shift = SHIFT * matrix.norm();
     let mut shifted = matrix.clone();
     (0..matrix.ncols()).for_each(|n| shifted[(n, n)] += shift);
     let (mut values, vectors) = eigen(&shifted)?;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::coupling::{Coupling, LowerTriangle};
 use crate::Vec3;
-use crate::body::{Body, State, TangentBlock};
+use crate::body::{Body, State, TangentBlock, bounds};
 
 /// Boxes of the grid, at most about.
 const BOXES: f64 = 700.0;
@@ -109,10 +109,8 @@ struct Grid {
 impl Grid {
     /// Of boxes that are as long as wide where the points are: along an axis where they reach less far than that there is one.
     fn over(points: &[Vec3]) -> Self {
-        let corner =
-            |of: fn(&Vec3, &Vec3) -> Vec3| points.iter().copied().reduce(|a, b| of(&a, &b)).unwrap_or_default();
-        let low = corner(Vec3::inf);
-        let extents = corner(Vec3::sup) - low;
+        let [low, high] = bounds(points.iter());
+        let extents = high - low;
         let is_flat = |axis: usize| extents[axis] <= FLAT * extents.max();
         let boxes = (points.len() as f64 / IN_BOX).min(BOXES);
         let mut divided: Vec<usize> = (0..3).filter(|&axis| !is_flat(axis)).collect();
@@ -125,17 +123,11 @@ impl Grid {
                 break edge;
             }
         };
-        let count = |axis: usize| match () {
-            () if divided.contains(&axis) => (extents[axis] / edge).round() as usize + 1,
-            () => {
-                if is_flat(axis) {
-                    1
-                } else {
-                    2
-                }
-            }
+        let boxes_along = |axis: usize| match divided.contains(&axis) {
+            true => (extents[axis] / edge).round() as usize,
+            false => usize::from(!is_flat(axis)),
         };
-        let counts = [0, 1, 2].map(count);
+        let counts = [0, 1, 2].map(|axis| boxes_along(axis) + 1);
         let edges = Vec3::from_fn(|axis, _| extents[axis] / (counts[axis] - 1).max(1) as f64);
         Self { low, edges, counts }
     }

@@ -7,7 +7,7 @@ use super::basis::Basis;
 use super::beyond::Beyond;
 use super::coupling::{Coupling, couplings};
 use crate::Vec3;
-use crate::body::{Body, Cutout, Restriction, State, neighbourhood};
+use crate::body::{Body, Cutout, Restriction, State, bounds, neighbourhood};
 
 /// A body around its rest state: sparse stiffness, damping and masses, and the body itself for its restrictions.
 #[derive(Debug)]
@@ -53,11 +53,7 @@ impl Around {
     /// that go on beyond nearly as far: to steps of a quarter of what is around the patch, up to all of it.
     pub(super) fn likeness(&self, whole: &RestingBody, states: usize) -> u64 {
         let gives_way = self.nodes.iter().map(|&node| u64::from(whole.inverse_masses()[node as usize] > 0.0));
-        let [[low, high], [least, most]] = [self.body.rest(), whole.rest()].map(|rest| {
-            let corner =
-                |of: fn(&Vec3, &Vec3) -> Vec3| rest.iter().copied().reduce(|a, b| of(&a, &b)).unwrap_or_default();
-            [corner(Vec3::inf), corner(Vec3::sup)]
-        });
+        let [[low, high], [least, most]] = [self.body.rest(), whole.rest()].map(|rest| bounds(rest.iter()));
         let extent = (high - low).max();
         let beyond = (low - least).iter().chain(&(most - high)).map(|far| far.clamp(0.0, extent)).collect::<Vec<_>>();
         let steps = beyond.into_iter().map(|far| (far / (FARTHER * extent)).round() as u64);

@@ -1,7 +1,7 @@
 //! The part of a body that a patch holds, in compact numbering.
 
 use crate::Vec3;
-use crate::body::Body;
+use crate::body::{Body, bounds};
 use crate::contact::{Contact, Skin, Touch};
 use crate::mesh::Surface;
 
@@ -191,9 +191,8 @@ impl Window {
 
     /// The diagonal of the box around the patch whose nodes are at `rest` (m).
     pub(in crate::local) fn extent(&self, rest: &[Vec3]) -> f64 {
-        let places = || self.nodes[..self.movable].iter().map(|&node| rest[node as usize]);
-        let corner = |of: fn(&Vec3, &Vec3) -> Vec3| places().reduce(|a, b| of(&a, &b)).unwrap_or_default();
-        (corner(Vec3::sup) - corner(Vec3::inf)).norm()
+        let [low, high] = bounds(self.nodes[..self.movable].iter().map(|&node| &rest[node as usize]));
+        (high - low).norm()
     }
 
     /// Copies the window's share of a global array.
