@@ -12,6 +12,9 @@ use zenoh::Config;
 /// time (its issue 2557). This has both done on one thread.
 pub const TLS_RUNTIME: &str = "(rx: (handover: tx))";
 
+/// A peer from which nothing has come for so long (ms) is gone.
+pub(crate) const LEASE_MS: u32 = 2000;
+
 /// What a message over zenoh may come to at most (bytes): a little more than any of the engine's.
 const MOST_BYTES: usize = palpate::link::LARGEST + 1024;
 
@@ -109,12 +112,13 @@ impl Access {
             ("scouting/gossip/enabled", "false"),
             ("timestamping/enabled", "false"),
             ("adminspace/enabled", "false"),
-            // A peer that is gone is noticed soon.
-            ("transport/link/tx/lease", "2000"),
-            // Who pushes into a dead connection holds up all others meanwhile, and may hold the routing tables: for so long (us) at most.
-            ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
         ];
         all.extend(common.map(|(key, value)| (key, value.to_owned())));
+        all.push(("transport/link/tx/lease", LEASE_MS.to_string()));
+        // Who pushes into a dead connection waits no longer (us) than it takes to notice that. A line that is only slow is not broken: one that
+        // loses packets, or has just begun over a long way, may take nothing for a second.
+        let pushes_for = (1000 * LEASE_MS).to_string();
+        all.push(("transport/link/tx/queue/congestion_control/block/wait_before_close", pushes_for));
         all.push(("transport/link/rx/max_message_size", MOST_BYTES.to_string()));
         if let Some(Tls { authority, certificate, key }) = &self.tls {
             for (name, file) in [

@@ -11,10 +11,12 @@ use zenoh::{Config, Wait};
 
 use crate::desk::Answer;
 use crate::inbox::Inbox;
-use crate::line::{HELLO, LINES, Line, Lines, Way};
+use crate::line::{HELLO, Hears, LINES, Line, Lines, Way};
 
 /// An answer to hello is waited for so long.
-pub(crate) const ANSWERS_WITHIN: Duration = Duration::from_millis(700);
+const ANSWERS_WITHIN: Duration = Duration::from_millis(700);
+/// Where zenoh knows of nobody who could answer yet.
+const ASKS_AGAIN_AFTER: Duration = Duration::from_millis(10);
 /// Round trips of which the quickest counts.
 const ROUND_TRIPS: usize = 5;
 #[derive(Debug)]
@@ -55,7 +57,7 @@ impl Connection {
     pub(crate) fn round_trip(&self) -> Nanos {
         let trip = |_| {
             let began = Instant::now();
-            ask(self.zenoh(), Vec::new(), ANSWERS_WITHIN).map(|_| began.elapsed())
+            ask_first(self.zenoh(), &[]).map(|_| began.elapsed())
         };
         let quickest = (0..ROUND_TRIPS).filter_map(trip).min().unwrap_or_default();
         Nanos(u64::try_from(quickest.as_nanos()).unwrap_or(u64::MAX))
@@ -87,7 +89,7 @@ impl OwnLine {
     /// If nobody is there, or zenoh or the system refuses.
     pub(crate) fn open(config: &Config, session: u64, number: usize, inbox: &Arc<Inbox>) -> Result<Self, Error> {
         let zenoh = open(config)?;
-        Ok(Self { number, line: Line::new(&zenoh, session, number, Way::Up, inbox)?, zenoh })
+        Ok(Self { number, line: Line::new(&zenoh, session, number, (Way::Up, Hears::All), inbox)?, zenoh })
     }
 }
 
@@ -100,12 +102,14 @@ pub(crate) struct Replaced {
 
 /// The lines that have no connection of their own [among](Connection::by_line) these, or one at whose other end nobody is.
 pub(crate) fn lacking(by_line: &[zenoh::Session]) -> Vec<usize> {
-    let is_broken = |zenoh: &zenoh::Session| {
-        let info = zenoh.info();
-        info.routers_zid().wait().next().is_none() && info.peers_zid().wait().next().is_none()
-    };
     let is_own = |line: usize| line == 0 || by_line[line].zid() != by_line[0].zid();
     (0..by_line.len()).filter(|&line| !is_own(line) || is_broken(&by_line[line])).collect()
+}
+
+/// True if nobody is at the other end any more.
+pub(crate) fn is_broken(zenoh: &zenoh::Session) -> bool {
+    let info = zenoh.info();
+    info.routers_zid().wait().next().is_none() && info.peers_zid().wait().next().is_none()
 }
 
 /// One connection.
@@ -122,15 +126,37 @@ pub(crate) fn in_background(name: &str, work: impl FnOnce() + Send + 'static) ->
     std::thread::Builder::new().name(name.to_owned()).spawn(work).ok()
 }
 
-/// Says hello; `None` if nobody answers within that time.
+/// Says hello over a connection that may be new; `None` if nobody answers in time.
+pub(crate) fn say_first(zenoh: &zenoh::Session, hello: &Hello) -> Option<Answer> {
+    ask_first(zenoh, &written(hello))
+}
+
+/// Asks over a connection that may be new: for a round trip and more it knows of nobody who answers, and zenoh says at once that there is
+/// none.
+fn ask_first(zenoh: &zenoh::Session, question: &[u8]) -> Option<Answer> {
+    let began = Instant::now();
+    loop {
+        let answer = ask(zenoh, question, ANSWERS_WITHIN);
+        if answer.is_some() || began.elapsed() > ANSWERS_WITHIN {
+            return answer;
+        }
+        std::thread::sleep(ASKS_AGAIN_AFTER);
+    }
+}
+
+/// Says hello over a connection that has been at work; `None` if nobody answers within that time.
 pub(crate) fn say(zenoh: &zenoh::Session, hello: &Hello, within: Duration) -> Option<Answer> {
+    ask(zenoh, &written(hello), within)
+}
+
+fn written(hello: &Hello) -> Vec<u8> {
     let mut bytes = Vec::new();
     hello.write(&mut bytes);
-    ask(zenoh, bytes, within)
+    bytes
 }
 
 /// Asks the global side; `None` if nobody answers in time.
-fn ask(zenoh: &zenoh::Session, question: Vec<u8>, within: Duration) -> Option<Answer> {
+fn ask(zenoh: &zenoh::Session, question: &[u8], within: Duration) -> Option<Answer> {
     let replies = zenoh.get(HELLO).payload(question).timeout(within).wait().ok()?;
     let reply = replies.recv_timeout(2 * within).ok()??;
     match reply.result() {

@@ -1,6 +1,5 @@
 //! The haptic side: says hello, waits for the first model, and comes back after whatever breaks.
 
-use std::net::{SocketAddr, ToSocketAddrs};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -11,9 +10,10 @@ use palpate::{Error, ErrorKind};
 use zenoh::Config;
 
 use crate::access::Access;
-use crate::connection::{ANSWERS_WITHIN, Connection, say};
+use crate::connection::{Connection, is_broken, say_first};
 use crate::desk::Answer;
 use crate::keeper::{Keeper, LOOK, Shared};
+use crate::sockets::places;
 use crate::{machine, unique};
 
 /// How long the first model is waited for.
@@ -74,7 +74,7 @@ impl GlobalSide {
                 std::thread::sleep(LOOK);
                 continue;
             };
-            match say(open.zenoh(), hello, ANSWERS_WITHIN) {
+            match say_first(open.zenoh(), hello) {
                 Some(Answer::Welcome(peer)) => {
                     is_welcome = true;
                     self.shared.kept().peer = peer;
@@ -95,9 +95,13 @@ impl GlobalSide {
                 }
                 Some(Answer::Wait | Answer::Taken(_)) => {}
                 Some(Answer::No(why)) => return Err(self.error(format!("refuses: {why}"))),
-                // What is on its way behind a lot else is waited for.
-                None if inbox.models() > 0 => {}
-                None => connection = None,
+                // Over another connection nobody would send again what was on its way here: it is begun anew.
+                None if is_broken(open.zenoh()) => {
+                    (connection, is_welcome) = (None, false);
+                    hello.session = unique();
+                }
+                // An answer may be on its way behind a lot else.
+                None => {}
             }
             let looked = Instant::now();
             while looked.elapsed() < LOOKS_FOR {
@@ -110,12 +114,6 @@ impl GlobalSide {
         }
         let (seconds, not) = (FIRST_MODEL.as_secs(), if is_welcome { "sends no model" } else { "does not answer" });
         Err(self.error(format!("{not} within {seconds} s: is `palpate serve` at work there, with this scene?")))
-    }
-
-    /// Where it may be reached.
-    fn places(&self) -> Vec<SocketAddr> {
-        let place = self.address.split_once('/').map_or("", |(_, place)| place);
-        place.to_socket_addrs().map(Iterator::collect).unwrap_or_default()
     }
 
     fn error(&self, message: String) -> Error {
@@ -138,7 +136,7 @@ impl Transport for GlobalSide {
         let mut hello = Hello { machine: machine(), session: unique(), ..hello.clone() };
         let connection = self.wait_for_models(&mut hello)?;
         self.shared.kept().connection = Some(connection);
-        let keeper = Keeper::new(Arc::clone(&self.shared), self.config.clone(), self.places(), hello);
+        let keeper = Keeper::new(Arc::clone(&self.shared), self.config.clone(), places(&self.address), hello);
         let keeper = std::thread::Builder::new().name("link keeper".to_owned()).spawn(move || keeper.keep());
         self.keeper = Some(keeper.map_err(|error| self.error(format!("gets no thread here: {error}")))?);
         Ok(())

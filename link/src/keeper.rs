@@ -10,10 +10,11 @@ use palpate::Error;
 use palpate::link::Hello;
 use zenoh::Config;
 
-use crate::connection::{ANSWERS_WITHIN, Connection, OwnLine, in_background, lacking, say};
+use crate::connection::{Connection, OwnLine, in_background, lacking, say, say_first};
 use crate::desk::Answer;
 use crate::inbox::Inbox;
 use crate::line::LINES;
+use crate::sockets::limit_waiting;
 use crate::unique;
 
 /// A link that has been silent for so long is asked whether somebody is there: there may be another process by now.
@@ -165,6 +166,8 @@ impl Keeper {
             return;
         }
         self.completed = Some(Instant::now());
+        // Those that zenoh opened since then, on its own too.
+        limit_waiting(&self.places);
         let by_line = self.shared.kept().connection.as_ref().map(Connection::by_line);
         let mut lacking = by_line.iter().flat_map(|by_line| lacking(by_line));
         if let Some(number) = lacking.find(|&number| self.opening[number].is_none()) {
@@ -220,7 +223,7 @@ impl Keeper {
         let old = self.shared.kept().connection.replace(connection);
         // Closing may wait for a peer that is not there.
         in_background("link closing", move || drop(old));
-        if let Some(Answer::Welcome(peer)) = say(&session, &self.hello, ANSWERS_WITHIN) {
+        if let Some(Answer::Welcome(peer)) = say_first(&session, &self.hello) {
             self.shared.kept().peer = peer;
             self.reopened = Some(Instant::now());
         }

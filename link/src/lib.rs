@@ -29,6 +29,7 @@ mod keys;
 mod line;
 mod outbox;
 mod server;
+mod sockets;
 
 pub use access::{Access, TLS_RUNTIME};
 pub use haptic::GlobalSide;

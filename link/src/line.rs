@@ -1,7 +1,7 @@
 //! The lines of a session: names, what goes out under them and what comes in.
 //!
 //! Over TCP whatever comes after a lost packet waits for it to come again, for a round trip and more. So there are several lines, each over
-//! a connection of its own as soon as that is there. Local models, of which hardly one is without a loss, go by all of them, and the first to
+//! a connection of its own as soon as that is there. Local models, of which hardly one is without a loss, go by all that have one, and the first to
 //! arrive is taken. Of the rest each message goes by one line, and those that go by the others do not wait for it: bases, which are long, all by the
 //! last one. Tool ticks, which repeat the last ones, are there in time whichever line is held up.
 
@@ -44,6 +44,20 @@ impl Way {
     }
 }
 
+/// What is taken of what comes by a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Hears {
+    All,
+    /// All but what goes by the other lines too.
+    WhatGoesOnce,
+}
+
+impl Hears {
+    fn names(self) -> &'static str {
+        if self == Self::All { "*/*" } else { "once/*" }
+    }
+}
+
 /// A session's messages over zenoh: gone when they are dropped.
 #[derive(Debug)]
 pub(crate) struct Lines {
@@ -58,7 +72,9 @@ impl Lines {
     /// # Errors
     /// If zenoh or the system refuses.
     pub(crate) fn new(zenoh: &zenoh::Session, session: u64, way: Way, inbox: &Arc<Inbox>) -> Result<Self, Error> {
-        let lines = (0..LINES).map(|number| Line::new(zenoh, session, number, way, inbox));
+        // Over one connection the copies of a model would only hold each other up.
+        let hears = |number| if number == 0 { Hears::All } else { Hears::WhatGoesOnce };
+        let lines = (0..LINES).map(|number| Line::new(zenoh, session, number, (way, hears(number)), inbox));
         Ok(Self { lines: lines.collect::<Result<_, _>>()?, sent: 0 })
     }
 
@@ -109,7 +125,7 @@ impl Line {
         zenoh: &zenoh::Session,
         session: u64,
         number: usize,
-        way: Way,
+        (way, hears): (Way, Hears),
         inbox: &Arc<Inbox>,
     ) -> Result<Self, Error> {
         let [out, back] = [way, way.back()].map(|way| way.prefix(session, number));
@@ -120,7 +136,7 @@ impl Line {
                 inbox.put(&payload.to_bytes());
             }
         };
-        let coming = zenoh.declare_subscriber(format!("{back}/*")).callback(keep).wait();
+        let coming = zenoh.declare_subscriber(format!("{back}/{}", hears.names())).callback(keep).wait();
         let subscriber = coming.map_err(|error| Error::new(ErrorKind::Runtime, format!("zenoh: {error}")))?;
         Ok(Self { outbox: Outbox::new(zenoh, &out)?, _subscriber: subscriber })
     }

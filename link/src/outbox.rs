@@ -16,16 +16,16 @@ const STACK: usize = 512 << 10;
 /// Messages of a lane that wait at most: of more, the oldest is dropped.
 const MOST_WAITING: usize = 256;
 
-/// How the lanes go, the most urgent first.
+/// How the lanes go, the most urgent first, and whether by all lines or once.
 ///
 /// A blocking message can stall a dropping one of its own priority (zenoh issue 2584), so each lane has a priority and a thread of its own.
 /// Ticks that cannot go at once are worth nothing a moment later. Everything else goes at the pace of the line; dropped half way, as
 /// zenoh does with what takes longer than 50 ms, it would never arrive over a slow one.
 const LANES: [(&str, Priority, CongestionControl); Lane::COUNT] = [
-    ("urgent", Priority::RealTime, CongestionControl::Drop),
-    ("model", Priority::InteractiveHigh, CongestionControl::Block),
-    ("bulk", Priority::DataLow, CongestionControl::Block),
-    ("pictures", Priority::Background, CongestionControl::Block),
+    ("once/urgent", Priority::RealTime, CongestionControl::Drop),
+    ("all/model", Priority::InteractiveHigh, CongestionControl::Block),
+    ("once/bulk", Priority::DataLow, CongestionControl::Block),
+    ("once/pictures", Priority::Background, CongestionControl::Block),
 ];
 
 /// The sending half of a line; its threads end when it is dropped.
@@ -58,7 +58,9 @@ impl Outbox {
             let publisher = publisher.priority(priority).congestion_control(congestion).express(true).wait();
             let publisher = publisher.map_err(|error| Error::new(ErrorKind::Runtime, format!("zenoh: {error}")))?;
             let queue = Arc::clone(queue);
-            let thread = std::thread::Builder::new().name(format!("link {name}")).stack_size(STACK);
+            let thread = std::thread::Builder::new()
+                .name(format!("link {}", name.rsplit('/').next().unwrap_or(name)))
+                .stack_size(STACK);
             let started = thread.spawn(move || queue.send(&publisher));
             started.map_err(|error| Error::new(ErrorKind::Runtime, format!("no thread for the link: {error}")))?;
         }

@@ -13,6 +13,7 @@ use crate::access::Access;
 use crate::desk::{Arrival, Desk, Guest};
 use crate::inbox::Inbox;
 use crate::line::{HELLO, Lines, Way};
+use crate::sockets::{limit_waiting, places};
 
 /// Between two looks whether somebody has come, or whoever serves wants to end.
 const LOOK: Duration = Duration::from_millis(50);
@@ -54,6 +55,7 @@ pub fn serve(
     let desk = Arc::new(Desk::new(ready.hello().clone()));
     let refused = |error: zenoh::Error| Error::new(ErrorKind::Runtime, format!("cannot listen: {error}")).at(address);
     let zenoh = zenoh::open(config).wait().map_err(refused)?;
+    limit_waiting(&places(address));
     let asked = Arc::clone(&desk);
     let answer = move |query: zenoh::query::Query| {
         let question = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
