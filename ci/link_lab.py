@@ -191,7 +191,7 @@ def scene_of(name, out, link=None, latency_ms=0, seed=1):
     if link:
         place = next(place for place, line in enumerate(lines) if line.startswith("[global]"))
         lines.insert(place + 1, f"compute_latency_ms = {latency_ms}")
-        lines += ["[link]", f"delay_ms = {link[0]}", f"loss = {link[1] / 100}", "in_order = true", f"seed = {seed}"]
+        lines += ["[link]", f"delay_ms = {link[0]}", f"loss = {link[1] / 100}", "tcp = true", f"seed = {seed}"]
     path = out / f"{name}{'-link' if link else ''}.toml"
     path.write_text("\n".join(lines) + "\n")
     return path

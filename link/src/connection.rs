@@ -4,14 +4,14 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use palpate::link::Hello;
+use palpate::link::{Hello, LINES};
 use palpate::runtime::Nanos;
 use palpate::{Error, ErrorKind};
 use zenoh::{Config, Wait};
 
 use crate::desk::Answer;
 use crate::inbox::Inbox;
-use crate::line::{HELLO, Hears, LINES, Line, Lines, Way};
+use crate::line::{HELLO, Hears, Line, Lines, Way};
 
 /// An answer to hello is waited for so long.
 const ANSWERS_WITHIN: Duration = Duration::from_millis(700);

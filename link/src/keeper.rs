@@ -7,13 +7,12 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use palpate::Error;
-use palpate::link::Hello;
+use palpate::link::{Hello, LINES};
 use zenoh::Config;
 
 use crate::connection::{Connection, OwnLine, in_background, lacking, say, say_first};
 use crate::desk::Answer;
 use crate::inbox::Inbox;
-use crate::line::LINES;
 use crate::sockets::limit_waiting;
 use crate::unique;
 

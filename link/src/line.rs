@@ -1,14 +1,10 @@
 //! The lines of a session: names, what goes out under them and what comes in.
 //!
-//! Over TCP whatever comes after a lost packet waits for it to come again, for a round trip and more. So there are several lines, each over
-//! a connection of its own as soon as that is there. Local models, of which hardly one is without a loss, go by all that have one, and the first to
-//! arrive is taken. Of the rest each message goes by one line, and those that go by the others do not wait for it: bases, which are long, all by the
-//! last one. Tool ticks, which repeat the last ones, are there in time whichever line is held up.
+//! By which of them a message goes [its lane](Lane::lines) says. Each has a connection of its own as soon as that is there.
 
 use std::sync::Arc;
 
-use palpate::link::Lane;
-use palpate::random::uniform;
+use palpate::link::{LINES, Lane};
 use palpate::{Error, ErrorKind};
 use zenoh::Wait;
 use zenoh::bytes::ZBytes;
@@ -16,9 +12,6 @@ use zenoh::pubsub::Subscriber;
 
 use crate::inbox::Inbox;
 use crate::outbox::Outbox;
-
-/// Lines of a session.
-pub(crate) const LINES: usize = 3;
 
 /// What the haptic side says hello to.
 pub(crate) const HELLO: &str = "palpate/hello";
@@ -62,7 +55,7 @@ impl Hears {
 #[derive(Debug)]
 pub(crate) struct Lines {
     lines: Vec<Line>,
-    /// Messages that went by one line each.
+    /// Messages that had to go.
     sent: u64,
 }
 
@@ -91,20 +84,10 @@ impl Lines {
     /// Hands over a message; never waits for the network.
     pub(crate) fn put(&mut self, lane: Lane, message: &[u8]) {
         let message = ZBytes::from(message);
-        if lane == Lane::Models {
-            self.lines.iter().for_each(|line| line.outbox.put(lane, message.clone()));
-            return;
-        }
-        let line = if lane == Lane::Bulk {
-            // All by one: what is long holds up the models behind it.
-            self.lines.last()
-        } else {
-            // By chance: in turn, those of one of three tools would all go by the same line.
-            self.sent += 1;
-            self.lines.get((uniform(0, self.sent) * self.lines.len() as f64) as usize)
-        };
-        if let Some(line) = line {
-            line.outbox.put(lane, message);
+        self.sent += 1;
+        // None once it is over.
+        for line in self.lines.get(lane.lines(self.sent)).into_iter().flatten() {
+            line.outbox.put(lane, message.clone());
         }
     }
 }

@@ -13,7 +13,7 @@ mod virtual_link;
 
 pub use clock::Clock;
 pub use hello::Hello;
-pub use lane::Lane;
+pub use lane::{LINES, Lane};
 pub use message::{Header, LARGEST, MOST_TICKS, Message, Refused, VERSION};
 pub use transport::Transport;
 pub use virtual_link::{Conditions, VirtualEnd, VirtualLink};

@@ -2,13 +2,14 @@
 //!
 //! A line that is as wide as it is said to be takes packets of [`PACKET`] bytes, of the most urgent message first. A message of one packet
 //! that is lost is lost. Of a longer one the packets that are lost are sent again, as a transport of whole messages does: each time that
-//! takes one more round trip. What is repeated takes no room on the line. A line that keeps the order, as TCP does, repeats short messages
-//! too, and whatever comes later waits for them.
+//! takes one more round trip. What is repeated takes no room on the line. Over TCP messages go by several lines, as over a real link, short ones are
+//! repeated too, and whatever comes later by the same line waits for them.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::{Lane, Transport};
+use super::{LINES, Lane, Transport};
 use crate::random::uniform;
 use crate::runtime::Nanos;
 
@@ -34,8 +35,9 @@ pub struct Conditions {
     pub duplicate: f64,
     /// Share of messages that are held back for one more delay, so that later ones overtake them.
     pub reorder: f64,
-    /// All comes in the order in which it went, and nothing that a repeat can bring is lost.
-    pub in_order: bool,
+    /// As over connections of TCP, one for each [line](Lane::lines): what comes by one comes in the order in which it went, and nothing that a
+    /// repeat can bring is lost.
+    pub tcp: bool,
     /// Bits per second that the line takes; all at once if absent.
     pub bits_per_s: Option<f64>,
     /// Times in which nothing comes through: from, and until.
@@ -77,9 +79,9 @@ impl Transport for VirtualEnd {
         let way = &mut ways[side];
         if *has_begun {
             way.pump(conditions, now);
-            way.wait(lane, message, now);
+            way.wait(conditions, lane, message, now);
         } else {
-            way.arrive(now, message.to_vec());
+            way.arrive(now, 0, message.to_vec());
         }
     }
 
@@ -118,13 +120,16 @@ struct Way {
     /// By time, and by number where times are equal.
     arriving: BTreeMap<(Nanos, u64), Vec<u8>>,
     arrived: u64,
-    /// When the latest of them comes.
-    latest: Nanos,
+    /// When the latest of them comes, by each line.
+    latest: [Nanos; LINES],
+    /// Messages that had to go.
+    sent: u64,
 }
 
 #[derive(Debug)]
 struct Waiting {
     message: Vec<u8>,
+    lines: Range<usize>,
     since: Nanos,
     /// Bytes that have not gone yet.
     left: usize,
@@ -133,7 +138,16 @@ struct Waiting {
 impl Way {
     fn new(seed: u64) -> Self {
         let (lanes, arriving) = Default::default();
-        Self { seed, drawn: 0, lanes, free_at: Nanos::ZERO, arriving, arrived: 0, latest: Nanos::ZERO }
+        Self {
+            seed,
+            drawn: 0,
+            lanes,
+            free_at: Nanos::ZERO,
+            arriving,
+            arrived: 0,
+            latest: [Nanos::ZERO; LINES],
+            sent: 0,
+        }
     }
 
     fn draw(&mut self) -> f64 {
@@ -141,7 +155,9 @@ impl Way {
         uniform(self.seed, self.drawn)
     }
 
-    fn wait(&mut self, lane: Lane, message: &[u8], now: Nanos) {
+    fn wait(&mut self, conditions: &Conditions, lane: Lane, message: &[u8], now: Nanos) {
+        let lines = if conditions.tcp { lane.lines(self.sent) } else { 0..1 };
+        self.sent += 1;
         let waiting = &mut self.lanes[lane as usize];
         if lane.keeps_the_newest() {
             // One that has begun to go goes on.
@@ -150,7 +166,7 @@ impl Way {
         if waiting.len() >= MOST_WAITING {
             waiting.pop_front();
         }
-        waiting.push_back(Waiting { message: message.to_vec(), since: now, left: message.len() });
+        waiting.push_back(Waiting { message: message.to_vec(), lines, since: now, left: message.len() });
     }
 
     /// Lets go what has its turn until `now`.
@@ -163,24 +179,25 @@ impl Way {
             let Some(first) = lane.front_mut() else { return };
             let packet = first.left.min(PACKET);
             first.left -= packet;
-            let takes = conditions.bits_per_s.map_or(0.0, |rate| packet as f64 * 8.0 / rate);
+            let bits = 8.0 * (packet * first.lines.len()) as f64;
+            let takes = conditions.bits_per_s.map_or(0.0, |rate| bits / rate);
             self.free_at = at + Nanos::from_secs_f64(takes);
             if first.left == 0
                 && let Some(gone) = lane.pop_front()
             {
-                self.carry(conditions, gone.message);
+                gone.lines.for_each(|line| self.carry(conditions, line, &gone.message));
             }
         }
     }
 
-    /// The last packet of `message` has gone.
-    fn carry(&mut self, conditions: &Conditions, message: Vec<u8>) {
+    /// The last packet of `message` has gone by that line.
+    fn carry(&mut self, conditions: &Conditions, line: usize, message: &[u8]) {
         let gone = self.free_at;
         let is_down = conditions.down.iter().any(|&[from, until]| from <= gone && gone < until);
         let packets = message.len().div_ceil(PACKET).max(1);
         let lose = |way: &mut Self, packets: usize| (0..packets).filter(|_| way.draw() < conditions.loss).count();
         let (mut lost, mut repeats) = (lose(self, packets), 0);
-        while (packets > 1 || conditions.in_order) && lost > 0 && repeats < MOST_REPEATS {
+        while (packets > 1 || conditions.tcp) && lost > 0 && repeats < MOST_REPEATS {
             lost = lose(self, lost);
             repeats += 1;
         }
@@ -192,14 +209,14 @@ impl Way {
             let jitter = Nanos((conditions.jitter.0 as f64 * self.draw()) as u64);
             if lost == 0 && !is_down {
                 let at = gone + conditions.delay + jitter + back + repeated;
-                self.arrive(if conditions.in_order { at.max(self.latest) } else { at }, message.clone());
+                self.arrive(if conditions.tcp { at.max(self.latest[line]) } else { at }, line, message.to_vec());
             }
         }
     }
 
-    fn arrive(&mut self, at: Nanos, message: Vec<u8>) {
+    fn arrive(&mut self, at: Nanos, line: usize, message: Vec<u8>) {
         self.arrived += 1;
-        self.latest = self.latest.max(at);
+        self.latest[line] = self.latest[line].max(at);
         self.arriving.insert((at, self.arrived), message);
     }
 }
@@ -265,14 +282,49 @@ mod tests {
         assert!(long.iter().any(|&(n, ms)| ms == u64::from(n) + 30), "one round trip more: {long:?}");
     }
 
+    /// Check that nothing is lost over TCP, and that what goes by the same line as a message that is repeated waits for it, and no other.
     #[test]
-    fn a_line_that_keeps_the_order_loses_nothing_and_holds_up_what_comes_after_a_loss() {
+    fn over_tcp_nothing_is_lost_and_only_what_goes_by_the_same_line_waits_for_a_loss() {
         let delay = Nanos(10 * MS);
-        let came = arrivals(Conditions { delay, loss: 0.05, in_order: true, ..Conditions::default() }, 100);
+        let mut came = arrivals(Conditions { delay, loss: 0.05, tcp: true, ..Conditions::default() }, 100);
+        came.sort_unstable();
         assert_eq!(came.iter().map(|&(n, _)| n).collect::<Vec<_>>(), (0..100).collect::<Vec<u8>>());
-        let late = came.iter().find(|&&(n, ms)| ms > u64::from(n) + 10).expect("one of a hundred is lost");
-        assert_eq!(late.1, u64::from(late.0) + 30, "one round trip more");
-        assert!(came.contains(&(late.0 + 1, late.1)), "the next one waits: {came:?}");
+        let line = |n: u8| Lane::Urgent.lines(n.into()).start;
+        let (mut late, mut waiting, mut latest) = (0, 0, [0; LINES]);
+        for (n, ms) in came {
+            let at_best = (u64::from(n) + 10).max(latest[line(n)]);
+            late += usize::from(ms == u64::from(n) + 30);
+            waiting += usize::from(ms == at_best && ms > u64::from(n) + 10);
+            assert!(ms == at_best || ms == u64::from(n) + 30 || ms == u64::from(n) + 50, "{n} comes after {ms} ms");
+            latest[line(n)] = ms;
+        }
+        assert!(late > 0 && waiting > late, "{late} {waiting}");
+    }
+
+    #[test]
+    fn over_tcp_a_model_is_there_when_the_first_of_its_copies_is() {
+        let conditions = |tcp| Conditions { delay: Nanos(10 * MS), loss: 0.02, tcp, ..Conditions::default() };
+        let mut late = [0, 0];
+        for (late, tcp) in late.iter_mut().zip([false, true]) {
+            let [mut here, mut there] = VirtualLink::ends(conditions(tcp));
+            here.begin();
+            let (mut message, mut newest) = (Vec::new(), None);
+            for ms in 0..8000 {
+                let now = Nanos(ms * MS);
+                if ms % 40 == 0 {
+                    here.send(Lane::Models, &[(ms / 40) as u8; 20 * PACKET], now);
+                }
+                while there.receive(now, &mut message) {
+                    if newest < Some(message[0]) {
+                        newest = Some(message[0]);
+                        *late += usize::from(ms % 40 > 10);
+                    }
+                }
+            }
+            assert_eq!(newest, Some(199));
+        }
+        // One of three copies without a loss comes in time.
+        assert!(late[0] > 40 && late[1] < late[0] / 2, "{late:?}");
     }
 
     #[test]

@@ -14,8 +14,9 @@ pub struct LinkSpec {
     pub duplicate: f64,
     /// The share of messages that are held back for one more delay.
     pub reorder: f64,
-    /// As TCP does: all comes in the order in which it went, and a short message that is lost is sent again too.
-    pub in_order: bool,
+    /// As over the connections of TCP that a real session has: a short message that is lost is sent again too, and what comes later by the same
+    /// connection waits for it.
+    pub tcp: bool,
     /// The rate of the line, one way (Mbit/s); without end if absent.
     pub rate_mbit_s: Option<f64>,
     /// Times in which nothing comes through: from, and until (s).

@@ -21,7 +21,7 @@ pub(super) fn conditions(spec: &LinkSpec) -> Conditions {
         loss: spec.loss,
         duplicate: spec.duplicate,
         reorder: spec.reorder,
-        in_order: spec.in_order,
+        tcp: spec.tcp,
         bits_per_s: spec.rate_mbit_s.map(|rate| 1e6 * rate),
         down: spec.down_s.iter().map(|outage| outage.map(Nanos::from_secs_f64)).collect(),
         seed: spec.seed,
