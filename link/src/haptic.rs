@@ -41,6 +41,8 @@ pub struct GlobalSide {
     config: Config,
     shared: Arc<Shared>,
     keeper: Option<JoinHandle<()>>,
+    /// How long the first model is waited for.
+    first_model: Duration,
 }
 
 impl GlobalSide {
@@ -50,19 +52,23 @@ impl GlobalSide {
     /// If the address is none, or `access` does not allow it.
     pub fn at(address: &str, access: &Access) -> Result<Self, Error> {
         let config = access.connecting(address)?;
-        Ok(Self { address: address.to_owned(), config, shared: Arc::default(), keeper: None })
+        Ok(Self { address: address.to_owned(), config, shared: Arc::default(), keeper: None, first_model: FIRST_MODEL })
     }
 
     /// Says hello until it is welcome and the first models have come, with their bases.
     fn wait_for_models(&self, hello: &mut Hello) -> Result<Connection, Error> {
         let inbox = &self.shared.inbox;
-        let (mut connection, mut is_told, mut is_welcome) = (None::<Connection>, false, false);
+        let (mut connection, mut is_told, mut welcome) = (None::<Connection>, false, None::<Instant>);
         // While others are waited for, the time of the first model does not run.
         let (mut began, mut others, mut first) = (Instant::now(), None::<Instant>, None::<Instant>);
-        while first.unwrap_or(began).elapsed() < FIRST_MODEL {
+        while first.unwrap_or(began).elapsed() < self.first_model {
             if !is_told && began.elapsed() > TELLS_AFTER {
                 is_told = true;
-                tracing::warn!("waiting for the global side at {}, up to {} s", self.address, FIRST_MODEL.as_secs());
+                tracing::warn!(
+                    "waiting for the global side at {}, up to {} s",
+                    self.address,
+                    self.first_model.as_secs()
+                );
             }
             if connection.is_none() {
                 connection = Connection::open(&self.config, hello.session, inbox).ok();
@@ -74,10 +80,12 @@ impl GlobalSide {
                 std::thread::sleep(LOOK);
                 continue;
             };
+            let mut is_lost = false;
             match say_first(open.zenoh(), hello) {
                 Some(Answer::Welcome(peer)) => {
-                    is_welcome = true;
                     self.shared.kept().peer = peer;
+                    let since = *welcome.get_or_insert_with(Instant::now);
+                    is_lost = inbox.models() == 0 && since.elapsed() > self.first_model / 2;
                 }
                 Some(Answer::WaitFor(devices)) => {
                     if others.is_none() {
@@ -95,24 +103,26 @@ impl GlobalSide {
                 }
                 Some(Answer::Wait | Answer::Taken(_)) => {}
                 Some(Answer::No(why)) => return Err(self.error(format!("refuses: {why}"))),
-                // Over another connection nobody would send again what was on its way here: it is begun anew.
-                None if is_broken(open.zenoh()) => {
-                    (connection, is_welcome) = (None, false);
-                    hello.session = unique();
-                }
-                // An answer may be on its way behind a lot else.
-                None => {}
+                // If it is not, an answer may be on its way behind a lot else.
+                None => is_lost = is_broken(open.zenoh()),
+            }
+            if is_lost {
+                // Nobody sends again what has been on its way here: it is begun anew.
+                (connection, welcome) = (None, None);
+                hello.session = unique();
+                continue;
             }
             let looked = Instant::now();
             while looked.elapsed() < LOOKS_FOR {
-                let has_models = is_welcome && inbox.models() > 0;
+                let has_models = welcome.is_some() && inbox.models() > 0;
                 if has_models && (inbox.is_ready() || first.get_or_insert_with(Instant::now).elapsed() > FIRST_BASES) {
                     return connection.ok_or_else(|| self.error("broke off".to_owned()));
                 }
                 std::thread::sleep(Duration::from_millis(2));
             }
         }
-        let (seconds, not) = (FIRST_MODEL.as_secs(), if is_welcome { "sends no model" } else { "does not answer" });
+        let (seconds, not) =
+            (self.first_model.as_secs(), if welcome.is_some() { "sends no model" } else { "does not answer" });
         Err(self.error(format!("{not} within {seconds} s: is `palpate serve` at work there, with this scene?")))
     }
 
@@ -153,5 +163,70 @@ impl Drop for GlobalSide {
         if let Some(keeper) = self.keeper.take() {
             let _ = keeper.join();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::TcpListener;
+    use std::sync::Mutex;
+
+    use palpate::link::{Header, Message};
+    use zenoh::Wait;
+
+    use super::*;
+    use crate::inbox::Inbox;
+    use crate::line::{HELLO, Lines, Way};
+
+    /// A message of the lane of models, as far as anybody looks who only passes it on.
+    fn model() -> Vec<u8> {
+        let mut bytes = Vec::new();
+        Message::Ping.write(Header::default(), &mut bytes);
+        (0..u8::MAX)
+            .map(|kind| [&bytes[..6], &[kind], &bytes[7..]].concat())
+            .find(|bytes| matches!(Message::glance(bytes), Ok((Lane::Models, _))))
+            .expect("a kind of message")
+    }
+
+    /// Check that a machine that is welcome and gets no model asks again under another number, as what was sent to it may be lost.
+    #[test]
+    fn whoever_is_welcome_and_gets_nothing_begins_anew() {
+        let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let (address, access) = (format!("tcp/{free}"), Access::default());
+        let there = zenoh::open(access.listening(&address).unwrap()).wait().unwrap();
+        let sessions = Arc::new(Mutex::new(Vec::new()));
+        let seen = Arc::clone(&sessions);
+        let answer = move |query: zenoh::query::Query| {
+            let question = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+            let said = match Hello::read(&question) {
+                Ok(hello) => {
+                    let mut seen = seen.lock().unwrap();
+                    seen.push(hello.session);
+                    seen.dedup();
+                    Answer::Welcome(1)
+                }
+                Err(_) => Answer::Wait,
+            };
+            query.reply(query.key_expr().clone(), said.write()).wait().unwrap();
+        };
+        let _queryable = there.declare_queryable(HELLO).callback(answer).wait().unwrap();
+        let mut haptic = GlobalSide::at(&address, &access).unwrap();
+        haptic.first_model = Duration::from_secs(6);
+        let comes = std::thread::spawn(move || haptic.connect(&Hello::default()).map(|()| haptic));
+        let began = Instant::now();
+        while sessions.lock().unwrap().len() < 2 {
+            assert!(began.elapsed() < Duration::from_secs(6), "it asks under one number: {sessions:?}");
+            std::thread::sleep(LOOK);
+        }
+        let session = sessions.lock().unwrap()[1];
+        let mut lines = Lines::new(&there, session, Way::Down, &Arc::new(Inbox::default())).unwrap();
+        let mut ready = Vec::new();
+        Message::Ready.write(Header::default(), &mut ready);
+        while !comes.is_finished() {
+            lines.put(Lane::Models, &model());
+            lines.put(Lane::Bulk, &ready);
+            std::thread::sleep(LOOK);
+        }
+        assert!(comes.join().unwrap().is_ok());
     }
 }
