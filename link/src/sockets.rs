@@ -14,37 +14,38 @@ pub(crate) fn places(address: &str) -> Vec<SocketAddr> {
 
 /// Lets connections to these places, and those that are accepted there, end once nothing has been acknowledged for as long as a peer may be
 /// silent. Where the system has no such thing, or does not allow it, they only end later.
-#[cfg(not(target_os = "linux"))]
-pub(crate) fn limit_waiting(_: &[SocketAddr]) {}
-
-#[cfg(target_os = "linux")]
-pub(crate) use linux::limit_waiting;
+pub(crate) fn limit_waiting(places: &[SocketAddr]) {
+    #[cfg(target_os = "linux")]
+    for socket in linux::sockets(places) {
+        let _ = rustix::net::sockopt::set_tcp_user_timeout(&socket, crate::access::LEASE_MS);
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = places;
+}
 
 #[cfg(target_os = "linux")]
 mod linux {
+    use std::fs::DirEntry;
     use std::net::SocketAddr;
-    use std::os::fd::OwnedFd;
+    use std::os::fd::{OwnedFd, RawFd};
 
     use rustix::net::{getpeername, getsockname, sockopt};
     use rustix::process::{PidfdFlags, PidfdGetfdFlags, getpid, pidfd_getfd, pidfd_open};
-
-    use crate::access::LEASE_MS;
-
-    /// Lets connections to these places, and those that are accepted there, end once nothing has been acknowledged for as long as a peer may
-    /// be silent. Where the system does not allow it they only end later.
-    pub(crate) fn limit_waiting(places: &[SocketAddr]) {
-        for socket in sockets(places) {
-            let _ = sockopt::set_tcp_user_timeout(&socket, LEASE_MS);
-        }
-    }
 
     /// Those of this process that are connected to these places or accept there: other descriptors of the same sockets.
     pub(super) fn sockets(places: &[SocketAddr]) -> Vec<OwnedFd> {
         let Ok(own) = pidfd_open(getpid(), PidfdFlags::empty()) else { return Vec::new() };
         let Ok(all) = std::fs::read_dir("/proc/self/fd") else { return Vec::new() };
-        let numbers = all.filter_map(|one| one.ok()?.file_name().to_str()?.parse().ok());
-        let descriptors = numbers.filter_map(|number| pidfd_getfd(&own, number, PidfdGetfdFlags::empty()).ok());
-        descriptors.filter(|socket| end(socket).is_some_and(|place| places.contains(&place))).collect()
+        let numbers = all.filter_map(|one| number(&one.ok()?));
+        let sockets = numbers.filter_map(|number| pidfd_getfd(&own, number, PidfdGetfdFlags::empty()).ok());
+        sockets.filter(|socket| end(socket).is_some_and(|place| places.contains(&place))).collect()
+    }
+
+    /// Of a descriptor that is a socket. With another descriptor of a file the locks of this process on it would end.
+    fn number(descriptor: &DirEntry) -> Option<RawFd> {
+        let of = std::fs::read_link(descriptor.path()).ok()?;
+        let number = descriptor.file_name().to_str()?.parse().ok()?;
+        of.to_str()?.starts_with("socket:").then_some(number)
     }
 
     /// The other end of a connection, or the place where they are accepted.

@@ -22,7 +22,7 @@ use crate::runtime::Nanos;
 
 const MAGIC: [u8; 4] = *b"plnk";
 /// The version of the format: of another one nothing is read.
-pub const VERSION: u16 = 7;
+pub const VERSION: u16 = 8;
 /// No message is longer (bytes).
 pub const LARGEST: usize = 1 << 25;
 

@@ -3,7 +3,8 @@
 //! A line that is as wide as it is said to be takes packets of [`PACKET`] bytes, of the most urgent message first. A message of one packet
 //! that is lost is lost. Of a longer one the packets that are lost are sent again, as a transport of whole messages does: each time that
 //! takes one more round trip. What is repeated takes no room on the line. Over TCP messages go by several lines, as over a real link, short ones are
-//! repeated too, and whatever comes later by the same line waits for them.
+//! repeated too, and whatever comes later by the same line waits for them. Once a line has lost something it also sends no quicker than it has as a
+//! rule, as BBR does: a model is then spread over the time between two.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
@@ -19,6 +20,9 @@ const PACKET: usize = 1200;
 const MOST_REPEATS: u32 = 8;
 /// A message that is held back comes so much later at least.
 const LEAST_BACK: Nanos = Nanos(1_000_000);
+/// Over TCP a line knows its rate from so many round trips, as BBR does, and sends so much quicker to learn whether it could.
+const KNOWN_FROM: f64 = 10.0;
+const PROBES: f64 = 1.25;
 /// Less urgent messages that wait for the line: of more, the oldest is dropped.
 const MOST_WAITING: usize = 256;
 
@@ -120,10 +124,31 @@ struct Way {
     /// By time, and by number where times are equal.
     arriving: BTreeMap<(Nanos, u64), Vec<u8>>,
     arrived: u64,
-    /// When the latest of them comes, by each line.
-    latest: [Nanos; LINES],
+    lines: [Paced; LINES],
     /// Messages that had to go.
     sent: u64,
+}
+
+/// What TCP knows of a line.
+#[derive(Clone, Copy, Debug, Default)]
+struct Paced {
+    /// When the latest of what goes by it comes.
+    latest: Nanos,
+    /// The mean of what went by it lately (bytes/s), and when it was taken.
+    rate: f64,
+    at: Nanos,
+    has_lost: bool,
+}
+
+impl Paced {
+    /// The time from packet to packet of a message of so many bytes that goes now, by a line of that round trip.
+    fn apart(&mut self, bytes: usize, now: Nanos, round_trip: Nanos) -> Nanos {
+        let known_from = KNOWN_FROM * round_trip.max(LEAST_BACK).as_secs_f64();
+        let passed = now.saturating_sub(self.at).as_secs_f64();
+        self.rate = self.rate * (-passed / known_from).exp() + bytes as f64 / known_from;
+        self.at = now;
+        if self.has_lost { Nanos::from_secs_f64(PACKET as f64 / (PROBES * self.rate)) } else { Nanos::ZERO }
+    }
 }
 
 #[derive(Debug)]
@@ -138,16 +163,7 @@ struct Waiting {
 impl Way {
     fn new(seed: u64) -> Self {
         let (lanes, arriving) = Default::default();
-        Self {
-            seed,
-            drawn: 0,
-            lanes,
-            free_at: Nanos::ZERO,
-            arriving,
-            arrived: 0,
-            latest: [Nanos::ZERO; LINES],
-            sent: 0,
-        }
+        Self { seed, drawn: 0, lanes, free_at: Nanos::ZERO, arriving, arrived: 0, lines: Default::default(), sent: 0 }
     }
 
     fn draw(&mut self) -> f64 {
@@ -195,28 +211,39 @@ impl Way {
         let gone = self.free_at;
         let is_down = conditions.down.iter().any(|&[from, until]| from <= gone && gone < until);
         let packets = message.len().div_ceil(PACKET).max(1);
-        let lose = |way: &mut Self, packets: usize| (0..packets).filter(|_| way.draw() < conditions.loss).count();
-        let (mut lost, mut repeats) = (lose(self, packets), 0);
-        while (packets > 1 || conditions.tcp) && lost > 0 && repeats < MOST_REPEATS {
-            lost = lose(self, lost);
+        let round_trip = Nanos(conditions.delay.0.saturating_mul(2).saturating_add(conditions.jitter.0));
+        let apart = if conditions.tcp { self.lines[line].apart(message.len(), gone, round_trip) } else { Nanos::ZERO };
+        let after = |packet: usize, repeats: u32| {
+            Nanos(apart.0.saturating_mul(packet as u64).saturating_add(round_trip.0.saturating_mul(repeats.into())))
+        };
+        let mut lost: Vec<usize> = (0..packets).filter(|_| self.draw() < conditions.loss).collect();
+        self.lines[line].has_lost |= !lost.is_empty();
+        // When all of them are through, and how often one was sent again.
+        let (mut through, mut repeats) = (after(packets - 1, 0), 0);
+        while (packets > 1 || conditions.tcp)
+            && repeats < MOST_REPEATS
+            && let Some(&last) = lost.last()
+        {
             repeats += 1;
+            through = through.max(after(last, repeats));
+            lost.retain(|_| self.draw() < conditions.loss);
         }
         let copies = if self.draw() < conditions.duplicate { 2 } else { 1 };
         let back = if self.draw() < conditions.reorder { conditions.delay.max(LEAST_BACK) } else { Nanos::ZERO };
-        let round_trip = conditions.delay.0.saturating_mul(2).saturating_add(conditions.jitter.0);
-        let repeated = Nanos(round_trip.saturating_mul(repeats.into()));
         for _ in 0..copies {
             let jitter = Nanos((conditions.jitter.0 as f64 * self.draw()) as u64);
-            if lost == 0 && !is_down {
-                let at = gone + conditions.delay + jitter + back + repeated;
-                self.arrive(if conditions.tcp { at.max(self.latest[line]) } else { at }, line, message.to_vec());
+            if lost.is_empty() && !is_down {
+                let at = gone + conditions.delay + jitter + back + through;
+                let at = if conditions.tcp { at.max(self.lines[line].latest) } else { at };
+                self.arrive(at, line, message.to_vec());
             }
         }
     }
 
     fn arrive(&mut self, at: Nanos, line: usize, message: Vec<u8>) {
         self.arrived += 1;
-        self.latest[line] = self.latest[line].max(at);
+        let latest = &mut self.lines[line].latest;
+        *latest = at.max(*latest);
         self.arriving.insert((at, self.arrived), message);
     }
 }
@@ -301,30 +328,37 @@ mod tests {
         assert!(late > 0 && waiting > late, "{late} {waiting}");
     }
 
-    #[test]
-    fn over_tcp_a_model_is_there_when_the_first_of_its_copies_is() {
-        let conditions = |tcp| Conditions { delay: Nanos(10 * MS), loss: 0.02, tcp, ..Conditions::default() };
-        let mut late = [0, 0];
-        for (late, tcp) in late.iter_mut().zip([false, true]) {
-            let [mut here, mut there] = VirtualLink::ends(conditions(tcp));
-            here.begin();
-            let (mut message, mut newest) = (Vec::new(), None);
-            for ms in 0..8000 {
-                let now = Nanos(ms * MS);
-                if ms % 40 == 0 {
-                    here.send(Lane::Models, &[(ms / 40) as u8; 20 * PACKET], now);
-                }
-                while there.receive(now, &mut message) {
-                    if newest < Some(message[0]) {
-                        newest = Some(message[0]);
-                        *late += usize::from(ms % 40 > 10);
-                    }
+    /// How long (ms) models of 20 packets take that go every 40 ms over TCP, in increasing order, but for those of the first second.
+    fn models_take(loss: f64) -> Vec<u64> {
+        let [mut here, mut there] =
+            VirtualLink::ends(Conditions { delay: Nanos(10 * MS), loss, tcp: true, ..Conditions::default() });
+        here.begin();
+        let (mut message, mut newest, mut took) = (Vec::new(), None, Vec::new());
+        for ms in 0..9000 {
+            let now = Nanos(ms * MS);
+            if ms % 40 == 0 {
+                here.send(Lane::Models, &[(ms / 40) as u8; 20 * PACKET], now);
+            }
+            while there.receive(now, &mut message) {
+                if newest < Some(message[0]) {
+                    newest = Some(message[0]);
+                    took.push(ms - 40 * u64::from(message[0]));
                 }
             }
-            assert_eq!(newest, Some(199));
         }
-        // One of three copies without a loss comes in time.
-        assert!(late[0] > 40 && late[1] < late[0] / 2, "{late:?}");
+        took.drain(..25);
+        took.sort_unstable();
+        took
+    }
+
+    /// Check that a model over TCP is spread over the time between two once something was lost, and that of its copies one is there by then.
+    #[test]
+    fn over_tcp_a_model_takes_no_longer_than_it_is_spread_over_as_one_copy_loses_nothing() {
+        let took = models_take(0.0);
+        assert!(took.len() == 200 && took.iter().all(|&ms| ms == 10), "{took:?}");
+        let took = models_take(0.01);
+        let [half, most] = [0.5, 0.9].map(|share| took[(share * took.len() as f64) as usize]);
+        assert!(took.len() > 190 && (30..50).contains(&half) && most <= half + 2, "{took:?}");
     }
 
     #[test]
