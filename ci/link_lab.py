@@ -199,7 +199,7 @@ def scene_of(name, out, link=None, latency_ms=0, seed=1):
 
 def simulate(palpate, out, scene, model, link, latency_ms, seed, seconds):
     """The log of a run over a virtual link."""
-    log = out / "virtual.mcap"
+    log = out / f"{scene}-{model}-{link[0]:g}-{link[1]:g}-virtual.mcap"
     path = scene_of(scene, out, link, latency_ms, seed)
     run(palpate, "run", path, "--virtual", "--model", model, "--duration", seconds, "--out", log)
     return log
