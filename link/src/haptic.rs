@@ -80,12 +80,11 @@ impl GlobalSide {
                 std::thread::sleep(LOOK);
                 continue;
             };
-            let mut is_lost = false;
-            match say_first(open.zenoh(), hello) {
+            let is_lost = match say_first(open.zenoh(), hello) {
                 Some(Answer::Welcome(peer)) => {
                     self.shared.kept().peer = peer;
                     let since = *welcome.get_or_insert_with(Instant::now);
-                    is_lost = inbox.models() == 0 && since.elapsed() > self.first_model / 2;
+                    inbox.models() == 0 && since.elapsed() > self.first_model / 2
                 }
                 Some(Answer::WaitFor(devices)) => {
                     if others.is_none() {
@@ -97,15 +96,16 @@ impl GlobalSide {
                         return Err(self.error(format!("waits for {devices}, which did not come in {minutes} minutes")));
                     }
                     began = Instant::now();
+                    false
                 }
                 Some(Answer::Taken(device)) if began.elapsed() > OTHER_GONE => {
                     return Err(self.error(format!("works for another haptic machine with {device}")));
                 }
-                Some(Answer::Wait | Answer::Taken(_)) => {}
+                Some(Answer::Wait | Answer::Taken(_)) => false,
                 Some(Answer::No(why)) => return Err(self.error(format!("refuses: {why}"))),
                 // If it is not, an answer may be on its way behind a lot else.
-                None => is_lost = is_broken(open.zenoh()),
-            }
+                None => is_broken(open.zenoh()),
+            };
             if is_lost {
                 // Nobody sends again what has been on its way here: it is begun anew.
                 (connection, welcome) = (None, None);

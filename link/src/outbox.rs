@@ -58,9 +58,7 @@ impl Outbox {
             let publisher = publisher.priority(priority).congestion_control(congestion).express(true).wait();
             let publisher = publisher.map_err(|error| Error::new(ErrorKind::Runtime, format!("zenoh: {error}")))?;
             let queue = Arc::clone(queue);
-            let thread = std::thread::Builder::new()
-                .name(format!("link {}", name.rsplit('/').next().unwrap_or(name)))
-                .stack_size(STACK);
+            let thread = std::thread::Builder::new().name(format!("link {name}")).stack_size(STACK);
             let started = thread.spawn(move || queue.send(&publisher));
             started.map_err(|error| Error::new(ErrorKind::Runtime, format!("no thread for the link: {error}")))?;
         }
