@@ -3,6 +3,7 @@
 use super::cutout::part_of;
 use super::half_space::contact_modulus;
 use super::kernel::{InstructionSet, LatticeKernel, NOMINAL_SPRING_S};
+use super::lattice_piece::LatticePiece;
 use super::lattice_springs::LatticeSprings;
 use super::region::{Material, Region, materials};
 use super::stress::virial;
@@ -170,6 +171,21 @@ impl Block {
         springs
     }
 
+    /// The smallest box that has `nodes` and all ends of their springs, and the nodes in it, in increasing order.
+    fn box_around(&self, nodes: &[u32]) -> Option<(Lattice, Vec<u32>)> {
+        let at = || nodes.iter().map(|&node| self.lattice.coordinates(node));
+        let low = at().reduce(|a, b| std::array::from_fn(|axis| a[axis].min(b[axis])))?;
+        let high = at().reduce(|a, b| std::array::from_fn(|axis| a[axis].max(b[axis])))?;
+        let low = low.map(|c| c.saturating_sub(1));
+        let lattice =
+            Lattice { nodes: std::array::from_fn(|axis| (high[axis] + 2).min(self.lattice.nodes[axis]) - low[axis]) };
+        let whole = |id: u32| {
+            let at = lattice.coordinates(id);
+            self.lattice.id(std::array::from_fn(|axis| low[axis] + at[axis]))
+        };
+        Some((lattice, (0..lattice.len() as u32).map(whole).collect()))
+    }
+
     /// The name of the instruction set that forces of blocks are computed with on this machine.
     pub fn instruction_set() -> &'static str {
         InstructionSet::detect().name()
@@ -244,22 +260,22 @@ impl Body for Block {
             let ends = move |(other, spring)| (node.min(other), node.max(other), spring);
             self.springs.neighbours(&self.lattice, node).map(ends)
         };
-        Some(SpringNetwork::restricted(&self.rest, &self.inverse_masses, nodes, springs))
+        let piece = |all: &[u32]| {
+            let (lattice, ids) = self.box_around(nodes)?;
+            let mut is_asked = vec![false; ids.len()];
+            let place = |id: &u32| ids.binary_search(id).ok().map(|place| place as u32);
+            nodes.iter().filter_map(place).for_each(|place| is_asked[place as usize] = true);
+            let mut springs = self.springs.part(&lattice, &ids);
+            springs.retain(|place| is_asked[place]);
+            let rest: Vec<Vec3> = ids.iter().map(|&id| self.rest[id as usize]).collect();
+            LatticePiece::new(springs, all.iter().filter_map(place).collect(), &rest)
+        };
+        Some(SpringNetwork::restricted(&self.rest, &self.inverse_masses, nodes, springs, piece))
     }
 
     fn cutout(&self, nodes: &[u32]) -> Option<Cutout> {
-        let at = || nodes.iter().map(|&node| self.lattice.coordinates(node));
-        let low = at().reduce(|a, b| std::array::from_fn(|axis| a[axis].min(b[axis])))?;
-        let high = at().reduce(|a, b| std::array::from_fn(|axis| a[axis].max(b[axis])))?;
         // The rim has all ends of their springs; those between its own nodes are there too and move nothing.
-        let low = low.map(|c| c.saturating_sub(1));
-        let lattice =
-            Lattice { nodes: std::array::from_fn(|axis| (high[axis] + 2).min(self.lattice.nodes[axis]) - low[axis]) };
-        let whole = |id: u32| {
-            let at = lattice.coordinates(id);
-            self.lattice.id(std::array::from_fn(|axis| low[axis] + at[axis]))
-        };
-        let ids: Vec<u32> = (0..lattice.len() as u32).map(whole).collect();
+        let (lattice, ids) = self.box_around(nodes)?;
         let springs = self.springs.part(&lattice, &ids);
         let inverse_mass =
             |&id: &u32| if nodes.binary_search(&id).is_ok() { self.inverse_masses[id as usize] } else { 0.0 };

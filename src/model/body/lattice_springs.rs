@@ -94,6 +94,24 @@ impl LatticeSprings {
         Self { nodes, elasticity: elasticity(&exist), offsets, exist }
     }
 
+    /// Leaves only the springs of nodes that are `wanted`.
+    pub(super) fn retain(&mut self, wanted: impl Fn(usize) -> bool) {
+        for (eight, exist) in self.exist.iter_mut().enumerate() {
+            for (bits, offset) in exist.iter_mut().zip(&self.offsets) {
+                let is_left = |lane: &usize| {
+                    let first = eight * LANES + lane;
+                    *bits >> lane & 1 == 1 && (wanted(first) || wanted(first + offset.delta))
+                };
+                *bits = (0..LANES).filter(is_left).map(|lane| 1 << lane).sum();
+            }
+        }
+    }
+
+    /// In how many directions springs begin at eight nodes, over all eights.
+    pub(super) fn directions(&self) -> usize {
+        self.exist.iter().flatten().filter(|&&bits| bits != 0).count()
+    }
+
     /// How far the nodes of a spring are apart at most, in the numbering.
     pub(super) fn reach(&self) -> usize {
         self.offsets.iter().map(|offset| offset.delta).max().unwrap_or(0)

@@ -4,6 +4,7 @@ mod block;
 mod cutout;
 mod half_space;
 pub(crate) mod kernel;
+mod lattice_piece;
 mod lattice_springs;
 mod neighbourhood;
 mod network;

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::kernel::{InstructionSet, NOMINAL_SPRING_S, NetworkKernel};
+use super::lattice_piece::LatticePiece;
 use super::stress::{enclosed, virial};
 use super::{Body, Restriction, Spring, State, TangentBlock};
 use crate::error::ModelError;
@@ -44,7 +45,15 @@ pub struct SpringNetwork {
     volume: f64,
     /// The springs at each node.
     at_node: Lists,
-    kernel: NetworkKernel,
+    kernel: Kernel,
+}
+
+/// What computes the forces.
+#[derive(Clone, Debug)]
+enum Kernel {
+    Any(NetworkKernel),
+    /// Quicker, where the springs are some of a lattice's.
+    Lattice(Box<LatticePiece>),
 }
 
 /// Collects what a [`SpringNetwork`] is made of.
@@ -136,7 +145,7 @@ impl SpringNetworkBuilder {
         Ok(SpringNetwork {
             volume: enclosed(&self.rest, &surface.triangles),
             surface,
-            kernel: NetworkKernel::new(nodes, &self.springs),
+            kernel: Kernel::Any(NetworkKernel::new(nodes, &self.springs)),
             rest: self.rest,
             inverse_masses,
             at_node: Lists::new(nodes, ends),
@@ -184,7 +193,10 @@ impl SpringNetwork {
     /// # Errors
     /// If this machine does not have it.
     pub fn with_instruction_set(mut self, set: InstructionSet) -> Result<Self, ModelError> {
-        self.kernel.set_instruction_set(set.available()?);
+        let set = set.available()?;
+        if let Kernel::Any(kernel) = &mut self.kernel {
+            kernel.set_instruction_set(set);
+        }
         Ok(self)
     }
 
@@ -196,16 +208,20 @@ impl SpringNetwork {
     /// If `cores` is 0 or the system refuses a thread.
     #[cfg(feature = "parallel")]
     pub fn on_cores(mut self, cores: usize) -> Result<Self, ModelError> {
-        self.kernel.set_cores(&self.springs, cores)?;
+        if let Kernel::Any(kernel) = &mut self.kernel {
+            kernel.set_cores(&self.springs, cores)?;
+        }
         Ok(self)
     }
 
-    /// The restriction to `asked` of a body of springs with nodes at `rest`; `springs` gives those at a node.
+    /// The restriction to `asked` of a body of springs with nodes at `rest`; `springs` gives those at a node, `piece` a quicker way to the
+    /// forces on its nodes, if there is one.
     pub(super) fn restricted<I: Iterator<Item = (u32, u32, Spring)>>(
         rest: &[Vec3],
         inverse_masses: &[f64],
         asked: &[u32],
         springs: impl Fn(u32) -> I,
+        piece: impl FnOnce(&[u32]) -> Option<LatticePiece>,
     ) -> Restriction {
         let ends = asked.iter().flat_map(|&node| springs(node).flat_map(|(i, j, _)| [i, j]));
         let nodes = Restriction::order(asked, ends, inverse_masses);
@@ -227,7 +243,10 @@ impl SpringNetwork {
             surface: Surface::default(),
             volume: 0.0,
             at_node: Lists::new(nodes.len(), ends),
-            kernel: NetworkKernel::new(nodes.len(), &near),
+            kernel: match piece(&nodes) {
+                Some(piece) => Kernel::Lattice(Box::new(piece)),
+                None => Kernel::Any(NetworkKernel::new(nodes.len(), &near)),
+            },
             springs: near,
         };
         Restriction { nodes, body: Box::new(body) }
@@ -265,7 +284,10 @@ impl Body for SpringNetwork {
     }
 
     fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
-        self.kernel.forces(&state.positions, &state.velocities, forces);
+        match &mut self.kernel {
+            Kernel::Any(kernel) => kernel.forces(&state.positions, &state.velocities, forces),
+            Kernel::Lattice(piece) => piece.forces(&state.positions, &state.velocities, forces),
+        }
     }
 
     fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
@@ -286,7 +308,7 @@ impl Body for SpringNetwork {
 
     fn restriction(&self, nodes: &[u32]) -> Option<Restriction> {
         let springs = |node| self.at_node.of(node).iter().map(|&spring| self.springs[spring as usize]);
-        Some(Self::restricted(&self.rest, &self.inverse_masses, nodes, springs))
+        Some(Self::restricted(&self.rest, &self.inverse_masses, nodes, springs, |_| None))
     }
 
     fn stress(&self, state: &State, node: u32) -> Option<Mat3> {

@@ -264,6 +264,9 @@ fn accumulate<S: Simd, C: Source<S>>(
         let speed = [s.load(lane(u, first)), s.load(lane(v, first)), s.load(lane(w, first))];
         let mut own = [s.splat(0.0); 3];
         for (direction, (bits, offset)) in springs.exist[eight].iter().zip(&springs.offsets).enumerate() {
+            if *bits == 0 {
+                continue;
+            }
             let other = first + offset.delta;
             let along = [
                 s.sub(s.load(lane(x, other)), here[0]),
