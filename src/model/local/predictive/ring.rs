@@ -18,7 +18,6 @@ pub(super) struct NearBody {
     stiffness: Stiffness,
     /// Working memory, of the restriction's nodes.
     state: State,
-    forces: Vec<Vec3>,
 }
 
 impl NearBody {
@@ -34,15 +33,13 @@ impl NearBody {
         if self.restriction.is_none() || self.patch != patch {
             patch.clone_into(&mut self.patch);
             self.restriction = body.restriction(patch);
-            let nodes = self.restriction.as_ref().map_or(0, |restriction| restriction.nodes.len());
-            self.forces.resize(nodes, Vec3::zeros());
         }
         self.restriction.as_ref().map_or([&[], &[]], |near| [near.ring(patch.len()), near.held(patch.len())])
     }
 
     /// The number of its nodes: patch, ring and held ones, the first of the window.
     pub(super) fn len(&self) -> usize {
-        self.forces.len()
+        self.restriction.as_ref().map_or(0, |restriction| restriction.nodes.len())
     }
 
     /// The longest stable step where its forces were asked for last, over that at rest.
@@ -53,14 +50,13 @@ impl NearBody {
 
     /// Writes the force that it puts on each node of the window (N); patch, ring and held nodes come first there as here.
     pub(super) fn forces(&mut self, window: &State, forces: &mut [Vec3]) {
-        let count = self.forces.len();
+        let (near, rest) = forces.split_at_mut(self.len());
         if let Some(Restriction { body, .. }) = &mut self.restriction {
-            window.positions[..count].clone_into(&mut self.state.positions);
-            window.velocities[..count].clone_into(&mut self.state.velocities);
-            body.forces(&self.state, &mut self.forces);
+            window.positions[..near.len()].clone_into(&mut self.state.positions);
+            window.velocities[..near.len()].clone_into(&mut self.state.velocities);
+            body.forces(&self.state, near);
         }
-        forces[..count].copy_from_slice(&self.forces);
-        forces[count..].fill(Vec3::zeros());
+        rest.fill(Vec3::zeros());
     }
 }
 
