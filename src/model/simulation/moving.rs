@@ -30,7 +30,7 @@ impl Moving {
     pub(super) fn advance(&mut self, ticks: u32, motion: impl Fn(usize) -> ToolMotion, watch: &mut impl FnMut(&State)) {
         let Self { body, state, forces, touches, rows, law, candidates, inverse_masses, stepping, stride, means } =
             self;
-        debug_assert!((1..=*stride).contains(&ticks), "{ticks} ticks in steps of at most {stride}");
+        assert!((1..=*stride).contains(&ticks), "{ticks} ticks in steps of at most {stride}");
         means.fill(Wrench::default());
         touches.iter_mut().for_each(Touch::begin);
         body.forces(state, forces);

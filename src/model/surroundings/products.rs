@@ -89,7 +89,7 @@ impl Columns {
 
     /// out = A^T y; `y` has a number per row, `out` one per column.
     pub(super) fn project(&self, y: &[f64], scratch: &mut Scratch, out: &mut [f64]) {
-        debug_assert!(y.len() == self.rows && out.len() == self.columns);
+        assert!(y.len() == self.rows && out.len() == self.columns);
         let Scratch { given, sums, .. } = scratch;
         given.as_flattened_mut().as_flattened_mut().iter_mut().zip(y).for_each(|(single, &y)| *single = rounded(y));
         self.set.run(Project { columns: self, y: given, sums });
@@ -102,7 +102,7 @@ impl Columns {
 
     /// out = A weights; `out` has a number per row, `weights` one per column.
     pub(super) fn combine(&self, weights: &[f64], scratch: &mut Scratch, out: &mut [f64]) {
-        debug_assert!(out.len() == self.rows && weights.len() == self.columns);
+        assert!(out.len() == self.rows && weights.len() == self.columns);
         let Scratch { found, weights: singles, .. } = scratch;
         singles.iter_mut().zip(weights).for_each(|(single, &weight)| *single = rounded(weight));
         self.set.run(Combine { columns: self, weights: singles, out: found });

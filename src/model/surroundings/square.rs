@@ -61,7 +61,7 @@ impl Square {
 
     /// out = A x.
     pub(super) fn times(&self, x: &[f64], scratch: &mut SquareScratch, out: &mut [f64]) {
-        debug_assert!(x.len() == self.size && out.len() == self.size);
+        assert!(x.len() == self.size && out.len() == self.size);
         let SquareScratch { given, found } = scratch;
         given.iter_mut().zip(x).for_each(|(single, &x)| *single = rounded(x));
         self.set.run(Times { square: self, x: given, out: found });

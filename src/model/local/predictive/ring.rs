@@ -97,7 +97,7 @@ impl RingPath {
 
     /// Appends the nodes of `ring` with the `forces` on them.
     pub(super) fn push(&mut self, state: &State, forces: &[Vec3], ring: Range<usize>) {
-        debug_assert_eq!(3 * ring.len(), self.numbers);
+        assert_eq!(3 * ring.len(), self.numbers);
         for vectors in [&state.positions, &state.velocities, forces] {
             vectors[ring.clone()].iter().for_each(|vector| self.samples.extend_from_slice(vector.as_slice()));
         }
