@@ -34,9 +34,10 @@ command -v cargo >/dev/null || { echo "missing: cargo; install the Rust toolchai
 # lz4 is compiled from C.
 command -v cc >/dev/null || install_packages "a C compiler" gcc libc6-dev
 
-# Builds the command and the examples as the tests need them: so all jobs compile them once, in the folder `debug`.
+# Builds the command and the examples as the tests need them: so all jobs compile them once, in the folder `debug`. Nothing to do
+# where the job `build` was before.
 build_programs() {
-    cargo build --locked --profile test --bins --examples
+    [ -n "${PALPATE_BUILT:-}" ] || cargo build --locked --profile test --bins --examples
 }
 
 # A folder of Python packages: python_venv NAME MODULES PACKAGE... sets `venv` to its path. It is made again if MODULES, a list with
