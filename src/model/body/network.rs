@@ -52,7 +52,7 @@ pub struct SpringNetwork {
 #[derive(Clone, Debug)]
 enum Kernel {
     Any(NetworkKernel),
-    /// Quicker, where the springs are some of a lattice's.
+    /// Quicker, where the springs are some of a lattice's: in restrictions of a block.
     Lattice(Box<LatticePiece>),
 }
 
