@@ -10,6 +10,9 @@ use nalgebra::{Complex, DMatrix};
 /// A real matrix, kept column after column.
 pub type Matrix = DMatrix<f64>;
 
+/// A matrix of complex numbers, kept column after column.
+pub type ComplexMatrix = DMatrix<Complex<f64>>;
+
 /// Singular values below this share of the largest are rounding: the Gram matrix squares them.
 const NUMERICAL_RANK: f64 = 1e-7;
 /// Directions with less than this share of the largest mass are combinations of others.
@@ -137,6 +140,14 @@ pub fn solve_positive(a: &Matrix, b: &Matrix) -> Option<Matrix> {
     let mut x: Mat<f64> = view(b).to_owned();
     factor.solve_in_place(x.as_mut());
     Some(owned(x.as_ref()))
+}
+
+/// X with A X = B for complex numbers, by elimination with pivots; `None` if A is singular.
+///
+/// # Real-time
+/// Not real-time safe: allocates.
+pub fn solve_complex(a: ComplexMatrix, b: &ComplexMatrix) -> Option<ComplexMatrix> {
+    a.lu().solve(b)
 }
 
 /// L with L L^T = Z Z^T, square, for a Z with more columns than rows.

@@ -10,7 +10,8 @@ mod dissection;
 mod sparse;
 
 pub use dense::{
-    Matrix, cholesky, eigenvalues, lower_factor, product, product_t, solve_positive, svd, symmetric_eigen,
+    ComplexMatrix, Matrix, cholesky, eigenvalues, lower_factor, product, product_t, solve_complex, solve_positive, svd,
+    symmetric_eigen,
 };
 pub(crate) use dense::{eliminate, leading_combinations, leading_left_singular_vectors, modes};
 pub use dissection::dissection;

@@ -5,7 +5,7 @@ use palpate::model::ModelError;
 
 use super::congruence::Congruence;
 use super::gramian;
-use super::linalg::{CMatrix, Matrix, complex, eigenvalues, product, product_t, scaled_columns, svd};
+use super::linalg::{CMatrix, Matrix, complex, eigenvalues, product, product_t, scaled_columns, solve_complex, svd};
 use super::modal::Modal;
 use super::response::Response;
 
@@ -175,7 +175,7 @@ impl Response for StateSpace {
     fn at(&self, s: Complex<f64>) -> Option<CMatrix> {
         let mut matrix = complex(&(-&self.a));
         (0..self.order()).for_each(|at| matrix[(at, at)] += s);
-        let x = matrix.lu().solve(&complex(&self.b))?;
+        let x = solve_complex(matrix, &complex(&self.b))?;
         Some(complex(&self.c) * x + complex(&self.d))
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::linalg::{CMatrix, Matrix, complex, product_t, solve_positive, symmetrised};
+use super::linalg::{CMatrix, Matrix, complex, product_t, solve_complex, solve_positive, symmetrised};
 use super::response::Response;
 use super::system::{Ports, Rayleigh, SecondOrder};
 
@@ -116,7 +116,7 @@ impl Congruence {
 
 impl Response for Congruence {
     fn at(&self, s: Complex<f64>) -> Option<CMatrix> {
-        let x = self.dynamic_stiffness(s).lu().solve(&complex(&self.ports.input))?;
+        let x = solve_complex(self.dynamic_stiffness(s), &complex(&self.ports.input))?;
         Some(complex(&self.ports.direct) + self.outputs(s).transpose() * x)
     }
 }

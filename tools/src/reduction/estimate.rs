@@ -5,7 +5,7 @@ use palpate::model::ModelError;
 
 use super::congruence::Congruence;
 use super::krylov::Projection;
-use super::linalg::{CMatrix, Matrix, complex, product_t, side_by_side};
+use super::linalg::{CMatrix, Matrix, complex, product_t, side_by_side, solve_complex};
 use super::modal::slow_modes;
 use super::system::{Rayleigh, SecondOrder};
 
@@ -58,7 +58,7 @@ impl ErrorBound {
         let mut sides = CMatrix::zeros(r, m + p);
         sides.columns_mut(0, m).copy_from(&complex(&model.ports.input));
         sides.columns_mut(m, p).copy_from(&model.outputs(s));
-        let answers = model.dynamic_stiffness(s).lu().solve(&sides)?;
+        let answers = solve_complex(model.dynamic_stiffness(s), &sides)?;
         let (x, y) = (answers.columns(0, m).into_owned(), answers.columns(m, p).into_owned());
         // The residuals as combinations of the columns behind `gram`.
         let residual = |z: &CMatrix, of_input: bool| {

@@ -1,10 +1,11 @@
 //! What reductions do with dense matrices, beside what [`palpate::model::linear_algebra`] does.
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DVector};
 
-pub use palpate::model::linear_algebra::Matrix;
+pub use palpate::model::linear_algebra::{ComplexMatrix as CMatrix, Matrix};
 pub(super) use palpate::model::linear_algebra::{
-    SparseFactor, cholesky, eigenvalues, lower_factor, product, product_t, solve_positive, svd, symmetric_eigen,
+    SparseFactor, cholesky, eigenvalues, lower_factor, product, product_t, solve_complex, solve_positive, svd,
+    symmetric_eigen,
 };
 
 /// Directions of which this share of their length is new are combinations of those that are there.
@@ -12,9 +13,6 @@ pub(super) const DEPENDENT: f64 = 1e-11;
 
 /// A column of real numbers.
 pub(super) type Vector = DVector<f64>;
-
-/// A matrix of complex numbers, kept column after column.
-pub type CMatrix = DMatrix<Complex<f64>>;
 
 /// The columns of all `parts`, which have as many rows, one part after the other.
 pub(super) fn side_by_side(parts: &[&Matrix]) -> Matrix {
