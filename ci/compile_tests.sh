@@ -1,4 +1,4 @@
 #!/usr/bin/env bash
 # The tests, compiled and not run.
 source "$(dirname "${BASH_SOURCE[0]}")/prepare.sh"
-cargo test --locked --no-run
+exec cargo test --locked --no-run
