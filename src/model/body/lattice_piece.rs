@@ -5,7 +5,7 @@ use super::kernel::{LANES, LatticeKernel};
 use super::lattice_springs::LatticeSprings;
 use crate::Vec3;
 
-/// How many springs of a list take as long as one of a lattice, there or not (`cargo bench --bench spring_kernel`).
+/// So many places for a spring in a lattice, with one or without, take as long as a spring of a list (`cargo bench --bench spring_kernel`).
 const QUICKER: usize = 2;
 
 /// Springs of a lattice and some of its nodes. The rest of the nodes stay where they are at rest: no spring is there.
