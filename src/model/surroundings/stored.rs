@@ -9,7 +9,7 @@ use crate::bytes::{BytesReader, BytesWriter};
 use crate::linear_algebra::Matrix;
 
 /// What the bytes begin with; its number changes with what follows.
-const MAGIC: &[u8; 16] = b"palpate-basis-9\n";
+const MAGIC: &[u8; 17] = b"palpate-basis-10\n";
 const SUM: usize = size_of::<u64>();
 
 impl Basis {
