@@ -26,15 +26,25 @@ pub(super) struct Search {
     fine: Corners,
     /// How far the triangles of a vicinity are from the tool's axis at least, squared (m^2).
     apart: Vec<f64>,
-    /// Working memory for what passes through the surface.
+    /// Working memory: places that are behind the surface.
+    behind: Vec<Behind>,
+    /// The same for what passes through it.
     sides: Vec<u8>,
+}
+
+/// A place that the axis is behind, so far away (m).
+#[derive(Clone, Copy, Debug)]
+struct Behind {
+    near: Near,
+    away: f64,
 }
 
 impl Search {
     /// For so many tools.
     pub(super) fn new(tools: usize) -> Self {
         let vicinities = vec![<[Vicinity; 2]>::default(); tools];
-        Self { near: Vec::with_capacity(MOST_POINTS), vicinities, ..Self::default() }
+        let (near, behind) = (Vec::with_capacity(MOST_POINTS), Vec::with_capacity(MOST_POINTS));
+        Self { near, vicinities, behind, ..Self::default() }
     }
 
     /// Makes room for a body of so many nodes and candidates, and forgets another one.
@@ -66,9 +76,11 @@ impl Search {
         if !self.find_passed(vicinity, touch, motion) {
             let front = self.find_near(vicinity, touch, &motion.to);
             if !is_narrow {
-                // What is nearest stays so near, or nearer: what is farther is neither the nearest nor touched.
+                // What is nearest stays so near, or nearer: what is farther is neither the nearest nor touched. Parts of a long axis
+                // may be inside while others are not.
                 let radius = touch.shape.radius();
-                let nearest = (front + NARROW).min(radius + MAX_DEPTH);
+                let most = radius + MAX_DEPTH;
+                let nearest = if is_long(touch) { most } else { (front + NARROW).min(most) };
                 let beyond = |place: u32| corners::beyond(touch, wide.nodes[place as usize] as usize);
                 narrow.narrow(&wide, (body, touch), motion, d, |number, more| {
                     let beyond = wide.corners[number].into_iter().map(beyond).fold(0.0, f64::max);
@@ -80,11 +92,13 @@ impl Search {
         self.vicinities[tool] = [wide, narrow];
     }
 
-    /// A place of the surface that the axis passes within the step; whatever else is near at its end is the far side.
+    /// A place of the surface that the axis passes within the step; whatever else is near at its end is the far side. None if a long axis
+    /// has gone in so little that the way out is where it came in: it may rest on many places.
     fn find_passed(&mut self, vicinity: &Vicinity, touch: &Touch, motion: ToolMotion) -> bool {
         let shape = &touch.shape;
         let [from, to] = [shape.axis(&motion.from), shape.axis(&motion.to)];
-        let ends = if shape.half_axis() == Vec3::zeros() { 1 } else { 3 };
+        let ends = if is_long(touch) { 3 } else { 1 };
+        let mut is_shallow = is_long(touch);
         for end in 0..ends {
             let share = [0.0, 1.0, 0.5][end];
             let [from, to] = [from, to].map(|[a, b]| a + (b - a) * share);
@@ -96,29 +110,62 @@ impl Search {
             let Some(normal) = across.try_normalize(0.0) else { continue };
             let gap = (to - place).dot(&normal) - shape.radius();
             let triangle = vicinity.triangles[found];
+            is_shallow = is_shallow
+                && way_out(vicinity, &self.corners, &to, shape.radius()).is_some_and(|out| out.dot(&normal) > 0.0);
             self.near.push(Near { triangle, weights, place, normal, gap, share });
+        }
+        if is_shallow {
+            self.near.clear();
         }
         !self.near.is_empty()
     }
 
     /// Whatever is near at the end of the step; returns how far the nearest place in front of the surface is from the axis (m).
     fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) -> f64 {
-        let (shape, skin, fine) = (&touch.shape, &*touch.skin, touch.steady.fineness);
-        let coarse = 1.0 - fine;
-        let (radius, axis) = (shape.radius(), shape.axis(pose));
-        let is_long = shape.half_axis() != Vec3::zeros();
-        let around_axis = Extent::around(&axis);
-        let Self { near: list, corners, fine: met, apart, .. } = self;
-        apart.clear();
+        let (radius, axis) = (touch.shape.radius(), touch.shape.axis(pose));
+        let Self { near: list, corners, fine: met, .. } = self;
         met.find(vicinity, |place| corners[place as usize][1], touch, &axis, |found| keep(list, found));
-        // The nearest place in front of the surface, and the nearest behind it.
-        let (mut front, mut behind) = (f64::INFINITY, None::<Near>);
+        if is_long(touch) {
+            let found = self.near.len();
+            let front = self.look_around(vicinity, touch, &axis, 0.0);
+            if !self.leave_inside(vicinity, &axis, radius) {
+                return front;
+            }
+            // What is inside may be anywhere within reach.
+            self.near.truncate(found);
+            let front = self.look_around(vicinity, touch, &axis, radius + MAX_DEPTH);
+            self.leave_inside(vicinity, &axis, radius);
+            return front;
+        }
+        let front = self.look_around(vicinity, touch, &axis, 0.0);
+        // A centre inside is nearest to the inner side of some triangle: out of the body on the shortest way.
+        if let Some(&Behind { near, away }) = self.behind.first()
+            && away < front * (1.0 - 1e-9)
+            && away < MAX_DEPTH + radius
+        {
+            self.near.clear();
+            self.near.push(near);
+        }
+        front
+    }
+
+    /// Adds the places in front of the surface that touch, and puts those behind it aside, of a short axis the nearest, of triangles that touch, that are the nearest of
+    /// all or within `reach` (m); returns how far the nearest place in front is from the axis (m).
+    fn look_around(&mut self, vicinity: &Vicinity, touch: &Touch, axis: &[Vec3; 2], reach: f64) -> f64 {
+        let (skin, fine, radius) = (&*touch.skin, touch.steady.fineness, touch.shape.radius());
+        let coarse = 1.0 - fine;
+        let is_long = is_long(touch);
+        let around_axis = Extent::around(axis);
+        let Self { near: list, corners, fine: met, apart, behind, .. } = self;
+        apart.clear();
+        behind.clear();
+        let mut front = f64::INFINITY;
         for (&triangle, places) in vicinity.triangles.iter().zip(&vicinity.corners) {
             let corners = places.map(|place| corners[place as usize][1]);
             let depths = places.map(|place| coarse * skin.depth(vicinity.nodes[place as usize] as usize));
             // It touches, or is the nearest of all.
             let touching = radius + depths.into_iter().fold(0.0, f64::max);
-            let distance = touching.max(front.min(radius + MAX_DEPTH));
+            let distance = touching.max(front.min(radius + MAX_DEPTH)).max(reach);
             let squared = Extent::around(&corners).apart_squared(&around_axis);
             apart.push(squared);
             if squared > distance * distance {
@@ -126,7 +173,7 @@ impl Search {
             }
             let [a, b, c] = &corners;
             let across = (b - a).cross(&(c - a));
-            let shares = [closest::share_of_axis(&axis, &corners), 0.0, 1.0];
+            let shares = [closest::share_of_axis(axis, &corners), 0.0, 1.0];
             for share in if is_long { &shares[..] } else { &shares[..1] } {
                 let centre = axis[0] + (axis[1] - axis[0]) * *share;
                 let weights = closest::weights(&corners, &centre);
@@ -145,10 +192,15 @@ impl Search {
                     gap: distance - depth - radius,
                     share: *share,
                 };
+                let same = 1e-12 * radius * radius;
                 if away.dot(&across) < 0.0 {
-                    if behind.is_none_or(|known| -distance > known.gap + radius) {
-                        // Out of the body on the shortest way.
-                        behind = Some(Near { gap: -distance - radius, ..near(0.0) });
+                    let found = Behind { near: near(-distance), away: distance };
+                    let is_new = |known: &Behind| (known.near.place - place).norm_squared() >= same;
+                    if is_long && behind.len() < MOST_POINTS && behind.iter().all(is_new) {
+                        behind.push(found);
+                    } else if !is_long && behind.first().is_none_or(|known| distance < known.away) {
+                        behind.clear();
+                        behind.push(found);
                     }
                     continue;
                 }
@@ -158,7 +210,6 @@ impl Search {
                 }
                 let mut near = near(distance);
                 near.gap += fine * chord(&corners, &weights, radius);
-                let same = 1e-12 * radius * radius;
                 let is_new =
                     |found: &[Near]| found.iter().all(|known| (known.place - near.place).norm_squared() >= same);
                 if near.gap < 0.0 && is_new(list) {
@@ -166,16 +217,65 @@ impl Search {
                 }
             }
         }
-        // A centre inside is nearest to the inner side of some triangle.
-        if let Some(behind) = behind
-            && -(behind.gap + radius) < front * (1.0 - 1e-9)
-            && -(behind.gap + radius) < MAX_DEPTH + radius
-        {
-            list.clear();
-            list.push(behind);
-        }
         front
     }
+
+    /// Of a long axis: places behind the surface are where the tool touches if they are the way out for their part of the axis, and no
+    /// others are for such a part. Returns whether any part of the axis is inside.
+    fn leave_inside(&mut self, vicinity: &Vicinity, axis: &[Vec3; 2], radius: f64) -> bool {
+        if self.behind.is_empty() {
+            return false;
+        }
+        let Self { near: list, corners, behind, .. } = self;
+        let way_out = |share: f64| way_out(vicinity, corners, &(axis[0] + (axis[1] - axis[0]) * share), radius);
+        let is_way_out =
+            |&Behind { near, away }: &Behind| way_out(near.share).is_some_and(|out| away <= out.norm() * (1.0 + 1e-9));
+        behind.retain(is_way_out);
+        if behind.is_empty() {
+            return false;
+        }
+        list.retain(|near| way_out(near.share).is_none());
+        // From the ends inwards, no two nearer to each other than a radius: where the surface is folded, walls face each other.
+        let from_middle = |behind: &Behind| (behind.near.share - 0.5).abs();
+        behind.sort_unstable_by(|a, b| {
+            from_middle(b).total_cmp(&from_middle(a)).then(a.near.share.total_cmp(&b.near.share))
+        });
+        let (outside, apart) = (list.len(), radius / (axis[1] - axis[0]).norm());
+        for &Behind { near, .. } in &*behind {
+            if list[outside..].iter().all(|known| (known.share - near.share).abs() >= apart) && list.len() < MOST_POINTS
+            {
+                list.push(near);
+            }
+        }
+        true
+    }
+}
+
+/// True for a tool with an axis that is more than a point.
+fn is_long(touch: &Touch) -> bool {
+    touch.shape.half_axis() != Vec3::zeros()
+}
+
+/// From a point inside the body to the nearest place of its surface (m), with `corners` at the end of the step; `None` for one that is
+/// outside, or deeper than a tool of that `radius` (m) is held for inside.
+fn way_out(vicinity: &Vicinity, corners: &[[Vec3; 2]], point: &Vec3, radius: f64) -> Option<Vec3> {
+    let (mut front, mut behind) = (f64::INFINITY, (radius + MAX_DEPTH, None));
+    let around_point = Extent::around(&[*point]);
+    for places in &vicinity.corners {
+        let corners = places.map(|place| corners[place as usize][1]);
+        if Extent::around(&corners).apart_squared(&around_point) > behind.0 * behind.0 {
+            continue;
+        }
+        let out = interpolate(&closest::weights(&corners, point), &corners) - point;
+        let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+        let distance = out.norm();
+        if out.dot(&across) <= 0.0 {
+            front = front.min(distance);
+        } else if distance < behind.0 {
+            behind = (distance, Some(out));
+        }
+    }
+    behind.1.filter(|_| behind.0 < front * (1.0 - 1e-9))
 }
 
 /// Adds a place; of too many the deepest are kept.

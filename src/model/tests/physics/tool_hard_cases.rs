@@ -4,7 +4,7 @@ use crate::common::*;
 use crate::{tissue_support, tool_support};
 use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, State, Tissue};
-use palpate_model::contact::{Contact, ContactMode, Friction, Law, ToolMotion, ToolShape};
+use palpate_model::contact::{Contact, ContactMode, ContactPoint, Friction, Law, ToolMotion, ToolShape};
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
 
@@ -54,6 +54,35 @@ fn a_small_tool_that_is_pressed_deep_is_pushed_out_the_way_it_came() {
             assert!(last.z >= 0.0 && normals.fold(1.0, f64::min) > 0.7, "{shape:?}: {last} at {to}");
         }
         assert!(last.z > 0.1 && last.xy().norm() < 0.3 * last.z, "{shape:?}: {last}");
+    }
+}
+
+/// Check that a thin capsule that lies flat is held along its whole length while its axis goes into the surface, by forces that grow little by
+/// little and turn it by next to nothing: it was held at one place alone from there on, by less than half the force.
+#[test]
+fn a_thin_capsule_that_is_pressed_flat_keeps_its_places() {
+    for radius in [1.5e-3, 2.5e-3, 3.5e-3] {
+        let shape = ToolShape::Capsule { radius, half_axis: Vec3::x() * 0.018 };
+        let mut simulation = reference_block(shape, 0.5);
+        let height = |k: i32| 0.1 + radius - 2.0 * radius * minjerk(f64::from(k) / 600.0);
+        let (mut last, mut largest, mut deepest) = (Vec3::zeros(), 0.0_f64, 0.0_f64);
+        for k in 0..600 {
+            let [from, to] = [k, k + 1].map(|k| Vec3::new(0.05, 0.05, height(k)));
+            let wrench = simulation.tick(ToolMotion::straight(from, to));
+            let places = simulation.contact_points(0).iter().filter(|point| point.force.norm() > 0.0);
+            let (left, right): (Vec<&ContactPoint>, Vec<&ContactPoint>) =
+                places.partition(|point| point.place.x < 0.05);
+            largest = largest.max((wrench.force - last).norm());
+            last = wrench.force;
+            if last.z > 0.02 {
+                assert!(!left.is_empty() && !right.is_empty(), "{radius}: {left:?} {right:?} after {k} ms");
+                assert!(wrench.torque.norm() < 0.1 * 0.018 * last.z, "{radius}: {wrench:?} after {k} ms");
+                deepest = left.iter().chain(&right).map(|point| point.place.z - to.z).fold(deepest, f64::max);
+            }
+        }
+        println!("{radius}: {:.3} N, at most {largest:.4} N more in a tick, axis {deepest:.5} m deep", last.z);
+        assert!(deepest > 1e-4, "{radius}: the axis has not gone in");
+        assert!(largest < 0.02 * last.z, "{radius}: {largest} N of {}", last.z);
     }
 }
 
