@@ -1,5 +1,7 @@
 //! The search for the places at which a tool with a shape may touch in a step.
 
+use std::cmp::Ordering;
+
 use super::ToolMotion;
 use super::closest;
 use super::corners::{self, Corners, chord};
@@ -149,8 +151,9 @@ impl Search {
         front
     }
 
-    /// Adds the places in front of the surface that touch, and puts those behind it aside, of a short axis the nearest, of triangles that touch, that are the nearest of
-    /// all or within `reach` (m); returns how far the nearest place in front is from the axis (m).
+    /// Adds the places in front of the surface that touch, and puts those behind it aside, for an axis that is a point the nearest alone. Of
+    /// triangles that touch, that are the nearest of all or within `reach` (m). Returns how far the nearest place in front is from the
+    /// axis (m).
     fn look_around(&mut self, vicinity: &Vicinity, touch: &Touch, axis: &[Vec3; 2], reach: f64) -> f64 {
         let (skin, fine, radius) = (&*touch.skin, touch.steady.fineness, touch.shape.radius());
         let coarse = 1.0 - fine;
@@ -227,7 +230,14 @@ impl Search {
             return false;
         }
         let Self { near: list, corners, behind, .. } = self;
-        let way_out = |share: f64| way_out(vicinity, corners, &(axis[0] + (axis[1] - axis[0]) * share), radius);
+        let way_out_at = |share: f64| way_out(vicinity, corners, &(axis[0] + (axis[1] - axis[0]) * share), radius);
+        // Every triangle has a place for each end.
+        let of_ends = [0.0, 1.0].map(way_out_at);
+        let way_out = |share: f64| match share {
+            0.0 => of_ends[0],
+            1.0 => of_ends[1],
+            _ => way_out_at(share),
+        };
         let is_way_out =
             |&Behind { near, away }: &Behind| way_out(near.share).is_some_and(|out| away <= out.norm() * (1.0 + 1e-9));
         behind.retain(is_way_out);
@@ -236,9 +246,10 @@ impl Search {
         }
         list.retain(|near| way_out(near.share).is_none());
         // From the ends inwards, no two nearer to each other than a radius: where the surface is folded, walls face each other.
-        let from_middle = |behind: &Behind| (behind.near.share - 0.5).abs();
+        let key = |Behind { near, away }: &Behind| [-(near.share - 0.5).abs(), near.share, *away];
         behind.sort_unstable_by(|a, b| {
-            from_middle(b).total_cmp(&from_middle(a)).then(a.near.share.total_cmp(&b.near.share))
+            let pairs = key(a).into_iter().zip(key(b));
+            pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
         });
         let (outside, apart) = (list.len(), radius / (axis[1] - axis[0]).norm());
         for &Behind { near, .. } in &*behind {
