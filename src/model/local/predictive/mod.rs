@@ -220,6 +220,9 @@ impl LocalModel for Predictive {
         self.take_present(&resync);
         self.predict(&mut resync);
         self.surroundings.rest(self.basis.as_ref().map(|basis| &basis.answers), resync.global.stiffness());
+        // How short the steps of the first tick have to be follows from the forces that were asked for last: these, and not those that
+        // were predicted for the path's end.
+        self.take_near_forces();
     }
 
     fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
