@@ -1,5 +1,7 @@
 //! One place at which a tool may touch, as a row of the system for the impulses of all of them.
 
+use std::cmp::Ordering;
+
 use super::ContactMode;
 use super::grain::{Grain, Sinking, Sunk};
 use crate::Vec3;
@@ -36,4 +38,9 @@ pub(super) struct Row {
     pub(super) impulse: Vec3,
     /// Its nodes in the list of the system.
     pub(super) nodes: (usize, usize),
+}
+
+/// The order of two lists of numbers, by the first that differ.
+pub(super) fn in_order(one: &[f64], other: &[f64]) -> Ordering {
+    one.iter().zip(other).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
 }

@@ -1,14 +1,12 @@
 //! The places at which tools may touch in one step, as rows of one system for the impulses there.
 
-use std::cmp::Ordering;
-
 use super::deformable::Deformable;
 use super::exact::Exact;
 use super::grain::Sunk;
 use super::near::Near;
 use super::nearness::Nearness;
 use super::resolve::{IMMOVABLE, Place, RECOVERY, approach};
-use super::row::Row;
+use super::row::{Row, in_order};
 use super::search::Search;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
@@ -92,11 +90,7 @@ impl Rows {
     /// triangles are.
     pub(super) fn sort(&mut self) {
         let key = |row: &Row| [row.place, row.normal, row.target].map(<[f64; 3]>::from);
-        self.rows.sort_unstable_by(|one, other| {
-            let [one, other] = [key(one), key(other)];
-            let pairs = one.as_flattened().iter().zip(other.as_flattened());
-            pairs.map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
-        });
+        self.rows.sort_unstable_by(|one, other| in_order(key(one).as_flattened(), key(other).as_flattened()));
     }
 
     /// The rows of a tool with the nodes of each.

@@ -1,7 +1,5 @@
 //! The search for the places at which a tool with a shape may touch in a step.
 
-use std::cmp::Ordering;
-
 use super::ToolMotion;
 use super::closest;
 use super::corners::{self, Corners, chord};
@@ -9,6 +7,7 @@ use super::deformable::Deformable;
 use super::extent::Extent;
 use super::near::Near;
 use super::passing;
+use super::row::in_order;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
 use super::vicinity::{MAX_DEPTH, NARROW, Vicinity};
@@ -247,10 +246,7 @@ impl Search {
         list.retain(|near| way_out(near.share).is_none());
         // From the ends inwards, no two nearer to each other than a radius: where the surface is folded, walls face each other.
         let key = |Behind { near, away }: &Behind| [-(near.share - 0.5).abs(), near.share, *away];
-        behind.sort_unstable_by(|a, b| {
-            let pairs = key(a).into_iter().zip(key(b));
-            pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
-        });
+        behind.sort_unstable_by(|one, other| in_order(&key(one), &key(other)));
         let (outside, apart) = (list.len(), radius / (axis[1] - axis[0]).norm());
         for &Behind { near, .. } in &*behind {
             if list[outside..].iter().all(|known| (known.share - near.share).abs() >= apart) && list.len() < MOST_POINTS

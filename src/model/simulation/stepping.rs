@@ -60,8 +60,7 @@ impl Stepping {
 mod tests {
     use super::*;
 
-    /// Check that no part of a step is longer than what the body bears, down to a sixteenth of what it bears at rest: tissue under a thin
-    /// capsule that slides 5 mm deep bears less than a fifth.
+    /// Check that no part of a step is longer than what the body bears, down to a sixteenth of what it bears at rest.
     #[test]
     fn steps_are_divided_until_the_body_bears_them() {
         let stepping = Stepping { tick: 1e-3, substeps: 3 };
