@@ -6,6 +6,7 @@
 use std::ops::Mul;
 
 use super::ContactMode;
+use super::columns::Columns;
 use super::nearness::Nearness;
 use super::row::Row;
 use crate::Vec3;
@@ -47,12 +48,12 @@ impl Default for Exact {
 
 impl Exact {
     /// The changes of the impulses (N s), place after place, after which `rows` close as their modes demand. Directions of sliding stay
-    /// what they are. `false` if there is no such change, or too many unknowns. `coupling` and `closing` are those of the sweeps.
-    pub(super) fn solve<C: Copy + Mul<Vec3, Output = Vec3>>(
+    /// what they are. `false` if there is no such change, or too many unknowns. `answers` and `closing` are those of the sweeps.
+    pub(super) fn solve<C: Copy + Default + Mul<Vec3, Output = Vec3>>(
         &mut self,
         rows: &[Row],
         nearness: &Nearness,
-        coupling: &[C],
+        answers: &Columns<C>,
         closing: &[Vec3],
         d: f64,
     ) -> bool {
@@ -80,7 +81,6 @@ impl Exact {
                 _ => {}
             }
         }
-        let count = rows.len();
         self.matrix.clear();
         self.right.clear();
         for one in &self.unknowns {
@@ -88,7 +88,7 @@ impl Exact {
             let allowed = if one.presses { row.allowed + row.sunk.at(nearness.load(one.place) / d) / d } else { 0.0 };
             self.right.push(one.test.dot(&closing[one.place]) - allowed);
             for other in &self.unknowns {
-                let mut answer = one.test.dot(&(coupling[other.place * count + one.place] * other.push));
+                let mut answer = one.test.dot(&(answers.get(other.place, one.place) * other.push));
                 if one.presses && other.presses {
                     answer += row.sunk.slope / (d * d) * nearness.share(other.place, one.place);
                 }
@@ -98,9 +98,15 @@ impl Exact {
         eliminate(&mut self.matrix, &mut self.right)
     }
 
-    /// What was found, as a change (N s) of the impulse at each place; a place may come more than once.
-    pub(super) fn changes(&self) -> impl Iterator<Item = (usize, Vec3)> {
-        self.unknowns.iter().zip(&self.right).map(|(unknown, amount)| (unknown.place, unknown.push * *amount))
+    /// How many changes were found.
+    pub(super) fn unknowns(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    /// One of them: a change of the impulse (N s) at a place, which may have more of them.
+    pub(super) fn change(&self, unknown: usize) -> (usize, Vec3) {
+        let Unknown { place, push, .. } = self.unknowns[unknown];
+        (place, push * self.right[unknown])
     }
 
     /// The part of the changes, at most all of them, up to which no place pulls.

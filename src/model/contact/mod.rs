@@ -15,6 +15,7 @@
 //! impulse, which moves every node.
 
 mod closest;
+mod columns;
 mod corners;
 mod coupled;
 mod deformable;

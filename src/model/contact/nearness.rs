@@ -1,13 +1,13 @@
 //! Which of the loads on a body are one load.
 
+use super::columns::Columns;
 use super::row::Row;
 
 /// What presses around each place of a step: places within the spread of a load are one load.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Nearness {
-    /// How much of the load at each place counts as one at each, one after the other for a load at each; zero for itself, for another
-    /// tool's, and for a place that does not sink in.
-    shares: Vec<f64>,
+    /// How much of the load at a place counts as one at each; zero for itself, for another tool's, and for a place that does not sink in.
+    shares: Columns<f64>,
     /// What presses at each place (N s).
     loads: Vec<f64>,
     /// What presses around it, on the same tool (N s).
@@ -19,8 +19,8 @@ pub(super) struct Nearness {
 impl Nearness {
     /// With room for so many places.
     pub(super) fn with_room(places: usize) -> Self {
-        let shares = Vec::with_capacity(places * places);
-        Self { shares, loads: Vec::with_capacity(places), beside: Vec::with_capacity(places), is_none: true }
+        let list = || Vec::with_capacity(places);
+        Self { shares: Columns::with_room(places), loads: list(), beside: list(), is_none: true }
     }
 
     /// Of `rows`, with the impulses that they have: places do not move within a step, so that it is found once for all sweeps.
@@ -29,22 +29,10 @@ impl Nearness {
             list.clear();
             list.resize(rows.len(), 0.0);
         }
-        self.shares.clear();
         self.is_none = rows.iter().all(|row| row.sinking.is_none());
-        if self.is_none {
-            return;
-        }
-        for (place, row) in rows.iter().enumerate() {
-            let share = |(other, near): (usize, &Row)| match &near.sinking {
-                Some((_, grain)) if other != place && near.tool == row.tool => {
-                    grain.nearness((near.place - row.place).norm_squared())
-                }
-                _ => 0.0,
-            };
-            self.shares.extend(rows.iter().enumerate().map(share));
-        }
-        for (place, row) in rows.iter().enumerate() {
-            self.change(place, row.impulse.dot(&row.normal));
+        if !self.is_none {
+            self.shares.begin(rows.len());
+            (0..rows.len()).for_each(|place| self.change(rows, place));
         }
     }
 
@@ -53,14 +41,24 @@ impl Nearness {
         self.is_none
     }
 
-    /// What presses at a place is `load` (N s) now.
-    pub(super) fn change(&mut self, place: usize, load: f64) {
-        if self.is_none {
+    /// The impulse at a place has changed.
+    pub(super) fn change(&mut self, rows: &[Row], place: usize) {
+        let row = &rows[place];
+        let load = row.impulse.dot(&row.normal);
+        let more = load - self.loads[place];
+        if self.is_none || more == 0.0 {
             return;
         }
-        let more = load - self.loads[place];
         self.loads[place] = load;
-        let shares = &self.shares[place * self.loads.len()..];
+        let share = |(other, near): (usize, &Row)| match &near.sinking {
+            Some((_, grain)) if other != place && near.tool == row.tool => {
+                grain.nearness((near.place - row.place).norm_squared())
+            }
+            _ => 0.0,
+        };
+        let shares = self.shares.of(place, |shares| {
+            shares.iter_mut().zip(rows.iter().enumerate()).for_each(|(to, near)| *to = share(near));
+        });
         self.beside.iter_mut().zip(shares).for_each(|(beside, share)| *beside += share * more);
     }
 
@@ -71,7 +69,7 @@ impl Nearness {
         } else if self.is_none {
             0.0
         } else {
-            self.shares[of * self.loads.len() + at]
+            self.shares.get(of, at)
         }
     }
 

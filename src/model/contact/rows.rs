@@ -1,13 +1,13 @@
 //! The places at which tools may touch in one step, as rows of one system for the impulses there.
 
+use super::columns::Columns;
 use super::deformable::Deformable;
-use super::exact::Exact;
 use super::grain::Sunk;
 use super::near::Near;
-use super::nearness::Nearness;
 use super::resolve::{IMMOVABLE, Place, RECOVERY, approach};
 use super::row::{Row, in_order};
 use super::search::Search;
+use super::solve::Work;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
 use super::{ContactMode, Law, ToolMotion};
@@ -26,14 +26,10 @@ pub(crate) struct Rows {
     /// The nodes of all rows with their weights.
     pub(super) nodes: Vec<(u32, f64)>,
     search: Search,
-    pub(super) nearness: Nearness,
-    pub(super) exact: Exact,
+    pub(super) work: Work,
     /// How each place answers to an impulse at each (1/kg): in an explicit step, and in an implicit one.
-    pub(super) shared: Vec<f64>,
-    pub(super) coupling: Vec<Mat3>,
-    /// How fast each place closes (m/s), and did before a sweep.
-    pub(super) closing: Vec<Vec3>,
-    pub(super) before: Vec<Vec3>,
+    pub(super) shared: Columns<f64>,
+    pub(super) coupling: Columns<Mat3>,
     /// A number for each node of the body; zeros between steps.
     pub(super) at_nodes: Vec<f64>,
     /// The place of each node in the list of a row, from one on; zeros but while that list is made.
@@ -48,12 +44,9 @@ impl Rows {
             rows: Vec::with_capacity(rows),
             nodes: Vec::with_capacity(40 * rows),
             search: Search::new(tools),
-            nearness: Nearness::with_room(rows),
-            exact: Exact::default(),
-            shared: Vec::with_capacity(rows * rows),
-            coupling: Vec::new(),
-            closing: Vec::with_capacity(rows),
-            before: Vec::with_capacity(rows),
+            work: Work::with_room(rows),
+            shared: Columns::with_room(rows),
+            coupling: Columns::default(),
             at_nodes: Vec::new(),
             listed: Vec::new(),
         }
@@ -61,9 +54,7 @@ impl Rows {
 
     /// Makes room for the coupling of so many places in an implicit step.
     pub(crate) fn reserve_coupling(&mut self, places: usize) {
-        let places = places.min(MOST_POINTS);
-        self.coupling.clear();
-        self.coupling.reserve(places * places);
+        self.coupling = Columns::with_room(places.min(MOST_POINTS));
     }
 
     /// Makes room for a body of so many nodes and candidates, and forgets what it knows of another one.

@@ -33,11 +33,14 @@ pub(super) struct Search {
     sides: Vec<u8>,
 }
 
-/// A place that the axis is behind, so far away (m).
+/// A place that the axis is behind.
 #[derive(Clone, Copy, Debug)]
 struct Behind {
     near: Near,
+    /// How far away its part of the axis is (m).
     away: f64,
+    /// No other of these places is nearer to that part.
+    is_nearest: bool,
 }
 
 impl Search {
@@ -140,7 +143,7 @@ impl Search {
         }
         let front = self.look_around(vicinity, touch, &axis, 0.0);
         // A centre inside is nearest to the inner side of some triangle: out of the body on the shortest way.
-        if let Some(&Behind { near, away }) = self.behind.first()
+        if let Some(&Behind { near, away, .. }) = self.behind.first()
             && away < front * (1.0 - 1e-9)
             && away < MAX_DEPTH + radius
         {
@@ -196,9 +199,9 @@ impl Search {
                 };
                 let same = 1e-12 * radius * radius;
                 if away.dot(&across) < 0.0 {
-                    let found = Behind { near: near(-distance), away: distance };
+                    let found = Behind { near: near(-distance), away: distance, is_nearest: true };
                     let is_new = |known: &Behind| (known.near.place - place).norm_squared() >= same;
-                    if is_long && behind.len() < MOST_POINTS && behind.iter().all(is_new) {
+                    if is_long && behind.len() < MOST_POINTS && behind.iter().rev().all(is_new) {
                         behind.push(found);
                     } else if !is_long && behind.first().is_none_or(|known| distance < known.away) {
                         behind.clear();
@@ -212,8 +215,9 @@ impl Search {
                 }
                 let mut near = near(distance);
                 near.gap += fine * chord(&corners, &weights, radius);
+                // Triangles that share a place are mostly next to each other in the list.
                 let is_new =
-                    |found: &[Near]| found.iter().all(|known| (known.place - near.place).norm_squared() >= same);
+                    |found: &[Near]| found.iter().rev().all(|known| (known.place - near.place).norm_squared() >= same);
                 if near.gap < 0.0 && is_new(list) {
                     keep(list, near);
                 }
@@ -237,15 +241,23 @@ impl Search {
             1.0 => of_ends[1],
             _ => way_out_at(share),
         };
-        let is_way_out =
-            |&Behind { near, away }: &Behind| way_out(near.share).is_some_and(|out| away <= out.norm() * (1.0 + 1e-9));
+        // Most are farther from their part of the axis than another place is, which is quick to tell.
+        for place in 0..behind.len() {
+            let Behind { near, away, .. } = behind[place];
+            let (centre, less) = (axis[0] + (axis[1] - axis[0]) * near.share, away * (1.0 - 2e-9));
+            let is_nearer = |other: &Behind| (other.near.place - centre).norm_squared() < less * less;
+            behind[place].is_nearest = !behind.iter().any(is_nearer);
+        }
+        let is_way_out = |&Behind { near, away, is_nearest }: &Behind| {
+            is_nearest && way_out(near.share).is_some_and(|out| away <= out.norm() * (1.0 + 1e-9))
+        };
         behind.retain(is_way_out);
         if behind.is_empty() {
             return false;
         }
         list.retain(|near| way_out(near.share).is_none());
         // From the ends inwards, no two nearer to each other than a radius: where the surface is folded, walls face each other.
-        let key = |Behind { near, away }: &Behind| [-(near.share - 0.5).abs(), near.share, *away];
+        let key = |Behind { near, away, .. }: &Behind| [-(near.share - 0.5).abs(), near.share, *away];
         behind.sort_unstable_by(|one, other| in_order(&key(one), &key(other)));
         let (outside, apart) = (list.len(), radius / (axis[1] - axis[0]).norm());
         for &Behind { near, .. } in &*behind {

@@ -2,6 +2,7 @@
 
 use std::ops::Mul;
 
+use super::columns::Columns;
 use super::deformable::Deformable;
 use super::exact::Exact;
 use super::nearness::Nearness;
@@ -9,8 +10,8 @@ use super::resolve::IMMOVABLE;
 use super::row::Row;
 use super::rows::Rows;
 use super::{ContactMode, Law};
-use crate::Vec3;
 use crate::linear::ImplicitStep;
+use crate::{Mat3, Vec3};
 
 /// Sweeps to and fro at most, of places on the body's own nodes, and of places that sink in for one and for however many: few of these
 /// that lie close together take the most.
@@ -34,25 +35,18 @@ impl Rows {
     /// Changes the velocities so that no place is entered, none pulls and each impulse is in its cone. Rows meet at shared nodes;
     /// sweeps go to and fro, so that none of them has the last word.
     pub(super) fn solve(&mut self, body: &mut Deformable<'_>, law: &Law, d: f64) {
-        let Self { rows, nodes, at_nodes, shared, closing, before, nearness, exact, .. } = self;
+        let Self { rows, nodes, at_nodes, shared, work, .. } = self;
         let of = |row: &Row| &nodes[row.nodes.0..row.nodes.1];
         // Masses are lumped: an impulse is felt where its nodes are, along itself.
-        let count = rows.len();
-        shared.resize(count * count, 0.0);
-        for (place, row) in rows.iter().enumerate() {
-            let weighted = |&(node, w): &(u32, f64)| w * body.inverse_masses[node as usize];
-            shared[place * count + place] = of(row).iter().map(|part| weighted(part) * part.1).sum();
-            if place + 1 == count {
-                break;
+        let find = |rows: &[Row], place: usize, column: &mut [f64]| {
+            let of_place = of(&rows[place]);
+            of_place.iter().for_each(|&(node, w)| at_nodes[node as usize] = w * body.inverse_masses[node as usize]);
+            for (answer, row) in column.iter_mut().zip(rows) {
+                *answer = of(row).iter().map(|&(node, w)| at_nodes[node as usize] * w).sum();
             }
-            of(row).iter().for_each(|part| at_nodes[part.0 as usize] = weighted(part));
-            for (other, row) in rows.iter().enumerate().skip(place + 1) {
-                let answer = of(row).iter().map(|&(node, w)| at_nodes[node as usize] * w).sum();
-                (shared[place * count + other], shared[other * count + place]) = (answer, answer);
-            }
-            of(row).iter().for_each(|&(node, _)| at_nodes[node as usize] = 0.0);
-        }
-        sweep_calmly(rows, (nearness, exact), shared, [closing, before], law, d);
+            of_place.iter().for_each(|&(node, _)| at_nodes[node as usize] = 0.0);
+        };
+        Sweeps { rows, answers: shared, find, work, law: *law, d }.go_calmly();
         for row in rows.iter() {
             for &(node, w) in of(row) {
                 body.velocities[node as usize] -= row.impulse * (w * body.inverse_masses[node as usize]);
@@ -62,15 +56,10 @@ impl Rows {
 
     /// The same for an implicit step, in which every node answers to an impulse, and not along it.
     pub(super) fn solve_coupled(&mut self, body: &mut Deformable<'_>, system: &ImplicitStep, law: &Law) {
-        let Self { rows, nodes, coupling, closing, before, nearness, exact, .. } = self;
+        let Self { rows, nodes, coupling, work, .. } = self;
         let of = |row: &Row| &nodes[row.nodes.0..row.nodes.1];
-        let count = rows.len();
-        coupling.clear();
-        for row in rows.iter() {
-            coupling.extend(rows.iter().map(|other| system.coupling(of(other), of(row))));
-        }
-        for (place, row) in rows.iter_mut().enumerate() {
-            let own = coupling[place * count + place];
+        for row in rows.iter_mut() {
+            let own = system.coupling(of(row), of(row));
             // The steepest answer bounds every other one: the projections stay contractions.
             row.compliance = own.trace();
             row.along = row.normal.dot(&(own * row.normal));
@@ -78,128 +67,176 @@ impl Rows {
                 (row.mode, row.impulse) = (ContactMode::Lost, Vec3::zeros());
             }
         }
-        sweep_calmly(rows, (nearness, exact), coupling, [closing, before], law, system.step());
+        let find = |rows: &[Row], place: usize, column: &mut [Mat3]| {
+            let others = rows.iter().map(|other| system.coupling(of(other), of(&rows[place])));
+            column.iter_mut().zip(others).for_each(|(to, answer)| *to = answer);
+        };
+        Sweeps { rows, answers: coupling, find, work, law: *law, d: system.step() }.go_calmly();
         for row in rows.iter() {
             system.push_all(body.velocities, of(row), row.impulse);
         }
     }
 }
 
-/// Sweeps with the friction of `law`, and again with less while they run away.
-fn sweep_calmly<C: Copy + Mul<Vec3, Output = Vec3>>(
-    rows: &mut [Row],
-    (nearness, exact): (&mut Nearness, &mut Exact),
-    coupling: &[C],
-    [closing, before]: [&mut Vec<Vec3>; 2],
-    law: &Law,
+/// Working memory of the sweeps.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Work {
+    nearness: Nearness,
+    exact: Exact,
+    /// How fast each place closes (m/s), and did before a sweep.
+    closing: Vec<Vec3>,
+    before: Vec<Vec3>,
+}
+
+impl Work {
+    /// With room for so many places.
+    pub(super) fn with_room(places: usize) -> Self {
+        let list = || Vec::with_capacity(places);
+        Self { nearness: Nearness::with_room(places), exact: Exact::default(), closing: list(), before: list() }
+    }
+}
+
+/// Sweeps over the places of a step of `d` seconds, from what pressed in the step before.
+struct Sweeps<'a, C, F> {
+    rows: &'a mut [Row],
+    /// How each place answers to an impulse at each (1/kg).
+    answers: &'a mut Columns<C>,
+    /// Finds how each of some rows answers to an impulse at one of them.
+    find: F,
+    work: &'a mut Work,
+    law: Law,
     d: f64,
-) {
-    let mut law = *law;
-    let mut calmer = CALMER.iter();
-    loop {
-        let fastest = find_closing(rows, closing);
-        sweep(rows, (nearness, exact), coupling, [closing, before], &law, d);
-        if !has_run_away(rows, closing, fastest) {
+}
+
+impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut [C])> Sweeps<'_, C, F> {
+    /// Sweeps with the friction of the law, and again with less while they run away.
+    fn go_calmly(&mut self) {
+        self.answers.begin(self.rows.len());
+        let mut calmer = CALMER.iter();
+        loop {
+            let fastest = self.begin();
+            self.go();
+            if !self.has_run_away(fastest) {
+                return;
+            }
+            let Some(&most) = calmer.next() else { return };
+            self.law.friction = self.law.friction.at_most(most);
+        }
+    }
+
+    /// Finds how fast each place closes if nothing presses; returns the fastest of what the sweeps are to end (m/s).
+    fn begin(&mut self) -> f64 {
+        let closing = &mut self.work.closing;
+        closing.clear();
+        closing.extend(self.rows.iter().map(|row| row.closing));
+        let faster = |most: f64, row: &Row| most.max(row.closing.norm()).max(row.allowed.abs());
+        self.rows.iter().fold(0.0, faster)
+    }
+
+    /// True if sweeps made places close much faster than the `fastest` before; nothing presses any more then.
+    fn has_run_away(&mut self, fastest: f64) -> bool {
+        // Written so that what is no number has run away.
+        let has = !self.work.closing.iter().all(|closing| closing.norm() <= RUN_AWAY * fastest);
+        if has {
+            self.rows.iter_mut().for_each(|row| row.impulse = Vec3::zeros());
+        }
+        has
+    }
+
+    /// Changes how fast all places close by a change of the impulse (N s) at one.
+    fn answer(&mut self, place: usize, change: Vec3) {
+        // Where a tool sinks in beside the elements most places do not press.
+        if change == Vec3::zeros() {
             return;
         }
-        let Some(&most) = calmer.next() else { return };
-        law.friction = law.friction.at_most(most);
+        let Self { rows, answers, find, work, .. } = self;
+        let answers = answers.of(place, |column| find(rows, place, column));
+        work.closing.iter_mut().zip(answers).for_each(|(closing, &answer)| *closing -= answer * change);
     }
-}
 
-/// Puts how fast each place closes if nothing presses in place of `closing`; returns the fastest of what the sweeps are to end (m/s).
-fn find_closing(rows: &[Row], closing: &mut Vec<Vec3>) -> f64 {
-    closing.clear();
-    closing.extend(rows.iter().map(|row| row.closing));
-    closing.iter().zip(rows).fold(0.0, |most: f64, (closing, row)| most.max(closing.norm()).max(row.allowed.abs()))
-}
-
-/// True if sweeps made places close much faster than the `fastest` before; nothing presses any more then.
-fn has_run_away(rows: &mut [Row], closing: &[Vec3], fastest: f64) -> bool {
-    // Written so that what is no number has run away.
-    let has = !closing.iter().all(|closing| closing.norm() <= RUN_AWAY * fastest);
-    if has {
-        rows.iter_mut().for_each(|row| row.impulse = Vec3::zeros());
-    }
-    has
-}
-
-/// Updates rows to and fro until nothing changes, beginning with what pressed in the last step. `coupling` has how each place
-/// answers to an impulse (1/kg), one after the other for an impulse at each. How deep the tool sinks in is taken as linear in the
-/// force meanwhile, and made anew until it is what it was taken to be.
-fn sweep<C: Copy + Mul<Vec3, Output = Vec3>>(
-    rows: &mut [Row],
-    (nearness, exact): (&mut Nearness, &mut Exact),
-    coupling: &[C],
-    [closing, before]: [&mut Vec<Vec3>; 2],
-    law: &Law,
-    d: f64,
-) {
-    let count = rows.len();
-    let answer = |closing: &mut [Vec3], place: usize, change: Vec3| {
-        for (closing, &coupling) in closing.iter_mut().zip(&coupling[place * count..]) {
-            *closing -= coupling * change;
-        }
-    };
-    for (place, row) in rows.iter().enumerate() {
-        answer(closing, place, row.impulse);
-    }
-    nearness.find(rows);
-    let most = if nearness.is_none() {
-        MOST_SWEEPS
-    } else {
-        (MOST_SUNKEN_SWEEPS[0] / count.max(1)).max(MOST_SUNKEN_SWEEPS[1])
-    };
-    for _ in 0..MOST_ROUNDS {
-        for (place, row) in rows.iter_mut().enumerate() {
-            if let Some((sinking, _)) = &row.sinking {
-                row.sunk = sinking.tangent(nearness.load(place) / d);
+    /// Updates rows to and fro until nothing changes, beginning with what pressed in the last step. How deep the tool sinks in is taken as
+    /// linear in the force meanwhile, and made anew until it is what it was taken to be.
+    fn go(&mut self) {
+        let (count, d) = (self.rows.len(), self.d);
+        (0..count).for_each(|place| self.answer(place, self.rows[place].impulse));
+        self.work.nearness.find(self.rows);
+        let most = if self.work.nearness.is_none() {
+            MOST_SWEEPS
+        } else {
+            (MOST_SUNKEN_SWEEPS[0] / count.max(1)).max(MOST_SUNKEN_SWEEPS[1])
+        };
+        for _ in 0..MOST_ROUNDS {
+            for (place, row) in self.rows.iter_mut().enumerate() {
+                if let Some((sinking, _)) = &row.sinking {
+                    row.sunk = sinking.tangent(self.work.nearness.load(place) / d);
+                }
             }
-        }
-        for turn in 1..=most {
-            before.clone_from(closing);
-            for place in (0..count).chain((0..count).rev()) {
-                let row = &mut rows[place];
-                let change = row.update(closing[place], law, nearness.beside(place), d);
-                answer(closing, place, change);
-                nearness.change(place, row.impulse.dot(&row.normal));
+            for turn in 1..=most {
+                if self.sweep() {
+                    break;
+                }
+                // Sweeps have the last word: they alone keep every place in its cone.
+                let is_due = !self.work.nearness.is_none()
+                    && turn % SWEEPS_BETWEEN == 0
+                    && turn + SWEEPS_BETWEEN <= most.min(MOST_EXACT * SWEEPS_BETWEEN);
+                if is_due {
+                    self.solve_exactly();
+                }
             }
-            let change =
-                closing.iter().zip(&*before).fold(0.0_f64, |most, (now, before)| most.max((now - before).norm()));
-            let done = rows.iter().fold(0.0_f64, |most, row| most.max(row.impulse.norm() * row.compliance));
-            if change <= FOUND * done {
+            if self.is_as_deep_as_taken() {
                 break;
             }
-            // Sweeps have the last word: they alone keep every place in its cone.
-            let is_due = !nearness.is_none()
-                && turn % SWEEPS_BETWEEN == 0
-                && turn + SWEEPS_BETWEEN <= most.min(MOST_EXACT * SWEEPS_BETWEEN);
-            if is_due && exact.solve(rows, nearness, coupling, closing, d) {
-                let part = exact.part(rows);
-                for (place, change) in exact.changes() {
-                    rows[place].impulse += change * part;
-                    answer(closing, place, change * part);
-                }
-                for (place, row) in rows.iter().enumerate() {
-                    nearness.change(place, row.impulse.dot(&row.normal));
-                }
-            }
         }
-        let is_as_taken = |(place, row): (usize, &Row)| {
+    }
+
+    /// One sweep to and fro; true if it changed next to nothing.
+    fn sweep(&mut self) -> bool {
+        let count = self.rows.len();
+        self.work.before.clone_from(&self.work.closing);
+        for place in (0..count).chain((0..count).rev()) {
+            let (closing, beside) = (self.work.closing[place], self.work.nearness.beside(place));
+            let change = self.rows[place].update(closing, &self.law, beside, self.d);
+            self.answer(place, change);
+            self.work.nearness.change(self.rows, place);
+        }
+        // Squares are quicker to find than lengths.
+        let changes =
+            self.work.closing.iter().zip(&self.work.before).map(|(now, before)| (now - before).norm_squared());
+        let done = self.rows.iter().map(|row| row.impulse.norm_squared() * (row.compliance * row.compliance));
+        changes.fold(0.0, f64::max) <= FOUND * FOUND * done.fold(0.0, f64::max)
+    }
+
+    /// Takes the modes that the sweeps have found as they are, and solves for the impulses.
+    fn solve_exactly(&mut self) {
+        let Self { rows, answers, work, d, .. } = self;
+        let Work { nearness, exact, closing, .. } = &mut **work;
+        if !exact.solve(rows, nearness, answers, closing, *d) {
+            return;
+        }
+        let part = exact.part(rows);
+        for unknown in 0..exact.unknowns() {
+            let (place, change) = self.work.exact.change(unknown);
+            self.rows[place].impulse += change * part;
+            self.answer(place, change * part);
+        }
+        (0..self.rows.len()).for_each(|place| self.work.nearness.change(self.rows, place));
+    }
+
+    /// True if the tool sinks in as deep at each place as it was taken to.
+    fn is_as_deep_as_taken(&self) -> bool {
+        let Work { nearness, closing, .. } = &*self.work;
+        self.rows.iter().enumerate().all(|(place, row)| {
             row.sinking.as_ref().is_none_or(|(sinking, _)| {
-                let force = nearness.load(place) / d;
+                let force = nearness.load(place) / self.d;
                 let depth = sinking.at(force);
                 if row.presses() {
                     return (row.sunk.at(force) - depth).abs() <= FOUND * depth;
                 }
                 // Around a larger force the tool was taken to sink in deeper than it does: that alone releases nothing.
-                let left = (closing[place].dot(&row.normal) - row.allowed) * d;
+                let left = (closing[place].dot(&row.normal) - row.allowed) * self.d;
                 row.mode == ContactMode::Lost || left <= depth + FOUND * sinking.most()
             })
-        };
-        if rows.iter().enumerate().all(is_as_taken) {
-            break;
-        }
+        })
     }
 }
 

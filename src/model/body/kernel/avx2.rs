@@ -200,8 +200,11 @@ impl Simd for Avx2 {
         unsafe {
             let mut fourth = [_mm256_setzero_pd(); 2];
             for half in 0..2 {
-                let row = |lane: usize| _mm256_loadu_pd(nodes[at[4 * half + lane] as usize].0.as_ptr());
-                fourth[half] = self.transpose([row(0), row(1), row(2), row(3)])[3];
+                let mut rows = [_mm256_setzero_pd(); 4];
+                for lane in 0..4 {
+                    rows[lane] = _mm256_loadu_pd(nodes[at[4 * half + lane] as usize].0.as_ptr());
+                }
+                fourth[half] = self.transpose(rows)[3];
             }
             fourth
         }

@@ -249,13 +249,18 @@ impl Simd for Avx512 {
     fn fourth(self, nodes: &[Motion], at: &Numbers) -> __m512d {
         // SAFETY: the features were detected; a motion is eight doubles.
         unsafe {
-            let row = |lane: usize| _mm256_loadu_pd(nodes[at[lane] as usize].0.as_ptr());
-            // Of four rows: second and fourth of two, and of these the upper halves.
-            let four = |n: usize| {
-                let (ab, cd) = (_mm256_unpackhi_pd(row(n), row(n + 1)), _mm256_unpackhi_pd(row(n + 2), row(n + 3)));
-                _mm256_permute2f128_pd::<0x31>(ab, cd)
-            };
-            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(four(0)), four(4))
+            // Of four rows: second and fourth of two, and of these the upper halves. Closures would be compiled without the features,
+            // and each instruction would be a call.
+            let mut fours = [_mm256_setzero_pd(); 2];
+            for half in 0..2 {
+                let mut rows = [_mm256_setzero_pd(); 4];
+                for lane in 0..4 {
+                    rows[lane] = _mm256_loadu_pd(nodes[at[4 * half + lane] as usize].0.as_ptr());
+                }
+                let (ab, cd) = (_mm256_unpackhi_pd(rows[0], rows[1]), _mm256_unpackhi_pd(rows[2], rows[3]));
+                fours[half] = _mm256_permute2f128_pd::<0x31>(ab, cd);
+            }
+            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(fours[0]), fours[1])
         }
     }
 

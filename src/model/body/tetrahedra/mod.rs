@@ -179,8 +179,9 @@ impl Body for Tetrahedra {
     /// The nearest nodes around each triangle's centroid at rest, as many as `size` makes, that it reaches through elements.
     fn patch(&self, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
         nodes.clear();
-        for &triangle in triangles {
-            window::grow(self, self.surface.triangles[triangle as usize], size.iter().product(), nodes);
+        let (count, mut seen) = (size.iter().product(), vec![0; self.rest().len()]);
+        for (&triangle, number) in triangles.iter().zip(1..) {
+            window::grow(self, self.surface.triangles[triangle as usize], count, (&mut seen, number), nodes);
         }
         nodes.sort_unstable();
         nodes.dedup();

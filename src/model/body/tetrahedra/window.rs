@@ -1,7 +1,7 @@
 //! The nodes around a place of the surface.
 
 use std::cmp::Ordering;
-use std::collections::{BinaryHeap, HashSet};
+use std::collections::BinaryHeap;
 
 use super::Tetrahedra;
 use crate::Vec3;
@@ -29,13 +29,21 @@ impl PartialOrd for Candidate {
 }
 
 /// Appends the `count` movable nodes that are nearest to the centroid of `triangle` at rest and that elements join to it on the
-/// way: what lies beyond a gap is not near. Held nodes are passed, as many at the most as are looked for.
-pub(super) fn grow(body: &Tetrahedra, triangle: [u32; 3], count: usize, nodes: &mut Vec<u32>) {
+/// way: what lies beyond a gap is not near. Held nodes are passed, as many at the most as are looked for. `seen` has for every node the
+/// number of the last growth that met it, and `number` is that of this one.
+pub(super) fn grow(
+    body: &Tetrahedra,
+    triangle: [u32; 3],
+    count: usize,
+    (seen, number): (&mut [u32], u32),
+    nodes: &mut Vec<u32>,
+) {
     let (rest, inverse_masses) = (body.rest(), body.inverse_masses());
     let centre = triangle.iter().map(|&node| rest[node as usize]).sum::<Vec3>() / 3.0;
     let candidate = |node: u32| Candidate { square: (rest[node as usize] - centre).norm_squared(), node };
     let mut edge: BinaryHeap<Candidate> = triangle.map(candidate).into();
-    let mut seen: HashSet<u32> = triangle.into();
+    let mut is_new = |node: u32| std::mem::replace(&mut seen[node as usize], number) != number;
+    triangle.into_iter().for_each(|node| _ = is_new(node));
     let (mut found, mut passed) = (0, 0);
     while found < count && passed <= count {
         let Some(Candidate { node, .. }) = edge.pop() else { return };
@@ -46,8 +54,7 @@ pub(super) fn grow(body: &Tetrahedra, triangle: [u32; 3], count: usize, nodes: &
             passed += 1;
         }
         for element in body.solid.at(node) {
-            let new = element.nodes.into_iter().filter(|&other| seen.insert(other));
-            edge.extend(new.map(candidate));
+            edge.extend(element.nodes.into_iter().filter(|&other| is_new(other)).map(candidate));
         }
     }
 }
