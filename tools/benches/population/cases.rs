@@ -17,12 +17,16 @@ use palpate_mesh::{Sizes, organs};
 use super::common::tissue;
 use super::paths::{Ground, Motion};
 use super::random::Random;
+use super::shapes;
 
 /// Simulated time (s).
 pub const DURATION_S: f64 = 1.2;
 
 /// How many times as many nodes those scenes have along each edge of a block that are called larger.
 pub const LONGER: f64 = 1.7;
+
+/// The elements of tissue under a tool with a shape, in those of other scenes.
+const FINER: f64 = 0.65;
 
 /// A third of the cases is for judging: nothing was chosen by what they say.
 pub fn is_unseen(seed: u64) -> bool {
@@ -55,6 +59,19 @@ impl Class {
     }
 }
 
+/// What is made of a seed's scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Variety {
+    /// As it is, with one tool.
+    Single,
+    /// With a second tool.
+    Pairs,
+    /// Blocks are so many times as long each way around the same motion.
+    Larger(f64),
+    /// With a capsule that turns or a sphere that presses deep, on finer tissue.
+    Shapes,
+}
+
 /// One scene of the population.
 pub struct Case {
     pub seed: u64,
@@ -75,8 +92,8 @@ impl fmt::Display for Case {
 }
 
 impl Case {
-    /// The scene of `seed`, with one tool or a pair. Blocks are `larger` times as long each way around the same motion.
-    pub fn new(seed: u64, is_pair: bool, larger: f64) -> Result<Self, Error> {
+    /// The scene of `seed` in that variety.
+    pub fn new(seed: u64, variety: Variety) -> Result<Self, Error> {
         // Not by the remainder that says what is unseen.
         let random = &mut Random(0x70a1_9a7e ^ (seed << 20));
         let class = random.one_of(&[
@@ -92,8 +109,8 @@ impl Case {
         ]);
         let mut scene = Scene::of_program().with_model(Kind::Predictive);
         let (body, inside, ground) = match class {
-            Class::Tissue => organ(random)?,
-            _ => springs(class, larger, random),
+            Class::Tissue => organ(if variety == Variety::Shapes { FINER } else { 1.0 }, random)?,
+            _ => springs(class, if let Variety::Larger(times) = variety { times } else { 1.0 }, random),
         };
         scene.body = Some(body);
         let motion = random.one_of(&Motion::ALL);
@@ -113,8 +130,10 @@ impl Case {
         let radius = scene.devices[0].tool.shape().radius();
         scene.devices[0].path = Some(path(motion, &ground, radius, random)?);
         let mut case = Self { seed, class, motion, inside, scene };
-        if is_pair {
-            case.add_second(ground, random)?;
+        match variety {
+            Variety::Single | Variety::Larger(_) => {}
+            Variety::Pairs => case.add_second(ground, random)?,
+            Variety::Shapes => shapes::use_shape(&mut case.scene, motion, ground, random)?,
         }
         Ok(case)
     }
@@ -197,22 +216,22 @@ fn springs(class: Class, larger: f64, random: &mut Random) -> (BodySpec, &'stati
     (body, inside, ground)
 }
 
-/// An organ or a beam of tetrahedra.
-fn organ(random: &mut Random) -> Result<(BodySpec, &'static str, Ground), Error> {
+/// An organ or a beam of tetrahedra, which are `finer` times as large as others.
+fn organ(finer: f64, random: &mut Random) -> Result<(BodySpec, &'static str, Ground), Error> {
     let kind = random.one_of(&["beam", "prostate", "liver"]);
     let (mesh, cell_m, centre_m, room_m, depth_m) = match kind {
         "beam" => {
             let size = [random.within(0.05, 0.08), random.within(0.03, 0.05), random.within(0.025, 0.04)];
-            let cell = random.within(6e-3, 8e-3);
+            let cell = finer * random.within(6e-3, 8e-3);
             let room = [0.35 * size[0] - cell, 0.35 * size[1] - cell].map(|room: f64| room.max(2e-3));
             (organs::beam(size, cell)?, cell, [0.55 * size[0], 0.5 * size[1]], room, random.within(2e-3, 4e-3))
         }
         "prostate" => {
-            let cell = random.within(4.5e-3, 6e-3);
+            let cell = finer * random.within(4.5e-3, 6e-3);
             (organs::prostate(Sizes::uniform(cell))?, cell, [0.0105, -0.003], [3e-3, 5e-3], random.within(1e-3, 2.5e-3))
         }
         _ => {
-            let cell = random.within(9e-3, 11e-3);
+            let cell = finer * random.within(9e-3, 11e-3);
             (organs::liver(Sizes::uniform(cell))?, cell, [-0.036, 0.003], [12e-3, 8e-3], random.within(2.5e-3, 5e-3))
         }
     };
@@ -232,7 +251,7 @@ fn organ(random: &mut Random) -> Result<(BodySpec, &'static str, Ground), Error>
 }
 
 /// A tool of that radius along `motion`, a sample every millisecond.
-fn path(motion: Motion, ground: &Ground, radius: f64, random: &mut Random) -> Result<ToolPath, Error> {
+pub fn path(motion: Motion, ground: &Ground, radius: f64, random: &mut Random) -> Result<ToolPath, Error> {
     let way = motion.way(ground, radius, DURATION_S, random);
     let times: Vec<f64> = (0..=(DURATION_S * 1e3).round() as u32).map(|tick| 1e-3 * f64::from(tick)).collect();
     let positions = times.iter().map(|&t| way(t)).collect();

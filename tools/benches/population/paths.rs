@@ -130,7 +130,8 @@ impl Motion {
     }
 }
 
-fn smooth(part: f64) -> f64 {
+/// From 0 to 1, without a kink.
+pub fn smooth(part: f64) -> f64 {
     let part = part.clamp(0.0, 1.0);
     part * part * (3.0 - 2.0 * part)
 }

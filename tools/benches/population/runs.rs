@@ -11,7 +11,7 @@ use palpate::scene::{LinkSpec, ModelChoice, Scene};
 use palpate::{Error, Session};
 use palpate_cli::compare::{CompareOptions, Comparison, Measured};
 
-use super::cases::{Case, Class};
+use super::cases::{Case, Class, Variety};
 use super::paths::Motion;
 
 /// What is tried in place of the defaults.
@@ -23,10 +23,7 @@ pub struct Settings {
     pub patch: Option<[usize; 3]>,
     pub basis: Option<usize>,
     pub latency_ms: Option<f64>,
-    /// Two tools in place of one.
-    pub pairs: bool,
-    /// How many times as long blocks are each way.
-    pub larger: f64,
+    pub variety: Variety,
     /// What is between local and global model.
     pub link: Option<LinkSpec>,
 }
@@ -165,7 +162,7 @@ pub fn run_all(
 
 fn run(seed: u64, settings: &Settings) -> Result<CaseResult, Error> {
     let begun = Instant::now();
-    let mut case = Case::new(seed, settings.pairs, settings.larger)?;
+    let mut case = Case::new(seed, settings.variety)?;
     settings.apply(&mut case.scene);
     let session = Session::from_scene(case.scene.clone().with_model(ModelChoice::Auto)).virtual_time().build()?;
     let choice = session.choice().expect("auto chooses");

@@ -22,11 +22,12 @@ const NOTHING_PCT: f64 = 1e-3;
 /// The axis of errors.
 const ERROR_AXIS: &str = "rms error (% of peak; 0.001 or less at the border)";
 
-/// The cases with one tool, with two, and with larger blocks.
+/// The cases with one tool, with two, with larger blocks, and with tools that have a shape.
 pub struct Populations {
     pub single: Vec<CaseResult>,
     pub pairs: Vec<CaseResult>,
     pub larger: Vec<CaseResult>,
+    pub shapes: Vec<CaseResult>,
 }
 
 /// Before the table of `auto`.
@@ -96,12 +97,14 @@ takes its nominal time. Percentiles are over scenes:
     )
 }
 
-pub fn document(Populations { single, pairs, larger }: &Populations) -> Document {
+pub fn document(Populations { single, pairs, larger, shapes }: &Populations) -> Document {
     let parts = [
         ("unseen", single, true),
         ("seen", single, false),
         ("pairs, unseen", pairs, true),
         ("larger, unseen", larger, true),
+        ("shapes, unseen", shapes, true),
+        ("shapes, seen", shapes, false),
     ];
     let models: Vec<Vec<String>> =
         parts.into_iter().flat_map(|(name, results, unseen)| of_models(name, &part(results, unseen))).collect();
