@@ -109,13 +109,17 @@ impl Exact {
         (place, push * self.right[unknown])
     }
 
-    /// The part of the changes, at most all of them, up to which no place pulls.
-    pub(super) fn part(&self, rows: &[Row]) -> f64 {
+    /// The part of the changes, at most all of them, up to which no place pulls, and the place that would with more.
+    pub(super) fn part(&self, rows: &[Row]) -> (f64, Option<usize>) {
         let pressing = self.unknowns.iter().zip(&self.right).filter(|(unknown, _)| unknown.presses);
-        pressing.fold(1.0, |part, (unknown, &more)| {
+        pressing.fold((1.0, None), |found, (unknown, &more)| {
             let row = &rows[unknown.place];
             let pressed = row.impulse.dot(&row.normal);
-            if pressed + more < 0.0 { part.min(pressed / -more) } else { part }
+            if pressed + more < 0.0 && pressed < -more * found.0 {
+                (pressed / -more, Some(unknown.place))
+            } else {
+                found
+            }
         })
     }
 }

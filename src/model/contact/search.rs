@@ -22,6 +22,8 @@ pub(super) struct Search {
     pub(super) near: Vec<Near>,
     /// Of each tool: the wide one, and the part of it that is looked at while little moves.
     vicinities: Vec<[Vicinity; 2]>,
+    /// Of each tool: a part of its axis was inside the body in the last step.
+    was_inside: Vec<bool>,
     /// The corners of a vicinity as the tool meets them at the start of the step, and at its end if nothing presses (m).
     corners: Vec<[Vec3; 2]>,
     fine: Corners,
@@ -48,7 +50,7 @@ impl Search {
     pub(super) fn new(tools: usize) -> Self {
         let vicinities = vec![<[Vicinity; 2]>::default(); tools];
         let (near, behind) = (Vec::with_capacity(MOST_POINTS), Vec::with_capacity(MOST_POINTS));
-        Self { near, vicinities, behind, ..Self::default() }
+        Self { near, vicinities, was_inside: vec![false; tools], behind, ..Self::default() }
     }
 
     /// Makes room for a body of so many nodes and candidates, and forgets another one.
@@ -78,7 +80,7 @@ impl Search {
         self.corners
             .extend(vicinity.nodes.iter().map(|&node| body.corner(&touch.skin, touch.steady.fineness, node, d)));
         if !self.find_passed(vicinity, touch, motion) {
-            let front = self.find_near(vicinity, touch, &motion.to);
+            let front = self.find_near(vicinity, (tool, touch), &motion.to);
             if !is_narrow {
                 // What is nearest stays so near, or nearer: what is farther is neither the nearest nor touched. Parts of a long axis
                 // may be inside while others are not.
@@ -125,20 +127,22 @@ impl Search {
     }
 
     /// Whatever is near at the end of the step; returns how far the nearest place in front of the surface is from the axis (m).
-    fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) -> f64 {
+    fn find_near(&mut self, vicinity: &Vicinity, (tool, touch): (usize, &Touch), pose: &Pose) -> f64 {
         let (radius, axis) = (touch.shape.radius(), touch.shape.axis(pose));
         let Self { near: list, corners, fine: met, .. } = self;
         met.find(vicinity, |place| corners[place as usize][1], touch, &axis, |found| keep(list, found));
         if is_long(touch) {
-            let found = self.near.len();
-            let front = self.look_around(vicinity, touch, &axis, 0.0);
-            if !self.leave_inside(vicinity, &axis, radius) {
-                return front;
+            // What is inside may be anywhere within reach. Who was inside will be so again, and looks so far at once.
+            let (found, far) = (self.near.len(), radius + MAX_DEPTH);
+            let was_inside = self.was_inside[tool];
+            let mut front = self.look_around(vicinity, touch, &axis, if was_inside { far } else { 0.0 });
+            let is_inside = self.leave_inside(vicinity, &axis, radius);
+            if is_inside && !was_inside {
+                self.near.truncate(found);
+                front = self.look_around(vicinity, touch, &axis, far);
+                self.leave_inside(vicinity, &axis, radius);
             }
-            // What is inside may be anywhere within reach.
-            self.near.truncate(found);
-            let front = self.look_around(vicinity, touch, &axis, radius + MAX_DEPTH);
-            self.leave_inside(vicinity, &axis, radius);
+            self.was_inside[tool] = is_inside;
             return front;
         }
         let front = self.look_around(vicinity, touch, &axis, 0.0);

@@ -23,13 +23,15 @@ const FOUND: f64 = 1e-7;
 /// Sweeps after which what they found of modes is used, and how often at most.
 const SWEEPS_BETWEEN: usize = 3;
 const MOST_EXACT: usize = 8;
+/// Places that let go at most where modes are used.
+const MOST_LET_GO: usize = 5;
 /// Friction is at most this where sweeps with more run away: a tool that wedges surfaces apart which stick to it pushes each of
 /// them against the others' friction, the more the longer it is swept. Without friction sweeps cannot run away.
 const CALMER: [f64; 4] = [1.0, 0.5, 0.25, 0.0];
 /// Places that close so many times faster after the sweeps than anything did before have run away.
 const RUN_AWAY: f64 = 10.0;
-/// Rounds in which the depth that a tool sinks in is found.
-const MOST_ROUNDS: usize = 16;
+/// So many times as many sweeps at most where the depth that a tool sinks in is not yet what it was taken to be.
+const MOST_TIMES: usize = 4;
 
 impl Rows {
     /// Changes the velocities so that no place is entered, none pulls and each impulse is in its cone. Rows meet at shared nodes;
@@ -157,34 +159,33 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
     /// Updates rows to and fro until nothing changes, beginning with what pressed in the last step. How deep the tool sinks in is taken as
     /// linear in the force meanwhile, and made anew until it is what it was taken to be.
     fn go(&mut self) {
-        let (count, d) = (self.rows.len(), self.d);
+        let count = self.rows.len();
         (0..count).for_each(|place| self.answer(place, self.rows[place].impulse));
         self.work.nearness.find(self.rows);
-        let most = if self.work.nearness.is_none() {
-            MOST_SWEEPS
-        } else {
-            (MOST_SUNKEN_SWEEPS[0] / count.max(1)).max(MOST_SUNKEN_SWEEPS[1])
-        };
-        for _ in 0..MOST_ROUNDS {
-            for (place, row) in self.rows.iter_mut().enumerate() {
-                if let Some((sinking, _)) = &row.sinking {
-                    row.sunk = sinking.tangent(self.work.nearness.load(place) / d);
-                }
+        let sinks = !self.work.nearness.is_none();
+        let most = if sinks { (MOST_SUNKEN_SWEEPS[0] / count.max(1)).max(MOST_SUNKEN_SWEEPS[1]) } else { MOST_SWEEPS };
+        self.take_depths();
+        for turn in 1..=MOST_TIMES * most {
+            let is_found = self.sweep();
+            if (is_found || turn >= most) && self.is_as_deep_as_taken() {
+                return;
             }
-            for turn in 1..=most {
-                if self.sweep() {
-                    break;
-                }
-                // Sweeps have the last word: they alone keep every place in its cone.
-                let is_due = !self.work.nearness.is_none()
-                    && turn % SWEEPS_BETWEEN == 0
-                    && turn + SWEEPS_BETWEEN <= most.min(MOST_EXACT * SWEEPS_BETWEEN);
-                if is_due {
-                    self.solve_exactly();
-                }
+            let is_due = turn % SWEEPS_BETWEEN == 0;
+            if is_found || is_due {
+                self.take_depths();
             }
-            if self.is_as_deep_as_taken() {
-                break;
+            // Sweeps have the last word: they alone keep every place in its cone.
+            if sinks && is_due && !is_found && turn + SWEEPS_BETWEEN <= most.min(MOST_EXACT * SWEEPS_BETWEEN) {
+                self.solve_exactly();
+            }
+        }
+    }
+
+    /// Takes how deep the tool sinks in as linear around the forces that were found.
+    fn take_depths(&mut self) {
+        for (place, row) in self.rows.iter_mut().enumerate() {
+            if let Some((sinking, _)) = &row.sinking {
+                row.sunk = sinking.tangent(self.work.nearness.load(place) / self.d);
             }
         }
     }
@@ -206,20 +207,32 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
         changes.fold(0.0, f64::max) <= FOUND * FOUND * done.fold(0.0, f64::max)
     }
 
-    /// Takes the modes that the sweeps have found as they are, and solves for the impulses.
+    /// Takes the modes that the sweeps have found as they are, and solves for the impulses. Whoever would pull lets go, and the others are
+    /// solved for again.
     fn solve_exactly(&mut self) {
-        let Self { rows, answers, work, d, .. } = self;
-        let Work { nearness, exact, closing, .. } = &mut **work;
-        if !exact.solve(rows, nearness, answers, closing, *d) {
-            return;
+        for _ in 0..MOST_LET_GO {
+            let Self { rows, answers, work, d, .. } = &mut *self;
+            let Work { nearness, exact, closing, .. } = &mut **work;
+            if !exact.solve(rows, nearness, answers, closing, *d) {
+                return;
+            }
+            let (part, pulling) = exact.part(rows);
+            for unknown in 0..exact.unknowns() {
+                let (place, change) = self.work.exact.change(unknown);
+                self.rows[place].impulse += change * part;
+                self.answer(place, change * part);
+            }
+            if let Some(place) = pulling {
+                let row = &mut self.rows[place];
+                let left = std::mem::take(&mut row.impulse);
+                row.mode = ContactMode::Free;
+                self.answer(place, -left);
+            }
+            (0..self.rows.len()).for_each(|place| self.work.nearness.change(self.rows, place));
+            if pulling.is_none() {
+                return;
+            }
         }
-        let part = exact.part(rows);
-        for unknown in 0..exact.unknowns() {
-            let (place, change) = self.work.exact.change(unknown);
-            self.rows[place].impulse += change * part;
-            self.answer(place, change * part);
-        }
-        (0..self.rows.len()).for_each(|place| self.work.nearness.change(self.rows, place));
     }
 
     /// True if the tool sinks in as deep at each place as it was taken to.
