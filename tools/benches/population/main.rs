@@ -34,7 +34,7 @@ use words::Populations;
 const CASES: u64 = 180;
 const PAIRS: u64 = 90;
 const LARGER: u64 = 117;
-const SHAPES: u64 = 120;
+const SHAPES: u64 = 90;
 
 fn document(is_quick: bool, settings: &Settings) -> Result<(), Error> {
     let seeds = |count: u64| -> Vec<u64> { if is_quick { vec![0, 5] } else { (0..count).collect() } };

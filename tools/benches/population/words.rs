@@ -84,6 +84,10 @@ farther off; a tick is that of both. `-- --seen --pairs` prints the seen ones.
 *Larger* are scenes whose blocks have {LONGER} times as many nodes along each edge, up to 22^3 and 27 x 27 x 10, around the same motion: no
 window takes all of most of them. `-- --seen --larger {LONGER}` prints the seen ones.
 
+*Shapes* are scenes whose tool is a capsule that turns by up to 1.2 rad as it moves, 1 to 5 cells long, or in a quarter of them a sphere; it goes
+up to twice as deep, elements of tissue are two thirds as long, and in two fifths friction takes more to break loose than to slide.
+`-- --seen --shapes` prints the seen ones.
+
 Each scene runs for 1.2 s in virtual time with the defaults, with results of the global model at once (*in time*) or one period *late*; a basis
 takes its nominal time. Percentiles are over scenes:
 
@@ -120,7 +124,7 @@ pub fn document(Populations { single, pairs, larger, shapes }: &Populations) -> 
         table(&OF_KINDS, 1, &of_kinds(&unseen)),
         chosen(&unseen),
     );
-    let pictures = vec![("population_error", errors(single, pairs)), ("population_cost", costs(single))];
+    let pictures = vec![("population_error", errors(single, pairs, shapes)), ("population_cost", costs(single))];
     let pictures = pictures.into_iter().map(|(name, picture)| (name.to_owned(), picture.to_svg())).collect();
     Document { text, pictures }
 }
@@ -245,10 +249,13 @@ fn drawn(run: &Run) -> f64 {
     run.rms.max(NOTHING_PCT)
 }
 
-/// The share of scenes above an error, by class and of pairs, one period late.
-fn errors(single: &[CaseResult], pairs: &[CaseResult]) -> Picture {
+/// The share of scenes above an error, by class, of pairs and of shapes, one period late.
+fn errors(single: &[CaseResult], pairs: &[CaseResult], shapes: &[CaseResult]) -> Picture {
     let of_class = |class: Class| (class.name(), single.iter().filter(|result| result.class == class).collect());
-    let of = Class::ALL.into_iter().map(of_class).chain([("pairs", pairs.iter().collect())]);
+    let of = Class::ALL
+        .into_iter()
+        .map(of_class)
+        .chain([("pairs", pairs), ("shapes", shapes)].map(|(name, of)| (name, of.iter().collect())));
     let series = |(number, (name, of)): (usize, (&str, Vec<&CaseResult>))| {
         let mut errors: Vec<f64> = runs(&of, Kind::Predictive, true).into_iter().map(drawn).collect();
         errors.sort_by(f64::total_cmp);
