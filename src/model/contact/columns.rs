@@ -1,4 +1,4 @@
-//! What each place of a step does to each, found for the places that do something alone.
+//! What each place of a step does to each, found only for the places that do something.
 
 /// A table with a row and a column for each place of a step. A column is found when it is first asked for: where a tool sinks in beside the
 /// elements it comes near many more places than press.
@@ -13,6 +13,14 @@ impl<T: Copy + Default> Columns<T> {
     /// With room for so many places.
     pub(super) fn with_room(places: usize) -> Self {
         Self { values: Vec::with_capacity(places * places), is_known: Vec::with_capacity(places) }
+    }
+
+    /// Makes room for so many places.
+    pub(super) fn make_room(&mut self, places: usize) {
+        self.values.clear();
+        self.values.reserve(places * places);
+        self.is_known.clear();
+        self.is_known.reserve(places);
     }
 
     /// A step with so many places begins: no column is known.
@@ -32,7 +40,7 @@ impl<T: Copy + Default> Columns<T> {
         column
     }
 
-    /// What a place whose column is known does to one; nothing else does anything.
+    /// What a place does to one; nothing if nobody has asked for its column.
     pub(super) fn get(&self, of: usize, at: usize) -> T {
         if self.is_known[of] { self.values[of * self.is_known.len() + at] } else { T::default() }
     }

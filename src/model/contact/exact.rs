@@ -65,7 +65,8 @@ impl Exact {
             let n = row.normal;
             let pressed = row.impulse.dot(&n);
             match row.mode {
-                ContactMode::Stick => {
+                // What has no impulse has changed nothing: nobody has asked how others answer to it.
+                ContactMode::Stick if row.impulse != Vec3::zeros() => {
                     let across = if n.x.abs() < 0.6 { n.cross(&Vec3::x()) } else { n.cross(&Vec3::y()) }.normalize();
                     let unknown = |axis: Vec3, presses| Unknown { place, push: axis, test: axis, presses };
                     let presses = !row.glued;
@@ -109,17 +110,13 @@ impl Exact {
         (place, push * self.right[unknown])
     }
 
-    /// The part of the changes, at most all of them, up to which no place pulls, and the place that would with more.
-    pub(super) fn part(&self, rows: &[Row]) -> (f64, Option<usize>) {
+    /// The part of the changes, at most all of them, up to which no place pulls.
+    pub(super) fn part(&self, rows: &[Row]) -> f64 {
         let pressing = self.unknowns.iter().zip(&self.right).filter(|(unknown, _)| unknown.presses);
-        pressing.fold((1.0, None), |found, (unknown, &more)| {
+        pressing.fold(1.0, |part, (unknown, &more)| {
             let row = &rows[unknown.place];
-            let pressed = row.impulse.dot(&row.normal);
-            if pressed + more < 0.0 && pressed < -more * found.0 {
-                (pressed / -more, Some(unknown.place))
-            } else {
-                found
-            }
+            let pressed = row.impulse.dot(&row.normal).max(0.0);
+            if pressed + more < 0.0 { part.min(pressed / -more) } else { part }
         })
     }
 }

@@ -23,7 +23,7 @@ impl Nearness {
         Self { shares: Columns::with_room(places), loads: list(), beside: list(), is_none: true }
     }
 
-    /// Of `rows`, with the impulses that they have: places do not move within a step, so that it is found once for all sweeps.
+    /// Of `rows`, with the impulses that they have: places do not move within a step, so that what a load counts as elsewhere is found once, when it first changes.
     pub(super) fn find(&mut self, rows: &[Row]) {
         for list in [&mut self.loads, &mut self.beside] {
             list.clear();
@@ -71,6 +71,11 @@ impl Nearness {
         } else {
             self.shares.get(of, at)
         }
+    }
+
+    /// What presses at a place (N s), as of its last change.
+    pub(super) fn own(&self, place: usize) -> f64 {
+        self.loads[place]
     }
 
     /// What presses around a place on the same tool, beside its own load (N s).

@@ -52,9 +52,9 @@ impl Rows {
         }
     }
 
-    /// Makes room for the coupling of so many places in an implicit step.
-    pub(crate) fn reserve_coupling(&mut self, places: usize) {
-        self.coupling = Columns::with_room(places.min(MOST_POINTS));
+    /// Makes room for the coupling of so many places of each tool in an implicit step.
+    pub(crate) fn reserve_coupling(&mut self, places: impl Iterator<Item = usize>) {
+        self.coupling.make_room(places.map(|places| places.min(MOST_POINTS)).sum());
     }
 
     /// Makes room for a body of so many nodes and candidates, and forgets what it knows of another one.

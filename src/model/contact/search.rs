@@ -22,8 +22,6 @@ pub(super) struct Search {
     pub(super) near: Vec<Near>,
     /// Of each tool: the wide one, and the part of it that is looked at while little moves.
     vicinities: Vec<[Vicinity; 2]>,
-    /// Of each tool: a part of its axis was inside the body in the last step.
-    was_inside: Vec<bool>,
     /// The corners of a vicinity as the tool meets them at the start of the step, and at its end if nothing presses (m).
     corners: Vec<[Vec3; 2]>,
     fine: Corners,
@@ -50,7 +48,7 @@ impl Search {
     pub(super) fn new(tools: usize) -> Self {
         let vicinities = vec![<[Vicinity; 2]>::default(); tools];
         let (near, behind) = (Vec::with_capacity(MOST_POINTS), Vec::with_capacity(MOST_POINTS));
-        Self { near, vicinities, was_inside: vec![false; tools], behind, ..Self::default() }
+        Self { near, vicinities, behind, ..Self::default() }
     }
 
     /// Makes room for a body of so many nodes and candidates, and forgets another one.
@@ -80,7 +78,7 @@ impl Search {
         self.corners
             .extend(vicinity.nodes.iter().map(|&node| body.corner(&touch.skin, touch.steady.fineness, node, d)));
         if !self.find_passed(vicinity, touch, motion) {
-            let front = self.find_near(vicinity, (tool, touch), &motion.to);
+            let front = self.find_near(vicinity, touch, &motion.to);
             if !is_narrow {
                 // What is nearest stays so near, or nearer: what is farther is neither the nearest nor touched. Parts of a long axis
                 // may be inside while others are not.
@@ -127,22 +125,20 @@ impl Search {
     }
 
     /// Whatever is near at the end of the step; returns how far the nearest place in front of the surface is from the axis (m).
-    fn find_near(&mut self, vicinity: &Vicinity, (tool, touch): (usize, &Touch), pose: &Pose) -> f64 {
+    fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) -> f64 {
         let (radius, axis) = (touch.shape.radius(), touch.shape.axis(pose));
         let Self { near: list, corners, fine: met, .. } = self;
         met.find(vicinity, |place| corners[place as usize][1], touch, &axis, |found| keep(list, found));
         if is_long(touch) {
-            // What is inside may be anywhere within reach. Who was inside will be so again, and looks so far at once.
-            let (found, far) = (self.near.len(), radius + MAX_DEPTH);
-            let was_inside = self.was_inside[tool];
-            let mut front = self.look_around(vicinity, touch, &axis, if was_inside { far } else { 0.0 });
-            let is_inside = self.leave_inside(vicinity, &axis, radius);
-            if is_inside && !was_inside {
-                self.near.truncate(found);
-                front = self.look_around(vicinity, touch, &axis, far);
-                self.leave_inside(vicinity, &axis, radius);
+            let found = self.near.len();
+            let front = self.look_around(vicinity, touch, &axis, 0.0);
+            if !self.leave_inside(vicinity, &axis, radius) {
+                return front;
             }
-            self.was_inside[tool] = is_inside;
+            // What is inside may be anywhere within reach.
+            self.near.truncate(found);
+            let front = self.look_around(vicinity, touch, &axis, radius + MAX_DEPTH);
+            self.leave_inside(vicinity, &axis, radius);
             return front;
         }
         let front = self.look_around(vicinity, touch, &axis, 0.0);
@@ -257,7 +253,7 @@ impl Search {
         };
         behind.retain(is_way_out);
         if behind.is_empty() {
-            return false;
+            return of_ends.iter().any(Option::is_some);
         }
         list.retain(|near| way_out(near.share).is_none());
         // From the ends inwards, no two nearer to each other than a radius: where the surface is folded, walls face each other.

@@ -20,11 +20,13 @@ const MOST_SUNKEN_SWEEPS: [usize; 2] = [400, 40];
 /// Sweeps that change how fast places close by less than this share of what the impulses do are the last. Impulses themselves
 /// need not come to rest: places on the same nodes may share theirs in many ways.
 const FOUND: f64 = 1e-7;
-/// Sweeps after which what they found of modes is used, and how often at most.
+/// Sweeps after which depths are taken anew and what was found of modes is used, and how often that at most.
 const SWEEPS_BETWEEN: usize = 3;
-const MOST_EXACT: usize = 8;
-/// Places that let go at most where modes are used.
+const MOST_EXACT: usize = 7;
+/// Places that let go at most each time modes are used.
 const MOST_LET_GO: usize = 5;
+/// What is left of a load that an exact solution took away, if it is less than this share: rounding.
+const GONE: f64 = 1e-12;
 /// Friction is at most this where sweeps with more run away: a tool that wedges surfaces apart which stick to it pushes each of
 /// them against the others' friction, the more the longer it is swept. Without friction sweeps cannot run away.
 const CALMER: [f64; 4] = [1.0, 0.5, 0.25, 0.0];
@@ -175,7 +177,7 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
                 self.take_depths();
             }
             // Sweeps have the last word: they alone keep every place in its cone.
-            if sinks && is_due && !is_found && turn + SWEEPS_BETWEEN <= most.min(MOST_EXACT * SWEEPS_BETWEEN) {
+            if sinks && is_due && !is_found && turn <= (most - SWEEPS_BETWEEN).min(MOST_EXACT * SWEEPS_BETWEEN) {
                 self.solve_exactly();
             }
         }
@@ -216,20 +218,23 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
             if !exact.solve(rows, nearness, answers, closing, *d) {
                 return;
             }
-            let (part, pulling) = exact.part(rows);
+            let part = exact.part(rows);
             for unknown in 0..exact.unknowns() {
                 let (place, change) = self.work.exact.change(unknown);
                 self.rows[place].impulse += change * part;
                 self.answer(place, change * part);
             }
-            if let Some(place) = pulling {
+            for place in 0..self.rows.len() {
                 let row = &mut self.rows[place];
-                let left = std::mem::take(&mut row.impulse);
-                row.mode = ContactMode::Free;
-                self.answer(place, -left);
+                let least = GONE * self.work.nearness.own(place);
+                if part < 1.0 && row.can_let_go() && row.impulse.dot(&row.normal) <= least {
+                    let left = std::mem::take(&mut row.impulse);
+                    row.mode = ContactMode::Free;
+                    self.answer(place, -left);
+                }
+                self.work.nearness.change(self.rows, place);
             }
-            (0..self.rows.len()).for_each(|place| self.work.nearness.change(self.rows, place));
-            if pulling.is_none() {
+            if part == 1.0 {
                 return;
             }
         }
@@ -254,6 +259,11 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
 }
 
 impl Row {
+    /// True if it touches and can let go.
+    fn can_let_go(&self) -> bool {
+        !self.glued && matches!(self.mode, ContactMode::Stick | ContactMode::Slip)
+    }
+
     fn presses(&self) -> bool {
         self.impulse.dot(&self.normal) > 0.0
     }

@@ -25,8 +25,8 @@ pub const DURATION_S: f64 = 1.2;
 /// How many times as many nodes those scenes have along each edge of a block that are called larger.
 pub const LONGER: f64 = 1.7;
 
-/// The elements of tissue under a tool with a shape, in those of other scenes.
-const FINER: f64 = 0.65;
+/// How long the elements of tissue under a tool with a shape are, in those of other scenes.
+const FINE: f64 = 0.65;
 
 /// A third of the cases is for judging: nothing was chosen by what they say.
 pub fn is_unseen(seed: u64) -> bool {
@@ -109,7 +109,7 @@ impl Case {
         ]);
         let mut scene = Scene::of_program().with_model(Kind::Predictive);
         let (body, inside, ground) = match class {
-            Class::Tissue => organ(if variety == Variety::Shapes { FINER } else { 1.0 }, random)?,
+            Class::Tissue => organ(if variety == Variety::Shapes { FINE } else { 1.0 }, random)?,
             _ => springs(class, if let Variety::Larger(times) = variety { times } else { 1.0 }, random),
         };
         scene.body = Some(body);
@@ -216,22 +216,22 @@ fn springs(class: Class, larger: f64, random: &mut Random) -> (BodySpec, &'stati
     (body, inside, ground)
 }
 
-/// An organ or a beam of tetrahedra, which are `finer` times as large as others.
-fn organ(finer: f64, random: &mut Random) -> Result<(BodySpec, &'static str, Ground), Error> {
+/// An organ or a beam of tetrahedra, `times` as long as those of most scenes.
+fn organ(times: f64, random: &mut Random) -> Result<(BodySpec, &'static str, Ground), Error> {
     let kind = random.one_of(&["beam", "prostate", "liver"]);
     let (mesh, cell_m, centre_m, room_m, depth_m) = match kind {
         "beam" => {
             let size = [random.within(0.05, 0.08), random.within(0.03, 0.05), random.within(0.025, 0.04)];
-            let cell = finer * random.within(6e-3, 8e-3);
+            let cell = times * random.within(6e-3, 8e-3);
             let room = [0.35 * size[0] - cell, 0.35 * size[1] - cell].map(|room: f64| room.max(2e-3));
             (organs::beam(size, cell)?, cell, [0.55 * size[0], 0.5 * size[1]], room, random.within(2e-3, 4e-3))
         }
         "prostate" => {
-            let cell = finer * random.within(4.5e-3, 6e-3);
+            let cell = times * random.within(4.5e-3, 6e-3);
             (organs::prostate(Sizes::uniform(cell))?, cell, [0.0105, -0.003], [3e-3, 5e-3], random.within(1e-3, 2.5e-3))
         }
         _ => {
-            let cell = finer * random.within(9e-3, 11e-3);
+            let cell = times * random.within(9e-3, 11e-3);
             (organs::liver(Sizes::uniform(cell))?, cell, [-0.036, 0.003], [12e-3, 8e-3], random.within(2.5e-3, 5e-3))
         }
     };

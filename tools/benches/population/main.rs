@@ -4,7 +4,7 @@
 //! `cargo bench --bench population`; with `-- --quick` a short form that prints and writes nothing; with `-- --seen` the two
 //! thirds of the cases that may be looked at while working, case by case, written nowhere; with `-- --unseen` the distributions of the
 //! rest; `--cases N` how many, `--from N` the first seed, or `--only A,B` which; `--pairs` those with two tools, `--larger
-//! FACTOR` with blocks so many times as long each way, `--shapes` with capsules and spheres that press deep; `--patch A,B,C`,
+//! FACTOR` with blocks so many times as long each way, `--shapes` with capsules and spheres that press deep, one of the three; `--patch A,B,C`,
 //! `--basis N`, `--basis-latency MS` and `--budget PERCENT` in place of the defaults; `--models A,B` in place of
 //! `predictive` and `patch`; `--link MS,SHARE` with the global model behind a link of so much delay one way and such a share of lost
 //! packets, which alone prints the document and writes nothing.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::random::Random;
 
 /// Time of the way down and of the way up (s).
-const PRESS_S: f64 = 0.2;
+pub const PRESS_S: f64 = 0.2;
 const LIFT_S: f64 = 0.15;
 
 /// Where a tool can go on a body.

@@ -200,6 +200,7 @@ impl Simd for Avx2 {
         unsafe {
             let mut fourth = [_mm256_setzero_pd(); 2];
             for half in 0..2 {
+                // No closure, for the reason that AVX-512's says.
                 let mut rows = [_mm256_setzero_pd(); 4];
                 for lane in 0..4 {
                     rows[lane] = _mm256_loadu_pd(nodes[at[4 * half + lane] as usize].0.as_ptr());

@@ -30,7 +30,7 @@ impl PartialOrd for Candidate {
 
 /// Appends the `count` movable nodes that are nearest to the centroid of `triangle` at rest and that elements join to it on the
 /// way: what lies beyond a gap is not near. Held nodes are passed, as many at the most as are looked for. `seen` has for every node the
-/// number of the last growth that met it, and `number` is that of this one.
+/// number of the last growth that met it, 0 if none has, and `number` is that of this one.
 pub(super) fn grow(
     body: &Tetrahedra,
     triangle: [u32; 3],
@@ -42,8 +42,8 @@ pub(super) fn grow(
     let centre = triangle.iter().map(|&node| rest[node as usize]).sum::<Vec3>() / 3.0;
     let candidate = |node: u32| Candidate { square: (rest[node as usize] - centre).norm_squared(), node };
     let mut edge: BinaryHeap<Candidate> = triangle.map(candidate).into();
+    triangle.iter().for_each(|&node| seen[node as usize] = number);
     let mut is_new = |node: u32| std::mem::replace(&mut seen[node as usize], number) != number;
-    triangle.into_iter().for_each(|node| _ = is_new(node));
     let (mut found, mut passed) = (0, 0);
     while found < count && passed <= count {
         let Some(Candidate { node, .. }) = edge.pop() else { return };

@@ -54,7 +54,7 @@ impl Patch {
         // A capsule has three places on a triangle.
         let (touches, _, rows) = self.tools.present();
         let places = |touch: &Touch| if touch.has_shape() { 3 * self.window.candidates.len() } else { 1 };
-        rows.reserve_coupling(touches.iter().map(places).sum());
+        rows.reserve_coupling(touches.iter().map(places));
     }
 
     /// True once none of its tools touches it any more: there is nothing left to advance.
