@@ -369,30 +369,4 @@ mod tests {
         }
         assert!(found > 3000 && inside > 20 && (600..1700).contains(&narrow), "{found} {inside} {narrow}");
     }
-
-    /// The way out of an end under a top that is tilted leaves the box around the axis, and with it what is looked at first.
-    #[test]
-    fn an_end_that_is_deeper_than_the_radius_under_a_tilted_top_is_inside() {
-        let block = Block::builder([9, 9, 3], [0.08, 0.08, 0.02]).fix(Face::ZMin).build().unwrap();
-        let candidates: Vec<u32> = (0..block.surface().triangles.len() as u32).collect();
-        let (radius, depth, half_axis) = (2e-3, 6.5e-3, Vec3::new(15e-3, 0.0, 0.0));
-        let tilt = nalgebra::Rotation3::from_axis_angle(&Vec3::y_axis(), 0.3);
-        let State { mut positions, mut velocities } = State::at_rest(block.rest());
-        positions.iter_mut().for_each(|x| *x = tilt * *x);
-        let shape = ToolShape::Capsule { radius, half_axis };
-        let touch = Touch::new(shape, Arc::new(Skin::new(&block, radius)), Contact::default());
-        let body = Deformable {
-            positions: &mut positions,
-            velocities: &mut velocities,
-            inverse_masses: block.inverse_masses(),
-            surface: block.surface(),
-            candidates: &candidates,
-        };
-        let end = tilt * Vec3::new(0.033, 0.041, 0.02 - depth);
-        let mut search = Search::new(1);
-        search.make_room(block.rest().len(), candidates.len());
-        search.find(&body, (0, &touch), ToolMotion::straight(end + half_axis, end + half_axis), 1e-3);
-        let deepest = search.near.iter().map(|near| near.gap).fold(0.0, f64::min);
-        assert!((deepest + depth + radius).abs() < 1e-4, "{:?}", search.near);
-    }
 }
