@@ -40,6 +40,7 @@ mod swept;
 mod touch;
 mod triangle;
 mod vicinity;
+mod work;
 
 use crate::{Pose, Vec3};
 

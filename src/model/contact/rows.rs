@@ -7,9 +7,9 @@ use super::near::Near;
 use super::resolve::{IMMOVABLE, Place, RECOVERY, approach};
 use super::row::{Row, in_order};
 use super::search::Search;
-use super::solve::Work;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
+use super::work::Work;
 use super::{ContactMode, Law, ToolMotion};
 use crate::{Mat3, Pose, Vec3};
 

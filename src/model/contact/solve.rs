@@ -4,11 +4,10 @@ use std::ops::Mul;
 
 use super::columns::Columns;
 use super::deformable::Deformable;
-use super::exact::Exact;
-use super::nearness::Nearness;
 use super::resolve::IMMOVABLE;
 use super::row::Row;
 use super::rows::Rows;
+use super::work::Work;
 use super::{ContactMode, Law};
 use crate::linear::ImplicitStep;
 use crate::{Mat3, Vec3};
@@ -79,24 +78,6 @@ impl Rows {
         for row in rows.iter() {
             system.push_all(body.velocities, of(row), row.impulse);
         }
-    }
-}
-
-/// Working memory of the sweeps.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Work {
-    nearness: Nearness,
-    exact: Exact,
-    /// How fast each place closes (m/s), and did before a sweep.
-    closing: Vec<Vec3>,
-    before: Vec<Vec3>,
-}
-
-impl Work {
-    /// With room for so many places.
-    pub(super) fn with_room(places: usize) -> Self {
-        let list = || Vec::with_capacity(places);
-        Self { nearness: Nearness::with_room(places), exact: Exact::default(), closing: list(), before: list() }
     }
 }
 
