@@ -12,7 +12,9 @@ pub(super) struct Columns<T> {
 impl<T: Copy + Default> Columns<T> {
     /// With room for so many places.
     pub(super) fn with_room(places: usize) -> Self {
-        Self { values: Vec::with_capacity(places * places), is_known: Vec::with_capacity(places) }
+        let mut columns = Self::default();
+        columns.make_room(places);
+        columns
     }
 
     /// Makes room for so many places.

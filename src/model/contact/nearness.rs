@@ -23,7 +23,8 @@ impl Nearness {
         Self { shares: Columns::with_room(places), loads: list(), beside: list(), is_none: true }
     }
 
-    /// Of `rows`, with the impulses that they have: places do not move within a step, so that what a load counts as elsewhere is found once, when it first changes.
+    /// Of `rows`, with the impulses that they have: places do not move within a step, so that what a load counts as elsewhere is found once,
+    /// when it first changes.
     pub(super) fn find(&mut self, rows: &[Row]) {
         for list in [&mut self.loads, &mut self.beside] {
             list.clear();
