@@ -200,7 +200,10 @@ impl Search {
                 let same = 1e-12 * radius * radius;
                 if away.dot(&across) < 0.0 {
                     let found = Behind { near: near(-distance), away: distance, is_nearest: true };
-                    let is_new = |known: &Behind| (known.near.place - place).norm_squared() >= same;
+                    // Where the axis passes the surface may also be the way out of its end.
+                    let is_new = |Behind { near, .. }: &Behind| {
+                        (near.place - place).norm_squared() >= same || (near.share - share).abs() > 1e-9
+                    };
                     if is_long && behind.len() < MOST_POINTS && behind.iter().rev().all(is_new) {
                         behind.push(found);
                     } else if !is_long && behind.first().is_none_or(|known| distance < known.away) {
@@ -315,6 +318,7 @@ mod tests {
     use super::super::skin::Skin;
     use super::super::{Contact, ToolShape};
     use super::*;
+    use crate::Turn;
     use crate::body::{Block, Body, State};
     use crate::mesh::Face;
 
@@ -368,5 +372,38 @@ mod tests {
             }
         }
         assert!(found > 3000 && inside > 20 && (600..1700).contains(&narrow), "{found} {inside} {narrow}");
+    }
+
+    /// A long axis that stands upright in a flat top, at places where nodes and edges are and where none is: where it passes the surface is the
+    /// way out of its end too.
+    #[test]
+    fn the_end_of_an_upright_axis_is_found_inside_wherever_it_goes_in() {
+        let block = Block::builder([9, 9, 5], [0.08, 0.08, 0.04]).fix(Face::ZMin).build().unwrap();
+        let candidates: Vec<u32> = (0..block.surface().triangles.len() as u32).collect();
+        let (radius, depth) = (2e-3, 6.5e-3);
+        for (x, y) in [(0.04, 0.021), (0.054, 0.027), (0.02, 0.03), (0.05, 0.04), (0.026, 0.041)] {
+            for tilt in [Vec3::zeros(), Vec3::x() * 0.3, Vec3::new(-0.2, 0.4, 0.7)].map(Turn::from_scaled_axis) {
+                let half_axis = tilt * Vec3::z() * 0.015;
+                let State { mut positions, mut velocities } = State::at_rest(block.rest());
+                positions.iter_mut().for_each(|position| *position = tilt * *position);
+                let body = Deformable {
+                    positions: &mut positions,
+                    velocities: &mut velocities,
+                    inverse_masses: block.inverse_masses(),
+                    surface: block.surface(),
+                    candidates: &candidates,
+                };
+                let shape = ToolShape::Capsule { radius, half_axis };
+                let touch = Touch::new(shape, Arc::new(Skin::new(&block, radius)), Contact::default());
+                let centre = tilt * Vec3::new(x, y, 0.04 - depth) + half_axis;
+                let mut search = Search::new(1);
+                search.make_room(block.rest().len(), candidates.len());
+                search.find(&body, (0, &touch), ToolMotion::straight(centre, centre), 1e-3);
+                let deepest = search.near.iter().min_by(|one, other| one.gap.total_cmp(&other.gap));
+                let Near { gap, normal, share, .. } = *deepest.expect("it is in the block");
+                assert!((gap + depth + radius).abs() < 1e-9 && share == 0.0, "{x} {y}: {gap} at {share}");
+                assert!((normal - tilt * Vec3::z()).norm() < 1e-9, "{x} {y}: {normal}");
+            }
+        }
     }
 }
