@@ -177,10 +177,9 @@ impl Predictive {
         self.near.forces(state, forces);
     }
 
-    /// A step of `d` seconds, each tool along `motion` of its number; the path is sampled `from` and `to` so many substeps after the
-    /// tick's start.
+    /// A step of `d` seconds by the near forces at its start, each tool along `motion` of its number; the path is sampled `from` and `to`
+    /// so many substeps after the tick's start.
     fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, d: f64, [from, to]: [f64; 2]) {
-        self.take_near_forces();
         self.patch.step(motion, d);
         let start = self.substep as f64;
         if let Some(basis) = &self.basis {
@@ -220,9 +219,6 @@ impl LocalModel for Predictive {
         self.take_present(&resync);
         self.predict(&mut resync);
         self.surroundings.rest(self.basis.as_ref().map(|basis| &basis.answers), resync.global.stiffness());
-        // How short the steps of the first tick have to be follows from the forces that were asked for last: these, and not those that
-        // were predicted for the path's end.
-        self.take_near_forces();
     }
 
     fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
@@ -231,10 +227,14 @@ impl LocalModel for Predictive {
             return self.patch.feel(ends, 1);
         }
         let stepping = self.patch.stepping;
+        self.take_near_forces();
         let divided = stepping.divided(self.near.stable_share());
         let substeps = f64::from(stepping.substeps);
         self.patch.tools.begin(tools);
         for [from, to] in divided.parts() {
+            if from > 0.0 {
+                self.take_near_forces();
+            }
             let on_path = [from * substeps, to * substeps];
             self.step(|tool| tools[tool].part(from, to), divided.step(), on_path);
         }
