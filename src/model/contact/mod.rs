@@ -23,6 +23,7 @@ mod exact;
 mod extent;
 mod friction;
 mod grain;
+mod inside;
 mod near;
 mod nearness;
 mod paper;

@@ -14,3 +14,18 @@ pub(super) struct Near {
     /// Where on the axis, from one end to the other.
     pub(super) share: f64,
 }
+
+/// Within so many radii of the surface the way from there to the axis is rounding: an axis that goes through a triangle is at none.
+const ON_SURFACE: f64 = 1e-3;
+
+/// True for an axis so far `away` (m) from a triangle that the way there has a direction, for a tool of that `radius` (m).
+pub(super) fn is_off(away: &Vec3, radius: f64) -> bool {
+    away.norm() > ON_SURFACE * radius
+}
+
+/// Out of the body at the place of a triangle that is so far `away` (m) from a tool's axis; `across` is the triangle's, of any length. `None`
+/// for a triangle without an area.
+pub(super) fn outward(away: &Vec3, across: &Vec3, radius: f64) -> Option<Vec3> {
+    let outward = if is_off(away, radius) { away * away.dot(across).signum() } else { *across };
+    outward.try_normalize(0.0)
+}

@@ -5,16 +5,13 @@ use super::closest;
 use super::corners::{self, Corners, chord};
 use super::deformable::Deformable;
 use super::extent::Extent;
-use super::near::Near;
+use super::inside::{MOST_PARTS, Surroundings};
+use super::near::{Near, is_off, outward};
 use super::passing;
-use super::row::in_order;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
 use super::vicinity::{MAX_DEPTH, NARROW, Vicinity};
 use crate::{Pose, Vec3};
-
-/// Within so many radii of the surface the way from there to the axis is rounding: an axis that goes through a triangle is at none.
-const ON_SURFACE: f64 = 1e-3;
 
 /// The places that were found, and what the search keeps from step to step.
 #[derive(Clone, Debug, Default)]
@@ -27,28 +24,26 @@ pub(super) struct Search {
     fine: Corners,
     /// How far the triangles of a vicinity are from the tool's axis at least, squared (m^2).
     apart: Vec<f64>,
-    /// Working memory: places that are behind the surface.
-    behind: Vec<Behind>,
-    /// The same for what passes through it.
+    /// Working memory: the ways out of what is inside.
+    outs: Vec<Option<Near>>,
+    /// The same for what passes through the surface.
     sides: Vec<u8>,
 }
 
-/// A place that the axis is behind.
-#[derive(Clone, Copy, Debug)]
-struct Behind {
-    near: Near,
-    /// How far away its part of the axis is (m).
-    away: f64,
-    /// No other of these places is nearer to that part.
-    is_nearest: bool,
+/// How far the nearest place that the axis is in front of is from it, and the nearest that it is behind (m), and whether it goes through
+/// the surface.
+struct Around {
+    front: f64,
+    behind: f64,
+    passes: bool,
 }
 
 impl Search {
     /// For so many tools.
     pub(super) fn new(tools: usize) -> Self {
         let vicinities = vec![<[Vicinity; 2]>::default(); tools];
-        let (near, behind) = (Vec::with_capacity(MOST_POINTS), Vec::with_capacity(MOST_POINTS));
-        Self { near, vicinities, behind, ..Self::default() }
+        let (near, outs) = (Vec::with_capacity(MOST_POINTS), Vec::with_capacity(MOST_PARTS + 1));
+        Self { near, vicinities, outs, ..Self::default() }
     }
 
     /// Makes room for a body of so many nodes and candidates, and forgets another one.
@@ -101,6 +96,7 @@ impl Search {
     fn find_passed(&mut self, vicinity: &Vicinity, touch: &Touch, motion: ToolMotion) -> bool {
         let shape = &touch.shape;
         let [from, to] = [shape.axis(&motion.from), shape.axis(&motion.to)];
+        let surroundings = Surroundings { vicinity, corners: &self.corners, touch, axis: to };
         let ends = if is_long(touch) { 3 } else { 1 };
         let mut is_shallow = is_long(touch);
         for end in 0..ends {
@@ -112,10 +108,9 @@ impl Search {
             let place = interpolate(&weights, &corners);
             let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
             let Some(normal) = across.try_normalize(0.0) else { continue };
-            let gap = (to - place).dot(&normal) - shape.radius();
+            let gap = (to - place).dot(&normal) - vicinity.depth(found, &weights, touch) - shape.radius();
             let triangle = vicinity.triangles[found];
-            is_shallow = is_shallow
-                && way_out(vicinity, &self.corners, &to, shape.radius()).is_some_and(|out| out.dot(&normal) > 0.0);
+            is_shallow = is_shallow && surroundings.way_out(share).is_some_and(|out| out.normal.dot(&normal) > 0.0);
             self.near.push(Near { triangle, weights, place, normal, gap, share });
         }
         if is_shallow {
@@ -126,51 +121,44 @@ impl Search {
 
     /// Whatever is near at the end of the step; returns how far the nearest place in front of the surface is from the axis (m).
     fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) -> f64 {
-        let (radius, axis) = (touch.shape.radius(), touch.shape.axis(pose));
+        let axis = touch.shape.axis(pose);
         let Self { near: list, corners, fine: met, .. } = self;
-        met.find(vicinity, |place| corners[place as usize][1], touch, &axis, |found| keep(list, found));
-        if is_long(touch) {
-            let found = self.near.len();
-            let front = self.look_around(vicinity, touch, &axis, 0.0);
-            if !self.leave_inside(vicinity, &axis, radius) {
-                return front;
-            }
-            // What is inside may be anywhere within reach.
-            self.near.truncate(found);
-            let front = self.look_around(vicinity, touch, &axis, radius + MAX_DEPTH);
-            self.leave_inside(vicinity, &axis, radius);
-            return front;
-        }
-        let front = self.look_around(vicinity, touch, &axis, 0.0);
-        // A centre inside is nearest to the inner side of some triangle: out of the body on the shortest way.
-        if let Some(&Behind { near, away, .. }) = self.behind.first()
-            && away < front * (1.0 - 1e-9)
-            && away < MAX_DEPTH + radius
-        {
-            self.near.clear();
-            self.near.push(near);
+        met.find(
+            vicinity,
+            |place| corners[place as usize][1],
+            touch,
+            &axis,
+            |found| keep(list, found, touch.shape.radius()),
+        );
+        let Around { front, behind, passes } = self.look_around(vicinity, touch, &axis);
+        let may_be_inside = if is_long(touch) {
+            behind.is_finite()
+        } else {
+            // A centre inside is nearest to the inner side of some triangle.
+            behind < front * (1.0 - 1e-9) && behind < MAX_DEPTH + touch.shape.radius()
+        };
+        if may_be_inside {
+            let Self { near: list, corners, outs, .. } = self;
+            Surroundings { vicinity, corners, touch, axis }.leave_inside(list, outs, passes);
         }
         front
     }
 
-    /// Adds the places in front of the surface that touch, and puts those behind it aside, for an axis that is a point the nearest alone. Of
-    /// triangles that touch, that are the nearest of all or within `reach` (m). Returns how far the nearest place in front is from the
-    /// axis (m).
-    fn look_around(&mut self, vicinity: &Vicinity, touch: &Touch, axis: &[Vec3; 2], reach: f64) -> f64 {
+    /// Adds the places in front of the surface that touch. Looks at triangles that do, or are the nearest of all.
+    fn look_around(&mut self, vicinity: &Vicinity, touch: &Touch, axis: &[Vec3; 2]) -> Around {
         let (skin, fine, radius) = (&*touch.skin, touch.steady.fineness, touch.shape.radius());
         let coarse = 1.0 - fine;
         let is_long = is_long(touch);
         let around_axis = Extent::around(axis);
-        let Self { near: list, corners, fine: met, apart, behind, .. } = self;
+        let Self { near: list, corners, fine: met, apart, .. } = self;
         apart.clear();
-        behind.clear();
-        let mut front = f64::INFINITY;
+        let mut around = Around { front: f64::INFINITY, behind: f64::INFINITY, passes: false };
         for (&triangle, places) in vicinity.triangles.iter().zip(&vicinity.corners) {
             let corners = places.map(|place| corners[place as usize][1]);
             let depths = places.map(|place| coarse * skin.depth(vicinity.nodes[place as usize] as usize));
             // It touches, or is the nearest of all.
             let touching = radius + depths.into_iter().fold(0.0, f64::max);
-            let distance = touching.max(front.min(radius + MAX_DEPTH)).max(reach);
+            let distance = touching.max(around.front.min(radius + MAX_DEPTH));
             let squared = Extent::around(&corners).apart_squared(&around_axis);
             apart.push(squared);
             if squared > distance * distance {
@@ -185,91 +173,24 @@ impl Search {
                 let place = interpolate(&weights, &corners);
                 let away = centre - place;
                 let distance = away.norm();
-                let is_off = distance > ON_SURFACE * radius;
-                let normal = if is_off { away * away.dot(&across).signum() } else { across };
-                let Some(normal) = normal.try_normalize(0.0) else { continue };
-                let depth: f64 = weights.iter().zip(depths).map(|(w, depth)| w * depth).sum();
-                let near = |distance: f64| Near {
-                    triangle,
-                    weights,
-                    place,
-                    normal,
-                    gap: distance - depth - radius,
-                    share: *share,
-                };
-                let same = 1e-12 * radius * radius;
+                around.passes |= !is_off(&away, radius);
                 if away.dot(&across) < 0.0 {
-                    let found = Behind { near: near(-distance), away: distance, is_nearest: true };
-                    // Where the axis passes the surface may also be the way out of its end.
-                    let is_new = |Behind { near, .. }: &Behind| {
-                        (near.place - place).norm_squared() >= same || (near.share - share).abs() > 1e-9
-                    };
-                    if is_long && behind.len() < MOST_POINTS && behind.iter().rev().all(is_new) {
-                        behind.push(found);
-                    } else if !is_long && behind.first().is_none_or(|known| distance < known.away) {
-                        behind.clear();
-                        behind.push(found);
-                    }
+                    around.behind = around.behind.min(distance);
                     continue;
                 }
-                front = front.min(distance);
+                around.front = around.front.min(distance);
                 if fine == 1.0 && met.are_met(places, &weights) {
                     continue;
                 }
-                let mut near = near(distance);
-                near.gap += fine * chord(&corners, &weights, radius);
-                // Triangles that share a place are mostly next to each other in the list.
-                let is_new =
-                    |found: &[Near]| found.iter().rev().all(|known| (known.place - near.place).norm_squared() >= same);
-                if near.gap < 0.0 && is_new(list) {
-                    keep(list, near);
+                let Some(normal) = outward(&away, &across, radius) else { continue };
+                let depth: f64 = weights.iter().zip(depths).map(|(w, depth)| w * depth).sum();
+                let gap = distance - depth - radius + fine * chord(&corners, &weights, radius);
+                if gap < 0.0 {
+                    keep(list, Near { triangle, weights, place, normal, gap, share: *share }, radius);
                 }
             }
         }
-        front
-    }
-
-    /// Of a long axis: places behind the surface are where the tool touches if they are the way out for their part of the axis, and no
-    /// others are for such a part. Returns whether any part of the axis is inside.
-    fn leave_inside(&mut self, vicinity: &Vicinity, axis: &[Vec3; 2], radius: f64) -> bool {
-        if self.behind.is_empty() {
-            return false;
-        }
-        let Self { near: list, corners, behind, .. } = self;
-        let way_out_at = |share: f64| way_out(vicinity, corners, &(axis[0] + (axis[1] - axis[0]) * share), radius);
-        // Every triangle has a place for each end.
-        let of_ends = [0.0, 1.0].map(way_out_at);
-        let way_out = |share: f64| match share {
-            0.0 => of_ends[0],
-            1.0 => of_ends[1],
-            _ => way_out_at(share),
-        };
-        // Most are farther from their part of the axis than another place is, which is quick to tell.
-        for place in 0..behind.len() {
-            let Behind { near, away, .. } = behind[place];
-            let (centre, less) = (axis[0] + (axis[1] - axis[0]) * near.share, away * (1.0 - 2e-9));
-            let is_nearer = |other: &Behind| (other.near.place - centre).norm_squared() < less * less;
-            behind[place].is_nearest = !behind.iter().any(is_nearer);
-        }
-        let is_way_out = |&Behind { near, away, is_nearest }: &Behind| {
-            is_nearest && way_out(near.share).is_some_and(|out| away <= out.norm() * (1.0 + 1e-9))
-        };
-        behind.retain(is_way_out);
-        if behind.is_empty() {
-            return of_ends.iter().any(Option::is_some);
-        }
-        list.retain(|near| way_out(near.share).is_none());
-        // From the ends inwards, no two nearer to each other than a radius: where the surface is folded, walls face each other.
-        let key = |Behind { near, away, .. }: &Behind| [-(near.share - 0.5).abs(), near.share, *away];
-        behind.sort_unstable_by(|one, other| in_order(&key(one), &key(other)));
-        let (outside, apart) = (list.len(), radius / (axis[1] - axis[0]).norm());
-        for &Behind { near, .. } in &*behind {
-            if list[outside..].iter().all(|known| (known.share - near.share).abs() >= apart) && list.len() < MOST_POINTS
-            {
-                list.push(near);
-            }
-        }
-        true
+        around
     }
 }
 
@@ -278,31 +199,16 @@ fn is_long(touch: &Touch) -> bool {
     touch.shape.half_axis() != Vec3::zeros()
 }
 
-/// From a point inside the body to the nearest place of its surface (m), with `corners` at the end of the step; `None` for one that is
-/// outside, or deeper than a tool of that `radius` (m) is held for inside.
-fn way_out(vicinity: &Vicinity, corners: &[[Vec3; 2]], point: &Vec3, radius: f64) -> Option<Vec3> {
-    let (mut front, mut behind) = (f64::INFINITY, (radius + MAX_DEPTH, None));
-    let around_point = Extent::around(&[*point]);
-    for places in &vicinity.corners {
-        let corners = places.map(|place| corners[place as usize][1]);
-        if Extent::around(&corners).apart_squared(&around_point) > behind.0 * behind.0 {
-            continue;
+/// Adds a place, or takes it for one that is there already, for another part of the axis or of another triangle, if it is deeper for a tool
+/// of that `radius` (m). Of too many the deepest are kept.
+fn keep(places: &mut Vec<Near>, near: Near, radius: f64) {
+    // Triangles that share a place are mostly next to each other in the list.
+    let is_same = |known: &&mut Near| (known.place - near.place).norm_squared() < 1e-12 * radius * radius;
+    if let Some(known) = places.iter_mut().rev().find(is_same) {
+        if near.gap < known.gap - 1e-9 * radius {
+            *known = near;
         }
-        let out = interpolate(&closest::weights(&corners, point), &corners) - point;
-        let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-        let distance = out.norm();
-        if out.dot(&across) <= 0.0 {
-            front = front.min(distance);
-        } else if distance < behind.0 {
-            behind = (distance, Some(out));
-        }
-    }
-    behind.1.filter(|_| behind.0 < front * (1.0 - 1e-9))
-}
-
-/// Adds a place; of too many the deepest are kept.
-fn keep(places: &mut Vec<Near>, near: Near) {
-    if places.len() < MOST_POINTS {
+    } else if places.len() < MOST_POINTS {
         places.push(near);
     } else if let Some(shallowest) = places.iter_mut().max_by(|a, b| a.gap.total_cmp(&b.gap))
         && near.gap < shallowest.gap
@@ -403,6 +309,38 @@ mod tests {
                 let Near { gap, normal, share, .. } = *deepest.expect("it is in the block");
                 assert!((gap + depth + radius).abs() < 1e-9 && share == 0.0, "{x} {y}: {gap} at {share}");
                 assert!((normal - tilt * Vec3::z()).norm() < 1e-9, "{x} {y}: {normal}");
+            }
+        }
+    }
+
+    /// A slanted axis over a flat top: a node is as near to it as it is, and not as near as an end of the axis, whichever way it slants.
+    #[test]
+    fn a_node_is_met_by_the_part_of_the_axis_that_is_nearest_to_it() {
+        let block = Block::builder([15, 15, 3], [0.042, 0.042, 0.006]).fix(Face::ZMin).build().unwrap();
+        let candidates: Vec<u32> = (0..block.surface().triangles.len() as u32).collect();
+        let radius = 5e-3;
+        for towards in [Vec3::x(), -Vec3::x(), Vec3::y(), -Vec3::y()] {
+            let half_axis = towards * 0.015 + Vec3::z() * 1.35e-3;
+            let centre = Vec3::new(0.021, 0.021, 0.006 + 2.65e-3);
+            let shape = ToolShape::Capsule { radius, half_axis };
+            let touch = Touch::new(shape, Arc::new(Skin::new(&block, radius)), Contact::default());
+            let State { mut positions, mut velocities } = State::at_rest(block.rest());
+            let body = Deformable {
+                positions: &mut positions,
+                velocities: &mut velocities,
+                inverse_masses: block.inverse_masses(),
+                surface: block.surface(),
+                candidates: &candidates,
+            };
+            let mut search = Search::new(1);
+            search.make_room(block.rest().len(), candidates.len());
+            search.find(&body, (0, &touch), ToolMotion::straight(centre, centre), 1e-3);
+            let axis = touch.shape.axis(&Pose::at(centre));
+            for k in -4..=4 {
+                let node = Vec3::new(0.021, 0.021, 0.006) + towards * 3e-3 * f64::from(k);
+                let near = search.near.iter().find(|near| (near.place - node).norm() < 1e-9).expect("it is touched");
+                let away = axis[0] + (axis[1] - axis[0]) * closest::share_at(&axis, &node) - node;
+                assert!((near.gap - (away.norm() - radius)).abs() < 1e-9, "{towards}, {k}: {near:?}");
             }
         }
     }

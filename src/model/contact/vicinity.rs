@@ -121,6 +121,13 @@ impl Vicinity {
         }));
     }
 
+    /// How far below the surface a place of the triangle of that number is met (m): smoothed corners lie below their nodes.
+    pub(super) fn depth(&self, number: usize, weights: &[f64; 3], touch: &Touch) -> f64 {
+        let coarse = 1.0 - touch.steady.fineness;
+        let depth = |&place: &u32| coarse * touch.skin.depth(self.nodes[place as usize] as usize);
+        self.corners[number].iter().zip(weights).map(|(place, weight)| weight * depth(place)).sum()
+    }
+
     /// How far the tool and the surface have moved together at most at the end of the step (m).
     fn moved(&self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion, d: f64) -> f64 {
         let ends = [&motion.from, &motion.to].map(|pose| touch.shape.axis(pose));
