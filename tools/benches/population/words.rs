@@ -30,11 +30,18 @@ pub struct Populations {
     pub shapes: Vec<CaseResult>,
 }
 
+/// Before the table of models.
+const RAN: &str = "\
+`patch` and `predictive` ran on every scene, any other local model only on the scenes for which `auto` chose it; *ran* says on how many.
+";
+
 /// Before the table of `auto`.
 const AUTO: &str = "\
 ## What `auto` chooses, unseen
 
-Costs are nominal, results one period late. `auto` breaks its word where it is more than the usual `error_pct` of 1 % off without a warning.
+The table covers the first rows above: unseen scenes that are neither *pairs* nor *larger* nor *shapes*. Where `auto` chose another local model for
+one of those, the first table has rows of it. Costs are nominal, results one period late. `auto` breaks its word where it is more than the usual
+`error_pct` of 1 % off without a warning.
 ";
 
 /// The columns of the table of models.
@@ -114,7 +121,7 @@ pub fn document(Populations { single, pairs, larger, shapes }: &Populations) -> 
         parts.into_iter().flat_map(|(name, results, unseen)| of_models(name, &part(results, unseen))).collect();
     let unseen = part(single, true);
     let text = format!(
-        "{}\n{}\n\n## All scenes\n\n{}\n{}\n## `predictive` by body and by motion, unseen\n\n{}\n{AUTO}\n{}\n\
+        "{}\n{}\n\n## All scenes\n\n{RAN}\n{}\n{}\n## `predictive` by body and by motion, unseen\n\n{}\n{AUTO}\n{}\n\
          ![Share of scenes above an error](img/population_error.svg)\n\n\
          ![Error against cost](img/population_cost.svg)\n",
         head(),
