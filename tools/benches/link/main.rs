@@ -1,5 +1,5 @@
 //! The global model behind a link: error and jump of `hold`, `patch` and `predictive` against one-way delay and loss, in virtual time.
-//! Writes the table of docs/link.md, between its marks, and a picture.
+//! Writes the table of docs/link_measured.md, between its marks, and a picture.
 //!
 //! `cargo bench --bench link`; with `-- --quick` a short form that prints and writes nothing; `-- --print` prints all of it and writes
 //! nothing.
@@ -25,7 +25,7 @@ const LOSSES: [f64; 3] = [0.0, 0.01, 0.05];
 const MODELS: [Kind; 3] = [Kind::Predictive, Kind::Patch, Kind::Hold];
 /// Simulated time: the drags up to their middle (s).
 const DURATION_S: f64 = 1.5;
-const DOCUMENT: &str = "docs/link.md";
+const DOCUMENT: &str = "docs/link_measured.md";
 const BEGIN: &str = "<!-- what `cargo bench --bench link` writes -->\n";
 const END: &str = "<!-- end -->\n";
 
