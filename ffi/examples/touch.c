@@ -1,7 +1,9 @@
 /* The least that a host with a haptic loop of its own does: a scene, a session, a tick per millisecond, a force.
  *
  * In virtual time, so that it runs anywhere and gives the same force every time; without that line, the ticks belong into the host's
- * thread at 1 kHz. Built by: cc ffi/examples/touch.c -I ffi/include -L target/debug -lpalpate_ffi */
+ * thread at 1 kHz. Built, after `cargo build --release -p palpate-ffi`, by
+ *
+ *     cc -o touch ffi/examples/touch.c -I ffi/include -L target/release -lpalpate_ffi -Wl,-rpath,$PWD/target/release -lm */
 
 #include <stdio.h>
 
