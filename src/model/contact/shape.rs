@@ -42,14 +42,15 @@ impl ToolShape {
         }
     }
 
-    /// No part of it is farther from its centre (m).
-    pub fn reach(&self) -> f64 {
-        self.radius() + self.half_axis().norm()
-    }
-
     /// The two ends of the axis of a tool at `pose` (m); both are the centre but for a capsule.
     pub fn axis(&self, pose: &Pose) -> [Vec3; 2] {
         let half = pose.orientation * self.half_axis();
         [pose.position - half, pose.position + half]
+    }
+
+    /// How high a tool at `pose` is over the origin along the unit vector `up` (m): its lowest part.
+    pub(crate) fn height(&self, pose: &Pose, up: &Vec3) -> f64 {
+        let [one, other] = self.axis(pose).map(|end| end.dot(up));
+        one.min(other) - self.radius()
     }
 }

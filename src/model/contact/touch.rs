@@ -44,6 +44,10 @@ pub(crate) struct Touch {
     points: Vec<ContactPoint>,
     /// The nodes that the tool pressed in the last step, each with the force on it (N).
     pressed: Vec<(u32, Vec3)>,
+    /// Of places that it would have pressed if they could give way: a node of each, for a tool with a shape.
+    unmoved: Vec<u32>,
+    /// At so many places it pressed.
+    pressing: usize,
 }
 
 /// One place at which a tool touches.
@@ -69,8 +73,8 @@ impl Touch {
     /// Of a tool with a shape on a whole body.
     pub(crate) fn new(shape: ToolShape, skin: Arc<Skin>, contact: Contact) -> Self {
         let room = if shape == ToolShape::Point { 0 } else { MOST_POINTS };
-        let (felt, points) = (Vec::with_capacity(room), Vec::with_capacity(room));
-        Self { shape, skin, contact, felt, points, pressed: Vec::with_capacity(40 * room), ..Self::default() }
+        let (felt, points, unmoved) = (Vec::with_capacity(room), Vec::with_capacity(room), Vec::with_capacity(room));
+        Self { shape, skin, contact, felt, points, unmoved, pressed: Vec::with_capacity(40 * room), ..Self::default() }
     }
 
     /// True for a tool that touches with its shape: not a point, and not glued by its centre.
@@ -105,6 +109,7 @@ impl Touch {
         (self.steady, self.stiffness) = (other.steady, other.stiffness);
         self.points.clone_from(&other.points);
         self.pressed.clear();
+        self.unmoved.clear();
         // Whether a place stuck is told by its triangle: corners have other numbers here.
         self.felt.clear();
         self.felt.extend(other.felt.iter().filter_map(|felt| {
@@ -206,6 +211,7 @@ impl Touch {
     pub(super) fn feel<'a>(&mut self, rows: impl Iterator<Item = (&'a Row, &'a [(u32, f64)])>, pose: &Pose, d: f64) {
         self.felt.iter_mut().for_each(|felt| felt.is_pressing = false);
         self.pressed.clear();
+        self.unmoved.clear();
         self.wrench = Wrench::default();
         let (mut largest, mut pushed, mut sticks, mut count) = (0.0, Vec3::zeros(), true, 0);
         let mut found = Contact { mode: ContactMode::Free, ..Contact::default() };
@@ -213,6 +219,7 @@ impl Touch {
         for (row, nodes) in rows {
             if row.mode == ContactMode::Lost {
                 lost = Some(row);
+                self.unmoved.extend(nodes.first().map(|&(node, _)| node));
             }
             let along = row.impulse.dot(&row.normal);
             if along <= 0.0 {
@@ -239,6 +246,7 @@ impl Touch {
                 self.felt.push(felt);
             }
         }
+        self.pressing = count;
         let radius = self.shape.radius();
         self.steady.follow(pushed.norm() / d * radius / (radius + self.shape.half_axis().norm()), d);
         self.contact = match lost {
@@ -274,6 +282,12 @@ impl Touch {
     /// The nodes that it pressed in the last step, each with the force on it (N).
     pub(crate) fn pressed(&self) -> &[(u32, Vec3)] {
         &self.pressed
+    }
+
+    /// The share of the places that it would press whose node `is_one` that did not give way in the last step.
+    pub(crate) fn unmoved(&self, is_one: impl Fn(u32) -> bool) -> f64 {
+        let unmoved = self.unmoved.iter().filter(|&&node| is_one(node)).count();
+        unmoved as f64 / (unmoved + self.pressing).max(1) as f64
     }
 
     /// Tells `each` node that it presses with the force on that (N): of a tool with a shape those of the last step, of a point its share of

@@ -1,7 +1,7 @@
 //! What a tool feels once it has left the patch: a spring as stiff as the surface was, and Coulomb's friction.
 
-use crate::contact::Friction;
-use crate::{Vec3, Wrench};
+use crate::contact::{Friction, ToolShape};
+use crate::{Pose, Vec3, Wrench};
 
 /// The stiffness of a surface along itself over that towards it, about that of a round contact on an elastic half-space with a
 /// Poisson's ratio of 0.4 (Mindlin 1949).
@@ -9,7 +9,7 @@ const ALONG: f64 = 0.75;
 /// The spring pushes at most so many times as hard as the surface ever did.
 const MOST: f64 = 1.2;
 
-/// What it held across the normal beyond friction becomes so much less with each tick.
+/// What it held across the normal beyond friction, and what pushes it with a stiffness that is not known, becomes so much less with each tick.
 const EASING: f64 = 0.95;
 
 /// A tool over a surface of which nothing is known any more but how stiff it was.
@@ -28,7 +28,7 @@ pub(super) struct Beyond {
 struct Left {
     /// The outward unit normal of the surface at rest.
     normal: Vec3,
-    /// How high the tool was over it (m), and how hard the spring pushed (N).
+    /// How high the tool's lowest part was (m), and how hard the spring pushed (N).
     height: f64,
     pressed: f64,
     /// What it held across the normal for what pressed. The dent that it was in has another normal than the surface at rest, so that
@@ -49,32 +49,36 @@ impl Beyond {
         }
     }
 
-    /// The tool leaves the patch at `at` (m), over a surface with the outward unit `normal`; it feels `felt`.
-    pub(super) fn leave(&mut self, normal: Vec3, at: Vec3, felt: Wrench) {
+    /// A tool of that `shape` leaves the patch at `pose`, over a surface with the outward unit `normal`; it feels `felt`.
+    pub(super) fn leave(&mut self, normal: Vec3, (shape, pose): (&ToolShape, &Pose), felt: Wrench) {
         let pressed = felt.force.dot(&normal).max(0.0);
         let across = if pressed > 0.0 { (felt.force - normal * pressed).norm() / pressed } else { 0.0 };
-        self.left = Some(Left { normal, height: at.dot(&normal), pressed, across, felt, at });
+        let height = shape.height(pose, &normal);
+        self.left = Some(Left { normal, height, pressed, across, felt, at: pose.position });
     }
 
     pub(super) fn has_left(&self) -> bool {
         self.left.is_some()
     }
 
-    /// What the tool feels at `to` (m), if it has left.
-    pub(super) fn follow(&mut self, to: Vec3, friction: &Friction) -> Option<Wrench> {
-        let stiffness = if self.squares > 0.0 { self.work / self.squares } else { 0.0 };
+    /// What the tool, of that `shape`, feels at the pose `to`, if it has left.
+    pub(super) fn follow(&mut self, (shape, to): (&ToolShape, &Pose), friction: &Friction) -> Option<Wrench> {
+        let is_known = self.squares > 0.0;
+        let stiffness = if is_known { self.work / self.squares } else { 0.0 };
         let most = MOST * self.most;
         let Left { normal, height, pressed, across, felt, at } = self.left.as_mut()?;
         let before = felt.force.dot(normal);
-        let along = (*pressed + stiffness * (*height - to.dot(normal))).clamp(0.0, most.max(*pressed));
-        let way = to - *at;
+        // Nothing says when a surface of unknown stiffness would let go.
+        *pressed *= if is_known { 1.0 } else { EASING };
+        let along = (*pressed + stiffness * (*height - shape.height(to, normal))).clamp(0.0, most.max(*pressed));
+        let way = to.position - *at;
         *across *= EASING;
         let limit = friction.kinetic.max(*across) * along;
         let across = felt.force - *normal * before - (way - *normal * way.dot(normal)) * (ALONG * stiffness);
         let across = if across.norm() > limit { across * (limit / across.norm()) } else { across };
         let torque = if before > 0.0 { felt.torque * (along / before) } else { Vec3::zeros() };
         *felt = Wrench { force: *normal * along + across, torque };
-        *at = to;
+        *at = to.position;
         Some(*felt)
     }
 }
@@ -86,7 +90,7 @@ mod tests {
     fn beyond(force: Vec3) -> Beyond {
         let mut beyond = Beyond::default();
         (1..=10).for_each(|n| beyond.learn(0.1 * f64::from(n), 1e-4 * f64::from(n)));
-        beyond.leave(Vec3::z(), Vec3::new(0.0, 0.0, -1e-3), force.into());
+        beyond.leave(Vec3::z(), (&ToolShape::Point, &Pose::at(Vec3::new(0.0, 0.0, -1e-3))), force.into());
         beyond
     }
 
@@ -94,15 +98,20 @@ mod tests {
     fn a_tool_that_stays_feels_what_it_felt_and_one_that_lifts_nothing() {
         let friction = Friction::from(0.5);
         let mut left = beyond(Vec3::new(0.3, 0.0, 1.0));
-        let stays = left.follow(Vec3::new(0.0, 0.0, -1e-3), &friction).unwrap();
+        let stays = left.follow((&ToolShape::Point, &Pose::at(Vec3::new(0.0, 0.0, -1e-3))), &friction).unwrap();
         assert!((stays.force - Vec3::new(0.3, 0.0, 1.0)).norm() < 1e-12, "{stays:?}");
-        let steep = beyond(Vec3::new(0.9, 0.0, 1.0)).follow(Vec3::new(0.0, 0.0, -1e-3), &friction).unwrap();
+        let steep = beyond(Vec3::new(0.9, 0.0, 1.0))
+            .follow((&ToolShape::Point, &Pose::at(Vec3::new(0.0, 0.0, -1e-3))), &friction)
+            .unwrap();
         assert!((steep.force.x - EASING * 0.9).abs() < 1e-12, "no jump: {steep:?}");
-        let half = left.follow(Vec3::new(0.0, 0.0, -0.5e-3), &friction).unwrap();
+        let half = left.follow((&ToolShape::Point, &Pose::at(Vec3::new(0.0, 0.0, -0.5e-3))), &friction).unwrap();
         assert!((half.force - Vec3::new(0.25, 0.0, 0.5)).norm() < 1e-12, "in the cone: {half:?}");
-        assert_eq!(left.follow(Vec3::new(0.0, 0.0, 1e-3), &friction), Some(Wrench::default()));
+        assert_eq!(
+            left.follow((&ToolShape::Point, &Pose::at(Vec3::new(0.0, 0.0, 1e-3))), &friction),
+            Some(Wrench::default())
+        );
         // 1000 N/m, but never much more than what was felt.
-        let deep = left.follow(Vec3::new(0.0, 0.0, -0.1), &friction).unwrap();
+        let deep = left.follow((&ToolShape::Point, &Pose::at(Vec3::new(0.0, 0.0, -0.1))), &friction).unwrap();
         assert!((deep.force.z - 1.2).abs() < 1e-12, "{deep:?}");
     }
 
@@ -111,7 +120,13 @@ mod tests {
         let mut left = beyond(Vec3::new(0.5, 0.0, 1.0));
         let mut force = Vec3::zeros();
         for n in 1..=20 {
-            force = left.follow(Vec3::new(1e-4 * f64::from(n), 0.0, -1e-3), &Friction::from(0.5)).unwrap().force;
+            force = left
+                .follow(
+                    (&ToolShape::Point, &Pose::at(Vec3::new(1e-4 * f64::from(n), 0.0, -1e-3))),
+                    &Friction::from(0.5),
+                )
+                .unwrap()
+                .force;
         }
         assert!((force - Vec3::new(-0.5, 0.0, 1.0)).norm() < 1e-12, "{force:?}");
     }
@@ -119,8 +134,31 @@ mod tests {
     #[test]
     fn one_that_never_touched_feels_nothing_and_stays_inside_says_so() {
         let mut never = Beyond::default();
-        assert!(!never.has_left() && never.follow(Vec3::zeros(), &Friction::default()).is_none());
-        never.leave(Vec3::z(), Vec3::zeros(), Wrench::default());
-        assert_eq!(never.follow(-Vec3::z(), &Friction::default()), Some(Wrench::default()));
+        assert!(
+            !never.has_left()
+                && never.follow((&ToolShape::Point, &Pose::at(Vec3::zeros())), &Friction::default()).is_none()
+        );
+        never.leave(Vec3::z(), (&ToolShape::Point, &Pose::default()), Wrench::default());
+        assert_eq!(
+            never.follow((&ToolShape::Point, &Pose::at(-Vec3::z())), &Friction::default()),
+            Some(Wrench::default())
+        );
+    }
+
+    /// An upright probe whose end is in the surface: it is let go where it is lifted, and soon if nothing was learned.
+    #[test]
+    fn a_capsule_that_is_lifted_is_let_go() {
+        let probe = ToolShape::Capsule { radius: 3e-3, half_axis: Vec3::z() * 0.02 };
+        let pose = |height: f64| Pose::at(Vec3::z() * (0.023 + height));
+        let mut left = Beyond::default();
+        (1..=10).for_each(|n| left.learn(0.1 * f64::from(n), 1e-4 * f64::from(n)));
+        left.leave(Vec3::z(), (&probe, &pose(-1e-3)), Vec3::z().into());
+        let mut feel = |height: f64| left.follow((&probe, &pose(height)), &Friction::default()).unwrap().force.z;
+        assert!((feel(-0.5e-3) - 0.5).abs() < 1e-12 && feel(0.0).abs() < 1e-12);
+        let mut unknown = Beyond::default();
+        unknown.leave(Vec3::z(), (&probe, &pose(-1e-3)), Vec3::z().into());
+        let force = |_| unknown.follow((&probe, &pose(-1e-3)), &Friction::default()).unwrap().force.z;
+        let forces: Vec<f64> = (0..200).map(force).collect();
+        assert!((forces[0] - EASING).abs() < 1e-12 && forces[199] < 1e-4, "{forces:?}");
     }
 }

@@ -52,7 +52,7 @@ impl ToolForecast {
     }
 
     /// The tool that is expected `t` seconds from now.
-    fn pose(&self, t: f64) -> Pose {
+    pub(super) fn pose(&self, t: f64) -> Pose {
         Pose { position: self.at(t), orientation: self.orientation }
     }
 

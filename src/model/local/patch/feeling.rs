@@ -3,7 +3,7 @@
 use super::super::beyond::Beyond;
 use crate::contact::{Friction, Normals, Touch, contact_normal, interpolate};
 use crate::mesh::Surface;
-use crate::{Vec3, Wrench};
+use crate::{Pose, Vec3, Wrench};
 
 /// No forecast errs by so much (m): a tool that begins a tick farther from where it ended the last one was put there.
 const PUT: f64 = 0.02;
@@ -23,12 +23,12 @@ pub(super) struct Feeling {
 }
 
 impl Feeling {
-    /// At a resync, of a tool at `at` (m) that feels `wrench`.
+    /// At a resync, of a tool at `pose` that feels `wrench`.
     ///
     /// Nothing that a patch knew before: which one is built anew hangs on the threads, and a replay is to be the same.
-    pub(super) fn new(wrench: Wrench, at: Vec3, touch: &Touch, surface: (&Surface, &[Vec3])) -> Self {
-        let mut feeling = Self { felt: wrench, at, ..Self::default() };
-        feeling.learn(at, touch, surface);
+    pub(super) fn new(wrench: Wrench, pose: &Pose, touch: &Touch, surface: (&Surface, &[Vec3])) -> Self {
+        let mut feeling = Self { felt: wrench, at: pose.position, ..Self::default() };
+        feeling.learn(pose, touch, surface);
         feeling
     }
 
@@ -63,26 +63,26 @@ impl Feeling {
         self.strayed = Some(contact_at_rest(touch, surface).map_or(Vec3::zeros(), |(_, normal)| normal));
     }
 
-    /// A tick of `steps` steps is over, with the tool at `at` (m).
-    pub(super) fn end(&mut self, at: Vec3, steps: u32, touch: &Touch, surface: (&Surface, &[Vec3])) {
-        self.at = at;
+    /// A tick of `steps` steps is over, with the tool at `pose`.
+    pub(super) fn end(&mut self, pose: &Pose, steps: u32, touch: &Touch, surface: (&Surface, &[Vec3])) {
+        self.at = pose.position;
         match self.strayed.take() {
-            Some(normal) => self.beyond.leave(normal, at, self.felt),
+            Some(normal) => self.beyond.leave(normal, (&touch.shape, pose), self.felt),
             None => {
                 self.felt = self.sum / f64::from(steps);
-                self.learn(at, touch, surface);
+                self.learn(pose, touch, surface);
             }
         }
     }
 
-    /// A tick is over beyond the patch.
-    pub(super) fn follow(&mut self, at: Vec3, friction: &Friction) {
-        self.felt = self.beyond.follow(at, friction).unwrap_or(self.felt);
+    /// A tick is over beyond the patch, with the tool of that `touch` at `pose`.
+    pub(super) fn follow(&mut self, pose: &Pose, touch: &Touch, friction: &Friction) {
+        self.felt = self.beyond.follow((&touch.shape, pose), friction).unwrap_or(self.felt);
     }
 
-    fn learn(&mut self, at: Vec3, touch: &Touch, surface: (&Surface, &[Vec3])) {
+    fn learn(&mut self, pose: &Pose, touch: &Touch, surface: (&Surface, &[Vec3])) {
         if let Some((place, normal)) = contact_at_rest(touch, surface) {
-            let depth = (place - at).dot(&normal) + touch.shape.radius();
+            let depth = place.dot(&normal) - touch.shape.height(pose, &normal);
             self.beyond.learn(self.felt.force.dot(&normal), depth);
         }
     }

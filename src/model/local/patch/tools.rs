@@ -86,8 +86,8 @@ impl Tools {
             mine.restart(touch, |contact| window.localised(contact), |triangle| window.triangle(triangle));
             let skin = Arc::make_mut(&mut mine.skin);
             touch.skin.localise(&window.nodes, |node| window.node(node), skin);
-            let at = resync.tools[number].position;
-            self.feelings.push(Feeling::new(global.wrench(number), at, mine, (&window.surface, rest)));
+            let pose = resync.tools[number].pose(0.0);
+            self.feelings.push(Feeling::new(global.wrench(number), &pose, mine, (&window.surface, rest)));
         }
         if self.touches.len() > 1 || self.touches[0].has_shape() {
             self.rows.make_room(window.nodes.len(), window.candidates.len());
@@ -152,12 +152,12 @@ impl Tools {
     ) {
         let id = |triangle: u32| window.triangles[triangle as usize];
         for ((touch, feeling), &number) in self.touches.iter_mut().zip(&mut self.feelings).zip(&self.numbers) {
-            let at = end(number).position;
+            let pose = end(number);
             if feeling.is_beyond() {
-                feeling.follow(at, friction);
+                feeling.follow(&pose, touch, friction);
             } else {
                 touch.end(steps, id);
-                feeling.end(at, steps, touch, (&window.surface, rest));
+                feeling.end(&pose, steps, touch, (&window.surface, rest));
             }
         }
     }

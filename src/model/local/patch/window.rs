@@ -5,8 +5,10 @@ use crate::body::{Body, bounds};
 use crate::contact::{Contact, Skin, Touch};
 use crate::mesh::Surface;
 
-/// A tool that presses more than this share of its force on nodes outside has left the patch.
+/// A tool that presses more than this share of its force on nodes outside has left the patch, ...
 const BEYOND: f64 = 0.02;
+/// ... and so has one that would touch at more than this share of its places outside. What is at the rim presses less.
+const UNMOVED: f64 = 0.1;
 
 /// Patch nodes first; then, if the model asks for them, the other nodes of the body's restriction to the patch: the ring,
 /// which can move, and held ones; then the rim: surface nodes that contact needs for normals and walking.
@@ -175,7 +177,8 @@ impl Window {
             // The far ends of a smoothed corner bear next to nothing.
             let force = |sum: f64, (_, force): &(u32, Vec3)| sum + force.norm();
             let outside = touch.pressed().iter().filter(beyond).fold(0.0, force);
-            return outside > BEYOND * touch.pressed().iter().fold(0.0, force);
+            return outside > BEYOND * touch.pressed().iter().fold(0.0, force)
+                || touch.unmoved(|node| self.beyond[node as usize]) > UNMOVED;
         }
         let contact = &touch.contact;
         let touched = contact.triangle.filter(|_| contact.is_touching());

@@ -14,6 +14,7 @@ mod contact_hard_cases;
 mod contact_invariants;
 mod crushed_tissue;
 mod implicit_step;
+mod left_window;
 mod paper_equations;
 mod parcel;
 mod restriction;
