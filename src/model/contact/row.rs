@@ -36,6 +36,8 @@ pub(super) struct Row {
     pub(super) mode: ContactMode,
     /// On the tool (N s).
     pub(super) impulse: Vec3,
+    /// How much of the step is over before it touches (s); nothing for a tool with a shape.
+    pub(super) before: f64,
     /// Its nodes in the list of the system.
     pub(super) nodes: (usize, usize),
 }

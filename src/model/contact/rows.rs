@@ -143,6 +143,7 @@ impl Rows {
             glued: contact.glued,
             mode: ContactMode::Free,
             impulse: Vec3::zeros(),
+            before: share * d,
             nodes: (first, self.nodes.len()),
         });
     }
@@ -229,6 +230,7 @@ impl Rows {
             glued: false,
             mode: if is_held { ContactMode::Lost } else { ContactMode::Free },
             impulse: if is_held { Vec3::zeros() } else { touch.impulse_at(&feature) },
+            before: 0.0,
             nodes: (first, self.nodes.len()),
         });
     }

@@ -79,10 +79,6 @@ pub(crate) fn step_all(
         return;
     }
     integrator::accelerate(body.velocities, forces, body.inverse_masses, d);
-    if touches.iter().all(|touch| !touch.has_shape()) && !share_nodes(body, touches, &motion, d) {
-        press_apart(body, touches, law, &motion, d);
-        return;
-    }
     press_all(body, touches, rows, law, &motion, d, |rows, body| rows.solve(body, law, d));
 }
 
@@ -142,38 +138,6 @@ fn press_all(
             touch.feel_point(rows.of(tool).next().map(|(row, _)| row), d);
             follow(body, &mut touch.contact, law, motion(tool));
         }
-    }
-}
-
-/// True if two points touch, or come in at, triangles with a node in common.
-fn share_nodes(body: &Deformable<'_>, touches: &[Touch], motion: &impl Fn(usize) -> ToolMotion, d: f64) -> bool {
-    let corners = |tool: usize| {
-        let mut contact = touches[tool].contact;
-        body.detect(&mut contact, motion(tool), d).map(|(triangle, _)| body.corners(triangle))
-    };
-    (0..touches.len()).any(|one| {
-        let Some(nodes) = corners(one) else { return false };
-        (0..one).filter_map(corners).any(|others| others.iter().any(|node| nodes.contains(node)))
-    })
-}
-
-/// Points that share no node: each as if it were alone.
-fn press_apart(
-    body: &mut Deformable<'_>,
-    touches: &mut [Touch],
-    law: &Law,
-    motion: &impl Fn(usize) -> ToolMotion,
-    d: f64,
-) {
-    for (tool, touch) in touches.iter_mut().enumerate() {
-        let force = press(body, &mut touch.contact, motion(tool), d, |body, place, tool, d_c| {
-            resolve(body, law, place, tool, d_c, d)
-        });
-        touch.wrench = force.into();
-    }
-    body.drift(d);
-    for (tool, touch) in touches.iter_mut().enumerate() {
-        follow(body, &mut touch.contact, law, motion(tool));
     }
 }
 

@@ -276,3 +276,32 @@ fn tools_on_a_linear_patch_feel_each_other_too() {
         }
     }
 }
+
+/// Check that a point that taps a body feels what it feels alone, whoever presses far away: its first touch, within a step, too.
+#[test]
+fn a_point_that_taps_feels_the_same_beside_another_tool() {
+    let builder = Block::builder([17, 5, 4], [0.16, 0.04, 0.03]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
+    let body = builder.fix(Face::ZMin).build().unwrap();
+    let law = Law { friction: Friction::from(0.5), ..Law::default() };
+    let stepping = Stepping { tick: 1e-3, substeps: 2 };
+    let alone = || {
+        let state = State::at_rest(body.rest());
+        Simulation::new(Box::new(body.clone()), state, Contact::default(), law, stepping).unwrap()
+    };
+    // Down at half a metre a second to 4 mm, and up again; the other one comes from above, 13 cm away.
+    let tap = |k: i32| Vec3::new(0.0137, 0.0212, 0.03 + 5e-4 * f64::from((k - 5).abs().min(13)) - 4e-3 + 1.3e-4);
+    let beside = |k: i32| Vec3::new(0.147, 0.0197, 0.03 + 7e-3 - 1e-4 * f64::from(k));
+    let motion = |at: &dyn Fn(i32) -> Vec3, k: i32| ToolMotion::straight(at(k), at(k + 1));
+    let mut lone = alone();
+    let felt: Vec<Vec3> = (-20..30).map(|k| lone.tick(motion(&tap, k)).force).collect();
+    assert!(felt.iter().filter(|force| force.z > 0.1).count() > 5, "it taps: {felt:?}");
+    for shape in [POINT, SPHERE] {
+        let mut both = alone().with_tool(Contact::default()).with_shape(1, shape);
+        for (k, force) in (-20..30).zip(&felt) {
+            both.tick_all(&[motion(&tap, k), motion(&beside, k)]);
+            let other = both.wrench(0).force;
+            // What the other tool does comes here as a wave, which is weak yet.
+            assert!((other - force).norm() < 1e-6, "{shape:?} at {k}: {other} and {force}");
+        }
+    }
+}
