@@ -274,10 +274,8 @@ impl GlobalActor {
     fn publish_checkpoint(&mut self, ctx: &TickContext) {
         let checkpoint = self.ports.checkpoint.buffer();
         checkpoint.tools.clear();
-        let with_contact =
-            |(tool, side): (usize, &ToolSide)| (side.tool, *self.simulation.contact(tool), self.simulation.force(tool));
-        checkpoint.tools.extend(self.tools.iter().enumerate().map(with_contact));
-        checkpoint.state.clone_from(self.simulation.state());
+        checkpoint.tools.extend(self.tools.iter().map(|side| side.tool));
+        self.simulation.save(&mut checkpoint.simulation);
         self.ports.checkpoint.publish(ctx);
     }
 

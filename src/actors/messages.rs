@@ -1,9 +1,9 @@
 //! What actors say to each other and to programs that watch.
 
 use crate::devices::DeviceState;
-use crate::model::body::{State, Stiffness};
-use crate::model::contact::{Contact, ContactMode};
-use crate::model::simulation::Simulation;
+use crate::model::body::Stiffness;
+use crate::model::contact::ContactMode;
+use crate::model::simulation::{Simulation, Snapshot};
 use crate::model::{Pose, Turn, Vec3};
 use crate::runtime::{Nanos, OutletWriter, TickContext};
 
@@ -101,10 +101,10 @@ pub fn show(surfaces: &mut [OutletWriter<SurfaceView>], ctx: &TickContext, time:
 }
 
 /// The global model after its last good resync: what it goes on from when it is started again.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct Checkpoint {
-    /// Each tool with the haptic tick that the state belongs to, its contact and the force on it (N).
-    pub tools: Vec<(ToolTick, Contact, Vec3)>,
-    /// Positions (m) and velocities (m/s) of all nodes.
-    pub state: State,
+    /// Each tool at the haptic tick that the state belongs to.
+    pub tools: Vec<ToolTick>,
+    /// The body and what its tools touch.
+    pub simulation: Snapshot,
 }

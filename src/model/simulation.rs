@@ -3,6 +3,7 @@
 mod ahead;
 mod moving;
 mod recorded;
+mod snapshot;
 mod stepping;
 mod told;
 
@@ -17,6 +18,7 @@ use moving::Moving;
 
 pub(crate) use told::Told;
 
+pub use snapshot::Snapshot;
 pub use stepping::Stepping;
 
 /// A body, its state and the contacts of the tools with it. Tools are numbered in the order of their devices.
@@ -352,14 +354,6 @@ impl Simulation {
     /// The contact of a tool, to put in what a local model found.
     pub(crate) fn contact_mut(&mut self, tool: usize) -> &mut Contact {
         &mut self.moving.touches[tool].contact
-    }
-
-    /// Puts `tool` in `contact` with the mean `force` of a last tick on it (N): to go on from what another one has saved.
-    ///
-    /// # Real-time
-    /// Wait-free, real-time safe.
-    pub fn restore_tool(&mut self, tool: usize, contact: Contact, force: Vec3) {
-        (self.moving.touches[tool].contact, self.moving.means[tool]) = (contact, force.into());
     }
 
     /// Takes `tool` off the body, unless it is glued to it: what it touched is let go.

@@ -118,6 +118,16 @@ impl Touch {
         }));
     }
 
+    /// Takes all that `other` knows but its shape: the tool goes on where that was, bit for bit.
+    pub(crate) fn remember(&mut self, other: &Self) {
+        (self.contact, self.wrench, self.stiffness) = (other.contact, other.wrench, other.stiffness);
+        (self.steady, self.pressing) = (other.steady, other.pressing);
+        self.felt.clone_from(&other.felt);
+        self.points.clone_from(&other.points);
+        self.pressed.clone_from(&other.pressed);
+        self.unmoved.clone_from(&other.unmoved);
+    }
+
     /// Where it touched in the last tick, with the mean forces.
     pub(crate) fn felt(&self) -> &[Felt] {
         &self.felt

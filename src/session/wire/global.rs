@@ -75,11 +75,9 @@ impl GlobalMaker {
     /// With the tools at `tools`.
     pub(super) fn new(simulation: Simulation, tools: &[Pose], plan: GlobalPlan, side: GlobalSide) -> Self {
         let spare = simulation.duplicate();
-        let contact = |(tool, &pose)| {
-            (ToolTick { pose, ..ToolTick::default() }, *simulation.contact(tool), simulation.force(tool))
-        };
-        let tools = tools.iter().enumerate().map(contact).collect();
-        let last = Checkpoint { tools, state: simulation.state().clone() };
+        let tools = tools.iter().map(|&pose| ToolTick { pose, ..ToolTick::default() }).collect();
+        let mut last = Checkpoint { tools, ..Checkpoint::default() };
+        simulation.save(&mut last.simulation);
         let saved = side.checkpoint.reader();
         Self { first: Some(simulation), spare, last, saved, plan, side, build_cost: None }
     }
@@ -115,21 +113,17 @@ impl GlobalMaker {
         }
         let mut ports = self.side.take();
         ports.shared.build_cost = self.build_cost.take();
-        let tools: Vec<ToolTick> = self.last.tools.iter().map(|&(tool, ..)| tool).collect();
         let simulation = match self.first.take() {
             Some(first) => first,
             None => self.restored()?,
         };
-        Ok(vec![Box::new(GlobalActor::new(simulation, &tools, self.plan.clone(), ports)?)])
+        Ok(vec![Box::new(GlobalActor::new(simulation, &self.last.tools, self.plan.clone(), ports)?)])
     }
 
     fn restored(&self) -> Result<Simulation, Error> {
         let copy = self.spare.as_ref().and_then(Simulation::duplicate);
         let mut simulation = copy.ok_or_else(|| Error::new(ErrorKind::Fault, "the body cannot be copied"))?;
-        simulation.state_mut().clone_from(&self.last.state);
-        for (tool, &(_, contact, force)) in self.last.tools.iter().enumerate() {
-            simulation.restore_tool(tool, contact, force);
-        }
+        simulation.restore(&self.last.simulation);
         Ok(simulation)
     }
 }
