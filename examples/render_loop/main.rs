@@ -8,8 +8,7 @@
 //! Look for: the same median lateness of the haptic group in both rows, and the pictures. What else the machine does shows
 //! up in either row: a p99 is worth comparing on a quiet machine only.
 //!
-//! `cargo run --release --example render_loop`; with `-- --readme` it draws `docs/img/demo.svg`, the picture of its page,
-//! from a run in virtual time instead.
+//! `cargo run --release --example render_loop`
 
 mod camera;
 mod picture;
@@ -32,8 +31,6 @@ const FRAME_RATE: u32 = 60;
 const DURATION_S: f64 = 2.6;
 /// Frames that are written to files: the first at or after each of these times.
 const KEPT: [Nanos; 4] = [Nanos(700_000_000), Nanos(1_300_000_000), Nanos(1_700_000_000), Nanos(2_400_000_000)];
-/// The picture of the documentation: the end of the drag.
-const README_TIME: Duration = Duration::from_millis(2000);
 
 /// What the renderer did.
 #[derive(Default)]
@@ -45,23 +42,10 @@ struct Frames {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    match std::env::args().nth(1).as_deref() {
-        None => compare(),
-        Some("--readme") => draw_readme(),
-        Some(other) => Err(format!("{other} is no option; usage: render_loop [--readme]").into()),
-    }
-}
-
-/// The scene that is drawn.
-fn liver() -> Result<Scene, palpate::Error> {
-    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/liver.toml"))
-}
-
-/// Runs the scene without and with a renderer.
-fn compare() -> Result<(), Box<dyn Error>> {
+    let scene = Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/liver.toml"))?;
     let folder = Path::new("out/render_loop");
     fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let session = || Session::from_scene(liver()?).duration_s(DURATION_S).build();
+    let session = || Session::from_scene(scene.clone()).duration_s(DURATION_S).build();
 
     eprintln!("{DURATION_S} s without a renderer ...");
     let alone = session()?.run()?;
@@ -115,22 +99,6 @@ fn render(mut viewer: Viewer, stopped: &Receiver<()>, folder: &Path) -> Result<F
             frames.files.push(file);
         }
     }
-}
-
-/// Draws that picture, the same at every call.
-fn draw_readme() -> Result<(), Box<dyn Error>> {
-    let mut running = Session::from_scene(liver()?).virtual_time().build()?.start()?;
-    let mut viewer = running.take_viewer().ok_or("the viewer is already taken")?;
-    let (triangles, rest) = (viewer.triangles(), viewer.surface().positions.clone());
-    running.wait_for(README_TIME);
-    let tool = viewer.tool();
-    let svg = picture::draw(&triangles, &rest, &viewer.surface().positions, &tool);
-    running.stop();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/img");
-    fs::create_dir_all(&folder)?;
-    fs::write(folder.join("demo.svg"), &svg)?;
-    println!("docs/img/demo.svg: {:.3} s, {} kB", tool.time.as_secs_f64(), svg.len() / 1000);
-    Ok(())
 }
 
 fn haptic(summary: &Summary) -> Option<&GroupSummary> {
