@@ -33,8 +33,6 @@ pub struct GroupSummary {
     pub jitter: Percentiles<u64>,
     /// The execution time of all releases together.
     pub busy: Nanos,
-    /// The scheduled time of the last release.
-    pub last_release: Nanos,
 }
 
 /// Gathers a [`GroupSummary`].
@@ -167,7 +165,6 @@ impl GroupCounter {
             period_error: self.period_error.percentiles(),
             jitter: self.jitter.percentiles(),
             busy: self.busy,
-            last_release: self.last.scheduled,
         }
     }
 }

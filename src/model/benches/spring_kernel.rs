@@ -113,7 +113,7 @@ fn shuffled(block: &Block, state: &State) -> (SpringNetwork, State) {
 
 fn per_spring(nodes: usize) {
     let (whole, state) = (block(nodes), deformed(block(nodes).rest()));
-    let (springs, net) = (whole.spring_count(), network(&whole));
+    let (springs, net) = (whole.springs().len(), network(&whole));
     let mut contestants: Vec<Contestant> = Vec::new();
     let (list, s, mut out) = (edges(&whole), state.clone(), vec![Vec3::zeros(); state.positions.len()]);
     contestants.push(("scalar loop over a list".into(), Box::new(move || scalar(black_box(&list), &s, &mut out))));

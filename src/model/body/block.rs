@@ -21,7 +21,7 @@ use crate::{Mat3, Vec3};
 /// # fn main() -> Result<(), palpate_model::ModelError> {
 /// let builder = Block::builder([12; 3], [0.1; 3]).stiffness(30.0).damping_ratio(0.3).node_mass(0.5e-3);
 /// let block = builder.fix(Face::ZMin).build()?;
-/// assert_eq!(block.spring_count(), 18_788);
+/// assert_eq!(block.springs().len(), 18_788);
 /// # Ok(())
 /// # }
 /// ```
@@ -154,11 +154,6 @@ impl Block {
     /// The lattice of the nodes: their numbering and neighbours.
     pub fn lattice(&self) -> Lattice {
         self.lattice
-    }
-
-    /// Number of springs of the block.
-    pub fn spring_count(&self) -> usize {
-        self.springs.len()
     }
 
     /// Every spring once, with the nodes that it joins.
@@ -345,7 +340,7 @@ mod tests {
     #[test]
     fn the_paper_block_has_18788_springs() {
         let block = Block::builder([12; 3], [0.1; 3]).fix(Face::ZMin).build().unwrap();
-        assert_eq!(block.spring_count(), 18_788);
+        assert_eq!(block.springs().len(), 18_788);
         assert_eq!(block.inverse_masses().iter().filter(|&&w| w == 0.0).count(), 144);
     }
 

@@ -37,23 +37,11 @@ pub struct Record {
     pub code: u16,
     /// A larger number with a meaning of the channel's own (a node, a triangle, a version).
     pub index: u32,
-    /// The payload: integers, or doubles by their bits ([`Record::with_floats`]).
+    /// The payload: integers, or doubles by their bits (`f64::to_bits`).
     pub words: [u64; 6],
 }
 
 const _: () = assert!(size_of::<Record>() == 64);
-
-impl Record {
-    /// A record whose payload is six doubles, kept bit for bit.
-    pub fn with_floats(stamp: Nanos, channel: Channel, code: u16, index: u32, floats: [f64; 6]) -> Self {
-        Self { stamp, channel, code, index, words: floats.map(f64::to_bits) }
-    }
-
-    /// The payload as doubles.
-    pub fn floats(&self) -> [f64; 6] {
-        self.words.map(f64::from_bits)
-    }
-}
 
 /// The kind of an [`Event`]: what happened. Its [`code`](Self::code) is the number in records and logs.
 ///

@@ -1,4 +1,4 @@
-//! What the system granted: asked for and given, so that a refused privilege is reported and never silent.
+//! What the system granted and what it refused, so that a refused privilege is reported and never silent.
 
 use crate::primitives::sync::lock;
 use crate::rate_group::RateGroup;
@@ -29,21 +29,15 @@ pub struct SystemGrant {
     pub groups: Vec<GroupGrant>,
 }
 
-/// The privileges that the thread of one rate group asked for and got.
+/// The privileges that the thread of one rate group got, and those that it was refused.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct GroupGrant {
     /// The group's name.
     pub name: String,
-    /// The scheduling policy asked for.
-    pub policy_asked: String,
     /// The scheduling policy in force.
     pub policy: String,
-    /// The real-time priority asked for; 0 for none.
-    pub priority_asked: u8,
     /// The real-time priority in force; 0 for none.
     pub priority: u8,
-    /// The number of the core asked for.
-    pub cpu_asked: Option<usize>,
     /// The number of the core that the thread is pinned to.
     pub cpu: Option<usize>,
     /// The numbers of the cores that the thread may run on, where several were asked for and granted.
@@ -127,11 +121,8 @@ pub(crate) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
     let waiter = Waiter::new(spec.wait, priority.is_some(), spec.rate.period());
     let group = GroupGrant {
         name: spec.name.clone(),
-        policy_asked: policy(spec.priority.is_some(), spec.by_deadline, spec.background),
         policy: policy(priority.is_some(), by_deadline, background),
-        priority_asked: spec.priority.unwrap_or(0),
         priority: priority.unwrap_or(0),
-        cpu_asked: spec.cpu,
         cpu,
         cpus,
         wait: waiter.to_string(),
@@ -170,14 +161,8 @@ pub(crate) fn refusals(groups: &[RateGroup]) -> Vec<String> {
 impl GroupGrant {
     /// The grant of a group that a thread of the program's releases: nothing is asked for.
     pub(crate) fn hosted(spec: &RateGroup) -> Self {
-        let (asked, hosted) = (OTHER.to_owned(), "the program's thread".to_owned());
-        Self {
-            name: spec.name.clone(),
-            policy_asked: asked,
-            policy: hosted,
-            wait: "hosted".to_owned(),
-            ..Self::default()
-        }
+        let policy = "the program's thread".to_owned();
+        Self { name: spec.name.clone(), policy, wait: "hosted".to_owned(), ..Self::default() }
     }
 }
 
@@ -205,7 +190,6 @@ impl SystemGrant {
     pub(crate) fn of_virtual_time<'a>(groups: impl Iterator<Item = &'a RateGroup>) -> Self {
         let group = |spec: &RateGroup| GroupGrant {
             name: spec.name.clone(),
-            policy_asked: OTHER.to_owned(),
             policy: OTHER.to_owned(),
             wait: "virtual".to_owned(),
             ..GroupGrant::default()

@@ -144,8 +144,8 @@ fn records(latency: Nanos, steps: &[u64]) -> Vec<Record> {
         model.refresh(ctx);
         state = (3.9 * state * (1.0 - state) + 1e-3 * model.get()[0].sin()).clamp(0.0, 1.0);
         up.push(ctx, state);
-        let floats = [state, model.version() as f64, ctx.dt_measured, 0.0, 0.0, 0.0];
-        recorder.push(Record::with_floats(ctx.scheduled, Channel::FIRST_USER, 0, 0, floats));
+        let words = [state.to_bits(), model.version(), ctx.dt_measured.to_bits(), 0, 0, 0];
+        recorder.push(Record { stamp: ctx.scheduled, channel: Channel::FIRST_USER, code: 0, index: 0, words });
         Outcome::Continue
     });
     let slow = actor_fn("slow", move |ctx| {
