@@ -5,10 +5,13 @@
 //! A body of the program's own panics at 1 s and stops answering at 2 s. What it needs for a restart is
 //! [`Body::duplicate`]: the new global model starts from the last good state and catches up along the tool's path.
 
-use palpate::model::Vec3;
-use palpate::model::body::{Block, Body, State, TangentBlock};
+#[path = "common/altered_block.rs"]
+mod altered_block;
+
+use altered_block::AlteredBlock;
+use palpate::model::body::{Block, Body};
 use palpate::model::local::Kind as LocalModelKind;
-use palpate::model::mesh::{Face, Surface};
+use palpate::model::mesh::Face;
 use palpate::prelude::*;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -16,61 +19,29 @@ use std::time::{Duration, Instant};
 /// When things go wrong (s): first a panic, then a call that does not return.
 const FAULTS_S: [f64; 2] = [1.0, 2.0];
 
-/// A block that fails twice, however often it is copied.
-#[derive(Clone, Debug)]
-struct Fragile {
-    block: Block,
-    faults: Arc<Mutex<usize>>,
-    begun: Instant,
-}
-
-impl Fragile {
-    /// Fails if it is time to; otherwise does nothing.
-    fn strain(&self) {
-        let mut faults = self.faults.lock().expect("nobody panics under it");
-        if FAULTS_S.get(*faults).is_none_or(|&due| self.begun.elapsed().as_secs_f64() < due) {
-            return;
-        }
-        *faults += 1;
-        let panics = *faults == 1;
-        drop(faults);
-        assert!(!panics, "the body gave way");
-        // Longer than anybody waits: the thread is left behind after two seconds.
-        std::thread::sleep(Duration::from_secs(60));
+/// Fails if it is time to; otherwise does nothing.
+fn strain(faults: &Mutex<usize>, begun: Instant) {
+    let mut faults = faults.lock().expect("nobody panics under it");
+    if FAULTS_S.get(*faults).is_none_or(|&due| begun.elapsed().as_secs_f64() < due) {
+        return;
     }
-}
-
-impl Body for Fragile {
-    fn rest(&self) -> &[Vec3] {
-        self.block.rest()
-    }
-    fn inverse_masses(&self) -> &[f64] {
-        self.block.inverse_masses()
-    }
-    fn surface(&self) -> &Surface {
-        self.block.surface()
-    }
-    fn forces(&mut self, state: &State, forces: &mut [Vec3]) {
-        self.strain();
-        self.block.forces(state, forces);
-    }
-    fn node_forces(&self, state: &State, nodes: &[u32], forces: &mut [Vec3]) {
-        self.block.node_forces(state, nodes, forces);
-    }
-    fn tangent(&self, state: &State, nodes: &[u32], clamp: bool, emit: &mut dyn FnMut(TangentBlock)) {
-        self.block.tangent(state, nodes, clamp, emit);
-    }
-    fn patch(&self, triangles: &[u32], size: [usize; 3], nodes: &mut Vec<u32>) {
-        self.block.patch(triangles, size, nodes);
-    }
-    fn duplicate(&self) -> Option<Box<dyn Body>> {
-        Some(Box::new(self.clone()))
-    }
+    *faults += 1;
+    let panics = *faults == 1;
+    drop(faults);
+    assert!(!panics, "the body gave way");
+    // Longer than anybody waits: the thread is left behind after two seconds.
+    std::thread::sleep(Duration::from_secs(60));
 }
 
 fn main() -> Result<(), Error> {
     let block = Block::builder([8; 3], [0.1; 3]).fix(Face::ZMin).build()?;
-    let body = Fragile { block, faults: Arc::default(), begun: Instant::now() };
+    // It fails twice, however often it is copied.
+    let (faults, begun) = (Arc::<Mutex<usize>>::default(), Instant::now());
+    let body = AlteredBlock::new(block, move |block, state, forces| {
+        strain(&faults, begun);
+        block.forces(state, forces);
+    });
+    let body = body.with_copies();
     let path =
         ToolPath::new(vec![0.0, 0.1, 10.0], vec![[0.05, 0.05, 0.101], [0.05, 0.05, 0.092], [0.06, 0.05, 0.092]])?;
     // Named, because a body of this size would be chosen to run whole at 1 kHz, without a global model to lose.
