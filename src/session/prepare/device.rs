@@ -180,10 +180,10 @@ fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<Replayed
                     return Err(Error::new(ErrorKind::Log, message).at(reader_place));
                 }
                 number = place.unwrap_or_default() as u16;
-                first = environment.first_tools.get(usize::from(number)).map(state);
+                first = environment.first_tools.get(usize::from(number)).map(|first| logged(first).state);
             }
             LogEntry::Record(LogRecord::Tool(sample)) if sample.device == number => {
-                samples.push(ReplayedSample { time: sample.time, id: sample.id, state: state(&sample) });
+                samples.push(logged(&sample));
             }
             _ => {}
         }
@@ -196,11 +196,13 @@ fn recorded(log: &Path, name: Option<&str>) -> Result<(DeviceState, Vec<Replayed
     }
 }
 
-fn state(sample: &ToolSample) -> DeviceState {
-    DeviceState {
+/// The sample of a device that a log has.
+pub(in crate::session) fn logged(sample: &ToolSample) -> ReplayedSample {
+    let state = DeviceState {
         position: sample.position_m.into(),
         velocity: sample.velocity_m_s.into(),
         orientation: sample.orientation,
         buttons: sample.buttons,
-    }
+    };
+    ReplayedSample { time: sample.time, id: sample.id, state }
 }

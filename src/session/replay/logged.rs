@@ -14,7 +14,7 @@ use crate::log::{
 use crate::model::body::Block;
 use crate::runtime::{Nanos, Recording, TickTiming};
 use crate::scene::{BodySpec, MAX_DEVICES, Scene, Volume};
-use crate::session::prepare::as_run;
+use crate::session::prepare::{as_run, logged};
 
 /// The rate group that is no part of what is repeated.
 const LOGGER: &str = "logger";
@@ -110,7 +110,7 @@ impl Gathered {
             LogRecord::Tool(sample) => {
                 let device = usize::from(sample.device).min(MAX_DEVICES);
                 self.samples.resize_with(self.samples.len().max(device + 1), Vec::new);
-                self.samples[device].push(ReplayedSample { time: sample.time, id: sample.id, state: state(sample) });
+                self.samples[device].push(logged(sample));
             }
             LogRecord::Event(event) => self.push_event(TextEvent::describe(event, &format!("group {}", event.group))),
             computed => self.comparison.log(computed),
@@ -167,7 +167,7 @@ impl Gathered {
         }
         let Self { recording, samples, comparison, .. } = self;
         let in_real_time = environment.execution != LoggedExecution::Virtual;
-        let tools = environment.first_tools.iter().map(state).zip(samples).collect();
+        let tools = environment.first_tools.iter().map(|first| logged(first).state).zip(samples).collect();
         Ok(Logged { scene, recording, in_real_time, tools, comparison, end, cut })
     }
 
@@ -242,7 +242,7 @@ impl Gathered {
         let local = environment.groups.iter().position(|group| group.name == "local");
         let local = local.ok_or_else(|| refusal("it has no rate group `local`, so it is no log of a session"))?;
         let mut samples = samples.iter();
-        let mut last = ReplayedSample { time: Nanos::ZERO, id: 0, state: state(first) };
+        let mut last = logged(first);
         for (tick, time) in self.recording.releases(local as u16) {
             match samples.next() {
                 Some(sample) if sample.time == time && follows(sample, &last) => last = *sample,
@@ -287,15 +287,6 @@ fn bits(state: &DeviceState) -> ([u64; 6], [u64; 4], u16) {
     let [d, e, f]: [f64; 3] = state.velocity.into();
     let turn = std::array::from_fn(|place| state.orientation.coords[place].to_bits());
     ([a, b, c, d, e, f].map(f64::to_bits), turn, state.buttons)
-}
-
-fn state(sample: &ToolSample) -> DeviceState {
-    DeviceState {
-        position: sample.position_m.into(),
-        velocity: sample.velocity_m_s.into(),
-        orientation: sample.orientation,
-        buttons: sample.buttons,
-    }
 }
 
 fn refusal(message: impl Into<String>) -> Error {
