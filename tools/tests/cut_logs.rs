@@ -1,4 +1,4 @@
-//! A real run's log cut at any byte: `export` and `timing` work up to the damage, and say so.
+//! A real run's log cut at any byte or with a wrong bit: `export` and `timing` work up to the damage, and say so.
 
 mod support;
 
@@ -15,28 +15,38 @@ fn log(folder: &Folder) -> Vec<u8> {
     std::fs::read(folder.path("whole.mcap")).unwrap()
 }
 
-/// Check that the command writes every force that is readable and nothing else, at cuts spread over the whole file.
+/// Check that the command writes every force that is readable and nothing else, at cuts spread over the whole file and with a
+/// wrong bit in three places.
 #[test]
 fn the_command_exits_with_0_and_one_warning() {
     let folder = Folder::new();
     let bytes = log(&folder);
     let whole = folder.succeed(&["export", "whole.mcap", "--topic", "/force"]);
-    for i in 0..SPAWNED {
-        let cut = MAGIC + i * (bytes.len() - MAGIC) / SPAWNED;
-        folder.write("cut.mcap", &bytes[..cut]);
-        let is_export = i % 2 == 0;
-        let args: &[&str] =
-            if is_export { &["export", "cut.mcap", "--topic", "/force"] } else { &["timing", "cut.mcap"] };
-        let called = folder.call(args);
-        assert_eq!((called.code, called.err.lines().count()), (Some(0), 1), "cut at {cut}: {called:?}");
-        assert!(called.err.starts_with("warning: cut.mcap: "), "cut at {cut}: {called:?}");
-        if is_export {
-            let mut reader = LogReader::new(&bytes[..cut], "cut.mcap").unwrap();
-            let is_force = |entry: &LogEntry| matches!(entry, LogEntry::Record(LogRecord::Force(_)));
-            assert!(whole.starts_with(&called.out), "cut at {cut}");
-            assert_eq!(called.out.lines().count(), 1 + reader.readable().filter(is_force).count(), "cut at {cut}");
-        } else {
-            assert!(called.out.contains("DAMAGED") || called.out.contains("damage"), "cut at {cut}: {called:?}");
+    let cuts = (0..SPAWNED).map(|i| bytes[..MAGIC + i * (bytes.len() - MAGIC) / SPAWNED].to_vec());
+    let flips = [1, 2, 3].map(|quarter| {
+        let (mut bytes, at) = (bytes.clone(), quarter * bytes.len() / 4);
+        bytes[at] ^= 0x40;
+        bytes
+    });
+    for (i, bytes) in cuts.chain(flips).enumerate() {
+        folder.write("bad.mcap", &bytes);
+        let args: [&[&str]; 3] =
+            [&["export", "bad.mcap", "--topic", "/force"], &["timing", "bad.mcap"], &["timing", "bad.mcap", "--json"]];
+        let called = folder.call(args[i % 3]);
+        assert_eq!((called.code, called.err.lines().count()), (Some(0), 1), "{i}: {called:?}");
+        assert!(called.err.starts_with("warning: bad.mcap: "), "{i}: {called:?}");
+        match i % 3 {
+            0 => {
+                let mut reader = LogReader::new(&*bytes, "bad.mcap").unwrap();
+                let is_force = |entry: &LogEntry| matches!(entry, LogEntry::Record(LogRecord::Force(_)));
+                assert!(whole.starts_with(&called.out), "{i}");
+                assert_eq!(called.out.lines().count(), 1 + reader.readable().filter(is_force).count(), "{i}");
+            }
+            1 => assert!(called.out.contains("DAMAGED") || called.out.contains("damage"), "{i}: {called:?}"),
+            _ => {
+                let report: serde_json::Value = serde_json::from_str(&called.out).expect("one JSON document");
+                assert!(report["damage"].is_string(), "{i}: {called:?}");
+            }
         }
     }
 }

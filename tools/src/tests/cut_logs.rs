@@ -61,6 +61,7 @@ fn every_cut_can_be_analysed() {
         let report = analysis.report();
         assert!(report.run.devices[0].force.ticks >= last, "cut at {cut}");
         last = report.run.devices[0].force.ticks;
+        assert_eq!(exported(&bytes[..cut], "/force").0.lines().count() as u64, 1 + last, "cut at {cut}");
         let json: serde_json::Value = serde_json::from_str(&timing_to_json(&report)).expect("one JSON document");
         assert!(!report.run.to_string().is_empty() && json.is_object(), "cut at {cut}");
     }

@@ -334,33 +334,6 @@ fn a_virtual_log_is_in_time_order_from_front_to_back() {
 }
 
 #[test]
-fn a_damaged_log_gives_what_is_readable_and_one_warning() {
-    let folder = Folder::new();
-    folder.succeed(&["run", "scene.toml", "--virtual"]);
-    let whole = std::fs::read(folder.path("palpate-virtual.mcap")).unwrap();
-    let forces = folder.succeed(&["export", "palpate-virtual.mcap", "--topic", "/force"]);
-    folder.write("cut.mcap", &whole[..whole.len() / 2]);
-    let mut flipped = whole.clone();
-    flipped[whole.len() / 2] ^= 0x40;
-    folder.write("flipped.mcap", flipped);
-    for log in ["cut.mcap", "flipped.mcap"] {
-        for args in [&["export", log, "--topic", "/force"][..], &["timing", log], &["timing", log, "--json"]] {
-            let called = folder.call(args);
-            assert_eq!((called.code, called.err.lines().count()), (Some(0), 1), "{args:?}: {called:?}");
-            assert!(called.err.starts_with(&format!("warning: {log}: ")), "{called:?}");
-            match args {
-                ["export", ..] => assert!(forces.starts_with(&called.out)),
-                [.., "--json"] => {
-                    let report: serde_json::Value = serde_json::from_str(&called.out).expect("one JSON document");
-                    assert!(report["damage"].is_string());
-                }
-                _ => assert!(!called.out.is_empty()),
-            }
-        }
-    }
-}
-
-#[test]
 #[cfg(target_os = "linux")]
 fn a_log_on_a_full_disk_ends_the_command_with_1_and_one_line() {
     let folder = Folder::new();

@@ -4,8 +4,6 @@ use serde_json::Value;
 
 use crate::support::{Called, Folder};
 
-const BOUNDARY: usize = 4096;
-
 /// A folder with the log of a run of some seconds in virtual time, `run.mcap`.
 fn folder(seconds: &str) -> (Folder, Vec<u8>) {
     let folder = Folder::new();
@@ -87,29 +85,18 @@ fn flipped(bytes: &[u8], at: usize) -> Vec<u8> {
     bytes
 }
 
-// Check a real run's log at a sample of the 4 KiB boundaries; every one of them is tried in log_recover.
+// Every boundary of 4 KiB is tried in log_recover.
 #[test]
-fn recover_makes_a_sound_log_of_every_cut() {
+fn recover_makes_a_sound_log_of_a_cut_one() {
     let (folder, bytes) = folder("3");
-    let boundaries = bytes.len() / BOUNDARY;
-    assert!(boundaries > 100, "{boundaries}");
-    let whole = folder.succeed(&["export", "run.mcap", "--topic", "/force"]);
-    let mut rows = 0;
-    for cut in (1..=boundaries).step_by(12) {
-        folder.write("cut.mcap", &bytes[..cut * BOUNDARY]);
-        let out = folder.succeed(&["log", "recover", "cut.mcap", "--out", "new.mcap"]);
-        assert!(out.starts_with("saved: ") && out.contains("cut off at byte"), "cut at {cut}: {out}");
-        assert_sound(&folder.call(&["log", "check", "new.mcap"]));
-        assert_eq!(json(&folder, "new.mcap")["has_index"], true);
-        let cut_log = folder.call(&["export", "cut.mcap", "--topic", "/force"]);
-        // A cut before the first chunk leaves no topics.
-        if json(&folder, "new.mcap")["messages"] != 0 {
-            let new = folder.succeed(&["export", "new.mcap", "--topic", "/force"]);
-            assert!(new == cut_log.out && whole.starts_with(&new) && new.len() >= rows, "cut at {cut}");
-            rows = new.len();
-        }
-    }
-    assert!(rows > whole.len() * 8 / 10);
+    folder.write("cut.mcap", &bytes[..bytes.len() * 9 / 10]);
+    let out = folder.succeed(&["log", "recover", "cut.mcap", "--out", "new.mcap"]);
+    assert!(out.starts_with("saved: ") && out.contains("cut off at byte"), "{out}");
+    assert_sound(&folder.call(&["log", "check", "new.mcap"]));
+    assert_eq!(json(&folder, "new.mcap")["has_index"], true);
+    let force = |log| folder.call(&["export", log, "--topic", "/force"]).out;
+    let (whole, new) = (force("run.mcap"), force("new.mcap"));
+    assert!(new == force("cut.mcap") && whole.starts_with(&new) && new.len() > whole.len() * 8 / 10);
 }
 
 #[test]
