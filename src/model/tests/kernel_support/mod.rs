@@ -1,12 +1,23 @@
 //! What the tests of spring forces share: the forces of springs one by one, and how near a body's own must be to them.
 
 use palpate_model::Vec3;
-use palpate_model::body::{Body, InstructionSet, Spring, State};
+use palpate_model::body::{Block, Body, InstructionSet, Spring, State};
 use proptest::prelude::*;
 
 /// The instruction sets of this machine.
 pub fn sets() -> impl Iterator<Item = InstructionSet> {
     InstructionSet::ALL.into_iter().filter(|set| set.is_available())
+}
+
+/// Deformed and moving, the same each time.
+pub fn deformed(block: &Block) -> State {
+    let mut state = State::at_rest(block.rest());
+    for (n, x) in state.positions.iter_mut().enumerate() {
+        let phase = n as f64;
+        *x += Vec3::new(phase.sin(), (2.0 * phase).cos(), (3.0 * phase).sin()) * 2e-3;
+        state.velocities[n] = *x * 3.0;
+    }
+    state
 }
 
 /// The forces of `springs` one by one, and for each node the sum of the magnitudes that went into it: rounding is a

@@ -1,25 +1,10 @@
-//! The spring kernels against [`Spring::force`], spring by spring: every instruction set of this machine, any state.
+//! The kernel of networks against [`Spring::force`], spring by spring, and against that of blocks: every instruction set of this
+//! machine, any state.
 
 use crate::kernel_support::*;
 use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, Spring, SpringNetwork, State};
-use palpate_model::mesh::Lattice;
 use proptest::prelude::*;
-
-/// The springs of a block as a list.
-fn springs(block: &Block) -> Vec<(u32, u32, Spring)> {
-    let (lattice, rest) = (block.lattice(), block.rest());
-    let mut springs = Vec::new();
-    for node in 0..lattice.len() as u32 {
-        let ends = Lattice::FORWARD.iter().filter_map(|&o| lattice.neighbour(lattice.coordinates(node), o));
-        for to in ends.map(|to| lattice.id(to)) {
-            let rest_length = (rest[to as usize] - rest[node as usize]).norm();
-            let damping = 0.3 * (2.0_f64 * 0.5e-3 * 30.0).sqrt();
-            springs.push((node, to, Spring { stiffness: 30.0, damping, rest_length }));
-        }
-    }
-    springs
-}
 
 /// A network of `rest`.
 fn network(rest: &[Vec3], springs: &[(u32, u32, Spring)]) -> SpringNetwork {
@@ -50,27 +35,13 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
-    fn a_block_has_the_forces_of_its_springs((block, mut state) in any_block(), collapsed in any::<prop::sample::Index>()) {
-        let springs = springs(&block);
-        // One spring without length, and so without direction.
-        let (i, j, _) = springs[collapsed.index(springs.len())];
-        state.positions[i as usize] = state.positions[j as usize];
-        let expected = one_by_one(&springs, &state);
-        for set in sets() {
-            let mut block = block.clone().with_instruction_set(set).unwrap();
-            let got = forces(&mut block, &state);
-            agree(&format!("block, {set:?}"), &got, &expected)?;
-            prop_assert_eq!(got, forces(&mut block, &state), "twice the same bits");
-        }
-    }
-
-    #[test]
     fn a_network_has_the_forces_of_its_springs_in_any_order(
         (block, mut state) in any_block(),
         collapsed in any::<prop::sample::Index>(),
         keys in prop::collection::vec(any::<u32>(), 3000),
     ) {
-        let springs = springs(&block);
+        let springs = block.springs();
+        // One spring without length, and so without direction.
         let (i, j, _) = springs[collapsed.index(springs.len())];
         state.positions[i as usize] = state.positions[j as usize];
         let expected = one_by_one(&springs, &state);
@@ -124,7 +95,7 @@ fn what_is_not_a_number_stays_none_and_leaves_nothing_behind() {
     for set in sets() {
         let mut bodies: [Box<dyn Body>; 2] = [
             Box::new(block.clone().with_instruction_set(set).unwrap()),
-            Box::new(network(block.rest(), &springs(&block)).with_instruction_set(set).unwrap()),
+            Box::new(network(block.rest(), &block.springs()).with_instruction_set(set).unwrap()),
         ];
         for body in &mut bodies {
             assert!(
@@ -138,12 +109,8 @@ fn what_is_not_a_number_stays_none_and_leaves_nothing_behind() {
 #[test]
 fn a_network_agrees_with_its_block_in_everything_that_a_body_is_asked() {
     let block = Block::builder([4, 3, 5], [0.1; 3]).build().unwrap();
-    let network = network(block.rest(), &springs(&block));
-    let mut state = State::at_rest(block.rest());
-    for (n, x) in state.positions.iter_mut().enumerate() {
-        *x += Vec3::new((n as f64).sin(), (2.0 * n as f64).cos(), (3.0 * n as f64).sin()) * 2e-3;
-        state.velocities[n] = *x * 3.0;
-    }
+    let network = network(block.rest(), &block.springs());
+    let state = deformed(&block);
     let nodes = [0, 17, 33, 59];
     let (mut ours, mut theirs) = ([Vec3::zeros(); 4], [Vec3::zeros(); 4]);
     network.node_forces(&state, &nodes, &mut ours);
@@ -199,26 +166,27 @@ fn a_bad_network_is_refused_and_says_why() {
 #[cfg(feature = "parallel")]
 #[test]
 fn several_cores_give_the_same_bits_every_time_and_the_same_forces() {
-    let block = Block::builder([9, 8, 7], [0.1; 3]).build().unwrap();
-    let springs = springs(&block);
-    let mut state = State::at_rest(block.rest());
-    for (n, x) in state.positions.iter_mut().enumerate() {
-        *x += Vec3::new((n as f64).sin(), (2.0 * n as f64).cos(), (3.0 * n as f64).sin()) * 2e-3;
-    }
-    let expected = one_by_one(&springs, &state);
-    // More cores than there are lanes of nodes, too.
-    for cores in [1, 2, 3, 100] {
-        let mut bodies: [Box<dyn Body>; 2] = [
-            Box::new(block.clone().on_cores(cores).unwrap()),
-            Box::new(network(block.rest(), &springs).on_cores(cores).unwrap()),
-        ];
-        for body in &mut bodies {
-            let first = forces(&mut **body, &state);
-            agree(&format!("{cores} cores"), &first, &expected).unwrap();
-            for _ in 0..20 {
-                assert_eq!(forces(&mut **body, &state), first);
+    use palpate_model::body::{Region, Shape};
+    let soft = Region::new(Shape::Sphere { centre: [0.05; 3], radius: 0.03 }).stiffness(3.0).damping_ratio(1.0);
+    let uniform = Block::builder([9, 8, 7], [0.1; 3]);
+    for builder in [uniform.clone(), uniform.region(soft)] {
+        let block = builder.build().unwrap();
+        let (springs, state) = (block.springs(), deformed(&block));
+        let expected = one_by_one(&springs, &state);
+        // More cores than there are lanes of nodes, too.
+        for cores in [1, 2, 3, 100] {
+            let mut bodies: [Box<dyn Body>; 2] = [
+                Box::new(block.clone().on_cores(cores).unwrap()),
+                Box::new(network(block.rest(), &springs).on_cores(cores).unwrap()),
+            ];
+            for body in &mut bodies {
+                let first = forces(&mut **body, &state);
+                agree(&format!("{cores} cores"), &first, &expected).unwrap();
+                for _ in 0..20 {
+                    assert_eq!(forces(&mut **body, &state), first);
+                }
             }
         }
+        assert!(block.on_cores(0).is_err());
     }
-    assert!(block.on_cores(0).is_err());
 }
