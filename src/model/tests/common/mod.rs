@@ -59,14 +59,6 @@ pub fn drag_path(t: f64) -> Vec3 {
     Vec3::new(x, 0.0512, z)
 }
 
-/// The reference's hand path, from the rest position of the attached node.
-pub fn hand_path(rest: Vec3, t: f64) -> Vec3 {
-    use std::f64::consts::TAU;
-    let e = minjerk(t / 0.2);
-    let z = -0.008 * (TAU * 2.0 * t).sin() - 0.004 * (TAU * 5.0 * t).sin();
-    rest + Vec3::new(0.004 * (TAU * 3.0 * t).sin(), 0.0, z) * e
-}
-
 /// Forces of every tick along `path` (a position per tick, tick 0 first).
 pub fn forces(simulation: &mut Simulation, path: &[Vec3]) -> Vec<Vec3> {
     path.windows(2).map(|q| simulation.tick(ToolMotion::straight(q[0], q[1])).force).collect()
