@@ -29,8 +29,8 @@ use figures::{FORCE_FIGURES, ForceFigure};
 use runs::ForceRuns;
 use table::Table;
 
-/// The plots that the README shows.
-const IN_README: [&str; 2] = ["fig13_wave_probe.svg", "fig16_drag_friction.svg"];
+/// The plots that docs/local_models.md shows.
+const IN_DOCS: [&str; 2] = ["fig13_wave_probe.svg", "fig16_drag_friction.svg"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let (mut readme, mut folder) = (false, PathBuf::from("out/paper_figures"));
@@ -65,10 +65,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     if readme {
         let images = repository::in_repository("docs/img");
         fs::create_dir_all(&images)?;
-        for name in IN_README {
+        for name in IN_DOCS {
             fs::copy(folder.join(name), images.join(name))?;
         }
-        println!("\nRenewed in docs/img: {}.", IN_README.join(", "));
+        println!("\nRenewed in docs/img: {}.", IN_DOCS.join(", "));
     }
     println!("\nPlots (SVG), numbers (CSV) and this page (summary.md): {}", folder.display());
     Ok(())
