@@ -2,14 +2,18 @@
 //!
 //! Contestants take turns; each figure is the least of many rounds. `cargo bench --bench spring_kernel --features parallel`
 
+mod common;
+
 use std::hint::black_box;
 use std::time::Instant;
 
 use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, InstructionSet, Region, Shape, Spring, SpringNetwork, State};
 use palpate_model::contact::{Contact, Law, ToolMotion};
-use palpate_model::mesh::{Face, Lattice};
+use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
+
+use common::{Contestant, deformed, least};
 
 fn block(nodes: usize) -> Block {
     let builder = Block::builder([nodes; 3], [0.1; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
@@ -32,36 +36,10 @@ fn mixed(nodes: usize, is_layered: bool) -> Block {
     builder.fix(Face::ZMin).build().expect("a valid block")
 }
 
-/// A deformed and moving state: nothing is zero or on a lattice line.
-fn deformed(rest: &[Vec3]) -> State {
-    let wobble =
-        |n: usize, a: f64| Vec3::new((a * n as f64).sin(), (1.7 * a * n as f64).cos(), (2.9 * a * n as f64).sin());
-    State {
-        positions: rest.iter().enumerate().map(|(n, x)| x + wobble(n, 0.7) * 3e-4).collect(),
-        velocities: (0..rest.len()).map(|n| wobble(n, 0.3) * 0.1).collect(),
-    }
-}
-
-/// The springs of a block as a list.
-fn edges(block: &Block) -> Vec<(u32, u32, Spring)> {
-    let lattice = block.lattice();
-    let mut edges = Vec::new();
-    for node in 0..lattice.len() as u32 {
-        for offset in Lattice::FORWARD {
-            if let Some(to) = lattice.neighbour(lattice.coordinates(node), offset) {
-                let to = lattice.id(to);
-                let rest_length = (block.rest()[to as usize] - block.rest()[node as usize]).norm();
-                edges.push((node, to, Spring { stiffness: 30.0, damping: 0.05, rest_length }));
-            }
-        }
-    }
-    edges
-}
-
-/// The straightforward loop over the list.
-fn scalar(edges: &[(u32, u32, Spring)], state: &State, forces: &mut [Vec3]) {
+/// The straightforward loop over a list.
+fn scalar(springs: &[(u32, u32, Spring)], state: &State, forces: &mut [Vec3]) {
     forces.fill(Vec3::zeros());
-    for (i, j, spring) in edges {
+    for (i, j, spring) in springs {
         let (i, j) = (*i as usize, *j as usize);
         let along = state.positions[j] - state.positions[i];
         let closing = state.velocities[j] - state.velocities[i];
@@ -69,22 +47,6 @@ fn scalar(edges: &[(u32, u32, Spring)], state: &State, forces: &mut [Vec3]) {
         forces[i] += force;
         forces[j] -= force;
     }
-}
-
-type Contestant = (String, Box<dyn FnMut()>);
-
-/// Contestants take turns; seconds of one call of each, the least of all rounds.
-fn least(contestants: &mut [Contestant], rounds: usize, calls: usize) -> Vec<f64> {
-    let mut least = vec![f64::INFINITY; contestants.len()];
-    for _ in 0..rounds {
-        for ((_, call), least) in contestants.iter_mut().zip(&mut least) {
-            call();
-            let start = Instant::now();
-            (0..calls).for_each(|_| call());
-            *least = least.min(start.elapsed().as_secs_f64() / calls as f64);
-        }
-    }
-    least
 }
 
 /// A body's forces in a deformed state.
@@ -95,7 +57,7 @@ fn forces(mut body: impl Body + 'static, state: &State) -> Box<dyn FnMut()> {
 
 fn network(block: &Block) -> SpringNetwork {
     let builder = SpringNetwork::builder(block.rest().to_vec()).masses(vec![0.5e-3; block.rest().len()]);
-    builder.springs(edges(block)).build().expect("a valid network")
+    builder.springs(block.springs()).build().expect("a valid network")
 }
 
 /// The same network, and a state of it, with its nodes in no order.
@@ -105,7 +67,7 @@ fn shuffled(block: &Block, state: &State) -> (SpringNetwork, State) {
     let mut place = vec![0; order.len()];
     order.iter().enumerate().for_each(|(new, &old)| place[old] = new as u32);
     let pick = |vectors: &[Vec3]| order.iter().map(|&old| vectors[old]).collect::<Vec<_>>();
-    let springs = edges(block).into_iter().map(|(i, j, spring)| (place[i as usize], place[j as usize], spring));
+    let springs = block.springs().into_iter().map(|(i, j, spring)| (place[i as usize], place[j as usize], spring));
     let builder = SpringNetwork::builder(pick(block.rest())).masses(vec![0.5e-3; order.len()]).springs(springs);
     let state = State { positions: pick(&state.positions), velocities: pick(&state.velocities) };
     (builder.build().expect("a valid network"), state)
@@ -113,10 +75,10 @@ fn shuffled(block: &Block, state: &State) -> (SpringNetwork, State) {
 
 fn per_spring(nodes: usize) {
     let (whole, state) = (block(nodes), deformed(block(nodes).rest()));
-    let (springs, net) = (whole.springs().len(), network(&whole));
+    let (springs, net) = (whole.springs(), network(&whole));
     let mut contestants: Vec<Contestant> = Vec::new();
-    let (list, s, mut out) = (edges(&whole), state.clone(), vec![Vec3::zeros(); state.positions.len()]);
-    contestants.push(("scalar loop over a list".into(), Box::new(move || scalar(black_box(&list), &s, &mut out))));
+    let (count, s, mut out) = (springs.len(), state.clone(), vec![Vec3::zeros(); state.positions.len()]);
+    contestants.push(("scalar loop over a list".into(), Box::new(move || scalar(black_box(&springs), &s, &mut out))));
     for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
         let block = whole.clone().with_instruction_set(set).expect("it is available");
         contestants.push((format!("lattice, {}", set.name()), forces(block, &state)));
@@ -130,7 +92,7 @@ fn per_spring(nodes: usize) {
     let times = least(&mut contestants, 40, 10);
     for ((name, _), time) in contestants.iter().zip(&times) {
         let share = times[0] / time;
-        println!("| {nodes}^3 | {name} | {:.1} | {:.2} | {share:.1} |", time * 1e6, time * 1e9 / springs as f64);
+        println!("| {nodes}^3 | {name} | {:.1} | {:.2} | {share:.1} |", time * 1e6, time * 1e9 / count as f64);
     }
 }
 

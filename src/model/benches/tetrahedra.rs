@@ -2,6 +2,7 @@
 //!
 //! Contestants take turns; each figure is the least of many rounds. `cargo bench --bench tetrahedra --features parallel`
 
+mod common;
 mod cubes;
 
 use std::hint::black_box;
@@ -12,6 +13,7 @@ use palpate_model::contact::{Contact, Law, ToolMotion};
 use palpate_model::simulation::{Simulation, Stepping};
 use palpate_model::{Mat3, Vec3};
 
+use common::{Contestant, deformed, least};
 use cubes::cube;
 
 const STEP: f64 = 1e-7;
@@ -77,32 +79,6 @@ impl Plain {
             (0..3).for_each(|n| forces[nodes[n + 1] as usize] += of_edges.column(n));
         }
     }
-}
-
-/// A deformed and moving state.
-fn deformed(rest: &[Vec3]) -> State {
-    let wobble =
-        |n: usize, a: f64| Vec3::new((a * n as f64).sin(), (1.7 * a * n as f64).cos(), (2.9 * a * n as f64).sin());
-    State {
-        positions: rest.iter().enumerate().map(|(n, x)| x + wobble(n, 0.7) * 3e-4).collect(),
-        velocities: (0..rest.len()).map(|n| wobble(n, 0.3) * 0.1).collect(),
-    }
-}
-
-type Contestant = (String, Box<dyn FnMut()>);
-
-/// Contestants take turns; seconds of one call of each, the least of all rounds.
-fn least(contestants: &mut [Contestant], rounds: usize, calls: usize) -> Vec<f64> {
-    let mut least = vec![f64::INFINITY; contestants.len()];
-    for _ in 0..rounds {
-        for ((_, call), least) in contestants.iter_mut().zip(&mut least) {
-            call();
-            let start = Instant::now();
-            (0..calls).for_each(|_| call());
-            *least = least.min(start.elapsed().as_secs_f64() / calls as f64);
-        }
-    }
-    least
 }
 
 /// A whole step of symplectic Euler with `forces`.
