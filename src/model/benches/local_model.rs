@@ -1,20 +1,22 @@
 //! What the local model and the whole body cost: one 1 kHz tick of `patch` with contact, building it on bodies of three
-//! sizes (the paper's O(1) claim), and one substep of the whole 12^3 body.
+//! sizes (the paper's O(1) claim), and one tick of the whole 12^3 body.
 //!
-//! `cargo bench --bench local_model`
+//! Contestants take turns; each figure is the least of many rounds. `cargo bench --bench local_model`
+
+mod common;
 
 use std::hint::black_box;
 use std::sync::Arc;
 
-use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, State};
 use palpate_model::contact::{Contact, Law, ToolMotion};
-use palpate_model::local::ToolForecast;
-use palpate_model::local::{Kind, LocalModel, ResyncView, Template};
+use palpate_model::local::{Kind, LocalModel, ResyncView, Template, ToolForecast};
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
 use palpate_model::surroundings::{Bases, Condensation, RestingBody};
+
+use common::{Contestant, least};
 
 /// The reference material, two substeps per tick, a tool pressed 5 mm into the top.
 fn pressed(nodes: usize) -> (Simulation, Vec3) {
@@ -32,16 +34,6 @@ fn pressed(nodes: usize) -> (Simulation, Vec3) {
     (sim, at(100))
 }
 
-fn template(kind: Kind, sim: &Simulation) -> Template {
-    Template::new(kind, [4, 4, 2], sim.body()).expect("a held body of resting")
-}
-
-fn model(template: &Template, sim: &mut Simulation) -> Box<dyn LocalModel> {
-    let mut model = template.empty();
-    rebuild(&mut *model, sim);
-    model
-}
-
 fn rebuild(patch: &mut dyn LocalModel, sim: &mut Simulation) {
     let triangle = sim.contact(0).triangle.expect("the tool touches");
     patch.rebuild(ResyncView {
@@ -57,86 +49,77 @@ fn rebuild(patch: &mut dyn LocalModel, sim: &mut Simulation) {
     });
 }
 
-fn patch_tick(c: &mut Criterion) {
-    let (mut sim, tool) = pressed(12);
-    let circle = |k: usize| {
+/// A local model, what it was built from, and where the tool is.
+fn built(nodes: usize, kind: Kind, is_implicit: bool) -> (Box<dyn LocalModel>, Simulation, Vec3) {
+    let (mut sim, tool) = pressed(nodes);
+    let template = Template::new(kind, [4, 4, 2], sim.body()).expect("a held body of resting");
+    let mut patch = if is_implicit { template.with_implicit_steps() } else { template }.empty();
+    rebuild(&mut *patch, &mut sim);
+    (patch, sim, tool)
+}
+
+fn patch_tick(steps: &str, is_implicit: bool) -> Contestant {
+    let ((mut patch, _, tool), mut k) = (built(12, Kind::Patch, is_implicit), 0);
+    let circle = move |k: usize| {
         let angle = k as f64 * 0.01;
         tool + Vec3::new(angle.cos() - 1.0, angle.sin(), 0.0) * 1e-3
     };
-    let explicit = template(Kind::Patch, &sim);
-    for (name, template) in [("2 substeps", explicit.clone()), ("implicit", explicit.with_implicit_steps())] {
-        let (mut patch, mut k) = (model(&template, &mut sim), 0);
-        c.bench_function(&format!("patch 4x4x2: one 1 kHz tick with contact, {name}"), |b| {
-            b.iter(|| {
-                k += 1;
-                black_box(patch.tick(&[ToolMotion::straight(circle(k - 1), circle(k))]))
-            });
-        });
+    let tick = move || {
+        k += 1;
+        black_box(patch.tick(&[ToolMotion::straight(circle(k - 1), circle(k))]));
         assert!(patch.contact(0).is_touching(), "the tick measured has a contact in it");
-    }
+    };
+    (format!("one 1 kHz tick with contact, {steps}"), Box::new(tick))
 }
 
-fn patch_build(c: &mut Criterion) {
-    let mut group = c.benchmark_group("patch 4x4x2: build at a resync");
-    for nodes in [8, 12, 20] {
-        let (mut sim, _) = pressed(nodes);
-        let mut patch = model(&template(Kind::Patch, &sim), &mut sim);
-        group.bench_function(BenchmarkId::from_parameter(format!("{nodes}^3 body")), |b| {
-            b.iter(|| rebuild(&mut *patch, &mut sim));
-        });
-    }
-    let (mut sim, _) = pressed(12);
-    for kind in [Kind::LinearBoundary, Kind::ScaledBoundary, Kind::Condensed] {
-        let mut patch = model(&template(kind, &sim), &mut sim);
-        group.bench_function(BenchmarkId::from_parameter(kind.name()), |b| b.iter(|| rebuild(&mut *patch, &mut sim)));
-    }
-    let mut patch = model(&template(Kind::Patch, &sim).with_implicit_steps(), &mut sim);
-    group.bench_function(BenchmarkId::from_parameter("implicit"), |b| b.iter(|| rebuild(&mut *patch, &mut sim)));
-    group.finish();
+fn patch_build(what: &str, nodes: usize, kind: Kind, is_implicit: bool) -> Contestant {
+    let (mut patch, mut sim, _) = built(nodes, kind, is_implicit);
+    (format!("build at a resync, {what}"), Box::new(move || rebuild(&mut *patch, &mut sim)))
 }
 
 /// What `condensed` costs besides: once for the body, and once for each window that the tool comes to.
-fn condense(c: &mut Criterion) {
-    let mut group = c.benchmark_group("condensed 4x4x2, 12^3 body");
+fn condense() -> [Contestant; 2] {
     let (sim, _) = pressed(12);
     let resting = Arc::new(RestingBody::new(sim.body()).expect("a body that can be taken apart"));
-    group.sample_size(10);
-    group.bench_function("factorise the body", |b| {
-        b.iter_batched(|| resting.clone(), |resting| Condensation::new(resting).expect("held"), BatchSize::LargeInput);
-    });
-    let body = Condensation::new(resting).expect("held");
+    let body = Condensation::new(resting.clone()).expect("held");
     let mut nodes = Vec::new();
     sim.body().patch(&[sim.contact(0).triangle.expect("the tool touches")], [4, 4, 2], &mut nodes);
-    group.bench_function("a new window", |b| b.iter(|| black_box(body.compliance(&nodes))));
-    group.finish();
+    let factorise = move || drop(black_box(Condensation::new(resting.clone())));
+    let window = move || drop(black_box(body.compliance(&nodes)));
+    [("factorise the body".into(), Box::new(factorise)), ("a new window".into(), Box::new(window))]
 }
 
-fn whole_body(c: &mut Criterion) {
+fn whole_body() -> [Contestant; 2] {
     let (mut sim, tool) = pressed(12);
-    let resting = ToolMotion::straight(tool, tool);
-    c.bench_function("12^3 body: one substep with contact (half a tick)", |b| {
-        // A tick is two substeps; criterion's time per iteration is for one.
-        b.iter_custom(|iterations| {
-            let start = std::time::Instant::now();
-            for _ in 0..iterations.div_ceil(2) {
-                black_box(sim.tick(resting));
-            }
-            start.elapsed()
-        });
-    });
-    let builder = Block::builder([12; 3], [0.1; 3]).fix(Face::ZMin);
-    c.bench_function("12^3 body: largest eigenvalues and substeps", |b| {
-        b.iter_batched(
-            || builder.clone().build().expect("a valid block"),
-            |mut body| palpate_model::simulation::Stepping::stable_substeps(&mut body, 1e-3),
-            BatchSize::LargeInput,
-        );
-    });
+    let mut block = Block::builder([12; 3], [0.1; 3]).fix(Face::ZMin).build().expect("a valid block");
+    let tick = move || {
+        black_box(sim.tick(ToolMotion::straight(tool, tool)));
+    };
+    let spectrum = move || {
+        black_box(Stepping::stable_substeps(&mut block, 1e-3));
+    };
+    [
+        ("one tick with contact, 2 substeps".into(), Box::new(tick)),
+        ("largest eigenvalues and substeps".into(), Box::new(spectrum)),
+    ]
 }
 
-criterion_group! {
-    name = benches;
-    config = Criterion::default().sample_size(60);
-    targets = patch_tick, patch_build, condense, whole_body
+fn print(of: &str, mut contestants: Vec<Contestant>, rounds: usize, calls: usize) {
+    let times = least(&mut contestants, rounds, calls);
+    for ((name, _), time) in contestants.iter().zip(times) {
+        println!("| {of} | {name} | {:.1} |", time * 1e6);
+    }
 }
-criterion_main!(benches);
+
+fn main() {
+    println!("| of | what | us |\n| --- | --- | ---: |");
+    let patch = "patch 4x4x2";
+    print(patch, vec![patch_tick("2 substeps", false), patch_tick("implicit", true)], 60, 1000);
+    let sizes = [8, 12, 20].map(|nodes| patch_build(&format!("{nodes}^3 body"), nodes, Kind::Patch, false));
+    let kinds = [Kind::LinearBoundary, Kind::ScaledBoundary, Kind::Condensed]
+        .map(|kind| patch_build(kind.name(), 12, kind, false));
+    let implicit = patch_build("implicit", 12, Kind::Patch, true);
+    print(patch, sizes.into_iter().chain(kinds).chain([implicit]).collect(), 60, 10);
+    print("condensed 4x4x2, 12^3 body", condense().into(), 10, 1);
+    print("12^3 body", whole_body().into(), 60, 10);
+}

@@ -1,4 +1,5 @@
 //! What benches share whose contestants take turns.
+#![allow(dead_code)]
 
 use std::time::Instant;
 
