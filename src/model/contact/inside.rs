@@ -3,9 +3,10 @@
 use super::closest;
 use super::extent::Extent;
 use super::near::{Near, outward};
+use super::swept::MAX_DEPTH;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
-use super::vicinity::{MAX_DEPTH, Vicinity};
+use super::vicinity::Vicinity;
 use crate::Vec3;
 
 /// A long axis is asked for its way out at its ends and between them; that of a needle at no more places.

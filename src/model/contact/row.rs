@@ -14,6 +14,8 @@ pub(super) struct Row {
     pub(super) weights: [f64; 3],
     /// The corners with a weight, in increasing order.
     pub(super) feature: [u32; 3],
+    /// Where on the tool's axis, from one end to the other.
+    pub(super) share: f64,
     /// Where it is at the end of the step if nothing presses (m).
     pub(super) place: Vec3,
     /// From the surface to the tool.

@@ -8,9 +8,10 @@ use super::extent::Extent;
 use super::inside::{MOST_PARTS, Surroundings};
 use super::near::{Near, is_off, outward};
 use super::passing;
+use super::swept::MAX_DEPTH;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
-use super::vicinity::{MAX_DEPTH, NARROW, Vicinity};
+use super::vicinity::{NARROW, Vicinity};
 use crate::{Pose, Vec3};
 
 /// The places that were found, and what the search keeps from step to step.

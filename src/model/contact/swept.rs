@@ -16,8 +16,8 @@ pub(super) struct Hit {
     pub share: f64,
 }
 
-/// Deepest penetration that the "already inside" search accepts (m).
-const MAX_DEPTH: f64 = 5e-3;
+/// A tool whose centre is farther than this below the surface, beside its radius, has lost it (m).
+pub(super) const MAX_DEPTH: f64 = 5e-3;
 /// A start this far below a triangle still counts as outside (m).
 const ON_SURFACE: f64 = 1e-9;
 /// Halvings of the step: resolves 1e-9 of it.

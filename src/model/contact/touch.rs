@@ -224,6 +224,7 @@ impl Touch {
         self.unmoved.clear();
         self.wrench = Wrench::default();
         let (mut largest, mut pushed, mut sticks, mut count) = (0.0, Vec3::zeros(), true, 0);
+        let (mut first, mut last) = (1.0_f64, 0.0_f64);
         let mut found = Contact { mode: ContactMode::Free, ..Contact::default() };
         let mut lost = None;
         for (row, nodes) in rows {
@@ -239,6 +240,7 @@ impl Touch {
             self.wrench += Wrench::at(row.place - pose.position, force);
             self.pressed.extend(nodes.iter().map(|&(node, weight)| (node, -force * weight)));
             pushed += row.normal * along;
+            (first, last) = (first.min(row.share), last.max(row.share));
             sticks &= row.mode == ContactMode::Stick;
             count += 1;
             if along > largest {
@@ -257,8 +259,9 @@ impl Touch {
             }
         }
         self.pressing = count;
-        let radius = self.shape.radius();
-        self.steady.follow(pushed.norm() / d * radius / (radius + self.shape.half_axis().norm()), d);
+        // Half of the axis' length along which it presses: a capsule on its tip is a sphere.
+        let (radius, half) = (self.shape.radius(), self.shape.half_axis().norm() * (last - first).max(0.0));
+        self.steady.follow(pushed.norm() / d * radius / (radius + half), d);
         self.contact = match lost {
             _ if count > 0 => {
                 let mode = if sticks { ContactMode::Stick } else { ContactMode::Slip };

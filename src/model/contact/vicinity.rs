@@ -3,11 +3,9 @@
 use super::ToolMotion;
 use super::deformable::Deformable;
 use super::extent::Extent;
+use super::swept::MAX_DEPTH;
 use super::touch::Touch;
 use crate::Vec3;
-
-/// A centre that is farther than this below the surface, beside the tool's radius, has lost it (m).
-pub(super) const MAX_DEPTH: f64 = 5e-3;
 
 /// Triangles are found for tools and surfaces that move by so much together: among all, and among those that were found so (m).
 const MARGIN: f64 = 3e-3;

@@ -1,7 +1,7 @@
 //! What a tool with a shape must keep, whatever the body, the pose, the motion and the friction.
 
 use crate::common::*;
-use crate::tissue_support;
+use crate::{tissue_support, tool_support};
 use palpate_model::body::{Block, Body, State, TangentBlock, Tissue};
 use palpate_model::contact::{Contact, ContactMode, Friction, Law, ToolMotion, ToolShape};
 use palpate_model::mesh::{Face, Surface};
@@ -387,6 +387,29 @@ fn a_capsule_on_a_flat_block_is_turned_only_where_its_press_is_one_sided() {
     assert!(rim.torque.y > 0.1 * rim.force.z * 0.02, "{}", rim.torque);
     let other = pressed_capsule(shape, Turn::identity(), -0.045, 0.0);
     assert!(other.torque.y < -0.1 * other.force.z * 0.02, "{}", other.torque);
+}
+
+/// Check that a capsule on its tip feels what a sphere of its radius does, on elements that are fine for both: it was 27 % less.
+#[test]
+fn an_upright_capsule_is_the_sphere_of_its_tip() {
+    let radius = 0.008;
+    let pressed = |shape: ToolShape, above: f64| {
+        let builder = Block::builder([25, 25, 9], [0.048, 0.048, 0.016]).stiffness(60.0).node_mass(1e-4);
+        let body = builder.damping_ratio(0.5).fix(Face::ZMin).build().unwrap();
+        let mut simulation = tool_support::resting(Box::new(body), shape);
+        let at = |tick: i32| {
+            let height = 0.016 + radius + above + 1e-3 - 4e-3 * minjerk(f64::from(tick) / 100.0);
+            Vec3::new(0.0243, 0.0237, height)
+        };
+        (0..200).fold(Vec3::zeros(), |_, tick| simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force)
+    };
+    let sphere = pressed(ToolShape::Sphere { radius }, 0.0);
+    for half_axis in [0.01, 0.04] {
+        let tip = pressed(ToolShape::Capsule { radius, half_axis: Vec3::z() * half_axis }, half_axis);
+        println!("{half_axis}: {} {}", tip.z, sphere.z);
+        // Corners of fine elements are met half as far from a capsule, as what is between them is straight along it: 2.1 %.
+        assert!((tip - sphere).norm() < 0.03 * sphere.norm(), "{tip} {sphere}");
+    }
 }
 
 /// Check that nothing depends on the axes of the world: body and capsule turned by a quarter feel the turned force.
