@@ -28,7 +28,9 @@ impl Surroundings<'_> {
     ///
     /// `outs` is working memory; `passes` is true if the axis goes through the surface.
     pub(super) fn leave_inside(&self, places: &mut Vec<Near>, outs: &mut Vec<Option<Near>>, passes: bool) {
-        let parts = ((self.axis[1] - self.axis[0]).norm() / self.spacing()).ceil().min(MOST_PARTS as f64);
+        // Places nearer to each other than nodes are would press the same ones.
+        let apart = self.touch.shape.radius().max(self.touch.skin.mean_edge());
+        let parts = ((self.axis[1] - self.axis[0]).norm() / apart).ceil().min(MOST_PARTS as f64);
         outs.clear();
         outs.extend([0.0, 1.0].map(|share| self.way_out(share)));
         if !passes && outs.iter().all(Option::is_none) {
@@ -45,13 +47,6 @@ impl Surroundings<'_> {
             }
         });
         places.extend(outs.iter().flatten().take(MOST_POINTS - places.len()));
-    }
-
-    /// How far apart the parts are (m): a radius, or as far as nodes are, of which places nearer to each other would press the same.
-    fn spacing(&self) -> f64 {
-        let Self { vicinity, touch, .. } = self;
-        let edges = vicinity.nodes.iter().map(|&node| touch.skin.edge(node as usize)).sum::<f64>();
-        touch.shape.radius().max(edges / vicinity.nodes.len() as f64)
     }
 
     /// Where the part of the axis at `share` comes out of the body on the shortest way; `None` for one that is outside, or deeper than

@@ -47,6 +47,8 @@ pub(crate) struct Skin {
     depths: Vec<f64>,
     /// Of each node; empty if the body's contact modulus is not known.
     grains: Vec<Grain>,
+    /// The mean edge of the body's triangles (m).
+    mean_edge: f64,
     /// No smoothed corner moves farther than its nodes do by more than this factor.
     stretch: f64,
     /// No smoothed corner is farther than this from its node (m), unless its triangles are stretched to more than twice their size.
@@ -87,19 +89,20 @@ impl Skin {
             (starts, shares, depths) = Default::default();
         }
         let reach = if starts.is_empty() { 0.0 } else { 2.0 * longest };
-        Self { starts, shares, depths, grains, stretch, reach }
+        let sides = surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let sum: f64 = sides.map(|[a, b]| (rest[a as usize] - rest[b as usize]).norm()).sum();
+        let mean_edge = sum / (3 * surface.triangles.len()).max(1) as f64;
+        Self { starts, shares, depths, grains, mean_edge, stretch, reach }
     }
 
     /// How coarse the surface is for the tool, of `radius` (m).
     pub(crate) fn coarseness(&self, body: &dyn Body, radius: f64) -> Coarseness {
-        let (surface, rest) = (body.surface(), body.rest());
-        let sides = surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        let sum: f64 = sides.map(|[a, b]| (rest[a as usize] - rest[b as usize]).norm()).sum();
-        let nodes = || (0..rest.len() as u32).filter(|&node| !surface.at_node(node).is_empty());
+        let surface = body.surface();
+        let nodes = || (0..body.rest().len() as u32).filter(|&node| !surface.at_node(node).is_empty());
         let smoothed = nodes().filter(|&node| !self.corner(node).is_empty()).count();
         let finest = nodes().filter_map(|node| Some(self.grains.get(node as usize)?.edge)).reduce(f64::min);
         Coarseness {
-            edge: sum / (3 * surface.triangles.len()).max(1) as f64,
+            edge: self.mean_edge,
             smoothed: smoothed as f64 / nodes().count().max(1) as f64,
             fine_from: finest.filter(|edge| *edge < COARSE[0] * radius).map(|edge| Steady::FINE * edge),
             sinks: !self.grains.is_empty(),
@@ -145,6 +148,11 @@ impl Skin {
         (mean.modulus > 0.0).then_some(mean)
     }
 
+    /// The mean edge of the body's triangles (m).
+    pub(super) fn mean_edge(&self) -> f64 {
+        self.mean_edge
+    }
+
     /// How much farther than its nodes a smoothed corner may move, as a factor.
     pub(super) fn stretch(&self) -> f64 {
         self.stretch
@@ -172,7 +180,7 @@ impl Skin {
         local.shares.clear();
         local.depths.clear();
         local.grains.clear();
-        (local.stretch, local.reach) = (self.stretch, self.reach);
+        (local.mean_edge, local.stretch, local.reach) = (self.mean_edge, self.stretch, self.reach);
         if !self.grains.is_empty() {
             local.grains.extend(nodes.iter().map(|&node| self.grains[node as usize]));
         }
