@@ -74,6 +74,8 @@ pub struct GlobalActor {
     version: u64,
     /// Something else than the tools has changed since the last models.
     is_changed: bool,
+    /// It goes on where another one was.
+    goes_on: bool,
     /// Working memory: how each tool moves in a tick.
     motions: Vec<ToolMotion>,
 }
@@ -102,8 +104,15 @@ impl GlobalActor {
             ToolSide::new(tool, windows, history, ports)
         };
         let tools = tools.iter().zip(of_tools).enumerate().map(side).collect();
-        let (version, motions, is_changed) = (0, Vec::new(), true);
-        Ok(Self { simulation, ports: shared, plan, tools, next, version, is_changed, motions })
+        let (version, motions, is_changed, goes_on) = (0, Vec::new(), true, false);
+        Ok(Self { simulation, ports: shared, plan, tools, next, version, is_changed, goes_on, motions })
+    }
+
+    /// One that goes on where another was. There are local models already, and what a program has changed is known from its first release on:
+    /// it publishes nothing before.
+    #[must_use]
+    pub fn going_on(self) -> Self {
+        Self { goes_on: true, ..self }
     }
 
     /// The haptic tick of the state.
@@ -291,7 +300,9 @@ impl Actor for GlobalActor {
     }
 
     fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
-        self.publish_models(ctx);
+        if !self.goes_on {
+            self.publish_models(ctx);
+        }
         self.publish_surface(ctx);
         Ok(())
     }

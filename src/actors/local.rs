@@ -57,7 +57,7 @@ impl LocalSide {
             tick,
             kind: model.serves_as(number),
             version: models.version(),
-            age_ticks: tick.saturating_sub(model.built_at()),
+            age_ticks: ctx.tick.saturating_sub(model.built_at()),
             contact: model.contact(number),
             points: model.contact_points(number),
             area_m2: model.contact_area(number),

@@ -146,6 +146,8 @@ impl LocalTool {
             && force == served.wrench.force
         {
             self.served.wrench.force = coupled.feel(force.into()).into();
+            // The coupling feels no step.
+            self.served.swap_step = Vec3::zeros();
         }
     }
 

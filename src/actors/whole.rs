@@ -88,7 +88,8 @@ impl WholeActor {
                 tick: self.now,
                 kind: Kind::Full,
                 version: 0,
-                age_ticks: 0,
+                // What is still owed after a stall: the force is that of a tool which is not yet where its device is.
+                age_ticks: ctx.tick.saturating_sub(self.now),
                 contact: *simulation.contact(index),
                 points: simulation.contact_points(index),
                 area_m2: simulation.contact_area(index),

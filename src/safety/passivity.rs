@@ -71,27 +71,46 @@ pub(crate) fn control(limits: &Passivity, balance_j: f64, force: Force, velocity
 /// free arm has 2 to 4 m/s.
 pub(crate) const FASTEST_HAND_M_S: f64 = 10.0;
 
+/// A device whose position stays the same for longer is at rest (s): those with 60 states a second have a new one every 17 ms.
+const SLOWEST_DEVICE_S: f64 = 0.02;
+
 /// The energy of one contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ledger {
     /// E(k) + E(0): taken in less given out, and what was stored at the start (J).
     balance_j: f64,
     last: Option<[f64; 3]>,
+    /// How fast the tool was when it was last told to be somewhere else (m/s), how long it had taken to get there, and how long ago
+    /// that is (s).
+    velocity: [f64; 3],
+    took: f64,
+    since: f64,
 }
 
 impl Ledger {
     /// A ledger of an environment that stores `stored_j` (J) at the start.
     pub(crate) fn new(stored_j: f64) -> Self {
-        Self { balance_j: stored_j, last: None }
+        Self { balance_j: stored_j, ..Self::default() }
     }
 
     /// Books the motion of the tool to `position` (m) within `dt` (s) under the held force `held` (N), and gives the
     /// velocity (m/s) and whether it was believed: a step that no hand makes is a fault of the measurement, not work.
+    ///
+    /// A device that is slower than the ticks repeats a position. Its tool is as fast as before for as long as the last step took, and
+    /// from then on as if that step were about to come.
     pub(crate) fn book(&mut self, held: Force, position: [f64; 3], dt: f64) -> ([f64; 3], bool) {
-        let moved = self.last.map_or([0.0; 3], |last| std::array::from_fn(|i| position[i] - last[i]));
-        self.last = Some(position);
-        let velocity = moved.map(|c| c / dt);
+        let Some(last) = self.last.replace(position) else { return ([0.0; 3], true) };
+        self.since += dt;
+        if position == last {
+            let slower = (self.took / self.since).min(1.0);
+            return (self.velocity.map(|c| c * slower), true);
+        }
+        let moved: [f64; 3] = std::array::from_fn(|i| position[i] - last[i]);
+        self.took = self.since.min(SLOWEST_DEVICE_S).max(dt);
+        self.since = 0.0;
+        let velocity = moved.map(|c| c / self.took);
         let believed = norm(velocity) <= FASTEST_HAND_M_S;
+        self.velocity = if believed { velocity } else { [0.0; 3] };
         if believed {
             self.balance_j -= dot(held, moved);
         }
@@ -105,7 +124,7 @@ impl Ledger {
 
     /// Forgets where the tool was: over a gap nobody knows what was exerted.
     pub(crate) fn forget_position(&mut self) {
-        self.last = None;
+        *self = Self { balance_j: self.balance_j, ..Self::default() };
     }
 }
 
@@ -168,5 +187,20 @@ mod tests {
         assert_eq!(ledger.balance_j(), 0.5);
         assert!(!ledger.book([1.0; 3], [-9.02, -9.0, -9.0], 1e-3).1);
         assert_eq!(ledger.balance_j(), 0.5, "a teleport is no work");
+    }
+
+    // A device with 60 states a second that repeats each: it is as fast as its hand, and not seventeen times as fast in one tick of as many.
+    #[test]
+    fn a_slow_device_is_as_fast_as_its_hand_and_comes_to_rest() {
+        let (mut ledger, hand) = (Ledger::new(0.0), 0.3);
+        let mut speeds = Vec::new();
+        for tick in 0..300 {
+            let told = f64::from((tick / 17).min(10)) * 17e-3 * hand;
+            speeds.push(norm(ledger.book([0.0; 3], [told, 0.0, 0.0], 1e-3).0));
+        }
+        assert!(speeds[17..187].iter().all(|speed| (speed - hand).abs() < 1e-9), "{speeds:?}");
+        assert!(speeds[187..].windows(2).all(|pair| pair[1] <= pair[0]) && speeds[299] < 0.2 * hand, "{speeds:?}");
+        // After a rest it is not taken for slow.
+        assert!(norm(ledger.book([0.0; 3], [10.0, 0.0, 0.0], 1e-3).0) > FASTEST_HAND_M_S);
     }
 }

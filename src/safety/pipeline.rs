@@ -84,6 +84,8 @@ pub struct Pipeline {
     age: AgeFade,
     tank: TankState,
     ledger: Ledger,
+    /// The last force that was computed, within what the device may exert (N); infinite if it was none.
+    computed: Force,
     /// The last force asked for, behind the first three stages.
     held: Force,
     last: Force,
@@ -103,6 +105,7 @@ impl Pipeline {
             age: AgeFade::default(),
             tank: TankState::new(&limits.tank.unwrap_or_default()),
             ledger: Ledger::new(limits.passivity.map_or(0.0, |passivity| passivity.stored_j)),
+            computed: [0.0; 3],
             held: [0.0; 3],
             last: [0.0; 3],
             torque: TorqueStages::default(),
@@ -119,10 +122,11 @@ impl Pipeline {
         let step_limit = limits.max_slew_n_per_s * dt;
         let mut swap_step = input.swap_step;
         if let Request::Force(force) = input.request {
-            let (force, acted) = finite(force);
-            actions.note(acted, Actions::FINITE);
+            let (force, is_none) = finite(force);
+            actions.note(is_none, Actions::FINITE);
             let (force, acted) = clamp(force, limits.max_force_n);
             actions.note(acted, Actions::CLAMP);
+            self.computed = if is_none { [f64::INFINITY; 3] } else { force };
             let (force, acted) = slew(self.held, force, step_limit);
             actions.note(acted, Actions::SLEW);
             let changed = norm(std::array::from_fn(|i| force[i] - self.held[i]));
@@ -140,7 +144,8 @@ impl Pipeline {
         let force = scaled(self.held, gain);
         // Against a motion that did not happen nothing is damped.
         let velocity = if believed { velocity } else { [0.0; 3] };
-        let force = self.by_energy(&Input { swap_step, ..*input }, force, velocity, &mut actions);
+        let force =
+            self.by_energy(&Input { swap_step: scaled(swap_step, gain), ..*input }, force, velocity, &mut actions);
         let [age, start_up, ramp] = self.by_time(input, &mut actions);
         let force = scaled(scaled(scaled(force, age), start_up), ramp);
         let gain = gain * age * start_up * ramp;
@@ -181,7 +186,8 @@ impl Pipeline {
             .model_age
             .map_or(1.0, |limits| self.age.advance(limits, input.model_age_ticks, input.dt / self.limits.tick_s));
         actions.note(age < 1.0, Actions::MODEL_AGE);
-        let start_up = self.limits.start_up.map_or(1.0, |limits| self.engagement.advance(limits, self.held, input.dt));
+        let start_up =
+            self.limits.start_up.map_or(1.0, |limits| self.engagement.advance(limits, self.computed, input.dt));
         actions.note(start_up < 1.0, Actions::START_UP);
         let ramp = self.ramp.advance(input.request != Request::Rest, input.dt);
         actions.note(ramp < 1.0, Actions::RAMP);
@@ -235,6 +241,7 @@ fn scaled(force: Force, gain: f64) -> Force {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{StartUp, Tank, ToolSpeed};
     use super::*;
     use proptest::prelude::*;
 
@@ -304,5 +311,35 @@ mod tests {
         assert_eq!((pipeline.release().force, pipeline.release().actions), ([0.0; 3], Actions::RAMP));
         let next = tick(&mut pipeline, wanted).0[2];
         assert!(next > 0.0 && next <= 0.02 * (1.0 + 1e-9), "{next}");
+    }
+
+    /// A force that is there from the first tick on, and one that is no number: neither is calm, however slowly the command could follow it.
+    #[test]
+    fn a_slow_limit_does_not_make_a_force_calm() {
+        for computed in [3.0, f64::NAN] {
+            let limits = Limits { max_slew_n_per_s: 40.0, start_up: Some(StartUp::default()), ..Limits::bare(3.0) };
+            let mut pipeline = Pipeline::new(limits);
+            let felt = |_| tick(&mut pipeline, Request::Force([0.0, 0.0, computed])).0;
+            assert!((0..3000).map(felt).all(|force| force == [0.0; 3]), "{computed}");
+            (0..4).for_each(|_| assert_eq!(tick(&mut pipeline, Request::Force([0.0; 3])).0, [0.0; 3]));
+            let felt = |_| tick(&mut pipeline, Request::Force([0.0, 0.0, 3.0])).0[2];
+            assert!((0..2500).map(felt).last().unwrap() > 2.9, "{computed}");
+        }
+    }
+
+    /// A resync while the tool is so fast that it feels nothing: what the tank holds back of a step is held back of nothing.
+    #[test]
+    fn of_a_step_that_is_not_felt_nothing_is_held_back() {
+        let (tank, tool_speed) = (Some(Tank::default()), Some(ToolSpeed::default()));
+        let limits = Limits { tank, tool_speed, ..Limits::bare(3.0) };
+        let mut pipeline = Pipeline::new(limits);
+        for n in 0..50 {
+            let stepped = if n == 20 { [0.0, 0.0, 0.4] } else { [0.0; 3] };
+            let force = [0.0, 0.0, if n < 20 { 0.5 } else { 0.9 }];
+            let position = [2.2e-3 * f64::from(n), 0.0, 2.2e-3 * f64::from(n)];
+            let input = Input { swap_step: stepped, ..Input::new(Request::Force(force), position, 1e-3) };
+            let Output { force, .. } = pipeline.apply(&input);
+            assert!(n < 2 || force == [0.0; 3], "{n}: {force:?}");
+        }
     }
 }

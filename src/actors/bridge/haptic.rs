@@ -169,6 +169,7 @@ impl HapticBridge {
         let peer = self.post.peer();
         if is_silent || std::mem::replace(&mut self.peer, peer) != peer {
             self.post.begin_epoch(self.post.epoch + 1);
+            self.clock = Clock::default();
             self.heard = None;
             self.newest = None;
             self.others().for_each(|(_, other)| other.begin_anew());

@@ -113,11 +113,12 @@ impl GlobalMaker {
         }
         let mut ports = self.side.take();
         ports.shared.build_cost = self.build_cost.take();
-        let simulation = match self.first.take() {
-            Some(first) => first,
-            None => self.restored()?,
-        };
-        Ok(vec![Box::new(GlobalActor::new(simulation, &self.last.tools, self.plan.clone(), ports)?)])
+        let (first, tools) = (self.first.take(), &self.last.tools);
+        let actor = |simulation| GlobalActor::new(simulation, tools, self.plan.clone(), ports);
+        Ok(vec![Box::new(match first {
+            Some(first) => actor(first)?,
+            None => actor(self.restored()?)?.going_on(),
+        })])
     }
 
     fn restored(&self) -> Result<Simulation, Error> {
