@@ -41,6 +41,9 @@ pub fn static_equilibrium(body: &mut dyn Body, held: &[(u32, Vec3)]) -> Result<S
     for &(node, position) in held {
         state.positions[node as usize] = position;
     }
+    if state.positions == body.rest() {
+        return Ok(state);
+    }
     let is_held = |node: usize| held.iter().any(|&(other, _)| other as usize == node);
     let free: Vec<u32> = (0..body.rest().len())
         .filter(|&node| body.inverse_masses()[node] > 0.0 && !is_held(node))
@@ -130,6 +133,13 @@ mod tests {
     use super::super::body::Block;
     use super::super::mesh::Face;
     use super::*;
+
+    #[test]
+    fn a_body_that_is_held_at_rest_is_in_equilibrium() {
+        let mut block = Block::builder([4; 3], [0.03; 3]).fix(Face::ZMin).build().unwrap();
+        let held = [(60, block.rest()[60])];
+        assert_eq!(static_equilibrium(&mut block, &held).unwrap().positions, block.rest());
+    }
 
     #[test]
     fn a_pulled_block_is_in_equilibrium_and_its_reactions_balance() {

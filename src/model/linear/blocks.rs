@@ -23,6 +23,9 @@ impl Blocks {
         let (rows, columns) = (matrix.nrows() / 3, matrix.ncols() / 3);
         let most = (DENSE * (rows * columns) as f64) as usize;
         self.fill();
+        if rows == 0 {
+            return;
+        }
         for columns in matrix.as_slice().chunks_exact(9 * rows) {
             let (first, others) = columns.split_at(3 * rows);
             let (second, third) = others.split_at(3 * rows);

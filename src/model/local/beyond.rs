@@ -73,7 +73,7 @@ impl Beyond {
         let along = (*pressed + stiffness * (*height - shape.height(to, normal))).clamp(0.0, most.max(*pressed));
         let way = to.position - *at;
         *across *= EASING;
-        let limit = friction.kinetic.max(*across) * along;
+        let limit = if along > 0.0 { friction.kinetic.max(*across) * along } else { 0.0 };
         let across = felt.force - *normal * before - (way - *normal * way.dot(normal)) * (ALONG * stiffness);
         let across = if across.norm() > limit { across * (limit / across.norm()) } else { across };
         let torque = if before > 0.0 { felt.torque * (along / before) } else { Vec3::zeros() };
@@ -160,5 +160,14 @@ mod tests {
         let force = |_| unknown.follow((&probe, &pose(-1e-3)), &Friction::default()).unwrap().force.z;
         let forces: Vec<f64> = (0..200).map(force).collect();
         assert!((forces[0] - EASING).abs() < 1e-12 && forces[199] < 1e-4, "{forces:?}");
+    }
+
+    #[test]
+    fn a_tool_that_sticks_whatever_presses_is_let_go_in_the_air() {
+        let mut left = beyond(Vec3::new(0.3, 0.0, 1.0));
+        let mut feel = |at: Vec3| left.follow((&ToolShape::Point, &Pose::at(at)), &f64::INFINITY.into()).unwrap().force;
+        assert!(feel(Vec3::new(-5e-3, 0.0, -1e-3)).x > 4.0);
+        assert_eq!(feel(Vec3::new(-5e-3, 0.0, 1e-3)), Vec3::zeros());
+        assert_eq!(feel(Vec3::new(-9e-3, 0.0, 1e-3)), Vec3::zeros());
     }
 }

@@ -1,14 +1,16 @@
 //! Where a simulation is, for another one to go on from.
 
 use super::Simulation;
-use crate::Wrench;
 use crate::body::{State, Stiffness};
-use crate::contact::Touch;
+use crate::contact::{Law, Touch};
+use crate::{Vec3, Wrench};
 
 /// Where a simulation is: another one of the same body, with the same tools, goes on from it bit for bit.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
     state: State,
+    forces: Vec<Vec3>,
+    law: Law,
     /// Now, and where it goes.
     stiffness: [Stiffness; 2],
     /// Of each tool, without its shape.
@@ -24,6 +26,8 @@ impl Simulation {
     pub fn save(&self, to: &mut Snapshot) {
         let moving = &self.moving;
         to.state.clone_from(&moving.state);
+        to.forces.clone_from(&moving.forces);
+        to.law = moving.law;
         to.stiffness = [moving.body.stiffness(), self.stiffness];
         to.touches.resize_with(moving.touches.len(), Touch::default);
         to.touches.iter_mut().zip(&moving.touches).for_each(|(to, touch)| to.remember(touch));
@@ -37,6 +41,8 @@ impl Simulation {
     pub fn restore(&mut self, from: &Snapshot) {
         let moving = &mut self.moving;
         moving.state.clone_from(&from.state);
+        moving.forces.clone_from(&from.forces);
+        moving.law = from.law;
         moving.touches.iter_mut().zip(&from.touches).for_each(|(touch, from)| touch.remember(from));
         moving.means.clone_from(&from.means);
         let [now, aim] = from.stiffness;
@@ -49,9 +55,8 @@ impl Simulation {
 mod tests {
     use super::super::Stepping;
     use super::*;
-    use crate::Vec3;
     use crate::body::{Block, Body};
-    use crate::contact::{Contact, Friction, Law, ToolMotion, ToolShape};
+    use crate::contact::{Contact, Friction, ToolMotion, ToolShape};
     use crate::mesh::Face;
 
     /// A sphere on elements so fine that it meets their corners, which stick and slip, while the body becomes stiffer.

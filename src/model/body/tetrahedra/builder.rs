@@ -11,6 +11,8 @@ use crate::error::ModelError;
 use crate::integrator::Spectrum;
 use crate::mesh::{MeshQuality, Surface, TetrahedralMesh};
 
+/// Shares of the body's extent by which a place may miss the boundary of a shape and lie on it: files of single precision are good to 6e-8.
+const ROUNDING: f64 = 1e-6;
 /// Shortest stable step (s): a tick of 1 ms would have more than two hundred substeps.
 const SHORTEST_STEP: f64 = 5e-6;
 /// The step that the worst element alone allows is good to this factor.
@@ -73,7 +75,7 @@ impl TetrahedraBuilder {
         let (mesh, left_out) = self.mesh.cleaned().map_err(|error| error.at("mesh"))?;
         let quality = mesh.quality();
         check_extent(&quality)?;
-        let places = Places { mesh: &mesh, tolerance: quality.extent().max() * 1e-9 };
+        let places = Places { mesh: &mesh, tolerance: quality.extent().max() * ROUNDING };
         let tissues = places.tissues(self.tissue, &self.regions)?;
         let is_held = places.held(&self.fixed)?;
         check_parts(&mesh, &is_held)?;

@@ -33,6 +33,10 @@ impl NearBody {
         if self.restriction.is_none() || self.patch != patch {
             patch.clone_into(&mut self.patch);
             self.restriction = body.restriction(patch);
+            // A tick allocates nothing, where nothing asks for forces before it either.
+            let nodes = self.len();
+            self.state.positions.resize(nodes, Vec3::zeros());
+            self.state.velocities.resize(nodes, Vec3::zeros());
         }
         self.restriction.as_ref().map_or([&[], &[]], |near| [near.ring(patch.len()), near.held(patch.len())])
     }

@@ -4,6 +4,7 @@ mod blend;
 mod ways;
 
 use super::LocalModels;
+use super::kind::Kind;
 use crate::{Vec3, Wrench};
 
 pub use blend::{Blend, BlendKind, Jump};
@@ -71,15 +72,17 @@ impl Succession {
         self.version = version;
     }
 
-    /// Takes newer models in exchange for spares. Models that are still catching up are given up for them, unless they are nearer to the
-    /// present by now: where catching up takes longer than a period, none would ever serve. Those that are older than what `ways` remember
+    /// Takes newer models in exchange for spares. Models of their kind that are still catching up are given up for them, unless they are nearer
+    /// to the present by now: where catching up takes longer than a period, none would ever serve. Those that are older than what `ways` remember
     /// are refused: they could not be brought to the present.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn offer(&mut self, models: &mut LocalModels, version: u32, ways: &Ways) {
         let reached = models.built_at();
-        let is_nearest = self.arrival.is_none_or(|(_, arriving)| arriving <= reached);
+        // One of another kind was asked for, and the whole body, which goes on by itself, is sent only where something has changed.
+        let is_other = models.kind() == Kind::Full || models.kind() != self.arriving.kind();
+        let is_nearest = self.arrival.is_none_or(|(_, arriving)| is_other || arriving <= reached);
         if is_nearest && ways.reaches_back_to(reached) {
             std::mem::swap(&mut self.arriving, models);
             self.arrival = Some((version, reached));
@@ -194,7 +197,7 @@ mod tests {
             self.built_at
         }
         fn kind(&self) -> Kind {
-            Kind::Patch
+            if self.base < 100.0 { Kind::Patch } else { Kind::Full }
         }
         fn serves_as(&self, _: usize) -> Kind {
             Kind::Patch
@@ -300,6 +303,25 @@ mod tests {
         followed.offer(model(4.0, 20, true), 3);
         followed.offer(model(5.0, 64, true), 4);
         assert_eq!((followed.tick(65).wrench.force.x, followed.models.version()), (5.0, 4));
+    }
+
+    /// Check that the whole body, which is sent once, is taken although what is there is nearer to the present.
+    #[test]
+    fn a_whole_body_is_not_given_up_for_models_that_are_nearer() {
+        let mut followed = Followed::new(0);
+        (1..=60).for_each(|t| {
+            followed.tick(t);
+        });
+        followed.offer(model(2.0, 33, true), 1);
+        (61..=63).for_each(|t| assert_eq!(followed.tick(t).wrench.force.x, 1.0));
+        followed.offer(model(100.0, 54, true), 2);
+        let served: Vec<f64> = (64..=70).map(|t| followed.tick(t).wrench.force.x).collect();
+        assert_eq!((served[6], followed.models.version()), (100.0, 2), "{served:?}");
+        // And other models are taken in its place.
+        followed.offer(model(101.0, 60, true), 3);
+        followed.offer(model(3.0, 50, true), 4);
+        let served: Vec<f64> = (71..=80).map(|t| followed.tick(t).wrench.force.x).collect();
+        assert_eq!((served[9], followed.models.version()), (3.0, 4), "{served:?}");
     }
 
     /// Check that a tick takes no longer for several tools than for one while models catch up.

@@ -77,6 +77,17 @@ fn what_cannot_be_is_named_in_one_line_with_its_place() {
     assert!(held().region(region(Where::Shape(Shape::Layer { axis: 2, from: 0.02, to: 1.0 }))).build().is_ok());
 }
 
+/// Check that nodes of a file of single precision lie on the planes that they were drawn on.
+#[test]
+fn a_shape_holds_what_a_file_of_single_precision_has_on_its_boundary() {
+    let mut mesh = irregular_box([3, 3, 4], [0.1; 3], 0.1);
+    mesh.points.iter_mut().for_each(|point| *point = point.map(|c| f64::from(c as f32)));
+    let top = Where::Shape(Shape::Layer { axis: 2, from: 0.1, to: 0.1 });
+    let body = Tetrahedra::builder(mesh).fix(top).build().unwrap();
+    let held = body.inverse_masses().iter().filter(|&&inverse_mass| inverse_mass == 0.0).count();
+    assert_eq!(held, 16);
+}
+
 #[test]
 fn a_later_region_wins_and_what_is_left_out_stays() {
     let layer = |from, to| Where::Shape(Shape::Layer { axis: 2, from, to });

@@ -4,6 +4,10 @@ use crate::tissue_support::*;
 use nalgebra::DMatrix;
 use palpate_model::Vec3;
 use palpate_model::body::{Body, Restriction, Shape, State, Tetrahedra, Tissue, TissueRegion, Where};
+use palpate_model::contact::{Contact, Law, ToolMotion};
+use palpate_model::local::{Aim, Kind, ResyncView, Template, ToolForecast};
+use palpate_model::simulation::{Simulation, Stepping};
+use palpate_model::surroundings::Bases;
 use proptest::prelude::*;
 
 /// A block of two tissues, held below.
@@ -77,5 +81,38 @@ fn what_is_left_of_one_tissue_does_not_know_the_nodes_and_gives_no_energy() {
             println!("nodal pressure {is_averaged}, nu {poisson_ratio}: least eigenvalue of what is left {least:.1e}");
             assert!(least > -1e-12, "{least}");
         }
+    }
+}
+
+/// Check that a linear model around a tool that is over a part which is held through and through, where nothing can move, feels nothing and
+/// goes on.
+#[test]
+fn linear_models_are_made_where_nothing_can_move() {
+    let mesh = irregular_box([6, 3, 3], [0.06, 0.03, 0.03], 0.1);
+    let half = Where::Shape(Shape::Layer { axis: 0, from: -1.0, to: 0.045 });
+    let mut body = Tetrahedra::builder(mesh).fix(half).build().unwrap();
+    let stepping = Stepping { tick: 1e-3, substeps: Stepping::stable_substeps(&mut body, 1e-3) };
+    let state = State::at_rest(body.rest());
+    let mut simulation = Simulation::new(Box::new(body), state, Contact::default(), Law::default(), stepping).unwrap();
+    let at = Vec3::new(0.005, 0.015, 0.0305);
+    let forecast = ToolForecast::at_rest(at);
+    let aim = Aim::new(simulation.body().surface(), &simulation.state().positions).unwrap();
+    let mut triangles = Vec::new();
+    aim.triangles((&simulation, 0), &forecast, [0.0; 2], &mut triangles);
+    for kind in [Kind::Patch, Kind::LinearBoundary, Kind::ScaledBoundary, Kind::Condensed] {
+        let mut model = Template::new(kind, [4, 4, 2], simulation.body()).unwrap().empty();
+        model.rebuild(ResyncView {
+            global: &mut simulation,
+            tick: 0,
+            triangles: &triangles,
+            nearest: &[],
+            patch: None,
+            tools: &[forecast],
+            index: 0,
+            horizon: 33,
+            bases: &Bases::default(),
+        });
+        let force = model.tick(&[ToolMotion::straight(at, at - Vec3::z() * 1e-3)]).force;
+        assert_eq!(force, Vec3::zeros(), "{kind:?}");
     }
 }
