@@ -20,6 +20,11 @@ use super::simd::{InstructionSet, Numbers, Simd, Work};
 #[cfg(feature = "parallel")]
 use crate::error::ModelError;
 
+/// By how much the faces of an element have grown in area, squared and in the mean, before its nodes are looked at.
+const FACES: f64 = 1.5;
+/// The same of its edges, to the fourth power, of which the longest count most: viscosity brakes along them.
+const EDGES: f64 = 1.2;
+
 /// Evaluates a list of elements.
 #[derive(Clone, Debug)]
 pub(crate) struct TetrahedraKernel {
@@ -110,12 +115,12 @@ impl TetrahedraKernel {
         });
     }
 
-    /// Calls `found` with the nodes of each element whose faces had grown more than `limit` times in area, squared, in the last
-    /// evaluation; none if pressures are the elements' own.
-    pub(crate) fn stretched(&self, limit: f64, mut found: impl FnMut([u32; 4])) {
+    /// Calls `found` with the nodes of each element whose faces, or whose edges if it is viscous, had grown beyond what steps at rest have to
+    /// spare in the last evaluation.
+    pub(crate) fn stretched(&self, mut found: impl FnMut([u32; 4])) {
         for part in &self.parts {
-            for (corners, stretches) in part.corners.iter().zip(&part.stretches) {
-                for (lane, _) in stretches.iter().enumerate().filter(|(_, stretch)| **stretch > limit) {
+            for (corners, [faces, edges]) in part.corners.iter().zip(&part.stretches) {
+                for lane in (0..LANES).filter(|&lane| faces[lane] > FACES || edges[lane] > EDGES) {
                     found([0, 1, 2, 3].map(|corner| self.order[part.own.start + corners[corner][lane] as usize]));
                 }
             }
@@ -174,6 +179,8 @@ struct Resting {
     volume: Lane,
     /// Over the sum of the squares of twice the areas of the faces at the first corner (1/m^4).
     inverse_faces: Lane,
+    /// Over the squares of the edges there, and the root of 3 (1/m^2); zero without viscosity.
+    inverse_edges: [Lane; 3],
 }
 
 /// The elements that belong to a range of nodes, with working memory of their own: what one core does.
@@ -185,8 +192,9 @@ struct Part {
     corners: Vec<Corners>,
     batches: Vec<Batch>,
     resting: Vec<Resting>,
-    /// By how much the squares of the elements' faces at their first corner have grown: their sum over that at rest.
-    stretches: Vec<Lane>,
+    /// By how much the elements' faces and edges at their first corner have grown: the mean square of the areas, and the mean of the fourth
+    /// powers of the lengths, over those at rest.
+    stretches: Vec<[Lane; 2]>,
     /// True if an element has a viscosity.
     is_viscous: bool,
     nodes: Vec<Motion>,
@@ -217,7 +225,7 @@ impl Part {
         for members in colour(&nodes, count) {
             part.push(&members, &nodes, elements);
         }
-        part.stretches.resize(part.resting.len(), [0.0; LANES]);
+        part.stretches.resize(part.resting.len(), [[0.0; LANES]; 2]);
         part
     }
 
@@ -232,7 +240,7 @@ impl Part {
             offset: zero,
             inverse_volume: zero,
         };
-        let mut resting = Resting { volume: zero, inverse_faces: zero };
+        let mut resting = Resting { volume: zero, inverse_faces: zero, inverse_edges: [zero; 3] };
         for (lane, &member) in members.iter().enumerate() {
             let element = &elements[member].1;
             (0..4).for_each(|corner| corners[corner][lane] = nodes[member][corner]);
@@ -247,6 +255,10 @@ impl Part {
             batch.inverse_volume[lane] = 1.0 / (6.0 * element.volume);
             resting.volume[lane] = element.volume;
             resting.inverse_faces[lane] = 1.0 / element.faces();
+            let edges = if element.viscosity == 0.0 { [f64::INFINITY; 3] } else { element.edges_squared() };
+            for (inverse, edge) in resting.inverse_edges.iter_mut().zip(edges) {
+                inverse[lane] = 1.0 / (3.0_f64.sqrt() * edge);
+            }
         }
         self.corners.push(corners);
         self.batches.push(batch);
@@ -259,11 +271,10 @@ impl Part {
             let (x, v) = (&x[old as usize], &v[old as usize]);
             node.0 = [x.x, x.y, x.z, 0.0, v.x, v.y, v.z, 0.0];
         }
-        if is_averaged {
-            self.growth.fill(0.0);
-            let Self { corners, resting, nodes, growth, stretches, .. } = self;
-            set.run(Growth { corners, resting, nodes, growth, stretches });
-        } else {
+        self.growth.fill(0.0);
+        let Self { corners, resting, nodes, growth, stretches, .. } = self;
+        set.run(Growth { corners, resting, nodes, growth, stretches });
+        if !is_averaged {
             self.evaluate::<false>(set);
         }
     }
@@ -303,13 +314,13 @@ fn dot<S: Simd>(s: S, a: &[S::V; 3], b: &[S::V; 3]) -> S::V {
     s.fused(a[2], b[2], s.fused(a[1], b[1], s.mul(a[0], b[0])))
 }
 
-/// First of two passes with average nodal pressure: by how much the volume at each node and the faces of each element have grown.
+/// First of two passes: by how much the volume at each node, for average nodal pressure, and the faces and edges of each element have grown.
 struct Growth<'a> {
     corners: &'a [Corners],
     resting: &'a [Resting],
     nodes: &'a [Motion],
     growth: &'a mut [f64],
-    stretches: &'a mut [Lane],
+    stretches: &'a mut [[Lane; 2]],
 }
 
 impl Work for Growth<'_> {
@@ -317,14 +328,22 @@ impl Work for Growth<'_> {
     fn run<S: Simd>(self, s: S) {
         let Self { corners, resting, nodes, growth, stretches } = self;
         let sixth = s.splat(1.0 / 6.0);
-        for ((corners, resting), stretch) in corners.iter().zip(resting).zip(stretches) {
+        for ((corners, resting), [grown_faces, grown_edges]) in corners.iter().zip(resting).zip(stretches) {
             let [[x1, y1, z1, _], _] = s.differences(nodes, &corners[0], &corners[1]);
             let [[x2, y2, z2, _], _] = s.differences(nodes, &corners[0], &corners[2]);
             let [[x3, y3, z3, _], _] = s.differences(nodes, &corners[0], &corners[3]);
             let (d1, d2, d3) = ([x1, y1, z1], [x2, y2, z2], [x3, y3, z3]);
             let (c1, c2, c3) = (cross(s, &d2, &d3), cross(s, &d3, &d1), cross(s, &d1, &d2));
             let faces = s.add(s.add(dot(s, &c1, &c1), dot(s, &c2, &c2)), dot(s, &c3, &c3));
-            s.store(s.mul(faces, s.load(&resting.inverse_faces)), stretch);
+            s.store(s.mul(faces, s.load(&resting.inverse_faces)), grown_faces);
+            let [i1, i2, i3] = &resting.inverse_edges;
+            // Closures would not be compiled for the instruction set.
+            let edges = [
+                s.mul(dot(s, &d1, &d1), s.load(i1)),
+                s.mul(dot(s, &d2, &d2), s.load(i2)),
+                s.mul(dot(s, &d3, &d3), s.load(i3)),
+            ];
+            s.store(dot(s, &edges, &edges), grown_edges);
             let mut grown = [0.0; LANES];
             s.store(s.sub(s.mul(dot(s, &d1, &c1), sixth), s.load(&resting.volume)), &mut grown);
             for corner in corners {

@@ -60,6 +60,12 @@ impl Element {
         (6.0 * self.volume).powi(2) * self.inverse.norm_squared()
     }
 
+    /// The squares of the edges from node 0 at rest (m^2).
+    pub(crate) fn edges_squared(&self) -> [f64; 3] {
+        let edges = self.inverse.try_inverse().unwrap_or_default();
+        [0, 1, 2].map(|corner| edges.column(corner).norm_squared())
+    }
+
     /// The gradient of the shape function of `node` at rest (1/m).
     pub(super) fn gradient(&self, node: u32) -> Vec3 {
         match self.nodes.iter().position(|&corner| corner == node) {

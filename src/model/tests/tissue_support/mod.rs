@@ -142,9 +142,14 @@ pub const WIDE: f64 = 0.03;
 
 /// A slab of tissue, `thick` (m) and held at its bottom, with irregular elements of `size` (m).
 pub fn slab(thick: f64, size: f64, poisson_ratio: f64, viscosity: f64) -> Tetrahedra {
+    slab_of(thick, size, poisson_ratio, viscosity, true)
+}
+
+/// The same with pressures averaged over nodes, or not.
+pub fn slab_of(thick: f64, size: f64, poisson_ratio: f64, viscosity: f64, is_averaged: bool) -> Tetrahedra {
     let cells = [WIDE, WIDE, thick].map(|extent| ((extent / size) as usize).max(2));
     let tissue = Tissue { young_modulus: 5e3, poisson_ratio, density: 1060.0, viscosity };
-    body(irregular_box(cells, [WIDE, WIDE, thick], 0.15), tissue, true)
+    body(irregular_box(cells, [WIDE, WIDE, thick], 0.15), tissue, is_averaged)
 }
 
 /// A state with displacements up to `size` (m) and velocities up to `speed` (m/s).
