@@ -91,7 +91,9 @@ impl VirtualRun {
                 self.begin_stop();
                 continue;
             }
-            let Some(Next { due, index, recorded }) = self.next() else { return self.end_all() };
+            let Some(Next { due, index, recorded }) = self.next() else {
+                return if self.stopping { self.end_the_rest() } else { self.end_all() };
+            };
             if due > horizon {
                 self.now = horizon;
                 return;
@@ -110,12 +112,15 @@ impl VirtualRun {
         }
     }
 
-    /// Ends the run in order: groups that wind down do so, in virtual time.
+    /// Ends the run in order: groups that wind down do so, in virtual time, also those that have begun.
     pub(crate) fn end_all(&mut self) {
         self.control.request_stop();
-        if !self.stopping {
-            self.advance(Nanos(u64::MAX));
-        }
+        self.advance(Nanos(u64::MAX));
+        self.end_the_rest();
+    }
+
+    /// Ends what is not released any more.
+    fn end_the_rest(&mut self) {
         self.indices(false).into_iter().for_each(|index| self.end(index));
         self.end_observers();
     }

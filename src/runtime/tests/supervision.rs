@@ -25,6 +25,7 @@ in_both_executions! {
     time_lost_in_a_restart_is_no_overrun
     a_factory_that_panics_stops_the_run_and_says_where
     a_silent_device_takes_no_time_from_the_wind_down
+    a_stop_that_was_requested_before_takes_no_time_from_the_wind_down
 }
 
 type Calls = Arc<Mutex<Vec<(GroupMode, u64)>>>;
@@ -78,6 +79,18 @@ fn assert_whole_wind_down(calls: &Calls, report: &RuntimeReport) {
     let (stopping, group) = (stopping(calls), &report.groups[0]);
     assert!(!stopping.is_empty() && stopping.len() as u64 + group.skipped >= 30, "{stopping:?} {group:?}");
     assert!(group.elapsed_periods - stopping[0] <= 30 && stopping.len() <= 30, "{stopping:?} {group:?}");
+}
+
+fn a_stop_that_was_requested_before_takes_no_time_from_the_wind_down(execution: Execution) {
+    let calls = Calls::default();
+    let mut graph = Runtime::builder(execution);
+    let group = RateGroup::hz(1000).wind_down(Nanos(30 * MS));
+    let running = graph.group(group, vec![fails_at(u64::MAX, &calls)]).build().unwrap().start().unwrap();
+    running.wait_for(Duration::from_millis(20));
+    running.request_stop();
+    // Some of the wind-down, but not all of it.
+    running.wait_for(Duration::from_millis(10));
+    assert_whole_wind_down(&calls, &running.stop());
 }
 
 fn a_fault_during_the_wind_down_takes_nothing_from_the_other_actors(execution: Execution) {
