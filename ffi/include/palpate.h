@@ -438,9 +438,11 @@ enum PalpateCode palpate_start_hosted(struct PalpateSetup setup,
                                       struct PalpateSession *session);
 
 /**
- * Waits for so many seconds, or until the session has ended by itself; in virtual time, runs that much of it.
+ * Waits for so many seconds, or until the session has ended, by itself or because another thread stops it; in virtual time, runs that
+ * much of it. It keeps no other thread from the session.
  */
-enum PalpateCode palpate_wait(struct PalpateSession session, double seconds);
+enum PalpateCode palpate_wait(struct PalpateSession session,
+                              double seconds);
 
 /**
  * The time since the start (s), simulated in virtual time, and whether the session has ended (1) or runs (0). Either pointer may be

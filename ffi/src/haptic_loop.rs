@@ -8,11 +8,10 @@ use std::sync::{Arc, Mutex};
 
 use palpate::devices::{DeviceState, ForceCommand, HostSide};
 use palpate::runtime::{HostRelease, HostedGroup, Nanos, Rate};
-use palpate::session::Running;
 
 use crate::code::{Failure, PalpateCode};
 use crate::handles::lock;
-use crate::session::{Host, Live, SESSIONS, Seat, with_running};
+use crate::session::{Host, Live, SESSIONS, Seat, Shared, with_running};
 use crate::types::PalpateCommand;
 
 /// More than a session may have: how many that is, it says itself.
@@ -34,7 +33,7 @@ enum Pace {
     /// The haptic group, on this thread, by the clock.
     Clock(Box<HostedGroup>),
     /// All groups, on this thread, to the next release of virtual time.
-    Virtual { running: Arc<Mutex<Option<Running>>>, haptic: Rate, next: u64 },
+    Virtual { running: Arc<Shared>, haptic: Rate, next: u64 },
     /// Nothing any more.
     Over,
 }

@@ -10,13 +10,14 @@
 //!    v
 //! boundary     nothing unwinds across it; codes and texts (code, last_error)
 //! memory       the one place where pointers of C's are followed; types: what they point at
-//! handles      what is alive, by number
+//! handles      what is alive, by number; fair_mutex: taken in turns
 //! ```
 
 mod boundary;
 mod code;
 mod contacts;
 pub mod exports;
+mod fair_mutex;
 mod handles;
 mod haptic_loop;
 mod last_error;

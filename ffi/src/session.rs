@@ -2,8 +2,8 @@
 
 use std::cell::RefCell;
 use std::ffi::{CString, c_char};
-use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use palpate::devices::{HostSide, PointerHandle};
 use palpate::runtime::{HostedGroup, Rate, StopHandle};
@@ -11,14 +11,26 @@ use palpate::session::{Controls, Running, Summary, Viewer};
 
 use crate::code::{Failure, PalpateCode};
 use crate::contacts::Contacts;
+use crate::fair_mutex::FairMutex;
 use crate::handles::Handles;
 use crate::types::{PalpateContact, PalpateSummary};
 
 pub(crate) static SESSIONS: Handles<Live> = Handles::new("session");
 
+/// For how long a wait in virtual time keeps others from the session, as long as one period takes less.
+const SLICE: Duration = Duration::from_millis(50);
+/// The least of virtual time that a wait runs at once, however long that takes.
+const LEAST_SLICE: Duration = Duration::from_millis(1);
+/// How often a wait on threads looks whether the session has ended.
+const POLL: Duration = Duration::from_millis(5);
+
+/// The session itself, for whoever has its turn; `None` once it has been stopped.
+pub(crate) type Shared = FairMutex<Option<Running>>;
+
 /// A session that runs.
 pub(crate) struct Live {
-    pub(crate) running: Arc<Mutex<Option<Running>>>,
+    pub(crate) running: Arc<Shared>,
+    pub(crate) is_virtual: bool,
     pub(crate) stop: StopHandle,
     pub(crate) viewer: Option<Viewer>,
     pub(crate) controls: Option<Controls>,
@@ -47,7 +59,7 @@ pub(crate) struct Seat {
 }
 
 impl Live {
-    pub(crate) fn new(mut running: Running, hosts: Option<(Vec<HostSide>, Rate)>) -> Self {
+    pub(crate) fn new(mut running: Running, is_virtual: bool, hosts: Option<(Vec<HostSide>, Rate)>) -> Self {
         let host = match hosts {
             None => Host::Palpate,
             Some((devices, haptic)) => {
@@ -60,7 +72,8 @@ impl Live {
             controls: running.take_controls(),
             pointer: running.take_pointer(0),
             contacts: running.take_records().map(Contacts::new),
-            running: Arc::new(Mutex::new(Some(running))),
+            running: Arc::new(FairMutex::new(Some(running))),
+            is_virtual,
             host,
         }
     }
@@ -84,18 +97,53 @@ impl Live {
     }
 }
 
-/// The session waits, or runs that much of virtual time.
-pub(crate) fn wait(running: &Mutex<Option<Running>>, seconds: f64) -> Result<(), Failure> {
+/// The session waits, or runs that much of virtual time; less if it ends before, also because another thread stops it, which does not
+/// have to wait for this one.
+pub(crate) fn wait(running: &Shared, is_virtual: bool, seconds: f64) -> Result<(), Failure> {
     let span = Duration::try_from_secs_f64(seconds)
         .map_err(|_| Failure::argument(format!("seconds is {seconds}, must be 0 or more")))?;
-    with_running(running, |running| running.wait_for(span))
+    // One that has been stopped is told here only: later it has ended while this waited.
+    with_running(running, |_| ())?;
+    if is_virtual {
+        run_for(running, span)
+    } else {
+        sleep_for(running, span)
+    }
+    Ok(())
 }
 
-pub(crate) fn with_running<R>(
-    running: &Mutex<Option<Running>>,
-    with: impl FnOnce(&Running) -> R,
-) -> Result<R, Failure> {
-    crate::handles::lock(running)
+/// Waits on threads, which need nobody for it.
+fn sleep_for(running: &Shared, span: Duration) {
+    let start = Instant::now();
+    while !has_ended(running) {
+        let Some(left) = span.checked_sub(start.elapsed()).filter(|left| !left.is_zero()) else { return };
+        std::thread::sleep(left.min(POLL));
+    }
+}
+
+/// Runs virtual time in slices, between which it is others' turn; what it comes to does not depend on them.
+fn run_for(running: &Shared, span: Duration) {
+    let (mut left, mut slice) = (span, LEAST_SLICE);
+    while !(left.is_zero() || has_ended(running)) {
+        let part = left.min(slice);
+        let start = Instant::now();
+        if with_running(running, |running| running.wait_for(part)).is_err() {
+            return;
+        }
+        left -= part;
+        let took_long = start.elapsed() > SLICE;
+        slice = if took_long { (slice / 2).max(LEAST_SLICE) } else { slice.saturating_mul(2) };
+    }
+}
+
+/// True of one that has been stopped too.
+fn has_ended(running: &Shared) -> bool {
+    running.lock().as_ref().is_none_or(Running::finished)
+}
+
+pub(crate) fn with_running<R>(running: &Shared, with: impl FnOnce(&Running) -> R) -> Result<R, Failure> {
+    running
+        .lock()
         .as_ref()
         .map(with)
         .ok_or_else(|| Failure::new(PalpateCode::BadHandle, "the session has been stopped"))

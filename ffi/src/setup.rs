@@ -25,6 +25,7 @@ pub(crate) struct Setup {
     haptic: Rate,
     /// The program said how long it runs.
     has_end: bool,
+    is_virtual: bool,
 }
 
 /// A body of tetrahedra as C gives it.
@@ -39,7 +40,7 @@ impl Setup {
     fn new(builder: SessionBuilder, haptic_hz: f64) -> Self {
         // What is no rate is refused when the session is built.
         let haptic = Rate::from_hz(haptic_hz).unwrap_or(Rate::hz(1000));
-        Self { builder: Some(builder), haptic, has_end: false }
+        Self { builder: Some(builder), haptic, has_end: false, is_virtual: false }
     }
 
     pub(crate) fn of_scene(scene: Scene) -> Self {
@@ -112,6 +113,15 @@ impl Setup {
     pub(crate) fn set_duration(&mut self, seconds: f64) -> Result<(), Failure> {
         self.has_end = true;
         self.change(|builder| builder.duration_s(seconds))
+    }
+
+    pub(crate) fn set_virtual(&mut self) -> Result<(), Failure> {
+        self.is_virtual = true;
+        self.change(SessionBuilder::virtual_time)
+    }
+
+    pub(crate) fn is_virtual(&self) -> bool {
+        self.is_virtual
     }
 
     /// The session, in which palpate owns the haptic loop.

@@ -21,7 +21,11 @@ use crate::types::{PalpateDevice, PalpateSession, PalpateSetup, PalpateSummary};
 /// `session` is null or can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_start(setup: PalpateSetup, session: *mut PalpateSession) -> PalpateCode {
-    let start = || Ok(PalpateSession { id: SESSIONS.add(Live::new(taken(setup)?.session()?.start()?, None)) });
+    let start = || {
+        let own = taken(setup)?;
+        let is_virtual = own.is_virtual();
+        Ok(PalpateSession { id: SESSIONS.add(Live::new(own.session()?.start()?, is_virtual, None)) })
+    };
     // SAFETY: the caller's promise.
     boundary(|| unsafe { put_made(session, "session", start) })
 }
@@ -52,8 +56,10 @@ pub unsafe extern "C" fn palpate_start_hosted(
             let name = (!device.name.is_null()).then(|| unsafe { text(device.name, "name") }).transpose()?;
             told.push((name, device));
         }
-        let (made, hosts, haptic) = taken(setup)?.hosted(&told)?;
-        Ok(PalpateSession { id: SESSIONS.add(Live::new(made.start()?, Some((hosts, haptic)))) })
+        let own = taken(setup)?;
+        let is_virtual = own.is_virtual();
+        let (made, hosts, haptic) = own.hosted(&told)?;
+        Ok(PalpateSession { id: SESSIONS.add(Live::new(made.start()?, is_virtual, Some((hosts, haptic)))) })
     };
     // SAFETY: the caller's promise.
     boundary(|| unsafe { put_made(session, "session", start) })
@@ -66,12 +72,14 @@ fn taken(setup: PalpateSetup) -> Result<crate::setup::Setup, Failure> {
         .ok_or_else(|| Failure::argument("another thread is changing this setup"))
 }
 
-/// Waits for so many seconds, or until the session has ended by itself; in virtual time, runs that much of it.
+/// Waits for so many seconds, or until the session has ended, by itself or because another thread stops it; in virtual time, runs that
+/// much of it. It keeps no other thread from the session.
 #[unsafe(no_mangle)]
 pub extern "C" fn palpate_wait(session: PalpateSession, seconds: f64) -> PalpateCode {
     boundary(|| {
-        let running = SESSIONS.with(session.id, |live| Ok(std::sync::Arc::clone(&live.running)))?;
-        session::wait(&running, seconds)
+        let (running, is_virtual) =
+            SESSIONS.with(session.id, |live| Ok((std::sync::Arc::clone(&live.running), live.is_virtual)))?;
+        session::wait(&running, is_virtual, seconds)
     })
 }
 
@@ -170,8 +178,13 @@ pub unsafe extern "C" fn palpate_stop(session: PalpateSession, summary: *mut Pal
         let live = SESSIONS.take(session.id)?;
         haptic_loop::detach(session.id);
         haptic_loop::vacate(&live);
-        let running = std::sync::Arc::clone(&handles::lock(&live).running);
-        let running = handles::lock(&running).take();
+        let (running, stop) = {
+            let live = handles::lock(&live);
+            (std::sync::Arc::clone(&live.running), live.stop.clone())
+        };
+        // Before its turn: so whoever waits, in virtual time, ends as soon. If this thread ticked it, it ticks no more.
+        stop.request();
+        let running = running.lock().take();
         let Some(running) = running else {
             return Err(Failure::new(PalpateCode::BadHandle, "the session has been stopped"));
         };

@@ -184,7 +184,7 @@ pub unsafe extern "C" fn palpate_setup_path(
 /// one haptic period, and not real-time safe.
 #[unsafe(no_mangle)]
 pub extern "C" fn palpate_setup_virtual_time(setup: PalpateSetup) -> PalpateCode {
-    boundary(|| SETUPS.with(setup.id, |own| own.change(|builder| builder.virtual_time())))
+    boundary(|| SETUPS.with(setup.id, Setup::set_virtual))
 }
 
 /// Lets the local model be changed while the session runs, by palpate_set_model.
