@@ -1,4 +1,4 @@
-//! Where the tools touch, from the records that the logger shares: some 50 ms old.
+//! Where the tools touch, from the records that the logger shares: 20 times a second, a tenth of a second late.
 
 use palpate::log::{ContactPointSample, ContactSample, LogRecord};
 use palpate::model::Vec3;

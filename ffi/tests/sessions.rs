@@ -1,7 +1,7 @@
 //! What threads do with one session at the same time, and what they are told of it.
 
-use palpate_ffi::exports::{run, setup};
-use palpate_ffi::{PalpateCode, PalpateSession, PalpateSetup};
+use palpate_ffi::exports::{run, setup, show};
+use palpate_ffi::{PalpateCode, PalpateContact, PalpateSession, PalpateSetup};
 use std::ptr::null_mut;
 use std::time::{Duration, Instant};
 
@@ -15,13 +15,16 @@ fn ok(code: PalpateCode) {
     assert_eq!(code, PalpateCode::Ok);
 }
 
-/// The built-in scene, without an end.
+/// The built-in scene without an end; the tool presses the upper face and stays there.
 fn demo(is_virtual: bool) -> PalpateSession {
     let (mut made, mut session) = (PalpateSetup::default(), PalpateSession::default());
+    let (times_s, places_m) = ([0.0, 0.3], [0.05, 0.05, 0.102, 0.05, 0.05, 0.09]);
     // SAFETY: every pointer is to a value of our own.
     unsafe {
         ok(setup::palpate_setup_demo(&mut made));
+        ok(setup::palpate_setup_path(made, times_s.as_ptr(), places_m.as_ptr(), times_s.len()));
         ok(setup::palpate_setup_duration(made, 1e6));
+        ok(setup::palpate_setup_share_contacts(made));
         if is_virtual {
             ok(setup::palpate_setup_virtual_time(made));
         }
@@ -78,6 +81,31 @@ fn a_wait_in_virtual_time_runs_exactly_as_much_as_it_was_told() {
     for (seconds, total_s) in [(0.25, 0.25), (0.0, 0.25), (0.1234, 0.3734)] {
         ok(run::palpate_wait(session, seconds));
         assert!((progress(session).0 - total_s).abs() < 1e-8, "{} s", progress(session).0);
+    }
+    ok(stop(session));
+}
+
+fn contacts(session: PalpateSession) -> Vec<PalpateContact> {
+    const ROOM: usize = 16;
+    let mut contacts = Vec::with_capacity(ROOM);
+    let mut count = 0;
+    // SAFETY: there is room for that many, and those that were counted are written if that is fewer.
+    unsafe {
+        ok(show::palpate_contacts(session, contacts.as_mut_ptr(), ROOM, &mut count));
+        contacts.set_len(count);
+    }
+    contacts
+}
+
+// Check that they are those of now, however long nobody has asked.
+#[test]
+fn contacts_are_the_newest_also_if_nobody_asked_for_long() {
+    let session = demo(true);
+    for seconds in [1.0, 9.0] {
+        ok(run::palpate_wait(session, seconds));
+        let (now_s, places) = (progress(session).0, contacts(session));
+        assert!(!places.is_empty(), "no contact at {now_s} s");
+        assert!(places.iter().all(|place| (0.09..0.16).contains(&(now_s - place.time_s))), "{now_s} s: {places:?}");
     }
     ok(stop(session));
 }

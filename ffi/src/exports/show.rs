@@ -89,8 +89,9 @@ pub unsafe extern "C" fn palpate_tool(session: PalpateSession, index: u32, tool:
     })
 }
 
-/// The places where tools touch, in the newest tick that is known, some 50 ms old; their number is put at `count`, also if it is more
-/// than there is `room` for, which is a failure. Of a session that was set up with palpate_setup_share_contacts.
+/// The places where tools touch, in the newest tick that is known: 0.1 to 0.15 s old, and up to 1.05 s while a part of the session takes
+/// that long for one release. Their number is put at `count`, also if it is more than there is `room` for, which is a failure. Of a
+/// session that was set up with palpate_setup_share_contacts.
 ///
 /// # Safety
 /// `contacts` is null or has room for `room` structs; `count` is null or can be written.
