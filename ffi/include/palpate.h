@@ -188,7 +188,7 @@ typedef struct PalpateBlock {
    */
   uint32_t fixed_faces;
   /**
-   * Nodes along x, y and z, at least 2 each.
+   * Nodes along x, y and z, at least 2 each and at most 1000000 in all.
    */
   uint32_t nodes[3];
   /**

@@ -32,7 +32,7 @@ pub struct PalpateBlock {
     pub size: u32,
     /// Faces that are held: bits 0 to 5 for x_min, x_max, y_min, y_max, z_min, z_max.
     pub fixed_faces: u32,
-    /// Nodes along x, y and z, at least 2 each.
+    /// Nodes along x, y and z, at least 2 each and at most 1000000 in all.
     pub nodes: [u32; 3],
     /// Extent along x, y and z (m); the block lies between the origin and there.
     pub size_m: [f64; 3],

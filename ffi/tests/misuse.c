@@ -182,6 +182,10 @@ static void arguments(void) {
     PalpateBlock block = BLOCK;
     block.nodes[1] = 1;
     EXPECT(palpate_setup_block(&block, &setup), PALPATE_CODE_SCENE, "");
+    for (int axis = 0; axis < 3; axis++) {
+        block.nodes[axis] = 100000;
+    }
+    EXPECT(palpate_setup_block(&block, &setup), PALPATE_CODE_SCENE, "at most 1000000 in all");
     block = BLOCK;
     block.fixed_faces = 1u << 6;
     EXPECT(palpate_setup_block(&block, &setup), PALPATE_CODE_BAD_ARGUMENT, "six faces");

@@ -91,25 +91,36 @@ impl BlockBuilder {
         self
     }
 
-    /// Refuses regions that cannot be or hold no node; the block is to have two nodes or more along each axis.
+    /// Refuses regions that cannot be or hold no node.
     ///
     /// # Errors
-    /// If there is one: `region[index].key` and what is wrong with it.
+    /// If there is one: `region[index].key` and what is wrong with it. If the numbers of nodes cannot be, that.
     pub fn check_regions(&self) -> Result<(), ModelError> {
-        materials(Lattice { nodes: self.nodes }, self.size, self.material, &self.regions).map(drop)
+        materials(self.lattice()?, self.size, self.material, &self.regions).map(drop)
+    }
+
+    fn lattice(&self) -> Result<Lattice, ModelError> {
+        let nodes = self.nodes;
+        let refused = |why: String| Err(ModelError::of("nodes", format!("{nodes:?}: {why}")));
+        if nodes.iter().any(|&n| n < 2) {
+            return refused("at least 2 per axis are needed".to_owned());
+        }
+        let total = nodes.iter().try_fold(1_usize, |total, &n| total.checked_mul(n));
+        if total.is_none_or(|total| total > Block::MAX_NODES) {
+            return refused(format!("at most {} in all are possible, take fewer along an axis", Block::MAX_NODES));
+        }
+        Ok(Lattice { nodes })
     }
 
     /// Makes the block.
     ///
     /// # Errors
-    /// If a number is not finite, a mass, stiffness or size is not positive, an axis has less than two nodes, or a region
-    /// holds no node or differs in nothing.
+    /// If a number is not finite, a mass, stiffness or size is not positive, an axis has less than two nodes, all have more than
+    /// [`Block::MAX_NODES`], or a region holds no node or differs in nothing.
     pub fn build(self) -> Result<Block, ModelError> {
         let positive = |value: f64| value.is_finite() && value > 0.0;
         let Material { stiffness, damping_ratio, node_mass } = self.material;
-        if self.nodes.iter().any(|&n| n < 2) {
-            return Err(ModelError::of("nodes", format!("{:?}: at least 2 per axis are needed", self.nodes)));
-        }
+        let lattice = self.lattice()?;
         if !self.size.iter().all(|&length| positive(length)) {
             return Err(ModelError::of("size_m", format!("{:?}: three lengths above 0 are needed", self.size)));
         }
@@ -121,7 +132,6 @@ impl BlockBuilder {
         if !(damping_ratio.is_finite() && damping_ratio >= 0.0) {
             return Err(ModelError::of("damping_ratio", format!("{damping_ratio}: 0 or more is needed")));
         }
-        let lattice = Lattice { nodes: self.nodes };
         let spacing: [f64; 3] = std::array::from_fn(|axis| self.size[axis] / (self.nodes[axis] - 1) as f64);
         let at = |id: usize| lattice.coordinates(id as u32);
         let held = |id: usize| self.fixed.iter().any(|&face| face.holds(at(id), self.nodes));
@@ -145,6 +155,9 @@ impl BlockBuilder {
 }
 
 impl Block {
+    /// The most nodes of a block; a million have 13 million springs, minutes of work for a second of simulation.
+    pub const MAX_NODES: usize = 1_000_000;
+
     /// Starts a block of `nodes` per axis and `size` (m).
     pub fn builder(nodes: [usize; 3], size: [f64; 3]) -> BlockBuilder {
         let material = Material { stiffness: 30.0, damping_ratio: 0.3, node_mass: 0.5e-3 };
@@ -342,6 +355,21 @@ mod tests {
         let block = Block::builder([12; 3], [0.1; 3]).fix(Face::ZMin).build().unwrap();
         assert_eq!(block.springs().len(), 18_788);
         assert_eq!(block.inverse_masses().iter().filter(|&&w| w == 0.0).count(), 144);
+    }
+
+    // Check that nothing is allocated for it, nor computed that overflows.
+    #[test]
+    fn a_block_of_more_nodes_than_possible_is_refused_in_a_line() {
+        let axis = 100_000;
+        for nodes in [[axis; 3], [usize::MAX; 3], [2, 2, Block::MAX_NODES / 4 + 1]] {
+            let builder = Block::builder(nodes, [0.1; 3]);
+            let refused = builder.check_regions().unwrap_err();
+            assert_eq!(builder.build().unwrap_err(), refused);
+            let message = refused.to_string();
+            assert!(message.starts_with("nodes: [") && message.contains("at most 1000000 in all"), "{message}");
+            assert!(!message.contains('\n'), "{message}");
+        }
+        assert!(Block::builder([2, 2, Block::MAX_NODES / 4], [0.1; 3]).lattice().is_ok());
     }
 
     #[test]

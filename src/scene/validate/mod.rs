@@ -19,6 +19,7 @@ use super::{
 };
 use crate::error::Error;
 use crate::model::ModelError;
+use crate::model::body::Block;
 use crate::model::contact::Equations;
 use crate::model::local::BlendKind;
 use crate::model::local::{Feedback, Kind};
@@ -26,8 +27,6 @@ use crate::model::mesh::Face;
 use crate::runtime::Rate;
 use check::{at_most_ms, inside, lengths_within, movable, not_negative, on_surface, positive};
 
-/// Largest body; a million nodes have 13 million springs, minutes of work for a second of simulation.
-const MAX_NODES: usize = 1_000_000;
 /// Longest edge or offset (m); a larger number has the wrong unit.
 const MAX_LENGTH_M: f64 = 1e3;
 /// The contact takes a smaller triangle (twice its area) for none.
@@ -167,8 +166,8 @@ fn lattice(block: &BlockSpec) -> Result<(), Error> {
         return Err(Error::scene("body.block.nodes", format!("is {nodes:?}, must be at least 2 along every axis")));
     }
     let total = nodes.iter().try_fold(1_usize, |total, &count| total.checked_mul(count));
-    if total.is_none_or(|total| total > MAX_NODES) {
-        let message = format!("is {nodes:?}, must be at most {MAX_NODES} nodes in all");
+    if total.is_none_or(|total| total > Block::MAX_NODES) {
+        let message = format!("is {nodes:?}, must be at most {} nodes in all", Block::MAX_NODES);
         return Err(Error::scene("body.block.nodes", message));
     }
     lengths_within("body.block.size_m", size_m, MAX_LENGTH_M)?;
