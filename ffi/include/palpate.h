@@ -68,6 +68,28 @@ typedef enum PalpateCode {
 } PalpateCode;
 
 /**
+ * What a contact does.
+ */
+typedef enum PalpateContactMode {
+  /**
+   * No force.
+   */
+  PALPATE_CONTACT_MODE_FREE = 0,
+  /**
+   * The contact point follows the tool.
+   */
+  PALPATE_CONTACT_MODE_STICK = 1,
+  /**
+   * The tool slides over the surface.
+   */
+  PALPATE_CONTACT_MODE_SLIP = 2,
+  /**
+   * Every node of the triangle is held: no force can be computed.
+   */
+  PALPATE_CONTACT_MODE_LOST = 3,
+} PalpateContactMode;
+
+/**
  * A session that is being set up. A plain number: copy it freely; once used up or freed it is recognised.
  */
 typedef struct PalpateSetup {

@@ -217,6 +217,7 @@ static void tetrahedra_from_arrays() {
     for (const PalpateContact &contact : contacts) {
         EXPECT(contact.size == sizeof contact && contact.tool == 0 && contact.normal[2] > 0.5f);
         EXPECT(std::abs(contact.place_m[2] - 0.037f) < 0.006f);
+        EXPECT(contact.mode == PALPATE_CONTACT_MODE_STICK || contact.mode == PALPATE_CONTACT_MODE_SLIP);
     }
     EXPECT(!session.ended());
     session.wait(1.0);
