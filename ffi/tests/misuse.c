@@ -50,12 +50,9 @@ static void nulls(void) {
     EXPECT(palpate_setup_model(setup, NULL), PALPATE_CODE_NULL_POINTER, "model is null");
     EXPECT(palpate_setup_log(setup, NULL), PALPATE_CODE_NULL_POINTER, "path is null");
     EXPECT(palpate_setup_path(setup, NULL, NULL, 2), PALPATE_CODE_NULL_POINTER, "times_s is null");
-    EXPECT(palpate_start(setup, NULL), PALPATE_CODE_NULL_POINTER, "session is null");
-    PalpateSession session = {0};
-    EXPECT(palpate_start_hosted(setup, NULL, 1, &session), PALPATE_CODE_NULL_POINTER, "PalpateDevice is null");
     EXPECT(palpate_setup_free(setup), PALPATE_CODE_OK, "");
 
-    session = hosted();
+    PalpateSession session = hosted();
     PalpateState state = STATE;
     PalpateCommand command = {.size = sizeof command};
     EXPECT(palpate_attach(session), PALPATE_CODE_OK, "");
@@ -105,11 +102,7 @@ static void sizes(void) {
             EXPECT(palpate_setup_block(&block, &setup), PALPATE_CODE_WRONG_SIZE, "PalpateBlock: its `size`");
         }
     }
-    PalpateDevice device = DEVICE;
-    PalpateSession session = {0};
-    device.size = 8;
-    EXPECT(palpate_start_hosted(setup_of_block(), &device, 1, &session), PALPATE_CODE_WRONG_SIZE, "PalpateDevice");
-    session = hosted();
+    PalpateSession session = hosted();
     EXPECT(palpate_attach(session), PALPATE_CODE_OK, "");
     PalpateState state = STATE;
     PalpateCommand command = {.size = sizeof command};
@@ -122,6 +115,37 @@ static void sizes(void) {
     EXPECT(palpate_stop(session, &summary), PALPATE_CODE_WRONG_SIZE, "PalpateSummary");
     summary.size = sizeof summary;
     EXPECT(palpate_stop(session, &summary), PALPATE_CODE_OK, "");
+}
+
+/* Whatever a start fails by, nobody has to free the setup. */
+static void used_up(void) {
+    PalpateSession session = {0};
+    PalpateSetup setup = setup_of_block();
+    EXPECT(palpate_start(setup, NULL), PALPATE_CODE_NULL_POINTER, "session is null");
+    EXPECT(palpate_setup_free(setup), PALPATE_CODE_BAD_HANDLE, "is gone");
+    setup = setup_of_block();
+    EXPECT(palpate_start_hosted(setup, &DEVICE, 1, NULL), PALPATE_CODE_NULL_POINTER, "session is null");
+    EXPECT(palpate_setup_free(setup), PALPATE_CODE_BAD_HANDLE, "is gone");
+    PalpateDevice small = DEVICE, nameless = DEVICE;
+    small.size = 8;
+    nameless.name = "\xff";
+    const struct {
+        const PalpateDevice *devices;
+        size_t count;
+        PalpateCode code;
+        const char *words;
+    } starts[] = {
+        {NULL, 1, PALPATE_CODE_NULL_POINTER, "PalpateDevice is null"},
+        {&DEVICE, 0, PALPATE_CODE_BAD_ARGUMENT, "count is 0"},
+        {&DEVICE, SIZE_MAX, PALPATE_CODE_BAD_ARGUMENT, "must be 1 to"},
+        {&small, 1, PALPATE_CODE_WRONG_SIZE, "PalpateDevice"},
+        {&nameless, 1, PALPATE_CODE_BAD_ARGUMENT, "not UTF-8"},
+    };
+    for (size_t place = 0; place < sizeof starts / sizeof starts[0]; place++) {
+        setup = setup_of_block();
+        EXPECT(palpate_start_hosted(setup, starts[place].devices, starts[place].count, &session), starts[place].code, starts[place].words);
+        EXPECT(palpate_setup_free(setup), PALPATE_CODE_BAD_HANDLE, "is gone");
+    }
 }
 
 static void *tick_elsewhere(void *given) {
@@ -172,7 +196,6 @@ static void arguments(void) {
     EXPECT(palpate_setup_friction(setup, -1.0), PALPATE_CODE_OK, "");
     PalpateSession session = {0};
     EXPECT(palpate_start_hosted(setup, &DEVICE, 1, &session), PALPATE_CODE_SCENE, "friction");
-    EXPECT(palpate_start_hosted(setup_of_block(), &DEVICE, 0, &session), PALPATE_CODE_BAD_ARGUMENT, "count is 0");
     PalpateDevice strong = DEVICE;
     strong.max_force_n = -1.0;
     EXPECT(palpate_start_hosted(setup_of_block(), &strong, 1, &session), PALPATE_CODE_DEVICE, "max_force_n");
@@ -234,6 +257,7 @@ int main(void) {
     nulls();
     handles();
     sizes();
+    used_up();
     threads();
     arguments();
     if (failures == 0) {

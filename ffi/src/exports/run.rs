@@ -21,13 +21,17 @@ use crate::types::{PalpateDevice, PalpateSession, PalpateSetup, PalpateSummary};
 /// `session` is null or can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_start(setup: PalpateSetup, session: *mut PalpateSession) -> PalpateCode {
-    let start = || {
-        let own = taken(setup)?;
-        let is_virtual = own.is_virtual();
-        Ok(PalpateSession { id: SESSIONS.add(Live::new(own.session()?.start()?, is_virtual, None)) })
-    };
-    // SAFETY: the caller's promise.
-    boundary(|| unsafe { put_made(session, "session", start) })
+    boundary(|| {
+        // Before anything can fail.
+        let own = taken(setup);
+        let start = || {
+            let own = own?;
+            let is_virtual = own.is_virtual();
+            Ok(PalpateSession { id: SESSIONS.add(Live::new(own.session()?.start()?, is_virtual, None)) })
+        };
+        // SAFETY: the caller's promise.
+        unsafe { put_made(session, "session", start) }
+    })
 }
 
 /// Starts a session whose haptic loop the host owns, for its `count` devices: the thread of that loop calls palpate_attach once and
@@ -43,26 +47,43 @@ pub unsafe extern "C" fn palpate_start_hosted(
     count: usize,
     session: *mut PalpateSession,
 ) -> PalpateCode {
-    let start = || {
-        if count == 0 || count > MOST_DEVICES {
-            return Err(Failure::argument(format!("count is {count}, must be 1 to {MOST_DEVICES} devices")));
-        }
-        let mut told = Vec::with_capacity(count);
-        for place in 0..count {
-            let device = if devices.is_null() { devices } else { devices.wrapping_add(place) };
-            // SAFETY: the caller's promise: those before it have the right size, so this one begins here.
-            let device = unsafe { read(device)? };
+    boundary(|| {
+        // Before anything can fail.
+        let own = taken(setup);
+        let start = || {
+            let own = own?;
             // SAFETY: the caller's promise.
-            let name = (!device.name.is_null()).then(|| unsafe { text(device.name, "name") }).transpose()?;
-            told.push((name, device));
-        }
-        let own = taken(setup)?;
-        let is_virtual = own.is_virtual();
-        let (made, hosts, haptic) = own.hosted(&told)?;
-        Ok(PalpateSession { id: SESSIONS.add(Live::new(made.start()?, is_virtual, Some((hosts, haptic)))) })
+            let told = unsafe { named_devices(devices, count)? };
+            let is_virtual = own.is_virtual();
+            let (made, hosts, haptic) = own.hosted(&told)?;
+            Ok(PalpateSession { id: SESSIONS.add(Live::new(made.start()?, is_virtual, Some((hosts, haptic)))) })
+        };
+        // SAFETY: the caller's promise.
+        unsafe { put_made(session, "session", start) }
+    })
+}
+
+/// The devices of a host, each with its name if it has one.
+///
+/// # Safety
+/// `devices` is null or an array of `count` structs, each of which begins with its size and whose name is null or a text that a zero
+/// byte ends.
+unsafe fn named_devices(
+    devices: *const PalpateDevice,
+    count: usize,
+) -> Result<Vec<(Option<String>, PalpateDevice)>, Failure> {
+    if count == 0 || count > MOST_DEVICES {
+        return Err(Failure::argument(format!("count is {count}, must be 1 to {MOST_DEVICES} devices")));
+    }
+    let named = |place: usize| {
+        let device = if devices.is_null() { devices } else { devices.wrapping_add(place) };
+        // SAFETY: the caller's promise: those before it have the right size, so this one begins here.
+        let device = unsafe { read(device)? };
+        // SAFETY: the caller's promise.
+        let name = (!device.name.is_null()).then(|| unsafe { text(device.name, "name") }).transpose()?;
+        Ok((name, device))
     };
-    // SAFETY: the caller's promise.
-    boundary(|| unsafe { put_made(session, "session", start) })
+    (0..count).map(named).collect()
 }
 
 fn taken(setup: PalpateSetup) -> Result<crate::setup::Setup, Failure> {
