@@ -295,9 +295,9 @@ impl Comparison {
         }
     }
 
-    /// The runs that stopped before their end: the model and the fault.
+    /// The runs that stopped before their end, those of [`finer`](Self::finer) last: the model and the fault.
     pub fn faults(&self) -> impl Iterator<Item = (&str, &str)> {
-        self.runs.iter().filter_map(|run| match &run.outcome {
+        self.runs.iter().chain(&self.finer).filter_map(|run| match &run.outcome {
             RunOutcome::Failed(fault) => Some((&*run.model, &**fault)),
             RunOutcome::Measured(_) | RunOutcome::Refused(_) => None,
         })
@@ -363,6 +363,19 @@ mod tests {
         let error = of(&[device(1.0, 9.0), device(f64::NAN, f64::NAN), device(2.0, 3.0)]);
         assert_eq!((error.rms, error.max), (2.0, 9.0));
         assert!(of(&[device(f64::NAN, 1.0)]).rms.is_nan());
+    }
+
+    #[test]
+    fn a_fault_of_any_run_is_told_of_also_of_a_finer_one() {
+        let run = |model: &str, outcome| ComparedRun { model: model.to_owned(), latency: Nanos::ZERO, outcome };
+        let fault = || RunOutcome::Failed("it diverged".to_owned());
+        let comparison = Comparison {
+            runs: vec![run("hold", fault()), run("patch", RunOutcome::Refused("it is too small".to_owned()))],
+            finer: vec![run("half the step", fault())],
+            ..Comparison::default()
+        };
+        let faults: Vec<_> = comparison.faults().collect();
+        assert_eq!(faults, [("hold", "it diverged"), ("half the step", "it diverged")]);
     }
 
     #[test]
