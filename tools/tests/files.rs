@@ -160,6 +160,78 @@ fn a_full_disk_leaves_no_part_of_an_output_behind_and_keeps_what_was_there() {
 }
 
 #[test]
+fn an_output_that_cannot_be_written_is_refused_before_the_work() {
+    let folder = Folder::new();
+    // Check that it is what is told of, though the work would be refused, too
+    folder.write("none.mcap", "no log");
+    folder.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.write("page.html", "old");
+    let files = folder.files();
+    let works: [(&[&str], &str); 4] = [
+        (&["compare", "scene.toml", "--duration", "-1", "--html"], "run.duration_s"),
+        (&["reduce", "scene.toml", "--patch", "9,9,9", "--html"], "patch"),
+        (&["timing", "none.mcap", "--html"], "no MCAP"),
+        (&["mesh", "open.obj", "--size-mm", "4", "--out"], "the surface is open"),
+    ];
+    for (args, words) in works {
+        let call = |out| folder.call(&[args, &[out]].concat());
+        let refused = call("nowhere/out");
+        assert!(refused.code == Some(2) && refused.err.starts_with("error: nowhere/out: "), "{args:?}: {refused:?}");
+        // Check that what was there stays, and no part of another is left, where the work is refused
+        let refused = call("page.html");
+        assert!(refused.code == Some(2) && refused.err.contains(words), "{args:?}: {refused:?}");
+        assert_eq!(
+            (folder.files(), &*std::fs::read_to_string(folder.path("page.html")).unwrap()),
+            (files.clone(), "old")
+        );
+    }
+}
+
+#[test]
+fn an_interrupted_command_leaves_no_part_of_its_output() {
+    let folder = Folder::new();
+    let files = folder.files();
+    let mut child = spawn(&folder, &["compare", "scene.toml", "--duration", "1000", "--html", "page.html"]);
+    while folder.files() == files {
+        assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    // Its handler is there a moment after the file.
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let called = ended(child.wait_with_output().unwrap());
+    assert_eq!((called.code, &*called.out), (Some(130), ""), "{called:?}");
+    assert_eq!(folder.files(), files);
+}
+
+// A name space of users, in which nobody may do what permissions deny.
+#[test]
+fn a_file_in_a_folder_that_takes_no_other_is_written_over_when_there_is_something_to_write() {
+    let folder = Folder::new();
+    folder.succeed(&["run", "scene.toml", "--virtual", "--out", "run.mcap"]);
+    folder.write("none.mcap", "no log");
+    std::fs::create_dir(folder.path("full")).unwrap();
+    let table = folder.succeed(&["export", "run.mcap", "--topic", "/force"]);
+    folder.write("full/table.csv", table.repeat(2));
+    folder.write("full/page.html", "old");
+    let script = "chmod 500 full
+        palpate() { setpriv --bounding-set=-dac_override \"$0\" \"$@\"; echo $?; }
+        palpate timing none.mcap --html full/page.html
+        palpate timing none.mcap --html full/new.html
+        palpate export run.mcap --topic /force --out full/table.csv
+        chmod 700 full; ls -A full";
+    let output = Command::new("unshare")
+        .args(["-r", "sh", "-c", script, env!("CARGO_BIN_EXE_palpate")])
+        .current_dir(folder.path(""))
+        .output()
+        .unwrap();
+    let called = ended(output);
+    assert_eq!(called.out, "2\n2\n0\npage.html\ntable.csv\n", "{called:?}");
+    assert_eq!(std::fs::read_to_string(folder.path("full/page.html")).unwrap(), "old");
+    assert_eq!(std::fs::read_to_string(folder.path("full/table.csv")).unwrap(), table);
+}
+
+#[test]
 fn an_output_follows_links_keeps_permissions_and_goes_to_devices_as_it_is_written() {
     use std::os::unix::fs::PermissionsExt;
     let folder = Folder::new();

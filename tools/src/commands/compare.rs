@@ -38,7 +38,7 @@ pub struct CompareArgs {
 pub fn run(args: &CompareArgs) -> Result<(), Error> {
     let scene = progress::load(&args.scene)?;
     let inputs = files::inputs_of(&args.scene, &scene);
-    args.html.as_ref().map_or(Ok(()), |html| files::keep_inputs(&inputs, html))?;
+    let page = files::begin(args.html.as_deref(), &inputs)?;
     let name = shared::name_of(&args.scene);
     let options = CompareOptions {
         models: args.models.clone(),
@@ -51,7 +51,7 @@ pub fn run(args: &CompareArgs) -> Result<(), Error> {
     shown.clear();
     let mut comparison = compared.map_err(|error| error.at(&name))?;
     comparison.scene = name;
-    files::write_page(args.html.as_deref(), &inputs, || to_html(&comparison))?;
+    files::write_page(page, || to_html(&comparison))?;
     shared::print_report(args.json, || to_json(&comparison), || to_text(&comparison))?;
     match comparison.faults().next() {
         Some((model, fault)) => Err(Error::new(ErrorKind::Fault, format!("the run of `{model}`: {fault}"))),

@@ -1,11 +1,13 @@
 //! What commands read and write as files: an output is never an input, and it is there whole or not at all.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Write};
+use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use palpate::scene::{BodySpec, Scene};
 use palpate::{Error, ErrorKind};
+
+use super::shared::{EXIT_CODE, on_interrupt};
 
 /// The extension of what a scene's `basis_folder` keeps.
 const BASIS: &str = "basis";
@@ -66,7 +68,8 @@ fn is_one_file(_: &Path, _: &Path) -> bool {
 }
 
 /// A file in the making beside the one that it becomes: that one appears, or is replaced, once all is written. Dropped
-/// before, it leaves nothing behind. Devices and pipes take what comes.
+/// before, it leaves nothing behind. Devices and pipes take what comes. A file in a folder that takes no other is written over, from
+/// the first byte on that comes.
 #[derive(Debug)]
 pub struct OutputFile {
     file: File,
@@ -74,6 +77,8 @@ pub struct OutputFile {
     path: PathBuf,
     /// The file in the making and the one that it becomes.
     part: Option<[PathBuf; 2]>,
+    /// True if it is a file that is written over.
+    is_over_another: bool,
 }
 
 impl OutputFile {
@@ -92,7 +97,7 @@ impl OutputFile {
             Ok(there) => {
                 let file = OpenOptions::new().write(true).open(path)?;
                 if !there.is_file() {
-                    return Ok(Self { file, path: named, part: None });
+                    return Ok(Self { file, path: named, part: None, is_over_another: false });
                 }
                 // A file system without locks protects no file.
                 if let Err(TryLockError::WouldBlock) = file.try_lock() {
@@ -115,15 +120,16 @@ impl OutputFile {
             let part = target.with_file_name(format!(".palpate-{}-{number}.part", std::process::id()));
             match OpenOptions::new().write(true).create_new(true).open(&part) {
                 Ok(file) => {
-                    let output = Self { file, path: named, part: Some([part, target]) };
+                    let output = Self { file, path: named, part: Some([part, target]), is_over_another: false };
                     permissions.map_or(Ok(()), |permissions| output.file.set_permissions(permissions))?;
                     return Ok(output);
                 }
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 // The file may be written though its folder may not.
                 Err(error) if error.kind() == io::ErrorKind::PermissionDenied && permissions.is_some() => {
-                    let file = OpenOptions::new().write(true).truncate(true).open(&target)?;
-                    return Ok(Self { file, path: named, part: None });
+                    // What was there stays until something comes in its place.
+                    let file = OpenOptions::new().write(true).open(&target)?;
+                    return Ok(Self { file, path: named, part: None, is_over_another: true });
                 }
                 Err(error) => return Err(error),
             }
@@ -140,7 +146,15 @@ impl OutputFile {
             fs::rename(part, target).map_err(|error| Error::io(&self.path, error))?;
         }
         self.part = None;
+        if self.is_over_another {
+            self.end_here().map_err(|error| Error::io(&self.path, error))?;
+        }
         Ok(())
+    }
+
+    /// Cuts off what is left of the file that is written over.
+    fn end_here(&self) -> io::Result<()> {
+        self.file.set_len((&self.file).stream_position()?)
     }
 }
 
@@ -149,6 +163,10 @@ impl Drop for OutputFile {
         if let Some([part, _]) = &self.part {
             // Nobody is left to tell if that fails, too.
             let _ = fs::remove_file(part);
+        }
+        // Half of what comes with half of what was there would be neither.
+        if self.is_over_another && (&self.file).stream_position().is_ok_and(|written| written > 0) {
+            let _ = self.end_here();
         }
     }
 }
@@ -163,18 +181,28 @@ impl Write for &OutputFile {
     }
 }
 
+/// Begins what a command writes after its work, if it is asked for: before the work, which would be lost if it could not be written. A
+/// command that is interrupted meanwhile leaves nothing behind. For commands that handle interrupts in no other way.
+///
+/// # Errors
+/// Those of [`OutputFile::create`], and those of [`on_interrupt`].
+pub fn begin(path: Option<&Path>, inputs: &[impl AsRef<Path>]) -> Result<Option<OutputFile>, Error> {
+    let output = path.map(|path| OutputFile::create(path, inputs)).transpose()?;
+    if let Some([part, _]) = output.as_ref().and_then(|output| output.part.clone()) {
+        on_interrupt(move || {
+            let _ = fs::remove_file(&part);
+            std::process::exit(EXIT_CODE.into());
+        })?;
+    }
+    Ok(output)
+}
+
 /// Writes a page to where it was asked for, if it was.
 ///
 /// # Errors
-/// Those of [`OutputFile::create`].
-pub fn write_page(
-    path: Option<&Path>,
-    inputs: &[impl AsRef<Path>],
-    page: impl FnOnce() -> String,
-) -> Result<(), Error> {
-    let Some(path) = path else { return Ok(()) };
-    let page = page();
-    let output = OutputFile::create(path, inputs)?;
-    (&output).write_all(page.as_bytes()).map_err(|error| Error::io(path, error))?;
+/// [`ErrorKind::Io`] if the system refuses it; nothing is left behind then.
+pub fn write_page(output: Option<OutputFile>, page: impl FnOnce() -> String) -> Result<(), Error> {
+    let Some(output) = output else { return Ok(()) };
+    (&output).write_all(page().as_bytes()).map_err(|error| Error::io(&output.path, error))?;
     output.finish()
 }

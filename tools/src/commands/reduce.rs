@@ -82,12 +82,12 @@ pub struct Cells(Vec<usize>);
 pub fn run(args: &ReduceArgs) -> Result<(), Error> {
     let scene = args.scene.as_ref().map(|path| progress::load(path).map(|scene| (path, scene))).transpose()?;
     let inputs = scene.as_ref().map_or(Vec::new(), |(path, scene)| files::inputs_of(path, scene));
-    args.html.as_ref().map_or(Ok(()), |html| files::keep_inputs(&inputs, html))?;
+    let page = files::begin(args.html.as_deref(), &inputs)?;
     let mut shown = StepBar::default();
     let made = study(args, scene, &mut shown);
     shown.clear();
     let study = made?;
-    files::write_page(args.html.as_deref(), &inputs, || to_html(&study))?;
+    files::write_page(page, || to_html(&study))?;
     shared::print_report(args.json, || to_json(&study), || to_text(&study))?;
     match &study.locality {
         Some(locality) if args.fail_if_not_local && !locality.is_local => {

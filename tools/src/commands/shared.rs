@@ -155,7 +155,11 @@ pub fn waits() -> Result<Interrupt, Error> {
     on_interrupt(|| {})
 }
 
-fn on_interrupt(act: impl Fn() + Send + 'static) -> Result<Interrupt, Error> {
+/// Lets Ctrl-C do this once; a second one ends the command at once.
+///
+/// # Errors
+/// If the system refuses the handler.
+pub fn on_interrupt(act: impl Fn() + Send + 'static) -> Result<Interrupt, Error> {
     static CAME: OnceLock<()> = OnceLock::new();
     let handler = move || {
         if CAME.set(()).is_err() {

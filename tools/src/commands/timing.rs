@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use palpate::{Error, ErrorKind};
 
-use super::files::{keep_inputs, write_page};
+use super::files::{begin, write_page};
 use super::progress::ReadBar;
 use super::shared::{WindowArgs, name_of, print_report, warn_of_damage};
 use crate::timing::{
@@ -49,10 +49,10 @@ pub struct TimingArgs {
 pub fn run(args: &TimingArgs) -> Result<(), Error> {
     let inputs: Vec<&Path> =
         [Some(&args.log), args.against.as_ref()].into_iter().flatten().map(AsRef::as_ref).collect();
-    args.html.as_ref().map_or(Ok(()), |html| keep_inputs(&inputs, html))?;
+    let page = begin(args.html.as_deref(), &inputs)?;
     let report = read(&args.log, args, &args.group)?;
     let name = args.log.file_name().unwrap_or_default().to_string_lossy();
-    write_page(args.html.as_deref(), &inputs, || timing_html(&report, &name))?;
+    write_page(page, || timing_html(&report, &name))?;
     match &args.against {
         Some(other_log) => {
             let other = matched(other_log, args)?;
