@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use palpate::devices::PointerHandle;
 use palpate::session::{Running, Summary, Viewer};
-use palpate_view::{Options, Server};
+use palpate_view::{NotServed, Options, Server};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -130,12 +130,18 @@ impl Live {
             let mut stage = self.lock();
             match std::mem::replace(&mut *stage, Stage::Over) {
                 Stage::Runs { running, viewer: None, pointer: None } => {
-                    let server = palpate_view::serve(*running, &options);
-                    server.map(|server| {
-                        let url = server.url();
-                        *stage = Stage::Shown(server);
-                        Some(url)
-                    })
+                    let (shown, url) = match palpate_view::serve(*running, &options) {
+                        Ok(server) => {
+                            let url = server.url();
+                            (Stage::Shown(server), Ok(Some(url)))
+                        }
+                        // It goes on without a page.
+                        Err(NotServed { running, error }) => {
+                            (Stage::Runs { running, viewer: None, pointer: None }, Err(error))
+                        }
+                    };
+                    *stage = shown;
+                    url
                 }
                 Stage::Shown(server) => {
                     let url = server.url();

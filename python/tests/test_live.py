@@ -1,5 +1,6 @@
 """Sessions in real time, and their page. Counts and states are looked at, never times."""
 
+import socket
 import urllib.request
 
 import numpy as np
@@ -53,6 +54,16 @@ def test_a_page_shows_it(block, press, capsys):
         with urllib.request.urlopen(url.split("#")[0]) as answer:
             assert answer.status == 200 and b"<html" in answer.read().lower()
         assert live.view(open=False, seconds=0.05) == url
+        live.wait(0.1)
+    assert len(live.stop()) > 0
+
+
+def test_a_page_that_cannot_be_leaves_the_session_as_it_is(block, press):
+    with palpate.Session(block, path=press, model="patch").start(endless=True) as live, socket.create_server(("127.0.0.1", 0)) as taken:
+        with pytest.raises(palpate.RefusedError, match="cannot listen"):
+            live.view(open=False, seconds=0, port=taken.getsockname()[1])
+        assert not live.finished and live.elapsed is not None
+        assert "#" in live.view(open=False, seconds=0)
         live.wait(0.1)
     assert len(live.stop()) > 0
 

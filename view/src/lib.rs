@@ -47,12 +47,13 @@ mod subject;
 mod tuning;
 mod wish;
 
+use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, SendError, channel};
 
-use palpate::Error;
 use palpate::session::Running;
+use palpate::{Error, ErrorKind};
 
 pub use options::Options;
 pub use server::Server;
@@ -70,14 +71,55 @@ use wish::Wish;
 /// [pointer](palpate::devices::Pointer).
 ///
 /// # Errors
-/// [`ErrorKind::Runtime`](palpate::ErrorKind::Runtime) if it cannot listen, or if the system has no random numbers for a token.
+/// [`ErrorKind::Runtime`](palpate::ErrorKind::Runtime) if it cannot listen, or if the system has no random numbers for a token, with the
+/// session, which goes on. Where it is dropped it ends, and `?` makes an [`Error`] of what is left.
 ///
 /// # Real-time
 /// Not for a tick: starts threads. The session's own are never waited for.
-pub fn serve(running: Running, options: &Options) -> Result<Server, Error> {
-    let (door, hub, wishes) = prepare(options)?;
-    let stage = Stage::of_running(Arc::clone(&hub), wishes, running);
-    Server::start(door, hub, move || stage.run())
+pub fn serve(running: Running, options: &Options) -> Result<Server, NotServed> {
+    // Handed over once everything that can fail has not.
+    let (sender, session) = channel::<Running>();
+    let start = || {
+        let (door, hub, wishes) = prepare(options)?;
+        let shared = Arc::clone(&hub);
+        let show = move || Stage::of_running(shared, wishes, session.recv().ok()?).run();
+        Server::start(door, hub, show)
+    };
+    let not_served = |running, error| NotServed { error, running: Box::new(running) };
+    match start() {
+        Err(error) => Err(not_served(running, error)),
+        Ok(server) => match sender.send(running) {
+            Ok(()) => Ok(server),
+            Err(SendError(running)) => {
+                let gone = "the thread of the page is gone";
+                Err(not_served(running, Error::new(ErrorKind::Runtime, gone.to_owned())))
+            }
+        },
+    }
+}
+
+/// Why a session is not shown; it goes on.
+#[derive(Debug)]
+pub struct NotServed {
+    /// What was in the way.
+    pub error: Error,
+    /// The session.
+    pub running: Box<Running>,
+}
+
+impl fmt::Display for NotServed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.error.fmt(f)
+    }
+}
+
+impl std::error::Error for NotServed {}
+
+impl From<NotServed> for Error {
+    /// Ends the session.
+    fn from(not_served: NotServed) -> Self {
+        not_served.error
+    }
 }
 
 /// Shows a scene: starts a session of it, and another in its place when a visitor resets it. Friction, stiffness and local model change

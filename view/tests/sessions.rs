@@ -157,12 +157,31 @@ fn the_log_of_what_was_felt_holds_what_was_shown() {
     assert!(reader.topics().get("/scene").is_some_and(|count| *count > 0), "with pictures: {:?}", reader.topics());
 }
 
-#[test]
-fn a_program_serves_its_own_session_in_three_lines() {
+/// A session that a program starts.
+fn started() -> palpate::session::Running {
     let body = Block::builder([6, 6, 6], [0.05; 3]).fix(palpate::model::mesh::Face::ZMin).build().unwrap();
     let path = ToolPath::constant([0.02, 0.02, 0.07]).unwrap();
-    let running = Session::builder(body).path(path).share_records().build().unwrap().start().unwrap();
-    let server = palpate_view::serve(running, &Options::default()).unwrap();
+    Session::builder(body).path(path).endless().share_records().build().unwrap().start().unwrap()
+}
+
+#[test]
+fn a_session_that_cannot_be_shown_goes_on() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let options = Options { port: taken.local_addr().unwrap().port(), ..Options::default() };
+    let refused = palpate_view::serve(started(), &options).unwrap_err();
+    assert!(refused.to_string().contains("cannot listen"), "{refused}");
+    assert!(!refused.running.finished());
+    // Check that nothing of it was taken, either
+    let server = palpate_view::serve(*refused.running, &Options::default()).unwrap();
+    let mut visitor = enter(&server, server.url().split_once('#').unwrap().1);
+    assert!(find(&mut visitor, hello).is_some_and(|hello| hello["has_samples"] == true));
+    assert!(find(&mut visitor, tool).is_some());
+    assert!(server.stop().is_some_and(|summary| summary.runtime.fault.is_none()));
+}
+
+#[test]
+fn a_program_serves_its_own_session_in_three_lines() {
+    let server = palpate_view::serve(started(), &Options::default()).unwrap();
     let token = server.url().split_once('#').unwrap().1.to_owned();
     let mut visitor = enter(&server, &token);
     let hello = find(&mut visitor, hello).unwrap();
