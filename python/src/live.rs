@@ -20,6 +20,8 @@ use crate::run::Run;
 
 /// How long a wait goes on before it looks whether somebody pressed Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
+/// How long it goes on before it looks whether the session has ended.
+const NAP: Duration = Duration::from_millis(5);
 
 /// A session that runs in real time on threads of its own, which Python never makes wait.
 ///
@@ -35,8 +37,14 @@ pub(crate) struct Live {
 
 /// Where the session is. Locked for a moment at a time, and never while Python is held.
 enum Stage {
-    Runs { running: Box<Running>, viewer: Option<Box<Viewer>>, pointer: Option<PointerHandle> },
+    Runs {
+        running: Box<Running>,
+        viewer: Option<Box<Viewer>>,
+        pointer: Option<PointerHandle>,
+    },
     Shown(Server),
+    /// Somebody is ending it.
+    Ends,
     Over,
 }
 
@@ -51,17 +59,26 @@ impl Live {
     }
 
     /// Waits until `is_over` says so, or `seconds` have passed. An interrupt ends it.
-    fn until(
-        &self,
-        py: Python<'_>,
-        seconds: Option<f64>,
-        is_over: impl Fn(&Stage, Duration) -> bool + Sync,
-    ) -> PyResult<()> {
+    fn until(&self, py: Python<'_>, seconds: Option<f64>, is_over: impl Fn(&Stage) -> bool + Sync) -> PyResult<()> {
         let end = seconds
             .map(|seconds| Instant::now() + Duration::try_from_secs_f64(seconds.max(0.0)).unwrap_or(Duration::MAX / 4));
         loop {
-            let left = end.map_or(LOOK, |end| end.saturating_duration_since(Instant::now()).min(LOOK));
-            if py.detach(|| is_over(&self.lock(), left)) || end.is_some_and(|end| Instant::now() >= end) {
+            let look = Instant::now() + LOOK;
+            let look = end.map_or(look, |end| end.min(look));
+            let is_over = py.detach(|| {
+                loop {
+                    // Other threads have the session while this one sleeps.
+                    if is_over(&self.lock()) {
+                        return true;
+                    }
+                    let left = look.saturating_duration_since(Instant::now());
+                    if left.is_zero() {
+                        return false;
+                    }
+                    std::thread::sleep(left.min(NAP));
+                }
+            });
+            if is_over || end.is_some_and(|end| Instant::now() >= end) {
                 return Ok(());
             }
             py.check_signals()?;
@@ -70,11 +87,16 @@ impl Live {
 
     /// Ends the session, and says how it went.
     fn end(&self) -> Option<Summary> {
-        match std::mem::replace(&mut *self.lock(), Stage::Over) {
+        // Threads are joined without the lock: others may look meanwhile.
+        let stage = std::mem::replace(&mut *self.lock(), Stage::Ends);
+        let summary = match stage {
             Stage::Runs { running, .. } => Some(running.stop()),
             Stage::Shown(server) => server.stop(),
             Stage::Over => None,
-        }
+            Stage::Ends => return None,
+        };
+        *self.lock() = Stage::Over;
+        summary
     }
 
     /// What is left of the session, for whoever ends it.
@@ -93,12 +115,10 @@ impl Live {
     /// Waits until the session has ended by itself, or `seconds` have passed. Ctrl-C ends the wait with KeyboardInterrupt.
     #[pyo3(signature = (seconds = None))]
     fn wait(&self, py: Python<'_>, seconds: Option<f64>) -> PyResult<()> {
-        self.until(py, seconds, |stage, span| match stage {
-            Stage::Runs { running, .. } => {
-                running.wait_for(span);
-                running.finished()
-            }
-            Stage::Shown(server) => server.wait_for(span),
+        self.until(py, seconds, |stage| match stage {
+            Stage::Runs { running, .. } => running.finished(),
+            Stage::Shown(server) => server.wait_for(Duration::ZERO),
+            Stage::Ends => false,
             Stage::Over => true,
         })
     }
@@ -160,8 +180,8 @@ impl Live {
         if open {
             py.import("webbrowser")?.call_method1("open", (&url,))?;
         }
-        let waited = self.until(py, seconds, |stage, span| match stage {
-            Stage::Shown(server) => server.wait_for(span),
+        let waited = self.until(py, seconds, |stage| match stage {
+            Stage::Shown(server) => server.wait_for(Duration::ZERO),
             _ => true,
         });
         // Ctrl-C is how a page is left.
@@ -230,7 +250,7 @@ impl Live {
     fn finished(&self, py: Python<'_>) -> bool {
         py.detach(|| match &*self.lock() {
             Stage::Runs { running, .. } => running.finished(),
-            Stage::Shown(_) => false,
+            Stage::Shown(_) | Stage::Ends => false,
             Stage::Over => true,
         })
     }
@@ -258,7 +278,7 @@ impl Live {
         let state = py.detach(|| match &*self.lock() {
             Stage::Runs { running, .. } => format!("{:.1} s", running.elapsed().as_secs_f64()),
             Stage::Shown(_) => "on a page".to_owned(),
-            Stage::Over => "over".to_owned(),
+            Stage::Ends | Stage::Over => "over".to_owned(),
         });
         format!("<palpate.Live of {}, {state}>", self.name)
     }

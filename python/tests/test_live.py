@@ -1,6 +1,7 @@
 """Sessions in real time, and their page. Counts and states are looked at, never times."""
 
 import socket
+import threading
 import urllib.request
 
 import numpy as np
@@ -66,6 +67,22 @@ def test_a_page_that_cannot_be_leaves_the_session_as_it_is(block, press):
         assert "#" in live.view(open=False, seconds=0)
         live.wait(0.1)
     assert len(live.stop()) > 0
+
+
+def test_a_thread_that_waits_is_in_nobodys_way(block, press):
+    for shown in (False, True):
+        live = palpate.Session(block, path=press, model="hold").start(endless=True)
+        if shown:
+            live.view(open=False, seconds=0)
+        waiting = threading.Thread(target=live.wait, args=(20.0,))
+        waiting.start()
+        # A tenth of the wait each, if each waited for a look of the other thread's.
+        for _ in range(1000):
+            assert (live.elapsed is None) == shown
+        assert waiting.is_alive()
+        assert len(live.stop()) > 0
+        waiting.join()
+        assert live.finished
 
 
 def test_what_now_took_no_page_can_have(block, press):
