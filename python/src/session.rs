@@ -92,6 +92,10 @@ impl Session {
         ];
         for (table, key, given) in given {
             if let Some(value) = keyword(given, &format!("{table}.{key}"))? {
+                if matches!(changes.get(table), Some(Value::Array(_))) {
+                    let message = format!("is for one {table}, and settings has a list of them: say it there");
+                    return Err(usage(py, key, &message));
+                }
                 put(&mut changes, table, key, value);
             }
         }

@@ -51,6 +51,16 @@ def test_a_session_is_refused_by_the_field_of_a_scene(block, press, keywords, fi
     assert field is None or caught.value.field == field
 
 
+@pytest.mark.parametrize("keywords", [{"tool": palpate.Sphere(0.004)}, {"attach_node": [3, 3, 7]}])
+def test_what_is_of_one_tool_is_refused_where_several_are_listed(block, press, keywords):
+    hand = {"kind": "pointer", "pointer": {"start_m": [0.03, 0.03, 0.07]}}
+    settings = {"device": [{"name": "left", **hand}, {"name": "right", **hand}]}
+    palpate.Session(block, settings=settings)
+    with pytest.raises(palpate.UsageError, match="a list of them") as caught:
+        palpate.Session(block, settings=settings, **keywords)
+    assert caught.value.field == next(iter(keywords))
+
+
 def test_a_file_is_named_with_its_line(tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text("[body]\nkind = 'mass_spring'\n[body.block]\nnodes = [8, 8]\n")
