@@ -38,7 +38,7 @@ const STEP: Duration = Duration::from_millis(10);
 /// is glued to, (i, j, k) of a block or its number. model: "auto", "full", "hold", "patch", "predictive" and so on. friction: Coulomb's
 /// coefficient, "stick" for a tool that sticks. error_pct: what 19 of 20 random scenes are to keep (rms, % of the peak force). patch: nodes
 /// along the surface, along it, into depth. basis: states of the reduced surroundings. crossfade_ms: resyncs are blended over so long. probes: nodes
-/// whose position is logged, numbers or (i, j, k). duration_s: simulated time; without, that of the path, or of the scene. rate_hz,
+/// whose position is logged, numbers or (i, j, k). duration_s: simulated time; without, what the scene says, or that of the path. rate_hz,
 /// global_rate_hz: of the local and the global model. settings: any tables of a scene file, such as {"safety": {...}}.
 ///
 /// Raises SceneError with the field of a scene file and what would be right.

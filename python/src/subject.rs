@@ -17,7 +17,7 @@ pub(crate) fn of_body(
     mut changes: Table,
     path: Option<ToolPath>,
 ) -> PyResult<EngineScene> {
-    let has_duration = changes.get("run").is_some_and(|run| run.get("duration_s").is_some());
+    let has_duration = has_duration(&changes);
     if changes.remove("body").is_some() {
         return Err(usage(py, "settings", "has a body, and so has the session: leave one out"));
     }
@@ -29,10 +29,7 @@ pub(crate) fn of_body(
     // A mesh has been read, and is not read again.
     scene.body = spec.cloned();
     if let Some(path) = path {
-        if !has_duration && path.duration_s() > 0.0 {
-            scene.run.duration_s = path.duration_s();
-        }
-        put_path(py, &mut scene, path)?;
+        put_path(py, &mut scene, path, has_duration)?;
     }
     Ok(scene)
 }
@@ -72,6 +69,7 @@ pub(crate) fn described(
         return Err(usage(py, "settings", "has a body, and so has the scene: make another Scene of its to_dict()"));
     }
     merge(&mut table, changes);
+    let has_duration = has_duration(&table);
     if !is_block {
         // Its mesh has been read, and is not read again.
         table.remove("body");
@@ -88,13 +86,20 @@ pub(crate) fn described(
         changed.devices[0].path.clone_from(&scene.devices[0].path);
     }
     if let Some(path) = path {
-        put_path(py, &mut changed, path)?;
+        put_path(py, &mut changed, path, has_duration)?;
     }
     Ok((changed, name.clone()))
 }
 
-/// Lets the first device follow `path`.
-fn put_path(py: Python<'_>, scene: &mut EngineScene, path: ToolPath) -> PyResult<()> {
+fn has_duration(table: &Table) -> bool {
+    table.get("run").is_some_and(|run| run.get("duration_s").is_some())
+}
+
+/// Lets the first device follow `path`, to the end of which the session lasts if nothing says how long.
+fn put_path(py: Python<'_>, scene: &mut EngineScene, path: ToolPath, has_duration: bool) -> PyResult<()> {
+    if !has_duration && path.duration_s() > 0.0 {
+        scene.run.duration_s = path.duration_s();
+    }
     let first = scene.devices.first_mut();
     let first = first.ok_or_else(|| usage(py, "path", "is for a scene with a device, and this has none"))?;
     (first.path, first.path_csv) = (Some(path), None);

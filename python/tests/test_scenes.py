@@ -46,6 +46,21 @@ def test_a_session_changes_a_scene_and_leaves_it_alone(scenes):
     assert scene.to_dict()["contact"]["friction"] == pytest.approx(1.0)
 
 
+def test_a_run_lasts_as_its_scene_says_or_to_the_end_of_the_path(block, press):
+    material = {"stiffness_n_per_m": 30.0, "damping_ratio": 0.3, "node_mass_kg": 0.0005}
+    body = {"body": {"kind": "mass_spring", "block": {"nodes": [8, 8, 8], "size_m": [0.06] * 3}, "material": material}}
+    timed = {**body, "run": {"duration_s": 0.1}}
+    for subject, keywords, ticks in [
+        (block, {}, 250),
+        (body, {}, 250),
+        (palpate.Scene(body), {}, 250),
+        (timed, {}, 100),
+        (timed, {"duration_s": 0.05}, 50),
+        (body, {"settings": {"run": {"duration_s": 0.05}}}, 50),
+    ]:
+        assert len(palpate.Session(subject, path=press, model="hold", **keywords).run()) == ticks
+
+
 def test_a_sphere_turns_and_touches_at_many_places(block):
     path = [(0.0, 0.03, 0.03, 0.068, 1, 0, 0, 0), (0.2, 0.03, 0.03, 0.06, np.sqrt(0.5), 0, 0, np.sqrt(0.5))]
     run = palpate.Session(block, tool=palpate.Capsule(0.004, 0.02, (1, 0, 0)), path=path, model="full").run()
