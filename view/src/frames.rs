@@ -68,6 +68,14 @@ pub(crate) fn surface(time: f64, points: impl ExactSizeIterator<Item = [f64; 3]>
     to.0.into()
 }
 
+/// Where a node is (m) in what [`surface`] made.
+pub(crate) fn place(surface: &[u8], node: u32) -> Option<[f64; 3]> {
+    let first = 16 + 12 * node as usize;
+    let (numbers, _) = surface.get(first..first + 12)?.as_chunks::<4>();
+    let &[x, y, z] = numbers else { return None };
+    Some([x, y, z].map(|c| f32::from_le_bytes(c).into()))
+}
+
 /// Tools with their pointers, of a surface of another time (s).
 pub(crate) fn tools(surface_time: f64, tools: &[ToolView], pointers: &[[f64; 3]], touches: &[Touch]) -> Bytes {
     let time = tools.iter().map(|tool| tool.time.as_secs_f64()).fold(0.0, f64::max);
@@ -132,6 +140,7 @@ mod tests {
         let surface = surface(1.5, [[1.0, 2.0, 3.0]].into_iter(), &[4e3]);
         assert_eq!(surface.len(), 16 + 12 + 4);
         assert_eq!(f64::from_le_bytes(surface[8..16].try_into().unwrap()), 1.5);
+        assert_eq!((place(&surface, 0), place(&surface, 1)), (Some([1.0, 2.0, 3.0]), None));
         let shown = tools(0.25, &[ToolView::default()], &[[4.0, 5.0, 6.0]], &[Touch::default()]);
         assert_eq!(shown.len(), 24 + 4 * (TOOL_FLOATS + CONTACT_FLOATS));
         let at = 24 + 4 * 13;

@@ -293,7 +293,8 @@ fn touch(touches: &mut Vec<(Nanos, Touch)>, record: &LogRecord, points: &[[f64; 
         LogRecord::Contact(contact) => {
             touches.retain(|(time, touch)| touch.device != contact.device || *time == contact.time);
             let has_places = touches.iter().any(|(_, touch)| touch.device == contact.device);
-            if !has_places && let Some(touch) = of_point(contact, points, topology) {
+            let place = |corner: u32| points.get(corner as usize).copied().unwrap_or_default();
+            if !has_places && let Some(touch) = of_point(contact, place, topology) {
                 touches.push((contact.time, touch));
             }
         }
@@ -301,14 +302,14 @@ fn touch(touches: &mut Vec<(Nanos, Touch)>, record: &LogRecord, points: &[[f64; 
     }
 }
 
-/// Where a tool that is a point touches the newest surface.
-fn of_point(contact: &ContactSample, points: &[[f64; 3]], topology: &Topology) -> Option<Touch> {
+/// Where a tool that is a point touches a surface whose nodes are at these places (m).
+pub(crate) fn of_point(contact: &ContactSample, node: impl Fn(u32) -> [f64; 3], topology: &Topology) -> Option<Touch> {
     let corners = topology.triangles.get(contact.triangle as usize).filter(|_| contact.normal_force_n > 0.0)?;
     let [u, v] = contact.weights;
     let weights = [1.0 - u - v, u, v];
     let place = |axis: usize| -> f64 {
         let parts = corners.iter().zip(weights);
-        parts.map(|(&corner, weight)| weight * points.get(corner as usize).map_or(0.0, |point| point[axis])).sum()
+        parts.map(|(&corner, weight)| weight * node(corner)[axis]).sum()
     };
     Some(Touch {
         place_m: std::array::from_fn(|axis| place(axis) as f32),

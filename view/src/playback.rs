@@ -7,9 +7,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use bytes::Bytes;
-use palpate::log::{Environment, LogEntry, LogReader, LogRecord, ToolSample};
+use palpate::log::{ContactSample, Environment, LogEntry, LogReader, LogRecord, ToolSample};
 use palpate::model::Vec3;
-use palpate::model::contact::ContactMode;
 use palpate::runtime::Nanos;
 use palpate::session::ToolView;
 use palpate::{Error, ErrorKind};
@@ -18,7 +17,7 @@ use serde_json::json;
 use crate::client::Picture;
 use crate::frames::{self, Topology, Touch};
 use crate::hub::{Begun, Hub};
-use crate::live::shape;
+use crate::live::{of_point, shape};
 use crate::samples::{Row, Rows, block};
 use crate::wish::Wish;
 
@@ -40,7 +39,7 @@ struct Frame {
 struct Track {
     tools: Vec<ToolSample>,
     rows: Vec<(Nanos, Row)>,
-    modes: Vec<(Nanos, ContactMode)>,
+    contacts: Vec<ContactSample>,
     touches: Vec<(Nanos, Touch)>,
 }
 
@@ -129,7 +128,7 @@ impl Playback {
         let mut add = |push: &dyn Fn(&mut Track)| push(self.tracks.entry(device).or_default());
         match record {
             LogRecord::Tool(sample) => add(&|track| track.tools.push(*sample)),
-            LogRecord::Contact(contact) => add(&|track| track.modes.push((time, contact.mode))),
+            LogRecord::Contact(contact) => add(&|track| track.contacts.push(*contact)),
             LogRecord::ContactPoint(point) => {
                 let touch = Touch { place_m: point.place_m, force_n: point.force_n, triangle: point.triangle, device };
                 add(&|track| track.touches.push((time, touch)));
@@ -190,7 +189,7 @@ impl Playback {
         let number = self.frames.partition_point(|frame| frame.time <= time).saturating_sub(1);
         let frame = &self.frames[number];
         let (samples, is_jump) = missing(shown.samples, time);
-        let tools = self.tools(time, frame.time);
+        let tools = self.tools(time, frame);
         hub.to_one(browser, |outbox| {
             if shown.frame != Some(number) {
                 outbox.show(Picture::Surface, frame.surface.clone());
@@ -212,7 +211,7 @@ impl Playback {
     }
 
     /// The tools at `time` beside the surface of another.
-    fn tools(&self, time: Nanos, surface: Nanos) -> Bytes {
+    fn tools(&self, time: Nanos, frame: &Frame) -> Bytes {
         let mut touches = Vec::new();
         let tools: Vec<ToolView> = self
             .tracks
@@ -221,13 +220,18 @@ impl Playback {
                 let before = |count: usize| count.checked_sub(1);
                 let tool = before(track.tools.partition_point(|tool| tool.time <= time)).map(|at| track.tools[at]);
                 let row = before(track.rows.partition_point(|row| row.0 <= time)).map(|at| track.rows[at]);
-                let mode = before(track.modes.partition_point(|mode| mode.0 <= time)).map(|at| track.modes[at].1);
+                let contact = before(track.contacts.partition_point(|contact| contact.time <= time));
+                let contact = contact.map(|at| track.contacts[at]);
                 let (tool, (_, row)) = (tool.unwrap_or_default(), row.unwrap_or_default());
+                let is_now = |then: Nanos| time.saturating_sub(then) < Nanos(2_000_000);
                 if let Some(tick) = before(track.touches.partition_point(|touch| touch.0 <= time)) {
                     let then = track.touches[tick].0;
-                    let is_now = time.saturating_sub(then) < Nanos(2_000_000);
-                    let own = track.touches[..=tick].iter().rev().take_while(|touch| is_now && touch.0 == then);
+                    let own = track.touches[..=tick].iter().rev().take_while(|touch| is_now(then) && touch.0 == then);
                     touches.extend(own.map(|touch| touch.1));
+                } else if let Some(contact) = contact.filter(|contact| is_now(contact.time)) {
+                    // A tool that is a point has no places of its own, in all of the log.
+                    let node = |corner| frames::place(&frame.surface, corner).unwrap_or_default();
+                    touches.extend(of_point(&contact, node, &self.topology));
                 }
                 ToolView {
                     time,
@@ -235,12 +239,12 @@ impl Playback {
                     orientation: tool.orientation,
                     computed_force: Vec3::from(row.force_n),
                     commanded_force: Vec3::from(row.command_n),
-                    mode: mode.unwrap_or_default(),
+                    mode: contact.unwrap_or_default().mode,
                     ..ToolView::default()
                 }
             })
             .collect();
-        frames::tools(surface.as_secs_f64(), &tools, &[], &touches)
+        frames::tools(frame.time.as_secs_f64(), &tools, &[], &touches)
     }
 }
 
