@@ -15,6 +15,8 @@ function showHello() {
   const may = state.role === "hand";
   ["model", "friction", "static", "stribeck", "stiffness", "reset", "home"].forEach((id) => { element(id).disabled = !may || hello.mode === "log"; });
   element("reset").hidden = !hello.can_restart;
+  // Its key does what it does, hidden or not.
+  element("reset").disabled ||= !hello.can_restart;
   element("home").hidden = hello.mode === "log";
   showPlayer();
   element("save-log").hidden = !hello.has_samples || hello.mode === "log";

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
-use palpate::Error;
 use palpate::session::{Running, Summary};
+use palpate::{Error, ErrorKind};
 use serde_json::{Value, json};
 
 use crate::hub::Hub;
@@ -110,8 +110,12 @@ impl Stage {
         }
     }
 
-    /// Puts another session in the place of this one.
+    /// Puts another session in the place of this one. That of a program is the only one, and goes on.
     fn restart(&mut self, change: &Change) -> Result<(), Error> {
+        if self.subject.is_none() {
+            let only = "the session is a program's own, and only the program starts it anew";
+            return Err(Error::new(ErrorKind::Usage, only.to_owned()));
+        }
         self.hub.say(&note("The body starts anew ..."));
         let result = self.replace(change);
         // What is shown goes on, or, if that has ended, starts anew as it was.

@@ -180,6 +180,19 @@ fn a_session_that_cannot_be_shown_goes_on() {
 }
 
 #[test]
+fn a_session_of_a_program_is_not_restarted_and_nobody_is_told_that_it_is() {
+    let server = palpate_view::serve(started(), &Options::default()).unwrap();
+    let mut visitor = enter(&server, server.url().split_once('#').unwrap().1);
+    assert_eq!(find(&mut visitor, hello).unwrap()["can_restart"], false);
+    say(&mut visitor, r#"{"do":"restart"}"#);
+    let told = find(&mut visitor, |message| text(message).filter(|said| said["kind"] == "note"));
+    let told = told.unwrap()["text"].to_string();
+    assert!(told.contains("does not work") && told.contains("program"), "{told}");
+    assert!(find(&mut visitor, tool).is_some());
+    assert!(server.stop().is_some_and(|summary| summary.runtime.fault.is_none()));
+}
+
+#[test]
 fn a_program_serves_its_own_session_in_three_lines() {
     let server = palpate_view::serve(started(), &Options::default()).unwrap();
     let token = server.url().split_once('#').unwrap().1.to_owned();
