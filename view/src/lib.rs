@@ -71,7 +71,7 @@ use wish::Wish;
 /// [pointer](palpate::devices::Pointer).
 ///
 /// # Errors
-/// [`ErrorKind::Runtime`](palpate::ErrorKind::Runtime) if it cannot listen, or if the system has no random numbers for a token, with the
+/// [`ErrorKind::Runtime`] if it cannot listen, or if the system has no random numbers for a token, with the
 /// session, which goes on. Where it is dropped it ends, and `?` makes an [`Error`] of what is left.
 ///
 /// # Real-time
@@ -139,7 +139,7 @@ pub fn serve_scene(pushed: Pushed, options: &Options) -> Result<Server, Error> {
 /// Shows a log with pictures (topic `/scene`): a visitor plays it, steps through it, slower and faster.
 ///
 /// # Errors
-/// Those of [`serve`]; [`ErrorKind::Io`](palpate::ErrorKind::Io) and [`ErrorKind::Log`](palpate::ErrorKind::Log) if the log cannot be
+/// Those of [`serve`]; [`ErrorKind::Io`] and [`ErrorKind::Log`] if the log cannot be
 /// read or has no pictures.
 ///
 /// # Real-time
