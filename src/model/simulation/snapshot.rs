@@ -5,7 +5,7 @@ use crate::body::{State, Stiffness};
 use crate::contact::{Law, Touch};
 use crate::{Vec3, Wrench};
 
-/// Where a simulation is: another one of the same body, with the same tools, goes on from it bit for bit.
+/// A simulation at one moment: another one of the same body, with the same tools, goes on from it bit for bit.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
     state: State,
