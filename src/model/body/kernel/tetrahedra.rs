@@ -154,7 +154,7 @@ fn average(parts: &mut [Part], inverse_volumes: &[f64], cores: &Cores) {
 type Corners = [Numbers; 4];
 
 /// Eight elements. All factors are negative, so that forces come out as they are and not as what resists them.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 struct Batch {
     /// A = V B B^T: 11, 22, 33, 12, 13, 23 (m).
@@ -172,7 +172,7 @@ struct Batch {
 }
 
 /// Eight elements at rest, for the first of two passes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 struct Resting {
     /// V (m^3).
@@ -231,16 +231,8 @@ impl Part {
 
     /// Appends a batch.
     fn push(&mut self, members: &[usize], nodes: &[[u32; 4]], elements: &[([u32; 4], Element)]) {
-        let (mut corners, zero) = ([[(self.nodes.len() - 1) as u32; LANES]; 4], [0.0; LANES]);
-        let mut batch = Batch {
-            metric: [zero; 6],
-            shear: zero,
-            viscosity: zero,
-            pressure: zero,
-            offset: zero,
-            inverse_volume: zero,
-        };
-        let mut resting = Resting { volume: zero, inverse_faces: zero, inverse_edges: [zero; 3] };
+        let mut corners = [[(self.nodes.len() - 1) as u32; LANES]; 4];
+        let (mut batch, mut resting) = (Batch::default(), Resting::default());
         for (lane, &member) in members.iter().enumerate() {
             let element = &elements[member].1;
             (0..4).for_each(|corner| corners[corner][lane] = nodes[member][corner]);
