@@ -26,7 +26,7 @@ const USED_BY_TICKS: &str = "
 
 /// Types whose own section speaks for all of their methods: plain values, actors, what is gone before a run.
 const SPEAK_FOR_ALL: &str = "
-    Nanos Rate TickContext Record TickTiming Event PortUse PortUseKind SlipCause SlipCounts Histogram GraphError ModelError
+    Nanos Rate TickContext TickTiming Event PortUse PortUseKind SlipCause SlipCounts Histogram GraphError ModelError
     LogRecord ContactSample ContactPointSample ContactMode Cause DeviceFault Capabilities DeviceState ForceCommand Actions Contact Friction ToolMotion Blend ToolForecast Spring Stepping TangentBlock Face Lattice Region Shape ToolShape Pose Wrench
     DeviceActor LocalActor LocalTool WholeActor GlobalActor LoggerActor LogSink HapticBridge GlobalBridge
     BytesWriter BytesReader Parcel Image
