@@ -281,32 +281,36 @@ mod tests {
         assert!(found > 3000 && inside > 20 && (600..1700).contains(&narrow), "{found} {inside} {narrow}");
     }
 
+    /// Where a resting tool of that `shape`, its centre at `centre`, touches a `block` whose nodes rest at `positions`.
+    fn places(block: &Block, mut positions: Vec<Vec3>, shape: ToolShape, centre: Vec3) -> Vec<Near> {
+        let candidates: Vec<u32> = (0..block.surface().triangles.len() as u32).collect();
+        let body = Deformable {
+            velocities: &mut vec![Vec3::zeros(); positions.len()],
+            positions: &mut positions,
+            inverse_masses: block.inverse_masses(),
+            surface: block.surface(),
+            candidates: &candidates,
+        };
+        let touch = Touch::new(shape, Arc::new(Skin::new(block, shape.radius())), Contact::default());
+        let mut search = Search::new(1);
+        search.make_room(block.rest().len(), candidates.len());
+        search.find(&body, (0, &touch), ToolMotion::straight(centre, centre), 1e-3);
+        search.near
+    }
+
     /// A long axis that stands upright in a flat top, at places where nodes and edges are and where none is: where it passes the surface is the
     /// way out of its end too.
     #[test]
     fn the_end_of_an_upright_axis_is_found_inside_wherever_it_goes_in() {
         let block = Block::builder([9, 9, 5], [0.08, 0.08, 0.04]).fix(Face::ZMin).build().unwrap();
-        let candidates: Vec<u32> = (0..block.surface().triangles.len() as u32).collect();
         let (radius, depth) = (2e-3, 6.5e-3);
         for (x, y) in [(0.04, 0.021), (0.054, 0.027), (0.02, 0.03), (0.05, 0.04), (0.026, 0.041)] {
             for tilt in [Vec3::zeros(), Vec3::x() * 0.3, Vec3::new(-0.2, 0.4, 0.7)].map(Turn::from_scaled_axis) {
                 let half_axis = tilt * Vec3::z() * 0.015;
-                let State { mut positions, mut velocities } = State::at_rest(block.rest());
-                positions.iter_mut().for_each(|position| *position = tilt * *position);
-                let body = Deformable {
-                    positions: &mut positions,
-                    velocities: &mut velocities,
-                    inverse_masses: block.inverse_masses(),
-                    surface: block.surface(),
-                    candidates: &candidates,
-                };
-                let shape = ToolShape::Capsule { radius, half_axis };
-                let touch = Touch::new(shape, Arc::new(Skin::new(&block, radius)), Contact::default());
+                let positions = block.rest().iter().map(|position| tilt * position).collect();
                 let centre = tilt * Vec3::new(x, y, 0.04 - depth) + half_axis;
-                let mut search = Search::new(1);
-                search.make_room(block.rest().len(), candidates.len());
-                search.find(&body, (0, &touch), ToolMotion::straight(centre, centre), 1e-3);
-                let deepest = search.near.iter().min_by(|one, other| one.gap.total_cmp(&other.gap));
+                let near = places(&block, positions, ToolShape::Capsule { radius, half_axis }, centre);
+                let deepest = near.iter().min_by(|one, other| one.gap.total_cmp(&other.gap));
                 let Near { gap, normal, share, .. } = *deepest.expect("it is in the block");
                 assert!((gap + depth + radius).abs() < 1e-9 && share == 0.0, "{x} {y}: {gap} at {share}");
                 assert!((normal - tilt * Vec3::z()).norm() < 1e-9, "{x} {y}: {normal}");
@@ -318,28 +322,16 @@ mod tests {
     #[test]
     fn a_node_is_met_by_the_part_of_the_axis_that_is_nearest_to_it() {
         let block = Block::builder([15, 15, 3], [0.042, 0.042, 0.006]).fix(Face::ZMin).build().unwrap();
-        let candidates: Vec<u32> = (0..block.surface().triangles.len() as u32).collect();
         let radius = 5e-3;
         for towards in [Vec3::x(), -Vec3::x(), Vec3::y(), -Vec3::y()] {
             let half_axis = towards * 0.015 + Vec3::z() * 1.35e-3;
             let centre = Vec3::new(0.021, 0.021, 0.006 + 2.65e-3);
             let shape = ToolShape::Capsule { radius, half_axis };
-            let touch = Touch::new(shape, Arc::new(Skin::new(&block, radius)), Contact::default());
-            let State { mut positions, mut velocities } = State::at_rest(block.rest());
-            let body = Deformable {
-                positions: &mut positions,
-                velocities: &mut velocities,
-                inverse_masses: block.inverse_masses(),
-                surface: block.surface(),
-                candidates: &candidates,
-            };
-            let mut search = Search::new(1);
-            search.make_room(block.rest().len(), candidates.len());
-            search.find(&body, (0, &touch), ToolMotion::straight(centre, centre), 1e-3);
-            let axis = touch.shape.axis(&Pose::at(centre));
+            let near = places(&block, block.rest().to_vec(), shape, centre);
+            let axis = shape.axis(&Pose::at(centre));
             for k in -4..=4 {
                 let node = Vec3::new(0.021, 0.021, 0.006) + towards * 3e-3 * f64::from(k);
-                let near = search.near.iter().find(|near| (near.place - node).norm() < 1e-9).expect("it is touched");
+                let near = near.iter().find(|near| (near.place - node).norm() < 1e-9).expect("it is touched");
                 let away = axis[0] + (axis[1] - axis[0]) * closest::share_at(&axis, &node) - node;
                 assert!((near.gap - (away.norm() - radius)).abs() < 1e-9, "{towards}, {k}: {near:?}");
             }
