@@ -21,21 +21,27 @@ pub(super) fn resolve_coupled(
     tool: ToolMotion,
     d_c: f64,
 ) -> Resolution {
-    let (nodes, weights) = (body.corners(place.triangle), place.weights);
-    let compliance = system.compliance(&nodes, weights);
+    let nodes = body.corners(place.triangle).map(|node| node as u32);
+    let nodes: [_; 3] = std::array::from_fn(|corner| (nodes[corner], place.weights[corner]));
+    let compliance = system.coupling(&nodes, &nodes);
     let (normal, closing) = match approach(body, law, place, tool, [d_c, system.step()], compliance.trace()) {
         Ok(found) => found,
         Err(without_force) => return without_force,
     };
     let friction = if place.is_glued { None } else { Some((law.friction, place.was_sticking)) };
     let (mode, impulse) = impulse(&compliance, closing, &normal, friction);
-    system.push(body.velocities, &nodes, weights, impulse);
+    system.push(body.velocities, &nodes, impulse);
     Resolution { mode, impulse, normal }
 }
 
 /// The impulse on the tool (N s) that takes away `closing` = G v* - v_t (m/s) within the cone of the friction, with whether
 /// the contact stuck in the step before; `None` is glued. Whatever the numbers, the impulse is in the cone.
-fn impulse(compliance: &Mat3, closing: Vec3, normal: &Vec3, friction: Option<(Friction, bool)>) -> (ContactMode, Vec3) {
+pub(super) fn impulse(
+    compliance: &Mat3,
+    closing: Vec3,
+    normal: &Vec3,
+    friction: Option<(Friction, bool)>,
+) -> (ContactMode, Vec3) {
     let none = (ContactMode::Free, Vec3::zeros());
     let Some(sticking) = compliance.try_inverse().map(|inverse| inverse * closing) else { return none };
     let Some((friction, was_sticking)) = friction else { return (ContactMode::Stick, sticking) };

@@ -2,7 +2,7 @@
 
 use super::deformable::Deformable;
 use super::triangle::{contact_normal, interpolate};
-use super::{ContactMode, Law, ToolMotion};
+use super::{ContactMode, Friction, Law, ToolMotion};
 use crate::Vec3;
 
 /// Penetration is recovered at this speed (m/s); an open gap is closed in full.
@@ -88,25 +88,33 @@ pub(super) fn resolve(
         Ok(found) => found,
         Err(without_force) => return without_force,
     };
-    let mut impulse = closing / compliance;
-    let mut mode = ContactMode::Stick;
-    if !place.is_glued {
-        let along = impulse.dot(&normal);
-        // Written so that an impulse that is not a number releases.
-        if along.is_nan() || along <= 0.0 {
-            return Resolution::without_force(ContactMode::Free, normal);
-        }
-        let tangential = impulse - normal * along;
-        let (outcome, friction) = law.friction.resolve(place.was_sticking, tangential, along, compliance);
-        match outcome {
-            ContactMode::Stick => {}
-            ContactMode::Slip => impulse = normal * along + friction,
-            ContactMode::Free | ContactMode::Lost => return Resolution::without_force(ContactMode::Free, normal),
-        }
-        mode = outcome;
-    }
+    let friction = if place.is_glued { None } else { Some((law.friction, place.was_sticking)) };
+    let (mode, impulse) = impulse(compliance, closing, &normal, friction);
     for (&node, w) in nodes.iter().zip(weights) {
         body.velocities[node] -= impulse * (w * body.inverse_masses[node]);
     }
     Resolution { mode, impulse, normal }
+}
+
+/// The impulse on the tool (N s) that takes away `closing` = G v* - v_t (m/s) at a point of the `compliance` (1/kg) within the cone of the
+/// friction, with whether the contact stuck in the step before; `None` is glued.
+pub(super) fn impulse(
+    compliance: f64,
+    closing: Vec3,
+    normal: &Vec3,
+    friction: Option<(Friction, bool)>,
+) -> (ContactMode, Vec3) {
+    let sticking = closing / compliance;
+    let Some((friction, was_sticking)) = friction else { return (ContactMode::Stick, sticking) };
+    let along = sticking.dot(normal);
+    // Written so that an impulse that is not a number releases.
+    if along.is_nan() || along <= 0.0 {
+        return (ContactMode::Free, Vec3::zeros());
+    }
+    let (mode, across) = friction.resolve(was_sticking, sticking - normal * along, along, compliance);
+    match mode {
+        ContactMode::Stick => (mode, sticking),
+        ContactMode::Slip => (mode, normal * along + across),
+        ContactMode::Free | ContactMode::Lost => (ContactMode::Free, Vec3::zeros()),
+    }
 }

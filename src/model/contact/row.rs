@@ -12,7 +12,7 @@ pub(super) struct Row {
     pub(super) tool: usize,
     pub(super) triangle: u32,
     pub(super) weights: [f64; 3],
-    /// The corners with a weight, in increasing order.
+    /// The corners with a weight, in increasing order; none of a point tool.
     pub(super) feature: [u32; 3],
     /// Where on the tool's axis, from one end to the other.
     pub(super) share: f64,
@@ -42,6 +42,13 @@ pub(super) struct Row {
     pub(super) before: f64,
     /// Its nodes in the list of the system.
     pub(super) nodes: (usize, usize),
+}
+
+impl Row {
+    /// True if the tool is a point: others touch with features of the surface.
+    pub(super) fn is_of_point(&self) -> bool {
+        self.feature == [u32::MAX; 3]
+    }
 }
 
 /// The order of two lists of numbers, by the first that differ.

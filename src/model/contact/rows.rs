@@ -124,7 +124,6 @@ impl Rows {
         let first = self.nodes.len();
         self.nodes.extend(corners.iter().zip(weights).map(|(&node, w)| (node as u32, w)));
         let velocity = interpolate(&weights, &corners.map(|node| body.velocities[node]));
-        let target = velocity - closing;
         self.rows.push(Row {
             tool,
             triangle,
@@ -133,8 +132,8 @@ impl Rows {
             share: 0.0,
             place: at,
             normal,
-            target,
-            closing: velocity - target,
+            target: velocity - closing,
+            closing,
             allowed: 0.0,
             compliance,
             along: compliance,

@@ -4,11 +4,11 @@ use std::ops::Mul;
 
 use super::columns::Columns;
 use super::deformable::Deformable;
-use super::resolve::IMMOVABLE;
+use super::resolve::{self, IMMOVABLE};
 use super::row::Row;
 use super::rows::Rows;
 use super::work::Work;
-use super::{ContactMode, Law};
+use super::{ContactMode, Friction, Law, coupled};
 use crate::linear::ImplicitStep;
 use crate::{Mat3, Vec3};
 
@@ -50,12 +50,17 @@ impl Rows {
             }
             of_place.iter().for_each(|&(node, _)| at_nodes[node as usize] = 0.0);
         };
-        Sweeps { rows, answers: shared, find, work, law: *law, d }.go_calmly();
+        if let Some((row, friction)) = point_alone(rows, law) {
+            (row.mode, row.impulse) = resolve::impulse(row.compliance, row.closing, &row.normal, friction);
+        } else {
+            Sweeps { rows, answers: shared, find, work, law: *law, d }.go_calmly();
+        }
         for row in rows.iter() {
             for &(node, w) in of(row) {
-                let change = row.impulse * (w * body.inverse_masses[node as usize]);
-                body.velocities[node as usize] -= change;
-                body.positions[node as usize] += change * row.before;
+                let node = node as usize;
+                body.positions[node] += body.velocities[node] * row.before;
+                body.velocities[node] -= row.impulse * (w * body.inverse_masses[node]);
+                body.positions[node] -= body.velocities[node] * row.before;
             }
         }
     }
@@ -77,14 +82,27 @@ impl Rows {
             let others = rows.iter().map(|other| system.coupling(of(other), of(&rows[place])));
             column.iter_mut().zip(others).for_each(|(to, answer)| *to = answer);
         };
-        Sweeps { rows, answers: coupling, find, work, law: *law, d: system.step() }.go_calmly();
+        if let Some((row, friction)) = point_alone(rows, law) {
+            let compliance = system.coupling(of(row), of(row));
+            (row.mode, row.impulse) = coupled::impulse(&compliance, row.closing, &row.normal, friction);
+        } else {
+            Sweeps { rows, answers: coupling, find, work, law: *law, d: system.step() }.go_calmly();
+        }
         for row in rows.iter() {
-            system.push_all(body.velocities, of(row), row.impulse);
+            system.push(body.velocities, of(row), row.impulse);
             if row.before > 0.0 {
-                system.push_all(body.positions, of(row), -row.impulse * row.before);
+                system.push(body.positions, of(row), -row.impulse * row.before);
             }
         }
     }
+}
+
+/// The row of a point that touches while no other tool does, if that is the only one, with its friction: it needs no sweeps, and feels what it
+/// would without the others, in every bit.
+fn point_alone<'a>(rows: &'a mut [Row], law: &Law) -> Option<(&'a mut Row, Option<(Friction, bool)>)> {
+    let [row] = rows else { return None };
+    let friction = (!row.glued).then_some((law.friction, row.stuck));
+    row.is_of_point().then_some((row, friction))
 }
 
 /// Sweeps over the places of a step of `d` seconds, from what pressed in the step before.

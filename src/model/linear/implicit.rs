@@ -60,33 +60,6 @@ impl ImplicitStep {
         }
     }
 
-    /// W = G A^-1 G^T (1/kg): how the point at `weights` of three nodes answers to an impulse on it. Nodes that are not of
-    /// the patch do not answer.
-    ///
-    /// # Real-time
-    /// Bounded, real-time safe.
-    pub(crate) fn compliance(&self, nodes: &[usize; 3], weights: &[f64; 3]) -> Mat3 {
-        let mut compliance = Mat3::zeros();
-        for (row, wr) in self.of_patch(nodes, weights) {
-            for (column, wc) in self.of_patch(nodes, weights) {
-                compliance += self.inverse.fixed_view::<3, 3>(3 * row, 3 * column) * (wr * wc);
-            }
-        }
-        compliance
-    }
-
-    /// v -= A^-1 G^T J for the `impulse` J (N s) of the point at `weights` of three nodes on the tool.
-    ///
-    /// # Real-time
-    /// Bounded, real-time safe: 27 n multiply-adds.
-    pub(crate) fn push(&self, velocities: &mut [Vec3], nodes: &[usize; 3], weights: &[f64; 3], impulse: Vec3) {
-        for (node, w) in self.of_patch(nodes, weights) {
-            for (place, v) in velocities.iter_mut().enumerate().take(self.inverse.nrows() / 3) {
-                *v -= self.inverse.fixed_view::<3, 3>(3 * place, 3 * node) * (impulse * w);
-            }
-        }
-    }
-
     /// G A^-1 H^T (1/kg): how one mean of nodes answers to an impulse on another. Nodes that are not of the patch do not answer.
     ///
     /// # Real-time
@@ -106,18 +79,13 @@ impl ImplicitStep {
     ///
     /// # Real-time
     /// Bounded, real-time safe: 9 n multiply-adds for each of the nodes.
-    pub(crate) fn push_all(&self, velocities: &mut [Vec3], nodes: &[(u32, f64)], impulse: Vec3) {
+    pub(crate) fn push(&self, velocities: &mut [Vec3], nodes: &[(u32, f64)], impulse: Vec3) {
         let n = self.inverse.nrows() / 3;
         for &(node, w) in nodes.iter().filter(|&&(node, _)| (node as usize) < n) {
             for (place, v) in velocities.iter_mut().enumerate().take(n) {
                 *v -= self.inverse.fixed_view::<3, 3>(3 * place, 3 * node as usize) * (impulse * w);
             }
         }
-    }
-
-    fn of_patch<'a>(&self, nodes: &'a [usize; 3], weights: &'a [f64; 3]) -> impl Iterator<Item = (usize, f64)> + 'a {
-        let n = self.inverse.nrows() / 3;
-        nodes.iter().copied().zip(weights.iter().copied()).filter(move |&(node, _)| node < n)
     }
 }
 
@@ -218,12 +186,13 @@ mod tests {
         let mut system = ImplicitStep::default();
         system.rebuild(&patch.tangent, &patch.inverse_masses, 1e-3);
         // The last is not of the patch.
-        let (nodes, weights, impulse) = ([3, 8, patch.forces.len()], [0.5, 0.3, 0.2], Vec3::new(1e-3, -2e-3, 3e-3));
+        let nodes = [(3, 0.5), (8, 0.3), (patch.forces.len() as u32, 0.2)];
+        let impulse = Vec3::new(1e-3, -2e-3, 3e-3);
         let before = patch.state.velocities.clone();
-        system.push(&mut patch.state.velocities, &nodes, &weights, impulse);
+        system.push(&mut patch.state.velocities, &nodes, impulse);
         let change = |node: usize| patch.state.velocities[node] - before[node];
         let point = change(3) * 0.5 + change(8) * 0.3;
-        assert!((point + system.compliance(&nodes, &weights) * impulse).norm() < 1e-15);
+        assert!((point + system.coupling(&nodes, &nodes) * impulse).norm() < 1e-15);
         assert!(change(20).norm() > 0.0, "every node answers");
     }
 }
