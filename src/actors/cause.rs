@@ -16,7 +16,7 @@ pub enum Cause {
     DeviceImpossible,
     /// The local model's force is not finite: zero is commanded until the next resync.
     LocalNotFinite,
-    /// The global model's state is not finite: it publishes nothing any more.
+    /// The global model's state is not finite: it is started again from the last one that was.
     GlobalNotFinite,
     /// Samples of the tool were lost between local and global model; the path was interpolated.
     SamplesLost,
@@ -54,7 +54,7 @@ impl Cause {
         Some(match code {
             300 => "the device reported numbers that are not finite",
             301 => "the local model's force is not finite, zero is commanded",
-            302 => "the global model's state is not finite, it publishes nothing any more",
+            302 => "the global model's state is not finite",
             304 => "the surroundings of a patch could not be reduced",
             306 => "the global model was too late to follow the tool, it goes on from the newest surface and tool",
             307 => "nothing comes from the global model's computer",

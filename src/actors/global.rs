@@ -320,7 +320,7 @@ impl Actor for GlobalActor {
             side.take_feedback(ctx, &mut self.simulation, index);
         }
         if !self.simulation.state().is_finite() {
-            return Outcome::Degraded(Cause::GlobalNotFinite.code());
+            return Outcome::Fault(Cause::GlobalNotFinite.code());
         }
         let version = self.publish_models(ctx);
         self.publish_surface(ctx);

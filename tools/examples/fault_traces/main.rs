@@ -58,6 +58,7 @@ fn title(fault: Fault) -> &'static str {
         Fault::DeviceWritePanics => "the device panics while it is written",
         Fault::DeviceNotFinite => "the device reports NaN for 50 ms",
         Fault::GlobalPanics => "the global model panics",
+        Fault::GlobalNotFinite => "the global model's state is not finite",
         Fault::GlobalStalls => "the global model stalls for 1 s",
         Fault::GlobalNeverReturns => "the global model never returns",
         Fault::DiskFull => "the disk is full",

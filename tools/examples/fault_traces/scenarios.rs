@@ -32,6 +32,7 @@ pub enum Fault {
     DeviceWritePanics,
     DeviceNotFinite,
     GlobalPanics,
+    GlobalNotFinite,
     GlobalStalls,
     GlobalNeverReturns,
     DiskFull,
@@ -42,13 +43,14 @@ pub enum Fault {
 }
 
 impl Fault {
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::LocalPanics,
         Self::LocalNotFinite,
         Self::DeviceReadPanics,
         Self::DeviceWritePanics,
         Self::DeviceNotFinite,
         Self::GlobalPanics,
+        Self::GlobalNotFinite,
         Self::GlobalStalls,
         Self::GlobalNeverReturns,
         Self::DiskFull,
@@ -64,6 +66,7 @@ impl Fault {
             self,
             Self::DeviceNotFinite
                 | Self::GlobalPanics
+                | Self::GlobalNotFinite
                 | Self::GlobalStalls
                 | Self::GlobalNeverReturns
                 | Self::DiskFull
@@ -78,6 +81,7 @@ impl Fault {
             Self::LocalPanics
                 | Self::LocalNotFinite
                 | Self::GlobalPanics
+                | Self::GlobalNotFinite
                 | Self::GlobalStalls
                 | Self::GlobalNeverReturns
         )
@@ -189,14 +193,14 @@ impl BodyFault {
         if self.written.lock().expect("no writer panics").0 < FAULT_S {
             return None;
         }
-        // NaN stays, everything else happens once.
+        // Where the whole body is the local model NaN stays, everything else happens once.
         if *fault == Some(Fault::LocalNotFinite) { *fault } else { fault.take() }
     }
 
     fn strike(&self, forces: &mut [Vec3]) {
         match self.due() {
             Some(Fault::LocalPanics | Fault::GlobalPanics) => panic!("the body gave way"),
-            Some(Fault::LocalNotFinite) => forces.fill(Vec3::repeat(f64::NAN)),
+            Some(Fault::LocalNotFinite | Fault::GlobalNotFinite) => forces.fill(Vec3::repeat(f64::NAN)),
             Some(Fault::GlobalStalls) => std::thread::sleep(Duration::from_secs(1)),
             Some(Fault::GlobalNeverReturns) => {
                 while !*self.let_go.lock().expect("nobody panics under it") {
