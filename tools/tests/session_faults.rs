@@ -99,10 +99,8 @@ fn faults_of_the_global_model_leave_the_haptic_side_alone() {
         let trace = run(fault);
         let summary = trace.summary.as_ref().unwrap();
         assert_eq!(summary.runtime.fault, None, "{fault:?}");
-        let restarts = usize::from(matches!(
-            fault,
-            Fault::GlobalPanics | Fault::GlobalNotFinite | Fault::GlobalNeverReturns
-        ));
+        let restarts =
+            usize::from(matches!(fault, Fault::GlobalPanics | Fault::GlobalNotFinite | Fault::GlobalNeverReturns));
         assert_eq!(summary.runtime.restarts.len(), restarts, "{fault:?}");
         assert_eq!(words(summary).contains("restarted"), restarts == 1, "{fault:?}: {}", words(summary));
         // Check that the tool is felt all the while that device and model are fresh, that the force is gone where the model
