@@ -64,6 +64,35 @@ fn what_programs_write_is_read_with_its_groups() {
     assert_eq!(raw, encoded);
 }
 
+/// A piece of one tetrahedron, and of others that another piece has.
+fn piece(points: &str, connectivity: &str, ghosts: &str) -> String {
+    let cells = ghosts.split(' ').count();
+    let array = |kind: &str, name: &str, values: &str| {
+        format!("<DataArray type=\"{kind}\" Name=\"{name}\" format=\"ascii\">{values}</DataArray>")
+    };
+    let ends = (1..=cells).map(|cell| (4 * cell).to_string()).collect::<Vec<_>>().join(" ");
+    let (points, types) = (array("Float64", "Points", points), vec!["10"; cells].join(" "));
+    let lists = array("Int64", "connectivity", connectivity)
+        + &array("Int64", "offsets", &ends)
+        + &array("UInt8", "types", &types);
+    let data = array("UInt8", "vtkGhostType", ghosts) + &array("Int32", "region", ghosts);
+    format!("<Piece><Points>{points}</Points><Cells>{lists}</Cells><CellData>{data}</CellData></Piece>")
+}
+
+#[test]
+fn pieces_of_one_mesh_meet_at_nodes_and_cells_that_two_have_count_once() {
+    let one = piece("0 0 0 1 0 0 0 1 0 0 0 1", "0 1 2 3", "0");
+    let other = piece("0 0 1 -0 -1 0 1 0 0 0 0 0 0 1 0", "3 1 2 0 0 2 4 3", "0 1");
+    let text =
+        format!("<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>{one}{other}</UnstructuredGrid></VTKFile>");
+    let file = read_volume("a.vtu", text.as_bytes()).unwrap();
+    assert_eq!(file.left_out_elements, [("cells of other pieces".to_owned(), 1)]);
+    let groups: Vec<_> = file.mesh.groups.iter().map(|group| (group.name.as_str(), group.nodes.len())).collect();
+    assert_eq!(groups, [("region=0", 5)]);
+    let (mesh, left_out) = file.mesh.cleaned().unwrap();
+    assert_eq!((mesh.points.len(), mesh.tetrahedra.len(), left_out.nodes), (5, 2, 0));
+}
+
 #[test]
 fn other_cells_are_left_out_by_name_and_their_nodes_with_them() {
     let file = read_volume_file(&path("gmsh_mixed.msh")).unwrap();

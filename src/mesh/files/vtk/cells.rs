@@ -1,5 +1,7 @@
 //! What VTK's two formats have in common: cells by type, and arrays of numbers at them.
 
+use std::collections::HashMap;
+
 use palpate_model::Vec3;
 
 use crate::error::MeshError;
@@ -10,6 +12,14 @@ use crate::files::collected::{Collected, TETRAHEDRON};
 const MOST_VALUES: usize = 64;
 /// Most arrays of a file that become groups.
 const MOST_ARRAYS: usize = 16;
+
+/// Arrays that mark cells of another piece, repeated around this one, and hidden cells.
+const GHOSTS: [&str; 2] = ["vtkGhostType", "vtkGhostLevels"];
+/// What of `vtkGhostType` does so; the rest of its bits are of no matter here. Levels count from one on.
+const REPEATED_OR_HIDDEN: i64 = 1 | 32;
+
+/// The nodes of earlier pieces by their places: a place where pieces meet is one node.
+type Border = HashMap<[u64; 3], u32>;
 
 /// A piece of a file.
 #[derive(Debug, Default)]
@@ -24,33 +34,38 @@ pub struct Piece {
     pub types: Vec<i64>,
     /// Names and values of arrays of whole numbers, one for each cell.
     pub arrays: Vec<(String, Vec<i64>)>,
+    /// True for each cell that is left out as one of another piece; empty if there are none.
+    pub ghosts: Vec<bool>,
 }
 
 impl Piece {
-    /// True if another array can become groups.
-    pub fn has_room(&self) -> bool {
-        self.arrays.len() < MOST_ARRAYS
+    /// True if an array of this name can become groups, or marks cells of other pieces.
+    pub fn has_room(&self, name: &str) -> bool {
+        GHOSTS.contains(&name) || self.arrays.len() < MOST_ARRAYS
     }
 
-    /// Takes an array if it can become groups.
+    /// Takes an array if there is room for it.
     pub fn keep_array(&mut self, name: &str, values: Vec<i64>) {
-        if self.has_room() {
+        if let Some(kind) = GHOSTS.iter().position(|ghosts| *ghosts == name) {
+            let is_ghost = |value: i64| if kind == 0 { value & REPEATED_OR_HIDDEN != 0 } else { value > 0 };
+            self.ghosts = values.into_iter().map(is_ghost).collect();
+        } else if self.has_room(name) {
             self.arrays.push((name.to_owned(), values));
         }
     }
 
-    /// Adds all cells, and groups such as `region=3` for the values of arrays.
-    pub fn collect(self, found: &mut Collected) -> Result<(), MeshError> {
+    /// Adds all cells, and groups such as `region=3` for the values of arrays. Where it meets earlier pieces its nodes are theirs.
+    pub fn collect(self, found: &mut Collected, border: Option<&mut Border>) -> Result<(), MeshError> {
         let refuse = |message: String| Err(MeshError::new(message));
-        let Self { points, connectivity, ends, types, arrays } = self;
+        let Self { points, connectivity, ends, types, arrays, ghosts } = self;
         let cells = types.len();
         if points.len() % 3 != 0 || ends.len() != cells {
             let (points, ends) = (points.len(), ends.len());
             return refuse(format!("{points} coordinates, {ends} cells and {cells} types of cells do not fit"));
         }
-        let first = found.points.len() as u32;
         let count = (points.len() / 3) as i64;
-        found.points.extend(points.chunks_exact(3).map(|point| Vec3::new(point[0], point[1], point[2])));
+        let places = points.as_chunks::<3>().0.iter().map(|&place| Vec3::from(place));
+        let numbers = numbered(places, &mut found.points, border);
         let mut groups_of_cell = vec![Vec::new(); cells];
         for (name, values) in arrays.iter().filter(|(_, values)| values.len() == cells) {
             let mut different = values.clone();
@@ -77,13 +92,14 @@ impl Piece {
             if let Some(point) = points.iter().find(|point| !(0..count).contains(point)) {
                 return refuse(format!("cell {cell} has point {point}, the points are 0 to {}", count - 1));
             }
-            let kind = kind(number);
+            let is_ghost = ghosts.get(cell) == Some(&true);
+            let kind = if is_ghost { "cells of other pieces".to_owned() } else { kind(number) };
             if kind == TETRAHEDRON && points.len() != 4 {
                 return refuse(format!("cell {cell} is a tetrahedron of {} points", points.len()));
             }
             nodes.clear();
-            nodes.extend(points.iter().map(|point| first + *point as u32));
-            found.add(&kind, &nodes, &groups_of_cell[cell]);
+            nodes.extend(points.iter().map(|point| numbers[*point as usize]));
+            found.add(&kind, &nodes, if is_ghost { &[] } else { &groups_of_cell[cell] });
         }
         Ok(())
     }
@@ -91,9 +107,26 @@ impl Piece {
 
 /// All pieces as one mesh.
 pub fn joined(pieces: impl IntoIterator<Item = Piece>) -> Result<VolumeFile, MeshError> {
-    let mut found = Collected::default();
-    pieces.into_iter().try_for_each(|piece| piece.collect(&mut found))?;
+    let pieces: Vec<Piece> = pieces.into_iter().collect();
+    let (mut found, mut border) = (Collected::default(), Border::new());
+    let is_one = pieces.len() == 1;
+    pieces.into_iter().try_for_each(|piece| piece.collect(&mut found, (!is_one).then_some(&mut border)))?;
     found.finish()
+}
+
+/// Adds the places of a piece to `points`; the number of each there. A place that is on the `border` to an earlier piece is the node there.
+fn numbered(places: impl Iterator<Item = Vec3>, points: &mut Vec<Vec3>, border: Option<&mut Border>) -> Vec<u32> {
+    let mut add = |place: Vec3| {
+        points.push(place);
+        points.len() as u32 - 1
+    };
+    let Some(border) = border else { return places.map(add).collect() };
+    // Zero has two signs.
+    let key = |place: &Vec3| <[f64; 3]>::from(place.add_scalar(0.0)).map(f64::to_bits);
+    let numbered: Vec<_> =
+        places.map(|place| (key(&place), border.get(&key(&place)).copied().unwrap_or_else(|| add(place)))).collect();
+    border.extend(numbered.iter().copied());
+    numbered.into_iter().map(|(_, number)| number).collect()
 }
 
 /// What cells of this type are called.

@@ -77,12 +77,12 @@ fn piece(node: Node, arrays: &Arrays) -> Result<Piece, MeshError> {
         connectivity: integers(named("connectivity")?)?,
         ends: integers(named("offsets")?)?,
         types: integers(named("types")?)?,
-        arrays: Vec::new(),
+        ..Piece::default()
     };
     for array in children(node, "CellData").flat_map(|data| children(data, "DataArray")) {
         let columns = array.attribute("NumberOfComponents").unwrap_or("1");
-        let is_wanted = columns == "1" && kind(array).is_some_and(Number::is_integer) && piece.has_room();
-        if let Some(name) = array.attribute("Name").filter(|_| is_wanted) {
+        let is_wanted = columns == "1" && kind(array).is_some_and(Number::is_integer);
+        if let Some(name) = array.attribute("Name").filter(|name| is_wanted && piece.has_room(name)) {
             piece.keep_array(name, integers(array)?);
         }
     }
