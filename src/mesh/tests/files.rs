@@ -93,6 +93,27 @@ fn pieces_of_one_mesh_meet_at_nodes_and_cells_that_two_have_count_once() {
     assert_eq!((mesh.points.len(), mesh.tetrahedra.len(), left_out.nodes), (5, 2, 0));
 }
 
+/// A kilobyte of zeros packed, as many times as it takes.
+#[test]
+fn a_small_file_does_not_unpack_to_any_size() {
+    let block = 1_u32 << 20;
+    let packed = miniz_oxide::deflate::compress_to_vec_zlib(&vec![0; block as usize], 6);
+    let blocks = (1 << 27) / block + 1;
+    let head = [blocks, block, 0].into_iter().chain((0..blocks).map(|_| packed.len() as u32));
+    let array = "<DataArray type=\"UInt8\" Name=\"many\" format=\"appended\" offset=\"0\"/>";
+    let text = format!(
+        "<VTKFile type=\"UnstructuredGrid\" compressor=\"vtkZLibDataCompressor\"><UnstructuredGrid><Piece><Points>{array}\
+         </Points><Cells/></Piece></UnstructuredGrid><AppendedData encoding=\"raw\">_"
+    );
+    let mut bytes = text.into_bytes();
+    head.for_each(|count| bytes.extend(count.to_le_bytes()));
+    (0..blocks).for_each(|_| bytes.extend(&packed));
+    bytes.extend(b"</AppendedData></VTKFile>");
+    assert!(bytes.len() < 200_000);
+    let error = read_volume("a.vtu", &bytes).unwrap_err().to_string();
+    assert_eq!(error, "a.vtu: array \"many\": the arrays have more than 134217728 numbers in all");
+}
+
 #[test]
 fn other_cells_are_left_out_by_name_and_their_nodes_with_them() {
     let file = read_volume_file(&path("gmsh_mixed.msh")).unwrap();

@@ -1,13 +1,15 @@
 //! The numbers of a VTU file: as text, in base 64, or appended, whole or in compressed blocks.
 
+use std::cell::Cell;
+
 use roxmltree::Node;
 
 use crate::error::{MeshError, quoted};
 use crate::files::base64;
 use crate::files::number::Number;
 
-/// Most bytes of one array.
-const MOST_BYTES: usize = 1 << 32;
+/// Most numbers of all arrays of a file: a small one may unpack to any size, and several arrays may be the same data.
+pub const MOST_NUMBERS: usize = 1 << 27;
 
 /// How the arrays of a file stand in it.
 pub struct Arrays<'a> {
@@ -17,6 +19,8 @@ pub struct Arrays<'a> {
     pub is_compressed: bool,
     /// What is appended, behind its underscore; raw if true, else base 64.
     pub appended: Option<(&'a [u8], bool)>,
+    /// So many numbers may still be read.
+    pub room: Cell<usize>,
 }
 
 impl Arrays<'_> {
@@ -44,7 +48,9 @@ impl Arrays<'_> {
             }
             other => return Err(refuse(format!("format {} is not known", quoted(other)))),
         };
-        let bytes = bytes.ok_or_else(|| refuse("its binary data are damaged or cut off".to_owned()))?;
+        let bytes = bytes.ok_or_else(|| refuse("its binary data are damaged, cut off or too many".to_owned()))?;
+        let room = self.room.get().checked_sub(bytes.len() / kind.width());
+        self.room.set(room.ok_or_else(|| refuse(format!("the arrays have more than {MOST_NUMBERS} numbers in all")))?);
         Ok(kind.split(&bytes, self.is_big_endian).map(|number| of_bytes(kind, number)).collect())
     }
 
@@ -54,10 +60,10 @@ impl Arrays<'_> {
             let start = if is_raw { data.get(..length)?.to_vec() } else { base64::decode(data, length)? };
             (start.len() == length).then_some(start)
         };
-        let width = self.header.width();
+        let (width, most) = (self.header.width(), 8 * self.room.get());
         let counts = |bytes: &[u8]| -> Option<Vec<usize>> {
             let counts = self.header.split(bytes, self.is_big_endian);
-            counts.map(|count| usize::try_from(self.header.integer(count)).ok().filter(|n| *n <= MOST_BYTES)).collect()
+            counts.map(|count| usize::try_from(self.header.integer(count)).ok().filter(|n| *n <= most)).collect()
         };
         let first = counts(&start(width)?)?[0];
         if !self.is_compressed {
@@ -80,7 +86,9 @@ impl Arrays<'_> {
         let mut bytes = Vec::new();
         for &packed in packed {
             let (this, after) = rest.split_at_checked(packed)?;
-            bytes.extend(miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(this, block).ok()?);
+            bytes.extend(
+                miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(this, block.min(most - bytes.len())).ok()?,
+            );
             rest = after;
         }
         Some(bytes)

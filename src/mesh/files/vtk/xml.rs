@@ -1,9 +1,11 @@
 //! VTU, the XML format of unstructured grids.
 
+use std::cell::Cell;
+
 use roxmltree::{Document, Node};
 
 use super::cells::{Piece, joined};
-use super::data_array::{Arrays, kind};
+use super::data_array::{Arrays, MOST_NUMBERS, kind};
 use crate::error::{MeshError, quoted};
 use crate::files::VolumeFile;
 use crate::files::number::Number;
@@ -37,6 +39,7 @@ pub fn read(bytes: &[u8]) -> Result<VolumeFile, MeshError> {
         header: if file.attribute("header_type") == Some("UInt64") { Number::UInt64 } else { Number::UInt32 },
         is_compressed,
         appended,
+        room: Cell::new(MOST_NUMBERS),
     };
     let grid = child(file, "UnstructuredGrid")?;
     let pieces: Vec<Node> = children(grid, "Piece").collect();
