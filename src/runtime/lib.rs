@@ -131,6 +131,7 @@ pub use supervision::restart::Restart;
 pub use supervision::stop::{STOP_BOUND, StopHandle};
 pub use system::grant::{GrantHandle, GroupGrant, SystemGrant};
 pub use system::machine::{MachineFinding, Readiness};
+pub use system::os::pinnable_cores;
 pub use system::stopwatch::Stopwatch;
 pub use time::{Nanos, Rate};
 

@@ -111,7 +111,7 @@ pub(crate) fn set_up_thread(spec: &RateGroup) -> ThreadGrant {
     let mut granted = |result: Result<(), String>| result.map_err(|reason| refused.push(reason)).is_ok();
     os::touch_stack();
     let timer_slack = os::set_timer_slack().map_or_else(|reason| reason, |()| "1 ns".to_owned());
-    let cpu = spec.cpu.filter(|&cpu| granted(os::pin(cpu)));
+    let cpu = spec.cpu.filter(|&cpu| granted(os::pin_to(&[cpu])));
     let priority = spec.priority.filter(|&priority| granted(os::set_realtime(priority)));
     let cpus = if !spec.cpus.is_empty() && granted(os::pin_to(&spec.cpus)) { spec.cpus.clone() } else { Vec::new() };
     // After the cores: the kernel looks at them when it grants it.

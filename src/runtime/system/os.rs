@@ -3,22 +3,46 @@
 //! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
 
 pub(crate) use imp::{
-    ThreadProbe, block_signals, give_way, is_root, lock_memory, may_lock_everything, monotonic, pin_to, set_deadline,
+    ThreadProbe, block_signals, give_way, is_root, lock_memory, may_lock_everything, monotonic, set_deadline,
     set_realtime, set_timer_slack, sleep_until, stay_awake, thread_cpu,
 };
 
+use std::collections::BTreeSet;
 use std::fs::read_to_string;
 
 /// The niceness of a thread that gives way.
 pub(crate) const BACKGROUND_NICE: i32 = 15;
 
-/// Moves the calling thread to one core.
-pub(crate) fn pin(cpu: usize) -> Result<(), String> {
-    let cores = core_affinity::get_core_ids().unwrap_or_default();
-    let Some(&core) = cores.iter().find(|core| core.id == cpu) else {
-        return Err(format!("core {cpu} is not open to this process (taskset -pc, or its cgroup's cpuset.cpus)"));
+/// Lets the calling thread run on these cores only.
+pub(crate) fn pin_to(cpus: &[usize]) -> Result<(), String> {
+    let closed = |cpus: &[usize], to: &[usize]| match cpus.iter().find(|cpu| !to.contains(cpu)) {
+        Some(cpu) => Err(format!("core {cpu} is not open to this process (taskset -pc, or its cgroup's cpuset.cpus)")),
+        None => Ok(()),
     };
-    if core_affinity::set_for_current(core) { Ok(()) } else { Err(format!("pinning to core {cpu} was refused")) }
+    closed(cpus, &pinnable_cores())?;
+    imp::set_affinity(cpus)?;
+    // The kernel leaves out what the cgroup does not have, and says nothing.
+    closed(cpus, &open_cores())
+}
+
+/// The cores that the calling thread may run on.
+fn open_cores() -> Vec<usize> {
+    core_affinity::get_core_ids().unwrap_or_default().into_iter().map(|core| core.id).collect()
+}
+
+/// The numbers of the processor cores that a group of a run on threads may be [pinned](crate::RateGroup::pin) to, in order: those
+/// open to the calling thread, and those that are isolated, which nobody inherits and everybody may ask for.
+///
+/// # Real-time
+/// Not real-time safe: reads files. Before the run.
+pub fn pinnable_cores() -> Vec<usize> {
+    let isolated = read_to_string("/sys/devices/system/cpu/isolated").unwrap_or_default();
+    pinnable(open_cores(), &isolated, &cores_there())
+}
+
+fn pinnable(open: Vec<usize>, isolated: &str, there: &[usize]) -> Vec<usize> {
+    let isolated = cores_in(isolated).into_iter().filter(|core| there.contains(core));
+    open.into_iter().chain(isolated).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 /// Writes to as much of the calling thread's stack as a tick may need, so that where memory is not locked its first
@@ -29,9 +53,10 @@ pub(crate) fn touch_stack() {
     std::hint::black_box(&mut [1_u8; DEEPEST_TICK]);
 }
 
-/// Processor cores that the process may use.
+/// How many processor cores the process may use, isolated ones included.
 pub(crate) fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+    let shared = std::thread::available_parallelism().map_or(1, usize::from);
+    shared + pinnable_cores().len() - open_cores().len()
 }
 
 /// The numbers of the processor cores that are there, whoever may use them; empty if the system does not say.
@@ -113,8 +138,8 @@ mod imp {
         unsafe { libc::geteuid() == 0 }
     }
 
-    /// Lets the calling thread run on these cores only.
-    pub(crate) fn pin_to(cpus: &[usize]) -> Result<(), String> {
+    /// Sets the cores of the calling thread.
+    pub(crate) fn set_affinity(cpus: &[usize]) -> Result<(), String> {
         let refused = |why: &dyn std::fmt::Display| Err(format!("cores {cpus:?} refused: {why}"));
         if let Some(cpu) = cpus.iter().find(|&&cpu| cpu >= libc::CPU_SETSIZE as usize) {
             return refused(&format!("core {cpu} is beyond the {} that are possible", libc::CPU_SETSIZE));
@@ -124,14 +149,6 @@ mod imp {
         let result = unsafe {
             let mut set: libc::cpu_set_t = std::mem::zeroed();
             cpus.iter().for_each(|&cpu| libc::CPU_SET(cpu, &mut set));
-            // Checked first: the kernel leaves out cores that do not exist and says nothing.
-            let mut allowed: libc::cpu_set_t = std::mem::zeroed();
-            libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &raw mut allowed);
-            if let Some(cpu) = cpus.iter().find(|&&cpu| !libc::CPU_ISSET(cpu, &allowed)) {
-                return refused(&format!(
-                    "core {cpu} is not open to this process (taskset -pc, or its cgroup's cpuset.cpus)"
-                ));
-            }
             libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set)
         };
         if result == 0 { Ok(()) } else { refused(&Error::last_os_error()) }
@@ -363,8 +380,12 @@ mod imp {
         false
     }
 
-    pub(crate) fn pin_to(_cpus: &[usize]) -> Result<(), String> {
-        Err(NOT_AVAILABLE.to_owned())
+    /// One core, where the system can do that.
+    pub(crate) fn set_affinity(cpus: &[usize]) -> Result<(), String> {
+        match cpus {
+            &[id] if core_affinity::set_for_current(core_affinity::CoreId { id }) => Ok(()),
+            _ => Err(format!("cores {cpus:?} refused: {NOT_AVAILABLE}")),
+        }
     }
 
     /// Knows nothing here.
@@ -431,6 +452,26 @@ mod tests {
 
     #[test]
     fn a_core_that_does_not_exist_is_refused_and_named() {
-        assert!(pin(usize::MAX).unwrap_err().contains(&usize::MAX.to_string()));
+        assert!(pin_to(&[usize::MAX]).unwrap_err().contains(&usize::MAX.to_string()));
+    }
+
+    #[test]
+    fn an_isolated_core_may_be_asked_for_although_nobody_inherits_it() {
+        assert_eq!(pinnable(vec![0, 1, 2], "3\n", &[0, 1, 2, 3]), [0, 1, 2, 3]);
+        assert_eq!(pinnable(vec![2], "1,3-5\n", &[0, 1, 2, 3]), [1, 2, 3]);
+        // Check that one which is closed and shared with others stays closed
+        assert_eq!(pinnable(vec![1], "\n", &[0, 1]), [1]);
+    }
+
+    #[test]
+    fn a_thread_is_pinned_to_the_cores_that_were_granted() {
+        let open = open_cores();
+        std::thread::spawn(move || {
+            assert_eq!(pin_to(&open), Ok(()));
+            assert_eq!(pin_to(&open[..1]), Ok(()));
+            assert_eq!(open_cores(), open[..1]);
+        })
+        .join()
+        .unwrap();
     }
 }

@@ -4,7 +4,7 @@ use super::tools::Tool;
 use crate::actors::GAP_S;
 use crate::error::{Error, ErrorKind};
 use crate::log::SceneFrame;
-use crate::runtime::{Execution, Nanos, OverrunPolicy, Rate, RateGroup, Release};
+use crate::runtime::{Execution, Nanos, OverrunPolicy, Rate, RateGroup, Release, pinnable_cores};
 use crate::scene::{DeviceKind, DeviceSpec, GlobalSpec};
 
 /// The name of the group that reduces surroundings.
@@ -52,11 +52,13 @@ pub(super) fn local_group(
     devices: &[DeviceSpec],
     execution: Execution,
 ) -> RateGroup {
-    let last_core = std::thread::available_parallelism().map_or(0, |cores| cores.get() - 1);
     let group = given.unwrap_or_else(|| {
         let group = RateGroup::new(rate);
-        // On a single core the haptic thread preempts the others; pinning would gain nothing.
-        if last_core > 0 { group.pin(last_core) } else { group }
+        match pinnable_cores()[..] {
+            // On a single core the haptic thread preempts the others; pinning would gain nothing.
+            [] | [_] => group,
+            [.., last] => group.pin(last),
+        }
     });
     // Policy and core of a program's own thread are its own affair.
     let group = if group.is_hosted() { group } else { group.realtime_by_default(HAPTIC_PRIORITY) };
