@@ -110,18 +110,13 @@ impl GroupThread {
 
     /// What becomes of the group after a fault: it goes on, or it ends, with the fault if the supervisor is to answer that.
     pub(crate) fn after(&mut self, fault: RuntimeFault, now: Nanos) -> ControlFlow<Option<RuntimeFault>> {
-        let Self { group, link: Link { control, post, .. }, .. } = self;
-        match group.after_fault(now, self.restartable, control.stop_requested()) {
-            AfterFault::Restart => return ControlFlow::Break(Some(fault)),
-            AfterFault::GoOn => {
-                post_fault(post, control, fault);
-                return ControlFlow::Continue(());
-            }
-            // It costs what it would have observed and nothing else.
-            AfterFault::End if group.spec.observer => drop(post.send(Message::Fault(fault))),
-            AfterFault::End => post_fault(post, control, fault),
+        let Self { group, link, .. } = self;
+        let next = group.after_fault(now, self.restartable, link.control.stop_requested());
+        if next == AfterFault::Restart {
+            return ControlFlow::Break(Some(fault));
         }
-        ControlFlow::Break(None)
+        link.post_fault(group.spec.observer, fault);
+        if next == AfterFault::GoOn { ControlFlow::Continue(()) } else { ControlFlow::Break(None) }
     }
 
     /// Stops the actors and tells the supervisor how it went.
@@ -135,7 +130,7 @@ impl GroupThread {
                 std::thread::sleep(POLL);
             }
             if let Err(fault) = group.last_tick(beginning.elapsed()) {
-                post_fault(post, control, fault);
+                link.post_fault(observer, fault);
             }
         }
         let books = group.ledger;
@@ -146,7 +141,7 @@ impl GroupThread {
             return;
         }
         if let Some(fault) = fault {
-            post_fault(post, control, fault);
+            link.post_fault(observer, fault);
         }
         if !observer {
             control.group_ended();
@@ -174,6 +169,14 @@ impl Link {
                 return None;
             }
             std::thread::sleep(POLL);
+        }
+    }
+
+    /// Tells a fault, which stops the run unless it is that of an observer.
+    fn post_fault(&self, observer: bool, fault: RuntimeFault) {
+        let _ = self.post.send(if observer { Message::ObserverFault(fault) } else { Message::Fault(fault) });
+        if !observer {
+            self.control.request_stop();
         }
     }
 
@@ -207,9 +210,4 @@ impl Link {
             }
         }
     }
-}
-
-fn post_fault(post: &Sender<Message>, control: &Control, fault: RuntimeFault) {
-    let _ = post.send(Message::Fault(fault));
-    control.request_stop();
 }

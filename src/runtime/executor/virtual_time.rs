@@ -170,25 +170,24 @@ impl VirtualRun {
     /// Starts a group again that has failed, or stops the run.
     fn answer(&mut self, index: usize, fault: RuntimeFault) {
         let Some(group) = &mut self.groups[index] else { return };
-        if self.reexecution.is_some() {
+        let observer = group.spec.observer;
+        if self.reexecution.is_some() && !observer {
             // How the run went on is part of the recording.
-            return self.note(Err(fault));
+            return self.note(observer, fault);
         }
         let restartable = self.restarters[index].as_ref().is_some_and(Restarter::may_restart);
         match group.after_fault(self.now, restartable, self.control.stop_requested()) {
             AfterFault::Restart => self.restart(index, fault),
             AfterFault::GoOn => {
                 self.paces[index].wind_down(group, self.now);
-                self.note(Err(fault));
+                self.note(observer, fault);
             }
             AfterFault::End => {
-                if group.spec.observer {
-                    // It costs what it would have observed and nothing else; it ends after the others, however it
-                    // fares.
+                self.note(observer, fault);
+                if observer {
+                    // It ends after the others, however it fares.
                     self.paces[index].take();
-                    self.supervisor.note(Message::Fault(fault));
                 } else {
-                    self.note(Err(fault));
                     self.end(index);
                 }
             }
@@ -228,7 +227,7 @@ impl VirtualRun {
                 Some(observer.filter(|observer| observer.due < recorded.due).unwrap_or(recorded))
             }
             Step::Stuck(fault) => {
-                self.note(Err(fault));
+                self.note(false, fault);
                 None
             }
             Step::Over => None,
@@ -281,8 +280,9 @@ impl VirtualRun {
     fn end_observers(&mut self) {
         for index in self.indices(true) {
             let now = self.now;
-            let result = self.groups[index].as_mut().map_or(Ok(()), |group| group.last_tick(now));
-            self.note(result);
+            if let Some(Err(fault)) = self.groups[index].as_mut().map(|group| group.last_tick(now)) {
+                self.note(true, fault);
+            }
             self.end(index);
         }
     }
@@ -291,7 +291,9 @@ impl VirtualRun {
         if let Some(group) = self.groups[index].take() {
             let observer = group.spec.observer;
             let (report, fault) = group.finish(self.now);
-            self.note(fault.map_or(Ok(()), Err));
+            if let Some(fault) = fault {
+                self.note(observer, fault);
+            }
             self.supervisor.note(Message::Ended(index, Box::new(report)));
             if !observer {
                 self.control.group_ended();
@@ -299,10 +301,12 @@ impl VirtualRun {
         }
     }
 
-    fn note(&mut self, result: Result<(), RuntimeFault>) {
-        if let Err(fault) = result {
-            self.supervisor.note(Message::Fault(fault));
-            self.control.request_stop();
+    /// Notes a fault, which stops the run unless it is that of an observer.
+    fn note(&mut self, observer: bool, fault: RuntimeFault) {
+        if observer {
+            return self.supervisor.note(Message::ObserverFault(fault));
         }
+        self.supervisor.note(Message::Fault(fault));
+        self.control.request_stop();
     }
 }

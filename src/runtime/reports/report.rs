@@ -129,7 +129,7 @@ pub struct RuntimeReport {
     pub graph: GraphView,
     /// The privileges that the system granted.
     pub grant: SystemGrant,
-    /// The fault that ended the run, if one did.
+    /// The fault that ended the run, if one did; else the first of an observer, which ends that one alone.
     pub fault: Option<RuntimeFault>,
     /// Faults that were answered by starting the group again, group by group.
     pub restarts: Vec<RuntimeFault>,

@@ -24,6 +24,7 @@ pub(crate) struct Teller {
     groups: Vec<Told>,
     restarts: usize,
     fault: bool,
+    observer_fault: bool,
     last: Option<Instant>,
 }
 
@@ -45,7 +46,8 @@ enum Event {
     Slip(Lost),
     Miss(Lost),
     Restart(RuntimeFault),
-    Fault(RuntimeFault),
+    /// With what stops because of it.
+    Fault(RuntimeFault, &'static str),
 }
 
 /// Periods or deadlines that a group lost by one cause.
@@ -71,7 +73,7 @@ impl Teller {
                 || enabled!(target: "palpate_runtime::restart", Level::WARN)
                 || enabled!(target: "palpate_runtime::fault", Level::ERROR)
         });
-        Self { to, heard, groups, restarts: 0, fault: false, last: None }
+        Self { to, heard, groups, restarts: 0, fault: false, observer_fault: false, last: None }
     }
 
     /// True if somebody listens.
@@ -88,9 +90,13 @@ impl Teller {
         }
         events.extend(supervisor.restarts[self.restarts..].iter().cloned().map(Event::Restart));
         self.restarts = supervisor.restarts.len();
-        if let Some(fault) = supervisor.fault().filter(|_| !self.fault) {
+        if let Some(fault) = supervisor.observer_fault().filter(|_| !self.observer_fault) {
+            self.observer_fault = true;
+            events.push(Event::Fault(fault.clone(), "the observer stops"));
+        }
+        if let Some(fault) = supervisor.stopping_fault().filter(|_| !self.fault) {
             self.fault = true;
-            events.push(Event::Fault(fault.clone()));
+            events.push(Event::Fault(fault.clone(), "the run stops"));
         }
         News { to: self.to.clone(), events }
     }
@@ -127,8 +133,8 @@ impl Event {
             Self::Restart(RuntimeFault { group, actor, at, what, .. }) => {
                 warn!(target: "palpate_runtime::restart", group, actor, at_s = at.as_secs_f64(), cause = what, "started again");
             }
-            Self::Fault(RuntimeFault { group, actor, at, what, .. }) => {
-                error!(target: "palpate_runtime::fault", group, actor, at_s = at.as_secs_f64(), cause = what, "the run stops");
+            Self::Fault(RuntimeFault { group, actor, at, what, .. }, stops) => {
+                error!(target: "palpate_runtime::fault", group, actor, at_s = at.as_secs_f64(), cause = what, "{stops}");
             }
         }
     }

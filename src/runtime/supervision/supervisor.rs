@@ -11,8 +11,10 @@ use std::fmt;
 /// What group threads tell the supervisor.
 #[derive(Debug)]
 pub(crate) enum Message {
-    /// Something fatal happened; a stop is already requested, unless it was in an observer.
+    /// Something fatal happened; a stop is already requested.
     Fault(RuntimeFault),
+    /// An observer failed: it costs what it would have observed and nothing else.
+    ObserverFault(RuntimeFault),
     /// The group with this number has ended, its actors are gone.
     Ended(usize, Box<GroupReport>),
     /// The actors of a restartable group failed and are gone; nobody has been told to stop.
@@ -61,13 +63,14 @@ pub(crate) struct Supervisor {
     reports: Vec<Option<GroupReport>>,
     ended: usize,
     fault: Option<RuntimeFault>,
+    observer_fault: Option<RuntimeFault>,
     /// Faults that were answered by a restart.
     pub(crate) restarts: Vec<RuntimeFault>,
 }
 
 impl Supervisor {
     pub(crate) fn new(groups: usize) -> Self {
-        Self { reports: vec![None; groups], ended: 0, fault: None, restarts: Vec::new() }
+        Self { reports: vec![None; groups], ended: 0, fault: None, observer_fault: None, restarts: Vec::new() }
     }
 
     pub(crate) fn note(&mut self, message: Message) {
@@ -75,6 +78,9 @@ impl Supervisor {
             Message::Fault(fault) => {
                 // What follows a fault is often its consequence: the first one is the one to report.
                 self.fault.get_or_insert(fault);
+            }
+            Message::ObserverFault(fault) => {
+                self.observer_fault.get_or_insert(fault);
             }
             Message::Ended(group, report) => self.end(group, *report),
             Message::Failed(failure) | Message::NotRestarted(failure) => {
@@ -90,9 +96,19 @@ impl Supervisor {
         self.ended += usize::from(self.reports[group].replace(report).is_none());
     }
 
-    /// The first fault.
+    /// The first fault, that of an observer only if there is no other.
     pub(crate) fn fault(&self) -> Option<&RuntimeFault> {
+        self.stopping_fault().or(self.observer_fault())
+    }
+
+    /// The first fault that stopped the run.
+    pub(crate) fn stopping_fault(&self) -> Option<&RuntimeFault> {
         self.fault.as_ref()
+    }
+
+    /// The first fault of an observer.
+    pub(crate) fn observer_fault(&self) -> Option<&RuntimeFault> {
+        self.observer_fault.as_ref()
     }
 
     /// How many groups have ended. Asked after every release of virtual time.
@@ -108,8 +124,8 @@ impl Supervisor {
         self.ended() == self.reports.len()
     }
 
-    /// The reports of the groups that ended, and the first fault.
+    /// The reports of the groups that ended, and the [fault](Self::fault).
     pub(crate) fn results(&self) -> (Vec<GroupReport>, Option<RuntimeFault>) {
-        (self.reports.iter().flatten().cloned().collect(), self.fault.clone())
+        (self.reports.iter().flatten().cloned().collect(), self.fault().cloned())
     }
 }

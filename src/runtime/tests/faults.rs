@@ -5,7 +5,7 @@ mod support;
 
 use palpate_runtime::{
     Actor, Event, Execution, GroupMode, Nanos, Outcome, RateGroup, Record, Restart, Runtime, RuntimeBuilder,
-    RuntimeReport, SlipCause, TickContext, actor_fn,
+    RuntimeFaultKind, RuntimeReport, SlipCause, TickContext, actor_fn,
 };
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -23,6 +23,7 @@ in_both_executions! {
     values_and_samples_reach_the_restarted_group_and_come_back
     a_panic_whose_payload_panics_is_contained
     every_actor_may_fail_in_the_wind_down_and_the_group_ends_with_its_sums
+    an_observers_fault_does_not_hide_the_one_that_ends_the_run
 }
 
 /// GroupMode and release of every call.
@@ -302,6 +303,29 @@ fn a_thread_that_never_returns_is_left_behind_with_its_ports() {
         ticks.windows(2).all(|pair| pair[0] < pair[1]) && !ticks.contains(&hung.lock().unwrap().unwrap()),
         "{ticks:?}"
     );
+}
+
+fn an_observers_fault_does_not_hide_the_one_that_ends_the_run(execution: Execution) {
+    let (failed, fails) = channel();
+    let log = actor_fn("log", move |ctx| {
+        if ctx.tick >= 2 {
+            let _ = failed.send(());
+            panic!("injected");
+        }
+        Outcome::Continue
+    });
+    let mut left = None;
+    let work = actor_fn("work", move |_| {
+        left = left.map(|left: u32| left - 1).or(fails.try_recv().ok().map(|()| 50));
+        if left == Some(0) { Outcome::Fault(7) } else { Outcome::Continue }
+    });
+    let mut graph = Runtime::builder(execution);
+    graph.group(RateGroup::hz(1000).name("log").observer(), vec![log]);
+    graph.group(RateGroup::hz(1000).name("work"), vec![work]);
+    let report = finish(&mut graph);
+    assert_identity(&report);
+    let fault = report.fault.unwrap();
+    assert_eq!((fault.group.as_str(), fault.kind), ("work", RuntimeFaultKind::Reported(7)));
 }
 
 #[test]

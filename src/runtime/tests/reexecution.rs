@@ -356,3 +356,26 @@ fn a_recording_of_another_graph_is_refused() {
     assert_eq!(error.kind(), GraphErrorKind::Refused);
     assert!(error.to_string().contains("another graph"), "{error}");
 }
+
+#[test]
+fn an_observers_fault_does_not_end_the_re_execution() {
+    let run = |mut graph: RuntimeBuilder, fails: bool| {
+        let records = Arc::new(Mutex::new(Vec::new()));
+        let (mut drain, all) = (graph.drain(), Arc::clone(&records));
+        let log = actor_fn("log", move |ctx| {
+            assert!(!fails || ctx.tick < 2, "injected");
+            drain.drain(&mut all.lock().unwrap());
+            Outcome::Continue
+        });
+        graph.group(RateGroup::hz(1000).name("work"), vec![actor_fn("idle", |_| Outcome::Continue)]);
+        graph.group(RateGroup::hz(1000).name("log").observer(), vec![log]).until(Nanos(50 * MS));
+        let running = graph.build().unwrap().start().unwrap();
+        running.wait_for(Duration::MAX);
+        let report = running.stop();
+        (report, Recording::from_records(records.lock().unwrap().iter()))
+    };
+    let (report, recording) = run(Runtime::builder(Execution::Virtual), false);
+    let (again, _) = run(Runtime::reexecution(recording), true);
+    assert_eq!((report.groups[0].released, again.groups[0].released), (51, 51));
+    assert_eq!(again.fault.map(|fault| fault.group).as_deref(), Some("log"));
+}

@@ -284,3 +284,25 @@ fn a_subscriber_of_restarts_or_of_faults_alone_hears_them() {
         assert_eq!(ear.all().len(), 1);
     }
 }
+
+#[test]
+fn an_observers_fault_is_told_as_that_and_keeps_no_other_from_being_told() {
+    let ear = Ear::default();
+    tracing::subscriber::with_default(ear.clone(), || {
+        let mut graph = Runtime::builder(Execution::Virtual);
+        let fails_at = |tick, code| {
+            let outcome = move |now| if now == tick { Outcome::Fault(code) } else { Outcome::Continue };
+            vec![actor_fn("actor", move |ctx| outcome(ctx.tick))]
+        };
+        graph.group(RateGroup::hz(1000).name("log").observer(), fails_at(2, 1));
+        graph.group(RateGroup::hz(1000).name("work"), fails_at(50, 7));
+        let running = graph.build().unwrap().start().unwrap();
+        running.wait_for(Duration::from_millis(10));
+        let told = ear.of("fault");
+        assert_eq!((told.len(), told[0].field("group"), told[0].field("message")), (1, "log", "the observer stops"));
+        running.wait_for(Duration::from_millis(90));
+        running.stop();
+    });
+    let told = ear.of("fault");
+    assert_eq!((told.len(), told[1].field("group"), told[1].field("message")), (2, "work", "the run stops"));
+}
