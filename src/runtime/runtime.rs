@@ -340,7 +340,7 @@ impl RunningGraph {
                 (group.lateness, group.execution) = shown.times();
             }
         }
-        let what = "of a stop and was given up; its tick or stop must return";
+        let what = "of a stop and its wind-down and was given up; its tick or stop must return";
         let stuck = || {
             RuntimeFault::of_group(
                 &given_up.join("`, `"),
@@ -411,6 +411,25 @@ mod tests {
         shared::<StopHandle>();
     }
 
+    fn give_up(running: &RunningGraph, bound: Duration) -> Vec<String> {
+        match &mut lock(&running.executor).executor {
+            Executor::Threaded(threads) => threads.join(&running.names, bound),
+            Executor::Virtual(_) => unreachable!("the graph is threaded"),
+        }
+    }
+
+    #[test]
+    fn a_stop_waits_for_a_wind_down_that_takes_longer_than_its_bound() {
+        let mut graph = Runtime::builder(Execution::Threaded);
+        let group = RateGroup::hz(100).wind_down(Nanos(2_000_000_000));
+        graph.group(group, vec![actor_fn("idle", |_| Outcome::Continue)]);
+        let running = graph.build().unwrap().start().unwrap();
+        running.wait_for(Duration::from_millis(30));
+        assert_eq!(give_up(&running, Duration::from_millis(800)), [] as [&str; 0]);
+        let report = running.stop();
+        assert_eq!((report.fault, report.groups.len()), (None, 1));
+    }
+
     #[test]
     fn a_group_that_does_not_return_is_given_up_and_observers_still_end() {
         let bound = Duration::from_millis(300);
@@ -424,14 +443,10 @@ mod tests {
         graph.group(RateGroup::hz(100).name("log").observer(), vec![]);
         let running = graph.build().unwrap().start().unwrap();
         running.wait_for(Duration::from_millis(30));
-        let given_up = |bound| match &mut lock(&running.executor).executor {
-            Executor::Threaded(threads) => threads.join(&running.names, bound),
-            Executor::Virtual(_) => unreachable!("the graph is threaded"),
-        };
-        assert_eq!(given_up(bound), ["stuck"]);
+        assert_eq!(give_up(&running, bound), ["stuck"]);
         // Check that a later stop, and the drop, do not wait for it again
         let again = Instant::now();
-        assert_eq!(given_up(STOP_BOUND), ["stuck"]);
+        assert_eq!(give_up(&running, STOP_BOUND), ["stuck"]);
         assert!(again.elapsed() < STOP_BOUND);
         let report = running.stop();
         assert_eq!(report.fault.map(|fault| fault.group).as_deref(), Some("stuck"));

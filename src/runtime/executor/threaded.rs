@@ -54,6 +54,8 @@ pub(crate) struct Threads {
     grants: GrantHandle,
     beginning: Arc<Beginning>,
     polled: Nanos,
+    /// The longest time that a group takes to come to rest.
+    wind_down: Duration,
     /// Set when somebody has waited long enough: nobody waits for the rest again.
     given_up: bool,
     /// Since when only observers are left.
@@ -100,6 +102,7 @@ impl Threads {
         }
         grants.set(grant);
         start_actors(&mut groups)?;
+        let wind_down = groups.iter().map(|group| group.spec.wind_down).max().unwrap_or_default().to_duration();
         let beginning = Arc::new(Beginning::new());
         if places.iter().all(Option::is_some) {
             beginning.set(os::monotonic() + LEAD_NS);
@@ -134,6 +137,7 @@ impl Threads {
             grants: grants.clone(),
             beginning,
             polled: Nanos::ZERO,
+            wind_down,
             given_up: false,
             closing: None,
             ended_at: None,
@@ -286,15 +290,16 @@ impl Threads {
         self.ended_at.unwrap_or_else(|| self.beginning.elapsed())
     }
 
-    /// Requests a stop and waits for all groups, `bound` for each step of the way: a group that does not end is given
-    /// up, then the observers get the same time to close what they hold. Returns the names of the groups given up.
+    /// Requests a stop and waits for all groups, `bound` for each step of the way and the longest wind-down: a group that
+    /// does not end is given up, then the observers get the same time to close what they hold. Returns the names of the
+    /// groups given up.
     pub(crate) fn join(&mut self, names: &[String], bound: Duration) -> Vec<String> {
         self.control.request_stop();
         let mut progress = (self.supervisor.ended(), Instant::now());
         while !self.poll() && !self.given_up {
             if self.supervisor.ended() != progress.0 {
                 progress = (self.supervisor.ended(), Instant::now());
-            } else if progress.1.elapsed() > bound {
+            } else if progress.1.elapsed() > bound + self.wind_down {
                 self.given_up = self.control.abandon();
                 progress.1 = Instant::now();
             }

@@ -54,7 +54,7 @@ pub enum RuntimeFaultKind {
     },
     /// A release did not return for as long as its [restart policy](crate::Restart::hung_after) allows.
     Hung,
-    /// A group did not end within [`STOP_BOUND`](crate::STOP_BOUND) of a stop and was given up with its thread.
+    /// A group did not end within [`STOP_BOUND`](crate::STOP_BOUND) of a stop and its wind-down and was given up with its thread.
     GivenUp,
     /// A re-execution left its recording, or the recording lacks what a release needs.
     Recording,

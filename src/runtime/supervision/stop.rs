@@ -8,7 +8,8 @@ use crate::primitives::sync::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The time for which a stop waits while no group ends before it gives up on those still running.
+/// The time for which a stop waits while no group ends, beyond the longest [wind-down](crate::RateGroup::wind_down), before
+/// it gives up on those still running.
 pub const STOP_BOUND: Duration = Duration::from_secs(5);
 
 /// Flags that all threads of a run share.
