@@ -38,6 +38,8 @@ pub(crate) struct Ledger {
     in_degraded_mode: u64,
     /// How often the watchdog of a device-paced group took over.
     pub(crate) takeovers: u64,
+    /// Set when the group has begun to come to rest: then nothing is due any more but that.
+    pub(crate) winding_down: bool,
     /// Set while the group is down after a fault: what was due meanwhile is skipped because of it.
     pub(crate) down: bool,
 }
@@ -62,12 +64,14 @@ impl Ledger {
             degraded: 0,
             in_degraded_mode: 0,
             takeovers: 0,
+            winding_down: false,
             down: false,
         }
     }
 
     /// Releases `periods` more from `now` on, and then no others. What is overdue by then is skipped.
-    pub(crate) fn end_after(&mut self, now: Nanos, periods: u64) {
+    pub(crate) fn wind_down(&mut self, now: Nanos, periods: u64) {
+        self.winding_down = true;
         let first = self.timeline.unbounded().latest_due(self.next, now);
         self.timeline.end_before(first.saturating_add(periods));
         self.policy = OverrunPolicy::Skip;

@@ -48,7 +48,7 @@ impl DeviceWait {
         let mut go_on = sleep(Nanos::ZERO);
         while go_on {
             // What is to come to rest does not wait for a device that may be gone.
-            let patient = !self.driving && !group.winding_down;
+            let patient = !self.driving && !group.ledger.winding_down;
             let limit = if patient { due + self.watchdog } else { due };
             let asked = now();
             let timeout = limit.saturating_sub(asked).min(SLICE);

@@ -80,7 +80,7 @@ impl GroupThread {
             let Link { lease, control, .. } = &*link;
             let observer = group.spec.observer;
             let due = next_due(group, now)?;
-            let winding_down = group.winding_down;
+            let winding_down = group.ledger.winding_down;
             let leave = || match observer {
                 true => control.observers_may_end(),
                 false => !winding_down && control.stop_requested() || lease.is_revoked(),

@@ -84,7 +84,7 @@ impl HostedGroup {
         let base_ns = beginning.get().unwrap_or_else(|| beginning.set(os::monotonic()));
         let now = || since(base_ns);
         let group = &mut thread.group;
-        let stops = !group.winding_down && thread.link.control.stop_requested();
+        let stops = !group.ledger.winding_down && thread.link.control.stop_requested();
         if stops && !group.begin_wind_down(now()) || next_due(group, now).is_none() {
             self.ended = true;
             return HostRelease::Ended;

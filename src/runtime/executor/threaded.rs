@@ -193,7 +193,9 @@ impl Threads {
     fn succeed(&mut self, failure: Box<Failure>) {
         let seat = &mut self.seats[failure.group];
         let restarter = seat.restart.take().map(|(restarter, _)| restarter).filter(Restarter::may_restart);
-        let Some(restarter) = restarter.filter(|_| !self.control.stop_requested()) else {
+        // What has begun to come to rest is not begun anew.
+        let is_over = self.control.stop_requested() || failure.books.winding_down;
+        let Some(restarter) = restarter.filter(|_| !is_over) else {
             return self.give_up(failure);
         };
         seat.incarnation += 1;

@@ -150,7 +150,7 @@ impl VirtualRun {
         self.stopping = true;
         let repeats = self.reexecution.is_some();
         for index in self.indices(false) {
-            let winds_down = self.groups[index].as_ref().is_some_and(|group| group.winding_down);
+            let winds_down = self.groups[index].as_ref().is_some_and(|group| group.ledger.winding_down);
             if repeats || !(winds_down || self.begin_wind_down(index)) {
                 self.end(index);
             }
@@ -159,7 +159,7 @@ impl VirtualRun {
     }
 
     fn begin_wind_down(&mut self, index: usize) -> bool {
-        let Some(group) = self.groups[index].as_mut().filter(|group| !group.winding_down) else { return false };
+        let Some(group) = self.groups[index].as_mut().filter(|group| !group.ledger.winding_down) else { return false };
         let begun = group.begin_wind_down(self.now);
         if begun {
             self.paces[index].wind_down(group, self.now);

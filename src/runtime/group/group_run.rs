@@ -37,7 +37,6 @@ pub(crate) struct GroupRun {
     pub(crate) books: Option<ExchangeWriter<Ledger>>,
     last: TickContext,
     degraded_code: Option<u32>,
-    pub(crate) winding_down: bool,
     /// Its overrun policy has stopped the run.
     overran: bool,
     /// After a fault the actors are stopped and nothing else, unless the group winds down.
@@ -89,7 +88,6 @@ impl GroupRun {
             books: None,
             last,
             degraded_code: None,
-            winding_down: false,
             overran: false,
             faulted: false,
         }
@@ -144,19 +142,18 @@ impl GroupRun {
     /// done so already.
     pub(crate) fn begin_wind_down(&mut self, now: Nanos) -> bool {
         let periods = self.spec.rate.last_release(self.spec.wind_down);
-        if self.winding_down || periods == 0 {
+        if self.ledger.winding_down || periods == 0 {
             return false;
         }
-        self.winding_down = true;
         self.faulted = false;
         self.event(self.ledger.due(self.ledger.elapsed_periods()).max(now), Event::WINDING_DOWN, periods);
-        self.ledger.end_after(now, periods);
+        self.ledger.wind_down(now, periods);
         true
     }
 
     /// Decides what comes after a fault, the same in both executions; a wind-down has then begun.
     pub(crate) fn after_fault(&mut self, now: Nanos, restartable: bool, stop_requested: bool) -> AfterFault {
-        if self.winding_down {
+        if self.ledger.winding_down {
             // What has already begun to come to rest is not begun anew.
             return if self.members.all_failed() { AfterFault::End } else { AfterFault::GoOn };
         }
@@ -201,7 +198,7 @@ impl GroupRun {
             Decision::Stop { skipped } => return Err(self.overrun(skipped)),
         };
         let scheduled = self.ledger.due(release);
-        let mode = if self.winding_down { GroupMode::Stopping } else { self.ledger.mode() };
+        let mode = if self.ledger.winding_down { GroupMode::Stopping } else { self.ledger.mode() };
         self.run(Due { tick: release, scheduled, skipped, mode }, wake, start, end)
     }
 

@@ -305,6 +305,36 @@ fn a_thread_that_never_returns_is_left_behind_with_its_ports() {
     );
 }
 
+#[test]
+fn a_thread_that_never_returns_from_the_wind_down_ends_the_run_and_is_not_replaced() {
+    let (let_go, held) = channel::<()>();
+    let held = Arc::new(Mutex::new(held));
+    let (calls, made) = (Calls::default(), Arc::new(Mutex::new(0)));
+    let (seen, count) = (Arc::clone(&calls), Arc::clone(&made));
+    let factory = move || {
+        *count.lock().unwrap() += 1;
+        let (seen, held, mut stopping) = (Arc::clone(&seen), Arc::clone(&held), 0);
+        Ok(vec![actor_fn("slow", move |ctx| {
+            seen.lock().unwrap().push((ctx.mode, ctx.tick));
+            stopping += u64::from(ctx.mode == GroupMode::Stopping);
+            if stopping == 3 {
+                let _ = held.lock().unwrap().recv();
+            }
+            Outcome::Continue
+        })])
+    };
+    let mut graph = Runtime::builder(Execution::Threaded);
+    let group = RateGroup::hz(100).wind_down(Nanos(200 * MS)).wind_down_at_end();
+    let restart = Restart { hung_after: Nanos(100 * MS), ..Restart::default() };
+    let report = finish(graph.restartable(group, restart, factory).until(Nanos(50 * MS)));
+    drop(let_go);
+    assert_eq!((report.restarts, *made.lock().unwrap()), (vec![], 1));
+    assert_eq!(report.fault.map(|fault| fault.kind), Some(RuntimeFaultKind::Hung));
+    // Check that nothing runs in normal mode after the end
+    let calls = calls.lock().unwrap();
+    assert!(calls.iter().all(|&(mode, tick)| mode == GroupMode::Stopping || tick <= 5), "{calls:?}");
+}
+
 fn an_observers_fault_does_not_hide_the_one_that_ends_the_run(execution: Execution) {
     let (failed, fails) = channel();
     let log = actor_fn("log", move |ctx| {
