@@ -430,6 +430,39 @@ mod tests {
         assert_eq!((report.fault, report.groups.len()), (None, 1));
     }
 
+    /// Panics, and does not return from its stop until it is let go.
+    struct HangsInStop(std::sync::mpsc::Sender<()>, std::sync::mpsc::Receiver<()>);
+
+    impl crate::Actor for HangsInStop {
+        fn name(&self) -> &str {
+            "hangs in stop"
+        }
+
+        fn tick(&mut self, _: &crate::TickContext) -> Outcome {
+            panic!("injected")
+        }
+
+        fn stop(&mut self, _: &crate::TickContext) {
+            let _ = self.0.send(());
+            let _ = self.1.recv();
+        }
+    }
+
+    #[test]
+    fn a_panic_is_the_fault_also_if_its_group_is_given_up_in_the_stop_after_it() {
+        let ((stops, stopping), (let_go, held)) = (std::sync::mpsc::channel(), std::sync::mpsc::channel());
+        let mut actors = Some(vec![Box::new(HangsInStop(stops, held)) as Box<dyn crate::Actor>]);
+        let factory = move || Ok(actors.take().expect("it is made once"));
+        let mut graph = Runtime::builder(Execution::Threaded);
+        graph.restartable(RateGroup::hz(100).name("stuck"), crate::Restart::default(), factory);
+        let running = graph.build().unwrap().start().unwrap();
+        stopping.recv().unwrap();
+        assert_eq!(give_up(&running, Duration::from_millis(300)), ["stuck"]);
+        let fault = running.stop().fault.unwrap();
+        assert_eq!((fault.kind, fault.actor.as_str()), (RuntimeFaultKind::Panic, "hangs in stop"));
+        drop(let_go);
+    }
+
     #[test]
     fn a_group_that_does_not_return_is_given_up_and_observers_still_end() {
         let bound = Duration::from_millis(300);

@@ -134,6 +134,9 @@ impl GroupThread {
             }
         }
         let books = group.ledger;
+        if let Some(fault) = &failed {
+            let _ = post.send(Message::Failing(index, *incarnation, fault.clone()));
+        }
         let (report, fault) = group.finish(beginning.elapsed());
         if let Some(fault) = failed {
             let failure = Failure { group: index, incarnation: *incarnation, fault, report, books };

@@ -39,6 +39,8 @@ struct Seat {
     restart: Option<(Restarter, ExchangeReader<Ledger>)>,
     incarnation: usize,
     lease: Arc<Lease>,
+    /// What its actors failed of, while they stop.
+    failing: Option<RuntimeFault>,
     /// `None` for a hosted group, whose thread is none of ours.
     probe: Option<ThreadProbe>,
     watch: OverdueWatch,
@@ -127,7 +129,8 @@ impl Threads {
                     (None, None)
                 }
             };
-            seats.push(Seat { handle, restart, incarnation: 0, lease, probe, watch: OverdueWatch::default() });
+            let watch = OverdueWatch::default();
+            seats.push(Seat { handle, restart, incarnation: 0, lease, failing: None, probe, watch });
         }
         let threads = Self {
             seats,
@@ -157,6 +160,12 @@ impl Threads {
     pub(crate) fn poll(&mut self) -> bool {
         while let Ok(message) = self.mail.try_recv() {
             match message {
+                Message::Failing(group, incarnation, fault) => {
+                    let seat = &mut self.seats[group];
+                    if incarnation == seat.incarnation {
+                        seat.failing = Some(fault);
+                    }
+                }
                 Message::Failed(failure) => self.answer(failure),
                 Message::Restarted(begun) => self.install(*begun),
                 Message::NotRestarted(failure) => self.give_up(failure),
@@ -200,7 +209,7 @@ impl Threads {
         };
         seat.incarnation += 1;
         seat.lease = Arc::new(Lease::default());
-        seat.watch = OverdueWatch::default();
+        (seat.watch, seat.failing) = (OverdueWatch::default(), None);
         let link = Link {
             incarnation: seat.incarnation,
             beginning: Arc::clone(&self.beginning),
@@ -283,7 +292,10 @@ impl Threads {
         let at = books.next_due().unwrap_or(now);
         restarter.abandoned(at);
         let what = format!("did not return within {} and was left behind", restarter.policy.hung_after);
-        let fault = RuntimeFault::of_group(&restarter.spec.name, at, RuntimeFaultKind::Hung, what);
+        let fault = match seat.failing.take() {
+            Some(fault) => RuntimeFault { what: format!("{}; its stop {what}", fault.what), ..fault },
+            None => RuntimeFault::of_group(&restarter.spec.name, at, RuntimeFaultKind::Hung, what),
+        };
         let (report, incarnation) = (books.report(&restarter.spec), seat.incarnation);
         self.succeed(Box::new(Failure { group: index, incarnation, fault, report, books }));
     }
@@ -308,6 +320,10 @@ impl Threads {
             std::thread::sleep(POLL);
         }
         for (index, seat) in self.seats.iter_mut().enumerate() {
+            if let Some(fault) = seat.failing.take() {
+                // Whatever it does since then is the consequence.
+                self.supervisor.note(Message::Fault(fault));
+            }
             if let Some(handle) = seat.handle.take().filter(|_| self.supervisor.has_ended(index)) {
                 // Panics of actors were caught inside, and the report has already come.
                 let _ = handle.join();

@@ -17,6 +17,9 @@ pub(crate) enum Message {
     ObserverFault(RuntimeFault),
     /// The group with this number has ended, its actors are gone.
     Ended(usize, Box<GroupReport>),
+    /// The actors of the restartable group with this number failed, said by this one of its threads, and are about to stop:
+    /// that may hang.
+    Failing(usize, usize, RuntimeFault),
     /// The actors of a restartable group failed and are gone; nobody has been told to stop.
     Failed(Box<Failure>),
     /// They could not be made or started again.
@@ -88,7 +91,7 @@ impl Supervisor {
                 self.end(failure.group, failure.report);
             }
             // Nothing has ended.
-            Message::Restarted(_) => {}
+            Message::Failing(..) | Message::Restarted(_) => {}
         }
     }
 

@@ -335,6 +335,55 @@ fn a_thread_that_never_returns_from_the_wind_down_ends_the_run_and_is_not_replac
     assert!(calls.iter().all(|&(mode, tick)| mode == GroupMode::Stopping || tick <= 5), "{calls:?}");
 }
 
+/// Panics, and does not return from its stop until it is let go.
+struct HangsInStop(Arc<Mutex<Receiver<()>>>);
+
+impl Actor for HangsInStop {
+    fn name(&self) -> &str {
+        "hangs in stop"
+    }
+
+    fn tick(&mut self, ctx: &TickContext) -> Outcome {
+        assert!(ctx.tick < 3, "injected");
+        Outcome::Continue
+    }
+
+    fn stop(&mut self, _: &TickContext) {
+        let _ = self.0.lock().unwrap().recv();
+    }
+}
+
+#[test]
+fn a_panic_is_the_fault_also_if_the_stop_after_it_never_returns() {
+    let (let_go, held) = channel::<()>();
+    let held = Arc::new(Mutex::new(held));
+    let made = Arc::new(Mutex::new(0));
+    let count = Arc::clone(&made);
+    let factory = move || {
+        let mut made = count.lock().unwrap();
+        *made += 1;
+        Ok(vec![match *made {
+            1 => Box::new(HangsInStop(Arc::clone(&held))) as Box<dyn Actor>,
+            _ => actor_fn("replacement", |_| Outcome::Continue),
+        }])
+    };
+    let mut graph = Runtime::builder(Execution::Threaded);
+    let restart = Restart { hung_after: Nanos(100 * MS), ..Restart::default() };
+    let running = graph.restartable(RateGroup::hz(100), restart, factory).build().unwrap().start().unwrap();
+    let begun = Instant::now();
+    while *made.lock().unwrap() < 2 {
+        assert!(begun.elapsed() < Duration::from_secs(20), "the group was not started again");
+        running.wait_for(Duration::from_millis(10));
+    }
+    running.wait_for(Duration::from_millis(50));
+    drop(let_go);
+    let report = running.stop();
+    assert_eq!((report.fault, report.restarts.len()), (None, 1));
+    let fault = &report.restarts[0];
+    assert_eq!((fault.kind, fault.actor.as_str()), (RuntimeFaultKind::Panic, "hangs in stop"));
+    assert!(fault.what.contains("injected") && fault.what.contains("left behind"), "{fault}");
+}
+
 fn an_observers_fault_does_not_hide_the_one_that_ends_the_run(execution: Execution) {
     let (failed, fails) = channel();
     let log = actor_fn("log", move |ctx| {
