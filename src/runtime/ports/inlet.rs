@@ -177,7 +177,10 @@ impl<T: InputValue> Parameter<T> {
     /// Takes a lock: from outside of ticks.
     pub fn update(&self, change: impl FnOnce(&mut T)) {
         let state = &mut *lock(&self.0);
-        change(&mut state.value);
+        let mut value = state.value;
+        change(&mut value);
+        // Only now: a change that panics changes nothing.
+        state.value = value;
         state.publish();
         state.sent.pass_outside();
     }

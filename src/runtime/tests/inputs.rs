@@ -141,3 +141,21 @@ fn actors_that_are_made_again_take_the_value_set_last() {
     assert_eq!(running.stop().restarts.len(), 1);
     assert_eq!((seen.lock().unwrap().clone(), gain.value()), (vec![1, 1, -7, -7, -7, -7, -7], -7));
 }
+
+#[test]
+fn a_change_that_panics_leaves_the_value_that_was_set_last() {
+    let mut graph = Runtime::builder(Execution::Virtual);
+    let gain = graph.parameter(1.0);
+    gain.set(2.0);
+    let fails = || {
+        gain.update(|value| {
+            *value = 3.0;
+            panic!("injected");
+        });
+    };
+    assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(fails)).is_err());
+    // Check that nothing is shown that was never sent
+    assert_eq!(gain.value(), 2.0);
+    gain.update(|value| *value += 1.0);
+    assert_eq!(gain.value(), 3.0);
+}
