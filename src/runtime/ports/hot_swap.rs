@@ -66,6 +66,11 @@ impl<H> Swappable<H> {
         &mut self.half
     }
 
+    /// True if a half has come that is not in force yet.
+    pub(crate) fn has_delivery(&self) -> bool {
+        self.inbox.has_news()
+    }
+
     /// The half that has come, if one has.
     #[inline]
     pub(crate) fn delivery(&mut self) -> Option<H> {

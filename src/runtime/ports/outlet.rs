@@ -66,12 +66,13 @@ impl<T> OutletWriter<T> {
         version
     }
 
-    /// True if the outside thread has taken the newest value, or there is none yet: while it is false nobody has looked since.
+    /// True if the outside thread has taken the newest value, or there is none for it yet, as after its place was
+    /// [taken](crate::OutletPort::reader): while it is false nobody has looked since.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn is_taken(&self) -> bool {
-        self.0.half().is_taken()
+        self.0.has_delivery() || self.0.half().is_taken()
     }
 }
 

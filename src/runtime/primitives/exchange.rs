@@ -207,13 +207,19 @@ impl<T> ExchangeReader<T> {
     /// Wait-free (one load, at most one atomic swap), real-time safe.
     #[inline]
     pub fn refresh(&mut self) -> bool {
-        // Relaxed: only a hint whether to swap; the swap synchronises with the publication. Only this side clears NEW,
-        // so a slot seen as new is still new, or newer, when it is swapped.
-        if self.shared.in_flight.load(Ordering::Relaxed) & NEW == 0 {
+        // Only this side clears NEW, so a slot seen as new is still new, or newer, when it is swapped.
+        if !self.has_news() {
             return false;
         }
         self.slot = self.shared.swap(self.slot) & INDEX;
         true
+    }
+
+    /// True if there is a value that was not taken yet.
+    #[inline]
+    pub(crate) fn has_news(&self) -> bool {
+        // Relaxed: only a hint whether to swap; the swap synchronises with the publication.
+        self.shared.in_flight.load(Ordering::Relaxed) & NEW != 0
     }
 
     /// The value of the last refresh, or the initial value.

@@ -4,8 +4,8 @@
 mod support;
 
 use palpate_runtime::{
-    Actor, ActorError, Execution, Nanos, Outcome, PortUse, PortUseKind, RateGroup, Reader, Record, Recording, Restart,
-    Runtime, RuntimeBuilder, RuntimeReport, TickContext, Writer, actor_fn,
+    Actor, ActorError, Execution, Nanos, Outcome, PortUse, PortUseKind, Rate, RateGroup, Reader, Record, Recording,
+    Restart, Runtime, RuntimeBuilder, RuntimeReport, TickContext, Writer, actor_fn,
 };
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
@@ -19,6 +19,7 @@ in_both_executions! {
     a_new_reader_begins_with_the_initial_value
     a_reader_that_stays_keeps_its_value_and_gets_the_last_one_of_the_failed_writer
     an_outlet_that_stays_keeps_its_value_and_gets_the_last_one_of_the_failed_writer
+    a_reader_of_an_outlet_that_is_taken_again_has_nothing_left_to_take
     what_start_publishes_after_a_restart_is_not_followed_by_older_values
     a_receiver_that_stays_gets_the_samples_of_both_senders_in_order
     a_new_receiver_gets_what_is_sent_from_then_on
@@ -259,6 +260,24 @@ fn an_outlet_that_stays_keeps_its_value_and_gets_the_last_one_of_the_failed_writ
     assert!(!display.refresh());
     assert_eq!((display.version(), *display.get()), (3, 3));
     assert_eq!(running.stop().restarts.len(), 1);
+}
+
+fn a_reader_of_an_outlet_that_is_taken_again_has_nothing_left_to_take(execution: Execution) {
+    let mut graph = Runtime::builder(execution);
+    let port = graph.outlet_port(|| 0_u64);
+    let (mut writer, gone) = (port.writer(), port.reader());
+    let ctx = TickContext::by_hand(Rate::hz(30), 0);
+    writer.publish(&ctx);
+    assert!(!writer.is_taken());
+    let mut display = port.reader();
+    drop(gone);
+    // Check that who publishes only for somebody who looks is not kept from it for ever
+    assert!(writer.is_taken());
+    *writer.buffer() = 7;
+    writer.publish(&ctx);
+    assert!(!writer.is_taken());
+    assert!(display.refresh() && writer.is_taken());
+    assert_eq!(*display.get(), 7);
 }
 
 fn what_start_publishes_after_a_restart_is_not_followed_by_older_values(execution: Execution) {
