@@ -3,6 +3,7 @@
 use crate::accounting::timeline::Wake;
 use crate::executor::beginning::since;
 use crate::executor::group_thread::{GroupThread, next_due};
+use crate::reports::report::RuntimeFaultKind;
 use crate::system::os;
 use crate::time::Nanos;
 use std::sync::Arc;
@@ -93,12 +94,15 @@ impl HostedGroup {
         if at < group.ledger.next_frame_from() {
             return HostRelease::Early;
         }
-        if let Err(fault) = group.release(Wake::by_frame(at), |_| now(), |_| now())
-            && thread.after(fault, now()).is_break()
-        {
-            self.ended = true;
+        let Err(fault) = group.release(Wake::by_frame(at), |_| now(), |_| now()) else { return HostRelease::Ran };
+        // The overrun policy has stopped the run in place of a release.
+        let ran = !matches!(fault.kind, RuntimeFaultKind::Overrun { .. });
+        self.ended = thread.after(fault, now()).is_break();
+        match (ran, self.ended) {
+            (true, _) => HostRelease::Ran,
+            (false, false) => HostRelease::Early,
+            (false, true) => HostRelease::Ended,
         }
-        HostRelease::Ran
     }
 
     /// Time since time zero; none before.

@@ -1,8 +1,8 @@
 //! Hosted groups: releases on a thread of the program's own, at whatever pace it keeps.
 
 use palpate_runtime::{
-    Actor, ActorTimes, Execution, GroupMode, HostRelease, HostedGroup, Nanos, Outcome, RateGroup, Restart,
-    RunningGraph, Runtime, RuntimeFaultKind, STOP_BOUND, TickContext, actor_fn,
+    Actor, ActorTimes, Execution, GroupMode, HostRelease, HostedGroup, Nanos, Outcome, OverrunPolicy, RateGroup,
+    Restart, RunningGraph, Runtime, RuntimeFaultKind, STOP_BOUND, TickContext, actor_fn,
 };
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -138,6 +138,29 @@ fn a_panic_stops_at_the_release_and_is_in_the_report() {
     let fault = running.stop().fault.unwrap();
     assert_eq!((fault.group.as_str(), fault.kind), ("haptic", RuntimeFaultKind::Panic));
     assert!(fault.what.contains("deliberate"), "{fault}");
+}
+
+#[test]
+fn a_release_that_the_overrun_policy_stops_has_not_run() {
+    for wind_down in [Nanos::ZERO, Nanos(50 * MS)] {
+        let group = RateGroup::hz(100).overrun(OverrunPolicy::Stop).wind_down(wind_down);
+        let (running, mut haptic) = started(group, noting(&Calls::default()));
+        let mut ran = u64::from(haptic.release() == HostRelease::Ran);
+        // A host that pauses for some periods.
+        std::thread::sleep(Duration::from_millis(60));
+        loop {
+            match haptic.release() {
+                HostRelease::Ran => ran += 1,
+                HostRelease::Early => std::thread::yield_now(),
+                HostRelease::Ended => break,
+            }
+        }
+        drop(haptic);
+        let report = running.stop();
+        let fault = report.fault.unwrap();
+        assert!(matches!(fault.kind, RuntimeFaultKind::Overrun { .. }), "{fault}");
+        assert_eq!(report.groups[0].released, ran);
+    }
 }
 
 #[test]
