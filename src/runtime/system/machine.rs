@@ -2,6 +2,7 @@
 //! in `docs/realtime.md`. A file that is not there leaves its finding unknown.
 
 use crate::rate_group::RateGroup;
+use crate::system::os::{CAP_IPC_LOCK, CAP_SYS_NICE, Capability};
 use std::fmt;
 use std::path::Path;
 
@@ -56,8 +57,8 @@ pub(crate) fn findings(root: &Path, groups: &[RateGroup]) -> Vec<MachineFinding>
             read("sys/devices/system/cpu/cpuidle/current_driver"),
             can_write(&root.join("dev/cpu_dma_latency")),
         ),
-        limit(read("proc/self/limits"), "Max realtime priority", "priority limit", 99),
-        limit(read("proc/self/limits"), "Max locked memory", "memory lock", u64::MAX),
+        limit("priority limit", "Max realtime priority", 99, CAP_SYS_NICE, read),
+        limit("memory lock", "Max locked memory", u64::MAX, CAP_IPC_LOCK, read),
         priorities(groups),
     ]
 }
@@ -147,19 +148,26 @@ fn idle_states(driver: Option<String>, can_hold: bool) -> MachineFinding {
     finding("C-states", is, found, "boot with processor.max_cstate=1 or intel_idle.max_cstate=1")
 }
 
-/// A soft limit of /proc/self/limits.
-fn limit(limits: Option<String>, key: &str, name: &'static str, least: u64) -> MachineFinding {
-    let line = limits.as_deref().and_then(|text| text.lines().find_map(|line| line.strip_prefix(key)));
-    let soft = line.and_then(|line| line.split_whitespace().next()).map(str::to_owned);
-    let value = soft.as_deref().map(|soft| soft.parse::<u64>().unwrap_or(u64::MAX));
-    let root = value.is_some_and(|value| value < least) && crate::system::os::is_root();
-    let found = match (soft, root) {
-        (Some(soft), true) => format!("the limit is {soft}, which root passes by"),
+/// The soft limit `key`, which a process with the `capability` passes by.
+fn limit(
+    name: &'static str,
+    key: &str,
+    least: u64,
+    capability: Capability,
+    read: impl Fn(&str) -> Option<String>,
+) -> MachineFinding {
+    let limits = read("proc/self/limits").unwrap_or_default();
+    let line = limits.lines().find_map(|line| line.strip_prefix(key));
+    let soft = line.and_then(|line| line.split_whitespace().next());
+    let enough = soft.map(|soft| soft.parse().unwrap_or(u64::MAX) >= least);
+    let passes_by = enough == Some(false) && capability.is_in(&read("proc/self/status").unwrap_or_default());
+    let found = match (soft, passes_by) {
+        (Some(soft), true) => format!("the limit is {soft}, which {} passes by", capability.name),
         (Some(soft), false) => format!("the limit is {soft}"),
         (None, _) => String::new(),
     };
     let remedy = "give the user rtprio 99 and memlock unlimited in /etc/security/limits.d";
-    finding(name, value.map(|value| value >= least || root), found, remedy)
+    finding(name, enough.map(|enough| enough || passes_by), found, remedy)
 }
 
 fn priorities(groups: &[RateGroup]) -> MachineFinding {
@@ -227,6 +235,20 @@ mod tests {
         // A folder in its place, which root cannot write either.
         let states = states(&machine("unwritable", &files), group());
         assert!(states.contains(&("C-states", Readiness::Missing)), "{states:?}");
+    }
+
+    #[test]
+    fn a_limit_is_passed_by_with_its_capability_and_not_by_who_the_user_is() {
+        let limits = "Max locked memory  65536  65536  bytes\nMax realtime priority  0  0  \n";
+        let of = |name: &str, capabilities: &str| {
+            let status = format!("Name:\tx\nCapEff:\t{capabilities}\nSeccomp:\t0\n");
+            let files = [("proc/self/limits", limits), ("proc/self/status", status.as_str())];
+            let states = states(&machine(name, &files), group());
+            ["priority limit", "memory lock"].map(|name| states.iter().find(|state| state.0 == name).unwrap().1)
+        };
+        assert_eq!(of("no-capability", "0000000000000000"), [Readiness::Missing; 2]);
+        assert_eq!(of("sys-nice", "0000000000800000"), [Readiness::Ready, Readiness::Missing]);
+        assert_eq!(of("ipc-lock", "0000000000004000"), [Readiness::Missing, Readiness::Ready]);
     }
 
     #[test]

@@ -3,8 +3,8 @@
 //! Every request that can be refused returns the refusal as a sentence for the report; none of them fails a run.
 
 pub(crate) use imp::{
-    ThreadProbe, block_signals, give_way, is_root, lock_memory, may_lock_everything, monotonic, set_deadline,
-    set_realtime, set_timer_slack, sleep_until, stay_awake, thread_cpu,
+    ThreadProbe, block_signals, give_way, lock_memory, may_lock_everything, monotonic, set_deadline, set_realtime,
+    set_timer_slack, sleep_until, stay_awake, thread_cpu,
 };
 
 use std::collections::BTreeSet;
@@ -12,6 +12,25 @@ use std::fs::read_to_string;
 
 /// The niceness of a thread that gives way.
 pub(crate) const BACKGROUND_NICE: i32 = 15;
+
+/// A capability of the kernel's, with which a limit is passed by.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Capability {
+    pub(crate) name: &'static str,
+    bit: u32,
+}
+
+pub(crate) const CAP_IPC_LOCK: Capability = Capability { name: "CAP_IPC_LOCK", bit: 14 };
+pub(crate) const CAP_SYS_NICE: Capability = Capability { name: "CAP_SYS_NICE", bit: 23 };
+
+impl Capability {
+    /// True if the process of this `/proc/self/status` has it.
+    pub(crate) fn is_in(self, status: &str) -> bool {
+        let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
+        let mask = effective.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+        mask.is_some_and(|mask| mask & (1 << self.bit) != 0)
+    }
+}
 
 /// Lets the calling thread run on these cores only.
 pub(crate) fn pin_to(cpus: &[usize]) -> Result<(), String> {
@@ -89,6 +108,7 @@ pub(crate) fn clock_source() -> String {
 
 #[cfg(target_os = "linux")]
 mod imp {
+    use super::CAP_IPC_LOCK;
     use std::fs::File;
     use std::io::{Error, Write};
     use std::sync::OnceLock;
@@ -130,12 +150,6 @@ mod imp {
         };
         // SAFETY: the pointer is to a timespec of our own; an absolute sleep writes no remainder.
         unsafe { libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &time, std::ptr::null_mut()) };
-    }
-
-    /// Whether the process has the rights of root, to whom limits say nothing.
-    pub(crate) fn is_root() -> bool {
-        // SAFETY: asks for a number and touches no memory.
-        unsafe { libc::geteuid() == 0 }
     }
 
     /// Sets the cores of the calling thread.
@@ -327,19 +341,11 @@ mod imp {
         let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
         // SAFETY: the pointer is to an rlimit of our own.
         let known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &mut limit) } == 0;
-        if has_lock_capability() || (known && limit.rlim_cur == libc::RLIM_INFINITY) {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        if CAP_IPC_LOCK.is_in(&status) || (known && limit.rlim_cur == libc::RLIM_INFINITY) {
             return Ok(());
         }
         Err(format!("not locked: the limit is {} bytes (ulimit -l unlimited, or CAP_IPC_LOCK)", limit.rlim_cur))
-    }
-
-    fn has_lock_capability() -> bool {
-        const CAP_IPC_LOCK: u32 = 14;
-        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-        let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
-        effective
-            .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
-            .is_some_and(|mask| mask & (1 << CAP_IPC_LOCK) != 0)
     }
 }
 
@@ -374,10 +380,6 @@ mod imp {
 
     pub(crate) fn set_deadline(_runtime: u64, _deadline: u64, _period: u64) -> Result<(), String> {
         Err(NOT_AVAILABLE.to_owned())
-    }
-
-    pub(crate) fn is_root() -> bool {
-        false
     }
 
     /// One core, where the system can do that.
