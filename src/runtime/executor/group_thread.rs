@@ -23,8 +23,14 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How often a thread looks that waits for time zero, or an observer that has ended whether the others have.
+/// How often an observer that has ended looks whether the others have.
 const POLL: Duration = Duration::from_millis(2);
+
+/// How often a group of this period that waits for time zero looks: it loses at most an eighth of its first period, as much
+/// as a host may come early.
+fn looks_every(period: Nanos) -> Duration {
+    (period.to_duration() / 8).min(POLL)
+}
 
 /// What the thread of a group shares with the supervisor.
 pub(crate) struct Link {
@@ -54,7 +60,7 @@ impl GroupThread {
         if self.watched {
             self.group.lease = Some(Arc::clone(&self.link.lease));
         }
-        let failed = match self.link.begun() {
+        let failed = match self.link.begun(looks_every(self.group.spec.rate.period())) {
             Some(base_ns) => {
                 self.group.time_actors(move || since(base_ns));
                 self.release_all(base_ns, &mut waiter)
@@ -163,7 +169,7 @@ pub(crate) fn next_due(group: &mut GroupRun, now: impl Fn() -> Nanos) -> Option<
 
 impl Link {
     /// Waits for time zero, which a host may let wait for itself; `None` if the run is stopped before.
-    fn begun(&self) -> Option<u64> {
+    fn begun(&self, looks_every: Duration) -> Option<u64> {
         loop {
             if let Some(base_ns) = self.beginning.get() {
                 return Some(base_ns);
@@ -171,7 +177,7 @@ impl Link {
             if self.control.stop_requested() {
                 return None;
             }
-            std::thread::sleep(POLL);
+            std::thread::sleep(looks_every);
         }
     }
 
@@ -211,6 +217,20 @@ impl Link {
                 let why = guarded(|| error.to_string()).unwrap_or_else(|text| format!("its error panicked: {text}"));
                 let _ = self.post.send(Message::NotRestarted(Box::new(failure.not_answered(&why))));
             }
+        }
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_group_that_waits_for_time_zero_sees_it_within_a_part_of_its_first_period() {
+        for hz in [1, 60, 500, 1_000, 10_000, 100_000] {
+            let period = crate::Rate::hz(hz).period();
+            let every = looks_every(period);
+            assert!(!every.is_zero() && every * 8 <= period.to_duration() && every <= POLL, "{hz} Hz: {every:?}");
         }
     }
 }
