@@ -102,7 +102,8 @@ impl Setup {
 
     pub(crate) fn set_rates(&mut self, haptic_hz: f64, global_hz: f64) -> Result<(), Failure> {
         let rate = |hz: f64, what: &str| {
-            Rate::from_hz(hz).ok_or_else(|| Failure::argument(format!("{what} is {hz}, must be a rate above 0 Hz")))
+            let rule = "must be 0.001 to 1000000 Hz with at most six decimals";
+            Rate::from_hz(hz).ok_or_else(|| Failure::argument(format!("{what} is {hz}, {rule}")))
         };
         self.haptic = rate(haptic_hz, "haptic_hz")?;
         let global = RateGroup::new(rate(global_hz, "global_hz")?);

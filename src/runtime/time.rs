@@ -126,7 +126,8 @@ impl Rate {
         Self { releases, seconds }
     }
 
-    /// The fraction with denominator 1, 10, ... 10^6 nearest to `hz`, or `None` outside 0.001 Hz to 1 MHz.
+    /// The fraction with denominator 1, 10, ... 10^6 that is `hz`. `None` outside 0.001 Hz to 1 MHz, and for a rate that no such
+    /// fraction of 32-bit numbers is, as one with more than six decimals: 1/3 Hz is [`Rate::new(1, 3)`](Self::new).
     pub fn from_hz(hz: f64) -> Option<Self> {
         if !(1e-3..=1e6).contains(&hz) {
             return None;
