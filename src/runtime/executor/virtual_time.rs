@@ -172,7 +172,7 @@ impl VirtualRun {
         let Some(group) = &mut self.groups[index] else { return };
         let observer = group.spec.observer;
         if self.reexecution.is_some() && !observer {
-            // How the run went on is part of the recording.
+            // What ran after a fault, by actors made anew or without the one that failed, is not repeated: it ends here.
             return self.note(observer, fault);
         }
         let restartable = self.restarters[index].as_ref().is_some_and(Restarter::may_restart);

@@ -21,7 +21,8 @@ use std::collections::{BTreeMap, VecDeque};
 ///   in virtual time are the scheduled ones), or from inputs that the program recorded itself,
 /// - in every release of a group, what its actors take from other groups comes before what they give to them (read in
 ///   `tick`, publish after). Releases are repeated whole: one that holds an answer to its own publication cannot be,
-/// - groups that are no observers take nothing from observers, which are not repeated.
+/// - groups that are no observers take nothing from observers, which are not repeated,
+/// - no actor failed: it ends at the first fault of one, and repeats neither the wind-down nor the restart that followed.
 ///
 /// ```
 /// use palpate_runtime::{Execution, Outcome, RateGroup, Recording, Runtime, RuntimeBuilder, actor_fn};
