@@ -4,12 +4,13 @@ mod session_support;
 
 use std::time::Duration;
 
+use palpate::devices::{Capabilities, Scripted};
 use palpate::link::{Header, Hello, Message};
 use palpate::model::Vec3;
-use palpate::model::body::Body;
+use palpate::model::body::{Block, Body, State};
 use palpate::model::local::Kind;
 use palpate::runtime::Nanos;
-use palpate::scene::Scene;
+use palpate::scene::{DeviceProfile, Scene};
 use palpate::session::{Running, Session, SessionBuilder};
 use session_support::line::{Line, has_models};
 use session_support::*;
@@ -246,4 +247,39 @@ fn a_scene_that_differs_is_named_and_what_is_of_one_side_alone_is_not() {
     assert_eq!(here.difference(&hello(|scene| scene.safety.max_force_n = Some(0.5))), None);
     let named = here.difference(&hello(|scene| scene.global.rate_hz = 20.0)).unwrap();
     assert!(named.contains("rate_hz = 30") && named.contains("rate_hz = 20"), "{named}");
+}
+
+#[test]
+fn a_body_that_is_too_slow_for_one_machine_has_its_global_model_on_another() {
+    let slow = || {
+        let body = AlteredBlock::new(block(), |block: &mut Block, state: &State, forces: &mut [Vec3]| {
+            // 200 ms of a global period of 33 ms.
+            std::thread::sleep(Duration::from_millis(3));
+            block.forces(state, forces);
+        });
+        Session::builder(body.with_copies()).path(pressing()).model(Kind::Hold).substeps_per_ms(2)
+    };
+    slow().global_over(Line::default().end(0)).build().expect("what is computed elsewhere need not fit here");
+    let error = slow().build_global().map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("a period of the global model takes"), "{error}");
+}
+
+/// Check that the limits of a device are held against the scene where it is, and as its scene says on the global side.
+#[test]
+fn a_device_is_looked_at_by_the_machine_that_has_it() {
+    // Too short for the 8.5 N of the device that a scene has by default.
+    let short_ramp = |mut scene: Scene| {
+        scene.safety.ramp_ms = 10.0;
+        scene.safety.max_force_n = None;
+        Session::from_scene(scene).model(Kind::Hold)
+    };
+    let mut touch = Scene::demo();
+    touch.devices[0].profile = DeviceProfile::Touch;
+    short_ramp(touch.clone()).virtual_time().build().unwrap();
+    short_ramp(touch).build_global().unwrap();
+    // Its profile is the default, whatever it is at the machine that has it.
+    let device = || Scripted::new(pressing()).with_capabilities(Capabilities::TOUCH);
+    let pair = short_ramp(Scene::of_program()).body(block());
+    let pair = pair.named_device("left", device()).named_device("right", device()).device_here("left");
+    pair.global_over(Line::default().end(0)).build().unwrap();
 }

@@ -47,6 +47,19 @@ pub struct DeviceSpec {
     pub path: Option<ToolPath>,
 }
 
+impl DeviceSpec {
+    /// What the device says that it can do; of a program's own, what its profile says.
+    pub(crate) fn capabilities(&self) -> Capabilities {
+        let of_profile = self.profile.capabilities();
+        match (self.kind, &self.haply) {
+            (DeviceKind::Hand, _) => self.plant.capabilities(of_profile),
+            (DeviceKind::Pointer, _) => self.pointer.capabilities(of_profile),
+            (DeviceKind::Haply, Some(haply)) => Capabilities::of_force(haply.max_force_n),
+            _ => of_profile,
+        }
+    }
+}
+
 /// What a scene leaves as it is need not be in its log.
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()

@@ -5,7 +5,7 @@ use super::prepare::{Prepared, prepare};
 use super::running::Running;
 use super::wire;
 use super::{Choice, SessionBuilder};
-use crate::devices::{Device, DeviceState, Scripted, ToolPath};
+use crate::devices::{Capabilities, Device, DeviceState, Scripted, ToolPath};
 use crate::error::Error;
 use crate::link::{HapticMachine, Hello};
 
@@ -26,11 +26,10 @@ impl GlobalSession {
     pub(super) fn of(mut parts: Parts) -> Result<Self, Error> {
         // In the places of those that are elsewhere.
         let none = Scripted::new(ToolPath::constant([0.0; 3])?);
-        let others = parts.scene.devices.len().saturating_sub(parts.devices.len());
-        parts.devices.iter_mut().for_each(|(_, device)| *device = Box::new(none.clone()));
-        parts
-            .devices
-            .extend(std::iter::repeat_n((), others).map(|()| (None, Box::new(none.clone()) as Box<dyn Device>)));
+        let like = |able: Capabilities| Box::new(none.clone().with_capabilities(able)) as Box<dyn Device>;
+        parts.devices.iter_mut().for_each(|(_, device)| *device = like(device.capabilities()));
+        let others = parts.scene.devices.iter().skip(parts.devices.len());
+        parts.devices.extend(others.map(|spec| (None, like(spec.capabilities()))));
         parts.side = Side::Global;
         parts.endless = true;
         let prepared = prepare(parts)?;

@@ -167,8 +167,16 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
         as_run.local.basis = Some(scene.local.basis_states());
     }
     let here = here.as_deref();
-    let making =
-        tools::Making { scene: &scene, start: &mut start, haptic: rates[0], execution, open_haply, is_replay, here };
+    let making = tools::Making {
+        scene: &scene,
+        start: &mut start,
+        haptic: rates[0],
+        execution,
+        open_haply,
+        is_replay,
+        side,
+        here,
+    };
     let tools;
     // The safety section with what it left to the device.
     (tools, as_run.safety) = tools::tools(devices, making)?;
@@ -182,9 +190,10 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let local = groups::local_group(local, rates[0], &tools, &scene.devices, execution);
     let measure = || budget::force_evaluation(&mut *start.body, &start.state);
     let nodes = start.state.positions.len();
-    let [local, global] = match execution {
-        Execution::Virtual => [local, global],
-        Execution::Threaded => budget::declare(measured, measure, (nodes, timing, kind), [local, global])?,
+    let [local, global] = match (execution, side) {
+        // Virtual time needs none, and what evaluates the forces of a haptic side is on another machine.
+        (Execution::Virtual, _) | (_, Side::Haptic) => [local, global],
+        _ => budget::declare(measured, measure, (nodes, timing, kind), [local, global])?,
     };
     let blend = Blend::new(scene.local.blend.kind, blend_ticks);
     let (probes, in_real_time) = (std::mem::take(&mut start.probes), options.in_real_time);

@@ -46,6 +46,7 @@ pub(super) struct Making<'a> {
     pub(super) execution: Execution,
     pub(super) open_haply: Option<OpenHaply>,
     pub(super) is_replay: bool,
+    pub(super) side: Side,
     /// The devices that are at this machine, if not all are.
     pub(super) here: Option<&'a [String]>,
 }
@@ -75,7 +76,7 @@ pub(super) fn tools(
     brought: Vec<(Option<String>, Box<dyn Device>)>,
     making: Making<'_>,
 ) -> Result<(Vec<Tool>, SafetySpec), Error> {
-    let Making { scene, start, haptic, execution, open_haply, is_replay, here } = making;
+    let Making { scene, start, haptic, execution, open_haply, is_replay, side, here } = making;
     let (body, state, tick) = (&mut *start.body, &start.state, haptic.period_s());
     // Both ledgers begin with a share of what is stored: together they give out no more than all of it.
     let stored_j = limits::stored_energy(body, state) / scene.devices.len() as f64;
@@ -103,8 +104,11 @@ pub(super) fn tools(
         let device_limits = limits::device_limits(&scene.safety, &device.capabilities());
         let resolved = limits::resolved(scene, &device_limits);
         let limits = limits::limits(&resolved, &device_limits, stored_j, tick);
-        check_ramp(&limits).map_err(of_this)?;
-        check_capabilities(device.capabilities(), &limits).map_err(of_this)?;
+        // Of one that is at another machine nobody knows here what it can do.
+        if side != Side::Global && elsewhere.is_none() {
+            check_ramp(&limits).map_err(of_this)?;
+            check_capabilities(device.capabilities(), &limits).map_err(of_this)?;
+        }
         // One that is elsewhere is told where it is behind its coupling.
         let coupling = match scene.local.coupling && elsewhere.is_none() {
             true => Some(limits::coupling(body, node, &device_limits, tick)?),
