@@ -17,7 +17,7 @@ const LOGGER_WITH_SCENE: Rate = Rate::hz(SceneFrame::RATE_HZ);
 /// The priority of the haptic thread: above everything but the kernel's own.
 const HAPTIC_PRIORITY: u8 = 80;
 
-/// The global group: the program's, or one of the scene's rate, with the scene's latency.
+/// The global group: the program's, or one of the scene's rate, with the scene's latency, which is the program's if that has none.
 ///
 /// # Errors
 /// On threads, if the latency is above the period.
@@ -28,19 +28,16 @@ pub(super) fn global_group(
     execution: Execution,
 ) -> Result<RateGroup, Error> {
     let group = given.unwrap_or_else(|| RateGroup::new(rate)).name("global");
-    match spec.compute_latency_ms {
-        // Not given: the latency of a group that the program brings stays.
-        0.0 => Ok(group),
-        latency_ms if execution == Execution::Threaded && latency_ms > 1e3 * rate.period_s() => {
-            let message = format!(
-                "is {latency_ms}, which is above the period of {:.3} ms: in real time a result must be there before the next \
-                 release; lower it, or run in virtual time (--virtual)",
-                1e3 * rate.period_s()
-            );
-            Err(Error::scene("global.compute_latency_ms", message))
-        }
-        latency_ms => Ok(group.latency(Nanos::from_secs_f64(latency_ms * 1e-3))),
+    let latency_ms = spec.compute_latency_ms;
+    if execution == Execution::Threaded && latency_ms > 1e3 * rate.period_s() {
+        let message = format!(
+            "is {latency_ms}, which is above the period of {:.3} ms: in real time a result must be there before the next \
+             release; lower it, or run in virtual time (--virtual)",
+            1e3 * rate.period_s()
+        );
+        return Err(Error::scene("global.compute_latency_ms", message));
     }
+    Ok(group.latency(Nanos::from_secs_f64(latency_ms * 1e-3)))
 }
 
 /// The haptic group: the program's, or one with a core of its own; real-time unless the program wants it otherwise, and

@@ -242,6 +242,10 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
 fn described(parts: &Parts) -> Result<Scene, Error> {
     let mut scene = parts.scene.clone();
     tools::complete(&mut scene, parts);
+    if let (0.0, Some(group)) = (scene.global.compute_latency_ms, &parts.global) {
+        // Whatever follows from it, here and in a replay, is looked up in the scene.
+        scene.global.compute_latency_ms = 1e3 * group.declared_latency().as_secs_f64();
+    }
     if parts.side != Side::Both {
         if parts.options.execution == Execution::Virtual {
             let message = "a link between two processes takes its own time: simulate one, by the table [link]";
