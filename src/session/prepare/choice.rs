@@ -85,7 +85,7 @@ pub(super) fn model(
 /// meets the error, a tight `full` comes before a model that is wrong.
 fn choose(situation: &Situation) -> Choice {
     let error = situation.error_pct;
-    if situation.load(Kind::Full) <= 1.0 {
+    if situation.fits(Kind::Full) {
         let why = format!("{}, and nothing beats full where it fits", situation.full_in_words("takes"));
         return Choice { model: Kind::Full, reason: ModelReason { why, warning: None } };
     }
@@ -177,6 +177,18 @@ mod tests {
             let small = Situation { error_pct, ..situation(38) };
             assert_chosen(&small, Kind::Full, &["takes 95 us of 1 ms (measured)", "nothing beats full"], None);
         }
+    }
+
+    #[test]
+    fn over_a_link_a_model_is_chosen_that_has_one() {
+        let of = |evaluation_us, error_pct| {
+            let possible = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Full).collect();
+            Situation { possible, error_pct, ..situation(evaluation_us) }
+        };
+        let why = ["full has no global model beyond the link", "predictive meets 10 %"];
+        assert_chosen(&of(38, 10.0), Kind::Predictive, &why, None);
+        // A tight one is none either.
+        assert_chosen(&of(315, 1.0), Kind::Condensed, &["beyond the link"], Some("condensed may be 42 % off"));
     }
 
     #[test]

@@ -76,7 +76,9 @@ impl Situation {
         let is_held = body.inverse_masses().contains(&0.0);
         let is_possible = |kind: &Kind| {
             let suits_body = match kind {
-                Kind::Full | Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
+                // Nothing of it would be beyond the link.
+                Kind::Full => scene.link.is_none(),
+                Kind::Hold | Kind::Patch | Kind::LinearBoundary | Kind::ScaledBoundary => true,
                 Kind::Condensed => is_restrictable && is_held,
                 Kind::Predicted => is_restrictable,
                 Kind::Predictive => is_restrictable && scene.local.basis_states() > 0,
@@ -156,13 +158,22 @@ impl Situation {
         (haptic / HAPTIC_SHARE).max(if kind == Kind::Full { 0.0 } else { shared })
     }
 
-    /// What part of its period a tick of `full` takes, if it can do that with some of them late.
-    pub(super) fn tight_share(&self) -> Option<f64> {
-        Some(self.full_tick_s() / self.haptic_period_s).filter(|share| *share <= TIGHT_SHARE)
+    /// True if `kind` is possible and fits.
+    pub(super) fn fits(&self, kind: Kind) -> bool {
+        self.possible.contains(&kind) && self.load(kind) <= 1.0
     }
 
-    /// What a tick of `full` takes of its period, in words.
+    /// What part of its period a tick of `full` takes, if it can do that with some of them late.
+    pub(super) fn tight_share(&self) -> Option<f64> {
+        let share = self.full_tick_s() / self.haptic_period_s;
+        (self.possible.contains(&Kind::Full) && share <= TIGHT_SHARE).then_some(share)
+    }
+
+    /// What a tick of `full` takes of its period, in words, or why there is none.
     pub(super) fn full_in_words(&self, verb: &str) -> String {
+        if !self.possible.contains(&Kind::Full) {
+            return "full has no global model beyond the link".to_owned();
+        }
         let (tick, period) = (short(self.full_tick_s()), short(self.haptic_period_s));
         format!("a full tick {verb} {tick} of {period} ({})", self.origin)
     }

@@ -6,8 +6,8 @@ use crate::scene::{GlobalSpec, Scene};
 /// What `scene` sets and `kind` does not use, as it is called in scenes. `has_global` says that a program gave a global group.
 pub(super) fn settings(scene: &Scene, kind: Kind, has_global: bool) -> Vec<&'static str> {
     let local = &scene.local;
-    // What is switched to may use all.
-    let switchable = scene.run.switchable;
+    // What is switched to may use all; over a link nothing is.
+    let switchable = scene.run.switchable && scene.link.is_none();
     let is_alone = kind == Kind::Full && !switchable;
     let is_global_set = has_global || scene.global.rate_hz != GlobalSpec::default().rate_hz;
     let blend = match local.blend.kind {
@@ -17,6 +17,7 @@ pub(super) fn settings(scene: &Scene, kind: Kind, has_global: bool) -> Vec<&'sta
     [
         blend.filter(|_| is_alone),
         (is_alone && is_global_set).then_some("global.rate_hz"),
+        (is_alone && scene.link.is_some()).then_some("link"),
         (is_alone && local.feedback.is_some()).then_some("local.feedback"),
         (!switchable && local.patch.is_some() && !kind.has_patch()).then_some("local.patch"),
         (!switchable && local.basis.is_some() && kind != Kind::Predictive).then_some("local.basis"),
@@ -40,7 +41,7 @@ pub(super) fn in_words<T: AsRef<str>>(settings: &[T], kind: Kind) -> Option<Stri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::BlendSpec;
+    use crate::scene::{BlendSpec, LinkSpec};
 
     #[test]
     fn what_a_model_does_not_use_is_named_and_nothing_else() {
@@ -56,5 +57,10 @@ mod tests {
         scene.run.switchable = true;
         assert_eq!(settings(&scene, Kind::Full, true), [""; 0]);
         assert_eq!(in_words::<&str>(&[], Kind::Full), None);
+        scene = Scene { link: Some(LinkSpec::default()), ..Scene::of_program() };
+        assert_eq!(settings(&scene, Kind::Predictive, true), [""; 0]);
+        assert_eq!(settings(&scene, Kind::Full, false), ["link"]);
+        scene.run.switchable = true;
+        assert_eq!(settings(&scene, Kind::Full, false), ["link"], "nothing else is switched to over it");
     }
 }
