@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use palpate::devices::Scripted;
 use palpate::log::{ForceSample, LogRecord, ServedBy};
-use palpate::model::local::Kind;
+use palpate::model::local::{Feedback, Kind};
 use palpate::prelude::*;
 use palpate::scene::LinkSpec;
 
@@ -247,4 +247,23 @@ fn a_log_with_changes_is_repeated_to_the_last_bit() {
         let report = pressed(Kind::Full, true).switchable().duration_s(1.4).replay(&log).unwrap().run().unwrap();
         assert!(report.is_identical(), "{name}: {report:?}");
     }
+}
+
+// Check that patch and feedback count for a model that is switched to as for one of the start, and that a log says them.
+#[test]
+fn what_was_asked_of_patch_and_feedback_counts_for_models_that_are_switched_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let switched = |change: fn(SessionBuilder) -> SessionBuilder| {
+        let log = folder.path().join("run.mcap");
+        let session = || change(pressed(Kind::Hold, true)).switchable();
+        let wanted: [Act<'_>; 1] = [(300, &|controls| controls.set_model(Kind::Patch).unwrap())];
+        let forces = run(session().log(&log), 800, &wanted);
+        let report = session().duration_s(0.8).replay(&log).unwrap().run().unwrap();
+        assert!(report.is_identical(), "{report:?}");
+        forces.iter().map(|force| force.force_n.map(f64::to_bits)).collect::<Vec<_>>()
+    };
+    let usual = switched(|session| session);
+    assert_eq!(usual, switched(|session| session.patch([4, 4, 2])), "what is usual");
+    assert_ne!(usual, switched(|session| session.patch([3, 3, 2])));
+    assert_ne!(usual, switched(|session| session.feedback(Feedback::Trajectory)));
 }

@@ -51,7 +51,8 @@ pub struct Template {
     pub patch: [usize; 3],
     /// The body around its rest state, for the models that need it.
     pub resting: Option<Arc<RestingBody>>,
-    feedback: Feedback,
+    /// Asked for, for every kind that can give it.
+    feedback: Option<Feedback>,
     is_implicit: bool,
     /// Of the global model, in haptic ticks.
     period: u32,
@@ -85,16 +86,16 @@ impl Template {
         };
         let resting =
             if matches!(kind, Kind::Predicted | Kind::Predictive) { Some(Arc::new(resting()?)) } else { None };
-        Ok(Self { kind, patch, resting, feedback: Feedback::of(kind), is_implicit: false, period, boundary })
+        Ok(Self { kind, patch, resting, feedback: None, is_implicit: false, period, boundary })
     }
 
-    /// Lets the models tell the global one `feedback`.
+    /// Lets the models tell the global one `feedback`, as far as one of their kind can.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
     #[must_use]
     pub fn with_feedback(mut self, feedback: Feedback) -> Self {
-        self.feedback = feedback;
+        self.feedback = Some(feedback);
         self
     }
 
@@ -126,7 +127,12 @@ impl Template {
     /// # Real-time
     /// Wait-free, real-time safe.
     pub fn feeds_back(&self) -> bool {
-        self.kind.is_linear() && self.feedback != Feedback::Trajectory
+        self.kind.is_linear() && self.feedback() != Feedback::Trajectory
+    }
+
+    /// The feedback that was asked for, or the usual one of a kind that cannot give it.
+    fn feedback(&self) -> Feedback {
+        self.feedback.filter(|feedback| feedback.fits(self.kind)).unwrap_or(Feedback::of(self.kind))
     }
 
     /// An empty model for the side of the global one, if the local one is built on another computer: it serves nobody, and has a
@@ -135,7 +141,7 @@ impl Template {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn departing(&self) -> Box<dyn LocalModel> {
-        let spec = LinearSpec { size: self.patch, feedback: self.feedback, is_implicit: self.is_implicit };
+        let spec = LinearSpec { size: self.patch, feedback: self.feedback(), is_implicit: self.is_implicit };
         let model = match self.kind {
             Kind::Predicted | Kind::Predictive => {
                 Model::Predictive(Box::new(Predictive::new(self.patch, self.kind == Kind::Predictive)))
@@ -156,7 +162,7 @@ impl Template {
     /// Not real-time safe: allocates.
     pub fn of_kind(&self, kind: Kind, patch: [usize; 3], body: &dyn Body) -> Result<Self, ModelError> {
         let made = Self::new(kind, patch, body)?.with_period(self.period);
-        Ok(if self.is_implicit { made.with_implicit_steps() } else { made })
+        Ok(Self { feedback: self.feedback, is_implicit: self.is_implicit, ..made })
     }
 
     /// An empty model, to be rebuilt in place. One of [`Kind::Full`] serves all tools; where nothing but `full` is wanted it is the
@@ -165,7 +171,7 @@ impl Template {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn empty(&self) -> Box<dyn LocalModel> {
-        let spec = LinearSpec { size: self.patch, feedback: self.feedback, is_implicit: self.is_implicit };
+        let spec = LinearSpec { size: self.patch, feedback: self.feedback(), is_implicit: self.is_implicit };
         match self.kind {
             Kind::Full => Box::new(Whole::default()),
             Kind::Predicted | Kind::Predictive => Box::new(Predictive::new(self.patch, self.kind == Kind::Predictive)),

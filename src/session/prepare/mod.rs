@@ -161,10 +161,10 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     };
 
     let mut as_run = as_run(&scene, Some((&start.attached, &start.probes)));
-    // Named in the log's scene: another version may take other sizes.
-    as_run.local.patch = Some(scene.patch_size());
-    if kind == Kind::Predictive || scene.run.switchable {
-        as_run.local.basis = Some(scene.local.basis_states());
+    // Named in the log's scene, as another version may take other sizes. What is asked of a switchable session is so of every kind.
+    if !scene.run.switchable {
+        as_run.local.patch = Some(scene.patch_size());
+        as_run.local.basis = scene.local.basis.or((kind == Kind::Predictive).then(|| scene.local.basis_states()));
     }
     let here = here.as_deref();
     let making = tools::Making {
@@ -183,7 +183,7 @@ pub(super) fn prepare(parts: Parts) -> Result<Prepared, Error> {
     let template = template(kind, &scene, &start, timing)?;
     let kinds = {
         let Start { body, state, .. } = &mut start;
-        plan::kinds(&scene, kind, || Situation::of(&scene, &mut **body, state, timing, execution))
+        plan::kinds(&scene, kind, is_replay, || Situation::of(&scene, &mut **body, state, timing, execution))
     };
     let resting = plan::resting(&scene, &template, &kinds, &start);
 
@@ -299,13 +299,13 @@ fn template(kind: Kind, scene: &Scene, start: &Start, timing: Timing) -> Result<
     };
     // The longer one where periods alternate, 33 and 34 ticks at 30 Hz.
     let ticks = (timing.haptic.as_hz() / timing.global.as_hz() - 1e-6).ceil().min(f64::from(u32::MAX)) as u32;
-    let template = Template::new(kind, scene.patch_size(), &*start.body)?
-        .with_feedback(scene.local.feedback.unwrap_or(match scene.link {
-            // A geometry that comes late belongs to another tick than the body's.
-            Some(_) => Feedback::Trajectory,
-            None => Feedback::of(kind),
-        }))
-        .with_period(ticks);
+    let template = Template::new(kind, scene.patch_size(), &*start.body)?.with_period(ticks);
+    // A geometry that comes late belongs to another tick than the body's.
+    let over_link = scene.link.as_ref().map(|_| Feedback::Trajectory);
+    let template = match scene.local.feedback.or(over_link) {
+        Some(feedback) => template.with_feedback(feedback),
+        None => template,
+    };
     Ok(if is_implicit { template.with_implicit_steps() } else { template })
 }
 

@@ -59,21 +59,23 @@ impl ModelPlan {
 }
 
 /// The kinds that the local models of `scene`, which names its own, may be: that one, and in a switchable session the others that body
-/// and rates allow.
-pub(super) fn kinds(scene: &Scene, first: Kind, situation: impl FnOnce() -> Situation) -> Vec<(Kind, [usize; 3])> {
+/// and rates allow. A replay has them all: what a tick of `full` took is known where the run was.
+pub(super) fn kinds(
+    scene: &Scene,
+    first: Kind,
+    is_replay: bool,
+    situation: impl FnOnce() -> Situation,
+) -> Vec<(Kind, [usize; 3])> {
     let mut kinds = vec![(first, scene.patch_size())];
     // Over a link both sides make their models of one kind.
     if !scene.run.switchable || scene.link.is_some() {
         return kinds;
     }
     let situation = situation();
-    // What was chosen for the first need not suit another.
-    let mut usual = scene.clone();
-    usual.local.patch = None;
     for kind in situation.possible.iter().copied().filter(|kind| *kind != first) {
-        let fits = kind != Kind::Full || situation.tight_share().is_some();
+        let fits = kind != Kind::Full || is_replay || situation.tight_share().is_some();
         if fits {
-            kinds.push((kind, usual.clone().with_model(kind).patch_size()));
+            kinds.push((kind, scene.clone().with_model(kind).patch_size()));
         }
     }
     kinds
@@ -91,4 +93,27 @@ pub(super) fn resting(
         return None;
     }
     template.resting.clone().or_else(|| RestingBody::new(&*start.body).map(Arc::new))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::body::{Block, Body, State};
+    use crate::model::mesh::Face;
+    use crate::runtime::{Execution, Rate};
+
+    #[test]
+    fn a_replay_can_be_switched_to_full_whatever_its_tick_would_take_here() {
+        let mut scene = Scene::of_program().with_model(Kind::Hold);
+        scene.run.switchable = true;
+        let timing = Timing { haptic: Rate::hz(1000), global: Rate::hz(40), substeps: 10_000, stride: 1, horizon: 32 };
+        let situation = || {
+            let mut body = Block::builder([4; 3], [0.03; 3]).fix(Face::ZMin).build().unwrap();
+            let state = State::at_rest(body.rest());
+            Situation::of(&scene, &mut body, &state, timing, Execution::Virtual)
+        };
+        let [run, replay] = [false, true].map(|is_replay| kinds(&scene, Kind::Hold, is_replay, situation));
+        assert!(run.iter().all(|(kind, _)| *kind != Kind::Full) && run.len() > 1, "{run:?}");
+        assert!(replay.iter().any(|(kind, _)| *kind == Kind::Full), "{replay:?}");
+    }
 }
