@@ -3,7 +3,7 @@
 
 mod session_support;
 
-use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, ToolPath};
+use palpate::devices::{Capabilities, Device, DeviceFault, DeviceState, ForceCommand, Scripted, ToolPath};
 use palpate::log::{Environment, Level, LogEntry, LogReader, LogRecord, McapWriter, TextEvent};
 use palpate::model::Vec3;
 use palpate::model::body::{Block, Body, State};
@@ -14,7 +14,7 @@ use palpate::runtime::{PortUseKind, RateGroup};
 use palpate::scene::Scene;
 use palpate::session::{Compared, ReplayReport, Session, SessionBuilder, Summary};
 use palpate::{Error, ErrorKind};
-use session_support::{AlteredBlock, block, pressing, top, wiggling};
+use session_support::{AlteredBlock, block, meeting, pressing, top, wide_block, wiggling};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -656,4 +656,20 @@ fn a_programs_own_body_needs_the_program_and_the_same_session() {
     assert_eq!(error.kind(), ErrorKind::Log);
     assert!(error.to_string().contains("`friction = 0.5` was run, this one has `friction = 0.25`"), "{error}");
     assert_identical(&own(block()).duration_s(0.3).replay(&log).unwrap().run().unwrap(), &summary);
+}
+
+#[test]
+fn devices_that_differ_have_their_own_limits_in_a_replay() {
+    let folder = folder();
+    let session = || {
+        let device = |path, max_force_n| {
+            Scripted::new(path).with_capabilities(Capabilities { max_force_n, ..Capabilities::TOUCH })
+        };
+        let session = own(wide_block()).named_device("left", device(pressing(), 0.1));
+        session.named_device("right", device(meeting(), 0.2)).duration_s(0.4)
+    };
+    let (summary, log) = record(session().virtual_time(), &folder);
+    assert!(summary.report.devices.iter().all(|device| device.force.peak_n > 0.2), "{summary}");
+    let report = session().replay(&log).unwrap().run().unwrap();
+    assert!(report.is_identical() && report.topics().all(Compared::is_identical), "{report}");
 }

@@ -115,7 +115,8 @@ impl SessionBuilder {
     /// Reads the log of an earlier run of this session, to execute it again in simulated time, as
     /// [`Session::replay`] does for a scene. The builder must be filled as it was for that run, a body of the program's own is not
     /// in the log. Devices may be left out, those of the log are used; where several are glued give any in their places, as
-    /// [`attach_node`](Self::attach_node) belongs to the one given last.
+    /// [`attach_node`](Self::attach_node) belongs to the one given last, and where several of the program's own differ give them again, as
+    /// their limits are in no log.
     ///
     /// # Errors
     /// Those of [`Session::replay`]; also [`ErrorKind::Log`] if the log is one of another session.

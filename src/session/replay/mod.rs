@@ -17,7 +17,7 @@ use super::wire::{Rerun, start};
 use crate::devices::{Capabilities, Device, DeviceState, Replayed, ReplayedSample};
 use crate::error::{Error, ErrorKind};
 use crate::runtime::{Actor, Execution, Nanos, Recording, RuntimeReport};
-use crate::scene::{BodySpec, DeviceKind, DeviceSpec, ModelChoice, Scene};
+use crate::scene::{BodySpec, DeviceSpec, ModelChoice, Scene};
 use compare::{Comparer, Comparison, End};
 use cut::Cut;
 use logged::Logged;
@@ -72,8 +72,10 @@ impl Replay {
         if parts.scene.local.model == ModelChoice::Auto {
             parts.scene.local.model = logged.scene.local.model;
         }
+        // Those of the program's own are not in the log, where they differ from device to device.
+        let mut own = std::mem::take(&mut parts.devices).into_iter().map(|(_, device)| device.capabilities());
         let device = |(spec, (first, samples)): (&DeviceSpec, (DeviceState, Vec<ReplayedSample>))| {
-            let known = capabilities(spec);
+            let known = own.next().unwrap_or_else(|| spec.capabilities());
             let capabilities = Capabilities {
                 max_force_n: max_force_n.unwrap_or(known.max_force_n),
                 max_torque_n_m: logged.scene.safety.max_torque_n_m.or(known.max_torque_n_m),
@@ -132,17 +134,6 @@ impl Replay {
             progress(running.elapsed().min(ends[0]));
         }
         Ok(report(&comparison, ends[1], cut, running.stop().runtime))
-    }
-}
-
-/// What the device of `spec` said that it can do; of a program's own, what its profile says.
-fn capabilities(spec: &DeviceSpec) -> Capabilities {
-    let of_profile = spec.profile.capabilities();
-    match (spec.kind, &spec.haply) {
-        (DeviceKind::Hand, _) => spec.plant.capabilities(of_profile),
-        (DeviceKind::Pointer, _) => spec.pointer.capabilities(of_profile),
-        (DeviceKind::Haply, Some(haply)) => Capabilities::of_force(haply.max_force_n),
-        _ => of_profile,
     }
 }
 
