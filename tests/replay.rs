@@ -102,8 +102,8 @@ impl Device for Moody {
         if self.reads.is_multiple_of(97) {
             std::thread::sleep(Duration::from_micros(700 * (self.reads / 97 % 20)));
         }
-        // The state before the start is not the one of release 0.
-        let offset = if self.reads == 1 { 1e-3 } else { 0.0 };
+        // The state before the start is not the one of release 0, but near it: a tool may be glued there.
+        let offset = if self.reads == 1 { 5e-4 } else { 0.0 };
         let position = Vec3::from(self.path.at(time.as_secs_f64())) + Vec3::repeat(offset);
         match self.reads % 13 {
             5 => Err(DeviceFault::Stale),

@@ -37,9 +37,10 @@ impl SessionBuilder {
         Self { parts: Parts::new(body, scene) }
     }
 
-    /// Puts a body of the program's own in the place of the scene's.
+    /// Puts a body of the program's own in the place of the scene's, which must not name nodes of its block then.
     #[must_use]
     pub fn body(mut self, body: impl Body + 'static) -> Self {
+        self.parts.scene.body = None;
         self.parts.body = Some(Box::new(body));
         self
     }
@@ -150,7 +151,12 @@ impl SessionBuilder {
     /// Names the local model; without, the session chooses one that fits body and machine.
     #[must_use]
     pub fn model(mut self, model: impl Into<ModelChoice>) -> Self {
-        self.parts.scene = self.parts.scene.with_model(model);
+        if self.parts.is_of_program {
+            // Whatever does not go with it was asked for, before or after.
+            self.parts.scene.local.model = model.into();
+        } else {
+            self.parts.scene = self.parts.scene.with_model(model);
+        }
         self
     }
 

@@ -103,8 +103,11 @@ impl Session {
     /// Runs the session to its end, see [`SessionBuilder::duration_s`].
     ///
     /// # Errors
-    /// If it cannot be started, see [`start`](Self::start).
+    /// [`ErrorKind::Runtime`] if it has no end; if it cannot be started, see [`start`](Self::start).
     pub fn run(self) -> Result<Summary, Error> {
+        if self.prepared.until.is_none() {
+            return Err(Error::new(ErrorKind::Runtime, "the session has no end: give duration_s(), or use start()"));
+        }
         let running = self.start()?;
         running.wait();
         Ok(running.stop())

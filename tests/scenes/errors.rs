@@ -459,6 +459,9 @@ fn errors_of_a_builder_name_its_calls() {
         (session().path(path()).offset_ms(0.0), "offset_ms(): is 0"),
         (session().path(path()).substeps_per_ms(0), "substeps_per_ms(): is 0"),
         (session().path(path()).duration_s(-1.0), "duration_s(): is -1"),
+        (session().path(path()).patch([4, 4, 0]), "patch(): is [4, 4, 0], must be at least [2, 2, 2]"),
+        (session().path(path()).patch([usize::MAX, 4, 2]), "patch(): is [18446744073709551615, 4, 2], must be"),
+        (session().path(path()).patch([9, 9, 9]), "patch(): is [9, 9, 9], must be"),
         (session(), "device: nothing moves the tool: give it a path(), an attach_node() or a device"),
     ];
     for (session, words) in errors {
@@ -473,4 +476,24 @@ fn errors_of_a_builder_name_its_calls() {
     // A scene of a file has keys.
     let error = Session::from_scene(Scene::demo()).friction(-1.0).build().unwrap_err();
     assert!(error.to_string().starts_with("contact.friction: "), "{error}");
+}
+
+#[test]
+fn the_calls_of_a_builder_come_in_any_order() {
+    use palpate::model::local::{Feedback, Kind};
+    use palpate::prelude::*;
+    use palpate::scene::StepKind;
+    let session = || {
+        let block = Block::builder([5; 3], [0.1; 3]).fix(Face::ZMin).build().unwrap();
+        Session::builder(block).path(ToolPath::constant([0.05, 0.05, 0.09]).unwrap()).virtual_time()
+    };
+    let refused = |session: SessionBuilder| session.build().unwrap_err().to_string();
+    let fed = |session: SessionBuilder| session.feedback(Feedback::Geometry);
+    let stepped = |session: SessionBuilder| session.local_step(StepKind::Implicit);
+    let first = [refused(fed(session()).model(Kind::Hold)), refused(stepped(session()).model(Kind::Hold))];
+    let last = [refused(fed(session().model(Kind::Hold))), refused(stepped(session().model(Kind::Hold)))];
+    assert_eq!(first, last);
+    assert!(first[0].starts_with("feedback(): ") && first[1].starts_with("local_step(): "), "{first:?}");
+    // One that is named later may suit what was asked before.
+    assert!(fed(session()).model(Kind::Hold).model(Kind::Patch).build().is_ok());
 }

@@ -6,6 +6,7 @@ mod common;
 mod session_support;
 
 mod bases;
+mod builder;
 mod coupling;
 mod safety;
 mod tools;

@@ -86,7 +86,10 @@ fn validate(scene: &Scene) -> Result<(), Error> {
             )?;
             any_patch(scene)?;
         }
-        None => on_no_lattice(scene, "names nodes of a block, and the body is the program's own")?,
+        None => {
+            on_no_lattice(scene, "names nodes of a block, and the body is the program's own")?;
+            scene.local.patch.map_or(Ok(()), patch_of_program)?;
+        }
     }
     duration(scene.run.duration_s, scene.local.rate_hz)
 }
@@ -132,8 +135,7 @@ fn on_no_lattice(scene: &Scene, why: &str) -> Result<(), Error> {
 /// Of a body without a lattice a patch has as many nodes as the product says.
 fn any_patch(scene: &Scene) -> Result<(), Error> {
     let patch = scene.patch_size();
-    let nodes = patch.iter().try_fold(1_usize, |nodes, &along| nodes.checked_mul(along)).unwrap_or(usize::MAX);
-    if (LEAST_PATCH_NODES..=MAX_PATCH_NODES).contains(&nodes) {
+    if (LEAST_PATCH_NODES..=MAX_PATCH_NODES).contains(&nodes_of(patch)) {
         return Ok(());
     }
     let message = format!(
@@ -141,6 +143,20 @@ fn any_patch(scene: &Scene) -> Result<(), Error> {
          are the patch of a body of tetrahedra"
     );
     Err(Error::scene("local.patch", message))
+}
+
+/// Of a program's own body nobody knows here how large a patch it has room for.
+fn patch_of_program(patch: [usize; 3]) -> Result<(), Error> {
+    if patch.iter().all(|&along| along >= 2) && nodes_of(patch) <= MAX_PATCH_NODES {
+        return Ok(());
+    }
+    let message = format!("is {patch:?}, must be at least [2, 2, 2] and at most {MAX_PATCH_NODES} nodes in all");
+    Err(Error::scene("local.patch", message))
+}
+
+/// How many nodes a patch has, or more than any may have.
+fn nodes_of(patch: [usize; 3]) -> usize {
+    patch.iter().fold(1, |nodes, &along| along.saturating_mul(nodes))
 }
 
 fn body(body: &MassSpringSpec) -> Result<(), Error> {

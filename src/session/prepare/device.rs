@@ -144,14 +144,15 @@ pub(super) fn check_path(spec: &DeviceSpec, reach_m: f64) -> Result<(), Error> {
 }
 
 fn check_start(field: &str, start: Vec3, glued_at: Option<Vec3>) -> Result<(), Error> {
-    let Some(node) = glued_at else { return Ok(()) };
-    let gap = (start - node).norm();
-    if gap <= LARGEST_START_GAP {
-        return Ok(());
-    }
-    let place: [f64; 3] = node.into();
-    let message = format!("starts {gap} m away from the node that the tool is glued to, must start at {place:?}");
-    Err(Error::scene(field, message))
+    let gap = glued_at.and_then(|node| start_gap(start, node));
+    gap.map_or(Ok(()), |message| Err(Error::scene(field, message)))
+}
+
+/// What is wrong with a `start` of a tool that is glued to a node at `node`, if it is too far from there.
+pub(in crate::session) fn start_gap(start: Vec3, node: Vec3) -> Option<String> {
+    let (gap, place): (_, [f64; 3]) = ((start - node).norm(), node.into());
+    (gap > LARGEST_START_GAP)
+        .then(|| format!("starts {gap} m away from the node that the tool is glued to, must start at {place:?}"))
 }
 
 fn replayed(spec: &DeviceSpec, glued_at: Option<Vec3>) -> Result<Box<dyn Device>, Error> {

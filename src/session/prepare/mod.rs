@@ -20,7 +20,7 @@ mod unused;
 
 pub use choice::Choice;
 use choice::extended;
-pub(super) use device::logged;
+pub(super) use device::{logged, start_gap};
 pub(super) use groups::BASIS;
 pub(super) use link::LINK;
 pub(super) use plan::ModelPlan;

@@ -7,6 +7,7 @@ use super::limits::{self, check_capabilities, check_ramp};
 use crate::actors::Bounds;
 use crate::devices::{Device, ElsewhereHandle, PointerHandle};
 use crate::error::Error;
+use crate::model::Vec3;
 use crate::model::body::Body;
 use crate::model::contact::{Contact, ToolShape};
 use crate::runtime::{Execution, Rate};
@@ -30,6 +31,8 @@ pub(crate) struct Tool {
     pub(crate) elsewhere: Option<ElsewhereHandle>,
     /// How it touches the body at the start.
     pub(crate) contact: Contact,
+    /// Where the node is then that it is glued to.
+    pub(crate) glued_at: Option<Vec3>,
     pub(crate) shape: ToolShape,
     pub(crate) limits: Limits,
     /// What is believed of its device.
@@ -131,6 +134,7 @@ pub(super) fn tools(
             is_elsewhere: elsewhere.is_some(),
             elsewhere,
             contact,
+            glued_at,
             shape: spec.tool.shape(),
             limits,
             bounds,

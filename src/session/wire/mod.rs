@@ -13,7 +13,7 @@ mod sink;
 
 use super::controls::Controls;
 use super::parts::Side;
-use super::prepare::{Prepared, Tool};
+use super::prepare::{Prepared, Tool, start_gap};
 use super::records::RecordSender;
 use super::running::{Memory, Outside, Running, Viewer};
 use crate::actors::{LoggerActor, LoggerOutcome, SceneWatch, SurfaceView, first_state};
@@ -168,9 +168,16 @@ fn first_of(tool: &mut Tool, rest: &[Vec3]) -> Result<DeviceState, Error> {
         return first;
     }
     let first = first.and_then(|state| {
-        near(&state, tool, rest).map_err(|error| error.at(format!("device `{}`", tool.device.name())))
+        let placed = at_node(&state, tool).and_then(|()| near(&state, tool, rest));
+        placed.map_err(|error| error.at(format!("device `{}`", tool.device.name())))
     });
     first.map_err(|error| if tool.name.is_empty() { error } else { error.at(&*tool.name) })
+}
+
+/// Refuses the first `state` of a tool that is glued to a node and begins away from it.
+fn at_node(state: &DeviceState, tool: &Tool) -> Result<(), Error> {
+    let message = tool.glued_at.and_then(|node| start_gap(state.position, node));
+    message.map_or(Ok(()), |message| Err(Error::new(ErrorKind::Device, message)))
 }
 
 /// The first `state` of a tool, if it is within its reach of the body.
