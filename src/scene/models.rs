@@ -130,7 +130,7 @@ pub enum StepKind {
 pub struct BlendSpec {
     /// The kind of blend.
     pub kind: BlendKind,
-    /// Length of the blend (ms); not used by `none`.
+    /// Length of the blend (ms), at most a period of the global model; not used by `none`.
     #[serde(default)]
     pub ms: f64,
 }

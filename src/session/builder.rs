@@ -199,14 +199,14 @@ impl SessionBuilder {
         self
     }
 
-    /// Blends resyncs over `ms` milliseconds, old and new model both running.
+    /// Blends resyncs over `ms` milliseconds, at most a period of the global model, old and new model both running.
     #[must_use]
     pub fn crossfade_ms(mut self, ms: f64) -> Self {
         self.parts.scene.local.blend = BlendSpec { kind: BlendKind::Crossfade, ms };
         self
     }
 
-    /// Lets the step of a resync decay over `ms` milliseconds while the new model alone runs.
+    /// Lets the step of a resync decay over `ms` milliseconds, at most a period of the global model, while the new model alone runs.
     #[must_use]
     pub fn offset_ms(mut self, ms: f64) -> Self {
         self.parts.scene.local.blend = BlendSpec { kind: BlendKind::Offset, ms };

@@ -211,6 +211,7 @@ const CASES: &[Case] = &[
     case("ms = 10", "ms = 0", "scene.toml:23: local.blend.ms: ", &["above 0"]),
     case(", ms = 10", "", "scene.toml:23: local.blend.ms: ", &["missing", "above 0"]),
     case("ms = 10", "ms = -5.0", "scene.toml:23: local.blend.ms: ", &["is -5"]),
+    case("ms = 10", "ms = 34", "scene.toml:23: local.blend.ms: ", &["is 34", "at most 33.3", "global.rate_hz"]),
     // Device, safety, initial, probe, run.
     case("attach_node = [5, 5, 11]", "attach_node = [5, 5, 12]", "scene.toml:26: device.attach_node: ", &["[5, 5, 12] is outside", "[11, 11, 11]"]),
     case("attach_node = [5, 5, 11]", "attach_node = [5, 5, 0]", "scene.toml:26: device.attach_node: ", &["fixed face z_min", "could not move"]),

@@ -281,8 +281,17 @@ fn local(local: &LocalSpec, global: &GlobalSpec) -> Result<(), Error> {
         BlendKind::Crossfade => "a crossfade",
         BlendKind::Offset => "an offset",
     };
-    if local.blend.ms == 0.0 {
+    let ms = local.blend.ms;
+    if ms == 0.0 {
         return Err(Error::scene("local.blend.ms", format!("is 0 or missing, {name} needs a time above 0 such as 10")));
+    }
+    let period_ms = 1e3 / global.rate_hz;
+    if ms > period_ms {
+        // A model that comes while its predecessor is blended in waits, and grows old.
+        let message = format!(
+            "is {ms}, must be at most {period_ms:.3}: {name} ends before the next resync; lower it, or global.rate_hz"
+        );
+        return Err(Error::scene("local.blend.ms", message));
     }
     Ok(())
 }

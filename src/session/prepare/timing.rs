@@ -59,7 +59,7 @@ pub(super) fn lateness(global: &RateGroup, haptic: Rate, work: Nanos, in_real_ti
 /// until the next, and the time to catch up and to blend.
 fn horizon(haptic: Rate, global: Rate, lateness: Nanos, blend_ticks: u32) -> u32 {
     let periods = PERIODS_AHEAD + lateness.as_secs_f64() / global.period_s();
-    (periods * haptic.as_hz() / global.as_hz()).ceil() as u32 + blend_ticks
+    ((periods * haptic.as_hz() / global.as_hz()).ceil() as u32).saturating_add(blend_ticks)
 }
 
 #[cfg(test)]
@@ -77,6 +77,7 @@ mod tests {
         assert_eq!(lateness(&group(0), HAPTIC, Nanos(500_000), false), Nanos::ZERO);
         assert_eq!(lateness(&group(75), HAPTIC, Nanos(500_000), false), Nanos(75_000_000));
         assert_eq!(horizon(HAPTIC, Rate::hz(20), Nanos(75_000_000), 1), 63 + 75 + 1);
+        assert_eq!(horizon(HAPTIC, Rate::hz(20), Nanos::ZERO, u32::MAX), u32::MAX, "and no sum is too large");
     }
 
     #[test]
