@@ -72,7 +72,7 @@ impl FaultSpec {
         Self { kind, from_s, to_s, reads: 1, probability: 1.0, seed: 0, stop: SafetyStop::Other }
     }
 
-    /// Names the first number that cannot be, with what would be right.
+    /// Names the first key that cannot be, or does nothing, with what would be right.
     pub(crate) fn fault(&self) -> Option<SpecFault> {
         let Self { from_s, to_s, reads, probability, .. } = *self;
         if !(from_s.is_finite() && from_s >= 0.0) {
@@ -84,7 +84,23 @@ impl FaultSpec {
         if !(1..=LATEST).contains(&(reads as usize)) {
             return Some(("reads", format!("is {reads}, must be 1 to {LATEST}")));
         }
-        (!(0.0..=1.0).contains(&probability)).then(|| ("probability", format!("is {probability}, must be 0 to 1")))
+        if !(0.0..=1.0).contains(&probability) {
+            return Some(("probability", format!("is {probability}, must be 0 to 1")));
+        }
+        self.of_another_kind()
+    }
+
+    /// Names the first key that is given and that only another kind of fault has.
+    fn of_another_kind(&self) -> Option<SpecFault> {
+        let usual = Self::new(self.kind, self.from_s, self.to_s);
+        let of_kind = [
+            ("reads", self.reads != usual.reads, FaultKind::Late, "late"),
+            ("probability", self.probability != usual.probability, FaultKind::Lost, "lost"),
+            ("seed", self.seed != usual.seed, FaultKind::Lost, "lost"),
+            ("stop", self.stop != usual.stop, FaultKind::SafetyStop, "safety_stop"),
+        ];
+        let (field, .., name) = of_kind.into_iter().find(|(_, is_set, kind, _)| *is_set && self.kind != *kind)?;
+        Some((field, format!("belongs to kind = {name:?}, set that or leave it out")))
     }
 
     /// True if the device fails at `time`.
